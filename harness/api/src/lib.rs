@@ -152,8 +152,9 @@ pub struct WitnessBsdf {
     /// Passed back unchanged.
     pub user: *mut c_void,
     /// Writes the BSDF value (cosine included) to `value`, three floats. Callable from any thread.
-    pub eval:
-        Option<unsafe extern "C" fn(user: *mut c_void, query: *const WitnessQuery, value: *mut f32)>,
+    pub eval: Option<
+        unsafe extern "C" fn(user: *mut c_void, query: *const WitnessQuery, value: *mut f32),
+    >,
 }
 
 /// A ray segment, world space.
@@ -335,7 +336,11 @@ pub struct Plugin {
     >,
     /// Draws one frame for a camera.
     pub draw_frame: Option<
-        unsafe extern "C" fn(pass: Pass, camera: *const CameraValue, message: *mut Message) -> Status,
+        unsafe extern "C" fn(
+            pass: Pass,
+            camera: *const CameraValue,
+            message: *mut Message,
+        ) -> Status,
     >,
     /// Reads the last frame back into `pixels`, `width * height * 3` linear floats.
     pub read_frame: Option<

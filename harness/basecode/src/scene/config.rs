@@ -1,0 +1,225 @@
+//! The TOML file of a scene.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::{CameraConfig, Error, Result};
+
+/// A scene file as it was written, defaults filled in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneConfig {
+    /// The TOML file itself.
+    pub path: PathBuf,
+    /// The mesh, already resolved against the folder of the TOML file.
+    pub mesh: PathBuf,
+    /// Where the scene is looked at from.
+    pub camera: CameraConfig,
+    /// Film width in pixels.
+    pub width: usize,
+    /// Film height in pixels.
+    pub height: usize,
+    /// Offline (false) or realtime (true).
+    pub realtime: bool,
+    /// Which integrator or render pass: `simple` or `direct` for this assignment, `normal` for
+    /// the previous one.
+    pub kind: String,
+    /// Samples per pixel, offline.
+    pub spp: usize,
+    /// Whether realtime draws shadows (the bonus).
+    pub bonus: bool,
+    /// Keys that nobody knows, as `section.key`. Harmless, but perhaps misspelt.
+    pub unknown_keys: Vec<String>,
+}
+
+/// Films larger than this in either direction are taken for a mistake.
+const MAX_FILM_SIDE: i64 = 16_384;
+
+#[derive(Deserialize)]
+struct File {
+    input: Input,
+    #[serde(default)]
+    camera: CameraConfig,
+    #[serde(default)]
+    film: FilmSection,
+    #[serde(default)]
+    renderer: RendererSection,
+}
+
+#[derive(Deserialize)]
+struct Input {
+    objfile: PathBuf,
+}
+
+#[derive(Deserialize)]
+#[serde(default)]
+struct FilmSection {
+    width: i64,
+    height: i64,
+}
+
+impl Default for FilmSection {
+    fn default() -> Self {
+        Self { width: 768, height: 576 }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(default)]
+struct RendererSection {
+    realtime: bool,
+    #[serde(rename = "type")]
+    kind: Option<String>,
+    spp: i64,
+    bonus: bool,
+}
+
+impl Default for RendererSection {
+    fn default() -> Self {
+        Self { realtime: false, kind: None, spp: 1, bonus: false }
+    }
+}
+
+const KNOWN_KEYS: &[&str] = &[
+    "input.objfile",
+    "camera.eye",
+    "camera.at",
+    "camera.up",
+    "camera.fov",
+    "film.width",
+    "film.height",
+    "renderer.realtime",
+    "renderer.type",
+    "renderer.spp",
+    "renderer.bonus",
+];
+
+impl SceneConfig {
+    /// Reads a scene file.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is not TOML, lacks `input.objfile`, or holds a value outside
+    /// its range; names file, line and key.
+    pub fn load(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| Error::file(path, format!("cannot read the scene: {error}")))?;
+        Self::parse(path, &text)
+    }
+
+    /// Reads the text of a scene file that lies at `path`.
+    ///
+    /// # Errors
+    /// As [`SceneConfig::load`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        let wrong = |line, message: String| Error::File { path: path.to_owned(), line, message };
+        let file: File = toml::from_str(text).map_err(|error| {
+            let line = error.span().map(|span| line_at(text, span.start));
+            wrong(line, error.message().to_owned())
+        })?;
+        let in_range = |section: &str, key: &str, value: i64, max: i64| {
+            usize::try_from(value).ok().filter(|_| (1..=max).contains(&value)).ok_or_else(|| {
+                let line = line_of_key(text, section, key);
+                wrong(line, format!("{section}.{key} is {value} but must lie between 1 and {max}"))
+            })
+        };
+        let camera = file.camera;
+        for (key, value) in [("eye", camera.eye), ("at", camera.at), ("up", camera.up)] {
+            if !value.is_finite() {
+                let line = line_of_key(text, "camera", key);
+                return Err(wrong(line, format!("camera.{key} is {value} but must be finite")));
+            }
+        }
+        let renderer = file.renderer;
+        let default_kind = if renderer.realtime { "direct" } else { "simple" };
+        Ok(Self {
+            path: path.to_owned(),
+            mesh: path.parent().unwrap_or(Path::new("")).join(file.input.objfile),
+            camera,
+            width: in_range("film", "width", file.film.width, MAX_FILM_SIDE)?,
+            height: in_range("film", "height", file.film.height, MAX_FILM_SIDE)?,
+            realtime: renderer.realtime,
+            kind: renderer.kind.unwrap_or_else(|| default_kind.to_owned()),
+            spp: in_range("renderer", "spp", renderer.spp, 1 << 20)?,
+            bonus: renderer.bonus,
+            unknown_keys: unknown_keys(text),
+        })
+    }
+}
+
+fn unknown_keys(text: &str) -> Vec<String> {
+    let Ok(table) = text.parse::<toml::Table>() else { return Vec::new() };
+    let mut unknown = Vec::new();
+    for (section, value) in &table {
+        match value.as_table() {
+            Some(keys) => unknown.extend(
+                keys.keys()
+                    .map(|key| format!("{section}.{key}"))
+                    .filter(|key| !KNOWN_KEYS.contains(&key.as_str())),
+            ),
+            None => unknown.push(section.clone()),
+        }
+    }
+    unknown
+}
+
+/// The line (from 1) that holds byte `offset`.
+pub(super) fn line_at(text: &str, offset: usize) -> usize {
+    1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
+}
+
+/// The line (from 1) where `key` is set in `[section]`, if it is written that way.
+fn line_of_key(text: &str, section: &str, key: &str) -> Option<usize> {
+    let mut current = String::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if let Some(name) = line.strip_prefix('[').and_then(|rest| rest.split(']').next()) {
+            current = name.trim().to_owned();
+        } else if current == section
+            && line.strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='))
+        {
+            return Some(index + 1);
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<SceneConfig> {
+        SceneConfig::parse(Path::new("a/tinyrender/b.toml"), text)
+    }
+
+    #[test]
+    fn defaults_are_the_original_course_ones() {
+        let config = parse("[input]\nobjfile = \"../mesh/b.obj\"\n").unwrap();
+        assert_eq!((config.width, config.height, config.spp), (768, 576, 1));
+        assert_eq!(config.mesh, Path::new("a/tinyrender/../mesh/b.obj"));
+        assert_eq!(config.camera, CameraConfig::default());
+        assert_eq!((config.realtime, config.kind.as_str(), config.bonus), (false, "simple", false));
+    }
+
+    #[test]
+    fn mistakes_name_file_line_and_key() {
+        let base = "[input]\nobjfile = \"b.obj\"\n";
+        for (text, expected) in [
+            ("[input\n", "b.toml:1"),
+            ("[camera]\nfov = 30\n", "missing field `input`"),
+            (&format!("{base}[film]\nwidth = 0\n"), "b.toml:4: film.width is 0"),
+            (&format!("{base}[film]\nheight = 99999\n"), "b.toml:4: film.height is 99999"),
+            (&format!("{base}[renderer]\nspp = -1\n"), "b.toml:4: renderer.spp is -1"),
+            (&format!("{base}[camera]\neye = [0, nan, 0]\n"), "b.toml:4: camera.eye"),
+            (&format!("{base}[camera]\nfov = \"wide\"\n"), "b.toml:4"),
+        ] {
+            let message = parse(text).unwrap_err().to_string();
+            assert!(message.contains(expected), "{text:?} gave {message:?}");
+        }
+    }
+
+    #[test]
+    fn unknown_keys_are_listed_not_refused() {
+        let config = parse("title = 1\n[input]\nobjfile = \"b.obj\"\n[film]\nwdth = 3\n").unwrap();
+        assert_eq!(config.unknown_keys, ["film.wdth", "title"]);
+    }
+}

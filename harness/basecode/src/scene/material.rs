@@ -1,0 +1,149 @@
+//! Materials as the MTL file describes them.
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use super::Texture;
+use crate::{Error, Result};
+
+/// Which BSDF a material asks for, by MTL's `illum`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MaterialModel {
+    /// `illum 7`: Lambertian reflection.
+    Diffuse,
+    /// `illum 5`: a mirror. It has no BSDF in this assignment and is black offline; realtime
+    /// draws it as a diffuse colour.
+    Mirror,
+    /// Any other `illum`: normalised Phong.
+    Phong,
+}
+
+/// A material as its file gives it, before any energy scale.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// The name in the MTL file.
+    pub name: String,
+    /// The BSDF it asks for.
+    pub model: MaterialModel,
+    /// Diffuse albedo Kd or map_Kd.
+    pub diffuse: Texture,
+    /// Specular albedo Ks or map_Ks.
+    pub specular: Texture,
+    /// Phong exponent Ns.
+    pub exponent: f32,
+    /// Emission Ke; for a point light its radiant intensity [W sr^-1].
+    pub emission: Vec3,
+}
+
+impl Material {
+    /// A diffuse material of a constant colour.
+    pub fn diffuse(albedo: Vec3) -> Self {
+        Self {
+            name: "diffuse".into(),
+            model: MaterialModel::Diffuse,
+            diffuse: albedo.into(),
+            specular: Vec3::ZERO.into(),
+            exponent: 1.0,
+            emission: Vec3::ZERO,
+        }
+    }
+
+    /// A Phong material of constant colours.
+    pub fn phong(diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
+        let (diffuse, specular) = (diffuse.into(), specular.into());
+        Self {
+            name: "phong".into(),
+            model: MaterialModel::Phong,
+            diffuse,
+            specular,
+            exponent,
+            ..Self::diffuse(Vec3::ZERO)
+        }
+    }
+
+    /// The factor on both terms of the Phong BSDF that keeps it from reflecting more than it
+    /// receives: 0.99 / m where m, the largest component of Kd + Ks, exceeds 1, and 1 elsewhere.
+    pub fn energy_scale(&self) -> f32 {
+        let largest = (self.diffuse.max() + self.specular.max()).max_element();
+        if self.model == MaterialModel::Phong && largest > 1.0 { 0.99 / largest } else { 1.0 }
+    }
+
+    /// Whether the material emits light.
+    pub fn is_emitter(&self) -> bool {
+        self.emission != Vec3::ZERO
+    }
+
+    /// Makes a material of an MTL entry; textures are looked up beside the MTL file.
+    pub(super) fn from_mtl(mtl: &Path, entry: &tobj::Material) -> Result<Self> {
+        let wrong =
+            |message: String| Error::file(mtl, format!("material \"{}\": {message}", entry.name));
+        let folder = mtl.parent().unwrap_or(Path::new(""));
+        let colour = |key: &str, value: Option<[f32; 3]>, map: &Option<String>| {
+            if let Some(name) = map {
+                return Texture::load(&folder.join(texture_file(name)));
+            }
+            let value = Vec3::from(value.unwrap_or_default());
+            if value.is_finite() && value.min_element() >= 0.0 {
+                Ok(Texture::Constant(value))
+            } else {
+                Err(wrong(format!("{key} is {value} but must be finite and at least 0")))
+            }
+        };
+        let exponent = entry.shininess.unwrap_or(1.0);
+        if !(exponent.is_finite() && exponent >= 0.0) {
+            return Err(wrong(format!("Ns is {exponent} but must be finite and at least 0")));
+        }
+        let emission = Vec3::from(entry.emissive.unwrap_or_default());
+        if !emission.is_finite() {
+            return Err(wrong(format!("Ke is {emission} but must be finite")));
+        }
+        Ok(Self {
+            name: entry.name.clone(),
+            model: match entry.illumination_model {
+                Some(7) => MaterialModel::Diffuse,
+                Some(5) => MaterialModel::Mirror,
+                _ => MaterialModel::Phong,
+            },
+            diffuse: colour("Kd", entry.diffuse, &entry.diffuse_texture)?,
+            specular: colour("Ks", entry.specular, &entry.specular_texture)?,
+            exponent,
+            emission,
+        })
+    }
+}
+
+/// The file of a `map_` statement: what follows its options, with either kind of slash.
+fn texture_file(statement: &str) -> String {
+    let mut words = statement.split_whitespace().peekable();
+    while let Some(option) = words.next_if(|word| word.starts_with('-')) {
+        let arguments = match option {
+            "-o" | "-s" | "-t" => 3,
+            "-mm" => 2,
+            _ => 1,
+        };
+        for _ in 0..arguments {
+            words.next();
+        }
+    }
+    words.collect::<Vec<_>>().join(" ").replace('\\', "/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn energy_scale_is_one_up_to_one_and_only_phong() {
+        let phong = |kd, ks| Material::phong(Vec3::splat(kd), Vec3::splat(ks), 30.0).energy_scale();
+        assert_eq!(phong(0.5, 0.5), 1.0);
+        assert_eq!(phong(0.8, 0.7), 0.99 / 1.5);
+        assert_eq!(Material::diffuse(Vec3::splat(2.0)).energy_scale(), 1.0);
+    }
+
+    #[test]
+    fn texture_statements_may_hold_options() {
+        assert_eq!(texture_file("-s 1 1 1 -clamp on tex\\wood floor.png"), "tex/wood floor.png");
+        assert_eq!(texture_file("wood.png"), "wood.png");
+    }
+}

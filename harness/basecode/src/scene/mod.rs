@@ -1,0 +1,204 @@
+//! Scenes: shapes, materials, the light, and the rays that meet them.
+
+mod config;
+mod material;
+mod mesh;
+mod texture;
+
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+
+pub use config::SceneConfig;
+pub use material::{Material, MaterialModel};
+pub use mesh::Shape;
+pub use texture::{Bitmap, Texture};
+
+use crate::bvh::{Bvh, Hit};
+use crate::{Bsdf, Camera, Error, Frame, Ray, Result, SurfaceInteraction};
+
+/// A scene, ready to be rendered.
+pub struct Scene {
+    config: SceneConfig,
+    shapes: Vec<Shape>,
+    materials: Vec<Material>,
+    light_position: Vec3,
+    light_intensity: Vec3,
+    bvh: Bvh,
+    /// Shape and triangle of each triangle in the hierarchy.
+    triangles: Vec<(u32, u32)>,
+    bsdfs: Vec<Box<dyn Bsdf>>,
+    witness: Option<Box<dyn Bsdf>>,
+}
+
+impl Scene {
+    /// Loads a scene's TOML file, its mesh and its materials. `make_bsdf` makes the BSDF of each
+    /// material; mirrors are black in this assignment and are not asked for.
+    ///
+    /// # Errors
+    /// When a file cannot be used (names file, place, expected and found) or the scene has no light.
+    pub fn load(path: &Path, make_bsdf: &dyn Fn(&Material) -> Box<dyn Bsdf>) -> Result<Self> {
+        let config = SceneConfig::load(path)?;
+        let (shapes, materials) = mesh::load(&config.mesh)?;
+        let Some(light) = shapes.iter().find(|shape| materials[shape.material].is_emitter()) else {
+            let message = "scene has no light: no material has a non-zero Ke";
+            return Err(Error::file(&config.mesh, message));
+        };
+        let mut triangles = Vec::new();
+        let mut vertices = Vec::new();
+        let mut blocks = Vec::new();
+        for (index, shape) in shapes.iter().enumerate() {
+            for primitive in 0..shape.triangles.len() {
+                triangles.push((index as u32, primitive as u32));
+                vertices.push(shape.corners(primitive));
+                blocks.push(!materials[shape.material].is_emitter());
+            }
+        }
+        let bsdfs = materials.iter().map(|material| match material.model {
+            MaterialModel::Mirror => Box::new(Black),
+            _ => make_bsdf(material),
+        });
+        Ok(Self {
+            light_position: light.index_mean(),
+            light_intensity: materials[light.material].emission,
+            bvh: Bvh::new(&vertices, &blocks),
+            bsdfs: bsdfs.collect(),
+            config,
+            shapes,
+            materials,
+            triangles,
+            witness: None,
+        })
+    }
+
+    /// What the TOML file says.
+    pub fn config(&self) -> &SceneConfig {
+        &self.config
+    }
+
+    /// The scene's camera for a film of `width` x `height` pixels.
+    ///
+    /// # Errors
+    /// As [`Camera::new`].
+    pub fn camera(&self, width: usize, height: usize) -> Result<Camera> {
+        Camera::new(self.config.camera, width, height)
+    }
+
+    /// All shapes, the emitter among them.
+    pub fn shapes(&self) -> &[Shape] {
+        &self.shapes
+    }
+
+    /// All materials; [`Shape::material`] indexes them.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// The material of a shape.
+    pub fn material_of(&self, shape: usize) -> &Material {
+        &self.materials[self.shapes[shape].material]
+    }
+
+    /// Position of the point light, world space: the first emitter's index mean.
+    pub fn first_light_position(&self) -> Vec3 {
+        self.light_position
+    }
+
+    /// Radiant intensity I of the point light [W sr^-1]: the first emitter's Ke.
+    pub fn first_light_intensity(&self) -> Vec3 {
+        self.light_intensity
+    }
+
+    /// The BSDF at a surface point.
+    pub fn bsdf(&self, i: &SurfaceInteraction) -> &dyn Bsdf {
+        match &self.witness {
+            Some(witness) => witness.as_ref(),
+            None => self.bsdfs[self.shapes[i.shape].material].as_ref(),
+        }
+    }
+
+    /// The closest surface along a ray, with `wo` set to where the ray came from.
+    ///
+    /// The emitter is a surface like any other here.
+    pub fn intersect(&self, ray: &Ray) -> Option<SurfaceInteraction> {
+        let hit = self.bvh.closest_hit(ray)?;
+        Some(self.interaction(ray, &hit))
+    }
+
+    /// Whether anything lies on a ray between its `min_t` and `max_t`: a shadow query. It stops
+    /// at the first hit, whichever that is. Emitters never block.
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        self.bvh.any_hit(ray)
+    }
+
+    /// Puts `witness` in the place of every BSDF until it is taken away with `None`.
+    pub fn set_witness(&mut self, witness: Option<Box<dyn Bsdf>>) {
+        self.witness = witness;
+    }
+
+    /// A surface point on triangle `primitive` of `shape`, with texture coordinates given; the
+    /// position is the triangle's first corner. For looking up a BSDF without a ray.
+    pub(crate) fn point_on(
+        &self,
+        shape: usize,
+        primitive: usize,
+        uv: Vec2,
+    ) -> Option<SurfaceInteraction> {
+        let corners =
+            self.shapes.get(shape).filter(|s| primitive < s.triangles.len())?.corners(primitive);
+        let ng = triangle_normal(corners);
+        let frame_ns = Frame::from_normal(if ng == Vec3::ZERO { Vec3::Z } else { ng });
+        let zero = Vec3::ZERO;
+        Some(SurfaceInteraction {
+            t: 0.0,
+            p: corners[0],
+            uv,
+            ng,
+            frame_ns,
+            wo: zero,
+            wi: zero,
+            shape,
+            primitive,
+        })
+    }
+
+    fn interaction(&self, ray: &Ray, hit: &Hit) -> SurfaceInteraction {
+        let (shape_index, primitive) = self.triangles[hit.triangle];
+        let shape = &self.shapes[shape_index as usize];
+        let vertices = shape.triangles[primitive as usize].map(|vertex| vertex as usize);
+        let [u, v] = hit.barycentric;
+        let w = 1.0 - u - v;
+        let ng = triangle_normal(shape.corners(primitive as usize));
+        let [n0, n1, n2] = vertices.map(|vertex| shape.normals[vertex]);
+        let [uv0, uv1, uv2] = vertices.map(|vertex| shape.uvs[vertex]);
+        let ns = (w * n0 + u * n1 + v * n2).normalize_or(ng);
+        let frame_ns = Frame::from_normal(ns);
+        SurfaceInteraction {
+            t: hit.t,
+            p: ray.at(hit.t),
+            uv: w * uv0 + u * uv1 + v * uv2,
+            ng,
+            wo: frame_ns.to_local(-ray.direction),
+            frame_ns,
+            wi: Vec3::ZERO,
+            shape: shape_index as usize,
+            primitive: primitive as usize,
+        }
+    }
+}
+
+/// The BSDF of what has none: reflects nothing.
+struct Black;
+
+impl Bsdf for Black {
+    fn eval(&self, _: &SurfaceInteraction) -> Vec3 {
+        Vec3::ZERO
+    }
+}
+
+fn triangle_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a).normalize_or_zero()
+}
+
+#[cfg(test)]
+mod tests;

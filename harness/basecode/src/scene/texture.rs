@@ -1,0 +1,128 @@
+//! Colours that may vary over a surface.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+
+use crate::{Error, Result, SurfaceInteraction};
+
+/// A colour, constant or looked up in a bitmap.
+#[derive(Clone, Debug)]
+pub enum Texture {
+    /// The same everywhere.
+    Constant(Vec3),
+    /// Looked up at the texture coordinates.
+    Bitmap(Arc<Bitmap>),
+}
+
+/// An image to look up colours in, linear RGB, row 0 on top.
+#[derive(Debug)]
+pub struct Bitmap {
+    width: usize,
+    height: usize,
+    texels: Vec<Vec3>,
+}
+
+/// Bitmaps larger than this in either direction are refused.
+const MAX_SIDE: u32 = 8192;
+
+impl Texture {
+    /// The colour at a surface point.
+    pub fn eval(&self, i: &SurfaceInteraction) -> Vec3 {
+        match self {
+            Self::Constant(colour) => *colour,
+            Self::Bitmap(bitmap) => bitmap.lookup(i.uv),
+        }
+    }
+
+    /// The largest value of each component anywhere.
+    pub fn max(&self) -> Vec3 {
+        match self {
+            Self::Constant(colour) => *colour,
+            Self::Bitmap(bitmap) => {
+                bitmap.texels.iter().fold(Vec3::ZERO, |max, texel| max.max(*texel))
+            }
+        }
+    }
+
+    /// The mean colour: what realtime uses in the texture's place.
+    pub fn average(&self) -> Vec3 {
+        match self {
+            Self::Constant(colour) => *colour,
+            Self::Bitmap(bitmap) => {
+                let sum = bitmap.texels.iter().fold(glam::DVec3::ZERO, |sum, t| sum + t.as_dvec3());
+                (sum / bitmap.texels.len() as f64).as_vec3()
+            }
+        }
+    }
+
+    /// Loads a bitmap (PNG, JPEG, TGA or BMP). Its 8-bit values are decoded from sRGB.
+    pub(super) fn load(path: &Path) -> Result<Self> {
+        let wrong = |message: String| Error::file(path, message);
+        let mut reader = image::ImageReader::open(path)
+            .and_then(image::ImageReader::with_guessed_format)
+            .map_err(|error| wrong(format!("cannot read the texture: {error}")))?;
+        let mut limits = image::Limits::default();
+        limits.max_image_width = Some(MAX_SIDE);
+        limits.max_image_height = Some(MAX_SIDE);
+        reader.limits(limits);
+        let picture = reader
+            .decode()
+            .map_err(|error| wrong(format!("cannot decode the texture: {error}")))?
+            .into_rgb8();
+        let (width, height) = (picture.width() as usize, picture.height() as usize);
+        if width == 0 || height == 0 {
+            return Err(wrong(format!("texture is {width}x{height} but needs at least one texel")));
+        }
+        let texels = picture
+            .pixels()
+            .map(|p| Vec3::from(p.0.map(|level| srgb_to_linear(f32::from(level) / 255.0))))
+            .collect();
+        Ok(Self::Bitmap(Arc::new(Bitmap { width, height, texels })))
+    }
+}
+
+impl From<Vec3> for Texture {
+    fn from(colour: Vec3) -> Self {
+        Self::Constant(colour)
+    }
+}
+
+impl Bitmap {
+    /// The nearest texel. Coordinates wrap around; v = 0 is the bottom row.
+    fn lookup(&self, uv: Vec2) -> Vec3 {
+        let wrap = |coordinate: f32, size: usize| {
+            // A coordinate that is not finite has no texel; take the first rather than fail.
+            ((coordinate.rem_euclid(1.0) * size as f32) as usize).min(size - 1)
+        };
+        let x = wrap(uv.x, self.width);
+        let y = self.height - 1 - wrap(uv.y, self.height);
+        self.texels[y * self.width + x]
+    }
+}
+
+/// Decodes an sRGB value in [0, 1] (IEC 61966-2-1).
+fn srgb_to_linear(value: f32) -> f32 {
+    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec2;
+
+    #[test]
+    fn lookups_wrap_and_v_points_up() {
+        let texels = vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE]; // top row: X Y
+        let bitmap = Bitmap { width: 2, height: 2, texels };
+        assert_eq!(bitmap.lookup(vec2(0.25, 0.75)), Vec3::X);
+        assert_eq!(bitmap.lookup(vec2(1.75, -0.25)), Vec3::Y);
+        assert_eq!(bitmap.lookup(vec2(0.0, 0.0)), Vec3::Z);
+        assert_eq!(bitmap.lookup(vec2(-0.25, 0.25)), Vec3::ONE);
+        bitmap.lookup(vec2(f32::NAN, f32::INFINITY));
+        let texture = Texture::Bitmap(Arc::new(bitmap));
+        assert_eq!(texture.average(), Vec3::splat(0.5));
+        assert_eq!(texture.max(), Vec3::ONE);
+    }
+}
