@@ -1,0 +1,103 @@
+//! What evidence is made of: checks, each with the values that decided it.
+
+use serde::{Deserialize, Serialize};
+
+/// Everything that was found out about one hand-in. Plain data: the rubric needs nothing else.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// The checks, in the order they were made.
+    pub checks: Vec<Check>,
+}
+
+/// One question that was put to a hand-in, and its answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Check {
+    /// Which question: a name that the rubric refers to, such as `bsdf.diffuse`.
+    pub id: String,
+    /// The scene it was asked on; empty when none.
+    pub scene: String,
+    /// Whether that scene is held back from the student.
+    pub held_back: bool,
+    /// The answer in a word.
+    pub verdict: Verdict,
+    /// How wrong the answer is: 0 is right, 1 is as large as the right answer itself (a relative
+    /// L1 error or a fraction of wrong answers; the summary says which).
+    pub error: f64,
+    /// One sentence: what was found, where, expected and actual.
+    pub summary: String,
+    /// What may be the cause, in a few words; empty when there is nothing to say.
+    pub hint: String,
+    /// The values that decided, passed ones too.
+    pub measures: Vec<Measure>,
+    /// Pictures that show it, as file names beside the report.
+    pub pictures: Vec<Picture>,
+}
+
+/// The answer to a check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Right within the tolerance.
+    Pass,
+    /// Wrong.
+    Fail,
+    /// The student has not written this part yet.
+    NotImplemented,
+    /// The question does not apply to this hand-in, or something else that is broken hides the
+    /// answer; the summary says what. Other evidence decides.
+    NotJudged,
+    /// The machine could not ask (no adapter, disk full). Costs nothing, earns nothing.
+    NotRun,
+}
+
+/// One value against its bound.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measure {
+    /// What was measured, with its unit.
+    pub name: String,
+    /// The value.
+    pub value: f64,
+    /// The largest value that passes.
+    pub bound: f64,
+    /// Whether it passed.
+    pub passed: bool,
+}
+
+/// A picture in a file beside the report.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Picture {
+    /// What it shows: actual, expected, difference...
+    pub title: String,
+    /// File name, relative to the folder of the hand-in's report.
+    pub file: String,
+}
+
+impl Check {
+    /// A check with nothing but a verdict and a sentence; the error is 0 for a pass and 1 otherwise.
+    pub fn new(id: &str, scene: &str, verdict: Verdict, summary: impl Into<String>) -> Self {
+        Self {
+            id: id.to_owned(),
+            scene: scene.to_owned(),
+            held_back: false,
+            verdict,
+            error: if verdict == Verdict::Pass { 0.0 } else { 1.0 },
+            summary: summary.into(),
+            hint: String::new(),
+            measures: Vec::new(),
+            pictures: Vec::new(),
+        }
+    }
+
+    /// The same check with a hint.
+    pub fn with_hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = hint.into();
+        self
+    }
+}
+
+impl Measure {
+    /// A value that passes when it is at most `bound`; NaN never passes.
+    pub fn at_most(name: impl Into<String>, value: f64, bound: f64) -> Self {
+        Self { name: name.into(), value, bound, passed: value <= bound }
+    }
+}

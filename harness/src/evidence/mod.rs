@@ -1,0 +1,7 @@
+//! What is found out about a hand-in: pure functions from values to checks.
+//!
+//! Nothing here knows of processes, GPUs or libraries.
+
+mod check;
+
+pub use check::{Check, Evidence, Measure, Picture, Verdict};

@@ -1,0 +1,247 @@
+//! The pure function from evidence to points.
+
+use serde::{Deserialize, Serialize};
+
+use super::rules::{Part, Rules};
+use crate::evidence::{Check, Evidence, Verdict};
+
+/// The check that says whether the source was built; images alone count when it failed.
+pub const BUILD: &str = "hand_in.build";
+
+/// The points of one hand-in.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grade {
+    /// The parts, in the handout's order.
+    pub parts: Vec<PartGrade>,
+    /// The least that the hand-in is worth, bonus included.
+    pub points: f64,
+    /// The most that it may be worth; equal to `points` when everything could be judged.
+    pub points_max: f64,
+    /// The points of all parts that are no bonus.
+    pub out_of: f64,
+    /// Gates that are closed, and other remarks on the whole.
+    pub remarks: Vec<String>,
+}
+
+/// The points of one part.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartGrade {
+    /// The handout's number.
+    pub id: String,
+    /// The handout's title.
+    pub title: String,
+    /// What it can earn.
+    pub out_of: f64,
+    /// Whether it is a bonus.
+    pub bonus: bool,
+    /// The least that it earned.
+    pub points: f64,
+    /// The most that it may have earned; equal to `points` unless it could not be judged.
+    pub points_max: f64,
+    /// What decided, in a sentence.
+    pub reason: String,
+    /// The checks that decided, as `id` or `id @ scene`.
+    pub evidence: Vec<String>,
+}
+
+/// What one part is worth, as fractions of its points.
+struct Worth {
+    least: f64,
+    most: f64,
+    reason: String,
+    evidence: Vec<String>,
+}
+
+/// Grades a hand-in. Depends on nothing but its arguments, nor on the order of the checks.
+pub fn grade(rules: &Rules, evidence: &Evidence) -> Grade {
+    let built = evidence.named(BUILD).all(|check| check.verdict == Verdict::Pass);
+    let mut worths: Vec<Worth> =
+        rules
+            .parts
+            .iter()
+            .map(|part| {
+                if built {
+                    by_code(rules, evidence, part)
+                } else {
+                    by_images(rules, evidence, part)
+                }
+            })
+            .collect();
+    if built {
+        blame_the_unexplained(rules, evidence, &mut worths);
+    }
+    let mut remarks = Vec::new();
+    let mut ceiling = 1.0f64;
+    for gate in &rules.gates {
+        if evidence.named(&gate.check).any(|check| check.verdict == Verdict::Fail) {
+            ceiling = ceiling.min(gate.ceiling);
+            remarks.push(gate.reason.clone());
+        }
+    }
+    if !built {
+        remarks.push(
+            "the source does not build: graded on the images alone, an instructor confirms".into(),
+        );
+    }
+    let parts: Vec<PartGrade> = rules
+        .parts
+        .iter()
+        .zip(worths)
+        .map(|(part, worth)| PartGrade {
+            id: part.id.clone(),
+            title: part.title.clone(),
+            out_of: part.points,
+            bonus: part.bonus,
+            points: round(part.points * worth.least * ceiling),
+            points_max: round(part.points * worth.most * ceiling),
+            reason: worth.reason,
+            evidence: worth.evidence,
+        })
+        .collect();
+    Grade {
+        points: round(parts.iter().map(|part| part.points).sum()),
+        points_max: round(parts.iter().map(|part| part.points_max).sum()),
+        out_of: rules.total_points(),
+        remarks,
+        parts,
+    }
+}
+
+/// Points are published with two digits.
+fn round(points: f64) -> f64 {
+    (points * 100.0).round() / 100.0
+}
+
+/// A part of a hand-in that builds.
+fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
+    if let Some(path) = rules.paths.get(&part.path) {
+        let mut proof = evidence.named(&path.proof).peekable();
+        if proof.peek().is_some() && proof.all(|check| check.verdict == Verdict::Pass) {
+            return Worth {
+                least: 1.0,
+                most: 1.0,
+                reason: format!("the {} images are right on every scene", part.path),
+                evidence: vec![path.proof.clone()],
+            };
+        }
+    }
+    by_checks(rules, evidence, &part.evidence)
+        .or_else(|| by_checks(rules, evidence, &part.fallback))
+        .unwrap_or_else(|| unjudged(evidence, part))
+}
+
+/// A part of a hand-in that does not build.
+fn by_images(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
+    let mut worth = match by_checks(rules, evidence, &part.images_only) {
+        Some(worth) => worth,
+        None => Worth {
+            least: 0.0,
+            most: 0.0,
+            reason: "the source does not build and no image shows this part".into(),
+            evidence: Vec::new(),
+        },
+    };
+    worth.least *= rules.images_only_ceiling;
+    worth.most *= rules.images_only_ceiling;
+    worth
+}
+
+/// What the checks named `ids` say together: the worst counts. `None` when none of them judges.
+fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String]) -> Option<Worth> {
+    let judging = |check: &&Check| {
+        matches!(check.verdict, Verdict::Pass | Verdict::Fail | Verdict::NotImplemented)
+    };
+    let checks: Vec<&Check> = ids.iter().flat_map(|id| evidence.named(id)).collect();
+    if checks.iter().any(|check| check.verdict == Verdict::NotRun) {
+        return None;
+    }
+    let judged: Vec<&Check> = checks.into_iter().filter(judging).collect();
+    // Ties are broken by the words, so that the order of the checks does not matter.
+    let worst = judged.iter().copied().min_by(|a, b| {
+        let (fa, fb) = (fraction(rules, a), fraction(rules, b));
+        fa.total_cmp(&fb).then_with(|| (&a.id, &a.scene).cmp(&(&b.id, &b.scene)))
+    })?;
+    let least = fraction(rules, worst);
+    let mut evidence: Vec<String> = judged
+        .iter()
+        .filter(|check| check.verdict != Verdict::Pass || least == 1.0)
+        .map(|check| check.name())
+        .collect();
+    evidence.sort();
+    evidence.dedup();
+    let reason = worst.summary.clone();
+    Some(Worth { least, most: least, reason, evidence })
+}
+
+fn unjudged(evidence: &Evidence, part: &Part) -> Worth {
+    let ids = part.evidence.iter().chain(&part.fallback);
+    let silent = ids.flat_map(|id| evidence.named(id)).map(|check| check.summary.as_str()).min();
+    Worth {
+        least: 0.0,
+        most: 1.0,
+        reason: match silent {
+            Some(why) => format!("could not be judged: {why}"),
+            None => "could not be judged: no evidence was collected".into(),
+        },
+        evidence: Vec::new(),
+    }
+}
+
+/// Rule 5: a wrong image that no part explains is paid by the path's `blame` part.
+fn blame_the_unexplained(rules: &Rules, evidence: &Evidence, worths: &mut [Worth]) {
+    for (name, path) in &rules.paths {
+        let failed = evidence.named(&path.proof).filter(|check| check.verdict == Verdict::Fail);
+        let worst = failed.min_by(|a, b| {
+            let (fa, fb) = (fraction(rules, a), fraction(rules, b));
+            fa.total_cmp(&fb).then_with(|| a.scene.cmp(&b.scene))
+        });
+        let Some(worst) = worst else { continue };
+        let own = |part: &Part| part.path == *name && !part.bonus;
+        let explained = rules
+            .parts
+            .iter()
+            .zip(worths.iter())
+            .any(|(part, worth)| own(part) && worth.least < 1.0);
+        if explained {
+            continue;
+        }
+        for (part, worth) in rules.parts.iter().zip(worths.iter_mut()) {
+            if part.id == path.blame {
+                worth.least = fraction(rules, worst);
+                worth.most = worth.least;
+                worth.reason = format!("every part alone is right, but {}", worst.summary);
+                worth.evidence = vec![worst.name()];
+            }
+        }
+    }
+}
+
+/// The fraction of points that a check leaves.
+fn fraction(rules: &Rules, check: &Check) -> f64 {
+    match check.verdict {
+        Verdict::Pass => 1.0,
+        Verdict::Fail => rules.curve.fraction(check.error),
+        _ => 0.0,
+    }
+}
+
+impl Evidence {
+    /// The checks with a name.
+    pub fn named<'a>(&'a self, id: &'a str) -> impl Iterator<Item = &'a Check> {
+        self.checks.iter().filter(move |check| check.id == id)
+    }
+}
+
+impl Check {
+    /// `id` or `id @ scene`.
+    pub fn name(&self) -> String {
+        if self.scene.is_empty() {
+            self.id.clone()
+        } else {
+            format!("{} @ {}", self.id, self.scene)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

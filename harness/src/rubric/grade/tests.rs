@@ -1,0 +1,154 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::rubric::Curve;
+use crate::rubric::rules::{Gate, PathRule};
+
+/// Two parts on one path, a bonus of its own, one gate.
+fn rules() -> Rules {
+    let part = |id: &str, points, path: &str, evidence: &str, fallback: &[&str]| Part {
+        id: id.into(),
+        title: format!("part {id}"),
+        points,
+        bonus: path.is_empty(),
+        path: path.into(),
+        evidence: vec![evidence.into()],
+        fallback: fallback.iter().map(|&f| f.into()).collect(),
+        images_only: vec![format!("images.{id}")],
+    };
+    let rules = Rules {
+        curve: Curve::try_from(vec![[0.0, 0.9], [0.1, 0.5], [1.0, 0.0]]).unwrap(),
+        images_only_ceiling: 0.5,
+        gates: vec![Gate { check: "tree".into(), ceiling: 0.0, reason: "wrong tree".into() }],
+        paths: [("offline".into(), PathRule { proof: "image".into(), blame: "2".into() })].into(),
+        parts: vec![
+            part("1", 10.0, "offline", "bsdf", &["pixels"]),
+            part("2", 30.0, "offline", "rays", &[]),
+            part("3", 20.0, "", "bonus", &[]),
+        ],
+    };
+    assert_eq!(rules.problem(), None);
+    rules
+}
+
+fn check(id: &str, verdict: Verdict, error: f64) -> Check {
+    Check { error, ..Check::new(id, "", verdict, format!("{id} said so")) }
+}
+
+fn points(checks: &[Check]) -> Vec<f64> {
+    let grade = grade(&rules(), &Evidence { checks: checks.to_vec() });
+    grade.parts.iter().map(|part| part.points).collect()
+}
+
+use Verdict::{Fail, NotImplemented, NotJudged, NotRun, Pass};
+
+#[test]
+fn right_end_to_end_is_enough_on_every_scene_only() {
+    let wrong_part = check("bsdf", Fail, 1.0);
+    let all = [check("image", Pass, 0.0), wrong_part.clone(), check("bonus", NotImplemented, 1.0)];
+    assert_eq!(points(&all), [10.0, 30.0, 0.0]);
+    let one_wrong =
+        [all.as_slice(), &[check("image", Fail, 0.2), check("rays", Pass, 0.0)]].concat();
+    assert_eq!(points(&one_wrong), [0.0, 30.0, 0.0]);
+}
+
+#[test]
+fn the_worst_scene_counts_and_the_curve_gives_partial_points() {
+    let base = [check("image", Fail, 0.5), check("rays", Pass, 0.0), check("bonus", Pass, 0.0)];
+    for (error, expected) in [(0.0, 9.0), (0.05, 7.0), (0.1, 5.0), (1.0, 0.0)] {
+        let mut checks = base.to_vec();
+        checks.extend([check("bsdf", Pass, 0.0), check("bsdf", Fail, error)]);
+        assert_eq!(points(&checks), [expected, 30.0, 20.0], "error {error}");
+    }
+}
+
+#[test]
+fn an_unexplained_wrong_image_is_paid_by_the_blamed_part() {
+    let checks = [check("image", Fail, 0.1), check("bsdf", Pass, 0.0), check("rays", Pass, 0.0)];
+    let grade = grade(&rules(), &Evidence { checks: checks.to_vec() });
+    assert_eq!(grade.parts[0].points, 10.0);
+    assert_eq!(grade.parts[1].points, 15.0);
+    assert!(grade.parts[1].reason.contains("every part alone is right"));
+}
+
+#[test]
+fn what_cannot_be_judged_is_a_range_with_its_reason() {
+    let checks = [check("image", Fail, 0.5), check("bsdf", NotRun, 0.0), check("rays", Fail, 1.0)];
+    let graded = grade(&rules(), &Evidence { checks: checks.to_vec() });
+    let part = &graded.parts[0];
+    assert_eq!((part.points, part.points_max), (0.0, 10.0));
+    assert_eq!(part.reason, "could not be judged: bsdf said so");
+    assert_eq!((graded.parts[2].points, graded.parts[2].points_max), (0.0, 20.0));
+    assert_eq!((graded.points, graded.points_max), (0.0, 30.0));
+    assert_eq!(graded.out_of, 40.0, "the bonus comes on top");
+}
+
+#[test]
+fn evidence_that_does_not_apply_gives_way_to_the_fallback() {
+    let checks = [
+        check("image", Fail, 0.5),
+        check("bsdf", NotJudged, 0.0),
+        check("pixels", Fail, 0.1),
+        check("rays", NotImplemented, 1.0),
+    ];
+    assert_eq!(points(&checks)[..2], [5.0, 0.0]);
+}
+
+#[test]
+fn images_alone_earn_at_most_the_ceiling_and_a_closed_gate_everything() {
+    let mut checks = vec![
+        check(BUILD, Fail, 1.0),
+        check("images.1", Pass, 0.0),
+        check("images.2", Fail, 0.1),
+        check("image", Pass, 0.0),
+    ];
+    assert_eq!(points(&checks), [5.0, 7.5, 0.0]);
+    checks.push(check("tree", Fail, 1.0));
+    assert_eq!(points(&checks), [0.0, 0.0, 0.0]);
+}
+
+fn any_check() -> impl Strategy<Value = Check> {
+    let id = prop::sample::select(vec!["image", "bsdf", "pixels", "rays", "bonus", "tree", BUILD]);
+    let verdict = prop::sample::select(vec![Pass, Fail, NotImplemented, NotJudged, NotRun]);
+    (id, verdict, 0.0..2.0f64, 0..3u8).prop_map(|(id, verdict, error, scene)| Check {
+        scene: format!("scene{scene}"),
+        ..check(id, verdict, error)
+    })
+}
+
+proptest! {
+    #[test]
+    fn points_are_bounded_and_independent_of_the_order(
+        checks in prop::collection::vec(any_check(), 0..12), turn in 0..12usize
+    ) {
+        let before = grade(&rules(), &Evidence { checks: checks.clone() });
+        for part in &before.parts {
+            prop_assert!(0.0 <= part.points && part.points <= part.points_max);
+            prop_assert!(part.points_max <= part.out_of);
+        }
+        let mut turned = checks;
+        if !turned.is_empty() {
+            let middle = turn % turned.len();
+            turned.rotate_left(middle);
+            turned.reverse();
+        }
+        prop_assert_eq!(before, grade(&rules(), &Evidence { checks: turned }));
+    }
+
+    #[test]
+    fn a_larger_error_never_earns_more(
+        mut checks in prop::collection::vec(any_check(), 1..12), at in 0..12usize, more in 0.0..1.0f64
+    ) {
+        let before = grade(&rules(), &Evidence { checks: checks.clone() });
+        let at = at % checks.len();
+        checks[at].error += more;
+        let after = grade(&rules(), &Evidence { checks: checks.clone() });
+        prop_assert!(after.points <= before.points);
+        if checks[at].verdict == Pass && checks[at].id != BUILD && checks[at].id != "tree" {
+            checks[at].verdict = Fail;
+            // Failing may unlock isolation, which never gives a part more than in full.
+            let failed = grade(&rules(), &Evidence { checks });
+            prop_assert!(failed.points <= after.points);
+        }
+    }
+}

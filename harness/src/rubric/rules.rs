@@ -1,0 +1,111 @@
+//! The rules of the rubric, as `config.json` states them.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::Curve;
+
+/// How evidence becomes points.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rules {
+    /// Error to fraction of points, for failed checks.
+    pub curve: Curve,
+    /// Fraction of the points that images alone can earn when the source does not build.
+    pub images_only_ceiling: f64,
+    /// What must be in order before anything counts.
+    pub gates: Vec<Gate>,
+    /// The two halves of the assignment, by name.
+    pub paths: BTreeMap<String, PathRule>,
+    /// The parts, in the handout's order.
+    pub parts: Vec<Part>,
+}
+
+/// A condition on the whole hand-in.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gate {
+    /// The check that must not fail.
+    pub check: String,
+    /// Fraction of the points that can be earned when it fails.
+    pub ceiling: f64,
+    /// Why, in the words of the handout.
+    pub reason: String,
+}
+
+/// One half of the assignment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PathRule {
+    /// The check that, passed on every scene, earns all parts of this path in full.
+    pub proof: String,
+    /// The part that pays when the proof fails and no part's own evidence says why.
+    pub blame: String,
+}
+
+/// One part of the assignment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// The handout's number, such as `1.1`.
+    pub id: String,
+    /// The handout's title.
+    pub title: String,
+    /// The handout's points.
+    pub points: f64,
+    /// Whether the points come on top of the total.
+    #[serde(default)]
+    pub bonus: bool,
+    /// The path it belongs to; empty when it stands for itself.
+    #[serde(default)]
+    pub path: String,
+    /// The checks that isolate it; the worst counts.
+    pub evidence: Vec<String>,
+    /// The checks that decide when the evidence does not apply.
+    #[serde(default)]
+    pub fallback: Vec<String>,
+    /// The checks on the images handed in, for a hand-in that does not build.
+    #[serde(default)]
+    pub images_only: Vec<String>,
+}
+
+impl Rules {
+    /// What is wrong with the rules themselves, if anything.
+    pub fn problem(&self) -> Option<String> {
+        for part in &self.parts {
+            if !(part.points.is_finite() && part.points >= 0.0) {
+                return Some(format!("part {}: points are {}", part.id, part.points));
+            }
+            if !part.path.is_empty() && !self.paths.contains_key(&part.path) {
+                return Some(format!("part {}: there is no path \"{}\"", part.id, part.path));
+            }
+            if part.evidence.is_empty() {
+                return Some(format!("part {}: no evidence is named", part.id));
+            }
+            if self.parts.iter().filter(|other| other.id == part.id).count() > 1 {
+                return Some(format!("part {} is there twice", part.id));
+            }
+        }
+        for (name, path) in &self.paths {
+            if !self.parts.iter().any(|part| part.id == path.blame && part.path == *name) {
+                return Some(format!(
+                    "path \"{name}\": its blame part {} is not its own",
+                    path.blame
+                ));
+            }
+        }
+        let ceilings = self.gates.iter().map(|gate| gate.ceiling).chain([self.images_only_ceiling]);
+        for ceiling in ceilings {
+            if !(0.0..=1.0).contains(&ceiling) {
+                return Some(format!("a ceiling is {ceiling} but must lie in [0, 1]"));
+            }
+        }
+        None
+    }
+
+    /// The points of all parts that are no bonus.
+    pub fn total_points(&self) -> f64 {
+        self.parts.iter().filter(|part| !part.bonus).map(|part| part.points).sum()
+    }
+}
