@@ -1,0 +1,141 @@
+//! What a camera sees, before any shading: the surface buffer of a scene.
+
+use basecode::{Camera, Frame, Ray, Result, Scene, SurfaceInteraction, Vec3};
+
+/// Where one camera ray meets the scene, and how the light stands there.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// The camera ray.
+    pub ray: Ray,
+    /// Index of the shape.
+    pub shape: usize,
+    /// Index of the triangle within the shape.
+    pub primitive: usize,
+    /// The point, world space.
+    pub position: Vec3,
+    /// Shading normal, world space.
+    pub normal: Vec3,
+    /// Unit direction toward the viewer, local shading frame.
+    pub wo: Vec3,
+    /// Unit direction toward the light, local shading frame.
+    pub wi: Vec3,
+    /// Distance to the light, scene units.
+    pub distance: f32,
+    /// What lies between the point and the light.
+    pub sight: Sight,
+}
+
+/// Whether a surface point and the light see each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    /// Nothing lies between, with a margin.
+    Clear,
+    /// Something lies between, with a margin.
+    Blocked,
+    /// It hangs on the epsilon of the shadow ray.
+    Unsure,
+}
+
+impl SurfacePoint {
+    /// Whether both directions face the surface, as every BSDF here demands.
+    pub fn faces_both(&self) -> bool {
+        Frame::cos_theta(self.wo) > 0.0 && Frame::cos_theta(self.wi) > 0.0
+    }
+
+    /// Casts one camera ray.
+    pub fn cast(scene: &Scene, ray: Ray) -> Option<Self> {
+        let hit = scene.intersect(&ray)?;
+        let to_light = scene.first_light_position() - hit.p;
+        let distance = to_light.length();
+        let direction = to_light / distance;
+        Some(Self {
+            ray,
+            shape: hit.shape,
+            primitive: hit.primitive,
+            position: hit.p,
+            normal: hit.frame_ns.n,
+            wo: hit.wo,
+            wi: hit.frame_ns.to_local(direction),
+            distance,
+            sight: sight(scene, &hit, direction, distance),
+        })
+    }
+}
+
+/// Shadow rays that leave a surface start somewhere between these distances from it, in scene
+/// units times the distance of the light: the original's epsilon is 1e-3, students use 1e-5 to 5e-3.
+const NEAREST_START: f32 = 1e-5;
+const FARTHEST_START: f32 = 5e-3;
+/// How far from its end a shadow ray may stop, relative to its length.
+const END_MARGIN: f32 = 5e-3;
+
+fn sight(scene: &Scene, hit: &SurfaceInteraction, direction: Vec3, distance: f32) -> Sight {
+    let from = |origin, start: f32, end: f32| {
+        scene.occluded(&Ray::segment(origin, direction, start, end))
+    };
+    let near = NEAREST_START * distance.max(1.0);
+    let far = FARTHEST_START * distance.max(1.0);
+    // Some students lift the origin along the normal instead of starting later on the ray.
+    let lifted = hit.p + far * hit.ng * hit.ng.dot(direction).signum();
+    let short = distance * (1.0 - END_MARGIN);
+    let answers = [
+        from(hit.p, near, distance * (1.0 - 1e-5)),
+        from(hit.p, far, short),
+        from(lifted, near, short),
+    ];
+    match answers {
+        [true, true, true] => Sight::Blocked,
+        [false, false, false] => Sight::Clear,
+        _ => Sight::Unsure,
+    }
+}
+
+/// What each pixel's centre sees; row-major, row 0 on top.
+#[derive(Clone, Debug)]
+pub struct SurfaceBuffer {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// The ray and, if it meets something, the point, for each pixel.
+    pub pixels: Vec<(Ray, Option<SurfacePoint>)>,
+}
+
+impl SurfaceBuffer {
+    /// Casts the centre ray of every pixel of a film of `width` x `height`.
+    ///
+    /// # Errors
+    /// When the film is empty or the scene's camera has no frame.
+    pub fn new(scene: &Scene, width: usize, height: usize) -> Result<Self> {
+        let camera = scene.camera(width, height)?;
+        let centres = (0..width * height).map(|index| {
+            let ray = camera.ray((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
+            (ray, SurfacePoint::cast(scene, ray))
+        });
+        Ok(Self { width, height, pixels: centres.collect() })
+    }
+}
+
+/// What the corners, edges and centres of all pixels see: (2 width + 1) x (2 height + 1) points,
+/// half a pixel apart.
+pub(super) struct Lattice {
+    width: usize,
+    points: Vec<Option<SurfacePoint>>,
+}
+
+impl Lattice {
+    pub(super) fn new(scene: &Scene, camera: &Camera, width: usize, height: usize) -> Self {
+        use rayon::prelude::*;
+        let (columns, rows) = (2 * width + 1, 2 * height + 1);
+        let points = (0..columns * rows).into_par_iter().map(|index| {
+            let (x, y) = ((index % columns) as f32 * 0.5, (index / columns) as f32 * 0.5);
+            SurfacePoint::cast(scene, camera.ray(x, y))
+        });
+        Self { width: columns, points: points.collect() }
+    }
+
+    /// The 3x3 points of pixel (`x`, `y`), its centre in the middle.
+    pub(super) fn around(&self, x: usize, y: usize) -> [&Option<SurfacePoint>; 9] {
+        std::array::from_fn(|i| &self.points[(2 * y + i / 3) * self.width + 2 * x + i % 3])
+    }
+}
