@@ -1,1 +1,41 @@
-fn main() {}
+//! `xtask`: the chores of this repository that are not part of grading.
+
+mod scenes;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// The chores of this repository.
+#[derive(Parser)]
+#[command(name = "xtask")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Write the scenes of the assignment into scenes/a2.
+    Scenes {
+        /// Write nothing; fail when a committed file differs from what would be written.
+        #[arg(long)]
+        check: bool,
+    },
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Scenes { check: true } => scenes::check(),
+        Command::Scenes { check: false } => scenes::write(),
+    };
+    match result {
+        Ok(summary) => {
+            println!("{summary}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

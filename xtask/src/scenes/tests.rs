@@ -1,0 +1,1 @@
+//! Tests of the scenes as they are written.
