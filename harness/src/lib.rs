@@ -1,0 +1,3 @@
+//! Umbra grades renderers.
+
+pub mod intake;
