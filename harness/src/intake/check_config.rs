@@ -1,0 +1,344 @@
+//! The `config.json` of a hand-in against its files.
+
+use std::collections::HashMap;
+
+use super::finding::{Finding, printable};
+use super::hand_in_config::{Field, HandInConfig};
+use super::limits::Limits;
+use super::name::safe_path;
+use super::tree::{CONFIG_FILE, TreeSpec};
+
+/// Checks what `config.json` says against the paths of the hand-in. Every finding has a line and a
+/// hint; what is missing altogether is put on line 1.
+pub fn check_config(config: &HandInConfig, paths: &[&str], tree: &TreeSpec) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    check_name(&config.first_name, "firstName", &mut findings);
+    check_name(&config.last_name, "lastName", &mut findings);
+    check_id(&config.student_id, &mut findings);
+    check_renders(config, paths, tree, &mut findings);
+    findings
+}
+
+fn error(code: &str, line: u32, message: String, hint: impl Into<String>) -> Finding {
+    Finding::error(code, message)
+        .at(CONFIG_FILE)
+        .on_line(line)
+        .hint(hint)
+}
+
+/// Whether a value is one that templates ship with.
+fn is_template_value(text: &str) -> bool {
+    let plain: String = text
+        .chars()
+        .filter(|c| c.is_alphanumeric())
+        .flat_map(char::to_lowercase)
+        .collect();
+    const TEMPLATE: [&str; 15] = [
+        "first",
+        "last",
+        "firstname",
+        "lastname",
+        "yourfirstname",
+        "yourlastname",
+        "yourname",
+        "name",
+        "studentid",
+        "yourstudentid",
+        "youremail",
+        "todo",
+        "xxx",
+        "123456789",
+        "260000000",
+    ];
+    TEMPLATE.contains(&plain.as_str()) || text.contains(['<', '>'])
+}
+
+fn check_name(field: &Option<Field>, key: &str, findings: &mut Vec<Finding>) {
+    let hint = format!("write your name: \"{key}\": \"Ada\"");
+    match field {
+        None => findings.push(error(
+            "config_credentials",
+            1,
+            format!("\"{key}\" is missing"),
+            hint,
+        )),
+        Some(field) if field.text.is_empty() => {
+            findings.push(error(
+                "config_credentials",
+                field.line,
+                format!("\"{key}\" is empty"),
+                hint,
+            ));
+        }
+        Some(field) if is_template_value(&field.text) => {
+            let message = format!(
+                "\"{key}\" is still the template's: {}",
+                printable(&field.text)
+            );
+            findings.push(error("config_credentials", field.line, message, hint));
+        }
+        Some(_) => {}
+    }
+}
+
+fn check_id(field: &Option<Field>, findings: &mut Vec<Finding>) {
+    let hint = "write your student number: \"studentID\": \"260123456\"; it seeds your sampler";
+    match field {
+        None => findings.push(error(
+            "config_credentials",
+            1,
+            "\"studentID\" is missing".to_owned(),
+            hint,
+        )),
+        Some(field) if field.text.is_empty() => {
+            findings.push(error(
+                "config_credentials",
+                field.line,
+                "\"studentID\" is empty".to_owned(),
+                hint,
+            ));
+        }
+        Some(field) if is_template_value(&field.text) => {
+            let message = format!(
+                "\"studentID\" is still the template's: {}",
+                printable(&field.text)
+            );
+            findings.push(error("config_credentials", field.line, message, hint));
+        }
+        // A sign would pass `parse`, so digits are asked for first.
+        Some(field)
+            if !field.text.bytes().all(|b| b.is_ascii_digit())
+                || field.text.parse::<u64>().is_err() =>
+        {
+            let message = format!(
+                "\"studentID\": expected digits only, found '{}'",
+                printable(&field.text)
+            );
+            findings.push(error("config_student_id", field.line, message, hint));
+        }
+        Some(field) if field.text.bytes().all(|b| b == b'0') => {
+            findings.push(error(
+                "config_student_id",
+                field.line,
+                "\"studentID\" is zero".to_owned(),
+                hint,
+            ));
+        }
+        Some(_) => {}
+    }
+}
+
+fn check_renders(
+    config: &HandInConfig,
+    paths: &[&str],
+    tree: &TreeSpec,
+    findings: &mut Vec<Finding>,
+) {
+    if !config.has_renders {
+        findings.push(error(
+            "config_renders",
+            1,
+            "the list \"renders\" is missing".to_owned(),
+            "list your images: \"renders\": [ { \"scene\": ..., \"render\": ... } ]",
+        ));
+        return;
+    }
+    // Line on which each image was listed first, by the canonical path of the tree.
+    let mut listed: HashMap<String, u32> = HashMap::new();
+    for render in &config.renders {
+        let written = printable(&render.render);
+        let path = match resolve(&render.render) {
+            Ok(path) => path,
+            Err(finding) => {
+                findings.push(finding.at(CONFIG_FILE).on_line(render.line));
+                continue;
+            }
+        };
+        let name = canonical(&path, tree);
+        if let Some(line) = listed.get(&name) {
+            let message = format!("'{written}' is listed twice, first on line {line}");
+            findings.push(error(
+                "config_listed_twice",
+                render.line,
+                message,
+                "keep one of the two entries",
+            ));
+            continue;
+        }
+        listed.insert(name.clone(), render.line);
+        if paths.iter().any(|found| canonical(found, tree) == name) {
+            continue;
+        }
+        let lower = name.to_lowercase();
+        match paths
+            .iter()
+            .find(|found| canonical(found, tree).to_lowercase() == lower)
+        {
+            Some(found) => findings.push(error(
+                "config_wrong_case",
+                render.line,
+                format!("'{written}' is handed in as '{found}'"),
+                format!("write \"{found}\": upper and lower case count"),
+            )),
+            None => findings.push(error(
+                "config_render_missing",
+                render.line,
+                format!("'{written}' is listed, but not handed in"),
+                "add the image or remove the entry",
+            )),
+        }
+    }
+    for path in paths
+        .iter()
+        .filter(|path| path.to_lowercase().ends_with(".exr"))
+    {
+        let is_listed = listed
+            .keys()
+            .any(|name| name.to_lowercase() == canonical(path, tree).to_lowercase());
+        if tree.file_at(path).is_some() && !is_listed {
+            findings.push(
+                Finding::warning(
+                    "config_not_listed",
+                    format!("'{path}' is handed in, but not listed"),
+                )
+                .at(CONFIG_FILE)
+                .on_line(1)
+                .hint(format!(
+                    "add {{ \"scene\": ..., \"render\": \"{path}\" }} to \"renders\""
+                )),
+            );
+        }
+    }
+}
+
+/// The tree's own path of a file that may stand at an alias.
+fn canonical(path: &str, tree: &TreeSpec) -> String {
+    tree.file_at(path)
+        .map_or(path, |file| &file.path)
+        .to_owned()
+}
+
+/// A listed path as a plain relative path.
+fn resolve(written: &str) -> Result<String, Finding> {
+    if written.trim().is_empty() {
+        return Err(
+            Finding::error("config_render_missing", "a render with an empty path")
+                .hint("write the image's path from the root of the hand-in"),
+        );
+    }
+    match safe_path(written.trim().as_bytes(), &Limits::default()) {
+        Ok(safe) => Ok(safe.path),
+        Err(finding) if finding.code == "name_backslash" => {
+            Err(Finding::error("config_backslash", format!("'{}' holds a backslash", printable(written)))
+                .hint(format!("write \"{}\"", printable(&written.replace('\\', "/")))))
+        }
+        Err(_) => Err(Finding::error("config_path_escape", format!("'{}' leaves the hand-in", printable(written)))
+            .hint("write the image's path from the root of the hand-in, such as offline/cbox_simple_offline.exr")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Codes and lines of the findings on a config with this list of renders.
+    fn check(renders: &str, paths: &[&str]) -> Vec<String> {
+        let text = format!(
+            "{{\"firstName\": \"Ada\", \"lastName\": \"Lovelace\",\n\"studentID\": \"42\", \"renders\": [\n{renders}\n]}}"
+        );
+        codes(&text, paths)
+    }
+
+    fn codes(text: &str, paths: &[&str]) -> Vec<String> {
+        let (config, mut findings) = HandInConfig::parse(text.as_bytes());
+        findings.extend(check_config(&config, paths, &TreeSpec::default()));
+        for finding in &findings {
+            assert!(
+                finding.hint.is_some() && finding.line.is_some(),
+                "{finding}"
+            );
+        }
+        findings
+            .iter()
+            .map(|f| format!("{}@{}", f.code, f.line.unwrap_or(0)))
+            .collect()
+    }
+
+    const CBOX: &str = "offline/cbox_simple_offline.exr";
+
+    #[test]
+    fn a_right_list_is_silent() {
+        assert_eq!(
+            check(
+                r#"{"scene": "c", "render": "offline/cbox_simple_offline.exr"}"#,
+                &[CBOX]
+            ),
+            [""; 0]
+        );
+    }
+
+    #[test]
+    fn any_name_of_the_bonus_is_the_bonus() {
+        for handed_in in [
+            "realtime/teapot_bonus.exr",
+            "realtime/teapot_simple_realtime_bonus.exr",
+        ] {
+            assert_eq!(
+                check(r#""renders/teapot_bonus.exr""#, &[handed_in]),
+                [""; 0]
+            );
+        }
+    }
+
+    #[test]
+    fn each_mistake_has_its_code() {
+        assert_eq!(
+            check("\"offline/nothing.exr\"", &[]),
+            ["config_render_missing@3"]
+        );
+        assert_eq!(check("\"../../etc/passwd\"", &[]), ["config_path_escape@3"]);
+        assert_eq!(check("\"/etc/passwd\"", &[]), ["config_path_escape@3"]);
+        assert_eq!(
+            check("\"offline\\\\cbox_simple_offline.exr\"", &[CBOX]),
+            ["config_backslash@3", "config_not_listed@1"]
+        );
+        assert_eq!(
+            check("\"Offline/cbox_simple_offline.exr\"", &[CBOX]),
+            ["config_wrong_case@3"]
+        );
+        assert_eq!(
+            check(&format!("\"{CBOX}\",\n\"./{CBOX}\""), &[CBOX]),
+            ["config_listed_twice@4"]
+        );
+        assert_eq!(check("", &[CBOX]), ["config_not_listed@1"]);
+        assert_eq!(check("\"\"", &[]), ["config_render_missing@3"]);
+    }
+
+    #[test]
+    fn credentials_are_checked() {
+        let with = |first: &str, id: &str| {
+            codes(
+                &format!(
+                    "{{\"firstName\": \"{first}\",\n\"lastName\": \"L\",\n\"studentID\": \"{id}\", \"renders\": []}}"
+                ),
+                &[],
+            )
+        };
+        assert_eq!(with("Ada", "260123456"), [""; 0]);
+        assert_eq!(with("", "260123456"), ["config_credentials@1"]);
+        assert_eq!(with("First", "260123456"), ["config_credentials@1"]);
+        assert_eq!(with("<your name>", "260123456"), ["config_credentials@1"]);
+        for bad in [
+            "26012345x",
+            "-1",
+            "+1",
+            "1.5",
+            "18446744073709551616",
+            "000",
+        ] {
+            assert_eq!(with("Ada", bad), ["config_student_id@3"], "{bad}");
+        }
+        assert_eq!(with("Ada", ""), ["config_credentials@3"]);
+        assert_eq!(codes("{}", &[]).len(), 4);
+    }
+}

@@ -1,0 +1,435 @@
+//! The private copy: admits entries one by one, writes their bytes below the destination, counts
+//! and hashes what really comes. Shared by zip, tar and folder.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+use flate2::Crc;
+use sha2::{Digest, Sha256};
+
+use super::finding::{Finding, Findings, printable};
+use super::limits::{Limits, mib};
+use super::name::safe_path;
+use super::tree::{CONFIG_FILE, TreeSpec};
+use super::unpack::{Format, HandIn, HandInFile, IntakeError, Refusal, archive_magic};
+
+/// Why reading stops before the end.
+pub(super) enum Halt {
+    /// The hand-in is refused; the findings say why.
+    Refused,
+    /// The destination or the source cannot be used; no matter of the hand-in.
+    Io(IntakeError),
+}
+
+impl From<IntakeError> for Halt {
+    fn from(error: IntakeError) -> Self {
+        Self::Io(error)
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    File,
+    Folder,
+}
+
+/// What becomes of an entry.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Admitted {
+    /// To be written at this path.
+    File(String),
+    /// Nothing to write; folders are made when a file needs them.
+    Folder,
+    /// Junk that is left out.
+    Ignored,
+    /// A finding was recorded; the hand-in as a whole will be refused.
+    Refused,
+}
+
+/// What was written of one file.
+pub(super) struct Written {
+    pub(super) bytes: u64,
+    pub(super) crc32: u32,
+}
+
+pub(super) struct PrivateCopy<'a> {
+    dest: &'a Path,
+    tree: &'a TreeSpec,
+    pub(super) limits: &'a Limits,
+    pub(super) findings: Findings,
+    files: BTreeMap<String, Option<HandInFile>>,
+    folders: BTreeSet<String>,
+    /// Lower-cased path to the first spelling seen.
+    spellings: HashMap<String, String>,
+    ignored: BTreeMap<String, u64>,
+    entries: u64,
+    total_bytes: u64,
+}
+
+impl<'a> PrivateCopy<'a> {
+    /// Starts a copy into `dest`, which must be an empty folder.
+    pub(super) fn new(
+        dest: &'a Path,
+        tree: &'a TreeSpec,
+        limits: &'a Limits,
+    ) -> Result<Self, IntakeError> {
+        let mut entries = fs::read_dir(dest).map_err(|e| IntakeError::io("list", dest, e))?;
+        if entries.next().is_some() {
+            return Err(IntakeError::DestinationNotEmpty {
+                path: dest.to_owned(),
+            });
+        }
+        Ok(Self {
+            dest,
+            tree,
+            limits,
+            findings: Findings::default(),
+            files: BTreeMap::new(),
+            folders: BTreeSet::new(),
+            spellings: HashMap::new(),
+            ignored: BTreeMap::new(),
+            entries: 0,
+            total_bytes: 0,
+        })
+    }
+
+    /// Records an error about the entry of that raw name.
+    pub(super) fn refuse(&mut self, finding: Finding) -> Halt {
+        self.findings.push(finding);
+        Halt::Refused
+    }
+
+    /// Counts one entry, its name unread (links, extended headers and the like count too).
+    pub(super) fn count_entry(&mut self) -> Result<(), Halt> {
+        self.entries += 1;
+        if self.entries > self.limits.max_entries {
+            let message = format!("more than {} entries", self.limits.max_entries);
+            return Err(self.refuse(
+                Finding::error("limit_entries", message)
+                    .hint("hand in only the files of the tree, no build folder"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Checks the name of an entry that was counted, and its place beside the others.
+    pub(super) fn admit(&mut self, raw: &[u8], kind: Kind) -> Admitted {
+        let safe = match safe_path(raw, self.limits) {
+            Ok(safe) => safe,
+            Err(finding) => {
+                self.findings.push(finding);
+                return Admitted::Refused;
+            }
+        };
+        let path = safe.path;
+        if path.is_empty() {
+            if kind == Kind::Folder {
+                return Admitted::Folder;
+            }
+            self.findings
+                .push(Finding::error("name_empty", "a file without a name"));
+            return Admitted::Refused;
+        }
+        if let Some(pattern) = self.tree.ignored_by(&path) {
+            *self.ignored.entry(printable(pattern)).or_default() += 1;
+            return Admitted::Ignored;
+        }
+        if safe.replaced {
+            self.findings.push(
+                Finding::warning(
+                    "name_not_utf8",
+                    "the name is not UTF-8; other bytes are shown as _xHH",
+                )
+                .at(path.as_str())
+                .hint("use plain letters in file names"),
+            );
+        }
+        self.note_spelling(&path);
+        let parents: Vec<&str> = path.match_indices('/').map(|(i, _)| &path[..i]).collect();
+        let is_both = parents
+            .iter()
+            .any(|parent| self.files.contains_key(*parent))
+            || match kind {
+                Kind::File => self.folders.contains(&path),
+                Kind::Folder => self.files.contains_key(&path),
+            };
+        if is_both {
+            self.findings.push(
+                Finding::error("file_and_folder", "the same path is a file and a folder").at(path),
+            );
+            return Admitted::Refused;
+        }
+        if kind == Kind::File && self.files.contains_key(&path) {
+            self.findings.push(
+                Finding::error(
+                    "duplicate_entry",
+                    "expected one entry of this name, found a second",
+                )
+                .at(path)
+                .hint("make a new archive instead of adding to an old one"),
+            );
+            return Admitted::Refused;
+        }
+        self.folders.extend(parents.into_iter().map(str::to_owned));
+        match kind {
+            Kind::Folder => {
+                self.folders.insert(path);
+                Admitted::Folder
+            }
+            Kind::File => {
+                self.files.insert(path.clone(), None);
+                Admitted::File(path)
+            }
+        }
+    }
+
+    /// Warns where two paths differ only in case: they are one path on Windows and macOS.
+    fn note_spelling(&mut self, path: &str) {
+        let ends = path.match_indices('/').map(|(i, _)| i).chain([path.len()]);
+        for end in ends {
+            let part = &path[..end];
+            let Some(first) = self.spellings.get(&part.to_lowercase()) else {
+                self.spellings.insert(part.to_lowercase(), part.to_owned());
+                continue;
+            };
+            if first != part {
+                self.findings.push(
+                    Finding::warning(
+                        "case_collision",
+                        format!("differs only in case from '{first}'"),
+                    )
+                    .at(part)
+                    .hint("use one spelling; both are the same file on Windows and macOS"),
+                );
+                // The parts below it follow from this one.
+                return;
+            }
+        }
+    }
+
+    /// Counts `n` more bytes of content towards the total.
+    pub(super) fn count_bytes(&mut self, n: u64, path: &str) -> Result<(), Halt> {
+        self.total_bytes += n;
+        if self.total_bytes > mib(self.limits.max_total_mib) {
+            let message = format!(
+                "contents exceed the limit of {} MiB in total",
+                self.limits.max_total_mib
+            );
+            return Err(self.refuse(
+                Finding::error("limit_total", message)
+                    .at(path)
+                    .hint("hand in only the files of the tree"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Writes one admitted file from `reader` up to its end, and counts what comes.
+    ///
+    /// `packed_bytes` is the size of what `reader` unpacks, for the ratio. Once the hand-in is
+    /// refused the bytes are read and counted, but not kept.
+    ///
+    /// The inner error is `reader`'s.
+    pub(super) fn write(
+        &mut self,
+        path: &str,
+        reader: &mut dyn Read,
+        packed_bytes: Option<u64>,
+    ) -> Result<io::Result<Written>, Halt> {
+        let mut out = if self.findings.has_errors() {
+            None
+        } else {
+            self.create(path)?
+        };
+        let mut sha256 = Sha256::new();
+        let mut crc = Crc::new();
+        let mut bytes = 0u64;
+        let mut buffer = vec![0u8; 64 * 1024];
+        loop {
+            let n = match reader.read(&mut buffer) {
+                Ok(0) => break,
+                Ok(n) => n,
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
+                Err(e) => return Ok(Err(e)),
+            };
+            let chunk = &buffer[..n];
+            if bytes == 0
+                && let Some(kind) = archive_magic(chunk)
+            {
+                self.findings.push(
+                    Finding::warning(
+                        "nested_archive",
+                        format!("an archive ({kind}) inside the hand-in is not opened"),
+                    )
+                    .at(path)
+                    .hint("put its files into the tree themselves"),
+                );
+            }
+            bytes += n as u64;
+            if bytes > mib(self.limits.max_file_mib) {
+                let message = format!(
+                    "the file exceeds the limit of {} MiB",
+                    self.limits.max_file_mib
+                );
+                return Err(self.refuse(Finding::error("limit_file", message).at(path)));
+            }
+            if packed_bytes.is_some_and(|packed| self.limits.ratio_exceeded(bytes, packed)) {
+                let message = format!(
+                    "unpacks to more than {} times its packed size",
+                    self.limits.max_ratio
+                );
+                return Err(self.refuse(Finding::error("limit_ratio", message).at(path)));
+            }
+            self.count_bytes(n as u64, path)?;
+            sha256.update(chunk);
+            crc.update(chunk);
+            if let Some(file) = &mut out {
+                file.write_all(chunk)
+                    .map_err(|e| IntakeError::io("write", &self.dest.join(path), e))?;
+            }
+        }
+        let sha256 = hex(&sha256.finalize());
+        self.files.insert(
+            path.to_owned(),
+            Some(HandInFile {
+                path: path.to_owned(),
+                bytes,
+                sha256,
+            }),
+        );
+        Ok(Ok(Written {
+            bytes,
+            crc32: crc.sum(),
+        }))
+    }
+
+    /// Creates a new file; `None` where its name is taken (a file system that ignores case).
+    fn create(&mut self, path: &str) -> Result<Option<File>, Halt> {
+        let full = self.dest.join(path);
+        if let Some(parent) = full.parent() {
+            fs::create_dir_all(parent).map_err(|e| IntakeError::io("create folder", parent, e))?;
+        }
+        match File::create_new(&full) {
+            Ok(file) => Ok(Some(file)),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {
+                self.findings.push(
+                    Finding::error(
+                        "case_collision",
+                        "the name is taken by one that differs only in case",
+                    )
+                    .at(path),
+                );
+                Ok(None)
+            }
+            Err(e) => Err(IntakeError::io("create", &full, e).into()),
+        }
+    }
+
+    /// Ends the copy after reading ended with `result`: lists it, or empties the destination.
+    pub(super) fn finish(
+        mut self,
+        name: &str,
+        format: Format,
+        result: Result<(), Halt>,
+    ) -> Result<HandIn, IntakeError> {
+        if let Err(Halt::Io(error)) = result {
+            clear(self.dest)?;
+            return Err(error);
+        }
+        for (pattern, count) in std::mem::take(&mut self.ignored) {
+            self.findings.push(Finding::note(
+                "ignored",
+                format!("{count} entries ignored: {pattern}"),
+            ));
+        }
+        let mut files: Vec<HandInFile> = self.files.into_values().flatten().collect();
+        if files.is_empty() && !self.findings.has_errors() {
+            self.findings.push(
+                Finding::error("empty", "the hand-in holds no files")
+                    .hint("archive the folder that holds config.json"),
+            );
+        }
+        if self.findings.has_errors() {
+            clear(self.dest)?;
+            return Err(IntakeError::Refused(Box::new(Refusal {
+                name: printable(name),
+                format: Some(format),
+                findings: self.findings.into_vec(),
+            })));
+        }
+        let wrapped_in = wrapping_folder(&files, self.tree);
+        let mut root = self.dest.to_owned();
+        if let Some(folder) = &wrapped_in {
+            root.push(folder);
+            for file in &mut files {
+                file.path.drain(..=folder.len());
+            }
+            self.findings.push(
+                Finding::note(
+                    "wrapped",
+                    "one wrapping folder: taken as the root of the hand-in",
+                )
+                .at(format!("{folder}/")),
+            );
+        }
+        files.sort_by(|a, b| a.path.cmp(&b.path));
+        Ok(HandIn {
+            name: printable(name),
+            format,
+            root,
+            wrapped_in,
+            digest: digest(&files),
+            files,
+            findings: self.findings.into_vec(),
+        })
+    }
+}
+
+/// The single folder that holds everything, unless it is one of the tree's own.
+fn wrapping_folder(files: &[HandInFile], tree: &TreeSpec) -> Option<String> {
+    let (top, _) = files.first()?.path.split_once('/')?;
+    let inside = |path: &str| {
+        path.strip_prefix(top)
+            .is_some_and(|rest| rest.starts_with('/'))
+    };
+    if !files.iter().all(|file| inside(&file.path)) {
+        return None;
+    }
+    let config = format!("{top}/{CONFIG_FILE}");
+    (!tree.is_top_folder(top) || files.iter().any(|file| file.path == config))
+        .then(|| top.to_owned())
+}
+
+/// SHA-256 over the sorted files: for each the length of its path (u64, little endian), the path
+/// and the SHA-256 of its content. The same for a zip, a tar and a folder with the same files.
+fn digest(files: &[HandInFile]) -> String {
+    let mut sha256 = Sha256::new();
+    for file in files {
+        sha256.update((file.path.len() as u64).to_le_bytes());
+        sha256.update(&file.path);
+        sha256.update(&file.sha256);
+    }
+    hex(&sha256.finalize())
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Removes what was written; the destination was empty before.
+fn clear(dest: &Path) -> Result<(), IntakeError> {
+    let entries = fs::read_dir(dest).map_err(|e| IntakeError::io("list", dest, e))?;
+    for entry in entries {
+        let path = entry.map_err(|e| IntakeError::io("list", dest, e))?.path();
+        let is_dir = path.symlink_metadata().is_ok_and(|m| m.is_dir());
+        let removed = if is_dir {
+            fs::remove_dir_all(&path)
+        } else {
+            fs::remove_file(&path)
+        };
+        removed.map_err(|e| IntakeError::io("remove", &path, e))?;
+    }
+    Ok(())
+}

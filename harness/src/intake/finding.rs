@@ -1,0 +1,232 @@
+//! A finding: one thing to say about a hand-in, with its place and what to do about it.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// How much a finding weighs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The hand-in is refused, or does not conform.
+    Error,
+    /// Somebody should look, but nothing is refused.
+    Warning,
+    /// Said for completeness.
+    Note,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+            Self::Note => "note",
+        })
+    }
+}
+
+/// One thing to say about a hand-in.
+///
+/// Text in `path`, `message` and `hint` holds no control and no bidirectional override characters.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Finding {
+    /// How much it weighs.
+    pub severity: Severity,
+    /// A stable name such as `zip_encrypted`, for tests and tables.
+    pub code: String,
+    /// The entry or file it is about, as the archive or folder names it.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub path: Option<String>,
+    /// Line in that file, from 1.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub line: Option<u32>,
+    /// What is the matter: expected and found.
+    pub message: String,
+    /// What to do about it.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub hint: Option<String>,
+}
+
+impl Finding {
+    fn new(severity: Severity, code: &str, message: impl Into<String>) -> Self {
+        Self {
+            severity,
+            code: code.to_owned(),
+            path: None,
+            line: None,
+            message: message.into(),
+            hint: None,
+        }
+    }
+
+    /// A finding that refuses the hand-in or keeps it from conforming.
+    pub fn error(code: &str, message: impl Into<String>) -> Self {
+        Self::new(Severity::Error, code, message)
+    }
+
+    /// A finding that somebody should look at.
+    pub fn warning(code: &str, message: impl Into<String>) -> Self {
+        Self::new(Severity::Warning, code, message)
+    }
+
+    /// A finding said for completeness.
+    pub fn note(code: &str, message: impl Into<String>) -> Self {
+        Self::new(Severity::Note, code, message)
+    }
+
+    /// Names the entry or file.
+    #[must_use]
+    pub fn at(mut self, path: impl Into<String>) -> Self {
+        self.path = Some(path.into());
+        self
+    }
+
+    /// Names the line, from 1.
+    #[must_use]
+    pub fn on_line(mut self, line: u32) -> Self {
+        self.line = Some(line);
+        self
+    }
+
+    /// Says what to do.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+}
+
+/// `error: config.json:3: studentID is empty (hint: write your student number)`
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: ", self.severity)?;
+        if let Some(path) = &self.path {
+            write!(f, "{path}:")?;
+            if let Some(line) = self.line {
+                write!(f, "{line}:")?;
+            }
+            f.write_str(" ")?;
+        }
+        f.write_str(&self.message)?;
+        if let Some(hint) = &self.hint {
+            write!(f, " (hint: {hint})")?;
+        }
+        Ok(())
+    }
+}
+
+/// Collects findings and keeps at most [`Findings::KEPT`] of each severity, so that an archive
+/// with a hundred thousand bad entries has a readable answer.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    list: Vec<Finding>,
+    counts: [usize; 3],
+}
+
+impl Findings {
+    /// Kept per severity.
+    pub(super) const KEPT: usize = 50;
+
+    pub(super) fn push(&mut self, finding: Finding) {
+        let count = &mut self.counts[finding.severity as usize];
+        *count += 1;
+        if *count <= Self::KEPT {
+            self.list.push(finding);
+        }
+    }
+
+    pub(super) fn has_errors(&self) -> bool {
+        self.counts[Severity::Error as usize] > 0
+    }
+
+    /// The kept findings, worst first, then in the order they were found; ends with a note where
+    /// some were left out.
+    pub(super) fn into_vec(mut self) -> Vec<Finding> {
+        self.list.sort_by_key(|finding| finding.severity);
+        for (severity, count) in [Severity::Error, Severity::Warning, Severity::Note]
+            .into_iter()
+            .zip(self.counts)
+        {
+            if count > Self::KEPT {
+                self.list.push(Finding::note(
+                    "more_findings",
+                    format!(
+                        "{} more of severity {severity} are not shown",
+                        count - Self::KEPT
+                    ),
+                ));
+            }
+        }
+        self.list
+    }
+}
+
+/// Whether a character may change how the text around it is shown: control characters and
+/// bidirectional overrides and isolates.
+pub(super) fn is_unprintable(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// Bytes of a hostile name as harmless text of at most about 160 characters.
+pub(super) fn printable_bytes(bytes: &[u8]) -> String {
+    printable(&String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]))
+}
+
+/// Hostile text as harmless text of at most about 160 characters.
+pub(super) fn printable(text: &str) -> String {
+    const SHOWN: usize = 160;
+    let mut out = String::new();
+    for (i, c) in text.chars().enumerate() {
+        if i == SHOWN {
+            out.push_str("...");
+            break;
+        }
+        if is_unprintable(c) {
+            out.extend(c.escape_default());
+        } else {
+            out.push(c);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prints_place_and_hint() {
+        let finding = Finding::error("x", "studentID is empty")
+            .at("config.json")
+            .on_line(3)
+            .hint("write your student number");
+        assert_eq!(
+            finding.to_string(),
+            "error: config.json:3: studentID is empty (hint: write your student number)"
+        );
+    }
+
+    #[test]
+    fn hostile_text_is_made_harmless() {
+        assert_eq!(printable("a\u{1b}[2Jb\u{202e}c"), "a\\u{1b}[2Jb\\u{202e}c");
+        assert_eq!(printable_bytes(b"a\0\xff"), "a\\u{0}\u{fffd}");
+        assert_eq!(printable(&"x".repeat(1000)).len(), 163);
+    }
+
+    #[test]
+    fn many_notes_hide_no_error() {
+        let mut findings = Findings::default();
+        for _ in 0..500 {
+            findings.push(Finding::note("n", "n"));
+        }
+        findings.push(Finding::error("e", "e"));
+        let list = findings.into_vec();
+        assert_eq!(list[0].code, "e");
+        assert_eq!(list.len(), 1 + Findings::KEPT + 1);
+        assert_eq!(
+            list.last().map(|f| f.message.as_str()),
+            Some("450 more of severity note are not shown")
+        );
+    }
+}

@@ -1,0 +1,46 @@
+//! Intake: from what a student hands in to a safe private copy, and what is to be said about it.
+//!
+//! ```text
+//! archive or folder --unpack--> HandIn (a copy, listed and hashed) --validate--> Validation
+//! working folder    --pack----> a2_first_last.zip
+//! nearly right one  --fix-----> a conforming zip
+//! ```
+//!
+//! Everything here is library code without processes. [`unpack`] is the one function that reads
+//! hostile bytes: it reads the hand-in, writes below an empty destination folder that the caller
+//! made, and touches nothing else, so that it can run inside a locked child.
+//!
+//! Conventions: paths of a hand-in are relative, UTF-8, with `/` between components and neither
+//! `.` nor `..`; sizes are bytes; hashes are lower-case hexadecimal SHA-256.
+
+mod check_config;
+mod copy;
+mod finding;
+mod folder;
+mod hand_in_config;
+mod json_lines;
+mod lexer;
+mod limits;
+mod name;
+mod pack;
+mod source_rules;
+mod tar;
+mod tree;
+mod tree_match;
+mod tree_text;
+mod unpack;
+mod validate;
+mod zip;
+
+pub use check_config::check_config;
+pub use finding::{Finding, Severity};
+pub use hand_in_config::{HandInConfig, ListedRender};
+pub use limits::Limits;
+pub use pack::{Packed, archive_name, fix, pack};
+pub use source_rules::{scan_source, scan_text};
+pub use tree::{TreeFile, TreeSpec};
+pub use tree_match::{Mark, TreeLine};
+pub use unpack::{
+    Format, HandIn, HandInFile, IntakeError, Refusal, format_of_bytes, unpack, unpack_bytes,
+};
+pub use validate::{Validation, validate, validate_hand_in, validate_refusal};

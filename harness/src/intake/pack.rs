@@ -1,0 +1,231 @@
+//! Writing conforming archives: `pack` from a working folder, `fix` from a nearly right hand-in.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+
+use ::zip::write::SimpleFileOptions;
+use ::zip::{CompressionMethod, DateTime, ZipWriter};
+use serde::{Deserialize, Serialize};
+
+use super::copy::Kind;
+use super::finding::Finding;
+use super::hand_in_config::{Field, HandInConfig};
+use super::limits::Limits;
+use super::tree::TreeSpec;
+use super::tree_match::{Mark, match_tree, tree_findings};
+use super::unpack::{HandIn, IntakeError, Refusal, copy_folder, unpack, unpack_bytes};
+use super::validate::{Validation, scratch_folder, validate_hand_in};
+
+/// An archive that was written.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Packed {
+    /// Where it lies.
+    pub archive: PathBuf,
+    /// Path in the source and path in the archive, sorted by the latter.
+    pub files: Vec<(String, String)>,
+    /// The archive's own validation; conforms.
+    pub validation: Validation,
+}
+
+/// Packs a working folder: only what the tree asks for, the bonus images under their own name.
+/// The same files give the same bytes. `out` is the archive to write, or a folder in which it is
+/// named by the credentials ([`archive_name`]).
+///
+/// # Errors
+/// [`IntakeError::Refused`] when the archive would not conform; nothing is then written.
+pub fn pack(
+    dir: &Path,
+    out: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<Packed, IntakeError> {
+    let is_wanted = |path: &str, kind: Kind| {
+        let below = |file: &str| {
+            file.strip_prefix(path)
+                .is_some_and(|rest| rest.starts_with('/'))
+        };
+        tree.open_folder_of(path).is_some()
+            || match kind {
+                Kind::File => tree.file_at(path).is_some(),
+                Kind::Folder => {
+                    tree.open_folders.iter().any(|folder| folder == path)
+                        || tree
+                            .files
+                            .iter()
+                            .any(|file| below(&file.path) || file.aliases.iter().any(|a| below(a)))
+                }
+            }
+    };
+    let scratch = scratch_folder()?;
+    let hand_in = copy_folder(dir, &is_wanted, scratch.path(), tree, limits)?;
+    write_conforming(&hand_in, out, tree, limits)
+}
+
+/// Repacks a nearly right hand-in: wrong level, wrong folders, other names, junk and stray files.
+///
+/// # Errors
+/// [`IntakeError::Refused`] when the hand-in itself is refused or something is missing that moving
+/// files cannot mend; nothing is then written.
+pub fn fix(
+    source: &Path,
+    out: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<Packed, IntakeError> {
+    let scratch = scratch_folder()?;
+    let hand_in = unpack(source, scratch.path(), tree, limits)?;
+    write_conforming(&hand_in, out, tree, limits)
+}
+
+/// `a2_first_last.zip` by the credentials: lower case, other signs than letters and digits as `-`.
+pub fn archive_name(config: &HandInConfig, tree: &TreeSpec) -> String {
+    let plain = |field: &Option<Field>| {
+        let text = field
+            .as_ref()
+            .map(|field| field.text.to_lowercase())
+            .unwrap_or_default();
+        let parts: Vec<&str> = text
+            .split(|c: char| !c.is_alphanumeric())
+            .filter(|part| !part.is_empty())
+            .collect();
+        let name: String = parts.join("-").chars().take(40).collect();
+        if name.is_empty() {
+            "unknown".to_owned()
+        } else {
+            name
+        }
+    };
+    format!(
+        "{}_{}_{}.zip",
+        tree.name_prefix,
+        plain(&config.first_name),
+        plain(&config.last_name)
+    )
+}
+
+fn write_conforming(
+    hand_in: &HandIn,
+    out: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<Packed, IntakeError> {
+    let places = places(hand_in, tree)?;
+    let bytes = zip_bytes(hand_in, &places)?;
+    let scratch = scratch_folder()?;
+    let name = out
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    let mut validation = match unpack_bytes(&bytes, &name, scratch.path(), tree, limits) {
+        Ok(copy) => validate_hand_in(&copy, tree)?,
+        Err(error) => return Err(error),
+    };
+    if !validation.conforms {
+        return Err(refused(hand_in, validation.findings));
+    }
+    let archive = match &validation.config {
+        Some(config) if out.is_dir() => out.join(archive_name(config, tree)),
+        _ => out.to_owned(),
+    };
+    validation.name = archive
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    validation
+        .findings
+        .retain(|finding| finding.code != "wrong_extension");
+    // Beside the target, so that a half-written archive is never seen under its name.
+    let partial = archive.with_extension("zip.partial");
+    fs::write(&partial, &bytes).map_err(|e| IntakeError::io("write", &partial, e))?;
+    fs::rename(&partial, &archive).map_err(|e| IntakeError::io("write", &archive, e))?;
+    Ok(Packed {
+        archive,
+        files: places.into_iter().map(|(to, from)| (from, to)).collect(),
+        validation,
+    })
+}
+
+fn refused(hand_in: &HandIn, mut findings: Vec<Finding>) -> IntakeError {
+    findings.sort_by_key(|finding| finding.severity);
+    IntakeError::Refused(Box::new(Refusal {
+        name: hand_in.name.clone(),
+        format: Some(hand_in.format),
+        findings,
+    }))
+}
+
+/// Path in the archive to path in the copy, for everything that belongs to the tree.
+fn places(hand_in: &HandIn, tree: &TreeSpec) -> Result<BTreeMap<String, String>, IntakeError> {
+    let paths: Vec<&str> = hand_in
+        .files
+        .iter()
+        .map(|file| file.path.as_str())
+        .collect();
+    let lines = match_tree(&paths, tree);
+    if lines.iter().any(|line| line.mark == Mark::Missing) {
+        let errors = tree_findings(&lines)
+            .into_iter()
+            .filter(|f| f.code == "tree_missing");
+        return Err(refused(hand_in, errors.collect()));
+    }
+    let mut moves: Vec<(String, String)> = Vec::new();
+    for line in lines {
+        if let (Some(expected), Some(found)) = (line.expected, line.found)
+            && hand_in.file(&found).is_some()
+        {
+            moves.push((expected, found));
+        }
+    }
+    for path in paths {
+        let is_moved = moves.iter().any(|(_, found)| found == path);
+        if !is_moved && tree.open_folder_of(path).is_some() {
+            moves.push((path.to_owned(), path.to_owned()));
+        }
+    }
+    let mut places = BTreeMap::new();
+    for (to, from) in moves {
+        if let Some(other) = places.insert(to.clone(), from.clone()) {
+            let finding = Finding::error(
+                "fix_collision",
+                format!("'{from}' and '{other}' belong to the same place"),
+            );
+            return Err(refused(
+                hand_in,
+                vec![finding.at(to).hint("keep one of them")],
+            ));
+        }
+    }
+    Ok(places)
+}
+
+/// A zip with fixed times, order and permissions.
+fn zip_bytes(hand_in: &HandIn, places: &BTreeMap<String, String>) -> Result<Vec<u8>, IntakeError> {
+    let failed = |e: ::zip::result::ZipError| {
+        refused(
+            hand_in,
+            vec![Finding::error(
+                "pack_failed",
+                format!("cannot be packed: {e}"),
+            )],
+        )
+    };
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .compression_level(Some(6))
+        .last_modified_time(DateTime::default())
+        .unix_permissions(0o644);
+    let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
+    for (to, from) in places {
+        let path = hand_in.root.join(from);
+        let content = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
+        writer.start_file(to.as_str(), options).map_err(failed)?;
+        writer
+            .write_all(&content)
+            .map_err(|e| IntakeError::io("pack", &path, e))?;
+    }
+    Ok(writer.finish().map_err(failed)?.into_inner())
+}

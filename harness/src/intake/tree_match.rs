@@ -1,0 +1,206 @@
+//! The found files laid beside the expected tree.
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+use super::finding::Finding;
+use super::tree::{TreeFile, TreeSpec};
+
+/// How one line of the tree fares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mark {
+    /// Where it must be.
+    Ok,
+    /// Optional and not handed in.
+    Absent,
+    /// Required and not handed in.
+    Missing,
+    /// Handed in under another path.
+    WrongPlace,
+    /// Not part of the tree.
+    Unexpected,
+}
+
+/// One line of the comparison.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TreeLine {
+    /// The expected path; none for files that are not part of the tree.
+    pub expected: Option<String>,
+    /// The found path.
+    pub found: Option<String>,
+    /// How it fares.
+    pub mark: Mark,
+    /// What to do, or what is special.
+    pub advice: String,
+}
+
+/// Lays `paths` (sorted, relative to the root) beside the tree.
+pub(super) fn match_tree(paths: &[&str], tree: &TreeSpec) -> Vec<TreeLine> {
+    let mut taken: BTreeSet<&str> = BTreeSet::new();
+    let mut lines = Vec::new();
+    // Files in their place first, so that no search for a lost file takes them.
+    let placed: Vec<Option<&str>> = tree
+        .files
+        .iter()
+        .map(|file| {
+            let found = std::iter::once(&file.path)
+                .chain(&file.aliases)
+                .find_map(|wanted| paths.iter().copied().find(|path| path == wanted));
+            taken.extend(found);
+            found
+        })
+        .collect();
+    for (file, found) in tree.files.iter().zip(placed) {
+        let found = found.or_else(|| {
+            let lost = find_lost(file, paths, &taken);
+            taken.extend(lost);
+            lost
+        });
+        lines.push(line_of(file, found));
+    }
+    for folder in &tree.open_folders {
+        let inside = |path: &&&str| {
+            path.strip_prefix(folder.as_str())
+                .is_some_and(|rest| rest.starts_with('/'))
+        };
+        let count = paths
+            .iter()
+            .filter(inside)
+            .filter(|path| !taken.contains(**path))
+            .count();
+        taken.extend(paths.iter().filter(inside));
+        if count > 0 {
+            lines.push(TreeLine {
+                expected: Some(format!("{folder}/")),
+                found: Some(format!("{folder}/")),
+                mark: Mark::Ok,
+                advice: format!(
+                    "{count} further {}",
+                    if count == 1 { "file" } else { "files" }
+                ),
+            });
+        }
+    }
+    // Files beside a lost source folder belong to it.
+    for path in paths.iter().filter(|path| !taken.contains(**path)) {
+        let place = source_place(path, &lines, tree);
+        lines.push(match place {
+            Some(place) => TreeLine {
+                advice: format!("move it to {place}"),
+                expected: Some(place),
+                found: Some((*path).to_owned()),
+                mark: Mark::WrongPlace,
+            },
+            None => TreeLine {
+                expected: None,
+                found: Some((*path).to_owned()),
+                mark: Mark::Unexpected,
+                advice: "leave it out; it is not looked at".to_owned(),
+            },
+        });
+    }
+    lines
+}
+
+fn line_of(file: &TreeFile, found: Option<&str>) -> TreeLine {
+    let (mark, advice) = match found {
+        Some(path) if path == file.path => (Mark::Ok, String::new()),
+        Some(path) if file.accepts(path) => (Mark::Ok, "accepted under this name too".to_owned()),
+        Some(_) => (Mark::WrongPlace, format!("move it to {}", file.path)),
+        None if file.required => (Mark::Missing, "add it".to_owned()),
+        None => (Mark::Absent, "optional".to_owned()),
+    };
+    TreeLine {
+        expected: Some(file.path.clone()),
+        found: found.map(str::to_owned),
+        mark,
+        advice,
+    }
+}
+
+/// A file that is probably the expected one: the same path in another case, else the same name in
+/// another folder, the shallowest one; never one of two that are equally likely.
+fn find_lost<'a>(file: &TreeFile, paths: &[&'a str], taken: &BTreeSet<&str>) -> Option<&'a str> {
+    let free = || paths.iter().copied().filter(|path| !taken.contains(path));
+    let names: Vec<&String> = std::iter::once(&file.path).chain(&file.aliases).collect();
+    if let Some(path) = free().find(|path| names.iter().any(|name| name.eq_ignore_ascii_case(path)))
+    {
+        return Some(path);
+    }
+    let base = |path: &str| path.rsplit('/').next().unwrap_or(path).to_lowercase();
+    let mut candidates: Vec<&str> = free()
+        .filter(|path| names.iter().any(|name| base(name) == base(path)))
+        .collect();
+    candidates.sort_by_key(|path| path.matches('/').count());
+    match candidates.as_slice() {
+        [one] => Some(one),
+        [first, second, ..] if first.matches('/').count() < second.matches('/').count() => {
+            Some(first)
+        }
+        _ => None,
+    }
+}
+
+/// Where a file belongs that lies beside a source file in the wrong place: `code/lib.rs` found for
+/// `src/lib.rs` means that `code/bsdfs/phong.rs` is `src/bsdfs/phong.rs`.
+fn source_place(path: &str, lines: &[TreeLine], tree: &TreeSpec) -> Option<String> {
+    lines
+        .iter()
+        .filter(|line| line.mark == Mark::WrongPlace)
+        .find_map(|line| {
+            let (expected, found) = (line.expected.as_ref()?, line.found.as_ref()?);
+            let folder = tree.open_folder_of(expected)?;
+            let rest = &expected[folder.len()..];
+            // Where the whole folder moved, the part after it is the same in both.
+            let moved = found
+                .strip_suffix(rest)
+                .or_else(|| found.strip_suffix(&rest[1..]))?;
+            let inside = if moved.is_empty() {
+                path
+            } else {
+                path.strip_prefix(moved)?.strip_prefix('/')?
+            };
+            // At the root only Rust and shader files are surely source.
+            let is_source =
+                !moved.is_empty() || [".rs", ".wgsl"].iter().any(|end| inside.ends_with(end));
+            is_source.then(|| format!("{folder}/{inside}"))
+        })
+}
+
+/// What the comparison means for the verdict.
+pub(super) fn tree_findings(lines: &[TreeLine]) -> Vec<Finding> {
+    lines
+        .iter()
+        .filter_map(|line| {
+            let expected = line.expected.clone().unwrap_or_default();
+            let found = line.found.clone().unwrap_or_default();
+            match line.mark {
+                Mark::Ok if !line.advice.starts_with("accepted") => None,
+                Mark::Absent => None,
+                Mark::Ok => {
+                    Some(Finding::note("alias", format!("accepted for '{expected}'")).at(found))
+                }
+                Mark::Missing => Some(
+                    Finding::error(
+                        "tree_missing",
+                        "expected in the hand-in, found nothing like it",
+                    )
+                    .at(expected)
+                    .hint("add it, then pack again"),
+                ),
+                Mark::WrongPlace => Some(
+                    Finding::error("tree_wrong_place", format!("expected at '{expected}'"))
+                        .at(found)
+                        .hint("move it there, or let umbra validate --fix do it"),
+                ),
+                Mark::Unexpected => Some(
+                    Finding::warning("tree_unexpected", "not part of the expected tree")
+                        .at(found)
+                        .hint("leave it out; it is not looked at"),
+                ),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,304 @@
+//! The entry of intake: decides the format by content and makes the private copy.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::copy::{Halt, Kind, PrivateCopy};
+use super::finding::{Finding, printable};
+use super::limits::{Limits, mib};
+use super::tree::TreeSpec;
+use super::{folder, tar, zip};
+
+/// What a hand-in is, by its content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Format {
+    /// A folder.
+    Folder,
+    /// A `.zip`.
+    Zip,
+    /// A `.tar`.
+    Tar,
+    /// A `.tar.gz` or `.tgz`.
+    TarGz,
+}
+
+/// One file of the private copy.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HandInFile {
+    /// Path from the root of the hand-in.
+    pub path: String,
+    /// Size [bytes].
+    pub bytes: u64,
+    /// SHA-256 of the content, lower-case hexadecimal.
+    pub sha256: String,
+}
+
+/// The private copy of a hand-in.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HandIn {
+    /// Name of the archive or folder as it was handed in.
+    pub name: String,
+    /// What it was.
+    pub format: Format,
+    /// Folder of the copy that corresponds to the root of the expected tree.
+    pub root: PathBuf,
+    /// The one wrapping folder, already part of `root`.
+    pub wrapped_in: Option<String>,
+    /// The files, sorted by path.
+    pub files: Vec<HandInFile>,
+    /// SHA-256 over sorted paths and contents; independent of the format and of wrapping.
+    pub digest: String,
+    /// What was seen on the way; no errors.
+    pub findings: Vec<Finding>,
+}
+
+impl HandIn {
+    /// The file at `path`.
+    pub fn file(&self, path: &str) -> Option<&HandInFile> {
+        self.files.iter().find(|file| file.path == path)
+    }
+}
+
+/// A hand-in that was refused as a whole; nothing of it was kept.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Refusal {
+    /// Name of the archive or folder as it was handed in.
+    pub name: String,
+    /// What it was, where that was told apart.
+    pub format: Option<Format>,
+    /// Why: at least one error.
+    pub findings: Vec<Finding>,
+}
+
+/// Why there is no private copy.
+#[derive(Debug, thiserror::Error)]
+pub enum IntakeError {
+    /// The submission's matter.
+    #[error("hand-in '{}' refused: {}", .0.name, .0.findings.first().map(ToString::to_string).unwrap_or_default())]
+    Refused(Box<Refusal>),
+    /// The environment's matter.
+    #[error("cannot {doing} '{path}': {source}")]
+    Io {
+        /// What was tried, such as `read`.
+        doing: &'static str,
+        /// On which path.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// The caller's matter: the copy must be alone in its folder.
+    #[error("destination '{path}' is not empty")]
+    DestinationNotEmpty {
+        /// The destination.
+        path: PathBuf,
+    },
+}
+
+impl IntakeError {
+    pub(super) fn io(doing: &'static str, path: &Path, source: io::Error) -> Self {
+        Self::Io {
+            doing,
+            path: path.to_owned(),
+            source,
+        }
+    }
+}
+
+/// Copies the hand-in at `source` (archive or folder) once, without following links, into the
+/// empty folder `dest`.
+///
+/// # Errors
+/// [`IntakeError::Refused`] with every reason found; `dest` is then empty again. The others are
+/// matters of the machine or the caller.
+pub fn unpack(
+    source: &Path,
+    dest: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<HandIn, IntakeError> {
+    let name = name_of(source);
+    // The path itself was given by whoever grades, so a link there is followed.
+    let metadata = source
+        .metadata()
+        .map_err(|e| IntakeError::io("read", source, e))?;
+    if metadata.is_dir() {
+        return copy_folder(source, &|_, _| true, dest, tree, limits);
+    }
+    if !metadata.is_file() {
+        return refused(
+            &name,
+            None,
+            Finding::error("not_a_file", "expected an archive or a folder"),
+        );
+    }
+    let file = File::open(source).map_err(|e| IntakeError::io("read", source, e))?;
+    let mut bytes = Vec::new();
+    file.take(mib(limits.max_total_mib).saturating_add(1))
+        .read_to_end(&mut bytes)
+        .map_err(|e| IntakeError::io("read", source, e))?;
+    unpack_bytes(&bytes, &name, dest, tree, limits)
+}
+
+/// Copies the wanted part of a folder.
+pub(super) fn copy_folder(
+    source: &Path,
+    is_wanted: &dyn Fn(&str, Kind) -> bool,
+    dest: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<HandIn, IntakeError> {
+    let mut copy = PrivateCopy::new(dest, tree, limits)?;
+    let result = folder::read(source, is_wanted, &mut copy);
+    copy.finish(&name_of(source), Format::Folder, result)
+}
+
+/// The last component of a path, also of `.` and `..`.
+fn name_of(source: &Path) -> String {
+    let whole = source.canonicalize().unwrap_or_else(|_| source.to_owned());
+    let name = source
+        .file_name()
+        .or(whole.file_name())
+        .unwrap_or(source.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// Like [`unpack`], of the archive with these bytes. `name` only serves the messages.
+///
+/// # Errors
+/// As [`unpack`].
+pub fn unpack_bytes(
+    bytes: &[u8],
+    name: &str,
+    dest: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<HandIn, IntakeError> {
+    let mut copy = PrivateCopy::new(dest, tree, limits)?;
+    if bytes.len() as u64 > mib(limits.max_total_mib) {
+        let message = format!(
+            "the archive exceeds the limit of {} MiB",
+            limits.max_total_mib
+        );
+        return refused(name, None, Finding::error("limit_total", message));
+    }
+    let Some(format) = format_of_bytes(bytes) else {
+        return refused(name, None, unknown_format(bytes));
+    };
+    check_extension(name, format, &mut copy);
+    let result = match format {
+        Format::Zip => zip::read(bytes, &mut copy),
+        Format::Tar => tar::read(bytes, &mut copy),
+        Format::TarGz => tar::read_gz(bytes, &mut copy),
+        Format::Folder => Err(Halt::Refused),
+    };
+    copy.finish(name, format, result)
+}
+
+fn refused<T>(name: &str, format: Option<Format>, finding: Finding) -> Result<T, IntakeError> {
+    let refusal = Refusal {
+        name: printable(name),
+        format,
+        findings: vec![finding],
+    };
+    Err(IntakeError::Refused(Box::new(refusal)))
+}
+
+/// The format of an archive by its content; never [`Format::Folder`].
+pub fn format_of_bytes(bytes: &[u8]) -> Option<Format> {
+    if bytes.starts_with(b"\x1f\x8b") {
+        Some(Format::TarGz)
+    } else if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06") {
+        Some(Format::Zip)
+    } else if tar::looks_like_tar(bytes) {
+        Some(Format::Tar)
+    } else if archive_magic(bytes).is_none() && zip::has_end_record(bytes) {
+        // Something stands before the zip; its reader says so.
+        Some(Format::Zip)
+    } else {
+        None
+    }
+}
+
+/// The kind of a packed file by its first bytes.
+pub(super) fn archive_magic(bytes: &[u8]) -> Option<&'static str> {
+    const MAGIC: [(&[u8], &str); 8] = [
+        (b"PK\x03\x04", "zip"),
+        (b"\x1f\x8b", "gzip"),
+        (b"Rar!\x1a\x07", "rar"),
+        (b"7z\xbc\xaf\x27\x1c", "7z"),
+        (b"BZh", "bzip2"),
+        (b"\xfd7zXZ\0", "xz"),
+        (b"\x28\xb5\x2f\xfd", "zstd"),
+        (b"MSCF", "cab"),
+    ];
+    MAGIC
+        .iter()
+        .find(|(magic, _)| bytes.starts_with(magic))
+        .map(|(_, kind)| *kind)
+}
+
+fn unknown_format(bytes: &[u8]) -> Finding {
+    const EXPECTED: &str = "expected a .zip, .tar or .tar.gz archive or a folder";
+    const HINT: &str = "umbra pack makes the right archive from your working folder";
+    match archive_magic(bytes) {
+        Some(kind @ ("rar" | "7z" | "cab")) => Finding::error(
+            "format_unsupported",
+            format!("this is a {kind} archive, which we cannot open; {EXPECTED}"),
+        )
+        .hint(format!(
+            "your files are fine: unpack the {kind} and zip the folder; {HINT}"
+        )),
+        Some(kind) => Finding::error(
+            "format_unsupported",
+            format!("this is {kind} data; {EXPECTED}"),
+        )
+        .hint(format!("pack it again as .tar.gz or .zip; {HINT}")),
+        None if bytes.is_empty() => {
+            Finding::error("empty", format!("the file is empty (0 bytes); {EXPECTED}"))
+                .hint("the upload may have been cut off; hand in again")
+        }
+        None => {
+            let start = bytes.get(..16).unwrap_or(bytes).to_ascii_lowercase();
+            let found = if start.starts_with(b"<!doctype") || start.starts_with(b"<html") {
+                "a web page"
+            } else if start.starts_with(b"%pdf") {
+                "a PDF"
+            } else if start.starts_with(b"v/1\x01") {
+                "a single EXR image"
+            } else {
+                "something else"
+            };
+            Finding::error("format_unknown", format!("{EXPECTED}, found {found}")).hint(HINT)
+        }
+    }
+}
+
+/// Notes an extension that does not belong to the content.
+fn check_extension(name: &str, format: Format, copy: &mut PrivateCopy<'_>) {
+    let lower = name.to_lowercase();
+    let (fits, what) = match format {
+        Format::Zip => (lower.ends_with(".zip"), "a zip archive"),
+        Format::Tar => (lower.ends_with(".tar"), "a tar archive"),
+        Format::TarGz => (
+            lower.ends_with(".gz") || lower.ends_with(".tgz"),
+            "gzip data",
+        ),
+        Format::Folder => (true, "a folder"),
+    };
+    if !fits {
+        copy.findings.push(
+            Finding::warning(
+                "wrong_extension",
+                format!(
+                    "the content is {what}, which '{}' does not say",
+                    printable(name)
+                ),
+            )
+            .hint("name it .zip, .tar or .tar.gz by what it is"),
+        );
+    }
+}

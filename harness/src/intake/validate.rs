@@ -1,0 +1,123 @@
+//! Whether a hand-in conforms to the expected tree, and what to do where it does not.
+
+use std::fs;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::check_config::check_config;
+use super::finding::{Finding, Severity};
+use super::hand_in_config::HandInConfig;
+use super::limits::Limits;
+use super::tree::{CONFIG_FILE, TreeSpec};
+use super::tree_match::{TreeLine, match_tree, tree_findings};
+use super::unpack::{Format, HandIn, IntakeError, Refusal, unpack};
+
+/// What `validate` found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Validation {
+    /// Name of the archive or folder.
+    pub name: String,
+    /// What it is.
+    pub format: Option<Format>,
+    /// Whether there is no error among the findings.
+    pub conforms: bool,
+    /// The expected tree beside the found one; empty for a hand-in that was refused.
+    pub tree: Vec<TreeLine>,
+    /// What `config.json` says, where there is one.
+    pub config: Option<HandInConfig>,
+    /// Everything to say, errors first.
+    pub findings: Vec<Finding>,
+}
+
+/// Largest `config.json` that is read [bytes].
+const MAX_CONFIG: u64 = 1 << 20;
+
+/// Validates an archive or folder by way of a private copy in the system's temporary folder.
+///
+/// # Errors
+/// Only matters of the machine; what is wrong with the hand-in is in the validation.
+pub fn validate(
+    source: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<Validation, IntakeError> {
+    let scratch = scratch_folder()?;
+    match unpack(source, scratch.path(), tree, limits) {
+        Ok(hand_in) => validate_hand_in(&hand_in, tree),
+        Err(IntakeError::Refused(refusal)) => Ok(validate_refusal(&refusal)),
+        Err(error) => Err(error),
+    }
+}
+
+pub(super) fn scratch_folder() -> Result<tempfile::TempDir, IntakeError> {
+    tempfile::tempdir().map_err(|e| IntakeError::io("create a folder in", &std::env::temp_dir(), e))
+}
+
+/// Validates a private copy that was already made.
+///
+/// # Errors
+/// The copy cannot be read.
+pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation, IntakeError> {
+    let paths: Vec<&str> = hand_in
+        .files
+        .iter()
+        .map(|file| file.path.as_str())
+        .collect();
+    let lines = match_tree(&paths, tree);
+    let mut findings = hand_in.findings.clone();
+    findings.extend(tree_findings(&lines));
+    let mut config = None;
+    if let Some(file) = hand_in.file(CONFIG_FILE) {
+        if file.bytes > MAX_CONFIG {
+            findings.push(
+                Finding::error(
+                    "config_shape",
+                    format!("{} bytes, over the limit of {MAX_CONFIG}", file.bytes),
+                )
+                .at(CONFIG_FILE)
+                .on_line(1)
+                .hint("start from the template's config.json"),
+            );
+        } else {
+            let path = hand_in.root.join(CONFIG_FILE);
+            let bytes = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
+            let (parsed, said) = HandInConfig::parse(&bytes);
+            // What could not be read would be reported as missing once more.
+            let is_readable = !said.iter().any(|f| {
+                matches!(
+                    f.code.as_str(),
+                    "json_syntax" | "json_encoding" | "json_depth" | "config_shape"
+                )
+            });
+            findings.extend(said);
+            if is_readable {
+                findings.extend(check_config(&parsed, &paths, tree));
+            }
+            config = Some(parsed);
+        }
+    }
+    findings.sort_by_key(|finding| finding.severity);
+    Ok(Validation {
+        name: hand_in.name.clone(),
+        format: Some(hand_in.format),
+        conforms: findings
+            .iter()
+            .all(|finding| finding.severity != Severity::Error),
+        tree: lines,
+        config,
+        findings,
+    })
+}
+
+/// The validation of a hand-in that was refused.
+pub fn validate_refusal(refusal: &Refusal) -> Validation {
+    Validation {
+        name: refusal.name.clone(),
+        format: refusal.format,
+        conforms: false,
+        tree: Vec::new(),
+        config: None,
+        findings: refusal.findings.clone(),
+    }
+}

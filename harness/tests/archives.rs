@@ -1,0 +1,1024 @@
+//! Hostile archives, one test each: the finding, the entry it names, nothing written outside the
+//! destination, nothing left inside it.
+
+mod support;
+
+use support::scratch::{assert_accepted, assert_refused};
+use support::tar_bytes::{self, gz, pax_record, tar};
+use support::zip_bytes::{Entry, Zip, crc32, deflated, extra};
+
+/// A second, honest entry: a refusal must not keep it.
+fn good() -> Entry {
+    Entry::deflated("config.json", b"{}")
+}
+
+#[track_caller]
+fn zip_refused(entries: impl IntoIterator<Item = Entry>, code: &str, path: &str) -> String {
+    let entries = std::iter::once(good()).chain(entries);
+    assert_refused(&Zip::of(entries).bytes(), "a.zip", code, path).message
+}
+
+#[track_caller]
+fn tar_refused(entries: &[tar_bytes::Entry], code: &str, path: &str) -> String {
+    let mut all = vec![tar_bytes::Entry::file("config.json", b"{}")];
+    all.extend_from_slice(entries);
+    let plain = assert_refused(&tar(&all), "a.tar", code, path);
+    let packed = assert_refused(&gz(&tar(&all)), "a.tar.gz", code, path);
+    assert_eq!(plain, packed);
+    plain.message
+}
+
+// --- names ---
+
+#[test]
+fn zip_absolute_path() {
+    zip_refused(
+        [Entry::stored("/etc/cron.d/x", b"x")],
+        "path_absolute",
+        "/etc/cron.d/x",
+    );
+}
+
+#[test]
+fn zip_drive_letter() {
+    zip_refused(
+        [Entry::stored("C:/Windows/x", b"x")],
+        "path_drive",
+        "C:/Windows/x",
+    );
+}
+
+#[test]
+fn zip_parent_at_start() {
+    zip_refused(
+        [Entry::stored("../canary.txt", b"x")],
+        "path_escape",
+        "../canary.txt",
+    );
+}
+
+#[test]
+fn zip_parent_in_the_middle() {
+    zip_refused(
+        [Entry::stored("src/../../canary.txt", b"x")],
+        "path_escape",
+        "src/../../canary.txt",
+    );
+}
+
+#[test]
+fn zip_parent_in_a_folder() {
+    zip_refused([Entry::stored("../out/", b"")], "path_escape", "../out/");
+}
+
+#[test]
+fn zip_parent_in_an_ignored_place() {
+    zip_refused(
+        [Entry::stored("__MACOSX/../../x", b"x")],
+        "path_escape",
+        "__MACOSX/../../x",
+    );
+}
+
+#[test]
+fn zip_backslash_parent() {
+    zip_refused(
+        [Entry::stored("..\\..\\canary.txt", b"x")],
+        "name_backslash",
+        "..\\..\\canary.txt",
+    );
+}
+
+#[test]
+fn zip_nul_in_name() {
+    zip_refused(
+        [Entry::stored("src/lib.rs\0.txt", b"x")],
+        "name_nul",
+        "src/lib.rs\\u{0}.txt",
+    );
+}
+
+#[test]
+fn zip_control_characters_in_name() {
+    zip_refused(
+        [Entry::stored("a\x1b[2J\n", b"x")],
+        "name_control",
+        "a\\u{1b}[2J\\n",
+    );
+}
+
+#[test]
+fn zip_bidi_override_in_name() {
+    zip_refused(
+        [Entry::stored("a\u{202e}txt.exe", b"x")],
+        "name_control",
+        "a\\u{202e}txt.exe",
+    );
+}
+
+#[test]
+fn zip_empty_name() {
+    zip_refused([Entry::stored("", b"x")], "name_empty", "");
+}
+
+#[test]
+fn zip_name_of_the_root() {
+    zip_refused([Entry::stored("./.", b"x")], "name_empty", "");
+}
+
+#[test]
+fn zip_name_too_long() {
+    let name = "n".repeat(121);
+    zip_refused([Entry::stored(&name, b"x")], "limit_path_bytes", &name);
+}
+
+#[test]
+fn zip_too_deep() {
+    zip_refused(
+        [Entry::stored("1/2/3/4/5/6/7", b"x")],
+        "limit_depth",
+        "1/2/3/4/5/6/7",
+    );
+}
+
+#[test]
+fn zip_unicode_extra_field_with_another_name() {
+    let mut field = vec![1];
+    field.extend(crc32(b"readme.txt").to_le_bytes());
+    field.extend(b"../canary.txt");
+    let entry = Entry::stored("readme.txt", b"x").both(|h| h.extra = extra(0x7075, &field));
+    zip_refused([entry], "zip_name_override", "readme.txt");
+}
+
+#[test]
+fn zip_unicode_extra_field_that_escapes() {
+    let mut field = vec![1];
+    field.extend(crc32(b"\xe9.txt").to_le_bytes());
+    field.extend(b"../canary.txt");
+    let entry =
+        Entry::with(b"\xe9.txt", 0, b"x".to_vec(), b"x").both(|h| h.extra = extra(0x7075, &field));
+    zip_refused([entry], "path_escape", "../canary.txt");
+}
+
+// --- kinds ---
+
+#[test]
+fn zip_symbolic_link() {
+    zip_refused(
+        [Entry::stored("src/lib.rs", b"/etc/passwd").mode(0o120777)],
+        "link",
+        "src/lib.rs",
+    );
+}
+
+#[test]
+fn zip_link_then_file_through_it() {
+    let entries = [
+        Entry::stored("src", b"/tmp").mode(0o120777),
+        Entry::stored("src/lib.rs", b"x"),
+    ];
+    zip_refused(entries, "link", "src");
+}
+
+#[test]
+fn zip_device() {
+    zip_refused(
+        [Entry::stored("dev", b"").mode(0o020666)],
+        "special_file",
+        "dev",
+    );
+}
+
+#[test]
+fn zip_fifo() {
+    zip_refused(
+        [Entry::stored("pipe", b"").mode(0o010666)],
+        "special_file",
+        "pipe",
+    );
+}
+
+#[test]
+fn zip_folder_with_data() {
+    zip_refused(
+        [Entry::stored("src/", b"hidden")],
+        "zip_folder_data",
+        "src/",
+    );
+}
+
+// --- several entries in one place ---
+
+#[test]
+fn zip_duplicate_entry() {
+    let twice = [
+        Entry::stored("src/lib.rs", b"a"),
+        Entry::stored("src/lib.rs", b"b"),
+    ];
+    zip_refused(twice, "duplicate_entry", "src/lib.rs");
+}
+
+#[test]
+fn zip_duplicate_after_normalising() {
+    let twice = [
+        Entry::stored("src/lib.rs", b"a"),
+        Entry::stored("./src//./lib.rs", b"b"),
+    ];
+    zip_refused(twice, "duplicate_entry", "src/lib.rs");
+}
+
+#[test]
+fn zip_file_and_folder() {
+    let both = [
+        Entry::stored("src", b"a"),
+        Entry::stored("src/lib.rs", b"b"),
+    ];
+    zip_refused(both, "file_and_folder", "src/lib.rs");
+}
+
+#[test]
+fn zip_folder_and_file() {
+    let both = [
+        Entry::stored("src/lib.rs", b"b"),
+        Entry::stored("src", b"a"),
+    ];
+    zip_refused(both, "file_and_folder", "src");
+}
+
+#[test]
+fn zip_overlap_same_local_header() {
+    let mut second = Entry::deflated("b", b"bbbb");
+    second.local = Entry::deflated("config.json", b"{}").local;
+    second.central = second.local.clone();
+    second.offset = Some(0);
+    let message = zip_refused([second], "zip_overlap", "config.json");
+    assert!(message.contains("config.json"));
+}
+
+#[test]
+fn zip_overlap_quoted_local_headers() {
+    // The full overlap of a better zip bomb: the first entry's data holds the second whole.
+    let inner = Entry::stored("b", b"bomb");
+    let inner_bytes = Zip::of([inner.clone()]).bytes();
+    let local = &inner_bytes[..30 + 1 + 4];
+    let outer = Entry::stored("a", local);
+    let mut zip = Zip::of([outer, inner]);
+    zip.entries[1].offset = Some(30 + 1);
+    assert_refused(&zip.bytes(), "a.zip", "zip_overlap", "b");
+}
+
+// --- limits ---
+
+#[test]
+fn zip_too_many_entries() {
+    let many = (0..41).map(|i| Entry::stored(&format!("src/{i}.rs"), b""));
+    assert_refused(&Zip::of(many).bytes(), "a.zip", "limit_entries", "");
+}
+
+#[test]
+fn zip_file_too_large() {
+    let noise: Vec<u8> = (0..2 * 1024 * 1024 + 1u32)
+        .map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8)
+        .collect();
+    zip_refused([Entry::stored("big.bin", &noise)], "limit_file", "big.bin");
+}
+
+#[test]
+fn zip_total_too_large() {
+    let noise: Vec<u8> = (0..2 * 1024 * 1024u32).map(|i| (i % 7) as u8).collect();
+    let three = ["a", "b", "c"]
+        .map(|name| Entry::deflated(name, &noise))
+        .map(|e| e.both(|h| h.flags = 0));
+    zip_refused(three, "limit_ratio", "a");
+    // Below the ratio, so that the total is what refuses.
+    let mut seed = 1u32;
+    let noise: Vec<u8> = (0..2 * 1024 * 1024u32)
+        .map(|i| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            if i % 4 == 0 { (seed >> 24) as u8 } else { 0 }
+        })
+        .collect();
+    let three = ["a", "b", "c"].map(|name| Entry::deflated(name, &noise));
+    zip_refused(three, "limit_total", "c");
+}
+
+#[test]
+fn zip_ratio_bomb() {
+    zip_refused(
+        [Entry::deflated("bomb", &vec![0; 1536 * 1024])],
+        "limit_ratio",
+        "bomb",
+    );
+}
+
+#[test]
+fn zip_bomb_with_a_small_size_in_its_headers() {
+    let entry = Entry::deflated("bomb", &vec![0; 1536 * 1024]).both(|h| h.unpacked = 10);
+    zip_refused([entry], "zip_size", "bomb");
+}
+
+// --- encryption and compression ---
+
+#[test]
+fn zip_encrypted() {
+    zip_refused(
+        [Entry::stored("secret", b"x").both(|h| h.flags = 1)],
+        "zip_encrypted",
+        "secret",
+    );
+}
+
+#[test]
+fn zip_aes() {
+    zip_refused(
+        [Entry::stored("secret", b"x").both(|h| h.method = 99)],
+        "zip_encrypted",
+        "secret",
+    );
+}
+
+#[test]
+fn zip_unsupported_compression() {
+    let message = zip_refused(
+        [Entry::stored("a", b"x").both(|h| h.method = 14)],
+        "zip_compression",
+        "a",
+    );
+    assert!(message.contains("lzma (14)"), "{message}");
+}
+
+// --- headers that disagree ---
+
+#[test]
+fn zip_names_disagree() {
+    let mut entry = Entry::stored("readme.txt", b"x");
+    entry.local.name = b"src/lib.rs".to_vec();
+    let message = zip_refused([entry], "zip_headers_disagree", "readme.txt");
+    assert!(message.contains("src/lib.rs"), "{message}");
+}
+
+#[test]
+fn zip_methods_disagree() {
+    let mut entry = Entry::stored("a", b"x");
+    entry.local.method = 8;
+    let message = zip_refused([entry], "zip_headers_disagree", "a");
+    assert_eq!(
+        message,
+        "compression method: the directory says 0, the entry's own header 8"
+    );
+}
+
+#[test]
+fn zip_unpacked_sizes_disagree() {
+    let mut entry = Entry::deflated("a", b"xxxx");
+    entry.local.unpacked = 3;
+    zip_refused([entry], "zip_headers_disagree", "a");
+}
+
+#[test]
+fn zip_packed_sizes_disagree() {
+    let mut entry = Entry::deflated("a", b"xxxx");
+    entry.local.packed -= 1;
+    zip_refused([entry], "zip_headers_disagree", "a");
+}
+
+#[test]
+fn zip_checksums_disagree() {
+    let mut entry = Entry::stored("a", b"x");
+    entry.local.crc32 ^= 1;
+    zip_refused([entry], "zip_headers_disagree", "a");
+}
+
+#[test]
+fn zip_flags_disagree() {
+    let mut entry = Entry::stored("a", b"x");
+    entry.local.flags = 1;
+    zip_refused([entry], "zip_headers_disagree", "a");
+}
+
+#[test]
+fn zip_descriptor_disagrees() {
+    let mut entry = Entry::deflated("a", b"xxxx").streamed();
+    entry.descriptor[12] ^= 1;
+    zip_refused([entry], "zip_headers_disagree", "a");
+}
+
+#[test]
+fn zip_descriptor_missing() {
+    let mut entry = Entry::deflated("a", b"xxxx").streamed();
+    entry.descriptor.clear();
+    zip_refused([entry], "zip_headers_disagree", "a");
+}
+
+// --- data that is not what the headers say ---
+
+#[test]
+fn zip_wrong_checksum() {
+    zip_refused(
+        [Entry::deflated("a", b"x").both(|h| h.crc32 ^= 1)],
+        "zip_crc",
+        "a",
+    );
+}
+
+#[test]
+fn zip_more_data_than_said() {
+    let entry = Entry::deflated("a", b"xxxx").both(|h| h.unpacked = 3);
+    assert_eq!(
+        zip_refused([entry], "zip_size", "a"),
+        "expected 3 unpacked bytes, found more"
+    );
+}
+
+#[test]
+fn zip_less_data_than_said() {
+    let entry = Entry::deflated("a", b"xxxx").both(|h| h.unpacked = 5);
+    assert_eq!(
+        zip_refused([entry], "zip_size", "a"),
+        "expected 5 unpacked bytes, found fewer"
+    );
+}
+
+#[test]
+fn zip_stored_sizes_differ() {
+    zip_refused(
+        [Entry::stored("a", b"xxxx").both(|h| h.unpacked = 5)],
+        "zip_size",
+        "a",
+    );
+}
+
+#[test]
+fn zip_broken_deflate_stream() {
+    let entry = Entry::with(b"a", 8, vec![0xff; 20], b"xxxx");
+    zip_refused([entry], "zip_corrupt", "a");
+}
+
+#[test]
+fn zip_data_after_deflate_stream() {
+    let mut data = deflated(b"xxxx");
+    data.extend(b"hidden");
+    zip_refused(
+        [Entry::with(b"a", 8, data, b"xxxx")],
+        "zip_entry_slack",
+        "a",
+    );
+}
+
+// --- the archive as a whole ---
+
+#[test]
+fn zip_data_before() {
+    let zip = Zip {
+        prefix: b"#!/bin/sh\n".to_vec(),
+        entries: vec![good()],
+        ..Zip::default()
+    };
+    assert_refused(&zip.bytes(), "a.zip", "zip_data_before", "config.json");
+}
+
+#[test]
+fn zip_data_before_with_offsets_of_its_own() {
+    let mut bytes = b"MZ self-extracting".to_vec();
+    bytes.extend(Zip::of([good()]).bytes());
+    assert_refused(&bytes, "a.zip", "zip_data_before", "");
+}
+
+#[test]
+fn zip_data_after() {
+    let zip = Zip {
+        entries: vec![good()],
+        suffix: b"tail".to_vec(),
+        ..Zip::default()
+    };
+    assert_refused(&zip.bytes(), "a.zip", "zip_data_after", "");
+}
+
+#[test]
+fn zip_two_directories() {
+    let inner = Zip::of([Entry::stored("other", b"x")]).bytes();
+    let zip = Zip {
+        entries: vec![good()],
+        comment: inner,
+        ..Zip::default()
+    };
+    assert_refused(&zip.bytes(), "a.zip", "zip_two_directories", "");
+}
+
+#[test]
+fn zip_count_lies() {
+    let zip = Zip {
+        entries: vec![good()],
+        count: Some(2),
+        ..Zip::default()
+    };
+    assert_refused(&zip.bytes(), "a.zip", "zip_directory", "");
+}
+
+#[test]
+fn zip_directory_points_past_the_end() {
+    let zip = Zip {
+        entries: vec![good()],
+        directory_offset: Some(1 << 30),
+        ..Zip::default()
+    };
+    assert_refused(&zip.bytes(), "a.zip", "zip_directory", "");
+}
+
+#[test]
+fn zip_bytes_between_directory_and_end() {
+    let zip = Zip {
+        entries: vec![good()],
+        before_end: vec![7; 9],
+        ..Zip::default()
+    };
+    assert_refused(&zip.bytes(), "a.zip", "zip_directory", "");
+}
+
+#[test]
+fn zip_offset_to_nowhere() {
+    let mut entry = Entry::stored("a", b"x");
+    entry.offset = Some(u32::MAX - 1);
+    zip_refused([entry], "zip_local_missing", "a");
+}
+
+#[test]
+fn zip_data_reach_into_the_directory() {
+    let entry = Entry::stored("a", b"x").both(|h| (h.packed, h.unpacked) = (100_000, 100_000));
+    zip_refused([entry], "zip_data_outside", "a");
+}
+
+#[test]
+fn zip64_sizes() {
+    let entry = Entry::stored("a", b"x").both(|h| {
+        (h.packed, h.unpacked) = (u32::MAX, u32::MAX);
+        h.extra = extra(1, &[1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0]);
+    });
+    zip_refused([entry], "zip64", "a");
+}
+
+#[test]
+fn zip64_extra_beside_plain_sizes() {
+    let mut entry = Entry::stored("a", b"x");
+    entry.central.extra = extra(1, &[9; 16]);
+    zip_refused([entry], "zip64", "a");
+}
+
+#[test]
+fn zip64_end_locator() {
+    let mut locator = b"PK\x06\x07".to_vec();
+    locator.extend([0; 16]);
+    let zip = Zip {
+        entries: vec![good()],
+        before_end: locator,
+        ..Zip::default()
+    };
+    assert_refused(&zip.bytes(), "a.zip", "zip64", "");
+}
+
+#[test]
+fn zip_over_several_disks() {
+    let zip = Zip {
+        entries: vec![good()],
+        disk: 1,
+        ..Zip::default()
+    };
+    assert_refused(&zip.bytes(), "a.zip", "zip_multi_disk", "");
+}
+
+#[test]
+fn zip_truncated() {
+    let bytes = Zip::of([good(), Entry::stored("a", b"xxxx")]).bytes();
+    assert_refused(&bytes[..bytes.len() - 30], "a.zip", "zip_truncated", "");
+}
+
+#[test]
+fn zip_empty() {
+    assert_refused(&Zip::default().bytes(), "a.zip", "empty", "");
+}
+
+#[test]
+fn zip_only_junk() {
+    let junk = [
+        Entry::stored("__MACOSX/._x", b"x"),
+        Entry::stored(".DS_Store", b"x"),
+    ];
+    assert_refused(&Zip::of(junk).bytes(), "a.zip", "empty", "");
+}
+
+// --- tar ---
+
+use tar_bytes::Entry as Tar;
+
+#[test]
+fn tar_absolute_path() {
+    tar_refused(&[Tar::file("/tmp/x", b"x")], "path_absolute", "/tmp/x");
+}
+
+#[test]
+fn tar_parent() {
+    tar_refused(
+        &[Tar::file("a/../../canary.txt", b"x")],
+        "path_escape",
+        "a/../../canary.txt",
+    );
+}
+
+#[test]
+fn tar_symbolic_link() {
+    tar_refused(
+        &[Tar::link("src", b'2', "/tmp"), Tar::file("src/x", b"x")],
+        "link",
+        "src",
+    );
+}
+
+#[test]
+fn tar_hard_link() {
+    tar_refused(&[Tar::link("a", b'1', "/etc/passwd")], "link", "a");
+}
+
+#[test]
+fn tar_character_device() {
+    tar_refused(&[Tar::of(b"null", b'3', b"")], "special_file", "null");
+}
+
+#[test]
+fn tar_block_device() {
+    tar_refused(&[Tar::of(b"sda", b'4', b"")], "special_file", "sda");
+}
+
+#[test]
+fn tar_fifo() {
+    tar_refused(&[Tar::of(b"pipe", b'6', b"")], "special_file", "pipe");
+}
+
+#[test]
+fn tar_unknown_type() {
+    tar_refused(&[Tar::of(b"volume", b'M', b"")], "tar_type", "volume");
+}
+
+#[test]
+fn tar_pax_path_escapes() {
+    let entries = [
+        Tar::pax(b'x', &[("path", "../../canary.txt")]),
+        Tar::file("harmless", b"x"),
+    ];
+    tar_refused(&entries, "path_escape", "../../canary.txt");
+}
+
+#[test]
+fn tar_pax_path_absolute() {
+    let entries = [
+        Tar::pax(b'x', &[("path", "/etc/cron.d/x")]),
+        Tar::file("harmless", b"x"),
+    ];
+    tar_refused(&entries, "path_absolute", "/etc/cron.d/x");
+}
+
+#[test]
+fn tar_pax_path_with_nul() {
+    let entries = [
+        Tar::pax(b'x', &[("path", "src/lib.rs\0x")]),
+        Tar::file("harmless", b"x"),
+    ];
+    tar_refused(&entries, "name_nul", "src/lib.rs\\u{0}x");
+}
+
+#[test]
+fn tar_global_pax_path() {
+    tar_refused(
+        &[
+            Tar::pax(b'g', &[("path", "src/lib.rs")]),
+            Tar::file("a", b"x"),
+        ],
+        "tar_global_override",
+        "",
+    );
+}
+
+#[test]
+fn tar_pax_size_disagrees() {
+    // One reader sees a file of 1024 bytes, the other a second header inside it.
+    let entries = [Tar::pax(b'x', &[("size", "1024")]), Tar::file("a", b"x")];
+    tar_refused(&entries, "tar_pax_size", "a");
+}
+
+#[test]
+fn tar_pax_record_with_a_wrong_length() {
+    let mut record = pax_record("path", "a");
+    record[0] = b'9';
+    tar_refused(
+        &[Tar::of(b"p", b'x', &record), Tar::file("a", b"x")],
+        "tar_header",
+        "",
+    );
+}
+
+#[test]
+fn tar_pax_header_without_an_entry() {
+    tar_refused(&[Tar::pax(b'x', &[("path", "a")])], "tar_header", "");
+}
+
+#[test]
+fn tar_huge_extended_header() {
+    let mut entry = Tar::of(b"p", b'x', b"");
+    entry.size_field = Some(b"77777777777\0".to_vec());
+    tar_refused(&[entry], "tar_header", "");
+}
+
+#[test]
+fn tar_gnu_sparse() {
+    tar_refused(&[Tar::of(b"sparse", b'S', b"")], "tar_sparse", "sparse");
+}
+
+#[test]
+fn tar_pax_sparse() {
+    let entries = [
+        Tar::pax(
+            b'x',
+            &[("GNU.sparse.major", "1"), ("GNU.sparse.name", "/x")],
+        ),
+        Tar::file("a", b"x"),
+    ];
+    tar_refused(&entries, "tar_sparse", "a");
+}
+
+#[test]
+fn tar_gnu_long_name_escapes() {
+    let name = format!("../{}", "n".repeat(100));
+    tar_refused(
+        &[Tar::long_name(&name), Tar::file("a", b"x")],
+        "path_escape",
+        &name,
+    );
+}
+
+#[test]
+fn tar_two_long_names() {
+    tar_refused(
+        &[
+            Tar::long_name("a"),
+            Tar::long_name("b"),
+            Tar::file("c", b"x"),
+        ],
+        "tar_header",
+        "",
+    );
+}
+
+#[test]
+fn tar_duplicate() {
+    tar_refused(
+        &[Tar::file("a", b"1"), Tar::file("./a", b"2")],
+        "duplicate_entry",
+        "a",
+    );
+}
+
+#[test]
+fn tar_too_many_entries() {
+    let many: Vec<Tar> = (0..41)
+        .map(|i| Tar::file(&format!("src/{i}.rs"), b""))
+        .collect();
+    tar_refused(&many, "limit_entries", "");
+}
+
+#[test]
+fn tar_many_extended_headers() {
+    let many: Vec<Tar> = (0..41)
+        .map(|_| Tar::pax(b'g', &[("comment", "x")]))
+        .collect();
+    tar_refused(&many, "limit_entries", "");
+}
+
+#[test]
+fn tar_too_deep() {
+    tar_refused(
+        &[Tar::file("1/2/3/4/5/6/7", b"x")],
+        "limit_depth",
+        "1/2/3/4/5/6/7",
+    );
+}
+
+#[test]
+fn tar_size_larger_than_the_archive() {
+    let mut entry = Tar::file("a", b"x");
+    entry.size_field = Some(b"00000004000\0".to_vec());
+    let mut bytes = tar_bytes::open(&[entry]);
+    bytes.extend([0; 512]);
+    assert_refused(&bytes, "a.tar", "tar_truncated", "a");
+}
+
+#[test]
+fn tar_size_of_exabytes() {
+    let mut entry = Tar::file("a", b"x");
+    entry.size_field = Some(vec![0x80, 0, 0, 0, 0x7f, 255, 255, 255, 255, 255, 255, 255]);
+    tar_refused(&[entry], "tar_truncated", "a");
+}
+
+#[test]
+fn tar_size_not_a_number() {
+    let mut entry = Tar::file("a", b"x");
+    entry.size_field = Some(b"twelve bytes".to_vec());
+    tar_refused(&[entry], "tar_header", "a");
+}
+
+#[test]
+fn tar_wrong_checksum() {
+    let mut entry = Tar::file("a", b"x");
+    entry.checksum = Some(1);
+    tar_refused(&[entry], "tar_checksum", "");
+}
+
+#[test]
+fn tar_data_after_the_end() {
+    let mut bytes = tar(&[Tar::file("config.json", b"{}")]);
+    bytes.extend(tar(&[Tar::file("hidden", b"x")]));
+    assert_refused(&bytes, "a.tar", "tar_data_after", "");
+    assert_refused(&gz(&bytes), "a.tar.gz", "tar_data_after", "");
+}
+
+#[test]
+fn tar_file_too_large() {
+    tar_refused(
+        &[Tar::file("big", &vec![1; 2 * 1024 * 1024 + 1])],
+        "limit_file",
+        "big",
+    );
+}
+
+// --- gzip ---
+
+#[test]
+fn gz_ratio_bomb() {
+    let bomb = gz(&tar(&[Tar::file("bomb", &vec![0; 1536 * 1024])]));
+    assert_refused(&bomb, "a.tar.gz", "limit_ratio", "");
+}
+
+#[test]
+fn gz_bomb_of_ignored_files() {
+    let bomb = gz(&tar(&[Tar::file("__MACOSX/x", &vec![0; 1536 * 1024])]));
+    assert_refused(&bomb, "a.tar.gz", "limit_ratio", "");
+}
+
+#[test]
+fn gz_bomb_of_padding() {
+    let mut bytes = tar(&[Tar::file("config.json", b"{}")]);
+    bytes.resize(bytes.len() + 3 * 1024 * 1024, 0);
+    assert_refused(&gz(&bytes), "a.tar.gz", "limit_ratio", "");
+    assert_refused(&bytes, "a.tar", "tar_data_after", "");
+}
+
+#[test]
+fn gz_data_after() {
+    let mut bytes = gz(&tar(&[Tar::file("config.json", b"{}")]));
+    bytes.extend(b"tail");
+    assert_refused(&bytes, "a.tar.gz", "gz_data_after", "");
+}
+
+#[test]
+fn gz_second_member() {
+    let mut bytes = gz(&tar(&[Tar::file("config.json", b"{}")]));
+    bytes.extend(gz(&tar(&[Tar::file("hidden", b"x")])));
+    assert_refused(&bytes, "a.tar.gz", "gz_data_after", "");
+}
+
+#[test]
+fn gz_truncated() {
+    let bytes = gz(&tar(&[Tar::file("config.json", b"{}")]));
+    assert_refused(&bytes[..bytes.len() / 2], "a.tar.gz", "gz_corrupt", "");
+}
+
+#[test]
+fn gz_wrong_checksum() {
+    let mut bytes = gz(&tar(&[Tar::file("config.json", b"{}")]));
+    let at = bytes.len() - 8;
+    bytes[at] ^= 1;
+    assert_refused(&bytes, "a.tar.gz", "gz_corrupt", "");
+}
+
+#[test]
+fn gz_without_a_tar() {
+    assert_refused(&gz(b"just text"), "a.tar.gz", "not_a_tar", "");
+}
+
+// --- other formats ---
+
+#[test]
+fn rar_gets_a_kind_sentence() {
+    let finding = assert_refused(
+        b"Rar!\x1a\x07\x01\x00....",
+        "a.zip",
+        "format_unsupported",
+        "",
+    );
+    assert!(
+        finding.message.starts_with("this is a rar archive"),
+        "{finding}"
+    );
+    assert!(
+        finding
+            .hint
+            .is_some_and(|hint| hint.starts_with("your files are fine"))
+    );
+}
+
+#[test]
+fn seven_zip_gets_a_kind_sentence() {
+    let finding = assert_refused(b"7z\xbc\xaf\x27\x1c....", "a.7z", "format_unsupported", "");
+    assert!(
+        finding.message.starts_with("this is a 7z archive"),
+        "{finding}"
+    );
+}
+
+#[test]
+fn xz_is_named() {
+    assert_refused(b"\xfd7zXZ\0....", "a.tar.xz", "format_unsupported", "");
+}
+
+#[test]
+fn web_page_is_named() {
+    let finding = assert_refused(b"<!DOCTYPE html><html>", "a.zip", "format_unknown", "");
+    assert!(finding.message.ends_with("found a web page"));
+}
+
+#[test]
+fn empty_file() {
+    assert_refused(b"", "a.zip", "empty", "");
+}
+
+// --- oddities that are reported, not refused ---
+
+#[test]
+fn nested_archive_is_reported() {
+    let inner = Zip::of([Entry::stored("x", b"x")]).bytes();
+    let (hand_in, _scratch) = assert_accepted(
+        &Zip::of([good(), Entry::stored("src.zip", &inner)]).bytes(),
+        "a.zip",
+        "nested_archive",
+    );
+    assert_eq!(hand_in.findings[0].path.as_deref(), Some("src.zip"));
+}
+
+#[test]
+fn case_collisions_are_reported() {
+    let entries = [
+        good(),
+        Entry::stored("src/lib.rs", b"a"),
+        Entry::stored("Src/lib.rs", b"b"),
+    ];
+    let (hand_in, _scratch) = assert_accepted(&Zip::of(entries).bytes(), "a.zip", "case_collision");
+    assert_eq!(hand_in.findings[0].path.as_deref(), Some("Src"));
+    assert_eq!(hand_in.files.len(), 3);
+    let entries = [
+        good(),
+        Entry::stored("src/A.rs", b"a"),
+        Entry::stored("src/a.rs", b"b"),
+    ];
+    assert_accepted(&Zip::of(entries).bytes(), "a.zip", "case_collision");
+}
+
+#[test]
+fn names_that_are_not_utf8_are_kept_readable() {
+    let entry = Entry::with(b"src/caf\xe9.rs", 0, b"x".to_vec(), b"x");
+    let (hand_in, _scratch) =
+        assert_accepted(&Zip::of([good(), entry]).bytes(), "a.zip", "name_not_utf8");
+    assert!(hand_in.file("src/caf_xE9.rs").is_some());
+    let bytes = tar(&[
+        Tar::file("config.json", b"{}"),
+        Tar::of(b"src/caf\xe9.rs", b'0', b"x"),
+    ]);
+    let (hand_in, _scratch) = assert_accepted(&bytes, "a.tar", "name_not_utf8");
+    assert!(hand_in.file("src/caf_xE9.rs").is_some());
+}
+
+#[test]
+fn gap_between_entries_is_reported() {
+    let zip = Zip {
+        entries: vec![good()],
+        gap: vec![0; 10],
+        ..Zip::default()
+    };
+    assert_accepted(&zip.bytes(), "a.zip", "zip_gap");
+}
+
+#[test]
+fn tar_without_an_end_is_reported() {
+    assert_accepted(
+        &tar_bytes::open(&[Tar::file("config.json", b"{}")]),
+        "a.tar",
+        "tar_no_end",
+    );
+}
+
+#[test]
+fn wrong_extension_is_reported() {
+    assert_accepted(&Zip::of([good()]).bytes(), "a.rar", "wrong_extension");
+    assert_accepted(
+        &gz(&tar(&[Tar::file("config.json", b"{}")])),
+        "a.zip",
+        "wrong_extension",
+    );
+}
