@@ -1,1 +1,2 @@
+pub mod exr_io;
 pub mod image;
