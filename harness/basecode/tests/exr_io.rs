@@ -445,10 +445,9 @@ fn a_claim_of_many_pixels_takes_no_memory() {
             (i32::MAX, i32::MAX),
         ] {
             let error = message(&claim(small(), n, w, h));
-            assert!(
-                error.contains("at most 67108864 pixels"),
-                "{w}x{h}: {error}"
-            );
+            // The decoder itself refuses a window whose corners overflow.
+            let named = error.contains("at most 67108864 pixels") || error.contains("window size");
+            assert!(named, "{w}x{h}: {error}");
         }
         assert!(decode(&claim(small(), n, 0, 3)).is_err());
         assert!(decode(&claim(small(), n, -7, 3)).is_err());
