@@ -22,6 +22,7 @@ mod bvh;
 mod camera;
 mod error;
 pub mod export;
+pub mod exr_io;
 mod film;
 mod frame;
 pub mod gpu;
