@@ -1,0 +1,348 @@
+//! Parts 1.1 and 1.2: a BSDF probed at a dense set of directions, against its formula in f64.
+
+use basecode::Vec3;
+use renderer_api as api;
+
+use super::{Check, Measure, Verdict};
+use crate::imaging::ratio_name;
+
+/// Which BSDF is probed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BsdfKind {
+    /// Lambertian reflection, part 1.1.
+    Diffuse,
+    /// Normalised Phong, part 1.2.
+    Phong,
+}
+
+/// One question to a BSDF, with the right answer.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfProbe {
+    /// The question.
+    pub query: api::BsdfQuery,
+    /// The BSDF's value, cosine included [sr^-1].
+    pub expected: [f64; 3],
+    /// The largest difference of a right answer, for each channel.
+    pub tolerance: [f64; 3],
+    /// The largest value of this material at any direction: the scale of a difference.
+    pub peak: f64,
+}
+
+/// Directions closer to the surface than this cosine are left out: a right answer may round
+/// either way.
+const MIN_COSINE: f32 = 1e-4;
+
+/// The probes of a BSDF given by value: albedos, exponents whole and fractional, Kd + Ks below and
+/// above 1, directions over both hemispheres, grazing ones included.
+pub fn probes(kind: BsdfKind) -> Vec<BsdfProbe> {
+    let mut probes = Vec::new();
+    for material in materials(kind) {
+        let exponent = if kind == BsdfKind::Phong { material.exponent } else { 1.0 };
+        for (wo, wi) in directions(exponent) {
+            let query = api::BsdfQuery {
+                source: api::BSDF_OF_VALUE,
+                material,
+                shape: 0,
+                primitive: 0,
+                uv: [0.5, 0.5],
+                wo: wo.into(),
+                wi: wi.into(),
+            };
+            probes.push(BsdfProbe::new(query, &material));
+        }
+    }
+    probes
+}
+
+/// A probe of the BSDF that a scene hands out for a textured shape; `material` holds the colours
+/// that its textures have at `uv`, already multiplied by the shape's energy scale.
+pub fn textured_probe(
+    (shape, primitive, uv): (u32, u32, [f32; 2]),
+    (wo, wi): (Vec3, Vec3),
+    material: &api::MaterialValue,
+) -> BsdfProbe {
+    let query = api::BsdfQuery {
+        source: api::BSDF_OF_SHAPE,
+        material: *material,
+        shape,
+        primitive,
+        uv,
+        wo: wo.into(),
+        wi: wi.into(),
+    };
+    BsdfProbe::new(query, material)
+}
+
+impl BsdfProbe {
+    fn new(query: api::BsdfQuery, material: &api::MaterialValue) -> Self {
+        // A shape's colours come scaled; a value's do not.
+        let scale = if query.source == api::BSDF_OF_VALUE { energy_scale(material) } else { 1.0 };
+        let expected = value(material, scale, query.wo, query.wi);
+        let up = [0.0, 0.0, 1.0];
+        let peak = value(material, scale, up, up).into_iter().fold(0.0, f64::max);
+        let n = if material.model == api::MATERIAL_PHONG { f64::from(material.exponent) } else { 0.0 };
+        // 1e-4 for f32 arithmetic in any order, 1e-6 n for what a power makes of its base's error.
+        let tolerance = expected.map(|b| (1e-4 + 1e-6 * n) * b.abs() + 1e-6 * peak);
+        Self { query, expected, tolerance, peak }
+    }
+}
+
+/// The normalised BSDF of the handout, equation (1), times cos theta_i, in f64.
+pub fn value(material: &api::MaterialValue, scale: f64, wo: [f32; 3], wi: [f32; 3]) -> [f64; 3] {
+    let [wo, wi] = [wo, wi].map(|w| w.map(f64::from));
+    if wo[2] <= 0.0 || wi[2] <= 0.0 {
+        return [0.0; 3];
+    }
+    let n = f64::from(material.exponent);
+    // The mirror image of wo about the normal is (-x, -y, z).
+    let cos_alpha = (wi[2] * wo[2] - wi[0] * wo[0] - wi[1] * wo[1]).max(0.0);
+    let lobe = (n + 2.0) / std::f64::consts::TAU * cos_alpha.powf(n);
+    std::array::from_fn(|c| {
+        let diffuse = f64::from(material.diffuse[c]) / std::f64::consts::PI;
+        let specular = match material.model {
+            api::MATERIAL_PHONG => f64::from(material.specular[c]) * lobe,
+            _ => 0.0,
+        };
+        scale * (diffuse + specular) * wi[2]
+    })
+}
+
+/// 0.99 over the largest component of Kd + Ks where that exceeds 1; 1 elsewhere and for diffuse.
+fn energy_scale(material: &api::MaterialValue) -> f64 {
+    let sums = (0..3).map(|c| f64::from(material.diffuse[c]) + f64::from(material.specular[c]));
+    let largest = sums.fold(0.0, f64::max);
+    if material.model == api::MATERIAL_PHONG && largest > 1.0 { 0.99 / largest } else { 1.0 }
+}
+
+fn materials(kind: BsdfKind) -> Vec<api::MaterialValue> {
+    let material = |model, diffuse, specular, exponent| api::MaterialValue {
+        model,
+        diffuse,
+        specular,
+        exponent,
+    };
+    match kind {
+        BsdfKind::Diffuse => [[0.8, 0.4, 0.1], [1.0, 1.0, 1.0], [0.0, 0.5, 0.02], [0.95, 0.9, 0.97]]
+            .map(|albedo| material(api::MATERIAL_DIFFUSE, albedo, [0.3, 0.2, 0.1], 7.0))
+            .to_vec(),
+        BsdfKind::Phong => {
+            let mut all = Vec::new();
+            for exponent in [1.0, 2.0, 9.8, 30.0, 50.0, 101.5, 500.0] {
+                for (diffuse, specular) in [
+                    ([0.5, 0.3, 0.1], [0.2, 0.3, 0.5]),
+                    ([0.0, 0.0, 0.0], [0.9, 0.6, 0.3]),
+                    ([0.9, 0.5, 0.2], [0.7, 0.2, 0.6]), // Kd + Ks above 1
+                ] {
+                    all.push(material(api::MATERIAL_PHONG, diffuse, specular, exponent));
+                }
+            }
+            all
+        }
+    }
+}
+
+/// Pairs of unit directions (wo, wi) in the local frame: both hemispheres, every azimuth between
+/// them, grazing, and around the mirror direction where a lobe of this exponent lives.
+fn directions(exponent: f32) -> Vec<(Vec3, Vec3)> {
+    const COSINES: [f32; 11] = [1.0, 0.94, 0.8, 0.6, 0.4, 0.2, 0.08, 0.02, 0.003, -0.03, -0.6];
+    let direction = |cos: f32, azimuth: f32| {
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        Vec3::new(sin * azimuth.cos(), sin * azimuth.sin(), cos)
+    };
+    let mut pairs = Vec::new();
+    for (i, &cos_o) in COSINES.iter().enumerate() {
+        let turn = 0.7 * i as f32;
+        let wo = direction(cos_o, turn);
+        for &cos_i in &COSINES {
+            for between in [0.0, 0.9, 2.0, std::f32::consts::PI, 4.4] {
+                pairs.push((wo, direction(cos_i, turn + between)));
+            }
+        }
+        let mirror = Vec3::new(-wo.x, -wo.y, wo.z);
+        let (s, t) = mirror.any_orthonormal_pair();
+        for level in [0.97f32, 0.7, 0.3, 0.05] {
+            let cos_alpha = level.powf(1.0 / exponent.max(1.0));
+            let sin_alpha = (1.0 - cos_alpha * cos_alpha).sqrt();
+            for azimuth in [0.4f32, 2.5, 4.6] {
+                let side = s * azimuth.cos() + t * azimuth.sin();
+                pairs.push((wo, (mirror * cos_alpha + side * sin_alpha).normalize()));
+            }
+        }
+    }
+    pairs.retain(|(wo, wi)| wo.z.abs() >= MIN_COSINE && wi.z.abs() >= MIN_COSINE);
+    pairs
+}
+
+/// Judges the answers to `probes`, three floats each.
+pub fn judge(kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Check {
+    let (id, name) = match kind {
+        BsdfKind::Diffuse => ("bsdf.diffuse", "diffuse"),
+        BsdfKind::Phong => ("bsdf.phong", "Phong"),
+    };
+    if values.len() != probes.len() {
+        let summary = format!("{} answers to {} BSDF queries", values.len(), probes.len());
+        return Check::new(id, "", Verdict::Fail, summary);
+    }
+    let (mut wrong, mut not_finite, mut apart, mut total) = (0usize, 0usize, 0.0, 0.0);
+    let mut worst: Option<(f64, usize)> = None;
+    let mut ratios = Vec::new();
+    for (index, (probe, value)) in probes.iter().zip(values).enumerate() {
+        let mut excess = 0.0f64;
+        for c in 0..3 {
+            let (a, b) = (f64::from(value[c]), probe.expected[c]);
+            // What is no number is as far off as the largest value.
+            let difference = if a.is_finite() { (a - b).abs() } else { probe.peak };
+            not_finite += usize::from(!a.is_finite());
+            excess = excess.max(difference / probe.tolerance[c].max(f64::MIN_POSITIVE));
+            apart += difference / probe.peak;
+            total += b / probe.peak;
+            if b > 0.01 * probe.peak && a.is_finite() {
+                ratios.push(a / b);
+            }
+        }
+        if excess > 1.0 {
+            wrong += 1;
+            if worst.is_none_or(|(most, _)| excess > most) {
+                worst = Some((excess, index));
+            }
+        }
+    }
+    let fraction = wrong as f64 / probes.len() as f64;
+    let mut check = match worst {
+        None => Check::new(
+            id,
+            "",
+            Verdict::Pass,
+            format!("the {name} BSDF is right at all {} directions probed", probes.len()),
+        ),
+        Some((_, index)) => {
+            let summary = describe(name, wrong, probes, index, values[index]);
+            Check::new(id, "", Verdict::Fail, summary).with_hint(hint(ratios, probes, values))
+        }
+    };
+    check.error = if wrong == 0 { 0.0 } else { apart / total };
+    check.measures = vec![
+        Measure::at_most("directions answered wrongly (fraction)", fraction, 0.0),
+        Measure::at_most("values not finite (count)", not_finite as f64, 0.0),
+    ];
+    check
+}
+
+fn describe(name: &str, wrong: usize, probes: &[BsdfProbe], worst: usize, found: [f32; 3]) -> String {
+    let BsdfProbe { query, expected, .. } = &probes[worst];
+    let degrees = |w: [f32; 3]| w[2].clamp(-1.0, 1.0).acos().to_degrees();
+    let material = match query.material.model {
+        api::MATERIAL_PHONG => format!(
+            "kd {:?}, ks {:?}, n {}",
+            query.material.diffuse, query.material.specular, query.material.exponent
+        ),
+        _ => format!("kd {:?}", query.material.diffuse),
+    };
+    format!(
+        "the {name} BSDF is wrong at {wrong} of {} directions; worst with {material}, wo {:.0} and wi {:.0} \
+         degrees from the normal: expected {}, found {}",
+        probes.len(),
+        degrees(query.wo),
+        degrees(query.wi),
+        triple(expected.map(|v| v as f32)),
+        triple(found),
+    )
+}
+
+fn triple(v: [f32; 3]) -> String {
+    format!("({:.4}, {:.4}, {:.4})", v[0], v[1], v[2])
+}
+
+/// What a constant ratio, or the place of the wrong answers, gives away.
+fn hint(mut ratios: Vec<f64>, probes: &[BsdfProbe], values: &[[f32; 3]]) -> String {
+    if values.iter().flatten().any(|v| !v.is_finite()) {
+        return "pow of a negative base is not a number: clamp cos alpha to 0 first".into();
+    }
+    let nonzero_where_black = |wanted: fn(&api::BsdfQuery) -> bool| {
+        probes.iter().zip(values).any(|(probe, value)| {
+            probe.expected == [0.0; 3] && wanted(&probe.query) && value.iter().any(|v| v.abs() > 1e-6)
+        })
+    };
+    if nonzero_where_black(|q| q.wi[2] < 0.0 && q.wo[2] > 0.0) {
+        return "light from below the surface must give 0: test cos theta of wi".into();
+    }
+    if nonzero_where_black(|q| q.wo[2] < 0.0 && q.wi[2] > 0.0) {
+        return "a surface seen from behind must give 0: test cos theta of wo".into();
+    }
+    if ratios.is_empty() {
+        return String::new();
+    }
+    ratios.sort_by(f64::total_cmp);
+    let at = |fraction: f64| ratios[((ratios.len() - 1) as f64 * fraction) as usize];
+    let (low, median, high) = (at(0.1), at(0.5), at(0.9));
+    if median.abs() < 1e-6 && high.abs() < 1e-6 {
+        return "the BSDF is black".into();
+    }
+    if (high - low).abs() < 0.002 * median.abs() {
+        return match ratio_name(median) {
+            Some(factor) => format!("off by a constant factor: {factor}"),
+            None => format!("off by a constant factor of {median:.4}"),
+        };
+    }
+    String::new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn answers(probes: &[BsdfProbe], change: impl Fn(&BsdfProbe) -> [f64; 3]) -> Vec<[f32; 3]> {
+        probes.iter().map(|probe| change(probe).map(|v| v as f32)).collect()
+    }
+
+    #[test]
+    fn the_formula_has_its_closed_forms() {
+        let material = materials(BsdfKind::Phong)[0];
+        let up = [0.0, 0.0, 1.0];
+        let expected = 0.5 / std::f64::consts::PI + 0.2 * 3.0 / std::f64::consts::TAU;
+        assert!((value(&material, 1.0, up, up)[0] - expected).abs() < 1e-7);
+        let down = [0.0, 0.0, -1.0];
+        assert_eq!(value(&material, 1.0, down, up), [0.0; 3]);
+        assert_eq!(value(&material, 1.0, up, down), [0.0; 3]);
+        let scaled = materials(BsdfKind::Phong)[2];
+        assert!((energy_scale(&scaled) - 0.99 / 1.6).abs() < 1e-7);
+    }
+
+    #[test]
+    fn right_answers_pass_and_each_mistake_fails() {
+        for kind in [BsdfKind::Diffuse, BsdfKind::Phong] {
+            let probes = probes(kind);
+            assert!(probes.len() > 1000);
+            let right = judge(kind, &probes, &answers(&probes, |p| p.expected));
+            assert_eq!((right.verdict, right.error), (Verdict::Pass, 0.0), "{right:?}");
+            let black = judge(kind, &probes, &answers(&probes, |_| [0.0; 3]));
+            assert_eq!(black.verdict, Verdict::Fail);
+            assert!((black.error - 1.0).abs() < 1e-6, "{}", black.error);
+            let gain = judge(kind, &probes, &answers(&probes, |p| p.expected.map(|v| 1.01 * v)));
+            assert_eq!(gain.verdict, Verdict::Fail);
+            assert!((gain.error - 0.01).abs() < 1e-4, "{}", gain.error);
+            let pi = judge(kind, &probes, &answers(&probes, |p| p.expected.map(|v| v * std::f64::consts::PI)));
+            assert!(pi.hint.contains("pi"), "{}", pi.hint);
+            let nan = judge(kind, &probes, &answers(&probes, |_| [f64::NAN; 3]));
+            assert!(nan.verdict == Verdict::Fail && nan.error >= 1.0, "{}", nan.error);
+            let cosine = answers(&probes, |p| p.expected.map(|v| v * f64::from(p.query.wi[2])));
+            assert_eq!(judge(kind, &probes, &cosine).verdict, Verdict::Fail);
+            let few = judge(kind, &probes, &[[0.0; 3]]);
+            assert_eq!(few.verdict, Verdict::Fail);
+        }
+    }
+
+    #[test]
+    fn a_missing_test_of_either_direction_is_named() {
+        let probes = probes(BsdfKind::Diffuse);
+        let unguarded = |p: &BsdfProbe| {
+            let cos = f64::from(p.query.wi[2]);
+            p.query.material.diffuse.map(|kd| f64::from(kd) / std::f64::consts::PI * cos)
+        };
+        let no_wi = judge(BsdfKind::Diffuse, &probes, &answers(&probes, unguarded));
+        assert!(no_wi.hint.contains("wi"), "{}", no_wi.hint);
+        let no_wo = answers(&probes, |p| unguarded(p).map(|v| v.max(0.0)));
+        let no_wo = judge(BsdfKind::Diffuse, &probes, &no_wo);
+        assert!(no_wo.hint.contains("wo"), "{}", no_wo.hint);
+    }
+}
