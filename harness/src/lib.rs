@@ -3,5 +3,7 @@
 //! Data flows one way: `intake` -> `build` -> `worker` -> `evidence` -> `rubric` -> `report`.
 
 pub mod evidence;
+pub mod expected;
+pub mod imaging;
 pub mod intake;
 pub mod rubric;

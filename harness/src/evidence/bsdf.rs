@@ -4,7 +4,7 @@ use basecode::Vec3;
 use renderer_api as api;
 
 use super::{Check, Measure, Verdict};
-use crate::imaging::ratio_name;
+use crate::imaging::ratio::ratio_name;
 
 /// Which BSDF is probed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

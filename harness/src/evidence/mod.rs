@@ -2,6 +2,7 @@
 //!
 //! Nothing here knows of processes, GPUs or libraries.
 
+pub mod bsdf;
 mod check;
 
 pub use check::{Check, Evidence, Measure, Picture, Verdict};

@@ -3,7 +3,7 @@
 use basecode::{Frame, MaterialModel, Result, Scene, Vec3};
 
 use super::surface::{Lattice, Sight, SurfacePoint};
-use crate::imaging::{Region, RegionMask};
+use crate::imaging::reference::{Region, RegionMask};
 
 /// A pixel whose specular lobe exceeds this fraction of its peak belongs to the highlight.
 const HIGHLIGHT: f32 = 0.1;

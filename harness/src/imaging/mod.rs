@@ -1,0 +1,14 @@
+//! Images: the comparison that decides, the error metrics that only inform, and the pictures that explain.
+//!
+//! Everything here is a pure function of images in memory. *Actual* is what a renderer drew, *expected* what the
+//! reference says, and every place is (column, row) with row 0 on top.
+
+pub mod blob;
+pub mod compare;
+pub mod evidence;
+pub mod flip;
+pub mod metrics;
+pub mod pictures;
+pub mod ratio;
+pub mod reference;
+pub mod srgb;

@@ -1,0 +1,102 @@
+//! The sRGB transfer function (IEC 61966-2-1) and 8-bit levels.
+
+use std::sync::LazyLock;
+
+/// Encodes a linear value in [0, 1].
+pub fn encode(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// Decodes an encoded value in [0, 1].
+pub fn decode(encoded: f64) -> f64 {
+    if encoded <= 0.040_45 {
+        encoded / 12.92
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// Linear values are looked up by exponent and this many leading bits of the fraction.
+const FRACTION_BITS: u32 = 8;
+/// Below 2^-13 every value is level 0, whose upper end is half of 1/255 / 12.92.
+const FIRST: u32 = (127 - 13) << FRACTION_BITS;
+
+struct Table {
+    /// The smallest linear value of each level; one past the last never comes.
+    starts: [f32; 257],
+    /// The level at the beginning of each bucket of floats.
+    buckets: Vec<u8>,
+}
+
+static TABLE: LazyLock<Table> = LazyLock::new(|| {
+    let mut starts = [f32::INFINITY; 257];
+    starts[0] = 0.0;
+    for (level, start) in starts.iter_mut().enumerate().take(256).skip(1) {
+        *start = decode((level as f64 - 0.5) / 255.0) as f32;
+    }
+    let last = 127 << FRACTION_BITS;
+    let buckets = (FIRST..=last).map(|bucket| {
+        let x = f32::from_bits(bucket << (23 - FRACTION_BITS));
+        (starts.partition_point(|&start| start <= x) - 1) as u8
+    });
+    let buckets = buckets.collect();
+    Table { starts, buckets }
+});
+
+/// The nearest 8-bit sRGB level of a linear value clamped to [0, 1]; NaN is 0.
+pub fn level(linear: f32) -> u8 {
+    let table = &*TABLE;
+    let x = linear.clamp(0.0, 1.0);
+    let bucket = x.to_bits() >> (23 - FRACTION_BITS);
+    if x.is_nan() || bucket < FIRST {
+        return 0;
+    }
+    let mut level = usize::from(table.buckets[(bucket - FIRST) as usize]);
+    while x >= table.starts[level + 1] {
+        level += 1;
+    }
+    level as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_levels() {
+        let cases = [
+            (0.0, 0),
+            (-3.0, 0),
+            (1.0, 255),
+            (39.0, 255),
+            (0.5, 188),
+            (0.2, 124),
+            (f32::NAN, 0),
+            (f32::INFINITY, 255),
+        ];
+        for (linear, expected) in cases {
+            assert_eq!(level(linear), expected, "{linear}");
+        }
+    }
+
+    #[test]
+    fn the_table_agrees_with_the_formula() {
+        for i in 0..=200_000u32 {
+            let x = (i as f32 / 200_000.0).powi(2);
+            let exact = 255.0 * encode(f64::from(x));
+            let distance = (f64::from(level(x)) - exact).abs();
+            assert!(distance < 0.5001, "{x}: {} for {exact}", level(x));
+        }
+    }
+
+    #[test]
+    fn every_level_comes_back() {
+        for l in 0..=255u8 {
+            assert_eq!(level(decode(f64::from(l) / 255.0) as f32), l);
+        }
+    }
+}
