@@ -80,7 +80,8 @@ impl BsdfProbe {
         let expected = value(material, scale, query.wo, query.wi);
         let up = [0.0, 0.0, 1.0];
         let peak = value(material, scale, up, up).into_iter().fold(0.0, f64::max);
-        let n = if material.model == api::MATERIAL_PHONG { f64::from(material.exponent) } else { 0.0 };
+        let n =
+            if material.model == api::MATERIAL_PHONG { f64::from(material.exponent) } else { 0.0 };
         // 1e-4 for f32 arithmetic in any order, 1e-6 n for what a power makes of its base's error.
         let tolerance = expected.map(|b| (1e-4 + 1e-6 * n) * b.abs() + 1e-6 * peak);
         Self { query, expected, tolerance, peak }
@@ -122,9 +123,11 @@ fn materials(kind: BsdfKind) -> Vec<api::MaterialValue> {
         exponent,
     };
     match kind {
-        BsdfKind::Diffuse => [[0.8, 0.4, 0.1], [1.0, 1.0, 1.0], [0.0, 0.5, 0.02], [0.95, 0.9, 0.97]]
-            .map(|albedo| material(api::MATERIAL_DIFFUSE, albedo, [0.3, 0.2, 0.1], 7.0))
-            .to_vec(),
+        BsdfKind::Diffuse => {
+            [[0.8, 0.4, 0.1], [1.0, 1.0, 1.0], [0.0, 0.5, 0.02], [0.95, 0.9, 0.97]]
+                .map(|albedo| material(api::MATERIAL_DIFFUSE, albedo, [0.3, 0.2, 0.1], 7.0))
+                .to_vec()
+        }
         BsdfKind::Phong => {
             let mut all = Vec::new();
             for exponent in [1.0, 2.0, 9.8, 30.0, 50.0, 101.5, 500.0] {
@@ -228,7 +231,13 @@ pub fn judge(kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Check
     check
 }
 
-fn describe(name: &str, wrong: usize, probes: &[BsdfProbe], worst: usize, found: [f32; 3]) -> String {
+fn describe(
+    name: &str,
+    wrong: usize,
+    probes: &[BsdfProbe],
+    worst: usize,
+    found: [f32; 3],
+) -> String {
     let BsdfProbe { query, expected, .. } = &probes[worst];
     let degrees = |w: [f32; 3]| w[2].clamp(-1.0, 1.0).acos().to_degrees();
     let material = match query.material.model {
@@ -260,7 +269,9 @@ fn hint(mut ratios: Vec<f64>, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Stri
     }
     let nonzero_where_black = |wanted: fn(&api::BsdfQuery) -> bool| {
         probes.iter().zip(values).any(|(probe, value)| {
-            probe.expected == [0.0; 3] && wanted(&probe.query) && value.iter().any(|v| v.abs() > 1e-6)
+            probe.expected == [0.0; 3]
+                && wanted(&probe.query)
+                && value.iter().any(|v| v.abs() > 1e-6)
         })
     };
     if nonzero_where_black(|q| q.wi[2] < 0.0 && q.wo[2] > 0.0) {
@@ -321,7 +332,11 @@ mod tests {
             let gain = judge(kind, &probes, &answers(&probes, |p| p.expected.map(|v| 1.01 * v)));
             assert_eq!(gain.verdict, Verdict::Fail);
             assert!((gain.error - 0.01).abs() < 1e-4, "{}", gain.error);
-            let pi = judge(kind, &probes, &answers(&probes, |p| p.expected.map(|v| v * std::f64::consts::PI)));
+            let pi = judge(
+                kind,
+                &probes,
+                &answers(&probes, |p| p.expected.map(|v| v * std::f64::consts::PI)),
+            );
             assert!(pi.hint.contains("pi"), "{}", pi.hint);
             let nan = judge(kind, &probes, &answers(&probes, |_| [f64::NAN; 3]));
             assert!(nan.verdict == Verdict::Fail && nan.error >= 1.0, "{}", nan.error);

@@ -4,5 +4,6 @@
 
 pub mod bsdf;
 mod check;
+pub mod rays;
 
 pub use check::{Check, Evidence, Measure, Picture, Verdict};

@@ -70,9 +70,8 @@ const FARTHEST_START: f32 = 5e-3;
 const END_MARGIN: f32 = 5e-3;
 
 fn sight(scene: &Scene, hit: &SurfaceInteraction, direction: Vec3, distance: f32) -> Sight {
-    let from = |origin, start: f32, end: f32| {
-        scene.occluded(&Ray::segment(origin, direction, start, end))
-    };
+    let from =
+        |origin, start: f32, end: f32| scene.occluded(&Ray::segment(origin, direction, start, end));
     let near = NEAREST_START * distance.max(1.0);
     let far = FARTHEST_START * distance.max(1.0);
     // Some students lift the origin along the normal instead of starting later on the ray.

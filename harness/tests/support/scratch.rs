@@ -84,12 +84,7 @@ pub fn assert_folder_refused(make: impl Fn(&Path), code: &str, path: &str) -> Fi
     fs::create_dir(&source).unwrap();
     make(&source);
     let before = scratch.outside();
-    let result = unpack(
-        &source,
-        &scratch.dest,
-        &TreeSpec::default(),
-        &small_limits(),
-    );
+    let result = unpack(&source, &scratch.dest, &TreeSpec::default(), &small_limits());
     check_refused(&scratch, before, result, code, path)
 }
 
@@ -106,32 +101,17 @@ fn check_refused(
         Err(other) => panic!("expected a refusal, found {other}"),
         Ok(hand_in) => panic!("expected a refusal with {code}, found {hand_in:#?}"),
     };
-    assert_eq!(
-        scratch.outside(),
-        before,
-        "something outside the destination changed"
-    );
-    assert_eq!(
-        fs::read_dir(&scratch.dest).unwrap().count(),
-        0,
-        "the destination is not empty"
-    );
+    assert_eq!(scratch.outside(), before, "something outside the destination changed");
+    assert_eq!(fs::read_dir(&scratch.dest).unwrap().count(), 0, "the destination is not empty");
     let first = &refusal.findings[0];
     assert_eq!(
-        (
-            first.severity,
-            first.code.as_str(),
-            first.path.as_deref().unwrap_or("")
-        ),
+        (first.severity, first.code.as_str(), first.path.as_deref().unwrap_or("")),
         (Severity::Error, code, path),
         "{:#?}",
         refusal.findings
     );
     for finding in &refusal.findings {
-        assert!(
-            !finding.to_string().chars().any(char::is_control),
-            "{finding:?}"
-        );
+        assert!(!finding.to_string().chars().any(char::is_control), "{finding:?}");
     }
     first.clone()
 }
@@ -145,11 +125,7 @@ pub fn assert_accepted(bytes: &[u8], name: &str, code: &str) -> (HandIn, Scratch
         Ok(hand_in) => hand_in,
         Err(error) => panic!("expected a copy, found {error}"),
     };
-    assert_eq!(
-        scratch.outside(),
-        before,
-        "something outside the destination changed"
-    );
+    assert_eq!(scratch.outside(), before, "something outside the destination changed");
     let codes: Vec<&str> = hand_in.findings.iter().map(|f| f.code.as_str()).collect();
     if code.is_empty() {
         assert_eq!(hand_in.findings, []);

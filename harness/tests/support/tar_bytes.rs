@@ -34,18 +34,13 @@ impl Entry {
     }
 
     pub fn link(name: &str, kind: u8, target: &str) -> Self {
-        Self {
-            link: target.as_bytes().to_vec(),
-            ..Self::of(name.as_bytes(), kind, b"")
-        }
+        Self { link: target.as_bytes().to_vec(), ..Self::of(name.as_bytes(), kind, b"") }
     }
 
     /// A pax header with these records.
     pub fn pax(kind: u8, records: &[(&str, &str)]) -> Self {
-        let content: Vec<u8> = records
-            .iter()
-            .flat_map(|(key, value)| pax_record(key, value))
-            .collect();
+        let content: Vec<u8> =
+            records.iter().flat_map(|(key, value)| pax_record(key, value)).collect();
         Self::of(b"PaxHeader", kind, &content)
     }
 

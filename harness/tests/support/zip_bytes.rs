@@ -88,11 +88,7 @@ impl Entry {
         self.central.flags |= 8;
         (self.local.crc32, self.local.packed, self.local.unpacked) = (0, 0, 0);
         self.descriptor = b"PK\x07\x08".to_vec();
-        for field in [
-            self.central.crc32,
-            self.central.packed,
-            self.central.unpacked,
-        ] {
+        for field in [self.central.crc32, self.central.packed, self.central.unpacked] {
             self.descriptor.extend(field.to_le_bytes());
         }
         self
@@ -124,10 +120,7 @@ pub struct Zip {
 
 impl Zip {
     pub fn of(entries: impl IntoIterator<Item = Entry>) -> Self {
-        Self {
-            entries: entries.into_iter().collect(),
-            ..Self::default()
-        }
+        Self { entries: entries.into_iter().collect(), ..Self::default() }
     }
 
     pub fn bytes(&self) -> Vec<u8> {
@@ -170,11 +163,7 @@ impl Zip {
         out.extend(count.to_le_bytes());
         out.extend(self.directory_size.unwrap_or(size as u32).to_le_bytes());
         out.extend(self.directory_offset.unwrap_or(start as u32).to_le_bytes());
-        out.extend(
-            self.comment_length
-                .unwrap_or(self.comment.len() as u16)
-                .to_le_bytes(),
-        );
+        out.extend(self.comment_length.unwrap_or(self.comment.len() as u16).to_le_bytes());
         out.extend(&self.comment);
         out.extend(&self.suffix);
         out

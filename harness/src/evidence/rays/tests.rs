@@ -1,0 +1,111 @@
+use basecode::Vec3;
+
+use super::*;
+use crate::expected::Sight;
+
+/// Forty lit and twenty dark rays at various distances and angles.
+fn batch() -> RayBatch {
+    let point = |index: usize| {
+        let cos = 0.1 + 0.9 * (index as f32 * 0.37).fract();
+        let wi = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+        SurfacePoint {
+            ray: Ray::new(Vec3::ZERO, Vec3::Z),
+            shape: 0,
+            primitive: 0,
+            position: Vec3::new(index as f32, 0.0, 0.0),
+            normal: Vec3::Z,
+            wo: Vec3::Z,
+            wi,
+            distance: 1.0 + (index as f32 * 0.71).fract(),
+            sight: if index < 40 { Sight::Clear } else { Sight::Blocked },
+        }
+    };
+    let points: Vec<SurfacePoint> = (0..60).map(point).collect();
+    RayBatch {
+        scene: "s".into(),
+        rays: points.iter().map(|p| p.ray).collect(),
+        points,
+        lit: 40,
+        intensity: Vec3::new(1.0, 2.0, 3.0),
+    }
+}
+
+fn witness(_: &SurfacePoint) -> [f64; 3] {
+    [1.0, 0.5, 0.25]
+}
+
+/// Right answers times `factor`.
+fn answers(batch: &RayBatch, factor: impl Fn(usize, &SurfacePoint) -> f64) -> Vec<[f32; 3]> {
+    (0..batch.rays.len())
+        .map(|index| {
+            let point = &batch.points[index];
+            let factor = factor(index, point);
+            batch.unshadowed(index, witness(point)).map(|v| (v * factor) as f32)
+        })
+        .collect()
+}
+
+fn unshadowed(factor: impl Fn(usize, &SurfacePoint) -> f64) -> Check {
+    let batch = batch();
+    let values = answers(&batch, factor);
+    let answer = Unshadowed { witness: "constant", bsdf: &witness, values: &values };
+    judge_unshadowed(&batch, &[answer])
+}
+
+#[test]
+fn unshadowed_radiance_is_judged_on_lit_rays_only() {
+    let right = unshadowed(|index, _| if index < 40 { 1.0 } else { 0.0 });
+    assert_eq!((right.verdict, right.error), (Verdict::Pass, 0.0));
+    for (factor, error) in [(0.0, 1.0), (1.01, 0.01), (f64::NAN, 10.0)] {
+        let wrong = unshadowed(|_, _| factor);
+        assert_eq!(wrong.verdict, Verdict::Fail, "{factor}");
+        assert!((wrong.error - error).abs() < 1e-4, "{factor}: {}", wrong.error);
+    }
+}
+
+#[test]
+fn known_factors_are_named() {
+    assert!(unshadowed(|_, p| f64::from(p.wi.z)).hint.contains("twice"));
+    assert!(unshadowed(|_, p| f64::from(p.distance).powi(2)).hint.contains("inverse square"));
+    assert!(unshadowed(|_, _| 4.0 * std::f64::consts::PI).hint.contains("4 pi"));
+    assert!(unshadowed(|_, _| 0.0).hint.contains("is 0"));
+}
+
+fn shadows(with: impl Fn(usize) -> f64, without: impl Fn(usize) -> f64) -> Check {
+    let batch = batch();
+    let with = answers(&batch, |index, _| with(index));
+    let without = answers(&batch, |index, _| without(index));
+    judge_shadows(&batch, &witness, &with, &without)
+}
+
+#[test]
+fn visibility_is_judged_apart_from_radiance() {
+    let right = |index| if index < 40 { 1.0 } else { 0.0 };
+    assert_eq!(shadows(right, |_| 1.0).verdict, Verdict::Pass);
+    // A wrong factor is not paid twice, nor is a switch that is ignored.
+    assert_eq!(shadows(|i| 7.0 * right(i), |_| 7.0).verdict, Verdict::Pass);
+    assert_eq!(shadows(right, right).verdict, Verdict::Pass);
+    for (name, with) in [("all lit", 1.0), ("all dark", 0.0), ("half", 0.5), ("nan", f64::NAN)] {
+        let check = shadows(|_| with, |_| 1.0);
+        assert!(check.verdict == Verdict::Fail && check.error >= 1.0, "{name}: {}", check.error);
+    }
+    let black = shadows(|_| 0.0, |_| 0.0);
+    assert!(black.verdict == Verdict::Fail && black.error >= 1.0);
+    let some = shadows(|index| if index < 45 { 1.0 } else { 0.0 }, |_| 1.0);
+    assert!((some.error - 0.25).abs() < 1e-9 && some.hint.contains("occluders"));
+}
+
+#[test]
+fn an_image_that_is_not_its_rays_is_found() {
+    let mask = RegionMask::background(4, 3);
+    let rays: Vec<[f32; 3]> = (0..12).map(|i| [i as f32; 3]).collect();
+    assert_eq!(judge_agreement("s", &mask, &rays, &rays).verdict, Verdict::Pass);
+    let flipped: Vec<[f32; 3]> =
+        (0..3).rev().flat_map(|y| rays[4 * y..4 * y + 4].to_vec()).collect();
+    let check = judge_agreement("s", &mask, &flipped, &rays);
+    assert_eq!(check.verdict, Verdict::Fail);
+    assert!(check.summary.contains("first at (0, 0)"), "{}", check.summary);
+    assert_eq!(judge_agreement("s", &mask, &[[0.0; 3]; 12], &rays).verdict, Verdict::Fail);
+    let black = [[0.0; 3]; 12];
+    assert_eq!(judge_agreement("s", &mask, &black, &black).verdict, Verdict::NotJudged);
+}
