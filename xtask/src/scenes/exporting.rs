@@ -53,7 +53,7 @@ pub fn scene_files(scene: &Scene) -> Result<Vec<File>> {
 }
 
 /// `value` rounded to `decimals` places, without trailing zeros and without a negative zero.
-fn decimal(value: f64, decimals: usize) -> String {
+pub fn decimal(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') {
         text.trim_end_matches('0').trim_end_matches('.')

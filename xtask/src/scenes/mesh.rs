@@ -1,6 +1,6 @@
 //! Triangle meshes with one position, normal and texture coordinate per vertex.
 
-use glam::{DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 /// A point of a surface.
 #[derive(Clone, Copy, Debug)]
@@ -80,9 +80,8 @@ impl Mesh {
         self
     }
 
-    /// Scales, then turns about the y axis (counter-clockwise seen from above), then moves.
-    pub fn place(mut self, scale: f64, turn_deg: f64, offset: DVec3) -> Self {
-        let turn = glam::DQuat::from_rotation_y(turn_deg.to_radians());
+    /// Scales, then turns, then moves.
+    pub fn place(mut self, scale: f64, turn: DQuat, offset: DVec3) -> Self {
         for vertex in &mut self.vertices {
             vertex.position = turn * (vertex.position * scale) + offset;
             vertex.normal = turn * vertex.normal;

@@ -111,4 +111,19 @@ impl Scene {
         );
         self.with("light", Material::Emitter { ke: intensity }, light)
     }
+
+    /// Where the point light is: the mean of the first emitter's positions over its index list.
+    pub fn light(&self) -> DVec3 {
+        let emitter = self
+            .shapes
+            .iter()
+            .find(|shape| matches!(shape.material, Material::Emitter { .. }));
+        let mesh = &emitter.expect("every scene has an emitter").mesh;
+        let indices = mesh.triangles.as_flattened();
+        indices
+            .iter()
+            .map(|&i| mesh.vertices[i as usize].position)
+            .sum::<DVec3>()
+            / indices.len() as f64
+    }
 }

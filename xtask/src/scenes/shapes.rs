@@ -28,6 +28,11 @@ pub fn sphere(centre: DVec3, radius: f64) -> Mesh {
     sphere_band(centre, radius, 64, 32, 1.0)
 }
 
+/// A coarser closed sphere, for small films.
+pub fn ball(centre: DVec3, radius: f64) -> Mesh {
+    sphere_band(centre, radius, 32, 16, 1.0)
+}
+
 /// The part of a sphere from its upper pole down to the fraction `part` of the way to the lower pole, seen from outside.
 pub fn sphere_band(centre: DVec3, radius: f64, segments: usize, rings: usize, part: f64) -> Mesh {
     Mesh::grid(segments, rings, |u, v| {
