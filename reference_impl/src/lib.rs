@@ -3,6 +3,7 @@
 mod bsdfs;
 mod integrators;
 mod renderer;
+mod renderpasses;
 
 use basecode::gpu::{Gpu, RenderPass};
 use basecode::{
@@ -45,12 +46,21 @@ impl Renderer for Reference {
     fn render_pass(
         &self,
         kind: &str,
-        _gpu: &Gpu,
-        _scene: &Scene,
-        _shadow_map: bool,
+        gpu: &Gpu,
+        scene: &Scene,
+        shadow_map: bool,
     ) -> Result<Box<dyn RenderPass>> {
-        Err(Error::Argument(format!("there is no render pass \"{kind}\"")))
+        match kind {
+            "simple" | "direct" => {
+                Ok(Box::new(renderpasses::SimplePass::new(gpu, scene, shadow_map)?))
+            }
+            "normal" => Ok(Box::new(renderpasses::NormalPass::new(gpu, scene)?)),
+            _ => Err(Error::Argument(format!("there is no render pass \"{kind}\""))),
+        }
     }
 }
 
 basecode::export_renderer!(Reference, "reference", "0.1.0");
+
+#[cfg(test)]
+mod tests;

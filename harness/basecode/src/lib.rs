@@ -43,6 +43,7 @@ pub use ray::{Ray, SurfaceInteraction};
 pub use renderer::{Bsdf, Integrator, RenderJob, Renderer};
 pub use sampler::Sampler;
 pub use scene::{Material, MaterialModel, Scene, Shape, Texture};
+pub use wgpu;
 
 /// The constant 1 / pi.
 pub const INV_PI: f32 = std::f32::consts::FRAC_1_PI;

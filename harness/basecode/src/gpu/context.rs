@@ -1,0 +1,194 @@
+//! The graphics device: which adapter, and what went wrong.
+
+use std::sync::{Arc, Mutex};
+
+use super::Layouts;
+use crate::{Error, Result};
+
+/// Which kind of adapter to draw with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AdapterKind {
+    /// Hardware when there is some, software otherwise.
+    Any,
+    /// A software adapter only (Mesa's lavapipe on Linux).
+    Software,
+    /// A hardware adapter only.
+    Hardware,
+}
+
+/// An open graphics device.
+pub struct Gpu {
+    /// Creates resources.
+    pub device: wgpu::Device,
+    /// Takes commands.
+    pub queue: wgpu::Queue,
+    /// What draws.
+    pub adapter: wgpu::AdapterInfo,
+    /// The bind group layouts of the shader contract.
+    pub layouts: Layouts,
+    stages: Vec<(String, String)>,
+    trouble: Arc<Mutex<Trouble>>,
+}
+
+/// What the graphics library says outside of any call.
+#[derive(Default)]
+struct Trouble {
+    /// Why the device was lost, once it is.
+    lost: Option<String>,
+    /// The first error that no scope caught.
+    uncaught: Option<wgpu::Error>,
+}
+
+/// The one graphics interface to use here. Never GL: on software adapters it has no float targets.
+const BACKEND: wgpu::Backends = if cfg!(target_vendor = "apple") {
+    wgpu::Backends::METAL
+} else if cfg!(windows) {
+    wgpu::Backends::DX12
+} else {
+    wgpu::Backends::VULKAN
+};
+
+/// What to do about a missing adapter.
+const HINT: &str = if cfg!(target_os = "linux") {
+    "install a Vulkan driver; on Debian and Ubuntu the software one is in the packages \
+     mesa-vulkan-drivers and libvulkan1"
+} else {
+    "install the graphics driver of this machine"
+};
+
+impl Gpu {
+    /// Opens an adapter of `kind` whose name holds `name` (any case; empty accepts all).
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] when none fits; it names those there are and what to install.
+    pub fn open(kind: AdapterKind, name: &str) -> Result<Self> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+            backends: BACKEND,
+            flags: wgpu::InstanceFlags::empty(),
+            ..wgpu::InstanceDescriptor::new_without_display_handle()
+        });
+        let mut adapters = pollster::block_on(instance.enumerate_adapters(BACKEND));
+        adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type));
+        let fits = |info: &wgpu::AdapterInfo| {
+            let software = info.device_type == wgpu::DeviceType::Cpu;
+            let kind_fits = match kind {
+                AdapterKind::Any => true,
+                AdapterKind::Software => software,
+                AdapterKind::Hardware => !software,
+            };
+            kind_fits && info.name.to_lowercase().contains(&name.to_lowercase())
+        };
+        let Some(adapter) = adapters.iter().find(|adapter| fits(&adapter.get_info())) else {
+            let found: Vec<_> = adapters.iter().map(|adapter| adapter.get_info()).collect();
+            return Err(no_adapter(kind, name, &found));
+        };
+        let info = adapter.get_info();
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("umbra"),
+            // Large films need more than the defaults; take all that the adapter has.
+            required_limits: adapter.limits(),
+            memory_hints: wgpu::MemoryHints::MemoryUsage,
+            ..wgpu::DeviceDescriptor::default()
+        }))
+        .map_err(|error| Error::NoAdapter(format!("cannot open {:?}: {error}", info.name)))?;
+        let trouble = Arc::new(Mutex::new(Trouble::default()));
+        let shared = Arc::clone(&trouble);
+        device.set_device_lost_callback(move |_, why| {
+            if let Ok(mut trouble) = shared.lock() {
+                trouble.lost.get_or_insert(why);
+            }
+        });
+        let shared = Arc::clone(&trouble);
+        // Without a handler of ours, wgpu panics.
+        device.on_uncaptured_error(Arc::new(move |error| {
+            if let Ok(mut trouble) = shared.lock() {
+                trouble.uncaught.get_or_insert(error);
+            }
+        }));
+        let layouts = Layouts::new(&device);
+        Ok(Self { device, queue, adapter: info, layouts, stages: Vec::new(), trouble })
+    }
+
+    /// Replaces the text of shader stages, by stage name (`simple.vs`, `diffuse.fs`, `phong.fs`).
+    pub fn replace_stages(&mut self, stages: Vec<(String, String)>) {
+        self.stages = stages;
+    }
+
+    /// The text of a stage: the host's replacement, or else the renderer's `own`.
+    pub fn stage<'a>(&'a self, name: &str, own: &'a str) -> &'a str {
+        self.stages.iter().find(|(stage, _)| stage == name).map_or(own, |(_, text)| text)
+    }
+
+    /// Begins to record commands.
+    pub fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    }
+
+    /// Ends the recording and hands the commands to the device.
+    pub fn submit(&self, encoder: wgpu::CommandEncoder) {
+        self.queue.submit([encoder.finish()]);
+    }
+
+    /// Runs `body` and reports what the graphics library found wrong with it.
+    ///
+    /// # Errors
+    /// The body's own error, or else [`Error::NoAdapter`] when the device was lost, or else
+    /// [`Error::Gpu`] with the library's message: for a shader it holds the line of WGSL.
+    pub fn checked<T>(&self, body: &mut dyn FnMut() -> Result<T>) -> Result<T> {
+        let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
+        let answer = body();
+        // An error that poll itself finds is a lost device, which the callback reports.
+        let _ = self.device.poll(wgpu::PollType::Poll);
+        // Scopes end in reverse order. The first error is the cause: what follows uses its debris.
+        let internal = pollster::block_on(internal.pop());
+        let memory = pollster::block_on(memory.pop());
+        let validation = pollster::block_on(validation.pop());
+        let (lost, uncaught) = match self.trouble.lock() {
+            Ok(mut trouble) => (trouble.lost.clone(), trouble.uncaught.take()),
+            Err(_) => (Some("an error handler panicked".to_owned()), None),
+        };
+        let value = answer?;
+        if let Some(why) = lost {
+            return Err(self.lost(&why));
+        }
+        match memory.or(internal).or(validation).or(uncaught) {
+            None => Ok(value),
+            Some(wgpu::Error::OutOfMemory { .. }) => Err(Error::Gpu(format!(
+                "the graphics device {:?} is out of memory",
+                self.adapter.name
+            ))),
+            Some(error) => Err(Error::Gpu(error.to_string().trim_end().to_owned())),
+        }
+    }
+
+    /// The error for a device that was lost.
+    pub(super) fn lost(&self, why: &str) -> Error {
+        Error::NoAdapter(format!("the graphics device {:?} was lost: {why}", self.adapter.name))
+    }
+}
+
+/// Adapters in the order of preference.
+fn rank(kind: wgpu::DeviceType) -> u32 {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    }
+}
+
+fn no_adapter(kind: AdapterKind, name: &str, found: &[wgpu::AdapterInfo]) -> Error {
+    let wanted = match kind {
+        AdapterKind::Any => "graphics adapter",
+        AdapterKind::Software => "software graphics adapter",
+        AdapterKind::Hardware => "hardware graphics adapter",
+    };
+    let named = if name.is_empty() { String::new() } else { format!(" named like {name:?}") };
+    let found: Vec<_> =
+        found.iter().map(|info| format!("{:?} ({:?})", info.name, info.device_type)).collect();
+    let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
+    Error::NoAdapter(format!("no {wanted}{named} on this machine; found {found}; {HINT}"))
+}

@@ -1,0 +1,153 @@
+//! Bind group layouts and pipelines: the fixed part of the shader contract.
+
+use super::{
+    COLOR_FORMAT, DEPTH_FORMAT, FrameUniforms, Gpu, MaterialUniforms, ObjectUniforms,
+    ShadowUniforms, VERTEX_STRIDE,
+};
+
+/// The fragment stage of emitters: plain white.
+pub const EMITTER_FS: Stage = Stage { name: "emitter.fs", text: include_str!("emitter.fs.wgsl") };
+
+/// One shader stage of a renderer.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage<'a> {
+    /// The name of its file without `.wgsl`, by which the host can replace its text.
+    pub name: &'a str,
+    /// Its WGSL text, complete in itself; the entry point is `vs_main` or `fs_main`.
+    pub text: &'a str,
+}
+
+/// The four bind group layouts. They are explicit: an automatic layout would drop what a shader
+/// does not use, and stages could not be exchanged.
+pub struct Layouts {
+    /// Group 0.
+    pub frame: wgpu::BindGroupLayout,
+    /// Group 1.
+    pub object: wgpu::BindGroupLayout,
+    /// Group 2.
+    pub material: wgpu::BindGroupLayout,
+    /// Group 3.
+    pub shadow: wgpu::BindGroupLayout,
+    all: wgpu::PipelineLayout,
+    depth: wgpu::PipelineLayout,
+}
+
+impl Layouts {
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        let layout = |name, entries: &[wgpu::BindGroupLayoutEntry]| {
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(name),
+                entries,
+            })
+        };
+        let uniform = |size: usize| {
+            entry(
+                0,
+                wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: false,
+                    min_binding_size: std::num::NonZeroU64::new(size as u64),
+                },
+            )
+        };
+        let map = entry(
+            1,
+            wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Depth,
+                view_dimension: wgpu::TextureViewDimension::D2Array,
+                multisampled: false,
+            },
+        );
+        let comparison = entry(2, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison));
+        let frame = layout("frame", &[uniform(size_of::<FrameUniforms>())]);
+        let object = layout("object", &[uniform(size_of::<ObjectUniforms>())]);
+        let material = layout("material", &[uniform(size_of::<MaterialUniforms>())]);
+        let shadow = layout("shadow", &[uniform(size_of::<ShadowUniforms>()), map, comparison]);
+        let pipeline = |name, groups: &[Option<&wgpu::BindGroupLayout>]| {
+            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(name),
+                bind_group_layouts: groups,
+                immediate_size: 0,
+            })
+        };
+        let all = pipeline("all", &[Some(&frame), Some(&object), Some(&material), Some(&shadow)]);
+        let depth = pipeline("depth", &[Some(&frame), Some(&object)]);
+        Self { frame, object, material, shadow, all, depth }
+    }
+}
+
+fn entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
+    let visibility = wgpu::ShaderStages::VERTEX_FRAGMENT;
+    wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
+}
+
+impl Gpu {
+    /// A pipeline that draws colour and depth into a [`super::Target`]. All four bind groups must be
+    /// set before it draws.
+    ///
+    /// What is wrong with a stage is reported by [`Gpu::checked`].
+    pub fn pipeline(&self, vertex: Stage, fragment: Stage) -> wgpu::RenderPipeline {
+        let module = self.module(fragment);
+        let fragment_state = wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("fs_main"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(COLOR_FORMAT.into())],
+        };
+        self.make_pipeline(fragment.name, &self.layouts.all, vertex, Some(fragment_state))
+    }
+
+    /// A pipeline that draws depth alone, as into a layer of a [`super::ShadowMap`]. Bind groups 0
+    /// and 1 must be set before it draws; no others exist for it.
+    pub fn depth_pipeline(&self, vertex: Stage) -> wgpu::RenderPipeline {
+        self.make_pipeline(vertex.name, &self.layouts.depth, vertex, None)
+    }
+
+    fn module(&self, stage: Stage) -> wgpu::ShaderModule {
+        self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(&format!("{}.wgsl", stage.name)),
+            source: wgpu::ShaderSource::Wgsl(self.stage(stage.name, stage.text).into()),
+        })
+    }
+
+    fn make_pipeline(
+        &self,
+        name: &str,
+        layout: &wgpu::PipelineLayout,
+        vertex: Stage,
+        fragment: Option<wgpu::FragmentState>,
+    ) -> wgpu::RenderPipeline {
+        let attribute = |shader_location, offset| wgpu::VertexAttribute {
+            format: wgpu::VertexFormat::Float32x3,
+            offset,
+            shader_location,
+        };
+        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(name),
+            layout: Some(layout),
+            vertex: wgpu::VertexState {
+                module: &self.module(vertex),
+                entry_point: Some("vs_main"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers: &[Some(wgpu::VertexBufferLayout {
+                    array_stride: VERTEX_STRIDE,
+                    step_mode: wgpu::VertexStepMode::Vertex,
+                    attributes: &[attribute(0, 0), attribute(1, VERTEX_STRIDE / 2)],
+                })],
+            },
+            // Triangles, both faces: what is seen from behind is for the fragment stage to decide.
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH_FORMAT,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Less),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState::default(),
+            fragment,
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}

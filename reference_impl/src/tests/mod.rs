@@ -1,0 +1,3 @@
+//! Drawing tests. They need a graphics adapter, and fail where there is none.
+
+mod scenes;
