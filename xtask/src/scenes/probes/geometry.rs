@@ -139,7 +139,7 @@ pub fn contact() -> Scene {
         .with(
             "fin",
             Material::diffuse([0.2, 0.3, 0.5]),
-            cuboid(dvec3(0.52, -0.01, -0.4), dvec3(0.54, 0.11, 0.4)),
+            cuboid(dvec3(0.536, -0.01, -0.4), dvec3(0.54, 0.11, 0.4)),
         )
         .lit_by(dvec3(-4.0, 2.0, 0.5), [52.0, 52.0, 52.0]);
     scene.film = [192, 144];

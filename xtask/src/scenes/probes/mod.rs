@@ -22,11 +22,11 @@ const PROBES: [Probe; 10] = [
     ),
     (
         materials::exponents,
-        "strips of exponent 1, 9.8, 101.5, 50 and 2, half of them with cos alpha < 0 and all at grazing angles: pow before clamp, NaN, n + 1 for n + 2",
+        "strips of exponent 1, 9.8, 101.5, 50 and 2, seen at grazing angles, cos alpha < 0 at their far end: pow before clamp, NaN, n + 1 for n + 2",
     ),
     (
         materials::coloured,
-        "a dim, coloured light on coloured Kd and Ks, nothing above 1: swapped channels, a light or material that goes in as grey, a clamp at 1 stays out of it",
+        "a dim, coloured light on coloured Kd and Ks, nothing above 1: swapped channels, a light or material taken as grey",
     ),
     (
         materials::textured,
@@ -34,7 +34,7 @@ const PROBES: [Probe; 10] = [
     ),
     (
         materials::open,
-        "bumpy diffuse and Phong strips without any occluder, every camera ray lit: unshadowed radiance alone, whatever the shadows do",
+        "bumpy diffuse and Phong strips without any occluder, everything in view lit: unshadowed radiance alone, whatever the shadows do",
     ),
     (
         geometry::behind,
