@@ -12,3 +12,4 @@ pub mod pictures;
 pub mod ratio;
 pub mod reference;
 pub mod srgb;
+mod walk;

@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn factors_have_names() {
-        assert_eq!(ratio_name(3.1400), Some("pi"));
+        assert_eq!(ratio_name(3.15), Some("pi"));
         assert_eq!(ratio_name(0.3175), Some("1/pi"));
         assert_eq!(ratio_name(12.57), Some("4 pi"));
         assert_eq!(ratio_name(0.5), Some("1/2"));
