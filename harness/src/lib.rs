@@ -2,8 +2,12 @@
 //!
 //! Data flows one way: `intake` -> `build` -> `worker` -> `evidence` -> `rubric` -> `report`.
 
+pub mod build;
 pub mod evidence;
 pub mod expected;
 pub mod imaging;
 pub mod intake;
+pub mod plugin;
+pub mod process;
 pub mod rubric;
+pub mod worker;

@@ -1,0 +1,69 @@
+//! Child processes: locked by themselves before anything hostile is touched, watched while they
+//! run, ended with all their descendants in reach and reaped on every path.
+//!
+//! Everything of Umbra that runs foreign code (the compiler, the worker) goes through [`run`].
+//! [`start`] is the one place where a process is made; what the child does to itself first is
+//! [`lock_self`]. A sandbox extends these two and nothing else.
+
+mod capture;
+mod limits;
+mod start;
+#[cfg(unix)]
+mod watch;
+#[cfg(not(unix))]
+#[path = "watch_plain.rs"]
+mod watch;
+
+pub use capture::Captured;
+pub use limits::{Limits, Lock, Policy, Purpose};
+pub use start::{EXIT_NOT_LOCKED, exec_main, exit_now, lock_self, start};
+pub use watch::run;
+
+use serde::{Deserialize, Serialize};
+
+/// How a child ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Exit {
+    /// By itself, with this code.
+    Code(i32),
+    /// By this signal, which Umbra did not send.
+    Signal(i32),
+    /// By Umbra, at the wall-clock deadline, or by the kernel, out of CPU time.
+    TimedOut,
+    /// By Umbra, because it wrote more output than allowed.
+    Flooded,
+    /// By Umbra, because the user asked to stop.
+    Cancelled,
+}
+
+/// What is known about a child that is gone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ended {
+    /// How it ended.
+    pub exit: Exit,
+    /// What its process id was, and its group's.
+    pub pid: u32,
+    /// Its standard output.
+    pub stdout: Captured,
+    /// Its standard error.
+    pub stderr: Captured,
+    /// From start to reaping, in seconds, as the parent's clock saw it.
+    pub wall_s: f64,
+    /// User and system time of the child and its reaped children, in seconds; 0 when unknown.
+    pub cpu_s: f64,
+    /// Largest resident size in MiB; 0 when unknown.
+    pub peak_resident_mib: u64,
+    /// Largest address space that was seen in MiB, by sampling; 0 when unknown.
+    pub peak_address_mib: u64,
+    /// Whether some process outside the child's group still held its output open in the end.
+    pub left_process: bool,
+}
+
+/// The usual name of a signal.
+pub fn signal_name(signal: i32) -> String {
+    #[cfg(unix)]
+    if let Ok(known) = nix::sys::signal::Signal::try_from(signal) {
+        return known.as_str().to_owned();
+    }
+    format!("signal {signal}")
+}

@@ -1,0 +1,118 @@
+//! The start of a child, on both sides. A sandbox belongs here: what the parent must do goes into
+//! [`start`], what the child does to itself into [`lock_self`].
+
+use std::ffi::{OsStr, OsString};
+use std::io;
+use std::process::{Child, Command, ExitCode};
+
+use super::{Limits, Lock};
+
+/// Carries the [`Lock`] to the child, which removes it.
+const LOCK_VARIABLE: &str = "UMBRA_LOCK";
+/// Carries the parent's process id to the child.
+const PARENT_VARIABLE: &str = "UMBRA_PARENT";
+
+/// The exit code of a child that could not lock itself or could not execute its program.
+pub const EXIT_NOT_LOCKED: u8 = 70;
+
+/// Starts `command`, which must be Umbra itself with a hidden command that calls [`lock_self`]
+/// before anything hostile is touched. The child must be waited for on the thread that calls this:
+/// it is killed when that thread ends.
+///
+/// # Errors
+/// When the process cannot be made.
+pub fn start(mut command: Command, lock: &Lock) -> io::Result<Child> {
+    command.env(LOCK_VARIABLE, serde_json::to_string(lock)?);
+    command.env(PARENT_VARIABLE, std::process::id().to_string());
+    command.spawn()
+}
+
+/// Locks this process by what [`start`] was given: a session and process group of its own, death
+/// with its parent, and its limits.
+///
+/// Call it first thing in `main`, while there is one thread.
+///
+/// # Errors
+/// When there is no lock, or any part of it cannot be applied: then nothing hostile may be touched.
+pub fn lock_self() -> io::Result<()> {
+    let lock = std::env::var(LOCK_VARIABLE)
+        .map_err(|_| io::Error::other("this command is for Umbra's own use"))?;
+    let lock: Lock = serde_json::from_str(&lock)?;
+    let parent = std::env::var(PARENT_VARIABLE).ok().and_then(|id| id.parse::<i32>().ok());
+    // SAFETY: the caller promises that this process has no other thread yet.
+    unsafe {
+        std::env::remove_var(LOCK_VARIABLE);
+        std::env::remove_var(PARENT_VARIABLE);
+    }
+    detach(parent)?;
+    limit(&lock.limits)
+}
+
+/// Locks this process, then turns it into `program`: the hidden command `__exec`.
+pub fn exec_main(program: &OsStr, args: &[OsString]) -> ExitCode {
+    let failure = match lock_self() {
+        Ok(()) => exec(Command::new(program).args(args)),
+        Err(error) => error,
+    };
+    eprintln!("umbra: cannot execute {}: {failure}", program.display());
+    ExitCode::from(EXIT_NOT_LOCKED)
+}
+
+#[cfg(unix)]
+fn exec(command: &mut Command) -> io::Error {
+    std::os::unix::process::CommandExt::exec(command)
+}
+
+#[cfg(not(unix))]
+fn exec(command: &mut Command) -> io::Error {
+    match command.status() {
+        Ok(status) => std::process::exit(status.code().unwrap_or(1)),
+        Err(error) => error,
+    }
+}
+
+#[cfg(unix)]
+fn detach(parent: Option<i32>) -> io::Result<()> {
+    nix::unistd::setsid()?;
+    #[cfg(target_os = "linux")]
+    nix::sys::prctl::set_pdeathsig(nix::sys::signal::Signal::SIGKILL)?;
+    // The parent may have died before the line above: then nobody would end this process.
+    if parent != Some(nix::unistd::getppid().as_raw()) {
+        return Err(io::Error::other("the parent is gone"));
+    }
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn detach(_parent: Option<i32>) -> io::Result<()> {
+    Ok(())
+}
+
+#[cfg(unix)]
+fn limit(limits: &Limits) -> io::Result<()> {
+    use nix::sys::resource::{Resource, setrlimit};
+    setrlimit(Resource::RLIMIT_CORE, 0, 0)?;
+    setrlimit(Resource::RLIMIT_NOFILE, limits.open_files, limits.open_files)?;
+    setrlimit(Resource::RLIMIT_FSIZE, limits.file_size_mib << 20, limits.file_size_mib << 20)?;
+    // SIGXCPU at the first, SIGKILL at the second.
+    setrlimit(Resource::RLIMIT_CPU, limits.cpu_s, limits.cpu_s + 1)?;
+    setrlimit(Resource::RLIMIT_AS, limits.memory_mib << 20, limits.memory_mib << 20)?;
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn limit(_limits: &Limits) -> io::Result<()> {
+    Ok(())
+}
+
+/// Ends this process at once, without running exit handlers or destructors: in a worker they may
+/// be a plugin's.
+pub fn exit_now(code: i32) -> ! {
+    #[cfg(unix)]
+    // SAFETY: `_exit` ends the process and touches nothing of it.
+    unsafe {
+        nix::libc::_exit(code)
+    }
+    #[cfg(not(unix))]
+    std::process::exit(code)
+}

@@ -1,0 +1,216 @@
+//! Watching a child on Unix.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::os::fd::{AsFd, OwnedFd};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use nix::errno::Errno;
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use nix::libc;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::signal::{Signal, kill};
+use nix::sys::wait::{Id, WaitPidFlag, WaitStatus, waitid};
+use nix::unistd::Pid;
+
+use super::capture::Capture;
+use super::{Ended, Exit, Lock, start};
+
+/// How often the deadline, the user's wish to stop and the memory in use are looked at.
+const TICK: Duration = Duration::from_millis(20);
+/// How long the output of a process that is gone may still be held open by another.
+const DRAIN: Duration = Duration::from_millis(200);
+
+/// Runs `command` (see [`start`]) to its end and reaps it. Standard input is empty; of each output
+/// stream the first `keep` bytes and a short tail are kept. `tick` is called now and then.
+///
+/// However it ends, its process group is killed and it is reaped before this returns.
+///
+/// # Errors
+/// When the child cannot be started or watched.
+pub fn run(
+    mut command: Command,
+    lock: &Lock,
+    keep: usize,
+    cancel: &AtomicBool,
+    tick: &mut dyn FnMut(),
+) -> io::Result<Ended> {
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let begin = Instant::now();
+    let mut child = start(command, lock)?;
+    let pid = Pid::from_raw(child.id() as i32);
+    let mut group = Group { pid, reaped: false };
+    let mut pipes = Vec::new();
+    for end in [child.stdout.take().map(OwnedFd::from), child.stderr.take().map(OwnedFd::from)] {
+        pipes.push(Pipe::new(end, keep)?);
+    }
+    let cap = lock.limits.output_kib << 10;
+    let deadline = begin + Duration::from_secs_f64(lock.limits.wall_s);
+    let mut peak_address_mib = 0;
+    let ended_by_us = loop {
+        let now = Instant::now();
+        wait_readable(&pipes, TICK.min(deadline.saturating_duration_since(now)));
+        pipes.iter_mut().for_each(Pipe::read);
+        peak_address_mib = peak_address_mib.max(address_space_mib(pid));
+        tick();
+        if total(&pipes) > cap {
+            break Some(Exit::Flooded);
+        }
+        if has_exited(pid)? {
+            break None;
+        }
+        if cancel.load(Ordering::Relaxed) {
+            break Some(Exit::Cancelled);
+        }
+        if Instant::now() >= deadline {
+            break Some(Exit::TimedOut);
+        }
+    };
+    let (status, usage) = group.end()?;
+    let wall_s = begin.elapsed().as_secs_f64();
+    let drained = Instant::now() + DRAIN;
+    while pipes.iter().any(Pipe::is_open) && Instant::now() < drained {
+        wait_readable(&pipes, drained.saturating_duration_since(Instant::now()));
+        pipes.iter_mut().for_each(Pipe::read);
+    }
+    let left_process = pipes.iter().any(Pipe::is_open);
+    let cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+    let out_of_cpu = cpu_s >= lock.limits.cpu_s as f64;
+    let exit = match (ended_by_us, libc::WIFSIGNALED(status).then(|| libc::WTERMSIG(status))) {
+        (Some(exit), _) => exit,
+        _ if total(&pipes) > cap => Exit::Flooded,
+        (None, Some(libc::SIGXCPU)) => Exit::TimedOut,
+        (None, Some(libc::SIGKILL)) if out_of_cpu => Exit::TimedOut,
+        (None, Some(signal)) => Exit::Signal(signal),
+        (None, None) => Exit::Code(libc::WEXITSTATUS(status)),
+    };
+    let mut captured = pipes.into_iter().map(|pipe| pipe.capture.finish());
+    Ok(Ended {
+        exit,
+        pid: pid.as_raw() as u32,
+        stdout: captured.next().unwrap_or_default(),
+        stderr: captured.next().unwrap_or_default(),
+        wall_s,
+        cpu_s,
+        // Kilobytes on Linux.
+        peak_resident_mib: usage.ru_maxrss as u64 >> 10,
+        peak_address_mib,
+        left_process,
+    })
+}
+
+/// A child and its process group; both are ended when this is dropped, on error paths too.
+struct Group {
+    pid: Pid,
+    reaped: bool,
+}
+
+impl Group {
+    /// Kills the group, reaps the child, and answers its wait status and resource usage.
+    fn end(&mut self) -> io::Result<(i32, libc::rusage)> {
+        // The child is not reaped yet, so its id cannot have gone to another process. Before it
+        // made its own session it has no descendants, and killing itself is enough.
+        for target in [Pid::from_raw(-self.pid.as_raw()), self.pid] {
+            match kill(target, Signal::SIGKILL) {
+                Ok(()) | Err(Errno::ESRCH) => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
+        let mut status = 0;
+        // SAFETY: all-zero is a valid `rusage`, plain integers.
+        let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
+        // SAFETY: both places are valid for writing during the call.
+        while unsafe { libc::wait4(self.pid.as_raw(), &mut status, 0, &mut usage) } < 0 {
+            let error = Errno::last();
+            if error != Errno::EINTR {
+                return Err(error.into());
+            }
+        }
+        self.reaped = true;
+        Ok((status, usage))
+    }
+}
+
+impl Drop for Group {
+    fn drop(&mut self) {
+        if !self.reaped {
+            let _ = self.end();
+        }
+    }
+}
+
+/// Whether the child is gone; it is not reaped by asking.
+fn has_exited(pid: Pid) -> io::Result<bool> {
+    let flags = WaitPidFlag::WEXITED | WaitPidFlag::WNOHANG | WaitPidFlag::WNOWAIT;
+    match waitid(Id::Pid(pid), flags) {
+        Ok(WaitStatus::StillAlive) | Err(Errno::EINTR) => Ok(false),
+        Ok(_) => Ok(true),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The read end of one of the child's output streams.
+struct Pipe {
+    end: Option<File>,
+    capture: Capture,
+}
+
+impl Pipe {
+    fn new(end: Option<OwnedFd>, keep: usize) -> io::Result<Self> {
+        if let Some(end) = &end {
+            fcntl(end, FcntlArg::F_SETFL(OFlag::O_NONBLOCK))?;
+        }
+        Ok(Self { end: end.map(File::from), capture: Capture::new(keep) })
+    }
+
+    fn is_open(&self) -> bool {
+        self.end.is_some()
+    }
+
+    /// Takes what is there, at most one buffer full, so that a flood cannot keep us here.
+    fn read(&mut self) {
+        let Some(end) = &mut self.end else { return };
+        let mut buffer = [0; 64 << 10];
+        match end.read(&mut buffer) {
+            Ok(0) => self.end = None,
+            Ok(count) => self.capture.push(&buffer[..count]),
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(_) => self.end = None,
+        }
+    }
+}
+
+fn total(pipes: &[Pipe]) -> u64 {
+    pipes.iter().map(|pipe| pipe.capture.bytes).sum()
+}
+
+/// Waits until a pipe can be read or `longest` has passed; less when the child closed both.
+fn wait_readable(pipes: &[Pipe], longest: Duration) {
+    let ends = pipes.iter().filter_map(|pipe| pipe.end.as_ref());
+    let mut polled: Vec<_> = ends.map(|end| PollFd::new(end.as_fd(), PollFlags::POLLIN)).collect();
+    if polled.is_empty() {
+        std::thread::sleep(longest.min(Duration::from_millis(1)));
+        return;
+    }
+    let longest = longest.as_millis() as u16;
+    // An error is a signal that arrived: the caller looks at everything anyway.
+    let _ = poll(&mut polled, PollTimeout::from(longest.max(1)));
+}
+
+/// The address space of a process now; 0 when it is not known.
+fn address_space_mib(pid: Pid) -> u64 {
+    let pages = std::fs::read_to_string(format!("/proc/{pid}/statm"))
+        .ok()
+        .and_then(|text| text.split_whitespace().next()?.parse::<u64>().ok());
+    pages.unwrap_or(0) * PAGE / (1 << 20)
+}
+
+/// Good enough for a figure that only tells "near its limit" from "far from it".
+const PAGE: u64 = 4096;
+
+fn seconds(time: libc::timeval) -> f64 {
+    time.tv_sec as f64 + time.tv_usec as f64 * 1e-6
+}

@@ -1,0 +1,157 @@
+//! The worker itself: the hidden command `umbra __worker DIR`.
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use renderer_api as api;
+
+use super::arena::{Input, Output, Table};
+use super::job::{Request, SceneRef};
+use super::neutral_pass;
+use super::table::{Record, STATUS_OURS, STATUS_REJECTED};
+use super::wire::{Folder, WireJob, WireRequest, queries, rays, words};
+use crate::plugin::{
+    CallError, CallErrorKind, HostPlugin, LoadedScene, OfflineJob, RealtimeJob, Witness,
+    WitnessState,
+};
+use crate::process::{exit_now, lock_self};
+
+/// Locks this process, then answers the job in `dir`. Does not return when it worked.
+pub fn child_main(dir: &Path) -> ExitCode {
+    let failure = match lock_self() {
+        Ok(()) => work(dir).err(),
+        Err(error) => Some(error),
+    };
+    if let Some(error) = failure {
+        eprintln!("umbra: the worker cannot work: {error}");
+        return ExitCode::from(crate::process::EXIT_NOT_LOCKED);
+    }
+    // The answers are in place; what a plugin wants to do at exit concerns nobody.
+    exit_now(0)
+}
+
+fn work(dir: &Path) -> std::io::Result<()> {
+    let folder = Folder(dir);
+    let job: WireJob = serde_json::from_slice(&std::fs::read(folder.job())?)?;
+    let table = Table::open(&folder.table(), job.requests.len())?;
+    let input = Input::open(&folder.input())?;
+    let loading = table.loading();
+    loading.start();
+    let plugin = match job.plugin.as_deref().map(HostPlugin::load).transpose() {
+        Ok(plugin) => plugin,
+        Err(error) => {
+            loading.answer(STATUS_REJECTED, &error.to_string(), 0.0);
+            return Ok(());
+        }
+    };
+    let name = plugin.as_ref().map(HostPlugin::name).unwrap_or_default();
+    loading.answer(api::STATUS_OK, &name, 0.0);
+    let mut scene = None;
+    for (index, request) in job.requests.iter().enumerate() {
+        let record = table.request(index);
+        record.start();
+        let begin = Instant::now();
+        let mut output = Output::open(&folder.output(), request.output)?;
+        let bytes = input.bytes(request.input);
+        let result = match &plugin {
+            Some(plugin) => ask(plugin, &mut scene, request, bytes, record, output.floats()),
+            None => neutral_pass::render(&request.request, output.floats()),
+        };
+        let seconds = begin.elapsed().as_secs_f64();
+        match result {
+            Ok(()) => record.answer(api::STATUS_OK, "", seconds),
+            Err(error) => record.answer(status(error.kind), &error.message, seconds),
+        }
+    }
+    // Scenes are left to the end of the process: unloading is foreign code with nothing to give.
+    std::mem::forget(scene);
+    Ok(())
+}
+
+/// The scene that is loaded, kept because requests about one scene come together.
+type Current<'p> = Option<(SceneRef, LoadedScene<'p>)>;
+
+fn ask<'p>(
+    plugin: &'p HostPlugin,
+    current: &mut Current<'p>,
+    request: &WireRequest,
+    input: &[u8],
+    record: &Record,
+    values: &mut [f32],
+) -> Result<(), CallError> {
+    let scene = load(plugin, current, request.request.scene())?;
+    match &request.request {
+        Request::EvalBsdf { .. } => scene.eval_bsdf(&queries(&words(input)), values),
+        Request::Radiance { shadows, witness, seed, .. } => {
+            let settings = api::RadianceSettings { shadows: (*shadows).into(), seed: *seed };
+            let state = WitnessState::new(*witness);
+            let asked = (*witness != Witness::True).then_some(&state);
+            let result = scene.radiance(&settings, asked, &rays(&words(input)), values);
+            record.witness(&state);
+            result
+        }
+        &Request::RenderOffline { width, height, spp, seed, threads, shadows, .. } => {
+            let progress = |done, total| record.progress(done, total);
+            let job =
+                OfflineJob { width, height, spp, threads, seed, shadows, progress: &progress };
+            scene.render_offline(&job, values)
+        }
+        Request::RenderRealtime { width, height, shadow_map, adapter, stages, cameras, .. } => {
+            let stages: Vec<_> = stages.iter().map(|stage| (&*stage.name, &*stage.text)).collect();
+            let mut pass = scene.open_realtime(&RealtimeJob {
+                width: *width,
+                height: *height,
+                shadow_map: *shadow_map,
+                adapter_kind: adapter.kind.as_api(),
+                adapter_name: &adapter.name,
+                stages: &stages,
+            })?;
+            let frame_floats = (3 * *width as usize * *height as usize).max(1);
+            for (camera, frame) in cameras.iter().zip(values.chunks_exact_mut(frame_floats)) {
+                let camera = api::CameraValue {
+                    eye: camera.eye,
+                    at: camera.at,
+                    up: camera.up,
+                    fov_y_deg: camera.fov_y_deg,
+                };
+                pass.frame(&camera, frame)?;
+            }
+            Ok(())
+        }
+    }
+}
+
+fn load<'c, 'p>(
+    plugin: &'p HostPlugin,
+    current: &'c mut Current<'p>,
+    wanted: &SceneRef,
+) -> Result<&'c mut LoadedScene<'p>, CallError> {
+    if current.as_ref().is_some_and(|(loaded, _)| loaded != wanted) {
+        *current = None;
+    }
+    let (_, scene) = match current.take() {
+        Some(loaded) => current.insert(loaded),
+        None => {
+            let Some(path) = wanted.path.to_str() else {
+                let message = format!("scene path {} is not UTF-8", wanted.path.display());
+                return Err(CallError { kind: CallErrorKind::Ours, message });
+            };
+            let scene = plugin.load_scene(path, &wanted.options)?;
+            current.insert((wanted.clone(), scene))
+        }
+    };
+    Ok(scene)
+}
+
+/// The status for the table.
+fn status(kind: CallErrorKind) -> i32 {
+    match kind {
+        CallErrorKind::Failed => api::STATUS_ERROR,
+        CallErrorKind::NotImplemented => api::STATUS_NOT_IMPLEMENTED,
+        CallErrorKind::Panicked => api::STATUS_PANICKED,
+        CallErrorKind::Cancelled => api::STATUS_CANCELLED,
+        CallErrorKind::NoAdapter => api::STATUS_NO_ADAPTER,
+        CallErrorKind::Ours => STATUS_OURS,
+    }
+}

@@ -1,0 +1,25 @@
+//! The worker: a child process that loads a plugin and answers requests, and its supervision.
+//!
+//! ```text
+//! Job -> Supervisor::run_job -> [umbra __worker DIR: load, call] -> JobReport
+//! ```
+//! Large inputs and all outputs travel through files that the worker maps (`arena`), progress and
+//! answers through a table of fixed-size records (`table`). The parent trusts neither: a plugin
+//! shares the worker's address space and can write anything there.
+
+mod arena;
+mod child;
+mod job;
+mod neutral_pass;
+mod outcome;
+mod supervise;
+mod table;
+mod wire;
+
+pub use child::child_main;
+pub use job::{
+    Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, RayQuery, Request, SceneRef,
+    Stage,
+};
+pub use outcome::{Answer, JobReport, Matter, Outcome, WitnessUse, WorkerRun};
+pub use supervise::{Progress, Supervisor};

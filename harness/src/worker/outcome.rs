@@ -1,0 +1,154 @@
+//! What became of a request, and whose matter it is.
+
+use serde::{Deserialize, Serialize};
+
+use crate::process::Ended;
+
+/// Whose matter an outcome is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Matter {
+    /// The submission's: it costs points.
+    Submission,
+    /// The machine's, to be believed only when the reference fails likewise in a fresh worker.
+    Machine,
+    /// Ours: a bug, to be said so. A plugin can forge it, so it too needs the reference's word.
+    Ours,
+}
+
+/// What became of one request.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Outcome {
+    /// Answered, rightly or not.
+    Done(Answer),
+    /// A part of the assignment is not implemented yet; names the task.
+    NotImplemented(String),
+    /// The renderer reported an error.
+    Failed(String),
+    /// The renderer panicked and said so.
+    Panicked(String),
+    /// The plugin cannot be used: not loadable, wrong magic, version or size, a write outside
+    /// its buffer.
+    Rejected(String),
+    /// A signal ended the worker; its name, and what is known of the cause.
+    CrashedBySignal(String),
+    /// The worker exited by itself, with this code, before it answered.
+    ExitedEarly(i32),
+    /// Out of wall-clock or CPU time.
+    TimedOut,
+    /// It ended at its memory limit.
+    OutOfMemory,
+    /// It wrote more to standard output and error than allowed.
+    FloodedOutput,
+    /// No graphics adapter fits, by the plugin's word.
+    NoAdapter(String),
+    /// Never asked.
+    NotRun {
+        /// Why.
+        reason: String,
+        /// Whose matter that is.
+        matter: Matter,
+    },
+}
+
+impl Outcome {
+    /// Whose matter this is, unless it is an answer.
+    pub fn matter(&self) -> Option<Matter> {
+        match self {
+            Self::Done(_) => None,
+            Self::NoAdapter(_) => Some(Matter::Machine),
+            Self::NotRun { matter, .. } => Some(*matter),
+            _ => Some(Matter::Submission),
+        }
+    }
+
+    /// The answer, when there is one.
+    pub fn answer(&self) -> Option<&Answer> {
+        match self {
+            Self::Done(answer) => Some(answer),
+            _ => None,
+        }
+    }
+}
+
+/// What a renderer answered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    /// The floats, as many as [`super::Request::answer_floats`] says; NaN where nothing was
+    /// written. Any value may be there.
+    #[serde(with = "as_base64")]
+    pub values: Vec<f32>,
+    /// What the witness saw, if there was one.
+    pub witness: Option<WitnessUse>,
+    /// Seconds it took by the worker's clock: for information, a plugin can forge it.
+    pub seconds: f64,
+}
+
+/// What a witness BSDF saw of its calls.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WitnessUse {
+    /// How often it was called.
+    pub calls: u64,
+    /// The largest | |w| - 1 | among all directions; none when one was not finite.
+    pub worst_norm_error: Option<f32>,
+}
+
+/// What became of a job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JobReport {
+    /// One for each request.
+    pub outcomes: Vec<Outcome>,
+    /// Name and version of the renderer by its own word, when it was loaded.
+    pub renderer: Option<String>,
+    /// The workers that it took.
+    pub runs: Vec<WorkerRun>,
+}
+
+/// One worker's life.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WorkerRun {
+    /// Indices of the requests that it was given.
+    pub requests: Vec<usize>,
+    /// Its end, output and timings.
+    pub ended: Ended,
+}
+
+/// Floats as base64 of their little-endian bytes: exact, and it keeps what JSON cannot (NaN).
+mod as_base64 {
+    use base64::Engine;
+    use base64::engine::general_purpose::STANDARD;
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn serialize<S: Serializer>(values: &[f32], serializer: S) -> Result<S::Ok, S::Error> {
+        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        serializer.serialize_str(&STANDARD.encode(bytes))
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f32>, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let bytes = STANDARD.decode(text).map_err(D::Error::custom)?;
+        if bytes.len() % 4 != 0 {
+            let length = bytes.len();
+            return Err(D::Error::custom(format!("{length} bytes are no whole floats")));
+        }
+        let word = |word: &[u8]| [word[0], word[1], word[2], word[3]];
+        Ok(bytes.chunks_exact(4).map(|bytes| f32::from_le_bytes(word(bytes))).collect())
+    }
+
+    #[cfg(test)]
+    mod tests {
+        use super::super::*;
+
+        #[test]
+        fn answers_survive_json_with_nan_and_infinity() {
+            let values = vec![1.5, f32::NAN, f32::NEG_INFINITY, -0.0];
+            let answer = Answer { values: values.clone(), witness: None, seconds: 0.5 };
+            let text = serde_json::to_string(&answer).unwrap();
+            let back: Answer = serde_json::from_str(&text).unwrap();
+            let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&back.values), bits(&values));
+            let broken = text.replace(r#""values":""#, r#""values":"AA"#);
+            assert!(serde_json::from_str::<Answer>(&broken).is_err());
+        }
+    }
+}

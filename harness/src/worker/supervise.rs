@@ -1,0 +1,367 @@
+//! The parent's side: prepares a worker's files, runs it, and judges what it left.
+
+use std::fs::{self, File};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use renderer_api as api;
+
+use super::job::{AdapterKind, Job, Request};
+use super::outcome::{Answer, JobReport, Matter, Outcome, WitnessUse, WorkerRun};
+use super::table::{Noted, RECORD, STATUS_OURS, STATUS_REJECTED};
+use super::wire::{Folder, Place, WireJob, WireRequest, take_input};
+use crate::plugin::Witness;
+use crate::process::{self, Ended, Exit, Limits, Lock, Policy, Purpose, signal_name};
+
+/// Bytes of a worker's output that are kept, besides a tail.
+const KEEP_OUTPUT: usize = 16 << 10;
+/// How often a running worker's table is looked at.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
+
+/// Starts workers.
+#[derive(Clone, Debug)]
+pub struct Supervisor {
+    /// The program with the hidden command `__worker`: Umbra itself.
+    pub umbra: PathBuf,
+    /// Where each worker's private folder is made, and removed in the end.
+    pub scratch: PathBuf,
+}
+
+/// How far a job is, by the worker's word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Requests with an outcome.
+    pub answered: usize,
+    /// Requests in all.
+    pub requests: usize,
+    /// Finished and total rows of the image that is being rendered; 0 of 0 otherwise.
+    pub rows: (u32, u32),
+}
+
+impl Supervisor {
+    /// Starts workers of the running program.
+    ///
+    /// # Errors
+    /// When its path cannot be found out.
+    pub fn of_this_program(scratch: PathBuf) -> io::Result<Self> {
+        Ok(Self { umbra: std::env::current_exe()?, scratch })
+    }
+
+    /// Asks all requests of `job` in one worker. When it dies, the request it was at gets the
+    /// blame, those before keep their answers, and those after are asked in a fresh worker.
+    /// `limits` hold for each worker. A `cancel` that becomes true ends it at once.
+    pub fn run_job(
+        &self,
+        job: &Job,
+        limits: &Limits,
+        cancel: &AtomicBool,
+        progress: &mut dyn FnMut(Progress),
+    ) -> JobReport {
+        let count = job.requests.len();
+        let mut outcomes: Vec<Option<Outcome>> = vec![None; count];
+        let mut report = JobReport { outcomes: Vec::new(), renderer: None, runs: Vec::new() };
+        let mut pending: Vec<usize> = (0..count).collect();
+        while !pending.is_empty() {
+            let answered = count - pending.len();
+            let mut worker_progress = |in_worker, rows| {
+                progress(Progress { answered: answered + in_worker, requests: count, rows });
+            };
+            match self.run_worker(job, &pending, limits, cancel, &mut worker_progress) {
+                Ok(run) => {
+                    for (&index, outcome) in pending.iter().zip(run.outcomes) {
+                        outcomes[index] = outcome;
+                    }
+                    report.renderer = report.renderer.or(run.renderer);
+                    report.runs.push(WorkerRun { requests: pending.clone(), ended: run.ended });
+                }
+                Err(error) => {
+                    let reason = format!("cannot run a worker: {error}");
+                    for &index in &pending {
+                        let (reason, matter) = (reason.clone(), Matter::Machine);
+                        outcomes[index] = Some(Outcome::NotRun { reason, matter });
+                    }
+                }
+            }
+            // Each worker settles one request at least, so this ends.
+            pending.retain(|&index| outcomes[index].is_none());
+        }
+        report.outcomes = outcomes.into_iter().flatten().collect();
+        report
+    }
+
+    fn run_worker(
+        &self,
+        job: &Job,
+        pending: &[usize],
+        limits: &Limits,
+        cancel: &AtomicBool,
+        progress: &mut dyn FnMut(usize, (u32, u32)),
+    ) -> io::Result<Run> {
+        let private = tempfile::Builder::new().prefix("umbra-worker-").tempdir_in(&self.scratch)?;
+        let requests: Vec<_> = pending.iter().map(|&index| &job.requests[index]).collect();
+        let mut files = Files::prepare(private.path(), job, &requests)?;
+        let lock = Lock { limits: limits.clone(), policy: policy(private.path(), job) };
+        let command = self.command(private.path(), &requests, limits)?;
+        let mut last = Instant::now();
+        let ended = process::run(command, &lock, KEEP_OUTPUT, cancel, &mut || {
+            if last.elapsed() >= PROGRESS_INTERVAL {
+                last = Instant::now();
+                if let Ok(records) = files.records() {
+                    let (answered, rows) = how_far(&records);
+                    progress(answered, rows);
+                }
+            }
+        })?;
+        // From here on the worker is gone, and what lies in the files stays as it is.
+        let records = files.records()?;
+        let mut run = Run { outcomes: vec![None; requests.len()], renderer: None, ended };
+        let all = |outcome: Outcome| vec![Some(outcome); requests.len()];
+        match &records[0] {
+            Noted::NotStarted => run.outcomes = all(not_started(&run.ended)),
+            Noted::Started { .. } => run.outcomes = all(death(&run.ended, limits)),
+            Noted::Answered { status: api::STATUS_OK, message, .. } => {
+                run.renderer = job.plugin.is_some().then(|| message.clone());
+                for (index, request) in requests.iter().enumerate() {
+                    let outcome = match &records[1 + index] {
+                        Noted::Answered { .. } => {
+                            files.outcome(index, request, &records[1 + index])?
+                        }
+                        _ => death(&run.ended, limits),
+                    };
+                    run.outcomes[index] = Some(outcome);
+                    if !matches!(records[1 + index], Noted::Answered { .. }) {
+                        break;
+                    }
+                }
+            }
+            Noted::Answered { message, .. } => {
+                run.outcomes = all(Outcome::Rejected(message.clone()));
+            }
+        }
+        if run.ended.exit == Exit::Cancelled {
+            run.outcomes.iter_mut().for_each(|outcome| {
+                outcome.get_or_insert_with(|| death(&run.ended, limits));
+            });
+        }
+        Ok(run)
+    }
+
+    fn command(&self, dir: &Path, requests: &[&Request], limits: &Limits) -> io::Result<Command> {
+        let mut command = Command::new(&self.umbra);
+        command.arg("__worker").arg(dir).current_dir(Folder(dir).scratch()).env_clear();
+        command.env("LANG", "C").env("HOME", "/nonexistent");
+        command.env("LP_NUM_THREADS", limits.threads.to_string());
+        command.env("RAYON_NUM_THREADS", limits.threads.to_string());
+        let software = requests.iter().any(|request| {
+            let Request::RenderRealtime { adapter, .. } = request else { return false };
+            adapter.kind == AdapterKind::Software
+        });
+        if software {
+            let driver = software_driver().unwrap_or_else(|| "/nonexistent".into());
+            command.env("VK_ICD_FILENAMES", &driver).env("VK_DRIVER_FILES", &driver);
+        }
+        if cfg!(windows) {
+            // Without it, no library of the system can be found.
+            command.envs(std::env::var_os("SystemRoot").map(|root| ("SystemRoot", root)));
+        }
+        Ok(command)
+    }
+}
+
+/// One worker's result: an outcome for each request up to the one that it died at.
+struct Run {
+    outcomes: Vec<Option<Outcome>>,
+    renderer: Option<String>,
+    ended: Ended,
+}
+
+fn policy(dir: &Path, job: &Job) -> Policy {
+    let folders = job.requests.iter().filter_map(|request| request.scene().path.parent());
+    let mut readable: Vec<PathBuf> = folders.map(Path::to_owned).collect();
+    readable.extend(job.plugin.clone());
+    readable.sort();
+    readable.dedup();
+    Policy { purpose: Purpose::Worker, readable, writable: vec![dir.to_owned()] }
+}
+
+/// Where Mesa's lavapipe describes itself to the Vulkan loader.
+fn software_driver() -> Option<PathBuf> {
+    let folders = ["/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
+    folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).find_map(|entries| {
+        let mut found = entries.flatten().map(|entry| entry.path()).filter(|path| {
+            path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("lvp_icd"))
+        });
+        found.next()
+    })
+}
+
+/// The files of a worker, as the parent holds them: opened before it began, read only by plain
+/// reads. (A mapping could be pulled away from under us by whoever truncates the file.)
+struct Files {
+    table: File,
+    output: File,
+    places: Vec<Place>,
+}
+
+impl Files {
+    fn prepare(dir: &Path, job: &Job, requests: &[&Request]) -> io::Result<Self> {
+        let folder = Folder(dir);
+        fs::create_dir(folder.scratch())?;
+        let new = |path| File::options().create_new(true).read(true).write(true).open(path);
+        let (mut input, mut output) = (new(folder.input())?, new(folder.output())?);
+        let (mut input_end, mut output_end) = (0, 0);
+        let mut wired = Vec::new();
+        for request in requests {
+            let (mut rest, words) = take_input(request);
+            let scene = rest.scene_mut();
+            scene.path = std::path::absolute(&scene.path)?;
+            let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_ne_bytes()).collect();
+            input.write_all(&bytes)?;
+            let place = Place::new(output_end, request.answer_floats());
+            output.write_all(&f32::NAN.to_ne_bytes().repeat(place.size / 4))?;
+            wired.push(WireRequest {
+                request: rest,
+                input: (input_end, bytes.len()),
+                output: place,
+            });
+            input_end += bytes.len();
+            output_end += place.size;
+        }
+        let mut table = new(folder.table())?;
+        table.write_all(&vec![0; RECORD * (1 + requests.len())])?;
+        let places = wired.iter().map(|request| request.output).collect();
+        let plugin = job.plugin.as_ref().map(std::path::absolute).transpose()?;
+        let wired = WireJob { plugin, requests: wired };
+        fs::write(folder.job(), serde_json::to_vec(&wired)?)?;
+        Ok(Self { table, output, places })
+    }
+
+    /// All records; what is missing at the end of the file was not started.
+    fn records(&mut self) -> io::Result<Vec<Noted>> {
+        let size = RECORD * (1 + self.places.len());
+        let mut bytes = read_at(&mut self.table, 0, size)?;
+        bytes.resize(size, 0);
+        let (records, _) = bytes.as_chunks::<RECORD>();
+        Ok(records.iter().map(Noted::parse).collect())
+    }
+
+    fn outcome(&mut self, index: usize, request: &Request, noted: &Noted) -> io::Result<Outcome> {
+        let Noted::Answered { status, message, seconds, calls, worst_norm_error } = noted else {
+            return Err(io::Error::other("only an answer becomes an outcome"));
+        };
+        let message = message.clone();
+        Ok(match *status {
+            api::STATUS_OK => {
+                let place = self.places[index];
+                let bytes = read_at(&mut self.output, place.start as u64, place.size)?;
+                let Some(values) = values(&bytes, place) else {
+                    let message = "the plugin wrote before the start of its output buffer, or cut \
+                                   the file short";
+                    return Ok(Outcome::Rejected(message.to_owned()));
+                };
+                let witnessed = match request {
+                    Request::Radiance { witness, .. } => *witness != Witness::True,
+                    _ => false,
+                };
+                let witness = witnessed.then_some(WitnessUse {
+                    calls: *calls,
+                    worst_norm_error: worst_norm_error.is_finite().then_some(*worst_norm_error),
+                });
+                Outcome::Done(Answer { values, witness, seconds: *seconds })
+            }
+            api::STATUS_ERROR => Outcome::Failed(message),
+            api::STATUS_NOT_IMPLEMENTED => Outcome::NotImplemented(message),
+            api::STATUS_PANICKED => Outcome::Panicked(message),
+            api::STATUS_CANCELLED => Outcome::Failed(format!(
+                "the plugin says it was asked to stop, but it was not: {message}"
+            )),
+            api::STATUS_NO_ADAPTER => Outcome::NoAdapter(message),
+            STATUS_REJECTED => Outcome::Rejected(message),
+            STATUS_OURS => Outcome::NotRun { reason: message, matter: Matter::Ours },
+            unknown => Outcome::Failed(format!("unknown status {unknown}: {message}")),
+        })
+    }
+}
+
+/// Reads up to `size` bytes, fewer where the file ends.
+fn read_at(file: &mut File, start: u64, size: usize) -> io::Result<Vec<u8>> {
+    file.seek(SeekFrom::Start(start))?;
+    let mut bytes = Vec::with_capacity(size);
+    file.take(size as u64).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The floats of a region; none when its size or its filler is not as the parent left it.
+fn values(region: &[u8], place: Place) -> Option<Vec<f32>> {
+    if region.len() != place.size {
+        return None;
+    }
+    let (filler, answer) = region.split_at(place.offset());
+    let (filler, _) = filler.as_chunks::<4>();
+    if filler.iter().any(|bytes| *bytes != f32::NAN.to_ne_bytes()) {
+        return None;
+    }
+    Some(answer.as_chunks::<4>().0.iter().map(|bytes| f32::from_ne_bytes(*bytes)).collect())
+}
+
+/// Number of answers, and the rows of the request that is being worked at.
+fn how_far(records: &[Noted]) -> (usize, (u32, u32)) {
+    let mut rows = (0, 0);
+    let mut answered = 0;
+    for record in records.iter().skip(1) {
+        match record {
+            Noted::Answered { .. } => answered += 1,
+            Noted::Started { rows: now } => rows = *now,
+            Noted::NotStarted => {}
+        }
+    }
+    (answered, rows)
+}
+
+/// What it means that the worker did not even come to loading its plugin.
+fn not_started(ended: &Ended) -> Outcome {
+    let (reason, matter) = match ended.exit {
+        Exit::Cancelled => ("cancelled".to_owned(), Matter::Machine),
+        Exit::TimedOut => ("the worker had no time to begin".to_owned(), Matter::Machine),
+        exit => {
+            (format!("the worker did not begin ({exit:?}): {}", ended.stderr.head), Matter::Ours)
+        }
+    };
+    Outcome::NotRun { reason, matter }
+}
+
+/// The outcome of the request at which a worker ended.
+fn death(ended: &Ended, limits: &Limits) -> Outcome {
+    match ended.exit {
+        Exit::TimedOut => Outcome::TimedOut,
+        Exit::Flooded => Outcome::FloodedOutput,
+        Exit::Cancelled => {
+            Outcome::NotRun { reason: "cancelled".to_owned(), matter: Matter::Machine }
+        }
+        Exit::Code(code) => Outcome::ExitedEarly(code),
+        Exit::Signal(_) if out_of_memory(ended, limits) => Outcome::OutOfMemory,
+        Exit::Signal(signal) => {
+            let name = signal_name(signal);
+            // What Rust's runtime says; a plugin may say it too, and only fools its own report.
+            let overflow = ended.stderr.contains("has overflowed its stack");
+            Outcome::CrashedBySignal(if overflow {
+                format!("{name}, stack overflow")
+            } else {
+                name
+            })
+        }
+    }
+}
+
+/// Whether a crash looks like one at the memory limit: Rust or C++ said so, or the process was
+/// seen within a tenth of its limit.
+fn out_of_memory(ended: &Ended, limits: &Limits) -> bool {
+    let near = limits.memory_mib - limits.memory_mib / 10;
+    ended.peak_address_mib >= near
+        || ended.peak_resident_mib >= near
+        || ended.stderr.contains("memory allocation of ")
+        || ended.stderr.contains("std::bad_alloc")
+}

@@ -1,0 +1,172 @@
+//! The table in which a worker notes how far it came: one record of fixed size for the plugin's
+//! loading and one for each request, in a file that both sides know.
+
+use std::sync::atomic::Ordering::{Relaxed, Release};
+use std::sync::atomic::{AtomicI32, AtomicU8, AtomicU32, AtomicU64};
+
+use crate::plugin::{MESSAGE_BYTES, WitnessState};
+
+/// Size of a record in bytes.
+pub const RECORD: usize = 4096;
+const MESSAGE_AT: usize = RECORD - MESSAGE_BYTES;
+
+/// Besides `renderer_api`'s statuses: the plugin was refused.
+pub const STATUS_REJECTED: i32 = -1;
+/// Besides `renderer_api`'s statuses: Umbra itself is at fault.
+pub const STATUS_OURS: i32 = -2;
+
+const STARTED: u32 = 1;
+const ANSWERED: u32 = 2;
+
+/// A record as the worker writes it, while the parent may look. All zero: not started.
+#[repr(C)]
+pub struct Record {
+    state: AtomicU32,
+    status: AtomicI32,
+    seconds: AtomicU64,
+    calls: AtomicU64,
+    worst_norm_error: AtomicU32,
+    length: AtomicU32,
+    done: AtomicU32,
+    total: AtomicU32,
+    _reserved: [AtomicU8; MESSAGE_AT - 40],
+    message: [AtomicU8; MESSAGE_BYTES],
+}
+
+const _: () = assert!(size_of::<Record>() == RECORD && align_of::<Record>() == 8);
+
+impl Record {
+    /// Notes that the work begins.
+    pub fn start(&self) {
+        self.state.store(STARTED, Release);
+    }
+
+    /// Notes finished and total rows.
+    pub fn progress(&self, done: u32, total: u32) {
+        self.done.store(done, Relaxed);
+        self.total.store(total, Relaxed);
+    }
+
+    /// Notes what a witness saw.
+    pub fn witness(&self, witness: &WitnessState) {
+        self.calls.store(witness.calls(), Relaxed);
+        self.worst_norm_error.store(witness.worst_norm_error().to_bits(), Relaxed);
+    }
+
+    /// Notes the answer, the state last. A message that is too long is cut.
+    pub fn answer(&self, status: i32, message: &str, seconds: f64) {
+        let length = message.len().min(MESSAGE_BYTES);
+        for (to, from) in self.message.iter().zip(message.bytes()) {
+            to.store(from, Relaxed);
+        }
+        self.length.store(length as u32, Relaxed);
+        self.seconds.store(seconds.to_bits(), Relaxed);
+        self.status.store(status, Relaxed);
+        self.state.store(ANSWERED, Release);
+    }
+}
+
+/// A record as the parent reads it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Noted {
+    /// The work did not begin.
+    NotStarted,
+    /// It began and did not end.
+    Started {
+        /// Finished and total rows.
+        rows: (u32, u32),
+    },
+    /// It ended.
+    Answered {
+        /// The status.
+        status: i32,
+        /// The message that goes with it.
+        message: String,
+        /// How long it took; 0 when the record holds nonsense.
+        seconds: f64,
+        /// Calls of the witness.
+        calls: u64,
+        /// Largest | |w| - 1 |.
+        worst_norm_error: f32,
+    },
+}
+
+impl Noted {
+    /// Reads a record. Any bytes are possible here: nothing in them is believed beyond its type.
+    pub fn parse(record: &[u8; RECORD]) -> Self {
+        let u32_at = |at: usize| {
+            let bytes = record[at..].first_chunk().copied();
+            u32::from_ne_bytes(bytes.unwrap_or_default())
+        };
+        let u64_at = |at: usize| {
+            let bytes = record[at..].first_chunk().copied();
+            u64::from_ne_bytes(bytes.unwrap_or_default())
+        };
+        match u32_at(0) {
+            STARTED => Self::Started { rows: (u32_at(32), u32_at(36)) },
+            ANSWERED => {
+                let length = (u32_at(28) as usize).min(MESSAGE_BYTES);
+                let message = &record[MESSAGE_AT..MESSAGE_AT + length];
+                let seconds = f64::from_bits(u64_at(8));
+                Self::Answered {
+                    status: u32_at(4) as i32,
+                    message: String::from_utf8_lossy(message).into_owned(),
+                    seconds: if seconds.is_finite() { seconds.max(0.0) } else { 0.0 },
+                    calls: u64_at(16),
+                    worst_norm_error: f32::from_bits(u32_at(24)),
+                }
+            }
+            _ => Self::NotStarted,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A record's bytes, as the file would hold them.
+    fn bytes(record: &Record) -> [u8; RECORD] {
+        // SAFETY: a record is 4096 bytes of atomics without padding, and nobody else writes it.
+        unsafe { std::ptr::from_ref(record).cast::<[u8; RECORD]>().read() }
+    }
+
+    fn zero() -> Record {
+        // SAFETY: all-zero is a valid record.
+        unsafe { std::mem::zeroed() }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let record = zero();
+        assert_eq!(Noted::parse(&bytes(&record)), Noted::NotStarted);
+        record.start();
+        record.progress(3, 9);
+        assert_eq!(Noted::parse(&bytes(&record)), Noted::Started { rows: (3, 9) });
+        record.answer(2, "task 1.2", 0.25);
+        let Noted::Answered { status, message, seconds, calls, worst_norm_error } =
+            Noted::parse(&bytes(&record))
+        else {
+            panic!("answered");
+        };
+        assert_eq!((status, message.as_str(), seconds), (2, "task 1.2", 0.25));
+        assert_eq!((calls, worst_norm_error), (0, 0.0));
+    }
+
+    #[test]
+    fn long_messages_are_cut_and_nonsense_is_harmless() {
+        let record = zero();
+        record.answer(1, &"x".repeat(9000), f64::NAN);
+        let Noted::Answered { message, seconds, .. } = Noted::parse(&bytes(&record)) else {
+            panic!("answered");
+        };
+        assert_eq!((message.len(), seconds), (MESSAGE_BYTES, 0.0));
+        let mut nonsense = [0xFF; RECORD];
+        assert_eq!(Noted::parse(&nonsense), Noted::NotStarted);
+        nonsense[..4].copy_from_slice(&ANSWERED.to_ne_bytes());
+        let Noted::Answered { status, message, .. } = Noted::parse(&nonsense) else {
+            panic!("answered");
+        };
+        assert_eq!((status, message.chars().count()), (-1, MESSAGE_BYTES));
+    }
+}

@@ -1,0 +1,237 @@
+//! How a job reaches the worker: a JSON file with the large arrays taken out, and those arrays as
+//! plain words in a file to be mapped.
+
+use std::path::{Path, PathBuf};
+
+use renderer_api as api;
+use serde::{Deserialize, Serialize};
+
+use super::job::{BsdfQuery, BsdfSource, Request};
+
+/// Outputs begin at multiples of this in their file: a multiple of every system's page size.
+pub const ALIGN: usize = 64 << 10;
+
+/// A job as the worker reads it.
+#[derive(Serialize, Deserialize)]
+pub struct WireJob {
+    /// The library to load.
+    pub plugin: Option<PathBuf>,
+    /// The requests, in order.
+    pub requests: Vec<WireRequest>,
+}
+
+/// A request whose arrays lie in the input file.
+#[derive(Serialize, Deserialize)]
+pub struct WireRequest {
+    /// The request, its `queries` or `rays` empty.
+    pub request: Request,
+    /// Where they lie in the input file, in bytes.
+    pub input: (usize, usize),
+    /// Where the answer goes.
+    pub output: Place,
+}
+
+/// A region of the output file. The answer ends where the region ends, so that a guard page can
+/// follow it; what lies before it in the region is filler that nobody may change.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// First byte of the region, a multiple of [`ALIGN`].
+    pub start: usize,
+    /// Size of the region in bytes, a multiple of [`ALIGN`].
+    pub size: usize,
+    /// Size of the answer in floats.
+    pub floats: usize,
+}
+
+impl Place {
+    /// The region for `floats` at `start`.
+    pub fn new(start: usize, floats: usize) -> Self {
+        Self { start, size: (4 * floats).next_multiple_of(ALIGN), floats }
+    }
+
+    /// Where the answer begins in the region, in bytes.
+    pub fn offset(&self) -> usize {
+        self.size - 4 * self.floats
+    }
+}
+
+/// The files of a worker's private folder.
+pub struct Folder<'a>(pub &'a Path);
+
+impl Folder<'_> {
+    /// The [`WireJob`].
+    pub fn job(&self) -> PathBuf {
+        self.0.join("job.json")
+    }
+    /// Queries and rays.
+    pub fn input(&self) -> PathBuf {
+        self.0.join("input")
+    }
+    /// Answers.
+    pub fn output(&self) -> PathBuf {
+        self.0.join("output")
+    }
+    /// Records: one for the plugin's loading, then one for each request.
+    pub fn table(&self) -> PathBuf {
+        self.0.join("table")
+    }
+    /// The worker's current folder.
+    pub fn scratch(&self) -> PathBuf {
+        self.0.join("scratch")
+    }
+}
+
+/// Takes the arrays out of a request, as words in the order of `renderer_api`'s fields.
+pub fn take_input(request: &Request) -> (Request, Vec<u32>) {
+    let mut words = Vec::new();
+    match request {
+        Request::EvalBsdf { scene, queries } => {
+            queries.iter().for_each(|query| query_words(query, &mut words));
+            (Request::EvalBsdf { scene: scene.clone(), queries: Vec::new() }, words)
+        }
+        Request::Radiance { scene, rays, shadows, witness, seed } => {
+            for ray in rays {
+                words.extend(ray.origin.map(f32::to_bits));
+                words.push(ray.min_t.to_bits());
+                words.extend(ray.direction.map(f32::to_bits));
+                words.push(ray.max_t.to_bits());
+            }
+            let (scene, rays) = (scene.clone(), Vec::new());
+            let (shadows, witness, seed) = (*shadows, *witness, *seed);
+            (Request::Radiance { scene, rays, shadows, witness, seed }, words)
+        }
+        other => (other.clone(), words),
+    }
+}
+
+const QUERY_WORDS: usize = 19;
+const RAY_WORDS: usize = 8;
+
+fn query_words(query: &BsdfQuery, words: &mut Vec<u32>) {
+    let value = |model, diffuse, specular, exponent| api::MaterialValue {
+        model,
+        diffuse,
+        specular,
+        exponent,
+    };
+    let none = value(api::MATERIAL_DIFFUSE, [0.0; 3], [0.0; 3], 0.0);
+    let (source, material, shape, primitive) = match query.source {
+        BsdfSource::Diffuse(albedo) => {
+            let material = value(api::MATERIAL_DIFFUSE, albedo, [0.0; 3], 0.0);
+            (api::BSDF_OF_VALUE, material, 0, 0)
+        }
+        BsdfSource::Phong { diffuse, specular, exponent } => {
+            let material = value(api::MATERIAL_PHONG, diffuse, specular, exponent);
+            (api::BSDF_OF_VALUE, material, 0, 0)
+        }
+        BsdfSource::Shape { shape, primitive } => (api::BSDF_OF_SHAPE, none, shape, primitive),
+    };
+    words.extend([source, material.model]);
+    words.extend(material.diffuse.map(f32::to_bits));
+    words.extend(material.specular.map(f32::to_bits));
+    words.push(material.exponent.to_bits());
+    words.extend([shape, primitive]);
+    words.extend(query.uv.map(f32::to_bits));
+    words.extend(query.wo.map(f32::to_bits));
+    words.extend(query.wi.map(f32::to_bits));
+}
+
+/// Reads queries back.
+pub fn queries(words: &[u32]) -> Vec<api::BsdfQuery> {
+    let query = |w: &[u32]| api::BsdfQuery {
+        source: w[0],
+        material: api::MaterialValue {
+            model: w[1],
+            diffuse: floats(w, 2),
+            specular: floats(w, 5),
+            exponent: f32::from_bits(w[8]),
+        },
+        shape: w[9],
+        primitive: w[10],
+        uv: floats(w, 11),
+        wo: floats(w, 13),
+        wi: floats(w, 16),
+    };
+    words.chunks_exact(QUERY_WORDS).map(query).collect()
+}
+
+/// Reads rays back.
+pub fn rays(words: &[u32]) -> Vec<api::RayQuery> {
+    let ray = |w: &[u32]| api::RayQuery {
+        origin: floats(w, 0),
+        min_t: f32::from_bits(w[3]),
+        direction: floats(w, 4),
+        max_t: f32::from_bits(w[7]),
+    };
+    words.chunks_exact(RAY_WORDS).map(ray).collect()
+}
+
+fn floats<const N: usize>(words: &[u32], at: usize) -> [f32; N] {
+    std::array::from_fn(|i| f32::from_bits(words[at + i]))
+}
+
+/// Words of mapped bytes; a rest that is no whole word is left out.
+pub fn words(bytes: &[u8]) -> Vec<u32> {
+    let word = |word: &[u8]| u32::from_ne_bytes([word[0], word[1], word[2], word[3]]);
+    bytes.chunks_exact(4).map(word).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::job::{RayQuery, SceneRef};
+    use super::*;
+    use crate::plugin::Witness;
+
+    fn scene() -> SceneRef {
+        SceneRef { path: "s.toml".into(), options: String::new() }
+    }
+
+    #[test]
+    fn queries_and_rays_arrive_as_they_left() {
+        let source = BsdfSource::Phong {
+            diffuse: [1.0, 2.0, 3.0],
+            specular: [4.0, 5.0, 6.0],
+            exponent: 7.0,
+        };
+        let phong = BsdfQuery { source, uv: [8.0, 9.0], wo: [10.0, 11.0, 12.0], wi: [13.0; 3] };
+        let source = BsdfSource::Shape { shape: 3, primitive: 4 };
+        let shape = BsdfQuery { source, ..phong };
+        let request = Request::EvalBsdf { scene: scene(), queries: vec![phong, shape] };
+        let read = queries(&take_input(&request).1);
+        assert_eq!(read.len(), 2);
+        assert_eq!((read[0].source, read[0].material.model), (0, api::MATERIAL_PHONG));
+        assert_eq!(read[0].material.specular, [4.0, 5.0, 6.0]);
+        assert_eq!((read[0].material.exponent, read[0].uv), (7.0, [8.0, 9.0]));
+        assert_eq!((read[0].wo, read[0].wi), ([10.0, 11.0, 12.0], [13.0; 3]));
+        assert_eq!((read[1].source, read[1].shape, read[1].primitive), (1, 3, 4));
+
+        let ray = RayQuery {
+            origin: [1.0, 2.0, 3.0],
+            min_t: 4.0,
+            direction: [5.0, 6.0, 7.0],
+            max_t: f32::INFINITY,
+        };
+        let request = Request::Radiance {
+            scene: scene(),
+            rays: vec![ray],
+            shadows: true,
+            witness: Witness::OfWi,
+            seed: 5,
+        };
+        let (rest, words) = take_input(&request);
+        let read = rays(&words)[0];
+        assert_eq!((read.origin, read.min_t), (ray.origin, ray.min_t));
+        assert_eq!((read.direction, read.max_t), (ray.direction, ray.max_t));
+        assert!(matches!(rest, Request::Radiance { rays, seed: 5, .. } if rays.is_empty()));
+        let json = serde_json::to_string(&request).unwrap();
+        assert_eq!(serde_json::from_str::<Request>(&json).unwrap(), request);
+    }
+
+    #[test]
+    fn an_answer_ends_at_the_end_of_its_region() {
+        let place = Place::new(ALIGN, 7);
+        assert_eq!((place.size, place.offset()), (ALIGN, ALIGN - 28));
+        assert_eq!(Place::new(0, ALIGN / 4).offset(), 0);
+        assert_eq!(Place::new(0, 0).size, 0);
+    }
+}
