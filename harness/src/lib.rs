@@ -2,9 +2,11 @@
 //!
 //! Data flows one way: `intake` -> `build` -> `worker` -> `evidence` -> `rubric` -> `report`.
 
+pub mod assignment;
 pub mod build;
 pub mod evidence;
 pub mod expected;
+pub mod grading;
 pub mod imaging;
 pub mod intake;
 pub mod plugin;

@@ -1,7 +1,9 @@
 //! What a right renderer draws: references, and the geometry that tells where they can be trusted.
 
 mod regions;
+mod store;
 mod surface;
 
 pub use regions::regions;
+pub use store::{Blessing, Expected, Store, load_scene};
 pub use surface::{Sight, SurfaceBuffer, SurfacePoint};

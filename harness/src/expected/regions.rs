@@ -20,18 +20,7 @@ const GRAZING: f32 = 1e-3;
 pub fn regions(scene: &Scene, width: usize, height: usize, shadows: bool) -> Result<RegionMask> {
     let camera = scene.camera(width, height)?;
     let lattice = Lattice::new(scene, &camera, width, height);
-    let mut mask = RegionMask::background(width, height);
-    for (material, description) in scene.materials().iter().enumerate() {
-        let exponent = match description.model {
-            MaterialModel::Phong => description.exponent,
-            _ => 0.0,
-        };
-        for light in ["lit", "shadowed"] {
-            let name = format!("{}, {light}", description.name);
-            mask.regions.push(Region { name, lit: light == "lit", exponent });
-        }
-        debug_assert_eq!(mask.regions.len(), 2 * material + 3);
-    }
+    let mut mask = table(scene, width, height);
     let mut edges = vec![false; width * height];
     for y in 0..height {
         for x in 0..width {
@@ -58,6 +47,22 @@ pub fn regions(scene: &Scene, width: usize, height: usize, shadows: bool) -> Res
         }
     }
     Ok(mask)
+}
+
+/// A mask that is background everywhere, with the regions of a scene: two for each material.
+pub(super) fn table(scene: &Scene, width: usize, height: usize) -> RegionMask {
+    let mut mask = RegionMask::background(width, height);
+    for material in scene.materials() {
+        let exponent = match material.model {
+            MaterialModel::Phong => material.exponent,
+            _ => 0.0,
+        };
+        for light in ["lit", "shadowed"] {
+            let name = format!("{}, {light}", material.name);
+            mask.regions.push(Region { name, lit: light == "lit", exponent });
+        }
+    }
+    mask
 }
 
 /// What one point of the lattice sees.

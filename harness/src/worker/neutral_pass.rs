@@ -1,15 +1,145 @@
-//! Umbra's own realtime pass, which draws a scene with given stage texts and no foreign code.
+//! Umbra's own realtime pass: it draws a scene with given stage texts, and no foreign code runs.
+//!
+//! It does what the shader contract says a right pass does, so that what is wrong in its picture
+//! is the stages' fault. Of a student it sees WGSL text alone.
 
-use super::job::Request;
+use basecode::gpu::{
+    self, EMITTER_FS, FRAME_GROUP, FrameUniforms, Gpu, MATERIAL_GROUP, MaterialUniforms, Mesh,
+    OBJECT_GROUP, ObjectUniforms, SHADOW_GROUP, ShadowMap, Stage, Target, Uniform,
+};
+use basecode::{Camera, CameraConfig, Error, Mat4, MaterialModel, Scene, wgpu};
+
+use super::job::{AdapterKind, Request};
+use crate::expected::load_scene;
 use crate::plugin::{CallError, CallErrorKind};
+
+/// The stages that a request must bring.
+const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
 
 /// Draws a [`Request::RenderRealtime`] into `values`, frame after frame.
 ///
 /// # Errors
-/// Always, for now. When it draws: [`CallErrorKind::NoAdapter`] without an adapter,
-/// [`CallErrorKind::Failed`] for stages that the graphics library refuses.
+/// [`CallErrorKind::NoAdapter`] without an adapter, [`CallErrorKind::Failed`] for stages that the
+/// graphics library refuses, [`CallErrorKind::Ours`] for a request that is not one.
 pub fn render(request: &Request, values: &mut [f32]) -> Result<(), CallError> {
-    let _ = (request, values);
-    let message = "umbra's neutral render pass is not written yet".to_owned();
-    Err(CallError { kind: CallErrorKind::Ours, message })
+    let Request::RenderRealtime { scene, width, height, adapter, stages, cameras, .. } = request
+    else {
+        return Err(ours("the neutral pass draws realtime images only"));
+    };
+    let mut texts = [""; 3];
+    for (text, name) in texts.iter_mut().zip(STAGES) {
+        let stage = stages.iter().find(|stage| stage.name == name);
+        *text = &stage.ok_or_else(|| ours("the neutral pass needs all three stages"))?.text;
+    }
+    let kind = match adapter.kind {
+        AdapterKind::Any => gpu::AdapterKind::Any,
+        AdapterKind::Software => gpu::AdapterKind::Software,
+        AdapterKind::Hardware => gpu::AdapterKind::Hardware,
+    };
+    let draw = || -> basecode::Result<()> {
+        let scene = load_scene(&scene.path)?;
+        let gpu = Gpu::open(kind, &adapter.name)?;
+        let (width, height) = (*width as usize, *height as usize);
+        let target = Target::new(&gpu, width, height)?;
+        let pass = gpu.checked(&mut || NeutralPass::new(&gpu, &scene, texts))?;
+        for (camera, frame) in cameras.iter().zip(values.chunks_mut(3 * width * height)) {
+            let config = CameraConfig {
+                eye: camera.eye.into(),
+                at: camera.at.into(),
+                up: camera.up.into(),
+                fov_y_deg: camera.fov_y_deg,
+            };
+            let camera = Camera::new(config, width, height)?;
+            gpu.checked(&mut || pass.draw(&gpu, &camera, &target))?;
+            let image = target.read_back(&gpu)?;
+            frame.copy_from_slice(image.pixels.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>().as_slice());
+        }
+        Ok(())
+    };
+    draw().map_err(|error| {
+        let kind = match error {
+            Error::NoAdapter(_) => CallErrorKind::NoAdapter,
+            Error::Gpu(_) => CallErrorKind::Failed,
+            _ => CallErrorKind::Ours,
+        };
+        CallError { kind, message: error.to_string() }
+    })
+}
+
+fn ours(message: &str) -> CallError {
+    CallError { kind: CallErrorKind::Ours, message: message.to_owned() }
+}
+
+/// A shape on the device, with the pipeline that its material asks for.
+struct Object {
+    mesh: Mesh,
+    placement: Uniform,
+    surface: Uniform,
+    pipeline: usize,
+}
+
+struct NeutralPass {
+    /// Diffuse, Phong, emitter.
+    pipelines: [wgpu::RenderPipeline; 3],
+    frame: Uniform,
+    objects: Vec<Object>,
+    shadow: ShadowMap,
+    light: [glam::Vec4; 2],
+}
+
+impl NeutralPass {
+    fn new(gpu: &Gpu, scene: &Scene, [vs, diffuse, phong]: [&str; 3]) -> basecode::Result<Self> {
+        let vertex = Stage { name: STAGES[0], text: vs };
+        let fragments = [Stage { name: STAGES[1], text: diffuse }, Stage { name: STAGES[2], text: phong }, EMITTER_FS];
+        let objects = scene.shapes().iter().enumerate().map(|(index, shape)| {
+            let material = scene.material_of(index);
+            let scale = material.energy_scale();
+            let uniforms = MaterialUniforms::new(
+                scale * material.diffuse.average(),
+                scale * material.specular.average(),
+                material.exponent,
+            );
+            Object {
+                mesh: Mesh::new(gpu, shape),
+                placement: Uniform::object(gpu, &ObjectUniforms::new(Mat4::IDENTITY)),
+                surface: Uniform::material(gpu, &uniforms),
+                pipeline: match material.model {
+                    _ if material.is_emitter() => 2,
+                    MaterialModel::Phong => 1,
+                    MaterialModel::Diffuse | MaterialModel::Mirror => 0,
+                },
+            }
+        });
+        Ok(Self {
+            pipelines: fragments.map(|fragment| gpu.pipeline(vertex, fragment)),
+            frame: Uniform::frame(gpu, &FrameUniforms::new(&scene.camera(1, 1)?)),
+            objects: objects.collect(),
+            shadow: ShadowMap::off(gpu),
+            light: [
+                scene.first_light_position().extend(1.0),
+                scene.first_light_intensity().extend(0.0),
+            ],
+        })
+    }
+
+    fn draw(&self, gpu: &Gpu, camera: &Camera, target: &Target) -> basecode::Result<()> {
+        let [light_position, light_intensity] = self.light;
+        let frame = FrameUniforms { light_position, light_intensity, ..FrameUniforms::new(camera) };
+        self.frame.write_frame(gpu, &frame);
+        let mut encoder = gpu.encoder();
+        let mut pass = target.begin(&mut encoder);
+        pass.set_bind_group(FRAME_GROUP, &self.frame.bind_group, &[]);
+        pass.set_bind_group(SHADOW_GROUP, &self.shadow.bind_group, &[]);
+        for object in &self.objects {
+            pass.set_pipeline(&self.pipelines[object.pipeline]);
+            pass.set_bind_group(OBJECT_GROUP, &object.placement.bind_group, &[]);
+            pass.set_bind_group(MATERIAL_GROUP, &object.surface.bind_group, &[]);
+            pass.set_vertex_buffer(0, object.mesh.vertices.slice(..));
+            pass.set_index_buffer(object.mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..object.mesh.index_count, 0, 0..1);
+        }
+        drop(pass);
+        gpu.submit(encoder);
+        Ok(())
+    }
 }

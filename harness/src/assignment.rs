@@ -1,0 +1,187 @@
+//! The assignment as data: what `config.json` at the top of the repository says.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::imaging::evidence::Tolerances;
+use crate::rubric::Rules;
+use crate::{intake, process};
+
+/// An assignment: its scenes, its parts, what each is worth and how it is judged.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Assignment {
+    /// Short name, also that of its folders: `a2`.
+    pub name: String,
+    /// Title in the handout.
+    pub title: String,
+    /// Course in the handout.
+    pub course: String,
+    /// When it is due, RFC 3339 with offset.
+    pub due: String,
+    /// The scenes, the hand-in's own first.
+    pub scenes: Vec<SceneEntry>,
+    /// The tree that a hand-in must have.
+    pub tree: intake::TreeSpec,
+    /// How evidence becomes points.
+    pub rules: Rules,
+    /// Where "different" begins for images.
+    pub tolerances: Tolerances,
+    /// What a hand-in may use.
+    pub limits: Limits,
+    /// The folder that all paths are relative to; not in the file.
+    #[serde(skip)]
+    pub root: PathBuf,
+}
+
+/// What a hand-in may use, at each stage.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// The archive.
+    pub archive: intake::Limits,
+    /// The compiler.
+    pub build: process::Limits,
+    /// Each worker.
+    pub run: process::Limits,
+}
+
+/// One scene of the assignment, with its files relative to the assignment's root.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneEntry {
+    /// Name for reports and for the file of its expected images.
+    pub name: String,
+    /// The offline TOML file.
+    pub offline: PathBuf,
+    /// The realtime TOML file.
+    pub realtime: PathBuf,
+    /// The realtime TOML file with shadows, when the scene can be chosen for the bonus.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bonus: Option<PathBuf>,
+    /// Film to judge it on, width and height in pixels; the scene's own when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub film: Option<[u32; 2]>,
+    /// Whether its expected images are kept in the repository.
+    #[serde(default)]
+    pub stored: bool,
+    /// Images that a hand-in holds of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hand_in: Option<HandInImages>,
+}
+
+/// The images of one scene in a hand-in, as paths in its tree.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HandInImages {
+    /// The offline image.
+    pub offline: String,
+    /// The realtime image.
+    pub realtime: String,
+    /// The realtime image with shadows (the bonus), if any.
+    pub bonus: String,
+}
+
+/// Why the assignment cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum AssignmentError {
+    /// The file cannot be read.
+    #[error("{}: cannot read the assignment: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is not an assignment.
+    #[error("{}:{line}: {message}", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What was expected and found.
+        message: String,
+    },
+    /// The file contradicts itself.
+    #[error("{}: {message}", path.display())]
+    Contradiction {
+        /// The file.
+        path: PathBuf,
+        /// How.
+        message: String,
+    },
+    /// There is none.
+    #[error("no assignment: expected a config.json with \"rules\" in {} or a folder above it", from.display())]
+    Missing {
+        /// Where the search began.
+        from: PathBuf,
+    },
+}
+
+impl Assignment {
+    /// Loads `config.json` in the folder `root`.
+    ///
+    /// # Errors
+    /// When it cannot be read, holds an unknown key or a value of another kind, or contradicts
+    /// itself; names file and line.
+    pub fn load(root: &Path) -> Result<Self, AssignmentError> {
+        let path = root.join("config.json");
+        let text = std::fs::read_to_string(&path)
+            .map_err(|source| AssignmentError::Read { path: path.clone(), source })?;
+        let mut assignment: Self =
+            serde_json::from_str(&text).map_err(|error| AssignmentError::Parse {
+                path: path.clone(),
+                line: error.line(),
+                message: error.to_string(),
+            })?;
+        if let Some(message) = assignment.problem() {
+            return Err(AssignmentError::Contradiction { path, message });
+        }
+        assignment.root = root.to_owned();
+        Ok(assignment)
+    }
+
+    /// Loads the assignment of the folder `from` or the nearest one above it.
+    ///
+    /// # Errors
+    /// As [`Assignment::load`], and when there is none.
+    pub fn find(from: &Path) -> Result<Self, AssignmentError> {
+        for folder in from.ancestors() {
+            // A hand-in has a config.json too; the assignment's stands beside its scenes.
+            if folder.join("config.json").is_file() && folder.join("scenes").is_dir() {
+                return Self::load(folder);
+            }
+        }
+        Err(AssignmentError::Missing { from: from.to_owned() })
+    }
+
+    fn problem(&self) -> Option<String> {
+        if let Some(problem) = self.rules.problem() {
+            return Some(problem);
+        }
+        for (index, scene) in self.scenes.iter().enumerate() {
+            if self.scenes[..index].iter().any(|other| other.name == scene.name) {
+                return Some(format!("scene \"{}\" is there twice", scene.name));
+            }
+            if scene.film.is_some_and(|[width, height]| width == 0 || height == 0) {
+                return Some(format!("scene \"{}\": its film is empty", scene.name));
+            }
+        }
+        if self.scenes.is_empty() {
+            return Some("no scene is named".into());
+        }
+        self.due.parse::<jiff::Timestamp>().err().map(|error| format!("due: {error}"))
+    }
+
+    /// Where the expected images of a stored scene lie.
+    pub fn expected_file(&self, scene: &SceneEntry) -> PathBuf {
+        self.root.join("expected").join(&self.name).join(format!("{}.exr", scene.name))
+    }
+
+    /// Where Umbra keeps what it can make again.
+    pub fn cache(&self) -> PathBuf {
+        self.root.join("target").join("umbra")
+    }
+}

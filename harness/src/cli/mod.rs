@@ -1,0 +1,104 @@
+//! The command line: parses, calls, prints. Each command is one file.
+
+mod bless;
+mod compare;
+mod context;
+mod hand_in;
+mod render;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Everything went well, and what was asked about is in order.
+pub const EXIT_OK: u8 = 0;
+/// What was asked about is not in order: a hand-in that does not conform, images that differ.
+pub const EXIT_NOT_IN_ORDER: u8 = 1;
+/// The command line or an input file cannot be used.
+pub const EXIT_USAGE: u8 = 2;
+/// The machine lacks something: an adapter, disk space, full isolation.
+pub const EXIT_MACHINE: u8 = 3;
+/// A bug of Umbra's.
+pub const EXIT_BUG: u8 = 70;
+/// Ended by Ctrl-C.
+pub const EXIT_INTERRUPTED: u8 = 130;
+
+/// Umbra grades renderers: it builds students' renderer plugins, runs them in isolation on every
+/// scene, offline and realtime, and explains every lost point with numbers and pictures.
+#[derive(Parser)]
+#[command(version, about, long_about = None, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    /// The folder that holds the assignment: config.json, scenes/, expected/ [default: the nearest
+    /// one at or above the current folder, or the program's]
+    #[arg(long, global = true, value_name = "DIR")]
+    root: Option<PathBuf>,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 in order; 1 not in order (does not conform, images differ, \
+points were lost in a check); 2 the command line or an input cannot be used; 3 the machine lacks \
+something; 70 a bug of Umbra's; 130 interrupted.";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Check your own working folder before handing in: builds src/, renders every public scene
+    /// and says what is wrong, where, and what it looks like
+    Check(hand_in::CheckArguments),
+    /// Grade hand-ins: archives (.zip, .tar, .tar.gz), folders, or folders full of them
+    Grade(hand_in::GradeArguments),
+    /// Check an archive's tree against the handout's; exit 0 when it conforms, 1 when not
+    Validate(hand_in::ValidateArguments),
+    /// Pack a working folder into an archive as the handout demands
+    Pack(hand_in::PackArguments),
+    /// Render a scene with a plugin, offline or realtime as the scene says
+    Render(render::RenderArguments),
+    /// Compare two EXR images
+    Compare(compare::CompareArguments),
+    /// Render the stored expected images anew with the reference renderer, and replace them
+    Bless(bless::BlessArguments),
+    /// (for Umbra's own use) answer a job in a locked process
+    #[command(name = "__worker", hide = true)]
+    Worker {
+        /// The worker's private folder.
+        dir: PathBuf,
+    },
+}
+
+/// Parses the command line, runs the command and prints its error once.
+pub fn main() -> ExitCode {
+    if let Command::Worker { dir } = &match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are no errors; clap knows which stream is right for each.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { EXIT_USAGE } else { EXIT_OK });
+        }
+    }
+    .command
+    {
+        return crate::worker::child_main(dir);
+    }
+    let Arguments { command, root } = Arguments::parse();
+    match run(command, root.as_deref()) {
+        Ok(code) => ExitCode::from(code),
+        Err(error) => {
+            eprintln!("umbra: {error:#}");
+            ExitCode::from(EXIT_USAGE)
+        }
+    }
+}
+
+fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
+    match command {
+        Command::Check(arguments) => hand_in::check(&arguments, root),
+        Command::Grade(arguments) => hand_in::grade(&arguments, root),
+        Command::Validate(arguments) => hand_in::validate(&arguments, root),
+        Command::Pack(arguments) => hand_in::pack(&arguments, root),
+        Command::Render(arguments) => render::run(&arguments, root),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Bless(arguments) => bless::run(&arguments, root),
+        Command::Worker { .. } => unreachable!("answered before"),
+    }
+}

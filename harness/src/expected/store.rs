@@ -1,0 +1,352 @@
+//! Where expected images come from: the repository, a cache, or the reference renderer.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use anyhow::{Context, bail, ensure};
+use basecode::exr_io::{ExrLayers, Precision, read_exr_layers, write_exr_layers};
+use basecode::{Image, Scene, Vec3};
+use sha2::{Digest, Sha256};
+
+use super::regions::regions;
+use crate::assignment::{Assignment, SceneEntry};
+use crate::imaging::reference::{ReferenceImage, RegionMask};
+use crate::process::Limits;
+use crate::worker::{Job, Outcome, Request, SceneRef, Supervisor};
+
+/// Batches that an expected image is the mean of; their spread is its variance.
+const BATCHES: u32 = 64;
+/// Samples per pixel of one batch for images kept in the repository: 512 in all.
+const STORED_SPP: u32 = 8;
+/// Samples per pixel of one batch for images that are made when needed: 256 in all.
+const CACHED_SPP: u32 = 4;
+/// Batches asked of one worker at a time, so that its memory stays small.
+const BATCHES_PER_JOB: u32 = 8;
+/// The seed of the first batch. Not a student id.
+const FIRST_SEED: u64 = 0x5EED_0000_0000_0000;
+
+/// What a right renderer draws of one scene, on one film.
+pub struct Expected {
+    /// The scene as the base code loads it, without BSDFs.
+    pub scene: Scene,
+    /// Offline, with shadows.
+    pub offline: ReferenceImage,
+    /// At pixel centres, without shadows: what realtime draws.
+    pub unshadowed: Image,
+    /// The regions of `unshadowed`.
+    pub unshadowed_mask: RegionMask,
+}
+
+/// Finds, makes and keeps expected images.
+pub struct Store<'a> {
+    /// The assignment.
+    pub assignment: &'a Assignment,
+    /// The reference renderer's library; absent in a student's kit.
+    pub reference: Option<PathBuf>,
+    /// Starts its workers.
+    pub supervisor: &'a Supervisor,
+    /// Threads to render with.
+    pub threads: u32,
+    /// Told what long work is being done.
+    pub progress: &'a (dyn Fn(&str) + Sync),
+}
+
+/// What a blessing changed.
+#[derive(Clone, Debug)]
+pub struct Blessing {
+    /// The file.
+    pub file: PathBuf,
+    /// Mean radiance of the image before, when there was one.
+    pub old_mean: Option<f64>,
+    /// Mean radiance of the new image.
+    pub new_mean: f64,
+    /// RMSE between old and new means, when both have one size.
+    pub rmse: Option<f64>,
+    /// Provenance of the new image.
+    pub attributes: BTreeMap<String, String>,
+}
+
+impl Store<'_> {
+    /// What is expected of a scene on the film it is judged on.
+    ///
+    /// # Errors
+    /// When the scene cannot be loaded, a stored image is missing, broken or stale, or what is
+    /// needed is neither stored nor cached and there is no reference renderer.
+    pub fn expected(&self, entry: &SceneEntry) -> anyhow::Result<Expected> {
+        let toml = self.assignment.root.join(&entry.offline);
+        let scene = load_scene(&toml)?;
+        let own = [scene.config().width as u32, scene.config().height as u32];
+        let [width, height] = entry.film.unwrap_or(own);
+        let stored = entry.stored && [width, height] == own;
+        let (mean, variance, n, centre) = if stored {
+            self.stored(entry, &toml, width, height)?
+        } else {
+            let file = self.cached(&toml, width, height, "offline")?;
+            let layers = self.layers(&file, &["mean", "variance", "centre"], || {
+                self.render_offline(&toml, width, height, CACHED_SPP)
+            })?;
+            let [mean, variance, centre] = layers;
+            (mean, variance, BATCHES * CACHED_SPP, centre)
+        };
+        let file = self.cached(&toml, width, height, "unshadowed")?;
+        let [unshadowed] = self.layers(&file, &["unshadowed"], || {
+            let image = self.render(&toml, width, height, 1, 0, false)?;
+            Ok(ExrLayers { layers: [("unshadowed".into(), image)].into(), ..Default::default() })
+        })?;
+        let file = self.cached(&toml, width, height, "masks")?;
+        let masks = self.layers(&file, &["shadowed", "unshadowed"], || {
+            let image = |shadows| Ok::<_, anyhow::Error>(as_image(&regions(&scene, width as usize, height as usize, shadows)?));
+            let layers = [("shadowed".into(), image(true)?), ("unshadowed".into(), image(false)?)];
+            Ok(ExrLayers { layers: layers.into(), ..Default::default() })
+        })?;
+        let [mask, unshadowed_mask] = masks.map(|image| as_mask(&scene, &image));
+        let offline = ReferenceImage::new(mean, variance, n, centre, mask)
+            .with_context(|| format!("scene \"{}\"", entry.name))?;
+        Ok(Expected { scene, offline, unshadowed, unshadowed_mask })
+    }
+
+    /// Renders the expected image of a stored scene anew and replaces the file.
+    ///
+    /// # Errors
+    /// When there is no reference renderer, it fails, or the file cannot be written.
+    pub fn bless(&self, entry: &SceneEntry) -> anyhow::Result<Blessing> {
+        let toml = self.assignment.root.join(&entry.offline);
+        let scene = load_scene(&toml)?;
+        let (width, height) = (scene.config().width as u32, scene.config().height as u32);
+        let mut layers = self.render_offline(&toml, width, height, STORED_SPP)?;
+        layers.attributes = self.provenance(&toml, STORED_SPP)?;
+        let file = self.assignment.expected_file(entry);
+        let old = read_exr_layers(&file).ok().and_then(|mut old| old.layers.remove("mean"));
+        let new = &layers.layers["mean"];
+        let blessing = Blessing {
+            old_mean: old.as_ref().map(mean_radiance),
+            new_mean: mean_radiance(new),
+            rmse: old
+                .filter(|old| (old.width, old.height) == (new.width, new.height))
+                .map(|old| crate::imaging::metrics::mse(new, &old).sqrt()),
+            attributes: layers.attributes.clone(),
+            file: file.clone(),
+        };
+        std::fs::create_dir_all(file.parent().unwrap_or(Path::new("")))?;
+        write_exr_layers(&file, &layers, Precision::Float)?;
+        Ok(blessing)
+    }
+
+    fn provenance(&self, toml: &Path, spp: u32) -> anyhow::Result<BTreeMap<String, String>> {
+        let attribute = |key: &str, value: String| (key.to_owned(), value);
+        Ok([
+            attribute("scene_sha256", scene_digest(toml)?),
+            attribute("umbra_version", env!("CARGO_PKG_VERSION").to_owned()),
+            attribute("samples_per_pixel", (BATCHES * spp).to_string()),
+            attribute("first_seed", FIRST_SEED.to_string()),
+        ]
+        .into())
+    }
+
+    fn stored(
+        &self,
+        entry: &SceneEntry,
+        toml: &Path,
+        width: u32,
+        height: u32,
+    ) -> anyhow::Result<(Image, Image, u32, Image)> {
+        let file = self.assignment.expected_file(entry);
+        let hint = "hint: `umbra bless` renders expected images";
+        let mut content = read_exr_layers(&file)
+            .with_context(|| format!("scene \"{}\" has no expected image; {hint}", entry.name))?;
+        let attribute = |key: &str| content.attributes.get(key).map_or("", String::as_str);
+        ensure!(
+            attribute("scene_sha256") == scene_digest(toml)?,
+            "{}: made from another version of the scene; {hint}",
+            file.display()
+        );
+        let n = attribute("samples_per_pixel").parse().with_context(|| {
+            format!("{}: samples_per_pixel is \"{}\"", file.display(), attribute("samples_per_pixel"))
+        })?;
+        let mut take = |name: &str| {
+            let image = content.layers.remove(name);
+            let image = image.with_context(|| format!("{}: no layer {name}", file.display()))?;
+            ensure!(
+                (image.width, image.height) == (width as usize, height as usize),
+                "{}: {}x{} pixels, expected {width}x{height}",
+                file.display(),
+                image.width,
+                image.height
+            );
+            Ok(image)
+        };
+        Ok((take("mean")?, take("variance")?, n, take("centre")?))
+    }
+
+    /// The cache file of something made from a scene; its name holds all that it depends on.
+    fn cached(&self, toml: &Path, width: u32, height: u32, what: &str) -> anyhow::Result<PathBuf> {
+        let mut hash = Sha256::new();
+        hash.update(scene_digest(toml)?);
+        hash.update(format!("{width} {height} {what} {BATCHES} {CACHED_SPP} {}", env!("CARGO_PKG_VERSION")));
+        let name = format!("{what}-{}.exr", &hex(&hash.finalize())[..24]);
+        Ok(self.assignment.cache().join("expected").join(name))
+    }
+
+    /// Reads layers of a cache file, or makes and keeps them.
+    fn layers<const N: usize>(
+        &self,
+        file: &Path,
+        names: &[&str; N],
+        make: impl FnOnce() -> anyhow::Result<ExrLayers>,
+    ) -> anyhow::Result<[Image; N]> {
+        let mut content = match read_exr_layers(file) {
+            Ok(content) => content,
+            Err(_) => {
+                let content = make()?;
+                let folder = file.parent().unwrap_or(Path::new(""));
+                std::fs::create_dir_all(folder)?;
+                // Another process may make the same file: whoever is last renames a whole one.
+                let draft = tempfile::Builder::new().suffix(".exr").tempfile_in(folder)?;
+                write_exr_layers(draft.path(), &content, Precision::Float)?;
+                draft.persist(file)?;
+                content
+            }
+        };
+        let mut images = Vec::new();
+        for name in names {
+            let image = content.layers.remove(*name);
+            images.push(image.with_context(|| format!("{}: no layer {name}", file.display()))?);
+        }
+        images.try_into().map_err(|_| anyhow::anyhow!("as many layers as names"))
+    }
+
+    fn render_offline(&self, toml: &Path, width: u32, height: u32, spp: u32) -> anyhow::Result<ExrLayers> {
+        let count = (width * height) as usize;
+        let (mut sum, mut square) = (vec![glam::DVec3::ZERO; count], vec![glam::DVec3::ZERO; count]);
+        for first in (0..BATCHES).step_by(BATCHES_PER_JOB as usize) {
+            (self.progress)(&format!(
+                "reference: {} at {width}x{height}, {} of {} spp",
+                toml.file_stem().unwrap_or_default().display(),
+                first * spp,
+                BATCHES * spp
+            ));
+            let seeds = first..(first + BATCHES_PER_JOB).min(BATCHES);
+            let requests = seeds
+                .map(|batch| self.request(toml, width, height, spp, u64::from(batch) << 32, true))
+                .collect();
+            for image in self.ask(requests)? {
+                for (index, value) in image.as_chunks::<3>().0.iter().enumerate() {
+                    let value = Vec3::from(*value).as_dvec3();
+                    sum[index] += value;
+                    square[index] += value * value;
+                }
+            }
+        }
+        let batches = f64::from(BATCHES);
+        let image = |of: &dyn Fn(usize) -> glam::DVec3| Image {
+            width: width as usize,
+            height: height as usize,
+            pixels: (0..count).map(|index| of(index).as_vec3()).collect(),
+        };
+        let mean = image(&|index| sum[index] / batches);
+        // The variance of one sample is spp times that of a batch's mean.
+        let variance = image(&|index| {
+            let spread = (square[index] - sum[index] * sum[index] / batches) / (batches - 1.0);
+            (f64::from(spp) * spread).max(glam::DVec3::ZERO)
+        });
+        let centre = self.render(toml, width, height, 1, 0, true)?;
+        let layers = [("mean", mean), ("variance", variance), ("centre", centre)];
+        let layers = layers.map(|(name, image)| (name.to_owned(), image)).into();
+        Ok(ExrLayers { layers, ..Default::default() })
+    }
+
+    fn render(&self, toml: &Path, width: u32, height: u32, spp: u32, seed: u64, shadows: bool) -> anyhow::Result<Image> {
+        let answers = self.ask(vec![self.request(toml, width, height, spp, seed, shadows)])?;
+        let pixels = answers[0].as_chunks::<3>().0.iter().map(|&value| Vec3::from(value)).collect();
+        Ok(Image { width: width as usize, height: height as usize, pixels })
+    }
+
+    fn request(&self, toml: &Path, width: u32, height: u32, spp: u32, seed: u64, shadows: bool) -> Request {
+        Request::RenderOffline {
+            scene: SceneRef { path: toml.to_owned(), options: String::new() },
+            width,
+            height,
+            spp,
+            seed: FIRST_SEED + seed,
+            threads: self.threads,
+            shadows,
+        }
+    }
+
+    fn ask(&self, requests: Vec<Request>) -> anyhow::Result<Vec<Vec<f32>>> {
+        let Some(reference) = &self.reference else {
+            bail!(
+                "an expected image is not stored and there is no reference renderer to make it; \
+                 hint: the scene is not one of the public scenes of this kit"
+            );
+        };
+        let job = Job { plugin: Some(reference.clone()), requests };
+        let limits = Limits { wall_s: 600.0, cpu_s: 1200, file_size_mib: 1024, ..Limits::default() };
+        let report = self.supervisor.run_job(&job, &limits, &AtomicBool::new(false), &mut |_| ());
+        let answers = report.outcomes.into_iter().map(|outcome| match outcome {
+            Outcome::Done(answer) if answer.values.iter().all(|v| v.is_finite()) => Ok(answer.values),
+            Outcome::Done(_) => bail!("the reference renderer drew a value that is not finite"),
+            other => bail!("the reference renderer failed: {other:?}"),
+        });
+        answers.collect()
+    }
+}
+
+/// Loads a scene for its geometry alone.
+///
+/// # Errors
+/// As [`Scene::load`].
+pub fn load_scene(toml: &Path) -> basecode::Result<Scene> {
+    struct NoBsdf;
+    impl basecode::Bsdf for NoBsdf {
+        fn eval(&self, _: &basecode::SurfaceInteraction) -> Vec3 {
+            Vec3::ZERO
+        }
+    }
+    Scene::load(toml, &|_| Box::new(NoBsdf))
+}
+
+/// SHA-256 over all that an image of a scene depends on: the TOML file and the files beside its mesh.
+fn scene_digest(toml: &Path) -> anyhow::Result<String> {
+    let config = basecode::scene::SceneConfig::load(toml)?;
+    let mut hash = Sha256::new();
+    hash.update(std::fs::read(toml)?);
+    let folder = config.mesh.parent().unwrap_or(Path::new(""));
+    let mut files = Vec::new();
+    for entry in folder.read_dir().with_context(|| format!("{}", folder.display()))? {
+        let entry = entry?;
+        if entry.file_type()?.is_file() {
+            files.push(entry.path());
+        }
+    }
+    files.sort();
+    for file in files {
+        hash.update(file.file_name().unwrap_or_default().as_encoded_bytes());
+        hash.update(std::fs::read(&file)?);
+    }
+    Ok(hex(&hash.finalize()))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn mean_radiance(image: &Image) -> f64 {
+    let sum: f64 = image.pixels.iter().map(|p| f64::from(p.element_sum()) / 3.0).sum();
+    sum / image.pixels.len() as f64
+}
+
+/// A mask as an image: 16-bit values are exact in floats.
+fn as_image(mask: &RegionMask) -> Image {
+    let pixels = mask.pixels.iter().map(|&value| Vec3::new(f32::from(value), 0.0, 0.0)).collect();
+    Image { width: mask.width, height: mask.height, pixels }
+}
+
+fn as_mask(scene: &Scene, image: &Image) -> RegionMask {
+    let mut mask = super::regions::table(scene, image.width, image.height);
+    for (value, pixel) in mask.pixels.iter_mut().zip(&image.pixels) {
+        *value = pixel.x as u16;
+    }
+    mask
+}

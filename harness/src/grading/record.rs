@@ -1,0 +1,72 @@
+//! What is kept of one graded hand-in: everything that its report and its grade are made from.
+
+use serde::{Deserialize, Serialize};
+
+use crate::evidence::Evidence;
+use crate::intake::Finding;
+
+/// One hand-in, after all evidence was collected. Rubric, dates and class list stay outside, so
+/// that grades can be derived from it again without rendering.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Name of the archive or folder as it was handed in.
+    pub name: String,
+    /// Unique among the hand-ins of a batch and safe as a folder name; its report's files lie there.
+    pub slug: String,
+    /// SHA-256 over the paths and contents of the private copy; empty when it was refused.
+    pub digest: String,
+    /// Whose it is, by its config.json.
+    pub student: Student,
+    /// What intake and the source rules have to say.
+    pub findings: Vec<Finding>,
+    /// What the compiler said when the source did not build; empty otherwise.
+    pub diagnostics: String,
+    /// What was found out.
+    pub evidence: Evidence,
+    /// What each stage cost, in order.
+    pub stages: Vec<StageCost>,
+    /// Under which conditions.
+    pub conditions: Conditions,
+}
+
+/// Credentials, as the hand-in states them.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Student {
+    /// First name; empty when it is not said.
+    pub first_name: String,
+    /// Last name; empty when it is not said.
+    pub last_name: String,
+    /// Student number as written; empty when it is not said.
+    pub id: String,
+}
+
+/// What one stage cost.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StageCost {
+    /// Which stage: `intake`, `build`, `offline`...
+    pub name: String,
+    /// Wall-clock seconds.
+    pub wall_s: f64,
+    /// CPU seconds of the child processes it ran; 0 when it ran none.
+    pub cpu_s: f64,
+}
+
+/// Under which conditions a hand-in was graded: records made under others are not comparable.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Conditions {
+    /// Version of Umbra.
+    pub umbra: String,
+    /// What isolation was in force, in words.
+    pub isolation: String,
+    /// The graphics adapter, or why there was none.
+    pub adapter: String,
+    /// The compiler.
+    pub compiler: String,
+}
+
+impl Student {
+    /// `First Last`, or what there is of it.
+    pub fn full_name(&self) -> String {
+        format!("{} {}", self.first_name, self.last_name).trim().to_owned()
+    }
+}
