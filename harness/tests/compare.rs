@@ -185,6 +185,7 @@ fn four_pixels_by_hand() {
     let evidence = offline(&actual, &reference, 16);
     let negative = evidence.check("negative").unwrap();
     assert_eq!(negative.detail, "1 pixel is negative; first at (1, 0)");
+    assert!(!negative.passed);
     actual.pixels[1].y = -0.9e-6;
     assert!(
         offline(&actual, &reference, 16)
@@ -192,6 +193,40 @@ fn four_pixels_by_hand() {
             .unwrap()
             .passed
     );
+}
+
+/// On an edge every other rule is lenient: a single NaN there must still fail, alone.
+#[test]
+fn one_value_that_is_not_finite_is_enough() {
+    let mut reference = flat(8, 8, Vec3::splat(0.5), 0.0);
+    reference.mask.pixels[9] |= RegionMask::EDGE;
+    let mut actual = reference.mean.clone();
+    actual.pixels[9].x = f32::NAN;
+    assert_eq!(failed(&offline(&actual, &reference, 16)), ["non_finite"]);
+}
+
+/// Three pixels, each within its noise, have a mean that proves nothing; sixteen of them do.
+#[test]
+fn a_tiny_region_has_no_bias() {
+    for (pixels, judged) in [(15, false), (16, true)] {
+        let mut reference = flat(8, 8, Vec3::splat(0.5), 0.0);
+        reference.mask.regions.push(lit("speck"));
+        reference.mask.pixels[..pixels].fill(2);
+        let mut actual = reference.mean.clone();
+        actual.pixels[..pixels].fill(Vec3::splat(0.503));
+        let evidence = offline(&actual, &reference, 16);
+        assert_eq!(
+            failed(&evidence).contains(&"bias: speck"),
+            judged,
+            "{pixels} pixels"
+        );
+        let said = evidence
+            .check("bias: speck")
+            .unwrap()
+            .detail
+            .contains("too few");
+        assert_eq!(said, !judged);
+    }
 }
 
 #[test]
