@@ -10,7 +10,7 @@ use super::finding::{Finding, Severity};
 use super::hand_in_config::HandInConfig;
 use super::limits::Limits;
 use super::tree::{CONFIG_FILE, TreeSpec};
-use super::tree_match::{TreeLine, match_tree, tree_findings};
+use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
 use super::unpack::{Format, HandIn, IntakeError, Refusal, unpack};
 
 /// What `validate` found.
@@ -92,7 +92,8 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
             });
             findings.extend(said);
             if is_readable {
-                findings.extend(check_config(&parsed, &paths, tree));
+                let (present, missing) = places(&lines);
+                findings.extend(check_config(&parsed, &present, &missing, tree));
             }
             config = Some(parsed);
         }
@@ -108,6 +109,20 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
         config,
         findings,
     })
+}
+
+/// Paths that are there once misplaced files are moved, and paths that are missing.
+fn places(lines: &[TreeLine]) -> (Vec<&str>, Vec<&str>) {
+    let mut present = Vec::new();
+    let mut missing = Vec::new();
+    for line in lines {
+        match line.mark {
+            Mark::Missing => missing.extend(line.expected.as_deref()),
+            Mark::WrongPlace => present.extend(line.expected.as_deref()),
+            Mark::Ok | Mark::Absent | Mark::Unexpected => present.extend(line.found.as_deref()),
+        }
+    }
+    (present, missing)
 }
 
 /// The validation of a hand-in that was refused.
