@@ -8,14 +8,23 @@ use super::limits::Limits;
 use super::name::safe_path;
 use super::tree::{CONFIG_FILE, TreeSpec};
 
-/// Checks what `config.json` says against the paths of the hand-in. Every finding has a line and a
-/// hint; what is missing altogether is put on line 1.
-pub fn check_config(config: &HandInConfig, paths: &[&str], tree: &TreeSpec) -> Vec<Finding> {
+/// Checks what `config.json` says against the hand-in. Every finding has a line and a hint; what is
+/// missing altogether is put on line 1.
+///
+/// `present` are the paths that are there once misplaced files are moved, `missing` those of the
+/// tree whose absence is reported already. The findings are in the order of lines.
+pub fn check_config(
+    config: &HandInConfig,
+    present: &[&str],
+    missing: &[&str],
+    tree: &TreeSpec,
+) -> Vec<Finding> {
     let mut findings = Vec::new();
     check_name(&config.first_name, "firstName", &mut findings);
     check_name(&config.last_name, "lastName", &mut findings);
     check_id(&config.student_id, &mut findings);
-    check_renders(config, paths, tree, &mut findings);
+    check_renders(config, present, missing, tree, &mut findings);
+    findings.sort_by_key(|finding| finding.line);
     findings
 }
 
@@ -131,6 +140,7 @@ fn check_id(field: &Option<Field>, findings: &mut Vec<Finding>) {
 fn check_renders(
     config: &HandInConfig,
     paths: &[&str],
+    missing: &[&str],
     tree: &TreeSpec,
     findings: &mut Vec<Finding>,
 ) {
@@ -166,27 +176,16 @@ fn check_renders(
             continue;
         }
         listed.insert(name.clone(), render.line);
-        if paths.iter().any(|found| canonical(found, tree) == name) {
+        if missing.contains(&name.as_str())
+            || paths.iter().any(|found| canonical(found, tree) == name)
+        {
             continue;
         }
-        let lower = name.to_lowercase();
-        match paths
-            .iter()
-            .find(|found| canonical(found, tree).to_lowercase() == lower)
-        {
-            Some(found) => findings.push(error(
-                "config_wrong_case",
-                render.line,
-                format!("'{written}' is handed in as '{found}'"),
-                format!("write \"{found}\": upper and lower case count"),
-            )),
-            None => findings.push(error(
-                "config_render_missing",
-                render.line,
-                format!("'{written}' is listed, but not handed in"),
-                "add the image or remove the entry",
-            )),
-        }
+        findings.push(
+            not_found(&written, &name, paths, tree)
+                .at(CONFIG_FILE)
+                .on_line(render.line),
+        );
     }
     for path in paths
         .iter()
@@ -208,6 +207,35 @@ fn check_renders(
                 )),
             );
         }
+    }
+}
+
+/// What to say about a listed path at which nothing lies.
+fn not_found(written: &str, name: &str, paths: &[&str], tree: &TreeSpec) -> Finding {
+    let lower = name.to_lowercase();
+    let base = |path: &str| path.rsplit('/').next().unwrap_or(path).to_lowercase();
+    let same_path = paths
+        .iter()
+        .find(|found| canonical(found, tree).to_lowercase() == lower);
+    let same_name = || paths.iter().find(|found| base(found) == base(name));
+    if let Some(found) = same_path {
+        Finding::error(
+            "config_wrong_case",
+            format!("'{written}' is listed, but its name is '{found}'"),
+        )
+        .hint(format!("write \"{found}\": upper and lower case count"))
+    } else if let Some(found) = same_name() {
+        Finding::error(
+            "config_wrong_place",
+            format!("'{written}' is listed, but its place is '{found}'"),
+        )
+        .hint(format!("write \"{found}\""))
+    } else {
+        Finding::error(
+            "config_render_missing",
+            format!("'{written}' is listed, but not handed in"),
+        )
+        .hint("add the image or remove the entry")
     }
 }
 
@@ -251,7 +279,7 @@ mod tests {
 
     fn codes(text: &str, paths: &[&str]) -> Vec<String> {
         let (config, mut findings) = HandInConfig::parse(text.as_bytes());
-        findings.extend(check_config(&config, paths, &TreeSpec::default()));
+        findings.extend(check_config(&config, paths, &[], &TreeSpec::default()));
         for finding in &findings {
             assert!(
                 finding.hint.is_some() && finding.line.is_some(),
@@ -300,7 +328,7 @@ mod tests {
         assert_eq!(check("\"/etc/passwd\"", &[]), ["config_path_escape@3"]);
         assert_eq!(
             check("\"offline\\\\cbox_simple_offline.exr\"", &[CBOX]),
-            ["config_backslash@3", "config_not_listed@1"]
+            ["config_not_listed@1", "config_backslash@3"]
         );
         assert_eq!(
             check("\"Offline/cbox_simple_offline.exr\"", &[CBOX]),
@@ -312,6 +340,10 @@ mod tests {
         );
         assert_eq!(check("", &[CBOX]), ["config_not_listed@1"]);
         assert_eq!(check("\"\"", &[]), ["config_render_missing@3"]);
+        assert_eq!(
+            check("\"cbox_simple_offline.exr\"", &[CBOX]),
+            ["config_not_listed@1", "config_wrong_place@3"]
+        );
     }
 
     #[test]

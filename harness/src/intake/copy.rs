@@ -341,7 +341,7 @@ impl<'a> PrivateCopy<'a> {
         for (pattern, count) in std::mem::take(&mut self.ignored) {
             self.findings.push(Finding::note(
                 "ignored",
-                format!("{count} entries ignored: {pattern}"),
+                format!("{count} ignored: {pattern}"),
             ));
         }
         let mut files: Vec<HandInFile> = self.files.into_values().flatten().collect();

@@ -138,7 +138,15 @@ impl HandInConfig {
             );
             return;
         };
-        for item in items {
+        if items.len() > MAX_RENDERS {
+            let message = format!("expected a few renders, found {}", items.len());
+            findings.push(
+                Finding::error("config_renders", message)
+                    .on_line(list.line)
+                    .hint("list each image once"),
+            );
+        }
+        for item in items.iter().take(MAX_RENDERS) {
             let (scene, render) = match &item.value {
                 Value::Text(path) => (String::new(), Some((path.clone(), item.line))),
                 Value::Object(members) => {
@@ -172,6 +180,9 @@ impl HandInConfig {
         }
     }
 }
+
+/// Renders that are read; an assignment has under ten.
+const MAX_RENDERS: usize = 100;
 
 const RENDER_HINT: &str =
     r#"write { "scene": "Teapot, offline", "render": "offline/teapot_simple_offline.exr" }"#;
@@ -259,6 +270,13 @@ mod tests {
             ("config_renders", Some(4))
         );
         assert_eq!(findings[0].path.as_deref(), Some("config.json"));
+    }
+
+    #[test]
+    fn endless_lists_are_cut() {
+        let text = format!("{{\"renders\": [{}\"a\"]}}", "\"a\",".repeat(5000));
+        let (config, findings) = HandInConfig::parse(text.as_bytes());
+        assert_eq!((config.renders.len(), findings.len()), (100, 1));
     }
 
     #[test]

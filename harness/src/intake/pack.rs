@@ -114,15 +114,9 @@ fn write_conforming(
     let places = places(hand_in, tree)?;
     let bytes = zip_bytes(hand_in, &places)?;
     let scratch = scratch_folder()?;
-    let name = out
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
-    let mut validation = match unpack_bytes(&bytes, &name, scratch.path(), tree, limits) {
-        Ok(copy) => validate_hand_in(&copy, tree)?,
-        Err(error) => return Err(error),
-    };
+    // The archive as whoever grades it will see it.
+    let copy = unpack_bytes(&bytes, "packed.zip", scratch.path(), tree, limits)?;
+    let mut validation = validate_hand_in(&copy, tree)?;
     if !validation.conforms {
         return Err(refused(hand_in, validation.findings));
     }
@@ -135,9 +129,6 @@ fn write_conforming(
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
-    validation
-        .findings
-        .retain(|finding| finding.code != "wrong_extension");
     // Beside the target, so that a half-written archive is never seen under its name.
     let partial = archive.with_extension("zip.partial");
     fs::write(&partial, &bytes).map_err(|e| IntakeError::io("write", &partial, e))?;

@@ -11,6 +11,9 @@ use super::unpack::{HandIn, IntakeError};
 /// Findings of one kind that are listed per file.
 const SHOWN_PER_FILE: usize = 5;
 
+/// Largest file that is scanned [bytes]; tokens take some forty times their text.
+const MAX_SCANNED: u64 = 2 << 20;
+
 /// Scans `src/` of a private copy.
 ///
 /// # Errors
@@ -29,6 +32,14 @@ pub fn scan_source(hand_in: &HandIn) -> Result<Vec<Finding>, IntakeError> {
             );
         }
         if !file.path.starts_with("src/") || !file.path.ends_with(".rs") {
+            continue;
+        }
+        if file.bytes > MAX_SCANNED {
+            let message = format!(
+                "not scanned: {} bytes, over the limit of {MAX_SCANNED}",
+                file.bytes
+            );
+            findings.push(Finding::warning("source_large", message).at(file.path.as_str()));
             continue;
         }
         let path = hand_in.root.join(&file.path);

@@ -51,34 +51,8 @@ pub(super) fn read_gz(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Ha
         inner: GzDecoder::new(bytes),
         unpacked: 0,
         limits: copy.limits,
-        ratio_exceeded: false,
-        total_exceeded: false,
     };
-    let result = read(&mut gz, copy);
-    if gz.ratio_exceeded || gz.total_exceeded {
-        // The reader's error was this limit, not damage.
-        let (code, message) = if gz.ratio_exceeded {
-            (
-                "limit_ratio",
-                format!(
-                    "unpacks to more than {} times its packed size",
-                    copy.limits.max_ratio
-                ),
-            )
-        } else {
-            (
-                "limit_total",
-                format!(
-                    "unpacks to more than the limit of {} MiB",
-                    copy.limits.max_total_mib
-                ),
-            )
-        };
-        return Err(
-            copy.refuse(Finding::error(code, message).hint("hand in only the files of the tree"))
-        );
-    }
-    result?;
+    read(&mut gz, copy)?;
     let rest = gz.inner.get_ref().len();
     if rest > 0 {
         let message = format!("{rest} bytes follow the gzip data");
@@ -93,8 +67,6 @@ struct Gz<'a> {
     packed: usize,
     unpacked: u64,
     limits: &'a Limits,
-    ratio_exceeded: bool,
-    total_exceeded: bool,
 }
 
 impl Read for Gz<'_> {
@@ -102,15 +74,53 @@ impl Read for Gz<'_> {
         let n = self.inner.read(buffer)?;
         self.unpacked += n as u64;
         let consumed = self.packed - self.inner.get_ref().len();
-        self.ratio_exceeded = self.limits.ratio_exceeded(self.unpacked, consumed as u64);
+        if self.limits.ratio_exceeded(self.unpacked, consumed as u64) {
+            return Err(io::Error::other(GzLimit::Ratio));
+        }
         // Headers and padding come on top of the contents: at most two blocks an entry.
         let overhead = self.limits.max_entries.saturating_mul(2 * BLOCK as u64) + 2 * MAX_PADDING;
-        self.total_exceeded =
-            self.unpacked > mib(self.limits.max_total_mib).saturating_add(overhead);
-        if self.ratio_exceeded || self.total_exceeded {
-            return Err(io::Error::other("limit exceeded"));
+        if self.unpacked > mib(self.limits.max_total_mib).saturating_add(overhead) {
+            return Err(io::Error::other(GzLimit::Total));
         }
         Ok(n)
+    }
+}
+
+/// A limit that gzip data exceed, on its way through an [`io::Error`].
+#[derive(Debug, thiserror::Error)]
+enum GzLimit {
+    #[error("ratio limit")]
+    Ratio,
+    #[error("total limit")]
+    Total,
+}
+
+/// What a reading error means.
+fn unreadable(error: &io::Error, limits: &Limits) -> Finding {
+    const HINT: &str = "hand in only the files of the tree";
+    match error.get_ref().and_then(|inner| inner.downcast_ref()) {
+        Some(GzLimit::Ratio) => {
+            let message = format!(
+                "unpacks to more than {} times its packed size",
+                limits.max_ratio
+            );
+            Finding::error("limit_ratio", message).hint(HINT)
+        }
+        Some(GzLimit::Total) => {
+            let message = format!(
+                "unpacks to more than the limit of {} MiB",
+                limits.max_total_mib
+            );
+            Finding::error("limit_total", message).hint(HINT)
+        }
+        None => {
+            let message = format!(
+                "the compressed data cannot be read: {}",
+                printable(&error.to_string())
+            );
+            Finding::error("gz_corrupt", message)
+                .hint("the upload may have been cut off; hand in again")
+        }
     }
 }
 
@@ -203,7 +213,7 @@ fn next_block(
             Ok(0) => return Err(copy.refuse(truncated("the last block is not whole"))),
             Ok(n) => filled += n,
             Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(copy.refuse(corrupt(&e))),
+            Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits))),
         }
     }
     Ok(Some(block))
@@ -217,17 +227,6 @@ fn truncated(message: &str) -> Finding {
     Finding::error("tar_truncated", message).hint("the upload may have been cut off; hand in again")
 }
 
-fn corrupt(error: &io::Error) -> Finding {
-    Finding::error(
-        "gz_corrupt",
-        format!(
-            "the compressed data cannot be read: {}",
-            printable(&error.to_string())
-        ),
-    )
-    .hint("the upload may have been cut off; hand in again")
-}
-
 /// After the first zero block only zeros may follow.
 fn check_padding(reader: &mut impl Read, copy: &mut PrivateCopy<'_>) -> Result<(), Halt> {
     let mut buffer = [0; 8 * BLOCK];
@@ -237,7 +236,7 @@ fn check_padding(reader: &mut impl Read, copy: &mut PrivateCopy<'_>) -> Result<(
             Ok(0) => return Ok(()),
             Ok(n) => n,
             Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
-            Err(e) => return Err(copy.refuse(corrupt(&e))),
+            Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits))),
         };
         padding += n as u64;
         if padding > MAX_PADDING || buffer[..n].iter().any(|b| *b != 0) {
@@ -264,7 +263,7 @@ fn read_extended(
     match reader.take(padded(size)).read_to_end(&mut data) {
         Ok(n) if n as u64 == padded(size) => {}
         Ok(_) => return Err(copy.refuse(truncated("an extended header is cut off"))),
-        Err(e) => return Err(copy.refuse(corrupt(&e))),
+        Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits))),
     }
     data.truncate(size as usize);
     Ok(data)
@@ -361,7 +360,7 @@ fn read_entry(
                     let message = format!("expected {size} bytes, found {}", written.bytes);
                     return Err(copy.refuse(truncated(&message).at(path)));
                 }
-                Err(e) => return Err(copy.refuse(corrupt(&e).at(path))),
+                Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits).at(path))),
             }
             skip(reader, padded(size) - size, &name, copy)
         }
@@ -457,7 +456,9 @@ fn skip(
                 copy.count_bytes(n as u64, &printable_bytes(name))?;
             }
             Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(copy.refuse(corrupt(&e))),
+            Err(e) => {
+                return Err(copy.refuse(unreadable(&e, copy.limits).at(printable_bytes(name))));
+            }
         }
     }
     Ok(())

@@ -6,11 +6,11 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::check_config::check_config;
-use super::finding::{Finding, Severity};
+use super::finding::{Finding, Findings, Severity};
 use super::hand_in_config::HandInConfig;
 use super::limits::Limits;
 use super::tree::{CONFIG_FILE, TreeSpec};
-use super::tree_match::{TreeLine, match_tree, tree_findings};
+use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
 use super::unpack::{Format, HandIn, IntakeError, Refusal, unpack};
 
 /// What `validate` found.
@@ -31,7 +31,7 @@ pub struct Validation {
 }
 
 /// Largest `config.json` that is read [bytes].
-const MAX_CONFIG: u64 = 1 << 20;
+const MAX_CONFIG: u64 = 64 << 10;
 
 /// Validates an archive or folder by way of a private copy in the system's temporary folder.
 ///
@@ -92,12 +92,18 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
             });
             findings.extend(said);
             if is_readable {
-                findings.extend(check_config(&parsed, &paths, tree));
+                let (present, missing) = places(&lines);
+                findings.extend(check_config(&parsed, &present, &missing, tree));
             }
             config = Some(parsed);
         }
     }
-    findings.sort_by_key(|finding| finding.severity);
+    // A hostile tree or config may say thousands of things.
+    let mut kept = Findings::default();
+    for finding in findings {
+        kept.push(finding);
+    }
+    let findings = kept.into_vec();
     Ok(Validation {
         name: hand_in.name.clone(),
         format: Some(hand_in.format),
@@ -108,6 +114,20 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
         config,
         findings,
     })
+}
+
+/// Paths that are there once misplaced files are moved, and paths that are missing.
+fn places(lines: &[TreeLine]) -> (Vec<&str>, Vec<&str>) {
+    let mut present = Vec::new();
+    let mut missing = Vec::new();
+    for line in lines {
+        match line.mark {
+            Mark::Missing => missing.extend(line.expected.as_deref()),
+            Mark::WrongPlace => present.extend(line.expected.as_deref()),
+            Mark::Ok | Mark::Absent | Mark::Unexpected => present.extend(line.found.as_deref()),
+        }
+    }
+    (present, missing)
 }
 
 /// The validation of a hand-in that was refused.

@@ -42,11 +42,15 @@ pub fn listing(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     while let Some(folder) = open.pop() {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
-            if path.symlink_metadata().unwrap().is_dir() {
+            let metadata = path.symlink_metadata().unwrap();
+            if metadata.is_dir() {
                 open.push(path);
-            } else {
-                let content = fs::read(&path).unwrap_or_default();
+            } else if metadata.is_file() {
+                let content = fs::read(&path).unwrap();
                 all.insert(path, content);
+            } else {
+                // Reading a fifo would wait for ever.
+                all.insert(path, Vec::new());
             }
         }
     }

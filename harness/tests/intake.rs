@@ -1,0 +1,788 @@
+//! Hand-ins that are right, nearly right and wrong in the usual ways: copies, validation as a
+//! student reads it, packing and fixing.
+
+mod support;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use similar_asserts::assert_eq;
+use support::scratch::{Scratch, assert_accepted, assert_folder_refused, listing};
+use support::tar_bytes::{self, gz, tar};
+use support::zip_bytes::{Entry, Zip, crc32, extra};
+use umbra::intake::{
+    Finding, Format, HandIn, IntakeError, Limits, TreeSpec, Validation, fix, pack, scan_source,
+    unpack, unpack_bytes, validate, validate_hand_in,
+};
+
+const CONFIG: &str = r#"{
+  "firstName": "Ada",
+  "lastName": "Lovelace",
+  "studentID": "260123456",
+  "renders": [
+    { "scene": "Teapot", "render": "offline/teapot_simple_offline.exr" },
+    { "scene": "Cornell box", "render": "offline/cbox_simple_offline.exr" },
+    { "scene": "Teapot, realtime", "render": "realtime/teapot_simple_realtime.exr" },
+    { "scene": "Cornell box, realtime", "render": "realtime/cbox_simple_realtime.exr" }
+  ]
+}
+"#;
+
+/// The files of a perfect hand-in; the images are no EXRs, which intake does not look at.
+fn perfect() -> Vec<(String, Vec<u8>)> {
+    let image = |path: &str| (path.to_owned(), path.as_bytes().to_vec());
+    vec![
+        ("config.json".to_owned(), CONFIG.as_bytes().to_vec()),
+        image("offline/cbox_simple_offline.exr"),
+        image("offline/teapot_simple_offline.exr"),
+        image("realtime/cbox_simple_realtime.exr"),
+        image("realtime/teapot_simple_realtime.exr"),
+        (
+            "src/bsdfs/phong.rs".to_owned(),
+            b"pub struct Phong;\n".to_vec(),
+        ),
+        ("src/lib.rs".to_owned(), b"mod bsdfs;\n".to_vec()),
+        ("src/shaders/phong.wgsl".to_owned(), b"// phong\n".to_vec()),
+    ]
+}
+
+fn zip_of(files: &[(String, Vec<u8>)]) -> Vec<u8> {
+    Zip::of(
+        files
+            .iter()
+            .map(|(name, content)| Entry::deflated(name, content)),
+    )
+    .bytes()
+}
+
+fn tar_of(files: &[(String, Vec<u8>)]) -> Vec<u8> {
+    let entries: Vec<_> = files
+        .iter()
+        .map(|(name, content)| tar_bytes::Entry::file(name, content))
+        .collect();
+    tar(&entries)
+}
+
+fn write_folder(folder: &Path, files: &[(String, Vec<u8>)]) {
+    for (name, content) in files {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, content).unwrap();
+    }
+}
+
+/// Each path moved by `change`; `None` drops the file.
+fn moved(change: impl Fn(&str) -> Option<String>) -> Vec<(String, Vec<u8>)> {
+    perfect()
+        .into_iter()
+        .filter_map(|(name, content)| Some((change(&name)?, content)))
+        .collect()
+}
+
+fn codes(findings: &[Finding]) -> Vec<String> {
+    findings
+        .iter()
+        .map(|f| format!("{} {}", f.code, f.path.as_deref().unwrap_or("-")))
+        .collect()
+}
+
+fn validate_bytes(bytes: &[u8], name: &str) -> Validation {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    validate(&path, &TreeSpec::default(), &Limits::default()).unwrap()
+}
+
+fn validate_files(files: &[(String, Vec<u8>)]) -> Validation {
+    validate_bytes(&zip_of(files), "a2_ada_lovelace.zip")
+}
+
+// --- copies ---
+
+#[test]
+fn every_format_gives_the_same_copy() {
+    let files = perfect();
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("a2_ada_lovelace");
+    write_folder(&source, &files);
+    let scratch = Scratch::new();
+    let from_folder = unpack(
+        &source,
+        &scratch.dest,
+        &TreeSpec::default(),
+        &Limits::default(),
+    )
+    .unwrap();
+    assert_eq!(from_folder.format, Format::Folder);
+    assert_eq!(from_folder.name, "a2_ada_lovelace");
+    assert_eq!(from_folder.findings, []);
+    let wrapped = moved(|path| Some(format!("a2_ada_lovelace/{path}")));
+    for (bytes, name, format) in [
+        (zip_of(&files), "a.zip", Format::Zip),
+        (tar_of(&files), "a.tar", Format::Tar),
+        (gz(&tar_of(&files)), "a.tar.gz", Format::TarGz),
+        (gz(&tar_of(&files)), "a.tgz", Format::TarGz),
+        (zip_of(&wrapped), "a.zip", Format::Zip),
+        (gz(&tar_of(&wrapped)), "a.tar.gz", Format::TarGz),
+    ] {
+        let scratch = Scratch::new();
+        let hand_in = unpack_bytes(
+            &bytes,
+            name,
+            &scratch.dest,
+            &TreeSpec::default(),
+            &Limits::default(),
+        )
+        .unwrap();
+        assert_eq!(hand_in.format, format);
+        assert_eq!(hand_in.files, from_folder.files);
+        assert_eq!(hand_in.digest, from_folder.digest);
+        for (path, content) in &files {
+            assert_eq!(&fs::read(hand_in.root.join(path)).unwrap(), content);
+        }
+        assert_eq!(listing(&scratch.dest).len(), files.len());
+    }
+}
+
+#[test]
+fn hash_is_sha256_of_the_content() {
+    let (hand_in, _scratch) = assert_accepted(
+        &Zip::of([Entry::stored("abc", b"abc")]).bytes(),
+        "a.zip",
+        "",
+    );
+    // FIPS 180-2, appendix B.1.
+    assert_eq!(
+        hand_in.files[0].sha256,
+        "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    );
+}
+
+#[test]
+fn digest_depends_on_paths_and_contents() {
+    let digest = |entries: &[(&str, &str)]| {
+        let zip = Zip::of(
+            entries
+                .iter()
+                .map(|(name, content)| Entry::stored(name, content.as_bytes())),
+        );
+        assert_accepted(&zip.bytes(), "a.zip", "").0.digest
+    };
+    let base = digest(&[("a", "1"), ("b", "2")]);
+    assert_eq!(digest(&[("b", "2"), ("a", "1")]), base);
+    for other in [
+        digest(&[("a", "2"), ("b", "1")]),
+        digest(&[("a", "1"), ("c", "2")]),
+        digest(&[("a", "1")]),
+    ] {
+        assert_ne!(other, base);
+    }
+}
+
+#[test]
+fn one_wrapping_folder_is_noted() {
+    let wrapped = moved(|path| Some(format!("a2 Ada/{path}")));
+    let (hand_in, _scratch) = assert_accepted(&zip_of(&wrapped), "a.zip", "wrapped");
+    assert_eq!(hand_in.wrapped_in.as_deref(), Some("a2 Ada"));
+    assert!(hand_in.root.ends_with("dest/a2 Ada") && hand_in.root.join("config.json").is_file());
+    assert_eq!(codes(&hand_in.findings), ["wrapped a2 Ada/"]);
+}
+
+#[test]
+fn junk_of_macos_and_windows_is_ignored() {
+    let mut files = moved(|path| Some(format!("a2/{path}")));
+    for junk in [
+        "__MACOSX/a2/._config.json",
+        "__MACOSX/._a2",
+        "a2/.DS_Store",
+        "a2/src/._lib.rs",
+        "a2/Thumbs.db",
+        "a2/offline/desktop.ini",
+        "a2/Icon\r",
+    ] {
+        files.push((junk.to_owned(), b"junk".to_vec()));
+    }
+    let (from_zip, _a) = assert_accepted(&zip_of(&files), "a.zip", "ignored");
+    let (from_tar, _b) = assert_accepted(&tar_of(&files), "a.tar", "ignored");
+    assert_eq!(from_zip.files.len(), perfect().len());
+    assert_eq!(from_zip.wrapped_in.as_deref(), Some("a2"));
+    assert_eq!(from_zip.digest, from_tar.digest);
+    assert!(validate_files(&files).conforms);
+}
+
+#[test]
+fn streamed_zip_of_macos_is_fine() {
+    let entries = perfect()
+        .into_iter()
+        .map(|(name, content)| Entry::deflated(&name, &content).streamed());
+    assert_accepted(&Zip::of(entries).bytes(), "a.zip", "");
+}
+
+#[test]
+fn descriptor_without_signature_and_small_zip64_header_are_fine() {
+    let mut unsigned = Entry::deflated("config.json", b"{}").streamed();
+    unsigned.descriptor.drain(..4);
+    let mut large = Entry::stored("a", b"xyz");
+    (large.local.packed, large.local.unpacked) = (u32::MAX, u32::MAX);
+    large.local.extra = extra(1, &[3, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0]);
+    assert_accepted(&Zip::of([unsigned, large]).bytes(), "a.zip", "");
+}
+
+#[test]
+fn zip_with_folders_comment_and_unicode_names_is_fine() {
+    let mut field = vec![1];
+    field.extend(crc32(b"src/\x82t\x82.rs").to_le_bytes());
+    field.extend("src/été.rs".as_bytes());
+    let zip = Zip {
+        entries: vec![
+            Entry::stored("src/", b"").mode(0o040755),
+            Entry::with(b"src/\x82t\x82.rs", 0, b"x".to_vec(), b"x")
+                .both(|h| h.extra = extra(0x7075, &field)),
+            Entry::stored("été.txt", b"x"),
+        ],
+        comment: b"made by hand".to_vec(),
+        ..Zip::default()
+    };
+    let (hand_in, _scratch) = assert_accepted(&zip.bytes(), "a.zip", "");
+    let paths: Vec<&str> = hand_in.files.iter().map(|f| f.path.as_str()).collect();
+    assert_eq!(paths, ["src/été.rs", "été.txt"]);
+}
+
+#[test]
+fn tar_long_names_and_pax_paths_are_fine() {
+    use tar_bytes::Entry as Tar;
+    let long = format!("src/{}.rs", "n".repeat(105));
+    let other = format!("src/{}.rs", "m".repeat(105));
+    let entries = [
+        Tar::pax(b'g', &[("comment", "0123456789abcdef")]),
+        Tar::of(b"./", b'5', b""),
+        Tar::of(b"./src/", b'5', b""),
+        Tar::long_name(&long),
+        Tar::file("truncated", b"x"),
+        Tar::pax(b'x', &[("mtime", "1.5"), ("path", &other), ("size", "1")]),
+        Tar::file("truncated", b"y"),
+        Tar::file("./config.json", b"{}"),
+    ];
+    let (hand_in, _scratch) = assert_accepted(&tar(&entries), "a.tar", "");
+    let paths: Vec<&str> = hand_in.files.iter().map(|f| f.path.as_str()).collect();
+    assert_eq!(paths, ["config.json", other.as_str(), long.as_str()]);
+}
+
+#[test]
+fn tar_of_the_tar_crate_is_fine() {
+    let mut builder = ::tar::Builder::new(Vec::new());
+    for (name, content) in perfect() {
+        let mut header = ::tar::Header::new_gnu();
+        header.set_size(content.len() as u64);
+        header.set_mode(0o644);
+        builder
+            .append_data(&mut header, &name, content.as_slice())
+            .unwrap();
+    }
+    let bytes = builder.into_inner().unwrap();
+    let (hand_in, _scratch) = assert_accepted(&bytes, "a.tar", "");
+    assert_eq!(hand_in.files.len(), perfect().len());
+}
+
+#[test]
+fn black_images_pack_well_and_are_no_bomb() {
+    let mut files = perfect();
+    for (name, content) in &mut files {
+        if name.ends_with(".exr") {
+            *content = vec![0; 800 * 600 * 6];
+        }
+    }
+    let scratch = Scratch::new();
+    let tree = TreeSpec::default();
+    unpack_bytes(
+        &zip_of(&files),
+        "a.zip",
+        &scratch.dest,
+        &tree,
+        &Limits::default(),
+    )
+    .unwrap();
+    let scratch = Scratch::new();
+    unpack_bytes(
+        &gz(&tar_of(&files)),
+        "a.tgz",
+        &scratch.dest,
+        &tree,
+        &Limits::default(),
+    )
+    .unwrap();
+}
+
+#[test]
+fn destination_must_be_empty() {
+    let scratch = Scratch::new();
+    fs::write(scratch.dest.join("mine"), "x").unwrap();
+    let result = scratch.unpack(&zip_of(&perfect()), "a.zip", &Limits::default());
+    assert!(matches!(
+        result,
+        Err(IntakeError::DestinationNotEmpty { .. })
+    ));
+    assert_eq!(fs::read_to_string(scratch.dest.join("mine")).unwrap(), "x");
+}
+
+#[test]
+fn missing_source_is_an_error_of_the_machine() {
+    let result = validate(
+        Path::new("/nowhere/a.zip"),
+        &TreeSpec::default(),
+        &Limits::default(),
+    );
+    let message = result.unwrap_err().to_string();
+    assert!(
+        message.starts_with("cannot read '/nowhere/a.zip': "),
+        "{message}"
+    );
+}
+
+// --- folders ---
+
+#[cfg(unix)]
+#[test]
+fn links_in_a_folder_are_refused() {
+    use std::os::unix::fs::symlink;
+    let file = |folder: &Path| {
+        fs::create_dir(folder.join("src")).unwrap();
+        symlink("/etc/passwd", folder.join("src/lib.rs")).unwrap();
+    };
+    assert_folder_refused(file, "link", "src/lib.rs");
+    assert_folder_refused(
+        |folder| symlink("/", folder.join("src")).unwrap(),
+        "link",
+        "src",
+    );
+    assert_folder_refused(
+        |folder| symlink("nowhere", folder.join("x")).unwrap(),
+        "link",
+        "x",
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn special_files_in_a_folder_are_refused() {
+    let socket = |folder: &Path| {
+        std::os::unix::net::UnixListener::bind(folder.join("socket")).unwrap();
+    };
+    assert_folder_refused(socket, "special_file", "socket");
+    let fifo = |folder: &Path| {
+        nix::unistd::mkfifo(&folder.join("pipe"), nix::sys::stat::Mode::S_IRWXU).unwrap();
+    };
+    assert_folder_refused(fifo, "special_file", "pipe");
+}
+
+#[test]
+fn limits_hold_for_folders() {
+    let many = |folder: &Path| {
+        for i in 0..41 {
+            fs::write(folder.join(format!("{i}")), "x").unwrap();
+        }
+    };
+    assert_folder_refused(many, "limit_entries", "");
+    assert_folder_refused(
+        |folder| fs::create_dir_all(folder.join("1/2/3/4/5/6/7")).unwrap(),
+        "limit_depth",
+        "1/2/3/4/5/6/7",
+    );
+    assert_folder_refused(
+        |folder| fs::write(folder.join("big"), vec![1; 3 << 20]).unwrap(),
+        "limit_file",
+        "big",
+    );
+    assert_folder_refused(|_| (), "empty", "");
+}
+
+#[cfg(unix)]
+#[test]
+fn sparse_file_in_a_folder_counts_its_apparent_size() {
+    let sparse = |folder: &Path| {
+        fs::File::create(folder.join("sparse"))
+            .unwrap()
+            .set_len(3 << 20)
+            .unwrap()
+    };
+    assert_folder_refused(sparse, "limit_file", "sparse");
+}
+
+// --- validation as text ---
+
+#[test]
+fn text_of_a_perfect_hand_in() {
+    assert_eq!(
+        validate_files(&perfect()).to_text(),
+        "\
+a2_ada_lovelace.zip: conforms (0 errors, 0 warnings)
+
+  expected                             found
+  config.json                          config.json                          ok
+  src/lib.rs                           src/lib.rs                           ok
+  offline/teapot_simple_offline.exr    offline/teapot_simple_offline.exr    ok
+  offline/cbox_simple_offline.exr      offline/cbox_simple_offline.exr      ok
+  realtime/teapot_simple_realtime.exr  realtime/teapot_simple_realtime.exr  ok
+  realtime/cbox_simple_realtime.exr    realtime/cbox_simple_realtime.exr    ok
+  realtime/teapot_bonus.exr            -                                    ok: optional
+  realtime/cbox_bonus.exr              -                                    ok: optional
+  src/                                 src/                                 ok: 2 further files
+"
+    );
+}
+
+#[test]
+fn text_of_a_wrong_tree() {
+    let mut files = moved(|path| match path {
+        "offline/cbox_simple_offline.exr" => None,
+        "offline/teapot_simple_offline.exr" => Some("teapot_simple_offline.exr".to_owned()),
+        "realtime/cbox_simple_realtime.exr" => Some("Realtime/cbox_simple_realtime.exr".to_owned()),
+        path => Some(path.to_owned()),
+    });
+    files.push(("Text.txt".to_owned(), b"hello".to_vec()));
+    files.push(("renders/teapot_bonus.exr".to_owned(), b"x".to_vec()));
+    files.push((".DS_Store".to_owned(), b"x".to_vec()));
+    assert_eq!(
+        validate_files(&files).to_text(),
+        "\
+a2_ada_lovelace.zip: does not conform (3 errors, 3 warnings)
+
+  expected                             found
+  config.json                          config.json                          ok
+  src/lib.rs                           src/lib.rs                           ok
+  offline/teapot_simple_offline.exr    teapot_simple_offline.exr            wrong place: move it to offline/teapot_simple_offline.exr
+  offline/cbox_simple_offline.exr      -                                    missing: add it
+  realtime/teapot_simple_realtime.exr  realtime/teapot_simple_realtime.exr  ok
+  realtime/cbox_simple_realtime.exr    Realtime/cbox_simple_realtime.exr    wrong place: move it to realtime/cbox_simple_realtime.exr
+  realtime/teapot_bonus.exr            renders/teapot_bonus.exr             ok: accepted under this name too
+  realtime/cbox_bonus.exr              -                                    ok: optional
+  src/                                 src/                                 ok: 2 further files
+  -                                    Text.txt                             unexpected: leave it out; it is not looked at
+
+error: teapot_simple_offline.exr: expected at 'offline/teapot_simple_offline.exr'
+  hint: move it there, or let umbra validate --fix do it
+
+error: offline/cbox_simple_offline.exr: expected in the hand-in, found nothing like it
+  hint: add it, then pack again
+
+error: Realtime/cbox_simple_realtime.exr: expected at 'realtime/cbox_simple_realtime.exr'
+  hint: move it there, or let umbra validate --fix do it
+
+warning: realtime: differs only in case from 'Realtime'
+  hint: use one spelling; both are the same file on Windows and macOS
+
+warning: Text.txt: not part of the expected tree
+  hint: leave it out; it is not looked at
+
+warning: config.json:1: 'renders/teapot_bonus.exr' is handed in, but not listed
+  hint: add { \"scene\": ..., \"render\": \"renders/teapot_bonus.exr\" } to \"renders\"
+
+note: 1 ignored: .DS_Store
+
+note: renders/teapot_bonus.exr: accepted for 'realtime/teapot_bonus.exr'
+"
+    );
+}
+
+#[test]
+fn text_of_a_broken_config() {
+    let mut files = perfect();
+    files[0].1 = CONFIG
+        .replace("\"Ada\"", "\"\"")
+        .replace("exr\" }\n  ]", "exr\" },\n  ]")
+        .into_bytes();
+    let text = validate_files(&files).to_text();
+    let (_, said) = text.split_once("further files\n").unwrap();
+    assert_eq!(
+        said,
+        "
+error: config.json:9: a comma before ']'
+  hint: remove the comma
+
+error: config.json:2: \"firstName\" is empty
+  hint: write your name: \"firstName\": \"Ada\"
+"
+    );
+}
+
+#[test]
+fn text_of_a_refused_archive() {
+    let mut entries: Vec<Entry> = perfect()
+        .iter()
+        .map(|(name, content)| Entry::deflated(name, content))
+        .collect();
+    entries.push(Entry::stored("../x", b"x"));
+    entries.push(Entry::stored("link", b"x").mode(0o120777));
+    assert_eq!(
+        validate_bytes(&Zip::of(entries).bytes(), "a.zip").to_text(),
+        "\
+a.zip: does not conform (2 errors, 0 warnings)
+
+error: link: expected a file or folder, found a symbolic link
+  hint: put the file itself there
+
+error: ../x: entry name refused: expected a plain relative path, found '..'
+  hint: archive the folder itself, without '..'
+"
+    );
+}
+
+#[test]
+fn wrong_levels_are_told_apart() {
+    // Two wrapping folders: one is accepted, everything in the second is in the wrong place.
+    let deep = validate_files(&moved(|path| Some(format!("a/b/{path}"))));
+    assert!(!deep.conforms);
+    assert!(
+        deep.findings
+            .iter()
+            .filter(|f| f.code == "tree_wrong_place")
+            .count()
+            == 8,
+        "{}",
+        deep.to_text()
+    );
+    // The content of src/ at the root.
+    let flat = validate_files(&moved(|path| {
+        Some(path.strip_prefix("src/").unwrap_or(path).to_owned())
+    }));
+    assert!(
+        flat.findings
+            .iter()
+            .any(|f| f.code == "tree_wrong_place" && f.path.as_deref() == Some("lib.rs")),
+        "{}",
+        flat.to_text()
+    );
+    // Only the source.
+    let bare = validate_files(&moved(|path| {
+        path.starts_with("src/").then(|| path.to_owned())
+    }));
+    assert_eq!(
+        bare.findings
+            .iter()
+            .filter(|f| f.code == "tree_missing")
+            .count(),
+        5
+    );
+}
+
+// --- pack and fix ---
+
+fn pack_in(
+    folder: &Path,
+    files: &[(String, Vec<u8>)],
+) -> Result<umbra::intake::Packed, IntakeError> {
+    let source = folder.join("work");
+    write_folder(&source, files);
+    pack(&source, folder, &TreeSpec::default(), &Limits::default())
+}
+
+/// The working folder of a student: everything that does not belong into a hand-in, too.
+fn working_folder() -> Vec<(String, Vec<u8>)> {
+    let mut files = perfect();
+    for extra in [
+        "Cargo.toml",
+        "README.md",
+        "target/release/libstudent.so",
+        "src/.DS_Store",
+        "src/target/release/x.o",
+        "data/a2/teapot.toml",
+        "offline/old.exr",
+        ".git/HEAD",
+        "node/deep/er/than/the/limit/of/a/path/a/b/c/d/e/f/g/h/i/j",
+    ] {
+        files.push((extra.to_owned(), b"not part of it".to_vec()));
+    }
+    files.push(("renders/teapot_bonus.exr".to_owned(), b"bonus".to_vec()));
+    files
+}
+
+#[test]
+fn packed_archives_conform_and_hold_only_what_is_needed() {
+    let folder = tempfile::tempdir().unwrap();
+    let packed = pack_in(folder.path(), &working_folder()).unwrap();
+    assert_eq!(packed.archive, folder.path().join("a2_ada_lovelace.zip"));
+    let mut want: Vec<String> = perfect().into_iter().map(|(name, _)| name).collect();
+    want.push("realtime/teapot_bonus.exr".to_owned());
+    want.sort();
+    let names: Vec<String> = packed.files.iter().map(|(_, to)| to.clone()).collect();
+    assert_eq!(names, want);
+    let validation = validate(&packed.archive, &TreeSpec::default(), &Limits::default()).unwrap();
+    assert!(validation.conforms);
+    assert_eq!(validation, packed.validation);
+    // A second reader of zip sees the same.
+    let mut archive = zip::ZipArchive::new(fs::File::open(&packed.archive).unwrap()).unwrap();
+    let mut theirs: Vec<String> = archive
+        .file_names()
+        .map(|name| name.unwrap().into_owned())
+        .collect();
+    theirs.sort();
+    assert_eq!(theirs, want);
+    let mut content = String::new();
+    std::io::Read::read_to_string(&mut archive.by_name("config.json").unwrap(), &mut content)
+        .unwrap();
+    assert_eq!(content, CONFIG);
+    // Nothing else was written.
+    let beside: Vec<PathBuf> = listing(folder.path())
+        .into_keys()
+        .filter(|p| p.parent() == Some(folder.path()))
+        .collect();
+    assert_eq!(beside, [packed.archive]);
+}
+
+#[test]
+fn packing_twice_gives_the_same_bytes() {
+    let archives = [0, 1].map(|_| {
+        let folder = tempfile::tempdir().unwrap();
+        fs::read(pack_in(folder.path(), &working_folder()).unwrap().archive).unwrap()
+    });
+    assert!(archives[0] == archives[1]);
+}
+
+fn refusal_codes(result: Result<umbra::intake::Packed, IntakeError>) -> Vec<String> {
+    match result {
+        Err(IntakeError::Refused(refusal)) => codes(&refusal.findings),
+        other => panic!("expected a refusal, found {other:?}"),
+    }
+}
+
+#[test]
+fn pack_refuses_what_would_not_conform() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = moved(|path| (path != "offline/cbox_simple_offline.exr").then(|| path.to_owned()));
+    let result = pack_in(folder.path(), &files);
+    assert_eq!(
+        refusal_codes(result),
+        ["tree_missing offline/cbox_simple_offline.exr"]
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let mut files = perfect();
+    files[0].1 = CONFIG.replace("260123456", "not yet").into_bytes();
+    assert_eq!(
+        refusal_codes(pack_in(folder.path(), &files)),
+        ["config_student_id config.json"]
+    );
+    assert_eq!(
+        fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "only the working folder"
+    );
+}
+
+fn fix_files(files: &[(String, Vec<u8>)]) -> Result<HandIn, IntakeError> {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, out) = (folder.path().join("in.zip"), folder.path().join("out.zip"));
+    fs::write(&source, zip_of(files)).unwrap();
+    let result = fix(&source, &out, &TreeSpec::default(), &Limits::default());
+    assert_eq!(result.is_ok(), out.exists());
+    result?;
+    let scratch = Scratch::new();
+    let hand_in = unpack(
+        &out,
+        &scratch.dest,
+        &TreeSpec::default(),
+        &Limits::default(),
+    )?;
+    assert!(validate_hand_in(&hand_in, &TreeSpec::default())?.conforms);
+    Ok(hand_in)
+}
+
+#[test]
+fn fix_mends_levels_folders_aliases_and_junk() {
+    let digest = fix_files(&perfect()).unwrap().digest;
+    let stray = |mut files: Vec<(String, Vec<u8>)>| {
+        files.push(("Text.txt".to_owned(), b"x".to_vec()));
+        files.push(("__MACOSX/._x".to_owned(), b"x".to_vec()));
+        files
+    };
+    for (what, files) in [
+        (
+            "two folders around it",
+            moved(|path| Some(format!("a/b/{path}"))),
+        ),
+        (
+            "a stray file beside the wrapping folder",
+            stray(moved(|path| Some(format!("a/{path}")))),
+        ),
+        (
+            "the source flat",
+            moved(|path| Some(path.strip_prefix("src/").unwrap_or(path).to_owned())),
+        ),
+        (
+            "the source elsewhere",
+            moved(|path| Some(path.replace("src/", "code/rust/"))),
+        ),
+        (
+            "other case",
+            moved(|path| Some(path.replace("src/", "Src/").replace("offline/", "Offline/"))),
+        ),
+        (
+            "images at the root",
+            moved(|path| Some(path.replace("offline/", "").replace("realtime/", ""))),
+        ),
+        (
+            "inside a folder named src",
+            moved(|path| Some(format!("src/{path}"))),
+        ),
+    ] {
+        match fix_files(&files) {
+            Ok(hand_in) => assert_eq!(hand_in.digest, digest, "{what}"),
+            Err(error) => panic!("{what}: {error}"),
+        }
+    }
+    let mut files = perfect();
+    files.push(("renders/cbox_bonus.exr".to_owned(), b"bonus".to_vec()));
+    let hand_in = fix_files(&files).unwrap();
+    assert!(hand_in.file("realtime/cbox_bonus.exr").is_some());
+}
+
+#[test]
+fn fix_refuses_what_moving_cannot_mend() {
+    let codes_of = |files: &[(String, Vec<u8>)]| match fix_files(files) {
+        Err(IntakeError::Refused(refusal)) => codes(&refusal.findings),
+        other => panic!("expected a refusal, found {other:?}"),
+    };
+    let no_source = moved(|path| (!path.starts_with("src/")).then(|| path.to_owned()));
+    assert_eq!(codes_of(&no_source), ["tree_missing src/lib.rs"]);
+    let mut no_name = perfect();
+    no_name[0].1 = CONFIG.replace("Ada", "").into_bytes();
+    assert_eq!(codes_of(&no_name), ["config_credentials config.json"]);
+}
+
+// --- the rest ---
+
+#[test]
+fn source_rules_name_file_and_line() {
+    let mut files = perfect();
+    files.push(("src/build.rs".to_owned(), b"fn main() {}".to_vec()));
+    files.push((
+        "src/evil.rs".to_owned(),
+        b"// unsafe\nfn f() {\n  unsafe { std::process::exit(0) }\n}\n".to_vec(),
+    ));
+    let (hand_in, _scratch) = assert_accepted(&zip_of(&files), "a.zip", "");
+    let found: Vec<String> = scan_source(&hand_in)
+        .unwrap()
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(
+        found,
+        [
+            "warning: src/evil.rs:3: unsafe code",
+            "warning: src/evil.rs:3: std::process",
+            "note: src/build.rs: build.rs is handed in, but ours is used",
+        ]
+    );
+}
+
+#[test]
+fn hand_in_and_validation_survive_json() {
+    let (hand_in, _scratch) = assert_accepted(&zip_of(&perfect()), "a.zip", "");
+    let text = serde_json::to_string(&hand_in).unwrap();
+    assert_eq!(serde_json::from_str::<HandIn>(&text).unwrap(), hand_in);
+    let validation = validate_files(&perfect());
+    let text = serde_json::to_string(&validation).unwrap();
+    assert_eq!(
+        serde_json::from_str::<Validation>(&text).unwrap(),
+        validation
+    );
+}
