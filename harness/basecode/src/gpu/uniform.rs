@@ -31,8 +31,7 @@ impl Uniform {
     }
 
     fn new(gpu: &Gpu, name: &str, layout: &wgpu::BindGroupLayout, bytes: &[u8]) -> Self {
-        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let buffer = filled_buffer(gpu, name, bytes, usage);
+        let buffer = filled_buffer(gpu, name, bytes, wgpu::BufferUsages::UNIFORM);
         let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(name),
             layout,
@@ -42,13 +41,20 @@ impl Uniform {
     }
 }
 
-/// A buffer that holds `bytes`.
+/// A buffer that holds `bytes`, a multiple of four of them.
 pub(super) fn filled_buffer(
     gpu: &Gpu,
     name: &str,
     bytes: &[u8],
     usage: wgpu::BufferUsages,
 ) -> wgpu::Buffer {
-    let contents = wgpu::util::BufferInitDescriptor { label: Some(name), contents: bytes, usage };
-    wgpu::util::DeviceExt::create_buffer_init(&gpu.device, &contents)
+    // Not mapped at creation: that panics when the device is lost or out of memory.
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(name),
+        size: bytes.len() as u64,
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    gpu.queue.write_buffer(&buffer, 0, bytes);
+    buffer
 }

@@ -1,0 +1,61 @@
+//! The student's template beside the reference: the same files, the same stages.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use basecode::gpu::{AdapterKind, EMITTER_FS, Gpu, Stage};
+
+fn source(package: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(package).join("src")
+}
+
+/// All files under a folder, by their path in it.
+fn files(root: &Path) -> BTreeSet<PathBuf> {
+    let mut found = BTreeSet::new();
+    let mut folders = vec![root.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                found.insert(path.strip_prefix(root).unwrap().to_owned());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn the_template_has_the_files_of_the_reference() {
+    let mut reference = files(&source("reference_impl"));
+    reference.retain(|path| !path.starts_with("tests"));
+    assert_eq!(files(&source("student_template")), reference);
+}
+
+#[test]
+fn the_stages_of_reference_and_template_fit_the_contract() {
+    let gpu = Gpu::open(AdapterKind::Any, "").expect("these tests need a graphics adapter");
+    for package in ["reference_impl", "student_template"] {
+        let folder = source(package).join("shaders");
+        let mut vertex = Vec::new();
+        let mut fragment = vec![(EMITTER_FS.name.to_owned(), EMITTER_FS.text.to_owned())];
+        for file in files(&folder) {
+            let name = file.to_str().unwrap().strip_suffix(".wgsl").unwrap().to_owned();
+            let text = std::fs::read_to_string(folder.join(&file)).unwrap();
+            if name.ends_with(".vs") {
+                vertex.push((name, text));
+            } else {
+                fragment.push((name, text));
+            }
+        }
+        assert_eq!((vertex.len(), fragment.len()), (3, 4), "{package}");
+        for (name, text) in &vertex {
+            let vertex = Stage { name, text };
+            gpu.checked(&mut || Ok(gpu.depth_pipeline(vertex))).unwrap();
+            for (name, text) in fragment.iter().filter(|_| vertex.name != "shadow.vs") {
+                gpu.checked(&mut || Ok(gpu.pipeline(vertex, Stage { name, text }))).unwrap();
+            }
+        }
+    }
+}
