@@ -4,6 +4,7 @@
 
 pub mod assignment;
 pub mod build;
+pub mod cli;
 pub mod evidence;
 pub mod expected;
 pub mod grading;

@@ -58,27 +58,22 @@ enum Command {
     Compare(compare::CompareArguments),
     /// Render the stored expected images anew with the reference renderer, and replace them
     Bless(bless::BlessArguments),
-    /// (for Umbra's own use) answer a job in a locked process
-    #[command(name = "__worker", hide = true)]
-    Worker {
-        /// The worker's private folder.
-        dir: PathBuf,
-    },
 }
 
 /// Parses the command line, runs the command and prints its error once.
+///
+/// Hidden commands come first: they are Umbra starting itself, and lock the process before
+/// anything else is done in it.
 pub fn main() -> ExitCode {
-    if let Command::Worker { dir } = &match Arguments::try_parse() {
-        Ok(arguments) => arguments,
-        Err(error) => {
-            // Help and version are no errors; clap knows which stream is right for each.
-            let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { EXIT_USAGE } else { EXIT_OK });
-        }
+    // Cargo runs this very binary as its compiler wrapper while it is recorded.
+    if let Some(code) = crate::build::wrapper_main() {
+        return code;
     }
-    .command
-    {
-        return crate::worker::child_main(dir);
+    let args: Vec<_> = std::env::args_os().skip(1).collect();
+    match (args.first().and_then(|name| name.to_str()), args.get(1)) {
+        (Some("__worker"), Some(dir)) => return crate::worker::child_main(Path::new(dir)),
+        (Some("__exec"), Some(program)) => return crate::process::exec_main(program, &args[2..]),
+        _ => {}
     }
     let Arguments { command, root } = Arguments::parse();
     match run(command, root.as_deref()) {
@@ -99,6 +94,5 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Render(arguments) => render::run(&arguments, root),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Bless(arguments) => bless::run(&arguments, root),
-        Command::Worker { .. } => unreachable!("answered before"),
     }
 }

@@ -1,0 +1,103 @@
+//! What most commands need: the assignment, workers, the reference renderer, Ctrl-C, progress.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context as _;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::assignment::Assignment;
+use crate::expected::Store;
+use crate::worker::Supervisor;
+
+/// Set by Ctrl-C; whatever runs ends soon after, and nothing half-written is left.
+pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// The assignment and the means to run things.
+pub struct Context {
+    /// What is graded.
+    pub assignment: Assignment,
+    /// Starts workers.
+    pub supervisor: Supervisor,
+    /// A line on standard error that tells what is being done; silent when it is no terminal.
+    pub line: ProgressBar,
+}
+
+impl Context {
+    /// Finds the assignment: at `root`, else at or above the current folder, else above the program.
+    pub fn new(root: Option<&Path>) -> anyhow::Result<Self> {
+        let assignment = match root {
+            Some(root) => Assignment::load(root)?,
+            None => {
+                let here = std::env::current_dir().context("cannot tell the current folder")?;
+                Assignment::find(&here).or_else(|missing| {
+                    let program = std::env::current_exe().unwrap_or_default();
+                    Assignment::find(&program).map_err(|_| missing)
+                })?
+            }
+        };
+        let scratch = assignment.cache().join("scratch");
+        std::fs::create_dir_all(&scratch)
+            .with_context(|| format!("cannot make {}", scratch.display()))?;
+        let line = ProgressBar::new_spinner();
+        line.set_style(ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        catch_interrupts();
+        Ok(Self { assignment, supervisor: Supervisor::of_this_program(scratch)?, line })
+    }
+
+    /// Where the reference renderer's library should be, if it is there.
+    pub fn reference(&self) -> Option<PathBuf> {
+        let name = library_name("reference_impl");
+        let beside = |folder: &Path| Some(folder.join(&name)).filter(|path| path.is_file());
+        let program = std::env::current_exe().ok();
+        beside(&self.assignment.root.join("target/release"))
+            .or_else(|| program.as_deref().and_then(Path::parent).and_then(beside))
+    }
+
+    /// Runs `body` with the store of expected images, showing what it does.
+    pub fn with_store<T>(&self, body: impl FnOnce(&Store) -> T) -> T {
+        let progress = |message: &str| self.say(message);
+        let store = Store {
+            assignment: &self.assignment,
+            reference: self.reference(),
+            supervisor: &self.supervisor,
+            threads: cores(),
+            progress: &progress,
+        };
+        body(&store)
+    }
+
+    /// Shows what is being done.
+    pub fn say(&self, message: &str) {
+        self.line.set_message(message.to_owned());
+        self.line.tick();
+    }
+}
+
+/// The number of cores to use.
+pub fn cores() -> u32 {
+    std::thread::available_parallelism().map_or(1, |cores| cores.get() as u32)
+}
+
+/// What this system calls the dynamic library of a crate.
+pub fn library_name(crate_name: &str) -> String {
+    format!("{}{crate_name}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX)
+}
+
+/// A second Ctrl-C ends the program at once.
+fn catch_interrupts() {
+    #[cfg(unix)]
+    {
+        extern "C" fn interrupted(_: i32) {
+            if INTERRUPTED.swap(true, Ordering::Relaxed) {
+                crate::process::exit_now(i32::from(super::EXIT_INTERRUPTED));
+            }
+        }
+        use nix::sys::signal::{SaFlags, SigAction, SigHandler, SigSet, Signal, sigaction};
+        let action = SigAction::new(SigHandler::Handler(interrupted), SaFlags::SA_RESTART, SigSet::empty());
+        for signal in [Signal::SIGINT, Signal::SIGTERM] {
+            // SAFETY: the handler touches one atomic and may call `_exit`: both are allowed there.
+            let _ = unsafe { sigaction(signal, &action) };
+        }
+    }
+}

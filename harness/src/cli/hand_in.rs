@@ -1,0 +1,80 @@
+//! `umbra check`, `grade`, `validate` and `pack`: what is done with hand-ins.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+
+use super::context::Context;
+use crate::intake;
+
+/// What `umbra validate` is told.
+#[derive(clap::Args)]
+pub struct ValidateArguments {
+    /// The archive or folder
+    archive: PathBuf,
+    /// Repack a nearly right one (wrong level, other names, junk) into a conforming archive
+    #[arg(long, value_name = "OUT.zip")]
+    fix: Option<PathBuf>,
+}
+
+/// What `umbra pack` is told.
+#[derive(clap::Args)]
+pub struct PackArguments {
+    /// The working folder: config.json, src/, offline/, realtime/
+    folder: PathBuf,
+    /// Where to write the archive, a file or a folder [default: the current folder]
+    #[arg(long, short, value_name = "OUT")]
+    output: Option<PathBuf>,
+}
+
+/// Prints the expected tree beside the found one; exit 0 when it conforms, 1 when not.
+pub fn validate(arguments: &ValidateArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+    let context = Context::new(root)?;
+    let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
+    let validation = intake::validate(&arguments.archive, tree, limits)?;
+    print!("{}", validation.to_text());
+    if let Some(out) = &arguments.fix {
+        let packed = intake::fix(&arguments.archive, out, tree, limits)?;
+        println!("repacked as {}", packed.archive.display());
+    }
+    Ok(if validation.conforms { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
+}
+
+/// Writes a conforming archive; exit 1 when the folder lacks something.
+pub fn pack(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+    let context = Context::new(root)?;
+    let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
+    let out = arguments.output.as_deref().unwrap_or(Path::new("."));
+    match intake::pack(&arguments.folder, out, tree, limits) {
+        Ok(packed) => {
+            println!("{}", packed.archive.display());
+            Ok(super::EXIT_OK)
+        }
+        Err(intake::IntakeError::Refused(refusal)) => {
+            print!("{}", intake::validate_refusal(&refusal).to_text());
+            Ok(super::EXIT_NOT_IN_ORDER)
+        }
+        Err(error) => bail!(error),
+    }
+}
+
+/// What `umbra check` is told.
+#[derive(clap::Args)]
+pub struct CheckArguments {
+    /// The working folder or archive
+    hand_in: PathBuf,
+}
+/// What `umbra grade` is told.
+#[derive(clap::Args)]
+pub struct GradeArguments {
+    /// Archives, folders, or folders full of archives
+    hand_ins: Vec<PathBuf>,
+}
+/// Checks
+pub fn check(_arguments: &CheckArguments, _root: Option<&Path>) -> anyhow::Result<u8> {
+    bail!("not written yet")
+}
+/// Grades
+pub fn grade(_arguments: &GradeArguments, _root: Option<&Path>) -> anyhow::Result<u8> {
+    bail!("not written yet")
+}

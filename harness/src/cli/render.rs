@@ -1,0 +1,179 @@
+//! `umbra render`: one image of one scene by one plugin.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use anyhow::{Context as _, bail};
+use basecode::exr_io::{Precision, write_exr};
+use basecode::scene::SceneConfig;
+use basecode::{Image, Vec3};
+
+use super::context::{Context, INTERRUPTED, cores};
+use crate::process::Limits;
+use crate::worker::{Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef};
+
+/// What `umbra render` is told.
+#[derive(clap::Args)]
+pub struct RenderArguments {
+    /// The scene's TOML file
+    scene: PathBuf,
+    /// Who renders: `reference`, or the path of a plugin's library
+    #[arg(long, value_name = "reference|PATH")]
+    plugin: String,
+    /// Where to write the image
+    #[arg(long, short, value_name = "OUT.exr")]
+    output: PathBuf,
+    /// Samples per pixel, offline [default: the scene's]
+    #[arg(long)]
+    spp: Option<u32>,
+    /// Seed of the samplers: your student id for a hand-in
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Threads to render with [default: all cores]
+    #[arg(long)]
+    threads: Option<u32>,
+    /// Shadows: offline they are on, realtime as the scene's `bonus` says
+    #[arg(long, value_name = "on|off")]
+    shadows: Option<Switch>,
+    /// Film size in pixels [default: the scene's]
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
+    /// Which adapter draws realtime scenes
+    #[arg(long, value_enum, default_value_t = AdapterChoice::Auto)]
+    adapter: AdapterChoice,
+    /// Options for the plugin; only the reference knows some (`mistake=NAME`)
+    #[arg(long, default_value = "", hide = true)]
+    options: String,
+}
+
+/// Which adapter to draw with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum AdapterChoice {
+    /// Hardware when there is some, software otherwise
+    Auto,
+    /// Hardware only
+    Gpu,
+    /// Software only (Mesa's lavapipe on Linux)
+    Software,
+}
+
+impl AdapterChoice {
+    /// As workers are told.
+    pub fn adapter(self) -> Adapter {
+        let kind = match self {
+            Self::Auto => AdapterKind::Any,
+            Self::Gpu => AdapterKind::Hardware,
+            Self::Software => AdapterKind::Software,
+        };
+        Adapter { kind, name: String::new() }
+    }
+}
+
+/// `on` or `off`.
+#[derive(Clone, Copy, Debug)]
+struct Switch(bool);
+
+impl FromStr for Switch {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "on" => Ok(Self(true)),
+            "off" => Ok(Self(false)),
+            _ => Err(format!("expected on or off, found {text}")),
+        }
+    }
+}
+
+/// Width and height in pixels.
+#[derive(Clone, Copy, Debug)]
+struct Size(u32, u32);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("expected WIDTHxHEIGHT such as 640x480, found {text}");
+        let (width, height) = text.split_once('x').ok_or_else(wrong)?;
+        let side = |text: &str| text.parse().ok().filter(|side| (1..=16_384).contains(side));
+        Ok(Self(side(width).ok_or_else(wrong)?, side(height).ok_or_else(wrong)?))
+    }
+}
+
+/// Renders the image and writes it: float for what is drawn offline, half for realtime as the
+/// course's own files.
+pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+    let context = Context::new(root)?;
+    let config = SceneConfig::load(&arguments.scene)?;
+    for key in &config.unknown_keys {
+        eprintln!("umbra: {}: warning: unknown key {key}", arguments.scene.display());
+    }
+    let plugin = match arguments.plugin.as_str() {
+        "reference" => context.reference().context(
+            "there is no reference renderer here; hint: cargo build --release --workspace",
+        )?,
+        path => PathBuf::from(path),
+    };
+    let plugin = plugin.canonicalize().with_context(|| format!("plugin {}", plugin.display()))?;
+    let Size(width, height) =
+        arguments.size.unwrap_or(Size(config.width as u32, config.height as u32));
+    let scene = SceneRef {
+        path: arguments.scene.canonicalize().context("scene")?,
+        options: arguments.options.clone(),
+    };
+    let request = if config.realtime {
+        let shadow_map = arguments.shadows.map_or(config.bonus, |Switch(on)| on);
+        let (adapter, cameras) = (arguments.adapter.adapter(), vec![camera_of(&config)]);
+        Request::RenderRealtime { scene, width, height, shadow_map, adapter, stages: vec![], cameras }
+    } else {
+        Request::RenderOffline {
+            scene,
+            width,
+            height,
+            spp: arguments.spp.unwrap_or(config.spp as u32),
+            seed: arguments.seed,
+            threads: arguments.threads.unwrap_or_else(cores).max(1),
+            shadows: arguments.shadows.is_none_or(|Switch(on)| on),
+        }
+    };
+    let job = Job { plugin: Some(plugin), requests: vec![request] };
+    // Whoever renders by hand may wait as long as he likes; Ctrl-C ends it.
+    let limits = Limits { wall_s: 86_400.0, cpu_s: 1 << 20, file_size_mib: 8192, memory_mib: 16_384, ..Limits::default() };
+    let mut report = context.supervisor.run_job(&job, &limits, &INTERRUPTED, &mut |progress| {
+        let (done, rows) = progress.rows;
+        context.say(&format!("rendering: {done} of {rows} rows"));
+    });
+    context.line.finish_and_clear();
+    if INTERRUPTED.load(std::sync::atomic::Ordering::Relaxed) {
+        return Ok(super::EXIT_INTERRUPTED);
+    }
+    let printed = report.runs.iter().map(|run| run.ended.stderr.head.clone() + &run.ended.stderr.tail).collect::<String>();
+    match report.outcomes.pop() {
+        Some(Outcome::Done(answer)) => {
+            let pixels = answer.values.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v)).collect();
+            let image = Image { width: width as usize, height: height as usize, pixels };
+            let precision = if config.realtime { Precision::Half } else { Precision::Float };
+            write_exr(&arguments.output, &image, precision, &[])?;
+            Ok(super::EXIT_OK)
+        }
+        Some(Outcome::NoAdapter(message)) => {
+            eprintln!("umbra: not run here: {message}");
+            Ok(super::EXIT_MACHINE)
+        }
+        outcome => {
+            eprint!("{printed}");
+            bail!("no image: {outcome:?}")
+        }
+    }
+}
+
+/// The camera of a scene file, as workers are told.
+pub fn camera_of(config: &SceneConfig) -> CameraValue {
+    let camera = &config.camera;
+    CameraValue {
+        eye: camera.eye.into(),
+        at: camera.at.into(),
+        up: camera.up.into(),
+        fov_y_deg: camera.fov_y_deg,
+    }
+}
