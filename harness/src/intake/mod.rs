@@ -31,6 +31,7 @@ mod tree_text;
 mod unpack;
 mod validate;
 mod zip;
+mod zip_headers;
 
 pub use check_config::check_config;
 pub use finding::{Finding, Severity};
