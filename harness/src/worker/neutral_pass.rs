@@ -36,7 +36,7 @@ pub fn render(request: &Request, values: &mut [f32]) -> Result<(), CallError> {
         AdapterKind::Software => gpu::AdapterKind::Software,
         AdapterKind::Hardware => gpu::AdapterKind::Hardware,
     };
-    let draw = || -> basecode::Result<()> {
+    let mut draw = || -> basecode::Result<()> {
         let scene = load_scene(&scene.path)?;
         let gpu = Gpu::open(kind, &adapter.name)?;
         let (width, height) = (*width as usize, *height as usize);
