@@ -12,5 +12,6 @@ pub mod imaging;
 pub mod intake;
 pub mod plugin;
 pub mod process;
+pub mod report;
 pub mod rubric;
 pub mod worker;

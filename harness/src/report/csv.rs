@@ -1,0 +1,134 @@
+//! `grades.csv`: one row a hand-in, for a grade book.
+
+use super::number::{is_range, of_part, points};
+use super::{Entry, ReportError, Sheet, harmless};
+
+/// The grades as CSV (UTF-8, comma, `\n`). The columns are student id, last and first name, name of
+/// the hand-in, the parts, total, what it is out of, lowest and highest, remarks.
+///
+/// `total` is empty where the hand-in could not be judged wholly, so that nobody imports a number
+/// that is not decided; `lowest` and `highest` are filled only there. A part that is a range reads
+/// `0..20`.
+///
+/// # Errors
+/// When there is no hand-in.
+pub fn grades(sheet: &Sheet) -> Result<String, ReportError> {
+    if sheet.entries.is_empty() {
+        return Err(ReportError::Empty);
+    }
+    let format = |reason: String| ReportError::Format { file: super::CSV_FILE, reason };
+    let mut writer = ::csv::Writer::from_writer(Vec::new());
+    let mut head = vec!["student_id", "last_name", "first_name", "hand_in"];
+    head.extend(sheet.rules.parts.iter().map(|part| part.id.as_str()));
+    head.extend(["total", "out_of", "lowest", "highest", "remarks"]);
+    let head = head.into_iter().map(cell);
+    writer.write_record(head).map_err(|error| format(error.to_string()))?;
+    for entry in &sheet.entries {
+        let row = row(sheet, entry).into_iter().map(|text| cell(&text));
+        writer.write_record(row).map_err(|error| format(error.to_string()))?;
+    }
+    let bytes = writer.into_inner().map_err(|error| format(error.to_string()))?;
+    String::from_utf8(bytes).map_err(|error| format(error.to_string()))
+}
+
+fn row(sheet: &Sheet, Entry { record, grade }: &Entry) -> Vec<String> {
+    let student = &record.student;
+    let mut row = vec![
+        student.id.clone(),
+        student.last_name.clone(),
+        student.first_name.clone(),
+        record.name.clone(),
+    ];
+    for part in &sheet.rules.parts {
+        let own = grade.parts.iter().find(|own| own.id == part.id);
+        row.push(own.map(of_part).unwrap_or_default());
+    }
+    let open = is_range(grade.points, grade.points_max);
+    let only = |condition: bool, value: f64| if condition { points(value) } else { String::new() };
+    row.push(only(!open, grade.points));
+    row.push(points(grade.out_of));
+    row.push(only(open, grade.points));
+    row.push(only(open, grade.points_max));
+    row.push(grade.remarks.join("; "));
+    row
+}
+
+/// A cell that no spreadsheet takes for a formula: one that begins like it gets an apostrophe.
+fn cell(text: &str) -> String {
+    let begins_as_formula = text.trim_start_matches(' ').starts_with([
+        '=', '+', '-', '@', '\t', '\r', '\n', '\u{ff1d}', '\u{ff0b}', '\u{ff0d}', '\u{ff20}',
+    ]);
+    let clean = harmless(text);
+    if begins_as_formula && !is_number(text) { format!("'{clean}") } else { clean }
+}
+
+/// `-12.5` and the like; nothing that a spreadsheet could read in another way.
+fn is_number(text: &str) -> bool {
+    let digits = text.strip_prefix(['+', '-']).unwrap_or(text);
+    digits.chars().all(|c| c.is_ascii_digit() || c == '.') && text.parse::<f64>().is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use similar_asserts::assert_eq;
+
+    use super::super::sample;
+    use super::*;
+
+    #[test]
+    fn known_answer() {
+        assert_eq!(
+            grades(&sample::sheet()).unwrap(),
+            "\
+student_id,last_name,first_name,hand_in,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,lowest,highest,remarks
+260000001,Lovelace,Ada,a2_ada.zip,5,10,20,15,25,20,95,75,,,
+0260000002,Müller,Jörg,two_cosines.tar.gz,5,10,9.85,15,25,0..20,,75,64.85,84.85,
+260000003,山田,花子,山田_花子.zip,2.25,0,8.13,0,12.5,0,22.88,75,,,\"the source does not build: graded on the images alone, an instructor confirms\"
+"
+        );
+    }
+
+    #[test]
+    fn formulas_are_made_harmless_and_numbers_left() {
+        for (text, expected) in [
+            ("=1+1", "'=1+1"),
+            ("+1-800", "'+1-800"),
+            ("-cmd|' /C calc'!A0", "'-cmd|' /C calc'!A0"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("\t=1", "'\\t=1"),
+            ("\r=1", "'\\r=1"),
+            ("  =1", "'  =1"),
+            ("\u{ff1d}1", "'\u{ff1d}1"),
+            ("-12.5", "-12.5"),
+            ("+3", "+3"),
+            ("-inf", "'-inf"),
+            ("-", "'-"),
+            ("007", "007"),
+            ("a=b", "a=b"),
+        ] {
+            assert_eq!(cell(text), expected);
+        }
+    }
+
+    #[test]
+    fn hostile_words_stay_in_their_cell() {
+        let mut sheet = sample::sheet();
+        sheet.entries.truncate(1);
+        let record = &mut sheet.entries[0].record;
+        record.student.last_name = "=HYPERLINK(\"http://x\",\"y\")".into();
+        record.name = "a,b\"c\r\n=2+2,\u{1b}[2J\u{202e}\0".into();
+        let text = grades(&sheet).unwrap();
+        assert_eq!(text.lines().count(), 2);
+        assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
+        let mut reader = ::csv::Reader::from_reader(text.as_bytes());
+        let row = reader.records().next().unwrap().unwrap();
+        assert_eq!(&row[1], "'=HYPERLINK(\"http://x\",\"y\")");
+        assert_eq!(&row[3], "a,b\"c\\r\\n=2+2,\\u{1b}[2J\\u{202e}\\u{0}");
+    }
+
+    #[test]
+    fn an_empty_batch_is_an_error() {
+        let sheet = Sheet { entries: Vec::new(), ..sample::sheet() };
+        assert!(matches!(grades(&sheet), Err(ReportError::Empty)));
+    }
+}

@@ -1,0 +1,104 @@
+//! The one gate for words that come from a hand-in.
+
+/// The text with every character made visible that could act on a terminal, reorder or hide the
+/// text around it, or break a file format: control characters (ANSI sequences begin with one),
+/// bidirectional marks, invisible characters, noncharacters. They become `\u{1b}` and the like.
+///
+/// Applying it twice changes nothing. What a format gives a meaning to (`<`, `=`) stays: escaping
+/// that is the format's own task.
+pub fn harmless(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_harmful(c) {
+            out.extend(escape(c));
+        } else {
+            out.push(c);
+        }
+    }
+    out
+}
+
+/// The lines of a text, each [`harmless`], tabs as four spaces. At most `most` lines: the first
+/// and the last ones when there are more, with a line between them that says how many are left out.
+pub(super) fn harmless_lines(text: &str, most: usize) -> Vec<String> {
+    /// A line of a compiler or a flood of output need not be read to its end.
+    const COLUMNS: usize = 2000;
+    let all: Vec<&str> = text.trim_end().lines().collect();
+    let clean = |line: &&str| {
+        let mut clean = harmless(&line.replace('\t', "    "));
+        if let Some((end, _)) = clean.char_indices().nth(COLUMNS) {
+            clean.truncate(end);
+            clean.push('…');
+        }
+        clean
+    };
+    if all.len() <= most {
+        return all.iter().map(clean).collect();
+    }
+    let tail = most / 4;
+    let (head, rest) = all.split_at(most - tail);
+    let (hidden, tail) = rest.split_at(rest.len() - tail);
+    let between = format!("… {} more lines …", hidden.len());
+    head.iter().map(clean).chain([between]).chain(tail.iter().map(clean)).collect()
+}
+
+/// The visible form of a harmful character.
+fn escape(c: char) -> impl Iterator<Item = char> {
+    // `escape_default` knows \n, \r and \t and escapes what is not printable ASCII.
+    c.escape_default()
+}
+
+fn is_harmful(c: char) -> bool {
+    c.is_control()
+        || matches!(c,
+            '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}' | '\u{200e}' | '\u{200f}'
+            // Line and paragraph separators, embeddings and overrides.
+            | '\u{2028}'..='\u{202e}'
+            // Word joiner, invisible operators, isolates, deprecated format characters.
+            | '\u{2060}'..='\u{206f}'
+            | '\u{feff}' | '\u{fff9}'..='\u{fffb}'
+            // Tags: invisible text.
+            | '\u{e0000}'..='\u{e0fff}')
+        // Noncharacters, two of which XML forbids.
+        || matches!(u32::from(c) & 0xffff, 0xfffe | 0xffff)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn makes_visible_what_acts() {
+        for (text, expected) in [
+            ("plain Ünïcode 日本 👩‍🚀", "plain Ünïcode 日本 👩‍🚀"),
+            ("\u{1b}[31mred\u{1b}[0m", "\\u{1b}[31mred\\u{1b}[0m"),
+            ("\u{9b}31m", "\\u{9b}31m"),
+            ("a\0b\u{7f}", "a\\u{0}b\\u{7f}"),
+            ("a\r\nb\tc", "a\\r\\nb\\tc"),
+            ("gpj\u{202e}exe", "gpj\\u{202e}exe"),
+            ("\u{2066}x\u{2069}\u{200b}\u{feff}", "\\u{2066}x\\u{2069}\\u{200b}\\u{feff}"),
+            ("\u{e0041}\u{fffe}\u{10ffff}", "\\u{e0041}\\u{fffe}\\u{10ffff}"),
+            ("<b>&'\"=", "<b>&'\"="),
+        ] {
+            assert_eq!(harmless(text), expected);
+            assert_eq!(harmless(expected), expected);
+        }
+    }
+
+    #[test]
+    fn nothing_harmful_is_left_of_any_character() {
+        for c in '\0'..=char::MAX {
+            assert!(!harmless(&c.to_string()).chars().any(is_harmful), "{c:?}");
+        }
+    }
+
+    #[test]
+    fn keeps_head_and_tail_of_many_lines() {
+        let text = (0..100).map(|i| format!("{i}\n")).collect::<String>();
+        let lines = harmless_lines(&text, 8);
+        assert_eq!(lines, ["0", "1", "2", "3", "4", "5", "… 92 more lines …", "98", "99"]);
+        assert_eq!(harmless_lines("a\r\n\tb\u{1b}[K\n\n", 8), ["a", "    b\\u{1b}[K"]);
+        assert_eq!(harmless_lines(&"x".repeat(5000), 8)[0].chars().count(), 2001);
+        assert!(harmless_lines("", 8).is_empty());
+    }
+}

@@ -1,0 +1,292 @@
+//! `report.json`: the batch for programs.
+
+use std::collections::BTreeMap;
+use std::io;
+
+use serde::Serialize;
+use serde_json::ser::{CharEscape, Formatter, PrettyFormatter};
+
+use super::number::significant;
+use super::{Entry, ReportError, Sheet, harmless};
+use crate::evidence::Check;
+use crate::grading::{Conditions, StageCost, Student};
+use crate::intake::Finding;
+use crate::rubric::{PartGrade, Rules};
+
+/// The value of the key `schema`.
+pub const SCHEMA: &str = "umbra.report";
+/// The value of the key `version`: it rises when a key changes its meaning or goes away.
+pub const VERSION: u32 = 1;
+
+/// Numbers are published with so many significant digits, so that the last bits of a sum, which
+/// depend on its order, do not show.
+const DIGITS: usize = 6;
+
+#[derive(Serialize)]
+struct Report<'a> {
+    schema: &'static str,
+    version: u32,
+    assignment: About<'a>,
+    /// Every set of conditions that occurs; a hand-in names its own by index.
+    conditions: Vec<&'a Conditions>,
+    hand_ins: Vec<HandIn<'a>>,
+    /// By slug. Last, and the only thing that two runs over the same hand-ins do not share.
+    timings: BTreeMap<&'a str, &'a [StageCost]>,
+}
+
+#[derive(Serialize)]
+struct About<'a> {
+    name: &'a str,
+    title: &'a str,
+    course: &'a str,
+    due: &'a str,
+    rules: &'a Rules,
+}
+
+#[derive(Serialize)]
+struct HandIn<'a> {
+    name: &'a str,
+    slug: &'a str,
+    digest: &'a str,
+    student: &'a Student,
+    conditions: usize,
+    points: f64,
+    points_max: f64,
+    out_of: f64,
+    remarks: &'a [String],
+    parts: &'a [PartGrade],
+    findings: &'a [Finding],
+    diagnostics: &'a str,
+    checks: &'a [Check],
+}
+
+/// The batch as JSON, keys in a fixed order, ending with a newline. Everything outside the key
+/// `timings` is the same, byte for byte, when the records and grades are. A number that is not
+/// finite is `null`.
+///
+/// # Errors
+/// When there is no hand-in.
+pub fn report(sheet: &Sheet) -> Result<String, ReportError> {
+    if sheet.entries.is_empty() {
+        return Err(ReportError::Empty);
+    }
+    let mut conditions: Vec<&Conditions> = Vec::new();
+    for Entry { record, .. } in &sheet.entries {
+        if !conditions.contains(&&record.conditions) {
+            conditions.push(&record.conditions);
+        }
+    }
+    let hand_ins = sheet.entries.iter().map(|entry| hand_in(entry, &conditions)).collect();
+    let timings = sheet
+        .entries
+        .iter()
+        .map(|Entry { record, .. }| (record.slug.as_str(), record.stages.as_slice()))
+        .collect();
+    let report = Report {
+        schema: SCHEMA,
+        version: VERSION,
+        assignment: About {
+            name: &sheet.assignment,
+            title: &sheet.title,
+            course: &sheet.course,
+            due: &sheet.due,
+            rules: &sheet.rules,
+        },
+        conditions,
+        hand_ins,
+        timings,
+    };
+    let format = |reason: String| ReportError::Format { file: super::JSON_FILE, reason };
+    let mut bytes = Vec::new();
+    let mut serializer =
+        serde_json::Serializer::with_formatter(&mut bytes, Harmless(PrettyFormatter::new()));
+    report.serialize(&mut serializer).map_err(|error| format(error.to_string()))?;
+    bytes.push(b'\n');
+    String::from_utf8(bytes).map_err(|error| format(error.to_string()))
+}
+
+fn hand_in<'a>(Entry { record, grade }: &'a Entry, conditions: &[&Conditions]) -> HandIn<'a> {
+    HandIn {
+        name: &record.name,
+        slug: &record.slug,
+        digest: &record.digest,
+        student: &record.student,
+        conditions: conditions.iter().position(|&c| *c == record.conditions).unwrap_or_default(),
+        points: grade.points,
+        points_max: grade.points_max,
+        out_of: grade.out_of,
+        remarks: &grade.remarks,
+        parts: &grade.parts,
+        findings: &record.findings,
+        diagnostics: &record.diagnostics,
+        checks: &record.evidence.checks,
+    }
+}
+
+/// Writes strings harmless, so that a program that prints them does no harm either, and numbers
+/// with the published digits. Newlines stay: they are JSON's to escape.
+struct Harmless<'a>(PrettyFormatter<'a>);
+
+impl Formatter for Harmless<'_> {
+    fn write_string_fragment<W: ?Sized + io::Write>(
+        &mut self,
+        writer: &mut W,
+        fragment: &str,
+    ) -> io::Result<()> {
+        // A fragment holds no control character: what `harmless` adds are backslashes, which JSON
+        // writes twice.
+        writer.write_all(harmless(fragment).replace('\\', "\\\\").as_bytes())
+    }
+
+    fn write_char_escape<W: ?Sized + io::Write>(
+        &mut self,
+        writer: &mut W,
+        escape: CharEscape,
+    ) -> io::Result<()> {
+        let control = match escape {
+            CharEscape::AsciiControl(byte) => char::from(byte),
+            CharEscape::Backspace => '\u{8}',
+            CharEscape::FormFeed => '\u{c}',
+            CharEscape::CarriageReturn => '\r',
+            other => return self.0.write_char_escape(writer, other),
+        };
+        self.write_string_fragment(writer, &harmless(&control.to_string()))
+    }
+
+    fn write_f64<W: ?Sized + io::Write>(&mut self, writer: &mut W, value: f64) -> io::Result<()> {
+        self.0.write_f64(writer, significant(value, DIGITS))
+    }
+
+    fn begin_array<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.begin_array(writer)
+    }
+
+    fn end_array<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.end_array(writer)
+    }
+
+    fn begin_array_value<W: ?Sized + io::Write>(
+        &mut self,
+        writer: &mut W,
+        first: bool,
+    ) -> io::Result<()> {
+        self.0.begin_array_value(writer, first)
+    }
+
+    fn end_array_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.end_array_value(writer)
+    }
+
+    fn begin_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.begin_object(writer)
+    }
+
+    fn end_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.end_object(writer)
+    }
+
+    fn begin_object_key<W: ?Sized + io::Write>(
+        &mut self,
+        writer: &mut W,
+        first: bool,
+    ) -> io::Result<()> {
+        self.0.begin_object_key(writer, first)
+    }
+
+    fn begin_object_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.begin_object_value(writer)
+    }
+
+    fn end_object_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.0.end_object_value(writer)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+    use similar_asserts::assert_eq;
+
+    use super::super::sample;
+    use super::*;
+
+    fn parsed(sheet: &Sheet) -> Value {
+        serde_json::from_str(&report(sheet).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn holds_what_a_program_asks_for() {
+        let json = parsed(&sample::sheet());
+        assert_eq!(json["schema"], "umbra.report");
+        assert_eq!(json["version"], 1);
+        assert_eq!(json["assignment"]["due"], "2019-10-06T23:59:00-04:00");
+        assert_eq!(json["conditions"].as_array().unwrap().len(), 2);
+        let second = &json["hand_ins"][1];
+        assert_eq!(second["student"]["id"], "0260000002");
+        assert_eq!((&second["points"], &second["points_max"]), (&64.85.into(), &84.85.into()));
+        assert_eq!(second["parts"][2]["points"], 9.85);
+        assert_eq!(second["checks"][2]["verdict"], "fail");
+        assert_eq!(second["checks"][2]["pictures"][0]["file"], "radiance_lit_cbox_actual.png");
+        assert_eq!(second["conditions"], 0);
+        assert_eq!(json["hand_ins"][2]["conditions"], 1);
+        assert_eq!(json["timings"]["two_cosines"][1]["name"], "build");
+    }
+
+    #[test]
+    fn keys_keep_their_order() {
+        let text = report(&sample::sheet()).unwrap();
+        let places = ["schema", "version", "assignment", "conditions", "hand_ins", "timings"]
+            .map(|key| text.find(&format!("\n  \"{key}\":")).unwrap());
+        assert!(places.is_sorted(), "{places:?}");
+    }
+
+    #[test]
+    fn only_timings_differ_between_two_runs() {
+        let first = sample::sheet();
+        let mut second = first.clone();
+        for entry in &mut second.entries {
+            for stage in &mut entry.record.stages {
+                stage.wall_s *= 1.5;
+                stage.cpu_s += 0.25;
+            }
+        }
+        let [first, second] = [first, second].map(|sheet| report(&sheet).unwrap());
+        assert_ne!(first, second);
+        let canonical = |text: &str| text.split("\n  \"timings\":").next().unwrap().to_owned();
+        assert_eq!(canonical(&first), canonical(&second));
+    }
+
+    #[test]
+    fn the_last_bits_do_not_show() {
+        let mut sheet = sample::sheet();
+        let before = report(&sheet).unwrap();
+        for entry in &mut sheet.entries {
+            for check in &mut entry.record.evidence.checks {
+                check.error *= 1.0 + 1e-15;
+            }
+        }
+        assert_eq!(report(&sheet).unwrap(), before);
+    }
+
+    #[test]
+    fn hostile_words_are_harmless_in_the_file_and_when_parsed() {
+        let mut sheet = sample::sheet();
+        let record = &mut sheet.entries[0].record;
+        record.name = "a\"b\\c\u{1b}[2J\0\u{8}\u{202e}</script>\r".into();
+        record.diagnostics = "line one\nline two\u{9b}1m".into();
+        record.evidence.checks[0].error = f64::NAN;
+        let text = report(&sheet).unwrap();
+        assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
+        let json = parsed(&sheet);
+        let expected = "a\"b\\c\\u{1b}[2J\\u{0}\\u{8}\\u{202e}</script>\\r";
+        assert_eq!(json["hand_ins"][0]["name"], expected);
+        assert_eq!(json["hand_ins"][0]["diagnostics"], "line one\nline two\\u{9b}1m");
+        assert_eq!(json["hand_ins"][0]["checks"][0]["error"], Value::Null);
+    }
+
+    #[test]
+    fn an_empty_batch_is_an_error() {
+        let sheet = Sheet { entries: Vec::new(), ..sample::sheet() };
+        assert!(matches!(report(&sheet), Err(ReportError::Empty)));
+    }
+}

@@ -1,0 +1,174 @@
+//! What is shown: a console text, `report.json`, `grades.csv` and HTML pages.
+//!
+//! It decides nothing. Every format lets a hand-in's words through one gate, [`harmless`], and adds
+//! the escaping that the format itself needs.
+
+mod csv;
+mod harmless;
+mod html;
+mod json;
+mod number;
+#[cfg(test)]
+mod sample;
+mod text;
+#[cfg(test)]
+mod write_tests;
+
+use std::collections::HashSet;
+use std::io::Write as _;
+use std::path::{Component, Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+pub use self::csv::grades as csv_grades;
+pub use self::harmless::harmless;
+pub use self::html::{batch as html_batch, hand_in as html_hand_in};
+pub use self::json::{SCHEMA, VERSION, report as json_report};
+pub use self::text::{detail as text_detail, table as text_table};
+
+use crate::assignment::Assignment;
+use crate::grading::Record;
+use crate::rubric::{Grade, Rules};
+
+/// The file for programs, in the batch's folder.
+pub const JSON_FILE: &str = "report.json";
+/// The file for the grade book, in the batch's folder.
+pub const CSV_FILE: &str = "grades.csv";
+/// The page for readers, in the batch's folder and in the folder of each hand-in.
+pub const HTML_FILE: &str = "report.html";
+
+/// One hand-in with its points.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    /// What was found out.
+    pub record: Record,
+    /// What it is worth.
+    pub grade: Grade,
+}
+
+/// Everything that a report of a batch is made from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sheet {
+    /// The assignment's short name: `a2`.
+    pub assignment: String,
+    /// The assignment's title.
+    pub title: String,
+    /// The course's title.
+    pub course: String,
+    /// When it was due, RFC 3339 with offset.
+    pub due: String,
+    /// The rules that made the points.
+    pub rules: Rules,
+    /// The hand-ins, in the order to be shown.
+    pub entries: Vec<Entry>,
+}
+
+/// Why there is no report.
+#[derive(Debug, Error)]
+pub enum ReportError {
+    /// A report of nothing would look like a batch that went well.
+    #[error(
+        "no hand-in to report: expected at least one (hint: name an archive, a folder, or a folder of them)"
+    )]
+    Empty,
+    /// The folder of a hand-in's page has no usable name.
+    #[error(
+        "hand-in {name:?}: expected a plain and unique folder name for its report, found {slug:?}"
+    )]
+    Slug {
+        /// The hand-in.
+        name: String,
+        /// The name.
+        slug: String,
+    },
+    /// A file cannot be written.
+    #[error("{}: cannot write the report: {source}", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A value has no place in the format.
+    #[error("{file}: cannot be made: {reason}")]
+    Format {
+        /// The file.
+        file: &'static str,
+        /// Why.
+        reason: String,
+    },
+}
+
+impl Sheet {
+    /// A sheet for hand-ins of an assignment.
+    pub fn new(assignment: &Assignment, entries: Vec<Entry>) -> Self {
+        Self {
+            assignment: assignment.name.clone(),
+            title: assignment.title.clone(),
+            course: assignment.course.clone(),
+            due: assignment.due.clone(),
+            rules: assignment.rules.clone(),
+            entries,
+        }
+    }
+
+    fn check(&self) -> Result<(), ReportError> {
+        if self.entries.is_empty() {
+            return Err(ReportError::Empty);
+        }
+        let mut seen = HashSet::new();
+        for Entry { record, .. } in &self.entries {
+            let mut components = Path::new(&record.slug).components();
+            let plain = matches!(
+                (components.next(), components.next()),
+                (Some(Component::Normal(name)), None) if name == record.slug.as_str()
+            );
+            let taken = [JSON_FILE, CSV_FILE, HTML_FILE].contains(&record.slug.as_str());
+            if !plain || taken || !seen.insert(&record.slug) {
+                let (name, slug) = (record.name.clone(), record.slug.clone());
+                return Err(ReportError::Slug { name, slug });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Writes `report.json`, `grades.csv`, `report.html`, and `<slug>/report.html` for each hand-in,
+/// into the folder `out`, which is made when missing. The pictures are expected to lie in
+/// `<slug>/` already.
+///
+/// Each file appears whole or not at all; the pages of the hand-ins come first, so that
+/// `report.html` never leads nowhere.
+///
+/// # Errors
+/// When there is no hand-in, a slug is no plain unique name, or a file cannot be written.
+pub fn write(out: &Path, sheet: &Sheet) -> Result<(), ReportError> {
+    sheet.check()?;
+    for entry in &sheet.entries {
+        let page = html_hand_in(sheet, entry);
+        put(&out.join(&entry.record.slug), HTML_FILE, page.as_bytes())?;
+    }
+    put(out, CSV_FILE, csv_grades(sheet)?.as_bytes())?;
+    put(out, JSON_FILE, json_report(sheet)?.as_bytes())?;
+    put(out, HTML_FILE, html_batch(sheet)?.as_bytes())
+}
+
+/// Writes one file under another name and renames it.
+fn put(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), ReportError> {
+    let path = folder.join(name);
+    let write = || {
+        std::fs::create_dir_all(folder)?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".report-").suffix(".partial");
+        // What the user's umask allows, as for any other file; the default would be private.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let mut file = builder.tempfile_in(folder)?;
+        file.write_all(bytes)?;
+        file.as_file().sync_all()?;
+        file.persist(&path).map_err(|error| error.error)?;
+        Ok(())
+    };
+    write().map_err(|source| ReportError::Write { path: path.clone(), source })
+}

@@ -1,0 +1,143 @@
+//! Numbers as they are shown.
+
+use crate::evidence::{Check, Measure, Verdict};
+use crate::rubric::{Grade, PartGrade};
+
+/// Points with at most two digits and no trailing zeros: `95.5`, `100`.
+pub(super) fn points(value: f64) -> String {
+    let text = format!("{value:.2}");
+    let short = text.trim_end_matches('0').trim_end_matches('.');
+    // Rounding may leave "-0".
+    if short == "-0" { "0".to_owned() } else { short.to_owned() }
+}
+
+/// Points, or a range of them: `80..100`.
+pub(super) fn range(least: f64, most: f64) -> String {
+    if is_range(least, most) {
+        format!("{}..{}", points(least), points(most))
+    } else {
+        points(least)
+    }
+}
+
+/// Whether two values differ when shown.
+pub(super) fn is_range(least: f64, most: f64) -> bool {
+    points(least) != points(most)
+}
+
+/// The points of a part: `12.5`, `0..20`.
+pub(super) fn of_part(part: &PartGrade) -> String {
+    range(part.points, part.points_max)
+}
+
+/// The total with what it is out of: `95.5/100`, `80..100/100`.
+pub(super) fn total(grade: &Grade) -> String {
+    format!("{}/{}", range(grade.points, grade.points_max), points(grade.out_of))
+}
+
+/// A value with four significant digits: `0.003`, `12.35`, `1.2e-7`, `nan`.
+pub(super) fn value(value: f64) -> String {
+    if value.is_nan() {
+        return "nan".to_owned();
+    }
+    if value.is_infinite() {
+        return if value > 0.0 { "infinite" } else { "-infinite" }.to_owned();
+    }
+    let rounded = significant(value, 4);
+    let size = rounded.abs();
+    if size != 0.0 && !(1e-4..1e6).contains(&size) {
+        format!("{rounded:e}")
+    } else {
+        format!("{rounded}")
+    }
+}
+
+/// The value rounded to so many significant decimal digits.
+pub(super) fn significant(value: f64, digits: usize) -> f64 {
+    if !value.is_finite() {
+        return value;
+    }
+    format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
+}
+
+/// Seconds as `0.12 s`, `83.4 s`.
+pub(super) fn seconds(value: f64) -> String {
+    if value.abs() < 9.995 { format!("{value:.2} s") } else { format!("{value:.1} s") }
+}
+
+/// A verdict in words.
+pub(super) fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Pass => "pass",
+        Verdict::Fail => "fail",
+        Verdict::NotImplemented => "not implemented",
+        Verdict::NotJudged => "not judged",
+        Verdict::NotRun => "not run",
+    }
+}
+
+/// `0.53, at most 0.002`
+pub(super) fn measure(measure: &Measure) -> String {
+    format!("{}, at most {}", value(measure.value), value(measure.bound))
+}
+
+/// Whether a check costs points.
+pub(super) fn is_failure(check: &Check) -> bool {
+    matches!(check.verdict, Verdict::Fail | Verdict::NotImplemented)
+}
+
+/// The hints of the checks that decided a part and did not pass, each once.
+pub(super) fn hints<'a>(part: &PartGrade, checks: &'a [Check]) -> Vec<&'a str> {
+    let mut hints: Vec<&str> = Vec::new();
+    for check in checks {
+        let decided = part.evidence.iter().any(|name| *name == check.id || *name == check.name());
+        let hint = check.hint.as_str();
+        if decided && check.verdict != Verdict::Pass && !hint.is_empty() && !hints.contains(&hint) {
+            hints.push(hint);
+        }
+    }
+    hints
+}
+
+/// `1 hand-in`, `2 hand-ins`.
+pub(super) fn count(number: usize, noun: &str) -> String {
+    if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_short() {
+        for (value, text) in [
+            (100.0, "100"),
+            (95.5, "95.5"),
+            (12.25, "12.25"),
+            (0.0, "0"),
+            (-1e-9, "0"),
+            (10.0, "10"),
+        ] {
+            assert_eq!(points(value), text);
+        }
+        assert_eq!(range(80.0, 100.0), "80..100");
+        assert_eq!(range(80.0, 80.0 + 1e-9), "80");
+    }
+
+    #[test]
+    fn values_have_four_digits() {
+        for (number, text) in [
+            (0.0, "0"),
+            (0.003, "0.003"),
+            (12.3456, "12.35"),
+            (1.23456e-7, "1.235e-7"),
+            (123456.0, "123500"),
+            (2.5e9, "2.5e9"),
+            (f64::NAN, "nan"),
+            (f64::INFINITY, "infinite"),
+        ] {
+            assert_eq!(value(number), text);
+        }
+        assert_eq!(significant(0.1 + 0.2, 6), 0.3);
+    }
+}

@@ -1,0 +1,250 @@
+//! Every detail of one hand-in.
+
+use super::super::harmless::harmless_lines;
+use super::super::number::{self, hints, is_failure, is_range, of_part, points, seconds, total};
+use super::super::{Entry, Sheet};
+use super::page::{Page, Style, columns, left, wrap};
+use crate::evidence::{Check, Verdict};
+use crate::intake::{Finding, Severity};
+
+/// So many lines of the compiler's are shown.
+const DIAGNOSTIC_LINES: usize = 60;
+/// Wide enough for a verdict and two spaces.
+const VERDICT_WIDTH: usize = 17;
+
+/// All that is known of one hand-in: parts with points, reason and hint; every check with value,
+/// bound and verdict; findings; what the compiler said. `width` in terminal columns; no line is
+/// wider. `colours` allows ANSI colours.
+pub fn detail(sheet: &Sheet, entry: &Entry, width: usize, colours: bool) -> String {
+    let Entry { record, grade } = entry;
+    let mut page = Page::new(width, colours);
+    page.wrapped(&[], Style::Heading, &sheet.title);
+    page.wrapped(&[(Style::Plain, "hand-in  ")], Style::Plain, &record.name);
+    let student = [record.student.full_name(), record.student.id.clone()];
+    let student: Vec<String> = student.into_iter().filter(|text| !text.is_empty()).collect();
+    let student = if student.is_empty() { "not said".to_owned() } else { student.join(", ") };
+    page.wrapped(&[(Style::Plain, "student  ")], Style::Plain, &student);
+    let style = Style::of_points(grade.points, grade.points_max, grade.out_of);
+    page.wrapped(&[(Style::Plain, "total    ")], style, &total(grade));
+    if is_range(grade.points, grade.points_max) {
+        let text = "a range: not everything could be judged; the reasons are below";
+        page.wrapped(&[(Style::Plain, "         ")], Style::Faint, text);
+    }
+    for remark in &grade.remarks {
+        page.wrapped(&[(Style::Bad, "remark   ")], Style::Plain, remark);
+    }
+    parts(&mut page, entry);
+    checks(&mut page, &record.evidence.checks);
+    findings(&mut page, &record.findings);
+    diagnostics(&mut page, &record.diagnostics);
+    costs(&mut page, entry);
+    page.finish()
+}
+
+fn heading(page: &mut Page, text: &str) {
+    page.gap();
+    page.line(&[(Style::Heading, text)]);
+}
+
+fn parts(page: &mut Page, Entry { record, grade }: &Entry) {
+    heading(page, "parts");
+    let worth = |part| format!("{}/{}", of_part(part), points(part.out_of));
+    let ids = grade.parts.iter().map(|part| columns(&part.id)).max().unwrap_or(0);
+    let worths = grade.parts.iter().map(|part| columns(&worth(part))).max().unwrap_or(0);
+    for part in &grade.parts {
+        let id = format!("  {}  ", left(&part.id, ids));
+        let worth = format!("{}  ", left(&worth(part), worths));
+        let style = Style::of_points(part.points, part.points_max, part.out_of);
+        page.wrapped(&[(Style::Plain, &id), (style, &worth)], Style::Plain, &part.title);
+        let indent = " ".repeat(columns(&id) + columns(&worth));
+        page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &part.reason);
+        if style == Style::Good {
+            continue;
+        }
+        for hint in hints(part, &record.evidence.checks) {
+            page.wrapped(
+                &[(Style::Plain, &indent), (Style::Heading, "hint: ")],
+                Style::Plain,
+                hint,
+            );
+        }
+        if !part.evidence.is_empty() {
+            let evidence = format!("decided by {}", part.evidence.join(", "));
+            page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &evidence);
+        }
+    }
+}
+
+/// What failed in full, then what could not be judged, then what passed in short.
+fn checks(page: &mut Page, checks: &[Check]) {
+    heading(page, "checks");
+    if checks.is_empty() {
+        page.wrapped(&[(Style::Plain, "  ")], Style::Plain, "none were made");
+    }
+    let order = |check: &&Check| match check.verdict {
+        Verdict::Fail | Verdict::NotImplemented => 0,
+        Verdict::NotJudged | Verdict::NotRun => 1,
+        Verdict::Pass => 2,
+    };
+    let mut sorted: Vec<&Check> = checks.iter().collect();
+    sorted.sort_by_key(order);
+    for check in sorted {
+        let style = match check.verdict {
+            Verdict::Pass => Style::Good,
+            Verdict::NotJudged | Verdict::NotRun => Style::Open,
+            Verdict::Fail | Verdict::NotImplemented => Style::Bad,
+        };
+        let verdict = format!("  {}", left(number::verdict(check.verdict), VERDICT_WIDTH));
+        let held_back = if check.held_back { " (held back)" } else { "" };
+        let name = format!("{}{held_back}: ", check.name());
+        if check.verdict == Verdict::Pass && !check.measures.is_empty() {
+            let measures = check.measures.iter();
+            let measures =
+                measures.map(|measure| format!("{} {}", measure.name, number::measure(measure)));
+            let text = format!("{name}{}", measures.collect::<Vec<_>>().join("; "));
+            page.wrapped(&[(style, &verdict)], Style::Plain, &text);
+            continue;
+        }
+        page.wrapped(&[(style, &verdict)], Style::Plain, &format!("{name}{}", check.summary));
+        let indent = " ".repeat(columns(&verdict));
+        for measure in &check.measures {
+            let (style, word) =
+                if measure.passed { (Style::Faint, "pass: ") } else { (Style::Bad, "fail: ") };
+            let text = format!("{}: {}", measure.name, number::measure(measure));
+            page.wrapped(&[(Style::Plain, &indent), (style, word)], Style::Plain, &text);
+        }
+        if !check.hint.is_empty() {
+            page.wrapped(
+                &[(Style::Plain, &indent), (Style::Heading, "hint: ")],
+                Style::Plain,
+                &check.hint,
+            );
+        }
+        if is_failure(check) && !check.pictures.is_empty() {
+            let files: Vec<&str> = check.pictures.iter().map(|p| p.file.as_str()).collect();
+            let text = format!("pictures: {}", files.join(", "));
+            page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &text);
+        }
+    }
+}
+
+fn findings(page: &mut Page, findings: &[Finding]) {
+    if findings.is_empty() {
+        return;
+    }
+    heading(page, "findings");
+    for finding in findings {
+        let style = match finding.severity {
+            Severity::Error => Style::Bad,
+            Severity::Warning => Style::Open,
+            Severity::Note => Style::Faint,
+        };
+        let text = finding.to_string();
+        let severity = finding.severity.to_string();
+        let rest = text.strip_prefix(&format!("{severity}: ")).unwrap_or(&text);
+        let lead = format!("  {}", left(&severity, 9));
+        page.wrapped(&[(style, &lead)], Style::Plain, rest);
+    }
+}
+
+fn diagnostics(page: &mut Page, diagnostics: &str) {
+    let lines = harmless_lines(diagnostics, DIAGNOSTIC_LINES);
+    if lines.is_empty() {
+        return;
+    }
+    heading(page, "compiler");
+    for line in lines {
+        for line in wrap(&line, page.width.saturating_sub(2)) {
+            page.line(&[(Style::Plain, "  "), (Style::Plain, &line)]);
+        }
+    }
+}
+
+fn costs(page: &mut Page, Entry { record, .. }: &Entry) {
+    heading(page, "conditions");
+    let conditions = &record.conditions;
+    for (name, text) in [
+        ("umbra", &conditions.umbra),
+        ("isolation", &conditions.isolation),
+        ("adapter", &conditions.adapter),
+        ("compiler", &conditions.compiler),
+    ] {
+        if !text.is_empty() {
+            page.wrapped(&[(Style::Faint, &format!("  {}", left(name, 11)))], Style::Plain, text);
+        }
+    }
+    if record.stages.is_empty() {
+        return;
+    }
+    let stages = record.stages.iter();
+    let each: Vec<String> =
+        stages.map(|stage| format!("{} {}", stage.name, seconds(stage.wall_s))).collect();
+    let sum: f64 = record.stages.iter().map(|stage| stage.wall_s).sum();
+    let text = format!("{}: {}", seconds(sum), each.join(", "));
+    page.wrapped(&[(Style::Faint, "  took       ")], Style::Plain, &text);
+}
+
+#[cfg(test)]
+mod tests {
+    use similar_asserts::assert_eq;
+    use unicode_width::UnicodeWidthStr;
+
+    use super::super::super::sample;
+    use super::*;
+
+    #[test]
+    fn known_answer() {
+        let sheet = sample::sheet();
+        assert_eq!(detail(&sheet, &sheet.entries[1], 100, false), include_str!("detail_100.txt"));
+    }
+
+    #[test]
+    fn what_does_not_build_shows_the_compiler() {
+        let sheet = sample::sheet();
+        let text = detail(&sheet, &sheet.entries[2], 80, false);
+        for line in [
+            "total    22.88/75",
+            "compiler",
+            "  error[E0308]: mismatched types",
+            "  error    config.json:3: studentID is empty (hint: write your student number)",
+        ] {
+            assert!(text.lines().any(|found| found == line), "{line:?} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn hostile_words_keep_their_place() {
+        let mut sheet = sample::sheet();
+        let evil = "\u{1b}[2J\u{202e}\0\r\nchecks\r\n";
+        let entry = &mut sheet.entries[1];
+        entry.record.name = evil.into();
+        entry.record.student.first_name = evil.repeat(30);
+        entry.record.diagnostics = format!("{evil}\u{9b}1m{}", "x".repeat(500));
+        for check in &mut entry.record.evidence.checks {
+            check.summary = evil.into();
+            check.hint = evil.into();
+            check.scene = evil.into();
+        }
+        for part in &mut entry.grade.parts {
+            part.reason = evil.repeat(9);
+        }
+        for width in [1, 7, 20, 33, 80, 200] {
+            let text = detail(&sheet, &sheet.entries[1], width, false);
+            assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
+            for line in text.lines() {
+                assert!(line.width() <= width.max(2), "{width}: {line:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn colours_do_not_change_the_words() {
+        let sheet = sample::sheet();
+        let mut text = detail(&sheet, &sheet.entries[1], 80, true);
+        assert!(text.contains("\u{1b}[31m"));
+        for code in ["0", "1", "2", "31", "32", "33"] {
+            text = text.replace(&format!("\u{1b}[{code}m"), "");
+        }
+        assert_eq!(text, detail(&sheet, &sheet.entries[1], 80, false));
+    }
+}

@@ -1,0 +1,221 @@
+//! Lines of text that keep within the terminal's width, whatever is in them.
+
+use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+
+use super::super::harmless;
+
+/// How a piece of text is shown; without colours all look the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Style {
+    Plain,
+    Heading,
+    Good,
+    Bad,
+    Open,
+    Faint,
+}
+
+impl Style {
+    /// The style of points that lie in `[least, most]` of `out_of`.
+    pub(super) fn of_points(least: f64, most: f64, out_of: f64) -> Self {
+        if super::super::number::is_range(least, most) {
+            Self::Open
+        } else if least >= out_of {
+            Self::Good
+        } else {
+            Self::Bad
+        }
+    }
+
+    /// The ANSI code (select graphic rendition) that begins it.
+    fn code(self) -> Option<&'static str> {
+        match self {
+            Self::Plain => None,
+            Self::Heading => Some("1"),
+            Self::Good => Some("32"),
+            Self::Bad => Some("31"),
+            Self::Open => Some("33"),
+            Self::Faint => Some("2"),
+        }
+    }
+}
+
+/// Text in the making.
+pub(super) struct Page {
+    /// No line is wider, in terminal columns.
+    pub(super) width: usize,
+    colours: bool,
+    out: String,
+}
+
+impl Page {
+    /// An empty page; `width` in terminal columns.
+    pub(super) fn new(width: usize, colours: bool) -> Self {
+        Self { width: width.max(1), colours, out: String::new() }
+    }
+
+    /// The text, each line ending with a newline.
+    pub(super) fn finish(self) -> String {
+        self.out
+    }
+
+    /// An empty line.
+    pub(super) fn gap(&mut self) {
+        self.out.push('\n');
+    }
+
+    /// One line of pieces; what does not fit is cut off.
+    pub(super) fn line(&mut self, pieces: &[(Style, &str)]) {
+        let mut left = self.width;
+        let last = pieces.iter().rposition(|(_, text)| !text.trim_end().is_empty());
+        let used = &pieces[..last.map_or(0, |last| last + 1)];
+        for (index, (style, text)) in used.iter().enumerate() {
+            let clean = harmless(text);
+            let text = if index + 1 == used.len() { clean.trim_end() } else { &clean };
+            let shown = cut(text, left);
+            left -= shown.width();
+            self.styled(*style, &shown);
+            if shown != *text {
+                break;
+            }
+        }
+        self.gap();
+    }
+
+    /// Text in as many lines as it needs, the first after `lead`, the others indented as deep.
+    pub(super) fn wrapped(&mut self, lead: &[(Style, &str)], style: Style, text: &str) {
+        let indent: usize = lead.iter().map(|(_, text)| harmless(text).width()).sum();
+        // Where the lead leaves no room the text begins on a line of its own.
+        let roomy = indent + 16.min(self.width / 2) <= self.width;
+        let indent = if roomy { indent } else { 2.min(self.width - 1) };
+        let spaces = " ".repeat(indent);
+        let mut lines = wrap(&harmless(text), self.width - indent).into_iter();
+        if roomy {
+            let first = lines.next().unwrap_or_default();
+            let mut pieces = lead.to_vec();
+            pieces.push((style, &first));
+            self.line(&pieces);
+        } else {
+            self.line(lead);
+        }
+        for line in lines {
+            self.line(&[(Style::Plain, &spaces), (style, &line)]);
+        }
+    }
+
+    fn styled(&mut self, style: Style, text: &str) {
+        match style.code().filter(|_| self.colours && !text.trim().is_empty()) {
+            Some(code) => {
+                self.out.push_str("\x1b[");
+                self.out.push_str(code);
+                self.out.push('m');
+                self.out.push_str(text);
+                self.out.push_str("\x1b[0m");
+            }
+            None => self.out.push_str(text),
+        }
+    }
+}
+
+/// Columns that a text takes once it is harmless.
+pub(super) fn columns(text: &str) -> usize {
+    harmless(text).width()
+}
+
+/// The text in exactly `width` columns, cut or filled at its end.
+pub(super) fn left(text: &str, width: usize) -> String {
+    let mut shown = cut(&harmless(text), width);
+    shown.push_str(&" ".repeat(width - shown.width()));
+    shown
+}
+
+/// The text in at least `width` columns, filled at its beginning.
+pub(super) fn right(text: &str, width: usize) -> String {
+    format!("{}{text}", " ".repeat(width.saturating_sub(text.width())))
+}
+
+/// The text, or its beginning and `…` when it is wider than `width`.
+fn cut(text: &str, width: usize) -> String {
+    if text.width() <= width {
+        return text.to_owned();
+    }
+    let mut shown = String::new();
+    for c in text.chars() {
+        shown.push(c);
+        // The width of a sequence may differ from the sum of its characters'.
+        if shown.width() + 1 > width {
+            shown.pop();
+            break;
+        }
+    }
+    if width > 0 {
+        shown.push('…');
+    }
+    shown
+}
+
+/// The text in lines of at most `width` columns, broken at spaces, and inside a word only where the
+/// word is longer than a line. Spaces at the beginning are kept.
+pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
+    let width = width.max(1);
+    let mut lines = Vec::new();
+    let mut line = String::new();
+    for (index, word) in text.split(' ').enumerate() {
+        if index > 0 {
+            if !line.trim().is_empty() && line.width() + 1 + word.width() > width {
+                lines.push(std::mem::take(&mut line));
+            } else {
+                line.push(' ');
+            }
+        }
+        for c in word.chars() {
+            if line.width() + c.width().unwrap_or(0) > width && !line.is_empty() {
+                lines.push(std::mem::take(&mut line));
+            }
+            line.push(c);
+        }
+    }
+    lines.push(line);
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cuts_and_fills_by_display_width() {
+        assert_eq!(left("abc", 5), "abc  ");
+        assert_eq!(left("abcdef", 5), "abcd…");
+        assert_eq!(left("山田花子", 5), "山田…");
+        assert_eq!(left("山田花子", 6), "山田… ");
+        assert_eq!(left("e\u{301}tude", 4), "e\u{301}tu…");
+        assert_eq!(left("\u{1b}", 9), "\\u{1b}   ");
+        assert_eq!(left("abc", 0), "");
+        assert_eq!(right("7", 3), "  7");
+    }
+
+    #[test]
+    fn wraps_at_spaces_and_inside_long_words() {
+        assert_eq!(wrap("one two three", 7), ["one two", "three"]);
+        assert_eq!(wrap("abcdefghij k", 4), ["abcd", "efgh", "ij k"]);
+        assert_eq!(wrap("", 4), [""]);
+        assert_eq!(wrap("   | x", 8), ["   | x"]);
+        for width in 1..40 {
+            for line in
+                wrap("unshadowed 山田 radiance is wrong along 12345678901234567890 rays", width)
+            {
+                assert!(line.width() <= width.max(2), "{line:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn colours_only_when_asked() {
+        for (colours, expected) in [(false, "a bc\n"), (true, "a \u{1b}[31mbc\u{1b}[0m\n")] {
+            let mut page = Page::new(80, colours);
+            page.line(&[(Style::Plain, "a "), (Style::Bad, "bc"), (Style::Good, "  ")]);
+            assert_eq!(page.finish(), expected);
+        }
+    }
+}
