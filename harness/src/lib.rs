@@ -4,3 +4,4 @@
 
 pub mod evidence;
 pub mod rubric;
+pub mod sandbox;
