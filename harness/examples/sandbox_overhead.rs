@@ -61,7 +61,9 @@ fn main() -> anyhow::Result<()> {
 fn time(umbra: &PathBuf, policy: Option<&Policy>) -> anyhow::Result<Duration> {
     let begin = Instant::now();
     let status = match policy {
-        None => std::process::Command::new(umbra).arg(doctor::PROBE_COMMAND).env_clear().status()?,
+        None => {
+            std::process::Command::new(umbra).arg(doctor::PROBE_COMMAND).env_clear().status()?
+        }
         Some(policy) => {
             let program = policy.seen(umbra);
             command(umbra, policy, &program, [doctor::PROBE_COMMAND])?.status()?

@@ -75,7 +75,8 @@ fn allowed(kind: Kind, gpu: bool, own_pid: u64) -> Result<Rules, String> {
     if kind.may_execute() {
         rules.extend(PROCESSES.iter().map(|&call| (call, Vec::new())));
         rules.insert(libc::SYS_clone, vec![rule(vec![argument(0, MaskedEq(NAMESPACES), 0)?])?]);
-        // The standard library's `Command` hears of a failed exec through a pair.
+        // The standard library's `Command` hears of a failed exec through a pair of sockets.
+        rules.extend(PAIR.iter().map(|&call| (call, Vec::new())));
         rules.insert(libc::SYS_socketpair, one_of(0, &[libc::AF_UNIX as u64])?);
         // `abort`; the process namespace keeps it inside.
         rules.insert(libc::SYS_tgkill, Vec::new());
@@ -98,7 +99,8 @@ fn refusals(kind: Kind, own_pid: u64) -> Result<Rules, String> {
         rules.insert(libc::SYS_socketpair, vec![rule(vec![other])?]);
         rules.insert(libc::SYS_kill, Vec::new());
     } else {
-        rules.extend(PROCESSES.iter().chain(&[libc::SYS_socketpair]).map(|&c| (c, Vec::new())));
+        let processes = PROCESSES.iter().chain(PAIR).chain(&[libc::SYS_socketpair]);
+        rules.extend(processes.map(|&call| (call, Vec::new())));
         let no_thread = argument(0, MaskedEq(libc::CLONE_THREAD as u64), 0)?;
         rules.insert(libc::SYS_clone, vec![rule(vec![no_thread])?]);
         for call in [libc::SYS_kill, libc::SYS_tgkill] {
@@ -333,6 +335,9 @@ const PROCESSES: &[i64] = &[
 const PROCESSES: &[i64] =
     &[libc::SYS_execve, libc::SYS_wait4, libc::SYS_waitid, libc::SYS_setsid, libc::SYS_setpgid];
 
+/// What is done with the one kind of socket that a compiler may have.
+const PAIR: &[i64] = &[libc::SYS_recvfrom, libc::SYS_recvmsg, libc::SYS_sendto, libc::SYS_sendmsg];
+
 /// Not allowed to anyone, and answered EPERM rather than ENOSYS. `clone3` and `memfd_create` are
 /// left to ENOSYS: libraries then fall back on what is filtered and counted.
 const REFUSED: &[i64] = &[
@@ -342,11 +347,7 @@ const REFUSED: &[i64] = &[
     libc::SYS_listen,
     libc::SYS_accept,
     libc::SYS_accept4,
-    libc::SYS_sendto,
-    libc::SYS_sendmsg,
     libc::SYS_sendmmsg,
-    libc::SYS_recvfrom,
-    libc::SYS_recvmsg,
     libc::SYS_recvmmsg,
     libc::SYS_setsockopt,
     libc::SYS_execveat,

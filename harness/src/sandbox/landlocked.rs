@@ -1,6 +1,6 @@
 //! Landlock: the same sight as the mount namespace gives, kept by another mechanism.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use landlock::{
     ABI, Access, AccessFs, AccessNet, BitFlags, LandlockStatus, PathBeneath, PathFd, Ruleset,
@@ -90,8 +90,8 @@ fn rules(policy: &Policy) -> Vec<(PathBuf, Right)> {
     if policy.layers.mount_ns || policy.scratch.without_mount.is_some() {
         rules.push((policy.scratch_path(), Right::Write));
     }
-    if policy.proc && policy.layers.mount_ns {
-        rules.push((Path::new("/proc").into(), Right::Read));
+    if policy.proc {
+        rules.push(("/proc/cpuinfo".into(), Right::Read));
     }
     rules
 }

@@ -41,8 +41,8 @@ impl Kind {
 /// A file or folder of the host and the path under which the child sees it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Bind {
-    /// Absolute path outside. The child can learn it from `/proc` (if it has one): where names
-    /// matter, stage under a neutral one.
+    /// Absolute path outside. The child must not learn it, but where names matter, stage under a
+    /// neutral one all the same.
     pub host: PathBuf,
     /// Absolute path inside, without `.` and `..`.
     pub inside: PathBuf,
@@ -230,7 +230,9 @@ pub struct Policy {
     pub limits: Limits,
     /// Device nodes and driver files, when it draws on a GPU.
     pub gpu: Option<Gpu>,
-    /// Whether it has a `/proc` of its own process namespace. It names the host paths of binds.
+    /// Whether it has a `/proc` of its own process namespace. Landlock leaves `/proc/cpuinfo` and
+    /// the links to be read (a program finds its own path by `/proc/self/exe`, as rustc's linker
+    /// does) and no other file: `mountinfo` would name the binds' host paths.
     pub proc: bool,
     /// Which layers lock it.
     pub layers: Layers,
@@ -255,7 +257,7 @@ impl Policy {
                 tasks: 64,
             },
             gpu: None,
-            proc: false,
+            proc: kind == Kind::Build,
             layers: Layers::full(),
             report: None,
         }

@@ -60,7 +60,8 @@ pub fn enter(policy: &Policy, identity: &Identity) -> Result<(), SandboxError> {
     );
     mount(Some("scratch"), &at, Some("tmpfs"), flags | MsFlags::MS_NOEXEC, Some(&*options))
         .map_err(failed("mount the scratch".to_owned()))?;
-    if policy.proc {
+    // Of the host's process namespace it would show everybody.
+    if policy.proc && policy.layers.pid_ns {
         let at = inside(Path::new("/proc"))?;
         make_folder(&at)?;
         mount(Some("proc"), &at, Some("proc"), flags | MsFlags::MS_NOEXEC, none)
