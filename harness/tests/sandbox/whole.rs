@@ -64,7 +64,7 @@ fn attacks(ground: &Ground, kind: Kind) -> Vec<(Vec<String>, &'static str)> {
     add(&["change", "/plugin/attack.so"], "EROFS");
     add(&["chmod", "/plugin/attack.so"], "EROFS");
     add(&["exec", "/bin/bash"], if executes { "ok" } else { "EPERM" });
-    add(&["exec", "/plugin/attack"], if executes { "attack:" } else { "EPERM" });
+    add(&["exec", "/plugin/attack"], if executes { "-c" } else { "EPERM" });
     add(&["fork"], if executes { "ok" } else { "EPERM" });
     add(&["clone3"], "ENOSYS");
     add(&["tcp", &port], "EPERM");
