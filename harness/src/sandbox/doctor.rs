@@ -78,9 +78,9 @@ fn probe(umbra: &Path, layers: &Layers) -> Result<InForce, SandboxError> {
     policy.layers = *layers;
     policy.read_only.push(super::Bind::new(umbra, UMBRA));
     policy.report = Some(folder.path().join("report"));
-    if !layers.mount_ns {
-        // Root's home may hide the binary from the user it becomes: then only the lock is tried.
-        policy.read_only.retain(|bind| bind.inside != Path::new(UMBRA) || !layers.drop_privileges);
+    if !layers.mount_ns && layers.drop_privileges {
+        // Root's home may hide the binary from the user it becomes.
+        policy.read_only.retain(|bind| bind.inside != Path::new(UMBRA));
     }
     let program = policy.seen(umbra);
     let mut command = command(umbra, &policy, &program, [PROBE_COMMAND])
@@ -92,7 +92,8 @@ fn probe(umbra: &Path, layers: &Layers) -> Result<InForce, SandboxError> {
         .as_deref()
         .map_or_else(|| Err(error("find the report", &"there is none")), read_report);
     match report {
-        Ok(in_force) if status.success() => Ok(in_force),
+        // Without a root of its own the program may be out of reach: then the lock is all.
+        Ok(in_force) if status.success() || !layers.mount_ns => Ok(in_force),
         Ok(_) => Err(error("execute a program in a locked child", &status)),
         Err(cause) => Err(cause),
     }

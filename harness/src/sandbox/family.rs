@@ -3,9 +3,10 @@
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::os::fd::OwnedFd;
+use std::path::{Path, PathBuf};
 
 use nix::errno::Errno;
-use nix::fcntl::{OFlag, open};
+use nix::fcntl::{OFlag, OpenHow, ResolveFlag, open, openat2};
 use nix::libc;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::prctl;
@@ -16,8 +17,9 @@ use nix::sys::wait::{WaitStatus, waitpid};
 use nix::unistd::{ForkResult, Pid, fork, getppid, pipe2};
 
 use super::cgroup::Group;
+use super::policy::SCRATCH;
 use super::privileges::{self, Identity};
-use super::{EXIT_NOT_LOCKED, InForce, Policy, SandboxError, locked, root};
+use super::{Bind, EXIT_NOT_LOCKED, InForce, Policy, SandboxError, locked, root};
 
 /// Ends this process with the thread that started it.
 ///
@@ -146,8 +148,52 @@ fn give_up(report: &mut Report, error: SandboxError) -> ! {
     exit(EXIT_NOT_LOCKED.into())
 }
 
-/// A file to copy when all is over: its path inside, and the host's file.
-type Copies = Vec<(std::path::PathBuf, OwnedFd)>;
+/// What to copy when all is over.
+struct Copies {
+    /// The scratch, as it was before anybody could change it.
+    scratch: OwnedFd,
+    /// Paths beneath it, and the host's files.
+    files: Vec<(PathBuf, OwnedFd)>,
+}
+
+impl Copies {
+    fn prepare(policy: &Policy) -> Result<Vec<(PathBuf, OwnedFd)>, SandboxError> {
+        let prepare = |bind: &Bind| {
+            let error = |cause: &dyn ToString| {
+                let step = format!("collect {}", bind.inside.display());
+                SandboxError::new("launcher", step, cause.to_string())
+            };
+            let beneath = bind.inside.strip_prefix(SCRATCH).map_err(|cause| error(&cause))?;
+            let flags = OFlag::O_WRONLY | OFlag::O_TRUNC | OFlag::O_NOFOLLOW | OFlag::O_CLOEXEC;
+            let host = open(&bind.host, flags, Mode::empty()).map_err(|cause| error(&cause))?;
+            Ok((beneath.to_owned(), host))
+        };
+        policy.collect.iter().map(prepare).collect()
+    }
+
+    /// A missing or oversized file leaves the host's empty: the caller sees that.
+    fn make(self, limit: u64) {
+        for (beneath, host) in self.files {
+            let _ = copy(&self.scratch, &beneath, host, limit);
+        }
+    }
+}
+
+/// Whatever was put there, nothing but a regular file of the scratch is read: no link is followed,
+/// not even on the way, and no pipe is waited for.
+fn copy(scratch: &OwnedFd, beneath: &Path, host: OwnedFd, limit: u64) -> io::Result<()> {
+    let resolve = ResolveFlag::RESOLVE_BENEATH
+        | ResolveFlag::RESOLVE_NO_SYMLINKS
+        | ResolveFlag::RESOLVE_NO_XDEV;
+    let flags = OFlag::O_RDONLY | OFlag::O_NONBLOCK | OFlag::O_CLOEXEC;
+    let how = OpenHow::new().flags(flags).resolve(resolve);
+    let file = File::from(openat2(scratch, beneath, how)?);
+    let meta = file.metadata()?;
+    if meta.is_file() && meta.len() <= limit {
+        io::copy(&mut file.take(limit), &mut File::from(host))?;
+    }
+    Ok(())
+}
 
 /// Becomes process 1 and makes the process that will be locked: that one gets nothing back.
 fn init(
@@ -158,17 +204,16 @@ fn init(
     let error =
         |step: &str, cause: &dyn ToString| SandboxError::new("launcher", step, cause.to_string());
     life.read_exact(&mut [0]).map_err(|cause| error("hear from the launcher", &cause))?;
-    let copies = policy.collect.iter().map(|bind| {
-        let flags = OFlag::O_WRONLY | OFlag::O_TRUNC | OFlag::O_NOFOLLOW | OFlag::O_CLOEXEC;
-        let host = open(&bind.host, flags, Mode::empty());
-        host.map(|host| (bind.inside.clone(), host))
-            .map_err(|cause| error(&format!("open {} for collecting", bind.host.display()), &cause))
-    });
-    let copies: Copies = copies.collect::<Result<_, _>>()?;
+    let files = Copies::prepare(policy)?;
     let own_proc = privileges::own_proc()?;
     if policy.layers.mount_ns {
         root::enter(policy, identity)?;
     }
+    let flags = OFlag::O_PATH | OFlag::O_DIRECTORY | OFlag::O_CLOEXEC;
+    let scratch = if policy.has_scratch() { policy.scratch_path() } else { "/".into() };
+    let scratch =
+        open(&scratch, flags, Mode::empty()).map_err(|cause| error("open the scratch", &cause))?;
+    let copies = Copies { scratch, files };
     privileges::drop_all(policy, identity, own_proc)?;
     // After the change of user, which clears both.
     prctl::set_pdeathsig(Signal::SIGKILL).map_err(|cause| error("follow the launcher", &cause))?;
@@ -201,23 +246,10 @@ fn watch(locked: Pid, copies: Copies, policy: &Policy, mut status: File) -> ! {
         while !matches!(waitpid(None, None), Err(Errno::ECHILD)) {}
     }
     if code == 0 {
-        for (inside, host) in copies {
-            // A missing or oversized file leaves the host's empty: the caller sees that.
-            let _ = collect(&inside, host, policy.limits.file_size_mib << 20);
-        }
+        copies.make(policy.limits.file_size_mib << 20);
     }
     let _ = status.write_all(&code.to_le_bytes());
     exit(0)
-}
-
-fn collect(inside: &std::path::Path, host: OwnedFd, limit: u64) -> io::Result<()> {
-    let flags = OFlag::O_RDONLY | OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK | OFlag::O_CLOEXEC;
-    let file = File::from(open(inside, flags, Mode::empty())?);
-    let meta = file.metadata()?;
-    if meta.is_file() && meta.len() <= limit {
-        io::copy(&mut file.take(limit), &mut File::from(host))?;
-    }
-    Ok(())
 }
 
 /// The process that the caller sees.

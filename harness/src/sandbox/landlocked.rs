@@ -87,7 +87,7 @@ fn rules(policy: &Policy) -> Vec<(PathBuf, Right)> {
         rules.extend(gpu.nodes.iter().map(|path| (path.clone(), Right::Device)));
         rules.extend(gpu.files.iter().map(|path| (path.clone(), Right::Read)));
     }
-    if policy.layers.mount_ns || policy.scratch.without_mount.is_some() {
+    if policy.has_scratch() {
         rules.push((policy.scratch_path(), Right::Write));
     }
     if policy.proc {

@@ -21,7 +21,7 @@ pub fn lock(policy: &Policy, identity: &Identity) -> Result<InForce, SandboxErro
     umask(Mode::from_bits_truncate(0o077));
     readable(policy)?;
     let scratch = policy.scratch_path();
-    if policy.layers.mount_ns || policy.scratch.without_mount.is_some() {
+    if policy.has_scratch() {
         chdir(&scratch).map_err(|cause| error("enter the scratch", cause))?;
     }
     if policy.layers.rlimits {
@@ -68,9 +68,8 @@ fn limit(limits: &Limits) -> Result<(), SandboxError> {
         ("fsize", Resource::RLIMIT_FSIZE, limits.file_size_mib << 20, limits.file_size_mib << 20),
         ("nofile", Resource::RLIMIT_NOFILE, limits.open_files, limits.open_files),
         ("nproc", Resource::RLIMIT_NPROC, limits.tasks, limits.tasks),
-        ("memlock", Resource::RLIMIT_MEMLOCK, 1 << 20, 1 << 20),
+        ("memlock", Resource::RLIMIT_MEMLOCK, 0, 0),
         ("msgqueue", Resource::RLIMIT_MSGQUEUE, 0, 0),
-        ("sigpending", Resource::RLIMIT_SIGPENDING, 1024, 1024),
     ];
     for (name, resource, soft, hard) in all {
         setrlimit(resource, soft, hard).map_err(|cause| {

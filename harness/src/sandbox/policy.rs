@@ -221,8 +221,9 @@ pub struct Policy {
     /// Existing files or folders that it changes. Nothing bounds a folder's total size: prefer
     /// single files of the right size, and [`Self::collect`].
     pub read_write: Vec<Bind>,
-    /// Files that are copied out of the scratch when the child ended with code 0: regular files
-    /// at most [`Limits::file_size_mib`] long, written over the existing host file.
+    /// Files beneath [`SCRATCH`] that are copied out when the child ended with code 0: regular
+    /// files, not reached through links, at most [`Limits::file_size_mib`] long. They are written
+    /// over the existing host file, which is left empty when there is no such file.
     pub collect: Vec<Bind>,
     /// Its writable place.
     pub scratch: Scratch,
@@ -276,6 +277,11 @@ impl Policy {
             Some(if whole { bind.inside.clone() } else { bind.inside.join(rest) })
         };
         binds.filter_map(through).next_back().unwrap_or_else(|| host.to_owned())
+    }
+
+    /// Whether there is a scratch at all.
+    pub fn has_scratch(&self) -> bool {
+        self.layers.mount_ns || self.scratch.without_mount.is_some()
     }
 
     /// The child's path of the scratch: [`SCRATCH`], or its stand-in when the mount layer is off.

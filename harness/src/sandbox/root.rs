@@ -54,10 +54,10 @@ pub fn enter(policy: &Policy, identity: &Identity) -> Result<(), SandboxError> {
     }
     let at = inside(Path::new(SCRATCH))?;
     make_folder(&at)?;
-    let options = format!(
-        "mode=700,uid={0},gid={0},size={1}m,nr_inodes={2}",
-        identity.inside_uid, policy.scratch.quota_mib, policy.scratch.files
-    );
+    // To the kernel 0 means without limit; the scratch itself is a file, too.
+    let (uid, size) = (identity.inside_uid, policy.scratch.quota_mib.max(1));
+    let files = policy.scratch.files + 1;
+    let options = format!("mode=700,uid={uid},gid={uid},size={size}m,nr_inodes={files}");
     mount(Some("scratch"), &at, Some("tmpfs"), flags | MsFlags::MS_NOEXEC, Some(&*options))
         .map_err(failed("mount the scratch".to_owned()))?;
     // Of the host's process namespace it would show everybody.

@@ -62,6 +62,8 @@ fn the_scratch_has_a_quota() {
         for attack in ["fill", "many"] {
             let mut policy = ground.policy(Kind::Worker, layers);
             assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
+            (policy.scratch.quota_mib, policy.scratch.files) = (0, 0);
+            assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
             policy.scratch.quota_mib = 32;
             policy.scratch.files = 30_000;
             assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ok");

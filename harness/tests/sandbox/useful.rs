@@ -110,6 +110,45 @@ fn the_linker_works_for_everyone() {
 }
 
 #[test]
+fn without_namespaces_there_is_reduced_isolation() {
+    for who in everyone() {
+        let ground = Ground::new(who);
+        let (source, result) = (ground.path("a.s"), ground.path("scratch/lib.so"));
+        std::fs::write(&source, ".globl two\ntwo: ret\n").expect("a file");
+        let layers = Layers {
+            drop_privileges: true,
+            landlock: true,
+            seccomp: true,
+            rlimits: true,
+            ..Layers::NONE
+        };
+        let mut policy = ground.policy(Kind::Build, layers);
+        // Counted with every process of the same user.
+        policy.limits.tasks = 1000;
+        policy.read_only.push(Bind::new(&source, "/src/a.s"));
+        let args = |source| ["-shared", "-fPIC", "-o", &*result, source].map(str::to_owned);
+        let cc = |args: [String; 5]| {
+            let mut command =
+                command(Path::new(UMBRA), &policy, Path::new("/usr/bin/cc"), args).expect("orders");
+            as_user(&mut command, who);
+            command.env("PATH", "/usr/bin:/bin").env("TMPDIR", policy.scratch_path());
+            command.output().expect("the binary under test")
+        };
+        let output = cc(args(&source));
+        assert!(output.status.success(), "{who:?}: {output:?}");
+        assert!(std::fs::read(&result).expect("a file").starts_with(b"\x7fELF"));
+        assert!(!cc(args(&ground.path("secret"))).status.success());
+        let missing = ["user_ns", "mount_ns", "pid_ns", "net_ns"].map(str::to_owned).to_vec();
+        for (attack, errno) in [("read", "EACCES"), ("change", "EACCES")] {
+            let outcome = ground.attack(&policy, &[attack, &ground.path("secret")]);
+            assert_eq!(outcome.verdict(), errno, "{outcome:?}");
+            let isolation = outcome.report.expect("a report").isolation;
+            assert_eq!(isolation, Isolation::Reduced { missing: missing.clone() });
+        }
+    }
+}
+
+#[test]
 fn a_given_file_is_changed_in_place() {
     for who in everyone() {
         let ground = Ground::new(who);
