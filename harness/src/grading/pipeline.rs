@@ -225,7 +225,8 @@ impl<'a> Grading<'a> {
             checks.extend(found);
             drawn.extend(image);
         }
-        checks.extend(sampler::judge(asker, plugin, &self.cases));
+        let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
+        checks.extend(sampler::judge(asker, plugin, &scene)?);
         Ok(())
     }
 

@@ -2,21 +2,19 @@
 
 use std::path::Path;
 
+use basecode::scene::SceneConfig;
+
 use super::ask::{self, Asker};
-use super::case::Case;
 use crate::evidence::{Check, Verdict};
 use crate::worker::{Outcome, Request};
 
-/// The scene that does not vary over rows.
-const SCENE: &str = "rows";
-
 /// Renders the scene of vertical stripes with one and several threads, one seed and two, and looks
 /// at what may differ and what may not.
-pub fn judge(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
-    let Some(case) = cases.iter().find(|case| case.entry.name == SCENE) else { return Vec::new() };
-    let (width, height) = case.film();
+pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<Check>> {
+    let config = SceneConfig::load(scene)?;
+    let (width, height) = (config.width as u32, config.height as u32);
     let render = |seed, threads| Request::RenderOffline {
-        scene: ask::scene(&case.offline),
+        scene: ask::scene(scene),
         width,
         height,
         spp: 4,
@@ -31,16 +29,16 @@ pub fn judge(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
         .filter_map(Outcome::answer)
         .map(|answer| answer.values.as_slice())
         .collect();
-    let &[one, four, again, other] = images.as_slice() else { return Vec::new() };
+    let &[one, four, again, other] = images.as_slice() else { return Ok(Vec::new()) };
     let check = |id: &str, good: bool, said: &str, hint: &str| {
         let verdict = if good { Verdict::Pass } else { Verdict::Fail };
-        Check::new(id, SCENE, verdict, said).with_hint(if good { "" } else { hint })
+        Check::new(id, "", verdict, said).with_hint(if good { "" } else { hint })
     };
     let bits = |image: &[f32]| image.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
     let same = bits(one) == bits(four) && bits(four) == bits(again);
     let row = |y: u32| &one[(3 * width * y) as usize..(3 * width * (y + 1)) as usize];
     let repeated = (1..height).filter(|&y| row(y) == row(y - 1)).count();
-    vec![
+    Ok(vec![
         check(
             "sampler.threads",
             same,
@@ -59,5 +57,5 @@ pub fn judge(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
             if bits(one) == bits(other) { "two seeds give the same image" } else { "two seeds give two images" },
             "seed the samplers with the job's seed, the student id",
         ),
-    ]
+    ])
 }
