@@ -11,14 +11,27 @@ use basecode::{
 };
 
 /// Point lights and shadows, offline and realtime.
-struct Reference;
+struct Reference {
+    /// Whether offline images show materials as realtime does: a texture is its average.
+    realtime_materials: bool,
+}
 
 impl Renderer for Reference {
-    fn new(_options: &str) -> Result<Self> {
-        Ok(Self)
+    /// Options are words separated by commas: `materials=realtime`.
+    fn new(options: &str) -> Result<Self> {
+        let mut reference = Self { realtime_materials: false };
+        for option in options.split(',').filter(|option| !option.is_empty()) {
+            match option {
+                "materials=realtime" => reference.realtime_materials = true,
+                _ => return Err(Error::Argument(format!("unknown option \"{option}\""))),
+            }
+        }
+        Ok(reference)
     }
 
     fn bsdf(&self, material: &Material) -> Box<dyn Bsdf> {
+        let averaged = self.realtime_materials.then(|| average(material));
+        let material = averaged.as_ref().unwrap_or(material);
         match material.model {
             MaterialModel::Diffuse => Box::new(bsdfs::DiffuseBsdf::new(material)),
             _ => Box::new(bsdfs::PhongBsdf::new(material)),
@@ -57,6 +70,16 @@ impl Renderer for Reference {
             "normal" => Ok(Box::new(renderpasses::NormalPass::new(gpu, scene)?)),
             _ => Err(Error::Argument(format!("there is no render pass \"{kind}\""))),
         }
+    }
+}
+
+/// A material without textures: their averages, the energy scale worked in.
+fn average(material: &Material) -> Material {
+    let scale = material.energy_scale();
+    Material {
+        diffuse: (scale * material.diffuse.average()).into(),
+        specular: (scale * material.specular.average()).into(),
+        ..material.clone()
     }
 }
 

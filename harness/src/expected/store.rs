@@ -107,9 +107,11 @@ impl Store<'_> {
     /// # Errors
     /// As [`Store::expected`].
     pub fn unshadowed(&self, toml: &Path, width: u32, height: u32) -> anyhow::Result<Image> {
-        let file = self.cached(toml, width, height, "unshadowed")?;
+        let file = self.cached(toml, width, height, "realtime")?;
         let [image] = self.layers(&file, &["unshadowed"], || {
-            let image = self.render(toml, width, height, 1, 0, false)?;
+            let mut request = self.request(toml, width, height, 1, 0, false);
+            request.scene_mut().options = "materials=realtime".into();
+            let image = self.render(request)?;
             Ok(ExrLayers { layers: [("unshadowed".into(), image)].into(), ..Default::default() })
         })?;
         Ok(image)
@@ -259,14 +261,17 @@ impl Store<'_> {
             let spread = (square[index] - sum[index] * sum[index] / batches) / (batches - 1.0);
             (f64::from(spp) * spread).max(glam::DVec3::ZERO)
         });
-        let centre = self.render(toml, width, height, 1, 0, true)?;
+        let centre = self.render(self.request(toml, width, height, 1, 0, true))?;
         let layers = [("mean", mean), ("variance", variance), ("centre", centre)];
         let layers = layers.map(|(name, image)| (name.to_owned(), image)).into();
         Ok(ExrLayers { layers, ..Default::default() })
     }
 
-    fn render(&self, toml: &Path, width: u32, height: u32, spp: u32, seed: u64, shadows: bool) -> anyhow::Result<Image> {
-        let answers = self.ask(vec![self.request(toml, width, height, spp, seed, shadows)])?;
+    fn render(&self, request: Request) -> anyhow::Result<Image> {
+        let Request::RenderOffline { width, height, .. } = request else {
+            bail!("only offline images are made here");
+        };
+        let answers = self.ask(vec![request])?;
         let pixels = answers[0].as_chunks::<3>().0.iter().map(|&value| Vec3::from(value)).collect();
         Ok(Image { width: width as usize, height: height as usize, pixels })
     }

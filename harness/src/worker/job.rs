@@ -190,7 +190,7 @@ impl Request {
     }
 
     /// The scene, to be changed.
-    pub(super) fn scene_mut(&mut self) -> &mut SceneRef {
+    pub fn scene_mut(&mut self) -> &mut SceneRef {
         match self {
             Self::EvalBsdf { scene, .. }
             | Self::Radiance { scene, .. }
