@@ -42,7 +42,9 @@ fn begin(title: &str) -> Html {
 /// Everything after the page's content.
 fn end(mut html: Html, sheet: &Sheet) -> String {
     html.raw("<footer>").text(&sheet.course).raw(" · ").text(&sheet.title).raw(" · due ");
-    html.raw("<time>").text(&sheet.due).raw("</time></footer>\n</body>\n</html>\n");
+    html.raw("<time>")
+        .text(&super::number::due(&sheet.due))
+        .raw("</time></footer>\n</body>\n</html>\n");
     html.finish()
 }
 
