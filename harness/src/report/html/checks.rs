@@ -49,7 +49,8 @@ fn article(html: &mut Html, place: usize, check: &Check) {
     if !check.hint.is_empty() {
         html.raw("<p class=\"hint\"><b>Hint</b> ").text(&check.hint).raw("</p>\n");
     }
-    if check.verdict == Verdict::Fail {
+    // Without a measure the error is only "wrong", which the verdict says.
+    if check.verdict == Verdict::Fail && !check.measures.is_empty() {
         html.raw("<p class=\"error\">Error <b>").text(&value(check.error));
         html.raw(
             "</b> <span class=\"of\">(0 is right, 1 as large as the answer itself)</span></p>\n",
