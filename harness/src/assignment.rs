@@ -22,6 +22,8 @@ pub struct Assignment {
     pub due: String,
     /// The scenes, the hand-in's own first.
     pub scenes: Vec<SceneEntry>,
+    /// The offline TOML file of a scene that does not vary over rows, for findings on samplers.
+    pub sampler_scene: PathBuf,
     /// The tree that a hand-in must have.
     pub tree: intake::TreeSpec,
     /// How evidence becomes points.

@@ -14,4 +14,5 @@ pub mod plugin;
 pub mod process;
 pub mod report;
 pub mod rubric;
+pub mod sandbox;
 pub mod worker;

@@ -1,5 +1,6 @@
 //! `xtask`: the chores of this repository that are not part of grading.
 
+mod samples;
 mod scenes;
 
 use clap::{Parser, Subcommand};
@@ -21,12 +22,15 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
+    /// Pack the sample hand-ins into target/umbra/samples, with the images that their code draws.
+    Samples,
 }
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Scenes { check: true } => scenes::check(),
         Command::Scenes { check: false } => scenes::write(),
+        Command::Samples => samples::pack(),
     };
     match result {
         Ok(summary) => {

@@ -448,6 +448,8 @@ fn guard(message: *mut api::Message, body: impl FnOnce() -> Result<()>) -> api::
     });
     let (status, said) = match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Ok(())) => return api::STATUS_OK,
+        // The status says it already: the message is the task alone, as for `todo!()`.
+        Ok(Err(Error::NotImplemented(task))) => (api::STATUS_NOT_IMPLEMENTED, task),
         Ok(Err(error)) => (status_of(&error), error.to_string()),
         Err(payload) => describe_panic(payload.as_ref()),
     };
@@ -466,7 +468,6 @@ fn guard(message: *mut api::Message, body: impl FnOnce() -> Result<()>) -> api::
 
 fn status_of(error: &Error) -> api::Status {
     match error {
-        Error::NotImplemented(_) => api::STATUS_NOT_IMPLEMENTED,
         Error::NoAdapter(_) => api::STATUS_NO_ADAPTER,
         Error::Cancelled => api::STATUS_CANCELLED,
         _ => api::STATUS_ERROR,

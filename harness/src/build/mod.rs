@@ -1,8 +1,18 @@
-//! Compiling a hand-in.
+//! Compiling a hand-in: one direct compiler call, the template's own as cargo makes it, with
+//! source and output replaced.
+//!
+//! [`Recording::obtain`] records that call once for a state of the base code; [`compile`] replays
+//! it. The compiler sees a staged folder with the base code's closure and nothing else of
+//! `target/`.
 
-use std::process::ExitCode;
+mod closure;
+mod diagnostics;
+mod record;
+mod replay;
 
-/// stub
-pub fn wrapper_main() -> Option<ExitCode> {
-    None
-}
+pub use diagnostics::{Diagnostic, Place};
+pub use record::{RecordError, Recording, wrapper_main};
+pub use replay::{BuildOutcome, BuildReport, compile, default_limits};
+
+/// The crate whose compiler call is recorded.
+const TEMPLATE: &str = "student_template";

@@ -3,8 +3,9 @@
 mod bless;
 mod compare;
 mod context;
-mod hand_in;
+mod grade;
 mod render;
+mod tree;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -45,13 +46,13 @@ something; 70 a bug of Umbra's; 130 interrupted.";
 enum Command {
     /// Check your own working folder before handing in: builds src/, renders every public scene
     /// and says what is wrong, where, and what it looks like
-    Check(hand_in::CheckArguments),
+    Check(grade::CheckArguments),
     /// Grade hand-ins: archives (.zip, .tar, .tar.gz), folders, or folders full of them
-    Grade(hand_in::GradeArguments),
+    Grade(grade::GradeArguments),
     /// Check an archive's tree against the handout's; exit 0 when it conforms, 1 when not
-    Validate(hand_in::ValidateArguments),
+    Validate(tree::ValidateArguments),
     /// Pack a working folder into an archive as the handout demands
-    Pack(hand_in::PackArguments),
+    Pack(tree::PackArguments),
     /// Render a scene with a plugin, offline or realtime as the scene says
     Render(render::RenderArguments),
     /// Compare two EXR images
@@ -70,6 +71,15 @@ pub fn main() -> ExitCode {
         return code;
     }
     let args: Vec<_> = std::env::args_os().skip(1).collect();
+    #[cfg(target_os = "linux")]
+    {
+        use crate::sandbox::{LAUNCH_COMMAND, doctor, launch_main};
+        match (args.first().and_then(|name| name.to_str()), args.get(1)) {
+            (Some(LAUNCH_COMMAND), Some(program)) => return launch_main(program, &args[2..]),
+            (Some(doctor::PROBE_COMMAND), _) => return ExitCode::SUCCESS,
+            _ => {}
+        }
+    }
     match (args.first().and_then(|name| name.to_str()), args.get(1)) {
         (Some("__worker"), Some(dir)) => return crate::worker::child_main(Path::new(dir)),
         (Some("__exec"), Some(program)) => return crate::process::exec_main(program, &args[2..]),
@@ -87,10 +97,10 @@ pub fn main() -> ExitCode {
 
 fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
     match command {
-        Command::Check(arguments) => hand_in::check(&arguments, root),
-        Command::Grade(arguments) => hand_in::grade(&arguments, root),
-        Command::Validate(arguments) => hand_in::validate(&arguments, root),
-        Command::Pack(arguments) => hand_in::pack(&arguments, root),
+        Command::Check(arguments) => grade::check(&arguments, root),
+        Command::Grade(arguments) => grade::grade(&arguments, root),
+        Command::Validate(arguments) => tree::validate(&arguments, root),
+        Command::Pack(arguments) => tree::pack(&arguments, root),
         Command::Render(arguments) => render::run(&arguments, root),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Bless(arguments) => bless::run(&arguments, root),

@@ -4,6 +4,8 @@
 
 pub mod bsdf;
 mod check;
+pub mod images;
 pub mod rays;
+pub mod stages;
 
 pub use check::{Check, Evidence, Measure, Picture, Verdict};

@@ -89,11 +89,7 @@ impl Store<'_> {
             let [mean, variance, centre] = layers;
             (mean, variance, BATCHES * CACHED_SPP, centre)
         };
-        let file = self.cached(&toml, width, height, "unshadowed")?;
-        let [unshadowed] = self.layers(&file, &["unshadowed"], || {
-            let image = self.render(&toml, width, height, 1, 0, false)?;
-            Ok(ExrLayers { layers: [("unshadowed".into(), image)].into(), ..Default::default() })
-        })?;
+        let unshadowed = self.unshadowed(&toml, width, height)?;
         let file = self.cached(&toml, width, height, "masks")?;
         let masks = self.layers(&file, &["shadowed", "unshadowed"], || {
             let image = |shadows| Ok::<_, anyhow::Error>(as_image(&regions(&scene, width as usize, height as usize, shadows)?));
@@ -104,6 +100,19 @@ impl Store<'_> {
         let offline = ReferenceImage::new(mean, variance, n, centre, mask)
             .with_context(|| format!("scene \"{}\"", entry.name))?;
         Ok(Expected { scene, offline, unshadowed, unshadowed_mask })
+    }
+
+    /// The pixel-centre image of a scene without shadows.
+    ///
+    /// # Errors
+    /// As [`Store::expected`].
+    pub fn unshadowed(&self, toml: &Path, width: u32, height: u32) -> anyhow::Result<Image> {
+        let file = self.cached(toml, width, height, "unshadowed")?;
+        let [image] = self.layers(&file, &["unshadowed"], || {
+            let image = self.render(toml, width, height, 1, 0, false)?;
+            Ok(ExrLayers { layers: [("unshadowed".into(), image)].into(), ..Default::default() })
+        })?;
+        Ok(image)
     }
 
     /// Renders the expected image of a stored scene anew and replaces the file.

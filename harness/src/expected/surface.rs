@@ -66,6 +66,9 @@ impl SurfacePoint {
 /// units times the distance of the light: the original's epsilon is 1e-3, students use 1e-5 to 5e-3.
 const NEAREST_START: f32 = 1e-5;
 const FARTHEST_START: f32 = 5e-3;
+/// A triangle that the light grazes or leaves while its shading normal still faces it shadows
+/// itself or not, as a renderer's epsilons want: the faceted terminator. Cosine to the triangle.
+const TERMINATOR: f32 = 0.02;
 /// How far from its end a shadow ray may stop, relative to its length.
 const END_MARGIN: f32 = 5e-3;
 
@@ -74,8 +77,12 @@ fn sight(scene: &Scene, hit: &SurfaceInteraction, direction: Vec3, distance: f32
         |origin, start: f32, end: f32| scene.occluded(&Ray::segment(origin, direction, start, end));
     let near = NEAREST_START * distance.max(1.0);
     let far = FARTHEST_START * distance.max(1.0);
+    let outside = hit.ng * hit.ng.dot(hit.frame_ns.n).signum();
+    if outside.dot(direction) < TERMINATOR && Frame::cos_theta(hit.frame_ns.to_local(direction)) > 0.0 {
+        return Sight::Unsure;
+    }
     // Some students lift the origin along the normal instead of starting later on the ray.
-    let lifted = hit.p + far * hit.ng * hit.ng.dot(direction).signum();
+    let lifted = hit.p + far * outside;
     let short = distance * (1.0 - END_MARGIN);
     let answers = [
         from(hit.p, near, distance * (1.0 - 1e-5)),

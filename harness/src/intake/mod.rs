@@ -35,7 +35,7 @@ mod zip_headers;
 
 pub use check_config::check_config;
 pub use finding::{Finding, Severity};
-pub use hand_in_config::{HandInConfig, ListedRender};
+pub use hand_in_config::{Field, HandInConfig, ListedRender};
 pub use limits::Limits;
 pub use pack::{Packed, archive_name, fix, pack};
 pub use source_rules::{scan_source, scan_text};

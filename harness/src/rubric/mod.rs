@@ -13,5 +13,5 @@ mod grade;
 mod rules;
 
 pub use curve::Curve;
-pub use grade::{Grade, PartGrade, grade};
+pub use grade::{BUILD, Grade, PartGrade, grade};
 pub use rules::{Gate, Part, PathRule, Rules};

@@ -4,15 +4,17 @@
 //! scene does not move: the map is drawn once, when the pass is made.
 //!
 //! # Bias
-//! A texel stands for the depth at its centre, but is asked about points up to half its diagonal
-//! away; a surface then seems to shadow itself (acne). With d the depth of the point and N the
-//! resolution, a texel is s = 2 d / N wide there, so the centre is at most s / sqrt 2 away. The
-//! fragment stages therefore look up the point moved by s along its normal: its texel's centre then
-//! still lies in front of the surface's plane, whatever the angle of the light. (A bias of depth
-//! would have to grow with the tangent of that angle, without bound.) Half a texel toward the
-//! light pays for rounding and for concave corners. Blockers come loose from their shadows
-//! (peter-panning) by about one and a half texels, which is 0.0015 d: less than a pixel.
-//! `docs/decisions/0002-shadow-map.md` has the measurements.
+//! A texel holds the depth at its centre, but is asked about points up to half its diagonal away; a
+//! surface then seems to shadow itself (acne). With d the depth of a point and N the resolution, a
+//! texel is s = 2 d / N wide there, so its centre is at most s / sqrt 2 = 0.71 s away. The fragment
+//! stages therefore look up the point moved by 0.8 s along its normal: the texel's centre then lies
+//! in front of the surface's plane, whatever the angle of the light. (A bias of depth would have to
+//! grow with the tangent of that angle, without bound.) They also move it by s toward the light:
+//! that shifts no shadow's edge, pays for rounding, and keeps concave corners lit.
+//!
+//! In return a blocker may come loose from its shadow (peter-panning): by at most s where a card
+//! without thickness stands on a floor, by nothing where a solid does. `docs/decisions/0002-shadow-map.md`
+//! has the measurements.
 
 use basecode::gpu::{
     FRAME_GROUP, FrameUniforms, Gpu, Mesh, OBJECT_GROUP, ObjectUniforms, ShadowMap, Stage, Uniform,
@@ -25,8 +27,9 @@ const SHADOW_VS: Stage =
 /// Width and height of a face of the cube, in texels.
 const RESOLUTION: u32 = 2048;
 
-/// By how many texels a point is moved along its normal before it is looked up.
-const NORMAL_OFFSET: f32 = 1.0;
+/// By how many texels a point is moved along its normal before it is looked up: `params.w` in the
+/// fragment stages.
+const NORMAL_OFFSET: f32 = 0.8;
 
 /// The nearest depth is at least this fraction of the farthest: a float resolves no more.
 const LEAST_NEAR: f32 = 1e-4;

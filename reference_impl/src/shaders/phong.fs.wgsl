@@ -48,7 +48,7 @@ fn visibility(position: vec3f, n: vec3f, wi: vec3f) -> f32 {
     let light = frame.light_position.xyz;
     let size = abs(position - light);
     let texel = 2.0 * max(size.x, max(size.y, size.z)) / shadow.params.z;
-    let moved = position + texel * (shadow.params.w * n + 0.5 * wi);
+    let moved = position + texel * (shadow.params.w * n + wi);
     let face = face_of(moved - light);
     let clip = shadow.light_view_projection[face] * vec4f(moved, 1.0);
     let ndc = clip.xyz / clip.w;

@@ -129,6 +129,24 @@ fn all_six_faces_of_the_cube_see_their_blockers() {
 }
 
 #[test]
+fn corners_of_a_room_stay_lit() {
+    let size = (400, 40);
+    for light in [vec3(0.1, 0.2, -0.15), vec3(1.2, -0.9, 0.3), vec3(-0.9, -1.6, 0.4)] {
+        let mut build = Build::new(light, Vec3::splat(5.0));
+        build.material("white", WHITE);
+        build.cuboid("white", Vec3::splat(2.0), Vec3::splat(-2.0));
+        let scene = build.load();
+        // Across the edge where x and y are -2; a pixel is about 0.0005 wide there.
+        let eye = vec3(-0.6, -0.7, 0.2);
+        let camera = camera(eye, vec3(-2.0, -2.0, 0.2), 0.6, size.0, size.1);
+        let camera = turned(camera, size);
+        let image = &draw("direct", &scene, true, &[camera], size)[0];
+        let dark = image.pixels.iter().filter(|pixel| **pixel == Vec3::ZERO).count();
+        assert_eq!(dark, 0, "{light}: dark pixels along the corner");
+    }
+}
+
+#[test]
 fn shadows_begin_where_things_stand() {
     let size = (400, 40);
     for (light, thickness) in [

@@ -34,6 +34,39 @@ fn the_template_has_the_files_of_the_reference() {
 }
 
 #[test]
+fn the_previous_assignment_is_solved_alike() {
+    for file in [
+        "integrators/normal.rs",
+        "renderpasses/normal.rs",
+        "shaders/normal.vs.wgsl",
+        "shaders/normal.fs.wgsl",
+    ] {
+        let text = |package| std::fs::read_to_string(source(package).join(file)).unwrap();
+        assert_eq!(text("student_template"), text("reference_impl"), "{file}");
+    }
+}
+
+#[test]
+fn every_task_is_marked_in_the_template() {
+    for (file, task, stub) in [
+        ("renderer.rs", "before you start", "Sampler::new(job.seed)"),
+        ("bsdfs/diffuse.rs", "1.1", "todo!(\"1.1 "),
+        ("bsdfs/phong.rs", "1.2", "todo!(\"1.2 "),
+        ("integrators/simple.rs", "1.3", "todo!(\"1.3 "),
+        ("integrators/simple.rs", "1.4", "todo!(\"1.4 "),
+        ("renderpasses/simple.rs", "2.1", "todo!(\"2.1 "),
+        ("shaders/simple.vs.wgsl", "2.2", "return out;"),
+        ("shaders/diffuse.fs.wgsl", "2.3", "return vec4f(0.0, 0.0, 0.0, 1.0);"),
+        ("shaders/phong.fs.wgsl", "2.4", "return vec4f(0.0, 0.0, 0.0, 1.0);"),
+        ("renderpasses/shadow.rs", "2.5", "Error::NotImplemented(\"2.5 "),
+    ] {
+        let text = std::fs::read_to_string(source("student_template").join(file)).unwrap();
+        assert!(text.contains(&format!("TODO(A2) {task}")), "{file} lacks TODO(A2) {task}");
+        assert!(text.contains(stub), "{file} lacks {stub}");
+    }
+}
+
+#[test]
 fn the_stages_of_reference_and_template_fit_the_contract() {
     let gpu = Gpu::open(AdapterKind::Any, "").expect("these tests need a graphics adapter");
     for package in ["reference_impl", "student_template"] {

@@ -30,9 +30,14 @@ const MAX_SIDE: u32 = 8192;
 impl Texture {
     /// The colour at a surface point.
     pub fn eval(&self, i: &SurfaceInteraction) -> Vec3 {
+        self.lookup(i.uv)
+    }
+
+    /// The colour at texture coordinates.
+    pub fn lookup(&self, uv: Vec2) -> Vec3 {
         match self {
             Self::Constant(colour) => *colour,
-            Self::Bitmap(bitmap) => bitmap.lookup(i.uv),
+            Self::Bitmap(bitmap) => bitmap.lookup(uv),
         }
     }
 

@@ -1,4 +1,4 @@
-//! `umbra check`, `grade`, `validate` and `pack`: what is done with hand-ins.
+//! `umbra validate` and `umbra pack`: a hand-in's tree, without running anything of it.
 
 use std::path::{Path, PathBuf};
 
@@ -56,25 +56,4 @@ pub fn pack(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8
         }
         Err(error) => bail!(error),
     }
-}
-
-/// What `umbra check` is told.
-#[derive(clap::Args)]
-pub struct CheckArguments {
-    /// The working folder or archive
-    hand_in: PathBuf,
-}
-/// What `umbra grade` is told.
-#[derive(clap::Args)]
-pub struct GradeArguments {
-    /// Archives, folders, or folders full of archives
-    hand_ins: Vec<PathBuf>,
-}
-/// Checks
-pub fn check(_arguments: &CheckArguments, _root: Option<&Path>) -> anyhow::Result<u8> {
-    bail!("not written yet")
-}
-/// Grades
-pub fn grade(_arguments: &GradeArguments, _root: Option<&Path>) -> anyhow::Result<u8> {
-    bail!("not written yet")
 }

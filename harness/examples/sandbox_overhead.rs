@@ -1,0 +1,79 @@
+//! What locking a child costs, start to exit: medians of a plain start and of a locked one, taken
+//! in turn so that the machine's mood touches both. `cargo run --release --example sandbox_overhead`.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use umbra::sandbox::{Bind, Kind, Layers, Policy, command, doctor};
+
+const RUNS: usize = 200;
+
+fn main() -> anyhow::Result<()> {
+    let own = std::env::current_exe()?;
+    let umbra = own.ancestors().nth(2).unwrap_or(Path::new(".")).join("umbra");
+    let examination = doctor::examine(&umbra);
+    for finding in &examination.findings {
+        let mark = if finding.available { "yes" } else { "no " };
+        println!("{mark} {:16} {} {}", finding.layer, finding.detail, finding.remedy);
+    }
+    println!("isolation: {:?}", examination.isolation);
+
+    let mut kinds: Vec<(String, Option<Policy>)> = vec![("plain".to_owned(), None)];
+    for kind in [Kind::Worker, Kind::Build] {
+        let mut policy = Policy::new(kind);
+        policy.read_only.push(Bind::new(&umbra, "/umbra"));
+        let name = format!("locked, full, {kind:?}");
+        // A worker executes nothing: its lock is timed with the program that a build executes.
+        policy.kind = Kind::Build;
+        kinds.push((name, Some(policy)));
+    }
+    for layer in ["mount_ns", "pid_ns", "net_ns", "landlock", "seccomp"] {
+        let mut policy = Policy::new(Kind::Build);
+        policy.read_only.push(Bind::new(&umbra, "/umbra"));
+        policy.layers = Layers::full();
+        if let Some(switch) = policy.layers.switch(layer) {
+            *switch = false;
+        }
+        if layer != "mount_ns" {
+            kinds.push((format!("full without {layer}"), Some(policy)));
+        }
+    }
+    let mut times = vec![Vec::new(); kinds.len()];
+    for _ in 0..RUNS {
+        for ((_, policy), times) in kinds.iter().zip(&mut times) {
+            times.push(time(&umbra, policy.as_ref())?);
+        }
+    }
+    let plain = median(&mut times[0]);
+    for ((name, _), times) in kinds.iter().zip(&mut times) {
+        let median = median(times);
+        let added = median.as_secs_f64() - plain.as_secs_f64();
+        println!(
+            "{name:28} median {:6.2} ms, added {:6.2} ms, ratio {:.2}",
+            median.as_secs_f64() * 1e3,
+            added * 1e3,
+            median.as_secs_f64() / plain.as_secs_f64()
+        );
+    }
+    Ok(())
+}
+
+fn time(umbra: &PathBuf, policy: Option<&Policy>) -> anyhow::Result<Duration> {
+    let begin = Instant::now();
+    let status = match policy {
+        None => {
+            std::process::Command::new(umbra).arg(doctor::PROBE_COMMAND).env_clear().status()?
+        }
+        Some(policy) => {
+            let program = policy.seen(umbra);
+            command(umbra, policy, &program, [doctor::PROBE_COMMAND])?.status()?
+        }
+    };
+    anyhow::ensure!(status.success(), "the child ended with {status}");
+    Ok(begin.elapsed())
+}
+
+fn median(times: &mut [Duration]) -> Duration {
+    times.sort();
+    times[times.len() / 2]
+}

@@ -1,0 +1,260 @@
+//! Recording the template's compiler call.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::TEMPLATE;
+use super::closure::{Metadata, libraries};
+
+/// Names the file that the compiler wrapper writes its [`Call`] to.
+const RECORD_VARIABLE: &str = "UMBRA_RECORD_FILE";
+
+/// The template's compiler call, and the staged libraries that it needs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Recording {
+    /// The compiler itself, not a launcher that chooses one.
+    pub rustc: PathBuf,
+    /// The toolchain's root, which the compiler reads.
+    pub sysroot: PathBuf,
+    /// Its arguments, as cargo gave them.
+    pub args: Vec<String>,
+    /// Cargo's environment for the crate: `CARGO_PKG_*` and the like.
+    pub env: BTreeMap<String, String>,
+    /// The folder with the base code's closure.
+    pub closure: PathBuf,
+    /// What the recording depends on, hashed: toolchain, lock file, base code, manifests.
+    pub key: String,
+}
+
+/// Why nothing could be recorded. The environment's matter or ours, never a submission's.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// A file cannot be read or written.
+    #[error("{}: {error}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What happened.
+        error: io::Error,
+    },
+    /// A program cannot be started or fails.
+    #[error("`{command}` failed: {message}")]
+    Program {
+        /// What was run.
+        command: String,
+        /// What it said.
+        message: String,
+    },
+}
+
+/// A compiler call as the wrapper saw it.
+#[derive(Serialize, Deserialize)]
+struct Call {
+    args: Vec<String>,
+    env: BTreeMap<String, String>,
+}
+
+/// When cargo runs this program as its compiler wrapper, plays that part and answers the exit code.
+/// `main` asks first of all.
+pub fn wrapper_main() -> Option<ExitCode> {
+    let file = PathBuf::from(std::env::var_os(RECORD_VARIABLE)?);
+    let mut args = std::env::args_os().skip(1);
+    let rustc = args.next()?;
+    let args: Vec<_> = args.collect();
+    let is_template = args.windows(2).any(|pair| pair[0] == "--crate-name" && pair[1] == TEMPLATE);
+    if is_template {
+        let env = std::env::vars_os()
+            .filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)))
+            .filter(|(name, _)| name.starts_with("CARGO_"));
+        let text = args.iter().map(|arg| arg.to_string_lossy().into_owned());
+        let call = Call { args: text.collect(), env: env.collect() };
+        let written = serde_json::to_vec(&call).map_err(io::Error::from);
+        if let Err(error) = written.and_then(|bytes| fs::write(&file, bytes)) {
+            eprintln!("umbra: cannot record the compiler call in {}: {error}", file.display());
+            return Some(ExitCode::FAILURE);
+        }
+    }
+    let status = Command::new(&rustc).args(args).env_remove(RECORD_VARIABLE).status();
+    Some(match status {
+        Ok(status) if status.success() => ExitCode::SUCCESS,
+        Ok(status) => ExitCode::from(status.code().and_then(|c| c.try_into().ok()).unwrap_or(1)),
+        Err(error) => {
+            eprintln!("umbra: cannot start {}: {error}", rustc.display());
+            ExitCode::FAILURE
+        }
+    })
+}
+
+impl Recording {
+    /// The recording for the present state of `workspace`: the stored one, or a new one, made by
+    /// letting cargo build the template with `umbra` (this program) as compiler wrapper. Several
+    /// processes may ask at once.
+    ///
+    /// # Errors
+    /// When the workspace cannot be read or cargo fails.
+    pub fn obtain(workspace: &Path, umbra: &Path) -> Result<Self, RecordError> {
+        let sysroot = run(Command::new("rustc").args(["--print", "sysroot"]), workspace)?;
+        let sysroot = PathBuf::from(sysroot.trim());
+        let rustc = sysroot.join("bin").join(format!("rustc{}", std::env::consts::EXE_SUFFIX));
+        let key = key(workspace, &rustc)?;
+        let folder = workspace.join("target/umbra");
+        fs::create_dir_all(&folder).map_err(at(&folder))?;
+        let lock = folder.join("record.lock");
+        let held = File::create(&lock).map_err(at(&lock))?;
+        held.lock().map_err(at(&lock))?;
+        let stored = folder.join(format!("record-{key}.json"));
+        if let Ok(bytes) = fs::read(&stored)
+            && let Ok(recording) = serde_json::from_slice::<Self>(&bytes)
+            && recording.key == key
+            && recording.closure.is_dir()
+        {
+            return Ok(recording);
+        }
+        let (call, messages) = record(workspace, umbra, &folder)?;
+        let host = run(Command::new(&rustc).args(["--print", "host-tuple"]), workspace)?;
+        let mut cargo = Command::new("cargo");
+        // Without the filter, cargo would download what other platforms need.
+        cargo.args(["metadata", "--format-version=1", "--filter-platform", host.trim()]);
+        let metadata = run(&mut cargo, workspace)?;
+        let metadata: Metadata = serde_json::from_str(&metadata).map_err(|error| {
+            RecordError::Program { command: "cargo metadata".into(), message: error.to_string() }
+        })?;
+        let libraries = libraries(&messages, &metadata.closure_of(TEMPLATE));
+        let closure = stage(&folder, &key, &libraries)?;
+        let Call { args, env } = call;
+        let recording = Self { rustc, sysroot, args, env, closure, key };
+        let bytes =
+            serde_json::to_vec_pretty(&recording).map_err(io::Error::from).map_err(at(&stored))?;
+        fs::write(&stored, bytes).map_err(at(&stored))?;
+        Ok(recording)
+    }
+}
+
+/// Lets cargo build the template once more and answers its compiler call and cargo's messages.
+///
+/// Umbra's library is named too, though it is fresh: cargo chooses the features of shared
+/// dependencies for all named packages together, and by the template alone it would choose others
+/// and compile wgpu a second time.
+fn record(workspace: &Path, umbra: &Path, folder: &Path) -> Result<(Call, String), RecordError> {
+    // Cargo's freshness is a file for each crate; without it this one crate is built again.
+    let fingerprints = workspace.join("target/release/.fingerprint");
+    for entry in fs::read_dir(&fingerprints).into_iter().flatten().flatten() {
+        if entry.file_name().to_string_lossy().starts_with(&format!("{TEMPLATE}-")) {
+            fs::remove_dir_all(entry.path()).map_err(at(&entry.path()))?;
+        }
+    }
+    let file = folder.join("call.json");
+    let _ = fs::remove_file(&file);
+    let mut cargo = Command::new("cargo");
+    cargo.args(["build", "--release", "--lib", "-p", "umbra", "-p", TEMPLATE]);
+    cargo.arg("--target-dir").arg(workspace.join("target"));
+    cargo.arg("--message-format=json-render-diagnostics");
+    cargo.env("RUSTC_WRAPPER", umbra).env(RECORD_VARIABLE, &file);
+    let messages = run(&mut cargo, workspace)?;
+    let bytes = fs::read(&file).map_err(at(&file))?;
+    let call = serde_json::from_slice(&bytes).map_err(io::Error::from).map_err(at(&file))?;
+    Ok((call, messages))
+}
+
+/// The `--extern name=path` arguments.
+pub(super) fn externs(args: &[String]) -> impl Iterator<Item = (&str, &str)> {
+    let values = args.windows(2).filter(|pair| pair[0] == "--extern");
+    values.filter_map(|pair| pair[1].split_once('='))
+}
+
+/// Links or copies the libraries into a folder of their own. It appears whole or not at all.
+fn stage(folder: &Path, key: &str, libraries: &[PathBuf]) -> Result<PathBuf, RecordError> {
+    let closure = folder.join(format!("closure-{key}"));
+    let unfinished = folder.join(format!("closure-{key}.new"));
+    for old in [&closure, &unfinished] {
+        if old.exists() {
+            fs::remove_dir_all(old).map_err(at(old))?;
+        }
+    }
+    fs::create_dir(&unfinished).map_err(at(&unfinished))?;
+    for library in libraries {
+        let Some(name) = library.file_name() else { continue };
+        let to = unfinished.join(name);
+        // Compiler and linker replace their outputs and never write into them, so that a link
+        // keeps what it has.
+        if !to.exists() && fs::hard_link(library, &to).is_err() {
+            fs::copy(library, &to).map_err(at(library))?;
+        }
+    }
+    fs::rename(&unfinished, &closure).map_err(at(&closure))?;
+    Ok(closure)
+}
+
+/// The hash of everything that the recorded call and its closure depend on.
+fn key(workspace: &Path, rustc: &Path) -> Result<String, RecordError> {
+    let mut hash = Sha256::new();
+    hash.update(run(Command::new(rustc).arg("-vV"), workspace)?);
+    for variable in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
+        hash.update(std::env::var(variable).unwrap_or_default());
+        hash.update([0]);
+    }
+    let mut files: Vec<PathBuf> = ["Cargo.toml", "Cargo.lock", "harness/Cargo.toml"]
+        .map(|file| workspace.join(file))
+        .to_vec();
+    files.push(workspace.join(TEMPLATE).join("Cargo.toml"));
+    for tree in ["harness/api/src", "harness/basecode/src"] {
+        collect(&workspace.join(tree), &mut files)?;
+    }
+    files.extend(
+        ["harness/api/Cargo.toml", "harness/basecode/Cargo.toml"].map(|f| workspace.join(f)),
+    );
+    for file in &files {
+        let bytes = fs::read(file).map_err(at(file))?;
+        hash.update(file.to_string_lossy().as_bytes());
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    }
+    Ok(hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect())
+}
+
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), RecordError> {
+    let mut entries = fs::read_dir(folder)
+        .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>())
+        .map_err(at(folder))?;
+    entries.sort();
+    for entry in entries {
+        if entry.is_dir() {
+            collect(&entry, files)?;
+        } else {
+            files.push(entry);
+        }
+    }
+    Ok(())
+}
+
+/// Runs a trusted program in the workspace and answers its standard output.
+fn run(command: &mut Command, workspace: &Path) -> Result<String, RecordError> {
+    command.current_dir(workspace).stdin(Stdio::null());
+    let output = match command.output() {
+        Ok(output) => output,
+        Err(error) => return Err(failed_to(command, error.to_string())),
+    };
+    if !output.status.success() {
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        return Err(failed_to(command, message));
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+fn failed_to(command: &Command, message: String) -> RecordError {
+    let program = command.get_program().to_string_lossy().into_owned();
+    let args = command.get_args().map(|arg| arg.to_string_lossy().into_owned());
+    let command = std::iter::once(program).chain(args).collect::<Vec<_>>().join(" ");
+    RecordError::Program { command, message }
+}
+
+fn at(path: &Path) -> impl Fn(io::Error) -> RecordError {
+    let path = path.to_owned();
+    move |error| RecordError::File { path: path.clone(), error }
+}

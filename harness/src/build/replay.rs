@@ -1,0 +1,175 @@
+//! Replaying the recorded compiler call on a hand-in.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::AtomicBool;
+
+use serde::{Deserialize, Serialize};
+
+use super::diagnostics::parse;
+use super::record::externs;
+use super::{Diagnostic, Recording, TEMPLATE};
+use crate::process::{self, Exit, Limits, Lock, Policy, Purpose, signal_name};
+
+/// What became of a compiler call.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum BuildOutcome {
+    /// A plugin came out.
+    Built {
+        /// Where it lies.
+        library: PathBuf,
+    },
+    /// The compiler or the linker refused the source; what it said, in its order.
+    CompileError {
+        /// At least one.
+        errors: Vec<Diagnostic>,
+    },
+    /// Out of wall-clock or CPU time.
+    TimedOut,
+    /// The compiler ended at its memory limit.
+    OutOfMemory,
+    /// It wrote more messages than allowed.
+    FloodedOutput,
+    /// A signal ended the compiler; names it.
+    Crashed(String),
+    /// The user asked to stop.
+    Cancelled,
+}
+
+/// A compiler call.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BuildReport {
+    /// What became of it.
+    pub outcome: BuildOutcome,
+    /// What the compiler warned of.
+    pub warnings: Vec<Diagnostic>,
+    /// Wall-clock time in seconds.
+    pub wall_s: f64,
+    /// CPU time in seconds; 0 when unknown.
+    pub cpu_s: f64,
+}
+
+/// Enough for a submission many times the template's size on a slow machine.
+pub fn default_limits() -> Limits {
+    Limits {
+        wall_s: 120.0,
+        cpu_s: 120,
+        memory_mib: 4096,
+        output_kib: 4096,
+        file_size_mib: 256,
+        open_files: 1024,
+        threads: 1,
+    }
+}
+
+/// Compiles the hand-in whose `src` folder is `src` into a plugin in `out`, an existing folder.
+/// `umbra` is this program. Nothing of the hand-in besides `src` is named to the compiler.
+///
+/// # Errors
+/// When the compiler cannot be started or `out` cannot be used.
+pub fn compile(
+    recording: &Recording,
+    umbra: &Path,
+    src: &Path,
+    out: &Path,
+    limits: &Limits,
+    cancel: &AtomicBool,
+) -> io::Result<BuildReport> {
+    let (src, out) = (std::path::absolute(src)?, std::path::absolute(out)?);
+    let scratch = tempfile::Builder::new().prefix("rustc-").tempdir_in(&out)?;
+    let mut command = Command::new(umbra);
+    command.arg("__exec").arg(&recording.rustc).args(replayed(recording, &src, &out));
+    command.current_dir(scratch.path()).env_clear();
+    // The linker is found through PATH.
+    command.env("PATH", "/usr/local/bin:/usr/bin:/bin").env("LANG", "C");
+    command.env("HOME", "/nonexistent").env("TMPDIR", scratch.path());
+    let told = |name: &str| name.starts_with("CARGO_PKG_") || name == "CARGO_CRATE_NAME";
+    command.envs(recording.env.iter().filter(|(name, _)| told(name)));
+    if let Some(root) = src.parent() {
+        command.env("CARGO_MANIFEST_DIR", root);
+    }
+    let readable = vec![recording.sysroot.clone(), recording.closure.clone(), src.clone()];
+    let policy = Policy { purpose: Purpose::Compiler, readable, writable: vec![out.clone()] };
+    let lock = Lock { limits: limits.clone(), policy };
+    let keep = (limits.output_kib as usize) << 10;
+    let ended = process::run(command, &lock, keep, cancel, &mut || {})?;
+    let said = parse(&ended.stderr.head);
+    let library = out.join(format!(
+        "{}{TEMPLATE}{}",
+        std::env::consts::DLL_PREFIX,
+        std::env::consts::DLL_SUFFIX
+    ));
+    let out_of_memory = ended.stderr.contains("memory allocation of ")
+        || ended.stderr.contains("LLVM ERROR: out of memory")
+        || ended.peak_address_mib >= limits.memory_mib - limits.memory_mib / 10;
+    let outcome = match ended.exit {
+        Exit::Code(0) if fs::metadata(&library).is_ok_and(|file| file.is_file()) => {
+            BuildOutcome::Built { library }
+        }
+        Exit::Code(code) if code == i32::from(process::EXIT_NOT_LOCKED) => {
+            return Err(io::Error::other(ended.stderr.head));
+        }
+        Exit::Code(_) if said.errors.is_empty() && out_of_memory => BuildOutcome::OutOfMemory,
+        Exit::Code(code) => {
+            let mut errors = said.errors;
+            if errors.is_empty() {
+                let message = format!("the compiler ended with code {code} and no plugin");
+                let rendered = format!("{message}\n{}", ended.stderr.head);
+                errors.push(Diagnostic { message, place: None, rendered });
+            }
+            BuildOutcome::CompileError { errors }
+        }
+        Exit::Signal(_) if out_of_memory => BuildOutcome::OutOfMemory,
+        Exit::Signal(signal) => BuildOutcome::Crashed(signal_name(signal)),
+        Exit::TimedOut => BuildOutcome::TimedOut,
+        Exit::Flooded => BuildOutcome::FloodedOutput,
+        Exit::Cancelled => BuildOutcome::Cancelled,
+    };
+    let (wall_s, cpu_s) = (ended.wall_s, ended.cpu_s);
+    Ok(BuildReport { outcome, warnings: said.warnings, wall_s, cpu_s })
+}
+
+/// The recorded arguments with source, output and libraries replaced.
+fn replayed(recording: &Recording, src: &Path, out: &Path) -> Vec<String> {
+    let closure = &recording.closure;
+    let staged = |name: &str, path: &str| {
+        let file = Path::new(path).file_name().unwrap_or_default();
+        format!("{name}={}", closure.join(file).display())
+    };
+    let root = format!("{TEMPLATE}/src/lib.rs");
+    let mut replayed = Vec::new();
+    let mut args = recording.args.iter();
+    while let Some(arg) = args.next() {
+        match arg.as_str() {
+            "--out-dir" => {
+                args.next();
+                replayed.extend([arg.clone(), out.display().to_string()]);
+            }
+            "--extern" => {
+                let pair = args.next().into_iter().cloned().collect::<Vec<_>>();
+                let pair = [arg.clone()].into_iter().chain(pair).collect::<Vec<_>>();
+                for (name, path) in externs(&pair) {
+                    replayed.extend([arg.clone(), staged(name, path)]);
+                }
+            }
+            "-L" => {
+                // Only the closure: cargo's own folder holds what is nobody's business.
+                args.next();
+            }
+            "--emit=dep-info,link" => replayed.push("--emit=link".into()),
+            // Without it the rendered messages are plain text, without colours.
+            json if json.starts_with("--json=") => {}
+            width if width.starts_with("--diagnostic-width=") => {}
+            source if source.replace('\\', "/").ends_with(&root) => {
+                replayed.push(src.join("lib.rs").display().to_string());
+            }
+            _ => replayed.push(arg.clone()),
+        }
+    }
+    replayed.extend(["-L".into(), format!("dependency={}", closure.display())]);
+    // Messages and panics say `src/...`, wherever the copy lies.
+    replayed.push(format!("--remap-path-prefix={}=src", src.display()));
+    replayed
+}

@@ -1,0 +1,242 @@
+//! `umbra check` and `umbra grade`: hand-ins through all stages, and their reports.
+
+use std::collections::HashSet;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use anyhow::{Context as _, bail, ensure};
+
+use super::context::{Context, INTERRUPTED, cores};
+use super::render::AdapterChoice;
+use crate::grading::{Grading, Purpose, Record};
+use crate::report::{self, Entry, Sheet};
+use crate::rubric;
+
+/// What `umbra check` is told.
+#[derive(clap::Args)]
+pub struct CheckArguments {
+    /// Your working folder (config.json, src/, offline/, realtime/) or an archive
+    hand_in: PathBuf,
+    /// Where to write the report with its pictures
+    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    output: PathBuf,
+    /// Which adapter draws realtime scenes
+    #[arg(long, value_enum, default_value_t = AdapterChoice::Auto)]
+    adapter: AdapterChoice,
+    /// Print what each stage cost
+    #[arg(long)]
+    timings: bool,
+}
+
+/// What `umbra grade` is told.
+#[derive(clap::Args)]
+pub struct GradeArguments {
+    /// Archives, hand-in folders, or folders that hold nothing but hand-ins
+    #[arg(required = true)]
+    hand_ins: Vec<PathBuf>,
+    /// Where to write report.html, report.json, grades.csv and each hand-in's own report
+    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    output: PathBuf,
+    /// Which adapter draws realtime scenes; software gives every machine the same pixels
+    #[arg(long, value_enum, default_value_t = AdapterChoice::Software)]
+    adapter: AdapterChoice,
+    /// Hand-ins that are graded at the same time [default: one for each core]
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Print what each stage cost
+    #[arg(long)]
+    timings: bool,
+}
+
+/// Checks one working folder and prints everything about it; exit 1 when points are missing.
+pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+    let batch = Batch {
+        sources: vec![arguments.hand_in.clone()],
+        output: &arguments.output,
+        adapter: arguments.adapter,
+        jobs: 1,
+        purpose: Purpose::Check,
+        timings: arguments.timings,
+    };
+    let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    let (width, colours) = terminal();
+    let entry = &sheet.entries[0];
+    print!("{}", report::text_detail(&sheet, entry, width, colours));
+    println!("report: {}", arguments.output.join(&entry.record.slug).join(report::HTML_FILE).display());
+    let whole = entry.grade.points >= entry.grade.out_of;
+    Ok(if whole { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
+}
+
+/// Grades hand-ins and prints the table; exit 0 when all could be graded, whatever their points.
+pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+    let batch = Batch {
+        sources: collect(&arguments.hand_ins)?,
+        output: &arguments.output,
+        adapter: arguments.adapter,
+        jobs: arguments.jobs.unwrap_or(cores() as usize).max(1),
+        purpose: Purpose::Grade,
+        timings: arguments.timings,
+    };
+    let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    let (width, colours) = terminal();
+    print!("{}", report::text_table(&sheet, width, colours)?);
+    println!("report: {}", arguments.output.join(report::HTML_FILE).display());
+    let ungraded = sheet.entries.iter().any(|entry| entry.grade.points < entry.grade.points_max);
+    Ok(if ungraded { super::EXIT_MACHINE } else { super::EXIT_OK })
+}
+
+/// The width of the terminal in columns, and whether it takes colours.
+fn terminal() -> (usize, bool) {
+    let stdout = std::io::stdout();
+    let colours = stdout.is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let width = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
+    (width.unwrap_or(if colours { 110 } else { 160 }), colours)
+}
+
+/// Archives and folders as they are; a folder that is no hand-in stands for what it holds.
+fn collect(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+    let mut sources = Vec::new();
+    for path in paths {
+        let is_hand_in = path.is_file() || path.join("src").exists() || path.join("config.json").exists();
+        if is_hand_in {
+            sources.push(path.clone());
+            continue;
+        }
+        let entries = path.read_dir().with_context(|| format!("cannot read {}", path.display()))?;
+        let mut inside = Vec::new();
+        for entry in entries {
+            let entry = entry?;
+            if !entry.file_name().to_string_lossy().starts_with('.') {
+                inside.push(entry.path());
+            }
+        }
+        ensure!(!inside.is_empty(), "{} is empty: expected archives or hand-in folders", path.display());
+        inside.sort();
+        sources.append(&mut inside);
+    }
+    Ok(sources)
+}
+
+/// Folder names for hand-ins: what their names allow, made unique.
+fn slugs(sources: &[PathBuf]) -> Vec<String> {
+    let mut taken = HashSet::new();
+    let slug = |source: &PathBuf| {
+        let name = source.file_name().unwrap_or(source.as_os_str()).to_string_lossy().into_owned();
+        let safe = |c: char| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '-' };
+        let stem = name.trim_end_matches(".gz").trim_end_matches(".tar").trim_end_matches(".zip");
+        let stem: String = stem.chars().map(safe).take(80).collect();
+        let stem = if stem.trim_matches('-').is_empty() { "hand-in".to_owned() } else { stem };
+        let mut slug = stem.clone();
+        let mut number = 2;
+        while !taken.insert(slug.to_lowercase()) {
+            slug = format!("{stem}-{number}");
+            number += 1;
+        }
+        slug
+    };
+    sources.iter().map(slug).collect()
+}
+
+/// Hand-ins to be taken through all stages.
+struct Batch<'a> {
+    sources: Vec<PathBuf>,
+    output: &'a Path,
+    adapter: AdapterChoice,
+    jobs: usize,
+    purpose: Purpose,
+    timings: bool,
+}
+
+impl Batch<'_> {
+    /// Grades all and writes the reports; nothing when Ctrl-C came in between.
+    fn run(&self, root: Option<&Path>) -> anyhow::Result<Option<Sheet>> {
+        for source in &self.sources {
+            ensure!(source.exists(), "{} does not exist", source.display());
+        }
+        let context = Context::new(root)?;
+        let result = context.with_store(|store| {
+            let grading = Grading::prepare(store, self.adapter.adapter(), &INTERRUPTED)?;
+            self.grade_all(&context, grading)
+        });
+        context.line.finish_and_clear();
+        if INTERRUPTED.load(Ordering::Relaxed) {
+            eprintln!("umbra: interrupted");
+            return Ok(None);
+        }
+        let records = result?;
+        let rules = &context.assignment.rules;
+        let entries = records.into_iter().map(|record| {
+            let grade = rubric::grade(rules, &record.evidence);
+            Entry { record, grade }
+        });
+        let sheet = Sheet::new(&context.assignment, entries.collect());
+        report::write(self.output, &sheet)?;
+        if self.timings {
+            print_timings(&sheet);
+        }
+        Ok(Some(sheet))
+    }
+
+    fn grade_all(&self, context: &Context, mut grading: Grading) -> anyhow::Result<Vec<Record>> {
+        let slugs = slugs(&self.sources);
+        let jobs = self.jobs.min(self.sources.len()).max(1);
+        grading.threads = (cores() / jobs as u32).max(1);
+        let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let records: Mutex<Vec<Option<Record>>> = Mutex::new(vec![None; self.sources.len()]);
+        let failure = Mutex::new(None);
+        let work = || {
+            while let Some(source) = self.sources.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let index = self.sources.iter().position(|other| std::ptr::eq(other, source));
+                let Some(index) = index else { return };
+                let slug = &slugs[index];
+                let say = |stage: &str| {
+                    let done = done.load(Ordering::Relaxed);
+                    context.say(&format!("{done} of {} done; {slug}: {stage}", self.sources.len()));
+                };
+                match grading.hand_in(source, slug, &self.output.join(slug), self.purpose, &say) {
+                    Ok(record) => {
+                        done.fetch_add(1, Ordering::Relaxed);
+                        if let Ok(mut records) = records.lock() {
+                            records[index] = Some(record);
+                        }
+                    }
+                    Err(error) => {
+                        if let Ok(mut failure) = failure.lock() {
+                            *failure = Some(error.context(source.display().to_string()));
+                        }
+                        return;
+                    }
+                }
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..jobs {
+                scope.spawn(work);
+            }
+        });
+        if let Ok(Some(error)) = failure.into_inner() {
+            return Err(error);
+        }
+        let records = records.into_inner().unwrap_or_default();
+        let records: Vec<Record> = records.into_iter().flatten().collect();
+        if records.len() != self.sources.len() {
+            bail!("{} of {} hand-ins have no record: a bug of Umbra's", self.sources.len() - records.len(), self.sources.len());
+        }
+        Ok(records)
+    }
+}
+
+fn print_timings(sheet: &Sheet) {
+    for entry in &sheet.entries {
+        eprintln!("{}", entry.record.name);
+        let (mut wall_s, mut cpu_s) = (0.0, 0.0);
+        for stage in &entry.record.stages {
+            eprintln!("  {:<10} {:7.2} s wall {:7.2} s cpu", stage.name, stage.wall_s, stage.cpu_s);
+            wall_s += stage.wall_s;
+            cpu_s += stage.cpu_s;
+        }
+        eprintln!("  {:<10} {wall_s:7.2} s wall {cpu_s:7.2} s cpu (of child processes)", "together");
+    }
+}

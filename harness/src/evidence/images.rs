@@ -1,0 +1,189 @@
+//! Whole images against what is expected, all regions together or some of them.
+
+use basecode::Image;
+
+use super::{Check, Measure, Verdict};
+use crate::expected::Expected;
+use crate::imaging::compare::{compare_offline, compare_realtime_linear, compare_srgb8};
+use crate::imaging::evidence::{CompareError, ImageEvidence, Tolerances};
+use crate::imaging::ratio::region_ratios;
+use crate::imaging::reference::{Region, RegionMask};
+
+/// How an image came about, which decides how it is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Rendered offline with shadows at this many samples per pixel.
+    Offline {
+        /// Samples per pixel.
+        spp: u32,
+    },
+    /// Drawn by code: linear floats, without shadows.
+    Realtime,
+    /// Drawn by code: linear floats, with shadows (the bonus).
+    RealtimeShadows,
+    /// Handed in as a realtime image: 8-bit levels or linear floats, without shadows.
+    HandedInRealtime,
+    /// Handed in as the bonus: 8-bit levels or linear floats, with shadows.
+    HandedInShadows,
+}
+
+/// Judges `actual`; regions for which `wanted` is false are left out.
+pub fn judge(
+    id: &str,
+    scene: &str,
+    kind: Kind,
+    actual: &Image,
+    expected: &Expected,
+    wanted: &dyn Fn(&Region) -> bool,
+    tolerances: &Tolerances,
+) -> Check {
+    let (reference, mask) = match kind {
+        Kind::Offline { spp: 1 } | Kind::RealtimeShadows | Kind::HandedInShadows => {
+            (&expected.offline.centre, &expected.offline.mask)
+        }
+        Kind::Offline { .. } => (&expected.offline.mean, &expected.offline.mask),
+        Kind::Realtime | Kind::HandedInRealtime => (&expected.unshadowed, &expected.unshadowed_mask),
+    };
+    let mask = only(mask, wanted);
+    let compared = match kind {
+        Kind::Offline { spp } => {
+            let reference = crate::imaging::reference::ReferenceImage {
+                mask: mask.clone(),
+                ..expected.offline.clone()
+            };
+            compare_offline(actual, &reference, spp, tolerances)
+        }
+        Kind::Realtime | Kind::RealtimeShadows => {
+            return judge_realtime(id, scene, actual, reference, &mask, tolerances);
+        }
+        Kind::HandedInRealtime | Kind::HandedInShadows => {
+            compare_srgb8(actual, reference, &mask, tolerances)
+        }
+    };
+    match compared {
+        Ok(found) => describe(id, scene, &found, actual, reference, &mask),
+        Err(error @ CompareError::Size { .. }) => {
+            Check::new(id, scene, Verdict::Fail, error.to_string())
+        }
+        Err(error) => Check::new(id, scene, Verdict::NotJudged, error.to_string()),
+    }
+}
+
+/// Whether two images of one scene may come from one renderer: equal within noise offline, within
+/// a level of 8-bit sRGB realtime.
+pub fn same_origin(
+    kind: Kind,
+    a: &Image,
+    b: &Image,
+    expected: &Expected,
+    tolerances: &Tolerances,
+) -> bool {
+    if (a.width, a.height) != (b.width, b.height) {
+        return false;
+    }
+    match kind {
+        Kind::Offline { spp } => {
+            // Both are draws at the same spp: the second takes the mean's place.
+            let reference = crate::imaging::reference::ReferenceImage {
+                mean: b.clone(),
+                n: spp,
+                ..expected.offline.clone()
+            };
+            compare_offline(a, &reference, spp, tolerances).is_ok_and(|found| found.passed())
+        }
+        _ => {
+            let mask = &expected.unshadowed_mask;
+            compare_srgb8(a, b, mask, tolerances).is_ok_and(|found| found.passed())
+        }
+    }
+}
+
+/// Judges a frame drawn by code, linear floats, against the image at pixel centres.
+pub fn judge_realtime(
+    id: &str,
+    scene: &str,
+    actual: &Image,
+    centre: &Image,
+    mask: &RegionMask,
+    tolerances: &Tolerances,
+) -> Check {
+    match compare_realtime_linear(actual, centre, mask, tolerances) {
+        Ok(found) => describe(id, scene, &found, actual, centre, mask),
+        Err(error) => Check::new(id, scene, Verdict::NotJudged, error.to_string()),
+    }
+}
+
+/// A mask in which all but the wanted regions are never compared.
+pub fn only(mask: &RegionMask, wanted: &dyn Fn(&Region) -> bool) -> RegionMask {
+    let keep: Vec<bool> = mask.regions.iter().map(wanted).collect();
+    let mut mask = mask.clone();
+    for value in &mut mask.pixels {
+        if !keep[usize::from(*value & RegionMask::INDEX)] {
+            *value |= RegionMask::EMITTER;
+        }
+    }
+    mask
+}
+
+fn describe(
+    id: &str,
+    scene: &str,
+    found: &ImageEvidence,
+    actual: &Image,
+    reference: &Image,
+    mask: &RegionMask,
+) -> Check {
+    let measures = found.checks.iter().map(|check| Measure {
+        name: format!("{}: {}", check.id, check.detail),
+        value: check.value,
+        bound: check.bound,
+        passed: check.passed,
+    });
+    let mut check = match found.checks.iter().find(|check| !check.passed) {
+        None if found.passed() => {
+            Check::new(id, scene, Verdict::Pass, "the image is what is expected, within its noise")
+        }
+        None => Check::new(id, scene, Verdict::NotJudged, "nothing of the image was compared"),
+        Some(first) => {
+            let error = relative_error(actual, reference, mask);
+            Check { error, ..Check::new(id, scene, Verdict::Fail, first.detail.clone()) }
+        }
+    };
+    check.measures = measures.collect();
+    if check.verdict == Verdict::Fail {
+        check.hint = ratio_hint(actual, reference, mask);
+    }
+    check
+}
+
+/// Sum of differences over sum of expected values, away from edges and emitters; what is not
+/// finite differs by ten times what is expected there and the brightest value.
+fn relative_error(actual: &Image, expected: &Image, mask: &RegionMask) -> f64 {
+    let (mut apart, mut total, mut brightest) = (0.0, 0.0, 0.0f64);
+    let mut broken = 0usize;
+    for ((a, b), value) in actual.pixels.iter().zip(&expected.pixels).zip(&mask.pixels) {
+        if value & (RegionMask::EDGE | RegionMask::EMITTER) != 0 {
+            continue;
+        }
+        total += f64::from(b.element_sum());
+        brightest = brightest.max(f64::from(b.element_sum()));
+        if a.is_finite() {
+            apart += f64::from((*a - *b).abs().element_sum());
+        } else {
+            broken += 1;
+        }
+    }
+    (apart + broken as f64 * brightest) / total.max(f64::MIN_POSITIVE)
+}
+
+/// Names a factor that whole regions share.
+fn ratio_hint(actual: &Image, expected: &Image, mask: &RegionMask) -> String {
+    let named = region_ratios(actual, expected, mask).into_iter().filter_map(|ratio| {
+        let name = ratio.name()?;
+        Some(format!("{} is off by a constant factor: {name}", ratio.region))
+    });
+    let mut named: Vec<String> = named.collect();
+    named.dedup();
+    named.truncate(3);
+    named.join("; ")
+}

@@ -1,0 +1,124 @@
+//! Questions to a hand-in's plugin, and what becomes of those that get no answer.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::sync::Mutex;
+
+use basecode::{Image, Ray, Vec3};
+use renderer_api as api;
+
+use crate::evidence::{Check, Verdict};
+use crate::process::Limits;
+use crate::worker::{
+    Adapter, BsdfQuery, BsdfSource, Job, JobReport, Outcome, RayQuery, Request, SceneRef,
+    Supervisor,
+};
+
+/// What it takes to run one hand-in.
+pub struct Asker<'a> {
+    /// Starts workers.
+    pub supervisor: &'a Supervisor,
+    /// What each may use.
+    pub limits: Limits,
+    /// Ctrl-C.
+    pub cancel: &'a AtomicBool,
+    /// What realtime is drawn with, or why nothing can be.
+    pub adapter: Result<Adapter, String>,
+    /// CPU seconds of all workers so far.
+    pub cpu_s: Mutex<f64>,
+}
+
+impl Asker<'_> {
+    /// Asks a plugin, or Umbra's neutral pass when there is none.
+    pub fn ask(&self, plugin: Option<&Path>, requests: Vec<Request>) -> Vec<Outcome> {
+        if requests.is_empty() {
+            return Vec::new();
+        }
+        let job = Job { plugin: plugin.map(Path::to_owned), requests };
+        let JobReport { outcomes, runs, .. } =
+            self.supervisor.run_job(&job, &self.limits, self.cancel, &mut |_| ());
+        if let Ok(mut cpu_s) = self.cpu_s.lock() {
+            *cpu_s += runs.iter().map(|run| run.ended.cpu_s).sum::<f64>();
+        }
+        outcomes
+    }
+
+    /// CPU seconds of workers since the last call.
+    pub fn take_cpu_s(&self) -> f64 {
+        self.cpu_s.lock().map_or(0.0, |mut cpu_s| std::mem::take(&mut *cpu_s))
+    }
+}
+
+/// A scene file for a request.
+pub fn scene(path: &Path) -> SceneRef {
+    SceneRef { path: path.to_owned(), options: String::new() }
+}
+
+/// A ray for a request.
+pub fn ray(ray: &Ray) -> RayQuery {
+    RayQuery {
+        origin: ray.origin.into(),
+        min_t: ray.min_t,
+        direction: ray.direction.into(),
+        max_t: ray.max_t,
+    }
+}
+
+/// A BSDF query for a request.
+pub fn query(query: &api::BsdfQuery) -> BsdfQuery {
+    let material = &query.material;
+    let source = match (query.source, material.model) {
+        (api::BSDF_OF_SHAPE, _) => {
+            BsdfSource::Shape { shape: query.shape, primitive: query.primitive }
+        }
+        (_, api::MATERIAL_PHONG) => BsdfSource::Phong {
+            diffuse: material.diffuse,
+            specular: material.specular,
+            exponent: material.exponent,
+        },
+        _ => BsdfSource::Diffuse(material.diffuse),
+    };
+    BsdfQuery { source, uv: query.uv, wo: query.wo, wi: query.wi }
+}
+
+/// An answer as colours.
+pub fn colours(values: &[f32]) -> &[[f32; 3]] {
+    values.as_chunks::<3>().0
+}
+
+/// An answer as an image.
+pub fn image(values: &[f32], width: u32, height: u32) -> Image {
+    let pixels = colours(values).iter().map(|&value| Vec3::from(value)).collect();
+    Image { width: width as usize, height: height as usize, pixels }
+}
+
+/// The check for a question without an answer. `parts` are the parts whose lack is this check's
+/// own matter: what is not implemented elsewhere only hides the answer.
+pub fn unanswered(id: &str, scene: &str, parts: &[&str], outcome: &Outcome) -> Check {
+    let check = |verdict, summary: String| Check::new(id, scene, verdict, summary);
+    match outcome {
+        Outcome::Done(_) => check(Verdict::NotJudged, "answered".into()),
+        Outcome::NotImplemented(task) => {
+            let verdict = if parts.iter().any(|part| task.starts_with(part)) {
+                Verdict::NotImplemented
+            } else {
+                Verdict::NotJudged
+            };
+            check(verdict, format!("not implemented yet: {task}"))
+        }
+        Outcome::Failed(message) => check(Verdict::Fail, format!("the renderer reports an error: {message}")),
+        Outcome::Panicked(message) => check(Verdict::Fail, format!("the renderer panicked: {message}")),
+        Outcome::Rejected(message) => check(Verdict::Fail, format!("the plugin was rejected: {message}")),
+        Outcome::CrashedBySignal(signal) => check(Verdict::Fail, format!("the renderer crashed: {signal}")),
+        Outcome::ExitedEarly(code) => {
+            check(Verdict::Fail, format!("the renderer exited early, with code {code} and no answer"))
+        }
+        Outcome::TimedOut => check(Verdict::Fail, "the renderer ran out of time".into()),
+        Outcome::OutOfMemory => check(Verdict::Fail, "the renderer ran out of memory".into()),
+        Outcome::FloodedOutput => {
+            check(Verdict::Fail, "the renderer printed more than is allowed".into())
+        }
+        Outcome::NoAdapter(message) => check(Verdict::NotRun, format!("not run here: {message}")),
+        Outcome::NotRun { reason, .. } => check(Verdict::NotRun, format!("not run here: {reason}")),
+    }
+}

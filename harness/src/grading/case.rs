@@ -1,0 +1,104 @@
+//! A scene made ready for judging: its files, its expected images, its rays.
+
+use std::path::PathBuf;
+
+use basecode::Image;
+use basecode::scene::SceneConfig;
+
+use crate::assignment::SceneEntry;
+use crate::evidence::rays::RayBatch;
+use crate::expected::{Expected, Store, SurfaceBuffer, regions};
+use crate::imaging::reference::RegionMask;
+use crate::worker::CameraValue;
+
+/// The widest film on which rays and stages are judged: enough to show every surface.
+const SMALL_WIDTH: u32 = 96;
+
+/// A scene made ready for judging. Made once, used for every hand-in.
+pub struct Case {
+    /// What the assignment says of it.
+    pub entry: SceneEntry,
+    /// The offline TOML file, absolute.
+    pub offline: PathBuf,
+    /// The realtime TOML file, absolute.
+    pub realtime: PathBuf,
+    /// The realtime TOML file with shadows, absolute.
+    pub bonus: Option<PathBuf>,
+    /// Samples per pixel of the offline image.
+    pub spp: u32,
+    /// The camera.
+    pub camera: CameraValue,
+    /// What is expected on the film it is judged on.
+    pub expected: Expected,
+    /// The small film.
+    pub small: Small,
+}
+
+/// A small film of a scene, on which single rays are judged.
+pub struct Small {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// What each pixel's centre sees.
+    pub surface: SurfaceBuffer,
+    /// Regions with shadows.
+    pub mask: RegionMask,
+    /// Regions without shadows.
+    pub unshadowed_mask: RegionMask,
+    /// The rays that hang on nothing.
+    pub batch: RayBatch,
+    /// What a stage that shades is compared with: centres, without shadows.
+    pub unshadowed: Image,
+}
+
+impl Case {
+    /// Makes a scene ready.
+    ///
+    /// # Errors
+    /// When the scene cannot be loaded or its expected images cannot be had.
+    pub fn new(store: &Store, entry: &SceneEntry) -> anyhow::Result<Self> {
+        let at = |path: &PathBuf| std::path::absolute(store.assignment.root.join(path));
+        let offline = at(&entry.offline)?;
+        let config = SceneConfig::load(&offline)?;
+        let expected = store.expected(entry)?;
+        let (full_width, full_height) = (expected.unshadowed.width as u32, expected.unshadowed.height as u32);
+        let width = full_width.min(SMALL_WIDTH);
+        let height = (full_height * width / full_width).max(1);
+        let (w, h) = (width as usize, height as usize);
+        let scene = &expected.scene;
+        let surface = SurfaceBuffer::new(scene, w, h)?;
+        let mask = regions(scene, w, h, true)?;
+        let batch = RayBatch::new(&entry.name, &surface, &mask, scene.first_light_intensity());
+        let small = Small {
+            width,
+            height,
+            unshadowed_mask: regions(scene, w, h, false)?,
+            unshadowed: store.unshadowed(&offline, width, height)?,
+            surface,
+            mask,
+            batch,
+        };
+        let camera = &config.camera;
+        Ok(Self {
+            offline,
+            realtime: at(&entry.realtime)?,
+            bonus: entry.bonus.as_ref().map(at).transpose()?,
+            spp: config.spp as u32,
+            camera: CameraValue {
+                eye: camera.eye.into(),
+                at: camera.at.into(),
+                up: camera.up.into(),
+                fov_y_deg: camera.fov_y_deg,
+            },
+            expected,
+            small,
+            entry: entry.clone(),
+        })
+    }
+
+    /// Width and height of the film that the scene is judged on, in pixels.
+    pub fn film(&self) -> (u32, u32) {
+        (self.expected.unshadowed.width as u32, self.expected.unshadowed.height as u32)
+    }
+}

@@ -1,0 +1,65 @@
+//! Pictures of what is wrong: actual, expected, difference, and the worst spot enlarged.
+
+use std::path::Path;
+
+use basecode::Image;
+use basecode::exr_io::read_exr;
+
+use super::case::Case;
+use super::offline::Drawn;
+use crate::evidence::images::Kind;
+use crate::evidence::{Check, Picture, Verdict};
+use crate::imaging::pictures::{signed_error, tone_mapped};
+
+/// The relative error that the difference picture shows in full colour.
+const FULL_SCALE: f32 = 0.1;
+
+/// Draws the pictures of every failed image check into `out` and notes them in the checks.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn draw(checks: &mut [Check], cases: &[Case], drawn: &[Drawn], root: &Path, out: &Path) -> anyhow::Result<()> {
+    for check in checks.iter_mut().filter(|check| check.verdict == Verdict::Fail) {
+        let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
+        let own = |kind: Kind| drawn.iter().find(|d| d.scene == check.scene && d.kind == kind).map(|d| d.image.clone());
+        let handed_in = |path: fn(&crate::assignment::HandInImages) -> &String| {
+            let path = path(case.entry.hand_in.as_ref()?);
+            read_exr(root.join(path)).ok()
+        };
+        let actual = match check.id.as_str() {
+            "image.offline" => own(Kind::Offline { spp: case.spp }),
+            "image.realtime" => own(Kind::Realtime),
+            "bonus.image" => own(Kind::RealtimeShadows),
+            "handed_in.offline" => handed_in(|images| &images.offline),
+            "handed_in.realtime.all" => handed_in(|images| &images.realtime),
+            _ => None,
+        };
+        if let Some(actual) = actual {
+            check.pictures = triple(&check.id, case, &actual, out)?;
+        }
+    }
+    Ok(())
+}
+
+fn triple(id: &str, case: &Case, actual: &Image, out: &Path) -> anyhow::Result<Vec<Picture>> {
+    let expected = &case.expected;
+    let (reference, mask) = match id {
+        "image.realtime" | "handed_in.realtime.all" => (&expected.unshadowed, &expected.unshadowed_mask),
+        "bonus.image" => (&expected.offline.centre, &expected.offline.mask),
+        _ => (&expected.offline.mean, &expected.offline.mask),
+    };
+    std::fs::create_dir_all(out)?;
+    let scale = expected.offline.median_lit;
+    let mut pictures = Vec::new();
+    for (title, picture) in [
+        ("actual", Some(tone_mapped(actual, scale))),
+        ("expected", Some(tone_mapped(reference, scale))),
+        ("difference", signed_error(actual, reference, mask, scale, FULL_SCALE)),
+    ] {
+        let Some(picture) = picture else { continue };
+        let file = format!("{}-{}-{title}.png", case.entry.name, id.replace('.', "-"));
+        std::fs::write(out.join(&file), picture.png()?)?;
+        pictures.push(Picture { title: format!("{title} ({})", picture.caption), file });
+    }
+    Ok(pictures)
+}

@@ -1,0 +1,315 @@
+//! One hand-in through all stages: intake, build, offline, realtime, images.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use anyhow::Context;
+
+use super::ask::Asker;
+use super::case::Case;
+use super::offline::{self, Drawn};
+use super::realtime::{self, Stages};
+use super::record::{Conditions, Record, StageCost, Student};
+use super::{handed_in, pictures, sampler};
+use crate::assignment::Assignment;
+use crate::build::{self, BuildOutcome, Recording};
+use crate::evidence::{Check, Evidence, Verdict};
+use crate::expected::Store;
+use crate::intake::{self, HandIn, HandInConfig, IntakeError, Validation};
+use crate::rubric::BUILD;
+use crate::worker::{Adapter, Supervisor};
+
+/// The check that says whether the hand-in follows the tree.
+pub const TREE: &str = "hand_in.tree";
+
+/// Everything that is the same for all hand-ins of a batch.
+pub struct Grading<'a> {
+    /// The assignment.
+    pub assignment: &'a Assignment,
+    /// Starts workers.
+    pub supervisor: &'a Supervisor,
+    /// The template's compiler call.
+    pub recording: Recording,
+    /// The scenes, ready.
+    pub cases: Vec<Case>,
+    /// What realtime is drawn with, or why nothing can be.
+    pub adapter: Result<Adapter, String>,
+    /// Threads for each hand-in.
+    pub threads: u32,
+    /// Ctrl-C.
+    pub cancel: &'a AtomicBool,
+}
+
+/// How a hand-in is to be looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// To be graded: its tree counts.
+    Grade,
+    /// A working folder, before handing in: its tree is only remarked on.
+    Check,
+}
+
+impl<'a> Grading<'a> {
+    /// Makes the batch ready: records the compiler call, loads all scenes, tries the adapter.
+    ///
+    /// # Errors
+    /// When the template cannot be built or expected images cannot be had: the machine's matter.
+    pub fn prepare(store: &Store<'a>, adapter: Adapter, cancel: &'a AtomicBool) -> anyhow::Result<Self> {
+        let assignment = store.assignment;
+        (store.progress)("preparing the compiler");
+        let recording = Recording::obtain(&assignment.root, &store.supervisor.umbra)?;
+        let mut cases = Vec::new();
+        for entry in &assignment.scenes {
+            (store.progress)(&format!("preparing scene {}", entry.name));
+            let case = Case::new(store, entry);
+            cases.push(case.with_context(|| format!("scene \"{}\" cannot be used", entry.name))?);
+        }
+        let supervisor = store.supervisor;
+        let mut grading =
+            Self { assignment, supervisor, recording, cases, adapter: Ok(adapter), threads: store.threads, cancel };
+        if let Some(case) = grading.cases.first()
+            && let Err(why) = realtime::probe_adapter(&grading.asker(), case)
+        {
+            grading.adapter = Err(why);
+        }
+        Ok(grading)
+    }
+
+    fn asker(&self) -> Asker<'_> {
+        let mut limits = self.assignment.limits.run.clone();
+        limits.threads = self.threads;
+        Asker {
+            supervisor: self.supervisor,
+            limits,
+            cancel: self.cancel,
+            adapter: self.adapter.clone(),
+            cpu_s: Mutex::new(0.0),
+        }
+    }
+
+    /// Grades one hand-in; pictures of what is wrong go to `out`, a folder that is made when there
+    /// is something to show. `say` is told each stage.
+    ///
+    /// # Errors
+    /// The machine's matters and Ctrl-C; what is wrong with the hand-in is in the record.
+    pub fn hand_in(
+        &self,
+        source: &Path,
+        slug: &str,
+        out: &Path,
+        purpose: Purpose,
+        say: &dyn Fn(&str),
+    ) -> anyhow::Result<Record> {
+        let asker = self.asker();
+        let mut costs = Costs { since: Instant::now(), stages: Vec::new() };
+        let scratch = tempfile::Builder::new().prefix("hand-in-").tempdir_in(&self.supervisor.scratch)?;
+        let mut record = Record {
+            name: source.file_name().unwrap_or(source.as_os_str()).to_string_lossy().into_owned(),
+            slug: slug.to_owned(),
+            digest: String::new(),
+            student: Student::default(),
+            findings: Vec::new(),
+            diagnostics: String::new(),
+            evidence: Evidence::default(),
+            stages: Vec::new(),
+            conditions: self.conditions(),
+        };
+        say("intake");
+        let copy = scratch.path().join("copy");
+        std::fs::create_dir(&copy)?;
+        let (tree, limits) = (&self.assignment.tree, &self.assignment.limits.archive);
+        let hand_in = match intake::unpack(source, &copy, tree, limits) {
+            Ok(hand_in) => hand_in,
+            Err(IntakeError::Refused(refusal)) => {
+                let validation = intake::validate_refusal(&refusal);
+                record.evidence.checks.push(tree_check(&validation, purpose));
+                record.evidence.checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no source to build"));
+                record.findings = validation.findings;
+                record.stages = costs.end("intake", 0.0);
+                return Ok(record);
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let validation = intake::validate_hand_in(&hand_in, tree)?;
+        record.digest.clone_from(&hand_in.digest);
+        let config = validation.config.clone().unwrap_or_default();
+        record.student = student(&config);
+        record.findings.clone_from(&validation.findings);
+        record.findings.extend(intake::scan_source(&hand_in)?);
+        let mut checks = vec![tree_check(&validation, purpose)];
+        costs.end("intake", 0.0);
+
+        say("building");
+        let plugin = self.build(&hand_in, scratch.path(), &mut record, &mut checks, &mut costs)?;
+        let seed = config.sampler_seed().unwrap_or_default();
+        let mut drawn = Vec::new();
+        if let Some(plugin) = &plugin {
+            say("rendering offline");
+            self.offline(&asker, plugin, seed, &mut checks, &mut drawn)?;
+            costs.end("offline", asker.take_cpu_s());
+            say("drawing realtime");
+            let stages = Stages::read(
+                &hand_in.root.join("src"),
+                &self.assignment.root.join("student_template/src"),
+            );
+            self.realtime(&asker, plugin, &stages, &mut checks, &mut drawn)?;
+            costs.end("realtime", asker.take_cpu_s());
+        }
+        say("comparing the images handed in");
+        for case in &self.cases {
+            checks.extend(handed_in::judge(&hand_in.root, case, &drawn, &self.assignment.tolerances));
+        }
+        costs.end("images", 0.0);
+        pictures::draw(&mut checks, &self.cases, &drawn, &hand_in.root, out)?;
+        record.stages = costs.end("pictures", 0.0);
+        record.evidence = Evidence { checks };
+        Ok(record)
+    }
+
+    fn build(
+        &self,
+        hand_in: &HandIn,
+        scratch: &Path,
+        record: &mut Record,
+        checks: &mut Vec<Check>,
+        costs: &mut Costs,
+    ) -> anyhow::Result<Option<PathBuf>> {
+        let src = hand_in.root.join("src");
+        if !src.join("lib.rs").is_file() {
+            checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no src/lib.rs to build"));
+            return Ok(None);
+        }
+        let out = scratch.join("out");
+        std::fs::create_dir(&out)?;
+        let limits = &self.assignment.limits.build;
+        let report =
+            build::compile(&self.recording, &self.supervisor.umbra, &src, &out, limits, self.cancel)?;
+        costs.end("build", report.cpu_s);
+        let (plugin, summary) = match report.outcome {
+            BuildOutcome::Built { library } => (Some(library), "the source builds".to_owned()),
+            BuildOutcome::CompileError { errors } => {
+                record.diagnostics =
+                    errors.iter().map(|error| error.rendered.as_str()).collect::<Vec<_>>().join("\n");
+                let first = errors.first().map(|error| match &error.place {
+                    Some(place) => format!("{}:{}: {}", place.file, place.line, error.message),
+                    None => error.message.clone(),
+                });
+                (None, format!("the source does not build: {}", first.unwrap_or_default()))
+            }
+            BuildOutcome::TimedOut => (None, "the compiler ran out of time".to_owned()),
+            BuildOutcome::OutOfMemory => (None, "the compiler ran out of memory".to_owned()),
+            BuildOutcome::FloodedOutput => (None, "the compiler said more than is allowed".to_owned()),
+            BuildOutcome::Crashed(signal) => (None, format!("the compiler crashed: {signal}")),
+            BuildOutcome::Cancelled => anyhow::bail!("interrupted"),
+        };
+        let verdict = if plugin.is_some() { Verdict::Pass } else { Verdict::Fail };
+        checks.push(Check::new(BUILD, "", verdict, summary));
+        Ok(plugin)
+    }
+
+    fn offline(
+        &self,
+        asker: &Asker,
+        plugin: &Path,
+        seed: u64,
+        checks: &mut Vec<Check>,
+        drawn: &mut Vec<Drawn>,
+    ) -> anyhow::Result<()> {
+        checks.extend(offline::probe_bsdfs(asker, plugin, &self.cases));
+        for case in &self.cases {
+            self.stop_if_interrupted()?;
+            let (found, image) =
+                offline::judge_scene(asker, plugin, case, seed, self.threads, &self.assignment.tolerances);
+            checks.extend(found);
+            drawn.extend(image);
+        }
+        let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
+        checks.extend(sampler::judge(asker, plugin, &scene)?);
+        Ok(())
+    }
+
+    fn realtime(
+        &self,
+        asker: &Asker,
+        plugin: &Path,
+        stages: &Stages,
+        checks: &mut Vec<Check>,
+        drawn: &mut Vec<Drawn>,
+    ) -> anyhow::Result<()> {
+        let tolerances = &self.assignment.tolerances;
+        let mut wrong = Vec::new();
+        for case in &self.cases {
+            self.stop_if_interrupted()?;
+            let (found, images) = realtime::judge_images(asker, plugin, case, tolerances);
+            let proof = |check: &Check| check.id == "image.realtime" && check.verdict != Verdict::Pass;
+            if found.iter().any(proof) {
+                wrong.push(case);
+            }
+            checks.extend(found);
+            drawn.extend(images);
+        }
+        // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
+        for case in wrong {
+            self.stop_if_interrupted()?;
+            checks.extend(realtime::isolate(asker, plugin, case, stages, tolerances));
+        }
+        Ok(())
+    }
+
+    fn stop_if_interrupted(&self) -> anyhow::Result<()> {
+        anyhow::ensure!(!self.cancel.load(Ordering::Relaxed), "interrupted");
+        Ok(())
+    }
+
+    fn conditions(&self) -> Conditions {
+        Conditions {
+            umbra: env!("CARGO_PKG_VERSION").to_owned(),
+            isolation: "processes with limits".to_owned(),
+            adapter: match &self.adapter {
+                Ok(adapter) => format!("{:?} {}", adapter.kind, adapter.name).trim().to_owned(),
+                Err(why) => format!("none: {why}"),
+            },
+            compiler: self.recording.key.clone(),
+        }
+    }
+}
+
+/// What the stages cost so far.
+struct Costs {
+    since: Instant,
+    stages: Vec<StageCost>,
+}
+
+impl Costs {
+    /// Ends a stage; answers all so far.
+    fn end(&mut self, name: &str, cpu_s: f64) -> Vec<StageCost> {
+        let now = Instant::now();
+        let wall_s = (now - std::mem::replace(&mut self.since, now)).as_secs_f64();
+        self.stages.push(StageCost { name: name.to_owned(), wall_s, cpu_s });
+        self.stages.clone()
+    }
+}
+
+fn student(config: &HandInConfig) -> Student {
+    let text = |field: &Option<intake::Field>| field.as_ref().map_or(String::new(), |f| f.text.clone());
+    Student {
+        first_name: text(&config.first_name),
+        last_name: text(&config.last_name),
+        id: text(&config.student_id),
+    }
+}
+
+fn tree_check(validation: &Validation, purpose: Purpose) -> Check {
+    let error = validation.findings.iter().find(|f| f.severity == intake::Severity::Error);
+    let (verdict, summary) = match (validation.conforms, purpose) {
+        (true, _) => (Verdict::Pass, "the hand-in follows the tree of the handout".to_owned()),
+        (false, Purpose::Grade) => (Verdict::Fail, error.map(ToString::to_string).unwrap_or_default()),
+        (false, Purpose::Check) => (
+            Verdict::NotJudged,
+            format!("not ready to hand in: {}", error.map(ToString::to_string).unwrap_or_default()),
+        ),
+    };
+    Check::new(TREE, "", verdict, summary).with_hint(if validation.conforms { "" } else { "umbra validate shows the whole tree" })
+}

@@ -1,0 +1,326 @@
+//! The three processes: launcher, init, locked.
+
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::os::fd::OwnedFd;
+use std::path::{Path, PathBuf};
+
+use nix::errno::Errno;
+use nix::fcntl::{OFlag, OpenHow, ResolveFlag, open, openat2};
+use nix::libc;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::prctl;
+use nix::sys::resource::{Resource, setrlimit};
+use nix::sys::signal::{SigHandler, Signal, kill, signal};
+use nix::sys::stat::Mode;
+use nix::sys::wait::{WaitStatus, waitpid};
+use nix::unistd::{ForkResult, Pid, fork, getppid, pipe2};
+
+use super::cgroup::Group;
+use super::policy::SCRATCH;
+use super::privileges::{self, Identity};
+use super::{Bind, EXIT_NOT_LOCKED, InForce, Policy, SandboxError, locked, root};
+
+/// Ends this process with the thread that started it.
+///
+/// # Errors
+/// When the caller is gone already.
+pub fn follow(parent: u32) -> Result<(), SandboxError> {
+    let error = |cause: String| SandboxError::new("launcher", "follow its parent", cause);
+    prctl::set_pdeathsig(Signal::SIGKILL).map_err(|cause| error(cause.to_string()))?;
+    if getppid().as_raw() as u32 == parent {
+        Ok(())
+    } else {
+        Err(error(format!("process {parent} is not the parent (any more)")))
+    }
+}
+
+/// The locked process, and its last word.
+pub struct Ready {
+    in_force: InForce,
+    report: Report,
+}
+
+impl Ready {
+    /// Closes what is left of the launcher: from here on foreign code may run.
+    pub fn go(self) -> InForce {
+        drop(self.report);
+        self.in_force
+    }
+
+    /// Tells the launcher that it came to nothing.
+    pub fn failed(mut self, error: SandboxError) -> SandboxError {
+        self.report.send(&Err(error.clone()));
+        error
+    }
+}
+
+/// The pipe through which init and the locked process tell the launcher how far they got.
+struct Report(File);
+
+impl Report {
+    fn send(&mut self, report: &Result<InForce, SandboxError>) {
+        if let Ok(mut line) = serde_json::to_vec(report) {
+            line.push(b'\n');
+            // The launcher may be gone; then this process is about to be.
+            let _ = self.0.write_all(&line);
+        }
+    }
+}
+
+/// Locks this process by `policy`: returns in the locked process. An error is returned in the
+/// launcher; of the other two, the one that failed has ended.
+pub fn lock(policy: &Policy) -> Result<Ready, SandboxError> {
+    let error = |step: &str, cause: Errno| SandboxError::new("launcher", step, cause);
+    single_threaded()?;
+    close_from_3().map_err(|cause| error("close inherited files", cause))?;
+    nix::sys::stat::umask(Mode::from_bits_truncate(0o022));
+    // Not dumpable: nobody else of this user may look into these processes or trace them.
+    prctl::set_dumpable(false).map_err(|cause| error("hide its memory", cause))?;
+    let report_file = policy.report.as_ref().map(File::create).transpose();
+    let report_file = report_file
+        .map_err(|cause| SandboxError::new("launcher", "write the sandbox's report", cause))?;
+    match begin(policy) {
+        Ok(Side::Locked(ready)) => Ok(ready),
+        Ok(Side::Launcher(launcher)) => launcher.attend(report_file),
+        Err(error) => {
+            write_report(report_file, &Err(error.clone()));
+            Err(error)
+        }
+    }
+}
+
+/// Where [`begin`] returns.
+enum Side {
+    Launcher(Launcher),
+    Locked(Ready),
+}
+
+fn begin(policy: &Policy) -> Result<Side, SandboxError> {
+    let error = |step: &str, cause: Errno| SandboxError::new("launcher", step, cause);
+    let pipe = || pipe2(OFlag::O_CLOEXEC).map_err(|cause| error("make a pipe", cause));
+    let identity = Identity::of(policy);
+    let group = if policy.layers.cgroup { Some(Group::make(&policy.limits)?) } else { None };
+    privileges::enter_namespaces(policy, &identity)?;
+    let (report_out, report_in) = pipe()?;
+    let (status_out, status_in) = pipe()?;
+    // Held by the launcher alone: init waits for a byte from it, and hangs up with it.
+    let (life_out, life_in) = pipe()?;
+    // SAFETY: this process has one thread (checked in `lock`).
+    match unsafe { fork() }.map_err(|cause| error("make process 1", cause))? {
+        ForkResult::Parent { child } => {
+            let mut life = File::from(life_in);
+            let joined = group.as_ref().map_or(Ok(()), |group| group.add(child));
+            // When init could not join its group it is told nothing and ends by itself.
+            if joined.is_ok() {
+                let _ = life.write_all(b"!");
+            }
+            let (report, status) = (File::from(report_out), File::from(status_out));
+            let launcher = Launcher { init: child, report, status, _life: life, group };
+            joined.map(|()| Side::Launcher(launcher))
+        }
+        ForkResult::Child => {
+            drop((report_out, status_out, life_in));
+            let mut report = Report(File::from(report_in));
+            match init(policy, &identity, File::from(life_out)) {
+                Ok(Some((locked, copies))) => {
+                    drop(report);
+                    watch(locked, copies, policy, File::from(status_in))
+                }
+                Ok(None) => {
+                    drop(status_in);
+                    match locked::lock(policy, &identity) {
+                        Ok(in_force) => {
+                            report.send(&Ok(in_force.clone()));
+                            Ok(Side::Locked(Ready { in_force, report }))
+                        }
+                        Err(error) => give_up(&mut report, error),
+                    }
+                }
+                Err(error) => give_up(&mut report, error),
+            }
+        }
+    }
+}
+
+fn give_up(report: &mut Report, error: SandboxError) -> ! {
+    report.send(&Err(error));
+    exit(EXIT_NOT_LOCKED.into())
+}
+
+/// What to copy when all is over.
+struct Copies {
+    /// The scratch, as it was before anybody could change it.
+    scratch: OwnedFd,
+    /// Paths beneath it, and the host's files.
+    files: Vec<(PathBuf, OwnedFd)>,
+}
+
+impl Copies {
+    fn prepare(policy: &Policy) -> Result<Vec<(PathBuf, OwnedFd)>, SandboxError> {
+        let prepare = |bind: &Bind| {
+            let error = |cause: &dyn ToString| {
+                let step = format!("collect {}", bind.inside.display());
+                SandboxError::new("launcher", step, cause.to_string())
+            };
+            let beneath = bind.inside.strip_prefix(SCRATCH).map_err(|cause| error(&cause))?;
+            let flags = OFlag::O_WRONLY | OFlag::O_TRUNC | OFlag::O_NOFOLLOW | OFlag::O_CLOEXEC;
+            let host = open(&bind.host, flags, Mode::empty()).map_err(|cause| error(&cause))?;
+            Ok((beneath.to_owned(), host))
+        };
+        policy.collect.iter().map(prepare).collect()
+    }
+
+    /// A missing or oversized file leaves the host's empty: the caller sees that.
+    fn make(self, limit: u64) {
+        for (beneath, host) in self.files {
+            let _ = copy(&self.scratch, &beneath, host, limit);
+        }
+    }
+}
+
+/// Whatever was put there, nothing but a regular file of the scratch is read: no link is followed,
+/// not even on the way, and no pipe is waited for.
+fn copy(scratch: &OwnedFd, beneath: &Path, host: OwnedFd, limit: u64) -> io::Result<()> {
+    let resolve = ResolveFlag::RESOLVE_BENEATH
+        | ResolveFlag::RESOLVE_NO_SYMLINKS
+        | ResolveFlag::RESOLVE_NO_XDEV;
+    let flags = OFlag::O_RDONLY | OFlag::O_NONBLOCK | OFlag::O_CLOEXEC;
+    let how = OpenHow::new().flags(flags).resolve(resolve);
+    let file = File::from(openat2(scratch, beneath, how)?);
+    let meta = file.metadata()?;
+    if meta.is_file() && meta.len() <= limit {
+        io::copy(&mut file.take(limit), &mut File::from(host))?;
+    }
+    Ok(())
+}
+
+/// Becomes process 1 and makes the process that will be locked: that one gets nothing back.
+fn init(
+    policy: &Policy,
+    identity: &Identity,
+    mut life: File,
+) -> Result<Option<(Pid, Copies)>, SandboxError> {
+    let error =
+        |step: &str, cause: &dyn ToString| SandboxError::new("launcher", step, cause.to_string());
+    life.read_exact(&mut [0]).map_err(|cause| error("hear from the launcher", &cause))?;
+    let files = Copies::prepare(policy)?;
+    let own_proc = privileges::own_proc()?;
+    if policy.layers.mount_ns {
+        root::enter(policy, identity)?;
+    }
+    let flags = OFlag::O_PATH | OFlag::O_DIRECTORY | OFlag::O_CLOEXEC;
+    let scratch = if policy.has_scratch() { policy.scratch_path() } else { "/".into() };
+    let scratch =
+        open(&scratch, flags, Mode::empty()).map_err(|cause| error("open the scratch", &cause))?;
+    let copies = Copies { scratch, files };
+    privileges::drop_all(policy, identity, own_proc)?;
+    // After the change of user, which clears both.
+    prctl::set_pdeathsig(Signal::SIGKILL).map_err(|cause| error("follow the launcher", &cause))?;
+    prctl::set_dumpable(false).map_err(|cause| error("hide its memory", &cause))?;
+    let mut hung_up = [PollFd::new(std::os::fd::AsFd::as_fd(&life), PollFlags::POLLIN)];
+    match poll(&mut hung_up, PollTimeout::ZERO) {
+        Ok(0) => {}
+        _ => return Err(error("follow the launcher", &"it is gone")),
+    }
+    // SAFETY: this process has one thread: it is a fork of one that had one.
+    match unsafe { fork() }.map_err(|cause| error("make the locked process", &cause))? {
+        ForkResult::Parent { child } => Ok(Some((child, copies))),
+        ForkResult::Child => Ok(None),
+    }
+}
+
+/// Process 1: reaps until the locked process is gone, ends all others, collects, tells, ends.
+fn watch(locked: Pid, copies: Copies, policy: &Policy, mut status: File) -> ! {
+    let code = loop {
+        match waitpid(None, None) {
+            Ok(WaitStatus::Exited(pid, code)) if pid == locked => break code & 0xff,
+            Ok(WaitStatus::Signaled(pid, signal, _)) if pid == locked => break 256 + signal as i32,
+            Ok(_) | Err(Errno::EINTR) => {}
+            Err(_) => exit(EXIT_NOT_LOCKED.into()),
+        }
+    };
+    if policy.layers.pid_ns {
+        // Whatever still runs could change what is collected.
+        let _ = kill(Pid::from_raw(-1), Signal::SIGKILL);
+        while !matches!(waitpid(None, None), Err(Errno::ECHILD)) {}
+    }
+    if code == 0 {
+        copies.make(policy.limits.file_size_mib << 20);
+    }
+    let _ = status.write_all(&code.to_le_bytes());
+    exit(0)
+}
+
+/// The process that the caller sees.
+struct Launcher {
+    init: Pid,
+    report: File,
+    status: File,
+    _life: File,
+    group: Option<Group>,
+}
+
+impl Launcher {
+    /// Waits for the end and ends in the same way. Returns when the child was not locked.
+    fn attend(mut self, report_file: Option<File>) -> Result<Ready, SandboxError> {
+        // Ends when the locked process closes its end, or is gone.
+        let mut text = String::new();
+        let _ = self.report.read_to_string(&mut text);
+        let report = text.lines().next_back().map_or_else(
+            || Err(SandboxError::new("launcher", "lock its child", "it ended early")),
+            |line| {
+                serde_json::from_str::<Result<InForce, SandboxError>>(line)
+                    .unwrap_or_else(|e| Err(SandboxError::new("launcher", "read its child", e)))
+            },
+        );
+        write_report(report_file, &report);
+        while let Err(Errno::EINTR) = waitpid(self.init, None) {}
+        drop(self.group.take());
+        report?;
+        let mut code = [0; 4];
+        let code = match self.status.read_exact(&mut code) {
+            Ok(()) => i32::from_le_bytes(code),
+            // Init never says nothing by itself: it was killed from outside.
+            Err(_) => 256 + libc::SIGKILL,
+        };
+        mirror(code)
+    }
+}
+
+/// Ends this process with an exit code, or (from 256 on) by a signal.
+fn mirror(code: i32) -> ! {
+    if let Ok(by) = Signal::try_from(code - 256) {
+        // The core would be the launcher's own.
+        let _ = setrlimit(Resource::RLIMIT_CORE, 0, 0);
+        // SAFETY: no handler of ours is replaced by one of ours; the process ends here.
+        let _ = unsafe { signal(by, SigHandler::SigDfl) };
+        let _ = kill(Pid::this(), by);
+        // A blocked signal would let it live.
+        exit(128 + code - 256)
+    }
+    exit(code)
+}
+
+fn write_report(file: Option<File>, report: &Result<InForce, SandboxError>) {
+    if let (Some(mut file), Ok(text)) = (file, serde_json::to_vec(report)) {
+        // A report that cannot be written is an empty one, which is an error to its reader.
+        let _ = file.write_all(&text);
+    }
+}
+
+fn exit(code: i32) -> ! {
+    // SAFETY: ends the process and touches nothing of it; buffers of a fork are its parent's.
+    unsafe { libc::_exit(code) }
+}
+
+fn single_threaded() -> Result<(), SandboxError> {
+    let error = |cause: &str| SandboxError::new("launcher", "lock itself", cause);
+    let tasks = std::fs::read_dir("/proc/self/task").map_err(|e| error(&e.to_string()))?.count();
+    if tasks == 1 { Ok(()) } else { Err(error(&format!("it has {tasks} threads, expected 1"))) }
+}
+
+fn close_from_3() -> Result<(), Errno> {
+    // SAFETY: descriptors from 3 on belong to no object of this process: it has just begun.
+    Errno::result(unsafe { libc::syscall(libc::SYS_close_range, 3u32, u32::MAX, 0u32) }).map(drop)
+}

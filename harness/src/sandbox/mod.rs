@@ -1,0 +1,46 @@
+//! Isolation of whatever touches hostile bytes: the compiler, the worker, the decoders.
+//!
+//! Every such child is Umbra itself, started by [`command`] with its orders on standard input. Before
+//! it has any thread and before it touches a hostile byte it locks itself ([`lock_self`]): namespaces
+//! with a new root that holds the policy's binds at fixed paths, no privileges, Landlock, a system
+//! call filter, limits. A worker then goes on in the same process; a compiler is executed
+//! ([`launch_main`]). A layer that is asked for and cannot be had is an error, never a silence.
+//!
+//! Three processes result. The *launcher*, which the caller sees, stays outside and mirrors how the
+//! inner process ended. *Init* is process 1 of the inner process namespace: when it dies, so does
+//! everything inside, daemons included. It dies with the launcher, and the launcher with the thread that
+//! started it. The third is *locked*, the only one that ever runs foreign code.
+
+pub mod policy;
+
+#[cfg(target_os = "linux")]
+mod cgroup;
+#[cfg(target_os = "linux")]
+pub mod doctor;
+#[cfg(target_os = "linux")]
+mod family;
+#[cfg(target_os = "linux")]
+mod filter;
+#[cfg(target_os = "linux")]
+mod landlocked;
+#[cfg(target_os = "linux")]
+mod launch;
+#[cfg(target_os = "linux")]
+mod locked;
+#[cfg(target_os = "linux")]
+mod privileges;
+#[cfg(target_os = "linux")]
+mod root;
+
+#[cfg(target_os = "linux")]
+pub use launch::{command, launch_main, lock_self, locked_pid, orders};
+pub use policy::{
+    Bind, Gpu, InForce, Isolation, Kind, Layers, Limits, Policy, SandboxError, Scratch, read_report,
+};
+
+/// The exit code of a child that could not lock itself. Foreign code can exit with it too:
+/// [`read_report`] tells which it was.
+pub const EXIT_NOT_LOCKED: u8 = 70;
+
+/// The hidden command of the binary that ends in [`launch_main`].
+pub const LAUNCH_COMMAND: &str = "__launch";

@@ -1,0 +1,148 @@
+//! Compiling hand-ins by the recorded call.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+
+use umbra::build::{BuildOutcome, BuildReport, Recording, compile, default_limits};
+use umbra::process::Limits;
+use umbra::worker::{BsdfQuery, BsdfSource, Job, Request, SceneRef, Supervisor};
+
+fn workspace() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}
+
+fn umbra() -> &'static Path {
+    Path::new(env!("CARGO_BIN_EXE_umbra"))
+}
+
+fn recording() -> &'static Recording {
+    static RECORDING: OnceLock<Recording> = OnceLock::new();
+    RECORDING.get_or_init(|| Recording::obtain(workspace(), umbra()).unwrap())
+}
+
+fn build(src: &Path, out: &Path, limits: &Limits) -> BuildReport {
+    compile(recording(), umbra(), src, out, limits, &AtomicBool::new(false)).unwrap()
+}
+
+/// Compiles a crate of one file.
+fn build_text(text: &str, limits: &Limits) -> BuildReport {
+    let dir = tempfile::tempdir().unwrap();
+    let (src, out) = (dir.path().join("handin/src"), dir.path().join("out"));
+    std::fs::create_dir_all(&src).unwrap();
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(src.join("lib.rs"), text).unwrap();
+    build(&src, &out, limits)
+}
+
+#[test]
+fn a_recording_is_made_once_and_stages_nothing_but_the_closure() {
+    let begin = std::time::Instant::now();
+    let again = Recording::obtain(workspace(), umbra()).unwrap();
+    assert_eq!(&again, recording());
+    assert!(begin.elapsed().as_secs() < 100);
+    let names: Vec<String> = std::fs::read_dir(&again.closure)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    let has = |name: &str| names.iter().any(|file| file.starts_with(&format!("lib{name}-")));
+    for inside in ["basecode", "renderer_api", "glam", "wgpu"] {
+        assert!(has(inside), "{inside} is missing in {names:?}");
+    }
+    for outside in ["umbra", "clap", "reference_impl", "student_template", "nix"] {
+        assert!(!has(outside), "{outside} is staged");
+    }
+}
+
+#[test]
+fn cargo_and_the_replay_build_renderers_that_draw_the_same() {
+    let cargo: PathBuf = workspace().join("target/release/libreference_impl.so");
+    assert!(cargo.is_file(), "run `cargo build --release --workspace` first");
+    let dir = tempfile::tempdir().unwrap();
+    let report = build(&workspace().join("reference_impl/src"), dir.path(), &default_limits());
+    let BuildOutcome::Built { library } = report.outcome else { panic!("{:#?}", report.outcome) };
+    eprintln!("replay: {:.2} s wall, {:.2} s cpu", report.wall_s, report.cpu_s);
+    assert!(report.warnings.is_empty(), "{:#?}", report.warnings);
+
+    std::fs::write(dir.path().join("s.toml"), "[input]\nobjfile = \"s.obj\"\n").unwrap();
+    let obj = "mtllib s.mtl\nv -9 0 -9\nv 9 0 -9\nv 9 0 9\nv -9 0 9\nv 0 3 0\nv 1 3 0\nv 0 3 1\n\
+               o floor\nusemtl shiny\nf 4 3 2 1\no lamp\nusemtl lamp\nf 5 6 7\n";
+    std::fs::write(dir.path().join("s.obj"), obj).unwrap();
+    let mtl = "newmtl shiny\nKd 0.5 0.4 0.3\nKs 0.2 0.3 0.4\nNs 9.8\nillum 4\n\
+               newmtl lamp\nKd 0 0 0\nKe 10 20 30\nillum 7\n";
+    std::fs::write(dir.path().join("s.mtl"), mtl).unwrap();
+    let scene = SceneRef { path: dir.path().join("s.toml"), options: String::new() };
+    let source = BsdfSource::Phong { diffuse: [0.3; 3], specular: [0.6; 3], exponent: 7.5 };
+    let (wo, wi) = ([0.6, 0.0, 0.8], [-0.48, 0.36, 0.8]);
+    let query = BsdfQuery { source, uv: [0.0; 2], wo, wi };
+    let requests = vec![
+        Request::RenderOffline {
+            scene: scene.clone(),
+            width: 64,
+            height: 48,
+            spp: 4,
+            seed: 260_123_456,
+            threads: 2,
+            shadows: true,
+        },
+        Request::EvalBsdf { scene, queries: vec![query] },
+    ];
+    let supervisor = Supervisor { umbra: umbra().to_owned(), scratch: dir.path().to_owned() };
+    let draw = |plugin: &Path| {
+        let job = Job { plugin: Some(plugin.to_owned()), requests: requests.clone() };
+        let cancel = AtomicBool::new(false);
+        let report = supervisor.run_job(&job, &Limits::default(), &cancel, &mut |_| {});
+        let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        let answers = report.outcomes.iter().map(|outcome| match outcome.answer() {
+            Some(answer) => bits(&answer.values),
+            None => panic!("{outcome:?}"),
+        });
+        answers.collect::<Vec<_>>()
+    };
+    let (by_cargo, by_replay) = (draw(&cargo), draw(&library));
+    assert_eq!(by_cargo[0].len(), 64 * 48 * 3);
+    assert!(by_cargo[0].iter().any(|bits| f32::from_bits(*bits) > 0.05), "something is lit");
+    assert!(by_cargo == by_replay, "the two builds draw differently");
+}
+
+#[test]
+fn compile_errors_name_file_and_line() {
+    let report =
+        build_text("\n\npub fn f() -> u32 { \"one\" }\nfn g() { h() }\n", &default_limits());
+    let BuildOutcome::CompileError { errors } = &report.outcome else { panic!("{report:#?}") };
+    assert_eq!(errors.len(), 2, "{errors:#?}");
+    for error in errors {
+        let place = error.place.as_ref().unwrap();
+        assert_eq!(place.file, "src/lib.rs");
+        assert!(error.rendered.contains(&format!("src/lib.rs:{}", place.line)));
+        assert!(!error.rendered.contains('\u{1b}'), "colours are off");
+    }
+    let lines: Vec<_> = errors.iter().map(|error| error.place.as_ref().unwrap().line).collect();
+    assert!(lines.contains(&3) && lines.contains(&4), "{lines:?}");
+}
+
+#[test]
+fn warnings_are_kept_and_umbras_own_crates_are_out_of_reach() {
+    let report = build_text("fn unused() {}\n", &default_limits());
+    assert!(matches!(report.outcome, BuildOutcome::Built { .. }), "{report:#?}");
+    assert_eq!(report.warnings.len(), 1);
+    for foreign in ["clap", "umbra", "libc"] {
+        let text = format!("extern crate {foreign};\n");
+        let report = build_text(&text, &default_limits());
+        let refused = matches!(&report.outcome, BuildOutcome::CompileError { .. });
+        assert!(refused, "{foreign}: {:#?}", report.outcome);
+    }
+    // The hand-in's folder besides `src`, and cargo's view of it, are not told.
+    let report = build_text("const _: &str = env!(\"CARGO_HOME\");\n", &default_limits());
+    assert!(matches!(report.outcome, BuildOutcome::CompileError { .. }));
+}
+
+#[test]
+fn a_compiler_that_does_not_end_is_ended() {
+    let text = "#![allow(long_running_const_eval)]\n\
+                pub const N: u64 = { let mut i = 0u64; while i < u64::MAX { i += 1; } i };\n";
+    let limits = Limits { wall_s: 1.0, ..default_limits() };
+    let report = build_text(text, &limits);
+    assert_eq!(report.outcome, BuildOutcome::TimedOut, "{:#?}", report.outcome);
+    assert!(report.wall_s < 2.0);
+}

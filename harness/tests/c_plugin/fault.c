@@ -1,0 +1,175 @@
+/* A plugin that misbehaves on purpose. What it does in render_offline is the scene's options
+ * text; without options it draws zeros. FAULT_AT_LOAD makes a constructor that ends the worker. */
+#include "umbra_renderer.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define TEXT(s) {(const uint8_t *)(s), sizeof(s) - 1}
+
+typedef struct {
+    char mode[64];
+} Loaded;
+
+static int is(UmbraScene scene, const char *mode)
+{
+    return strcmp(((Loaded *)scene)->mode, mode) == 0;
+}
+
+#ifdef FAULT_AT_LOAD
+__attribute__((constructor)) static void at_load(void)
+{
+    _exit(3);
+}
+#endif
+
+static UmbraStatus load_scene(const UmbraSceneRequest *request, UmbraScene *scene,
+                              UmbraMessage *message)
+{
+    size_t length = request->options.length;
+    Loaded *loaded = calloc(1, sizeof *loaded);
+    (void)message;
+    memcpy(loaded->mode, request->options.data, length < 63 ? length : 63);
+    *scene = is(loaded, "null_scene") ? NULL : (UmbraScene)loaded;
+    return UMBRA_STATUS_OK;
+}
+
+static void unload_scene(UmbraScene scene)
+{
+    free(scene);
+}
+
+__attribute__((noinline)) static int recurse(volatile int *above)
+{
+    volatile int here[512];
+    here[0] = above[0] + 1;
+    return recurse(here) + here[0];
+}
+
+static void daemon_that_holds_the_pipe(void)
+{
+    if (fork() == 0) {
+        setsid();
+        sleep(3);
+        _exit(0);
+    }
+    _exit(0);
+}
+
+static UmbraStatus render_offline(UmbraScene scene, const UmbraOfflineSettings *settings,
+                                  float *pixels, size_t float_count, UmbraMessage *message)
+{
+    static int start[1];
+    (void)settings;
+    memset(pixels, 0, float_count * sizeof(float));
+    if (is(scene, "abort"))
+        abort();
+    if (is(scene, "segv"))
+        *(volatile int *)8 = 1;
+    if (is(scene, "exit0"))
+        exit(0);
+    if (is(scene, "loop"))
+        for (volatile int i = 0;; i++)
+            ;
+    if (is(scene, "sleep"))
+        sleep(1000);
+    if (is(scene, "stack"))
+        return recurse(start);
+    if (is(scene, "flood"))
+        for (;;)
+            puts("all work and no play makes Jack a dull boy");
+    if (is(scene, "memory"))
+        for (;;) {
+            char *more = malloc(16 << 20);
+            if (more == NULL)
+                abort();
+            memset(more, 1, 16 << 20);
+        }
+    if (is(scene, "past_end"))
+        pixels[float_count] = 1;
+    if (is(scene, "before_start"))
+        pixels[-1] = 1;
+    if (is(scene, "status"))
+        return 77;
+    if (is(scene, "long_message")) {
+        message->length = (size_t)-1;
+        return UMBRA_STATUS_ERROR;
+    }
+    if (is(scene, "no_adapter"))
+        return UMBRA_STATUS_NO_ADAPTER;
+    if (is(scene, "fork")) {
+        if (fork() == 0)
+            sleep(1000);
+        abort();
+    }
+    if (is(scene, "daemon"))
+        daemon_that_holds_the_pipe();
+    if (is(scene, "truncate")) {
+        if (truncate("../output", 0) != 0)
+            abort();
+    }
+    return UMBRA_STATUS_OK;
+}
+
+static UmbraStatus not_there(UmbraMessage *message)
+{
+    message->length = 0;
+    return UMBRA_STATUS_NOT_IMPLEMENTED;
+}
+static UmbraStatus set_witness(UmbraScene s, const UmbraWitnessBsdf *w, UmbraMessage *m)
+{
+    (void)s, (void)w;
+    return not_there(m);
+}
+static UmbraStatus eval_bsdf(UmbraScene s, const UmbraBsdfQuery *q, size_t n, float *v,
+                             UmbraMessage *m)
+{
+    (void)s, (void)q, (void)n, (void)v;
+    return not_there(m);
+}
+static UmbraStatus radiance(UmbraScene s, const UmbraRadianceSettings *t, const UmbraRayQuery *r,
+                            size_t n, float *v, UmbraMessage *m)
+{
+    (void)s, (void)t, (void)r, (void)n, (void)v;
+    return not_there(m);
+}
+static UmbraStatus open_realtime(UmbraScene s, const UmbraRealtimeSettings *t, UmbraPass *p,
+                                 UmbraMessage *m)
+{
+    (void)s, (void)t, (void)p;
+    return not_there(m);
+}
+static UmbraStatus draw_frame(UmbraPass p, const UmbraCameraValue *c, UmbraMessage *m)
+{
+    (void)p, (void)c;
+    return not_there(m);
+}
+static UmbraStatus read_frame(UmbraPass p, float *v, size_t n, UmbraMessage *m)
+{
+    (void)p, (void)v, (void)n;
+    return not_there(m);
+}
+static void close_realtime(UmbraPass p)
+{
+    (void)p;
+}
+
+const UmbraPlugin umbra_renderer_plugin = {
+    .magic = UMBRA_MAGIC,
+    .interface_version = UMBRA_INTERFACE_VERSION,
+    .struct_size = sizeof(UmbraPlugin),
+    .name = TEXT("fault"),
+    .version = TEXT("1.0"),
+    .load_scene = load_scene,
+    .unload_scene = unload_scene,
+    .set_witness = set_witness,
+    .eval_bsdf = eval_bsdf,
+    .radiance = radiance,
+    .render_offline = render_offline,
+    .open_realtime = open_realtime,
+    .draw_frame = draw_frame,
+    .read_frame = read_frame,
+    .close_realtime = close_realtime,
+};

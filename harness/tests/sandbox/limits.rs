@@ -1,0 +1,94 @@
+//! Limits: of each process, of the scratch, of all together.
+
+use umbra::sandbox::{Kind, Layers, Limits};
+
+use crate::ground::{Ground, Who, everyone};
+
+fn small() -> Limits {
+    Limits { cpu_s: 1, memory_mib: 1024, file_size_mib: 1, open_files: 64, tasks: 16 }
+}
+
+#[test]
+fn each_limit_of_a_process_holds() {
+    for who in everyone() {
+        let ground = Ground::new(who);
+        let scratch = ground.path("scratch");
+        // As root the count of processes needs another user, in a namespace of its own.
+        let mut layers = Layers { rlimits: true, drop_privileges: true, ..Layers::NONE };
+        layers.user_ns = true;
+        let attacks: [(&[&str], &str); 5] = [
+            (&["allocate", "2000"], "ENOMEM"),
+            (&["threads", "100"], "EAGAIN"),
+            (&["descriptors"], "EMFILE"),
+            (&["fill", &scratch], "SIGXFSZ"),
+            (&["spin"], "SIGXCPU"),
+        ];
+        for (args, verdict) in attacks {
+            let mut policy = ground.policy(Kind::Worker, layers);
+            policy.limits = small();
+            let outcome = ground.attack(&policy, args);
+            assert_eq!(outcome.verdict(), verdict, "{who:?} {args:?}: {outcome:?}");
+            if !matches!(args[0], "spin" | "descriptors") {
+                policy.layers = Layers::NONE;
+                let outcome = ground.attack(&policy, args);
+                assert_eq!(outcome.verdict(), "ok", "{who:?} {args:?}, free: {outcome:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn processes_are_counted_per_child() {
+    for who in everyone() {
+        let ground = Ground::new(who);
+        let mut policy = ground.policy(Kind::Build, Layers::full());
+        policy.limits.tasks = 16;
+        // One at its limit does not keep another from starting.
+        let mut hog = ground.command(&policy, &["fork_forever"]);
+        let mut hog = hog.stdout(std::process::Stdio::null()).spawn().expect("the binary");
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        assert_eq!(ground.attack_beside(&policy, &["fork"]).verdict(), "ok", "{who:?}");
+        hog.kill().expect("our child");
+        hog.wait().expect("our child");
+        assert_eq!(ground.attack(&policy, &["fork_forever"]).verdict(), "EAGAIN");
+    }
+}
+
+#[test]
+fn the_scratch_has_a_quota() {
+    for who in everyone() {
+        let ground = Ground::new(who);
+        let layers = Layers { mount_ns: true, user_ns: who == Who::User, ..Layers::NONE };
+        for attack in ["fill", "many"] {
+            let mut policy = ground.policy(Kind::Worker, layers);
+            assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
+            (policy.scratch.quota_mib, policy.scratch.files) = (0, 0);
+            assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
+            policy.scratch.quota_mib = 32;
+            policy.scratch.files = 30_000;
+            assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ok");
+        }
+    }
+}
+
+#[test]
+fn a_control_group_counts_all_together() {
+    for who in everyone() {
+        let ground = Ground::new(who);
+        let mut policy = ground.policy(Kind::Build, Layers { cgroup: true, ..Layers::NONE });
+        policy.limits = Limits { memory_mib: 64, ..small() };
+        let outcome = ground.attack(&policy, &["touch", "200"]);
+        if let Err(error) = &outcome.report {
+            // Optional: not every machine has it. Then it says so, and nothing ran.
+            assert_eq!((&*error.layer, &*outcome.word), ("cgroup", ""), "{outcome:?}");
+            println!("no control groups here: {error}");
+            continue;
+        }
+        assert_eq!(outcome.verdict(), "SIGKILL", "{outcome:?}");
+        assert_eq!(ground.attack(&policy, &["touch", "20"]).verdict(), "ok");
+        policy.layers.pid_ns = true;
+        assert_eq!(ground.attack(&policy, &["fork_forever"]).verdict(), "EAGAIN");
+        policy.layers.cgroup = false;
+        assert_eq!(ground.attack(&policy, &["touch", "200"]).verdict(), "ok");
+    }
+}

@@ -1,0 +1,187 @@
+//! What a grader needs works inside: the compiler, its linker, and the library that they made.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use umbra::sandbox::policy::{PLUGIN, SRC, TOOLCHAIN};
+use umbra::sandbox::{Bind, Isolation, Kind, Layers, Policy, command, doctor};
+
+use crate::ground::{Ground, UMBRA, Who, as_user, everyone, open_to_all};
+
+fn sysroot() -> String {
+    let output = Command::new("rustc").args(["--print", "sysroot"]).output().expect("rustc");
+    String::from_utf8(output.stdout).expect("a path").trim().to_owned()
+}
+
+/// Compiles a library in a locked child, as root: its toolchain may lie in a home of mode 0700.
+fn compile(ground: &Ground, source: &str) -> (Output, Vec<u8>) {
+    let at = |name: &str| ground.path(name);
+    std::fs::create_dir_all(at("src")).expect("a folder");
+    std::fs::write(at("src/lib.rs"), source).expect("a file");
+    std::fs::write(at("lib.so"), "").expect("a file");
+    let mut policy = ground.policy(Kind::Build, Layers::full());
+    policy.read_only.push(Bind::new(sysroot(), TOOLCHAIN));
+    policy.read_only.push(Bind::new(at("src"), SRC));
+    policy.collect.push(Bind::new(at("lib.so"), "/scratch/lib.so"));
+    policy.scratch.quota_mib = 64;
+    let output = locked(
+        ground,
+        &policy,
+        "/toolchain/bin/rustc",
+        &[
+            "--edition=2024",
+            "--crate-type=cdylib",
+            "--crate-name=student",
+            "-Copt-level=3",
+            "-o/scratch/lib.so",
+            "/src/lib.rs",
+        ],
+    );
+    (output, std::fs::read(at("lib.so")).expect("a file"))
+}
+
+fn locked(ground: &Ground, policy: &Policy, program: &str, args: &[&str]) -> Output {
+    let mut command = command(Path::new(UMBRA), policy, Path::new(program), args).expect("orders");
+    as_user(&mut command, ground.who);
+    command.env("PATH", "/usr/bin:/bin").env("TMPDIR", "/scratch").env("HOME", "/scratch");
+    command.stdout(Stdio::piped()).stderr(Stdio::piped()).output().expect("the binary under test")
+}
+
+/// The user who runs the tests: another could not reach the toolchain.
+fn owner() -> Who {
+    everyone()[0]
+}
+
+#[test]
+fn rustc_compiles_what_a_worker_then_loads() {
+    let ground = Ground::new(owner());
+    let source = r#"
+        #[unsafe(no_mangle)]
+        pub extern "C" fn attack(_: i32, _: *const *const std::ffi::c_char) -> i32 {
+            let threads: Vec<_> = (0..4).map(|i| std::thread::spawn(move || i * 7)).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).sum()
+        }"#;
+    let (output, library) = compile(&ground, source);
+    assert!(output.status.success(), "{output:?}");
+    assert!(library.starts_with(b"\x7fELF"));
+    std::fs::write(ground.path("attack.so"), library).expect("a file");
+    let policy = ground.policy(Kind::Worker, Layers::full());
+    let outcome = ground.attack(&policy, &["any"]);
+    assert_eq!(outcome.status.code(), Some(42), "{outcome:?}");
+}
+
+#[test]
+fn rustc_cannot_include_what_is_not_there() {
+    let ground = Ground::new(owner());
+    let secret = ground.path("secret");
+    for path in [&*secret, "/etc/passwd", "/etc/shadow", "/proc/self/environ"] {
+        let text = format!("pub static S: &[u8] = include_bytes!({path:?});");
+        let (output, library) = compile(&ground, &text);
+        assert_eq!(output.status.code(), Some(1), "{output:?}");
+        assert!(library.is_empty());
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(stderr.contains("couldn't read"), "{stderr}");
+        let assembly = format!(".incbin \"{path}\"");
+        let text = format!("core::arch::global_asm!({assembly:?});");
+        let (output, library) = compile(&ground, &text);
+        assert!(!output.status.success() && library.is_empty(), "{output:?}");
+    }
+    // The same source compiles where the file is to be seen.
+    let text = "pub static S: &[u8] = include_bytes!(\"lib.rs\");";
+    assert!(compile(&ground, text).0.status.success());
+}
+
+#[test]
+fn the_linker_works_for_everyone() {
+    for who in everyone() {
+        let ground = Ground::new(who);
+        std::fs::create_dir(ground.path("src")).expect("a folder");
+        std::fs::write(ground.path("src/a.c"), "int two(void) { return 2; }").expect("a file");
+        let mut policy = ground.policy(Kind::Build, Layers::full());
+        policy.read_only.push(Bind::new(ground.path("src"), SRC));
+        std::fs::write(ground.path("lib.so"), "").expect("a file");
+        open_to_all(Path::new(&ground.path("lib.so")), 0o666);
+        policy.collect.push(Bind::new(ground.path("lib.so"), "/scratch/lib.so"));
+        let args = ["-shared", "-fPIC", "-o", "/scratch/lib.so", "/src/a.c"];
+        let output = locked(&ground, &policy, "/usr/bin/cc", &args);
+        assert!(output.status.success(), "{who:?}: {output:?}");
+        assert!(std::fs::read(ground.path("lib.so")).expect("a file").starts_with(b"\x7fELF"));
+    }
+}
+
+#[test]
+fn without_namespaces_there_is_reduced_isolation() {
+    for who in everyone() {
+        let ground = Ground::new(who);
+        let (source, result) = (ground.path("a.s"), ground.path("scratch/lib.so"));
+        std::fs::write(&source, ".globl two\ntwo: ret\n").expect("a file");
+        let layers = Layers {
+            drop_privileges: true,
+            landlock: true,
+            seccomp: true,
+            rlimits: true,
+            ..Layers::NONE
+        };
+        let mut policy = ground.policy(Kind::Build, layers);
+        // Counted with every process of the same user.
+        policy.limits.tasks = 1000;
+        policy.read_only.push(Bind::new(&source, "/src/a.s"));
+        let args = |source| ["-shared", "-fPIC", "-o", &*result, source].map(str::to_owned);
+        let cc = |args: [String; 5]| {
+            let mut command =
+                command(Path::new(UMBRA), &policy, Path::new("/usr/bin/cc"), args).expect("orders");
+            as_user(&mut command, who);
+            command.env("PATH", "/usr/bin:/bin").env("TMPDIR", policy.scratch_path());
+            command.output().expect("the binary under test")
+        };
+        let output = cc(args(&source));
+        assert!(output.status.success(), "{who:?}: {output:?}");
+        assert!(std::fs::read(&result).expect("a file").starts_with(b"\x7fELF"));
+        assert!(!cc(args(&ground.path("secret"))).status.success());
+        let missing = ["user_ns", "mount_ns", "pid_ns", "net_ns"].map(str::to_owned).to_vec();
+        for (attack, errno) in [("read", "EACCES"), ("change", "EACCES")] {
+            let outcome = ground.attack(&policy, &[attack, &ground.path("secret")]);
+            assert_eq!(outcome.verdict(), errno, "{outcome:?}");
+            let isolation = outcome.report.expect("a report").isolation;
+            assert_eq!(isolation, Isolation::Reduced { missing: missing.clone() });
+        }
+    }
+}
+
+#[test]
+fn a_given_file_is_changed_in_place() {
+    for who in everyone() {
+        let ground = Ground::new(who);
+        let table = ground.path("secret");
+        let mut policy = ground.policy(Kind::Worker, Layers::full());
+        let inside = format!("{PLUGIN}/table");
+        assert_eq!(ground.attack(&policy, &["change", &inside]).verdict(), "ENOENT");
+        if who == Who::User {
+            // What a user gives away is the user's own.
+            std::fs::remove_file(&table).expect("a file");
+            let mut make = Command::new("touch");
+            as_user(&mut make, who);
+            assert!(make.arg(&table).status().expect("`touch`").success());
+        } else {
+            open_to_all(Path::new(&table), 0o600);
+        }
+        policy.read_write.push(Bind::new(&table, &inside));
+        let outcome = ground.attack(&policy, &["change", &inside]);
+        assert_eq!(outcome.verdict(), "ok", "{who:?}: {outcome:?}");
+    }
+}
+
+#[test]
+fn the_doctor_finds_what_there_is() {
+    let examination = doctor::examine(Path::new(UMBRA));
+    let names: Vec<_> = examination.findings.iter().map(|finding| &*finding.layer).collect();
+    assert_eq!(names, Layers::NONE.named().map(|(name, _)| name));
+    for finding in &examination.findings {
+        assert_eq!(finding.available, finding.remedy.is_empty(), "{finding:?}");
+    }
+    // The tests of this file need full isolation anyway.
+    assert_eq!(examination.isolation, Isolation::Full);
+    // A binary that is not Umbra proves nothing.
+    let liar = doctor::examine(Path::new("/bin/true"));
+    assert_eq!(liar.isolation, Isolation::None);
+}

@@ -1,0 +1,352 @@
+//! The sample hand-ins: real archives, packed from `samples/`, with the images that their own code
+//! draws. They lie under `target/umbra/samples/`.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use anyhow::{Context, Result, bail, ensure};
+use basecode::exr_io::{Precision, write_exr};
+use basecode::scene::SceneConfig;
+use basecode::{Image, Vec3};
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+use umbra::assignment::Assignment;
+use umbra::build::{self, BuildOutcome, Recording};
+use umbra::worker::{Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef, Supervisor};
+
+/// How one sample is made; `samples/README.md` explains the fields.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    /// What it is about.
+    #[allow(dead_code)]
+    title: String,
+    /// Whose it claims to be.
+    student: StudentEntry,
+    /// Whose source it starts from: another sample, `template` or `nothing`.
+    #[serde(default = "template")]
+    base: String,
+    /// Files of the base that it lacks.
+    #[serde(default)]
+    remove: Vec<PathBuf>,
+    /// Whose code draws its images: `own`, `none` or `from:<sample>`.
+    images: String,
+    /// Where its bonus image lies, if it hands one in.
+    bonus: Option<String>,
+    /// `zip`, `tar` or `tar.gz`.
+    format: String,
+    /// A folder around everything.
+    wrap: Option<String>,
+    /// Files and folders that lie elsewhere than they should: from, to.
+    #[serde(default)]
+    moves: Vec<(String, String)>,
+    /// What it is worth; read by the tests.
+    #[allow(dead_code)]
+    expect: toml::Table,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StudentEntry {
+    first: String,
+    last: String,
+    id: String,
+}
+
+fn template() -> String {
+    "template".to_owned()
+}
+
+/// Packs every sample whose archive is missing or older than its sources; answers their paths.
+pub fn pack() -> Result<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask lies in the repository")?;
+    let packer = Packer::new(root)?;
+    let mut lines = Vec::new();
+    for name in packer.recipes.keys() {
+        lines.push(packer.pack(name).with_context(|| format!("sample {name}"))?.display().to_string());
+    }
+    Ok(lines.join("\n"))
+}
+
+struct Packer {
+    root: PathBuf,
+    out: PathBuf,
+    recipes: BTreeMap<String, Recipe>,
+    assignment: Assignment,
+    supervisor: Supervisor,
+    recording: Recording,
+}
+
+impl Packer {
+    fn new(root: &Path) -> Result<Self> {
+        let umbra = root.join(format!("target/release/umbra{}", std::env::consts::EXE_SUFFIX));
+        ensure!(umbra.is_file(), "{} is missing; hint: cargo build --release --workspace", umbra.display());
+        let mut recipes = BTreeMap::new();
+        for entry in root.join("samples").read_dir()? {
+            let path = entry?.path();
+            let file = path.join("recipe.toml");
+            if file.is_file() {
+                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                let text = fs::read_to_string(&file)?;
+                let recipe = toml::from_str(&text).with_context(|| file.display().to_string())?;
+                recipes.insert(name, recipe);
+            }
+        }
+        ensure!(!recipes.is_empty(), "samples/ holds no recipe.toml");
+        let assignment = Assignment::load(root)?;
+        let scratch = assignment.cache().join("scratch");
+        fs::create_dir_all(&scratch)?;
+        let out = assignment.cache().join("samples");
+        fs::create_dir_all(&out)?;
+        let recording = Recording::obtain(root, &umbra)?;
+        let supervisor = Supervisor { umbra, scratch };
+        Ok(Self { root: root.to_owned(), out, recipes, assignment, supervisor, recording })
+    }
+
+    /// The source files of a sample, relative to `src/`, with their contents.
+    fn source(&self, name: &str) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
+        let recipe = self.recipes.get(name).with_context(|| format!("there is no sample {name}"))?;
+        let mut files = match recipe.base.as_str() {
+            "nothing" => BTreeMap::new(),
+            "template" => read_tree(&self.root.join("student_template/src"))?,
+            base => self.source(base)?,
+        };
+        for path in &recipe.remove {
+            ensure!(files.remove(path).is_some(), "remove: {} is not in the base", path.display());
+        }
+        files.extend(read_tree(&self.root.join("samples").join(name).join("src"))?);
+        Ok(files)
+    }
+
+    fn pack(&self, name: &str) -> Result<PathBuf> {
+        let recipe = &self.recipes[name];
+        let archive = self.out.join(format!("{name}.{}", recipe.format));
+        let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
+        let source = self.source(name)?;
+        for (path, bytes) in &source {
+            files.insert(format!("src/{}", path.display()).replace('\\', "/"), bytes.clone());
+        }
+        let artist = match recipe.images.as_str() {
+            "own" => Some(source),
+            "none" => None,
+            other => match other.strip_prefix("from:") {
+                Some(sample) => Some(self.source(sample)?),
+                None => bail!("images is \"{other}\" but must be own, none or from:<sample>"),
+            },
+        };
+        let key = self.key(&files, recipe, artist.as_ref())?;
+        let key_file = self.out.join(format!(".{name}.key"));
+        if archive.is_file() && fs::read_to_string(&key_file).is_ok_and(|old| old == key) {
+            return Ok(archive);
+        }
+        eprintln!("packing sample {name}");
+        let mut renders = Vec::new();
+        if let Some(source) = &artist {
+            for (path, bytes) in self.draw(source, recipe)? {
+                renders.push(path.clone());
+                files.insert(path, bytes);
+            }
+        }
+        files.insert("config.json".into(), config(recipe, &renders)?);
+        for (from, to) in &recipe.moves {
+            let moved: Vec<String> = files.keys().filter(|path| path.starts_with(from.as_str())).cloned().collect();
+            ensure!(!moved.is_empty(), "moves: nothing lies at {from}");
+            for path in moved {
+                let rest = path[from.len()..].to_owned();
+                let bytes = files.remove(&path).unwrap_or_default();
+                files.insert(format!("{to}{rest}"), bytes);
+            }
+        }
+        write_archive(&archive, recipe, &files)?;
+        fs::write(key_file, key)?;
+        Ok(archive)
+    }
+
+    /// All that an archive depends on.
+    fn key(
+        &self,
+        files: &BTreeMap<String, Vec<u8>>,
+        recipe: &Recipe,
+        artist: Option<&BTreeMap<PathBuf, Vec<u8>>>,
+    ) -> Result<String> {
+        let mut hash = Sha256::new();
+        for (path, bytes) in files {
+            hash.update(path);
+            hash.update(bytes);
+        }
+        for (path, bytes) in artist.into_iter().flatten() {
+            hash.update(path.to_string_lossy().as_bytes());
+            hash.update(bytes);
+        }
+        hash.update(format!("{recipe:?} {}", self.recording.key));
+        for (path, bytes) in read_tree(&self.root.join("scenes"))? {
+            hash.update(path.to_string_lossy().as_bytes());
+            hash.update(bytes);
+        }
+        Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    }
+
+    /// Builds a source and draws the images that a hand-in must contain.
+    fn draw(&self, source: &BTreeMap<PathBuf, Vec<u8>>, recipe: &Recipe) -> Result<Vec<(String, Vec<u8>)>> {
+        let scratch = tempfile::tempdir_in(&self.supervisor.scratch)?;
+        let (src, out) = (scratch.path().join("src"), scratch.path().join("out"));
+        fs::create_dir(&out)?;
+        for (path, bytes) in source {
+            let file = src.join(path);
+            fs::create_dir_all(file.parent().unwrap_or(&src))?;
+            fs::write(file, bytes)?;
+        }
+        let cancel = AtomicBool::new(false);
+        let limits = &self.assignment.limits;
+        let report = build::compile(&self.recording, &self.supervisor.umbra, &src, &out, &limits.build, &cancel)?;
+        let library = match report.outcome {
+            BuildOutcome::Built { library } => library,
+            BuildOutcome::CompileError { errors } => {
+                let first = errors.first().map(|error| error.rendered.clone());
+                bail!("its source does not build:\n{}", first.unwrap_or_default())
+            }
+            other => bail!("its source does not build: {other:?}"),
+        };
+        let seed = recipe.student.id.parse().context("the student's id seeds the sampler")?;
+        let mut asked = Vec::new();
+        for scene in &self.assignment.scenes {
+            let Some(images) = &scene.hand_in else { continue };
+            asked.push((images.offline.clone(), self.request(&scene.offline, seed)?));
+            asked.push((images.realtime.clone(), self.request(&scene.realtime, seed)?));
+            let bonus = recipe.bonus.as_ref().filter(|path| path.contains(&scene.name));
+            if let (Some(path), Some(toml)) = (bonus, &scene.bonus) {
+                asked.push((path.clone(), self.request(toml, seed)?));
+            }
+        }
+        let mut images = Vec::new();
+        for (path, request) in asked {
+            let (Request::RenderOffline { width, height, .. } | Request::RenderRealtime { width, height, .. }) =
+                request
+            else {
+                bail!("only images are asked for");
+            };
+            let is_offline = matches!(request, Request::RenderOffline { .. });
+            let job = Job { plugin: Some(library.clone()), requests: vec![request] };
+            let report = self.supervisor.run_job(&job, &limits.run, &cancel, &mut |_| ());
+            // What does not draw hands in no image.
+            let Some(Outcome::Done(answer)) = report.outcomes.into_iter().next() else { continue };
+            // Realtime images were clamped to [0, 1] by the original course's framebuffer.
+            let pixel = |v: &[f32; 3]| {
+                let v = Vec3::from(*v);
+                if is_offline { v } else { v.clamp(Vec3::ZERO, Vec3::ONE) }
+            };
+            let pixels = answer.values.as_chunks::<3>().0.iter().map(pixel).collect();
+            let image = Image { width: width as usize, height: height as usize, pixels };
+            let file = scratch.path().join("image.exr");
+            write_exr(&file, &image, Precision::Half, &[])?;
+            images.push((path, fs::read(&file)?));
+        }
+        Ok(images)
+    }
+
+    fn request(&self, toml: &Path, seed: u64) -> Result<Request> {
+        let path = self.root.join(toml);
+        let config = SceneConfig::load(&path)?;
+        let scene = SceneRef { path, options: String::new() };
+        let (width, height) = (config.width as u32, config.height as u32);
+        let camera = config.camera;
+        Ok(if config.realtime {
+            Request::RenderRealtime {
+                scene,
+                width,
+                height,
+                shadow_map: config.bonus,
+                adapter: Adapter { kind: AdapterKind::Any, name: String::new() },
+                stages: Vec::new(),
+                cameras: vec![CameraValue {
+                    eye: camera.eye.into(),
+                    at: camera.at.into(),
+                    up: camera.up.into(),
+                    fov_y_deg: camera.fov_y_deg,
+                }],
+            }
+        } else {
+            let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
+            Request::RenderOffline { scene, width, height, spp: config.spp as u32, seed, threads, shadows: true }
+        })
+    }
+}
+
+/// The hand-in's own config.json, in the handout's form.
+fn config(recipe: &Recipe, renders: &[String]) -> Result<Vec<u8>> {
+    let title = |path: &String| {
+        let stem = Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        serde_json::json!({ "scene": stem.replace('_', " "), "render": path })
+    };
+    let config = serde_json::json!({
+        "firstName": recipe.student.first,
+        "lastName": recipe.student.last,
+        "studentID": recipe.student.id,
+        "renders": renders.iter().map(title).collect::<Vec<_>>(),
+    });
+    Ok(serde_json::to_vec_pretty(&config)?)
+}
+
+fn write_archive(archive: &Path, recipe: &Recipe, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
+    let inside = |path: &str| match &recipe.wrap {
+        Some(folder) => format!("{folder}/{path}"),
+        None => path.to_owned(),
+    };
+    let mut bytes = Vec::new();
+    match recipe.format.as_str() {
+        "zip" => {
+            let mut zip = zip::ZipWriter::new(std::io::Cursor::new(&mut bytes));
+            let options = zip::write::SimpleFileOptions::default();
+            for (path, content) in files {
+                zip.start_file(inside(path), options)?;
+                zip.write_all(content)?;
+            }
+            zip.finish()?;
+        }
+        "tar" => write_tar(&mut bytes, files, &inside)?,
+        "tar.gz" => {
+            let mut gz = flate2::write::GzEncoder::new(&mut bytes, flate2::Compression::fast());
+            write_tar(&mut gz, files, &inside)?;
+            gz.finish()?;
+        }
+        other => bail!("format is \"{other}\" but must be zip, tar or tar.gz"),
+    }
+    fs::write(archive, bytes).with_context(|| archive.display().to_string())
+}
+
+fn write_tar(
+    out: &mut impl Write,
+    files: &BTreeMap<String, Vec<u8>>,
+    inside: &dyn Fn(&str) -> String,
+) -> Result<()> {
+    let mut tar = tar::Builder::new(out);
+    for (path, content) in files {
+        let mut header = tar::Header::new_gnu();
+        header.set_size(content.len() as u64);
+        header.set_mode(0o644);
+        tar.append_data(&mut header, inside(path), content.as_slice())?;
+    }
+    tar.finish()?;
+    Ok(())
+}
+
+/// All files below a folder, by their relative paths; nothing when there is no such folder.
+fn read_tree(folder: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
+    let mut files = BTreeMap::new();
+    let mut pending = vec![folder.to_owned()];
+    while let Some(current) = pending.pop() {
+        let Ok(entries) = current.read_dir() else { continue };
+        for entry in entries {
+            let path = entry?.path();
+            if path.is_dir() {
+                pending.push(path);
+            } else {
+                files.insert(path.strip_prefix(folder)?.to_owned(), fs::read(&path)?);
+            }
+        }
+    }
+    Ok(files)
+}
