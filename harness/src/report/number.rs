@@ -104,6 +104,17 @@ pub(super) fn count(number: usize, noun: &str) -> String {
     if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
 }
 
+/// A date as `2006-01-02 15:04 -07:00`; anything but RFC 3339 stays as it is.
+pub(super) fn due(text: &str) -> String {
+    let digits = |range: std::ops::Range<usize>| text.get(range).unwrap_or_default();
+    match (text.parse::<jiff::Timestamp>(), text.get(19..)) {
+        (Ok(_), Some(offset)) if digits(16..17) == ":" => {
+            format!("{} {} {}", digits(0..10), digits(11..16), offset.replace('Z', "UTC"))
+        }
+        _ => text.to_owned(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,6 +133,18 @@ mod tests {
         }
         assert_eq!(range(80.0, 100.0), "80..100");
         assert_eq!(range(80.0, 80.0 + 1e-9), "80");
+    }
+
+    #[test]
+    fn dates_are_readable() {
+        for (text, expected) in [
+            ("2019-10-06T23:59:00-04:00", "2019-10-06 23:59 -04:00"),
+            ("2019-10-06T23:59:00Z", "2019-10-06 23:59 UTC"),
+            ("next week", "next week"),
+            ("山田山田山田山田山田", "山田山田山田山田山田"),
+        ] {
+            assert_eq!(due(text), expected);
+        }
     }
 
     #[test]

@@ -1,10 +1,71 @@
-//! stub
-use super::{Entry, ReportError, Sheet};
-/// stub
-pub fn batch(_sheet: &Sheet) -> Result<String, ReportError> {
-    Ok(String::new())
+//! HTML pages: one for the batch, one for each hand-in. They load nothing, need no script to be
+//! read, and forbid the browser to run any but the one that sorts the table.
+
+mod batch;
+mod checks;
+mod curve;
+mod hand_in;
+mod markup;
+#[cfg(test)]
+mod tests;
+
+use base64::Engine as _;
+use sha2::Digest as _;
+
+pub use batch::batch;
+pub use hand_in::hand_in;
+
+use self::markup::Html;
+use super::Sheet;
+use crate::rubric::PartGrade;
+
+const STYLE: &str = include_str!("style.css");
+/// Sorts the batch's table; the page is whole without it.
+const SORT: &str = include_str!("sort.js");
+
+/// Everything up to the page's content.
+fn begin(title: &str) -> Html {
+    let mut html = Html::default();
+    html.raw("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
+    // Should an escape ever be forgotten, the browser still runs and fetches nothing.
+    let script = base64::engine::general_purpose::STANDARD.encode(sha2::Sha256::digest(SORT));
+    html.raw("<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; ");
+    html.raw("img-src 'self' file:; style-src 'unsafe-inline'; base-uri 'none'; ");
+    html.raw("form-action 'none'; script-src 'sha256-").text(&script).raw("'\">\n");
+    html.raw("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
+    html.raw("<meta name=\"referrer\" content=\"no-referrer\">\n");
+    html.raw("<title>").text(title).raw("</title>\n<style>\n").raw(STYLE);
+    html.raw("</style>\n</head>\n<body>\n");
+    html
 }
-/// stub
-pub fn hand_in(_sheet: &Sheet, _entry: &Entry) -> String {
-    String::new()
+
+/// Everything after the page's content.
+fn end(mut html: Html, sheet: &Sheet) -> String {
+    html.raw("<footer>").text(&sheet.course).raw(" · ").text(&sheet.title).raw(" · due ");
+    html.raw("<time>")
+        .text(&super::number::due(&sheet.due))
+        .raw("</time></footer>\n</body>\n</html>\n");
+    html.finish()
+}
+
+/// The class of points that lie in `[least, most]` of `out_of`: how a cell is coloured.
+fn class(least: f64, most: f64, out_of: f64) -> &'static str {
+    if super::number::is_range(least, most) {
+        "open"
+    } else if least >= out_of {
+        "full"
+    } else if least > 0.0 {
+        "some"
+    } else {
+        "zero"
+    }
+}
+
+/// [`class`] of a part; a bonus that was not earned is nothing lost.
+fn part_class(part: &PartGrade) -> &'static str {
+    if part.bonus && part.points_max == 0.0 {
+        "unearned"
+    } else {
+        class(part.points, part.points_max, part.out_of)
+    }
 }

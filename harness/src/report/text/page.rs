@@ -211,6 +211,15 @@ mod tests {
     }
 
     #[test]
+    fn every_way_into_a_page_is_harmless() {
+        let mut page = Page::new(80, false);
+        page.line(&[(Style::Plain, "a\u{1b}[2J\nb")]);
+        page.wrapped(&[(Style::Plain, "\0")], Style::Plain, "c\u{202e}");
+        assert_eq!(page.finish(), "a\\u{1b}[2J\\nb\n\\u{0}c\\u{202e}\n");
+        assert_eq!(columns("\0"), 5);
+    }
+
+    #[test]
     fn colours_only_when_asked() {
         for (colours, expected) in [(false, "a bc\n"), (true, "a \u{1b}[31mbc\u{1b}[0m\n")] {
             let mut page = Page::new(80, colours);

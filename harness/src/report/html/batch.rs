@@ -1,0 +1,136 @@
+//! The page of the batch.
+
+use super::super::number::{count, due, is_range, of_part, points, range};
+use super::super::{Entry, HTML_FILE, ReportError, Sheet};
+use super::markup::Html;
+use super::{SORT, begin, class, end, part_class};
+use crate::grading::Conditions;
+use crate::intake::Severity;
+
+/// The page of the batch: one row for each hand-in, which leads to its own page.
+///
+/// # Errors
+/// When there is no hand-in.
+pub fn batch(sheet: &Sheet) -> Result<String, ReportError> {
+    if sheet.entries.is_empty() {
+        return Err(ReportError::Empty);
+    }
+    let mut html = begin(&sheet.title);
+    html.raw("<header class=\"top\">\n<p class=\"course\">").text(&sheet.course);
+    html.raw("</p>\n<h1>").text(&sheet.title).raw("</h1>\n<p>");
+    html.text(&count(sheet.entries.len(), "hand-in"));
+    let open = |entry: &&Entry| is_range(entry.grade.points, entry.grade.points_max);
+    match sheet.entries.iter().filter(open).count() {
+        0 => {}
+        open => {
+            html.raw(", ").show(open).raw(" not wholly judged (a range of points)");
+        }
+    }
+    html.raw("; due <time>").text(&due(&sheet.due)).raw("</time></p>\n</header>\n<main>\n");
+    table(&mut html, sheet);
+    parts(&mut html, sheet);
+    conditions(&mut html, sheet);
+    html.raw("</main>\n<script>").raw(SORT).raw("</script>\n");
+    Ok(end(html, sheet))
+}
+
+fn table(html: &mut Html, sheet: &Sheet) {
+    html.raw("<div class=\"scroll\" role=\"region\" aria-label=\"Grades\" tabindex=\"0\">\n");
+    html.raw(
+        "<table class=\"grades sortable\">\n<thead><tr><th scope=\"col\">Student, hand-in</th>",
+    );
+    html.raw("<th scope=\"col\" class=\"number\">Total<small>of ");
+    html.text(&points(sheet.rules.total_points())).raw("</small></th>");
+    html.raw("<th scope=\"col\">Number</th>");
+    for part in &sheet.rules.parts {
+        html.raw("<th scope=\"col\" class=\"number\" title=\"").text(&part.title).raw("\">");
+        html.text(&part.id).raw("<small>").raw(if part.bonus { "+" } else { "of " });
+        html.text(&points(part.points)).raw("</small></th>");
+    }
+    html.raw(
+        "<th scope=\"col\">Findings</th><th scope=\"col\">Remarks</th></tr></thead>\n<tbody>\n",
+    );
+    for entry in &sheet.entries {
+        row(html, sheet, entry);
+    }
+    html.raw("</tbody>\n</table>\n</div>\n");
+}
+
+fn row(html: &mut Html, sheet: &Sheet, Entry { record, grade }: &Entry) {
+    let student = &record.student;
+    let name = student.full_name();
+    let shown = if name.is_empty() { "(no name)" } else { &name };
+    let key = format!("{} {}", student.last_name, student.first_name);
+    html.raw("<tr><th scope=\"row\" data-sort=\"").text(&key).raw("\"><a href=\"");
+    html.address(&format!("{}/{HTML_FILE}", record.slug)).raw("\">").text(shown);
+    html.raw("</a><small>").text(&record.name).raw("</small></th>");
+    html.raw("<td class=\"number total ");
+    html.raw(class(grade.points, grade.points_max, grade.out_of)).raw("\" data-sort=\"");
+    html.show(grade.points).raw("\">").text(&range(grade.points, grade.points_max));
+    html.raw("</td><td>").text(&student.id).raw("</td>");
+    for part in &sheet.rules.parts {
+        match grade.parts.iter().find(|own| own.id == part.id) {
+            Some(own) => {
+                html.raw("<td class=\"number ").raw(part_class(own)).raw("\" data-sort=\"");
+                html.show(own.points).raw("\">").text(&of_part(own)).raw("</td>");
+            }
+            None => {
+                html.raw("<td></td>");
+            }
+        }
+    }
+    html.raw("<td class=\"findings\">");
+    let mut several = false;
+    for severity in [Severity::Error, Severity::Warning, Severity::Note] {
+        let number = record.findings.iter().filter(|found| found.severity == severity).count();
+        if number > 0 {
+            html.raw(if several { ", " } else { "" });
+            html.text(&count(number, &severity.to_string()));
+            several = true;
+        }
+    }
+    html.raw("</td><td class=\"remarks\">").text(&grade.remarks.join("; ")).raw("</td></tr>\n");
+}
+
+fn parts(html: &mut Html, sheet: &Sheet) {
+    html.raw("<details>\n<summary>The parts and what decides them</summary>\n");
+    html.raw(
+        "<div class=\"scroll\" role=\"region\" aria-label=\"Parts\" tabindex=\"0\">\n<table>\n",
+    );
+    html.raw("<thead><tr><th scope=\"col\">Part</th><th scope=\"col\">Title</th>");
+    html.raw("<th scope=\"col\" class=\"number\">Points</th><th scope=\"col\">Checks</th></tr></thead>\n<tbody>\n");
+    for part in &sheet.rules.parts {
+        html.raw("<tr><th scope=\"row\">").text(&part.id).raw("</th><td>").text(&part.title);
+        html.raw("</td><td class=\"number\">").raw(if part.bonus { "+" } else { "" });
+        html.text(&points(part.points)).raw("</td><td>").text(&part.evidence.join(", "));
+        if !part.fallback.is_empty() {
+            html.raw("; when they do not apply: ").text(&part.fallback.join(", "));
+        }
+        html.raw("</td></tr>\n");
+    }
+    html.raw("</tbody>\n</table>\n</div>\n");
+    super::curve::curve(html, &sheet.rules.curve, &[]);
+    html.raw("</details>\n");
+}
+
+fn conditions(html: &mut Html, sheet: &Sheet) {
+    let mut seen: Vec<(&Conditions, usize)> = Vec::new();
+    for Entry { record, .. } in &sheet.entries {
+        match seen.iter_mut().find(|(other, _)| **other == record.conditions) {
+            Some((_, number)) => *number += 1,
+            None => seen.push((&record.conditions, 1)),
+        }
+    }
+    html.raw("<section>\n<h2>Conditions</h2>\n");
+    if seen.len() > 1 {
+        html.raw("<p class=\"notice\">These hand-ins were not graded under the same conditions: ");
+        html.raw("their points are not strictly comparable.</p>\n");
+    }
+    for (conditions, number) in &seen {
+        if seen.len() > 1 {
+            html.raw("<p>").text(&count(*number, "hand-in")).raw(":</p>\n");
+        }
+        super::hand_in::conditions(html, conditions);
+    }
+    html.raw("</section>\n");
+}

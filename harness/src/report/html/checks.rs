@@ -1,0 +1,102 @@
+//! The checks on a hand-in's page: what failed in full and with pictures, the rest folded.
+
+use super::super::number::{self, is_failure, value};
+use super::markup::Html;
+use crate::evidence::{Check, Measure, Picture, Verdict};
+
+/// All checks, those that cost points first.
+pub(super) fn checks(html: &mut Html, checks: &[Check]) {
+    // A check is linked by its place in the evidence, wherever it is shown.
+    let pick = |wanted: fn(&Check) -> bool| -> Vec<(usize, &Check)> {
+        checks.iter().enumerate().filter(|(_, check)| wanted(check)).collect()
+    };
+    let failed = pick(is_failure);
+    if !failed.is_empty() {
+        html.raw("<section>\n<h2>What is wrong</h2>\n");
+        for (place, check) in failed {
+            article(html, place, check);
+        }
+        html.raw("</section>\n");
+    }
+    let silent = |check: &Check| matches!(check.verdict, Verdict::NotJudged | Verdict::NotRun);
+    folded(html, "could not be judged", true, &pick(silent));
+    folded(html, "passed", false, &pick(|check| check.verdict == Verdict::Pass));
+}
+
+fn folded(html: &mut Html, what: &str, open: bool, checks: &[(usize, &Check)]) {
+    if checks.is_empty() {
+        return;
+    }
+    html.raw(if open { "<details open>" } else { "<details>" }).raw("\n<summary>");
+    html.text(&number::count(checks.len(), "check")).raw(" ").text(what).raw("</summary>\n");
+    for (place, check) in checks {
+        article(html, *place, check);
+    }
+    html.raw("</details>\n");
+}
+
+fn article(html: &mut Html, place: usize, check: &Check) {
+    html.raw("<article id=\"check-").show(place).raw("\">\n<h3>");
+    badge(html, check.verdict);
+    html.raw(" <code>").text(&check.id).raw("</code>");
+    if !check.scene.is_empty() {
+        html.raw(" <span class=\"scene\">on ").text(&check.scene).raw("</span>");
+    }
+    if check.held_back {
+        html.raw(" <span class=\"badge unsure\">held back</span>");
+    }
+    html.raw("</h3>\n<p>").text(&check.summary).raw("</p>\n");
+    if !check.hint.is_empty() {
+        html.raw("<p class=\"hint\"><b>Hint</b> ").text(&check.hint).raw("</p>\n");
+    }
+    // Without a measure the error is only "wrong", which the verdict says.
+    if check.verdict == Verdict::Fail && !check.measures.is_empty() {
+        html.raw("<p class=\"error\">Error <b>").text(&value(check.error));
+        html.raw(
+            "</b> <span class=\"of\">(0 is right, 1 as large as the answer itself)</span></p>\n",
+        );
+    }
+    measures(html, &check.measures);
+    pictures(html, check);
+    html.raw("</article>\n");
+}
+
+fn badge(html: &mut Html, verdict: Verdict) {
+    // A sign and a word, so that nothing hangs on the colour.
+    html.raw(match verdict {
+        Verdict::Pass => "<span class=\"badge good\">✓ ",
+        Verdict::Fail | Verdict::NotImplemented => "<span class=\"badge bad\">✗ ",
+        Verdict::NotJudged | Verdict::NotRun => "<span class=\"badge unsure\">? ",
+    });
+    html.text(number::verdict(verdict)).raw("</span>");
+}
+
+fn measures(html: &mut Html, measures: &[Measure]) {
+    if measures.is_empty() {
+        return;
+    }
+    html.raw("<table class=\"measures\">\n<thead><tr><th scope=\"col\">Measure</th>");
+    html.raw("<th scope=\"col\" class=\"number\">Value</th><th scope=\"col\" class=\"number\">");
+    html.raw("At most</th><th scope=\"col\">Verdict</th></tr></thead>\n<tbody>\n");
+    for measure in measures {
+        html.raw(if measure.passed { "<tr>" } else { "<tr class=\"failed\">" });
+        html.raw("<th scope=\"row\">").text(&measure.name).raw("</th><td class=\"number\">");
+        html.text(&value(measure.value)).raw("</td><td class=\"number\">");
+        html.text(&value(measure.bound)).raw("</td><td>");
+        html.raw(if measure.passed { "✓ pass" } else { "✗ fail" }).raw("</td></tr>\n");
+    }
+    html.raw("</tbody>\n</table>\n");
+}
+
+fn pictures(html: &mut Html, check: &Check) {
+    if check.pictures.is_empty() {
+        return;
+    }
+    html.raw("<div class=\"pictures\">\n");
+    for Picture { title, file } in &check.pictures {
+        html.raw("<figure><a href=\"").address(file).raw("\"><img loading=\"lazy\" src=\"");
+        html.address(file).raw("\" alt=\"").text(&check.name()).raw(": ").text(title);
+        html.raw("\"></a><figcaption>").text(title).raw("</figcaption></figure>\n");
+    }
+    html.raw("</div>\n");
+}

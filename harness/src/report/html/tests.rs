@@ -1,0 +1,132 @@
+use super::super::{ReportError, sample};
+use super::*;
+
+#[test]
+fn pages_say_what_matters() {
+    let sheet = sample::sheet();
+    let page = batch(&sheet).unwrap();
+    for words in [
+        "<a href=\"./two_cosines/report.html\">Jörg Müller</a><small>two_cosines.tar.gz</small>",
+        "<td class=\"number total open\" data-sort=\"64.85\">64.85..84.85</td>",
+        "<td class=\"number open\" data-sort=\"0\">0..20</td>",
+        "3 hand-ins, 1 not wholly judged",
+        "not graded under the same conditions",
+        "1 warning, 1 note",
+    ] {
+        assert!(page.contains(words), "{words:?} is not in the batch's page");
+    }
+    let page = hand_in(&sheet, &sheet.entries[1]);
+    for words in [
+        "<strong>64.85..84.85</strong> of 75 points",
+        "<b>Hint</b> cos theta_i is multiplied twice: eval() holds it already",
+        "<a href=\"#check-2\">radiance.lit @ cbox</a>",
+        "<article id=\"check-2\">",
+        "src=\"./radiance_lit_cbox_expected.png\" alt=\"radiance.lit @ cbox: expected\"",
+        "it is for the instructor",
+        "<summary>2 checks passed</summary>",
+        "<summary>2 checks could not be judged</summary>",
+        "<code>src/lib.rs:12</code> the source uses unsafe",
+    ] {
+        assert!(page.contains(words), "{words:?} is not in the hand-in's page");
+    }
+    let page = hand_in(&sheet, &sheet.entries[2]);
+    assert!(page.contains("expected `Vec3`, found `f32`"));
+    assert!(!hand_in(&sheet, &sheet.entries[0]).contains("What is wrong"));
+}
+
+/// Every tag that stands in a page, in order: what a browser sees of structure.
+fn tags(page: &str) -> Vec<&str> {
+    page.split('<').skip(1).map(|rest| rest.split(['>', ' ', '\n']).next().unwrap()).collect()
+}
+
+#[test]
+fn hostile_words_stay_words() {
+    let evil = "</title></pre><script>alert(1)</script><img src=x onerror=alert(1)>\"'><b>\u{1b}[2J\u{202e}\0";
+    let mut sheet = sample::sheet();
+    let plain = sheet.clone();
+    for entry in &mut sheet.entries {
+        let record = &mut entry.record;
+        record.name = evil.into();
+        record.student.first_name = evil.into();
+        record.student.last_name = evil.into();
+        record.student.id = evil.into();
+        record.conditions.adapter.push_str(evil);
+        for finding in &mut record.findings {
+            finding.path = finding.path.as_ref().map(|_| evil.into());
+            finding.message = evil.into();
+            finding.hint = finding.hint.as_ref().map(|_| evil.into());
+        }
+        if !record.diagnostics.is_empty() {
+            record.diagnostics = evil.into();
+        }
+        for check in &mut record.evidence.checks {
+            check.summary = evil.into();
+            if !check.hint.is_empty() {
+                check.hint = evil.into();
+            }
+            for measure in &mut check.measures {
+                measure.name = evil.into();
+            }
+            for picture in &mut check.pictures {
+                picture.title = evil.into();
+                picture.file = "\" onerror=alert(1) javascript:x".into();
+            }
+        }
+        for part in &mut entry.grade.parts {
+            part.reason = evil.into();
+        }
+    }
+    let mut pages = vec![(batch(&plain).unwrap(), batch(&sheet).unwrap())];
+    for (plain_entry, entry) in plain.entries.iter().zip(&sheet.entries) {
+        pages.push((hand_in(&plain, plain_entry), hand_in(&sheet, entry)));
+    }
+    for (plain, page) in pages {
+        similar_asserts::assert_eq!(tags(&plain), tags(&page));
+        assert!(page.contains("&lt;script&gt;alert(1)"));
+        assert!(!page.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
+        assert!(!page.contains("\" onerror") && !page.contains("javascript:"));
+    }
+}
+
+#[test]
+fn pages_load_nothing_from_elsewhere() {
+    let sheet = sample::sheet();
+    let mut pages = vec![batch(&sheet).unwrap()];
+    pages.extend(sheet.entries.iter().map(|entry| hand_in(&sheet, entry)));
+    for page in pages {
+        assert!(!page.contains("http:") && !page.contains("https:") && !page.contains("url("));
+        assert!(page.contains("default-src 'none'"));
+    }
+}
+
+#[test]
+fn an_empty_batch_is_an_error() {
+    let sheet = Sheet { entries: Vec::new(), ..sample::sheet() };
+    assert!(matches!(batch(&sheet), Err(ReportError::Empty)));
+}
+
+/// Writes pages to look at: `UMBRA_LOOK=DIR cargo test --release -p umbra --lib look -- --ignored`.
+#[test]
+#[ignore = "for eyes, not for machines"]
+fn look() {
+    let Some(out) = std::env::var_os("UMBRA_LOOK") else { return };
+    let mut sheet = sample::sheet();
+    // A batch has many rows and the handout nine parts.
+    for id in ["2.1", "2.2", "2.3"] {
+        let mut part = sheet.rules.parts[0].clone();
+        part.id = id.into();
+        sheet.rules.parts.insert(sheet.rules.parts.len() - 2, part);
+        for entry in &mut sheet.entries {
+            let mut own = entry.grade.parts[0].clone();
+            own.id = id.into();
+            let place = entry.grade.parts.len() - 2;
+            entry.grade.parts.insert(place, own);
+        }
+    }
+    for index in 0..24 {
+        let mut entry = sheet.entries[index % 3].clone();
+        entry.record.slug.push_str(&format!("_{index}"));
+        sheet.entries.push(entry);
+    }
+    super::super::write(std::path::Path::new(&out), &sheet).unwrap();
+}
