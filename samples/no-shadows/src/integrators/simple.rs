@@ -13,6 +13,9 @@ impl Integrator for SimpleIntegrator {
         let Some(i) = scene.intersect(ray) else {
             return Vec3::ZERO;
         };
+        if self.shadows && !light_is_visible(scene, &i) {
+            return Vec3::ZERO;
+        }
         unshadowed(scene, i)
     }
 }
@@ -24,4 +27,10 @@ fn unshadowed(scene: &Scene, mut i: SurfaceInteraction) -> Vec3 {
     let incident = scene.first_light_intensity() / to_light.length_squared();
     // eval() holds the cosine already.
     incident * scene.bsdf(&i).eval(&i)
+}
+
+/// Whether nothing stands between the surface at `i` and the light.
+fn light_is_visible(_scene: &Scene, _i: &SurfaceInteraction) -> bool {
+    // TODO(A2) 1.4
+    true
 }
