@@ -227,8 +227,13 @@ int attack(int argc, char **argv) {
         /* Bounded, so that a hole hurts nobody. */
         for (int i = 0; i < 200; i++) {
             pid_t child = fork();
-            if (child < 0) return say(-1);
-            if (child == 0) { sleep(2); _exit(0); }
+            if (child < 0) {
+                int kept = errno;
+                sleep(number);
+                errno = kept;
+                return say(-1);
+            }
+            if (child == 0) { sleep(2 + number); _exit(0); }
         }
         return say(0);
     }

@@ -1,8 +1,10 @@
 //! Each layer by itself stops what is its to stop.
 
-use umbra::sandbox::{Kind, Layers};
+use std::path::Path;
 
-use crate::ground::{Ground, Who, everyone};
+use umbra::sandbox::{Bind, Kind, Layers};
+
+use crate::ground::{Ground, Who, everyone, open_to_all};
 
 /// Only this layer, with what it needs to work at all.
 fn only(name: &str, who: Who) -> Layers {
@@ -53,11 +55,15 @@ fn mount_namespace_hides_files() {
             attacks.push((words(&["list", "/root"]), "ENOENT"));
         }
         expect("mount_ns", who, Kind::Worker, &attacks, &ground);
-        // Not to be tried without the layer.
-        for place in ["/new", "/usr/lib/new", "/plugin/new"] {
-            let policy = ground.policy(Kind::Worker, only("mount_ns", who));
+        // Writable outside, read-only inside; and a root that is nobody's to change.
+        open_to_all(Path::new(&ground.path("jail")), 0o777);
+        let mut policy = ground.policy(Kind::Worker, only("mount_ns", who));
+        policy.read_only.push(Bind::new(ground.path("jail"), "/src"));
+        for place in ["/new", "/src/new", "/plugin/new"] {
             assert_eq!(ground.attack(&policy, &["write", place]).verdict(), "EROFS", "{place}");
         }
+        let free = ground.policy(Kind::Worker, Layers::NONE);
+        assert_eq!(ground.attack(&free, &["write", &ground.path("jail/new")]).verdict(), "ok");
     }
 }
 

@@ -44,7 +44,7 @@ fn processes_are_counted_per_child() {
         let mut policy = ground.policy(Kind::Build, Layers::full());
         policy.limits.tasks = 16;
         // One at its limit does not keep another from starting.
-        let mut hog = ground.command(&policy, &["fork_forever"]);
+        let mut hog = ground.command(&policy, &["fork_forever", "10"]);
         let mut hog = hog.stdout(std::process::Stdio::null()).spawn().expect("the binary");
         std::thread::sleep(std::time::Duration::from_millis(100));
         assert_eq!(ground.attack_beside(&policy, &["fork"]).verdict(), "ok", "{who:?}");
