@@ -205,7 +205,7 @@ fn what_cannot_be_had_is_an_error() {
         if who == Who::User {
             let mut policy = full.clone();
             policy.layers.user_ns = false;
-            broken.push(("mount_ns", policy));
+            broken.push(("pid_ns", policy));
         }
         for (layer, policy) in broken {
             let outcome = ground.attack(&policy, &["write", "/scratch/mine"]);
