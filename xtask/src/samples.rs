@@ -32,6 +32,16 @@ pub struct Recipe {
     /// Files of the base that it lacks.
     #[serde(default)]
     remove: Vec<PathBuf>,
+    /// Files that are the template's again.
+    #[serde(default)]
+    restore: Vec<PathBuf>,
+    /// Files that its archive lacks.
+    #[serde(default)]
+    omit: Vec<String>,
+    /// Whether grading it takes longer than the others: it waits for time limits.
+    #[serde(default)]
+    #[allow(dead_code)]
+    slow: bool,
     /// Whose code draws its images: `own`, `none` or `from:<sample>`.
     images: String,
     /// Where its bonus image lies, if it hands one in.
@@ -117,6 +127,11 @@ impl Packer {
         for path in &recipe.remove {
             ensure!(files.remove(path).is_some(), "remove: {} is not in the base", path.display());
         }
+        let template = self.root.join("student_template/src");
+        for path in &recipe.restore {
+            let bytes = fs::read(template.join(path)).with_context(|| format!("restore: {}", path.display()))?;
+            files.insert(path.clone(), bytes);
+        }
         files.extend(read_tree(&self.root.join("samples").join(name).join("src"))?);
         Ok(files)
     }
@@ -159,6 +174,9 @@ impl Packer {
                 let bytes = files.remove(&path).unwrap_or_default();
                 files.insert(format!("{to}{rest}"), bytes);
             }
+        }
+        for path in &recipe.omit {
+            ensure!(files.remove(path).is_some(), "omit: {path} is not in the archive");
         }
         write_archive(&archive, recipe, &files)?;
         fs::write(key_file, key)?;

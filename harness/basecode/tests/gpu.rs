@@ -9,7 +9,7 @@ use basecode::{Camera, CameraConfig, Error, Mat4, Shape, Vec2, Vec3, vec3, wgpu}
 const VS: Stage = Stage {
     name: "simple.vs",
     text: "struct Frame { view: mat4x4f, projection: mat4x4f }
-        @group(0) @binding(0) var<uniform> frame: Frame;
+        @group(0) @binding(0) var<storage, read> frame: Frame;
         @vertex fn vs_main(@location(0) p: vec3f) -> @builtin(position) vec4f {
             return frame.projection * frame.view * vec4f(p, 1.0);
         }",
@@ -103,7 +103,7 @@ fn a_faulty_stage_is_an_error_with_its_line_and_the_device_lives_on() {
     let error = draw(&gpu, Stage { name: "phong.fs", text }, &target).unwrap_err();
     assert!(error.to_string().contains("fs_main"), "{error}");
     // A uniform that does not fit the layout.
-    let text = "struct M { a: array<vec4f, 9> } @group(2) @binding(0) var<uniform> m: M;
+    let text = "struct M { a: array<vec4f, 9> } @group(2) @binding(0) var<storage, read> m: M;
         @fragment fn fs_main() -> @location(0) vec4f { return m.a[8]; }";
     let error = draw(&gpu, Stage { name: "phong.fs", text }, &target).unwrap_err();
     assert!(matches!(error, Error::Gpu(_)), "{error:?}");

@@ -1,8 +1,8 @@
 //! Questions to a hand-in's plugin, and what becomes of those that get no answer.
 
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use basecode::{Image, Ray, Vec3};
 use renderer_api as api;
@@ -10,8 +10,8 @@ use renderer_api as api;
 use crate::evidence::{Check, Verdict};
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, BsdfQuery, BsdfSource, Job, JobReport, Outcome, RayQuery, Request, SceneRef,
-    Supervisor,
+    Adapter, BsdfQuery, BsdfSource, Job, JobReport, MAX_TIMEOUTS, Matter, Outcome, RayQuery,
+    Request, SceneRef, Supervisor, not_asked,
 };
 
 /// What it takes to run one hand-in.
@@ -26,6 +26,8 @@ pub struct Asker<'a> {
     pub adapter: Result<Adapter, String>,
     /// CPU seconds of all workers so far.
     pub cpu_s: Mutex<f64>,
+    /// Questions of this path that ran out of time so far.
+    pub timeouts: AtomicUsize,
 }
 
 impl Asker<'_> {
@@ -34,17 +36,23 @@ impl Asker<'_> {
         if requests.is_empty() {
             return Vec::new();
         }
+        if self.timeouts.load(Ordering::Relaxed) >= MAX_TIMEOUTS {
+            return requests.iter().map(|_| not_asked()).collect();
+        }
         let job = Job { plugin: plugin.map(Path::to_owned), requests };
         let JobReport { outcomes, runs, .. } =
             self.supervisor.run_job(&job, &self.limits, self.cancel, &mut |_| ());
         if let Ok(mut cpu_s) = self.cpu_s.lock() {
             *cpu_s += runs.iter().map(|run| run.ended.cpu_s).sum::<f64>();
         }
+        let timeouts = outcomes.iter().filter(|outcome| matches!(outcome, Outcome::TimedOut));
+        self.timeouts.fetch_add(timeouts.count(), Ordering::Relaxed);
         outcomes
     }
 
-    /// CPU seconds of workers since the last call.
-    pub fn take_cpu_s(&self) -> f64 {
+    /// Ends a path: answers the CPU seconds of its workers, and forgets its timeouts.
+    pub fn end_path(&self) -> f64 {
+        self.timeouts.store(0, Ordering::Relaxed);
         self.cpu_s.lock().map_or(0.0, |mut cpu_s| std::mem::take(&mut *cpu_s))
     }
 }
@@ -119,6 +127,9 @@ pub fn unanswered(id: &str, scene: &str, parts: &[&str], outcome: &Outcome) -> C
             check(Verdict::Fail, "the renderer printed more than is allowed".into())
         }
         Outcome::NoAdapter(message) => check(Verdict::NotRun, format!("not run here: {message}")),
+        Outcome::NotRun { reason, matter: Matter::Submission } => {
+            check(Verdict::Fail, reason.clone())
+        }
         Outcome::NotRun { reason, .. } => check(Verdict::NotRun, format!("not run here: {reason}")),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use anyhow::Context;
@@ -86,6 +86,7 @@ impl<'a> Grading<'a> {
             cancel: self.cancel,
             adapter: self.adapter.clone(),
             cpu_s: Mutex::new(0.0),
+            timeouts: AtomicUsize::new(0),
         }
     }
 
@@ -148,14 +149,14 @@ impl<'a> Grading<'a> {
         if let Some(plugin) = &plugin {
             say("rendering offline");
             self.offline(&asker, plugin, seed, &mut checks, &mut drawn)?;
-            costs.end("offline", asker.take_cpu_s());
+            costs.end("offline", asker.end_path());
             say("drawing realtime");
             let stages = Stages::read(
                 &hand_in.root.join("src"),
                 &self.assignment.root.join("student_template/src"),
             );
             self.realtime(&asker, plugin, &stages, &mut checks, &mut drawn)?;
-            costs.end("realtime", asker.take_cpu_s());
+            costs.end("realtime", asker.end_path());
         }
         say("comparing the images handed in");
         for case in &self.cases {

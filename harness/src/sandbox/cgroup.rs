@@ -83,8 +83,16 @@ impl Group {
 impl Drop for Group {
     fn drop(&mut self) {
         for folder in &self.folders {
-            // What remains is swept by a later launcher.
-            let _ = fs::remove_dir(folder);
+            // A reaped process may count for another moment; what remains is swept by a later
+            // launcher.
+            for _ in 0..50 {
+                match fs::remove_dir(folder) {
+                    Err(cause) if cause.kind() == io::ErrorKind::ResourceBusy => {
+                        std::thread::sleep(std::time::Duration::from_millis(1));
+                    }
+                    _ => break,
+                }
+            }
         }
     }
 }

@@ -121,6 +121,8 @@ fn begin(policy: &Policy) -> Result<Side, SandboxError> {
         }
         ForkResult::Child => {
             drop((report_out, status_out, life_in));
+            // Its removal is the launcher's.
+            std::mem::forget(group);
             let mut report = Report(File::from(report_in));
             match init(policy, &identity, File::from(life_out)) {
                 Ok(Some((locked, copies))) => {

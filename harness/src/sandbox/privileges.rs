@@ -46,13 +46,13 @@ impl Identity {
     }
 }
 
-/// Leaves the host's namespaces. Without root that begins with a user namespace; the process
-/// namespace holds for the next child.
+/// Leaves the host's namespaces, but for the mount namespace, which is init's to leave: a change
+/// of root would take the launcher along. Without root it begins with a user namespace; the
+/// process namespace holds for the next child.
 pub fn enter_namespaces(policy: &Policy, identity: &Identity) -> Result<(), SandboxError> {
     let layers = &policy.layers;
     let wanted = [
         ("user_ns", layers.user_ns && !identity.root, CloneFlags::CLONE_NEWUSER),
-        ("mount_ns", layers.mount_ns, CloneFlags::CLONE_NEWNS),
         ("pid_ns", layers.pid_ns, CloneFlags::CLONE_NEWPID),
         (
             "net_ns",
@@ -61,14 +61,7 @@ pub fn enter_namespaces(policy: &Policy, identity: &Identity) -> Result<(), Sand
         ),
     ];
     for (layer, _, flags) in wanted.into_iter().filter(|(_, on, _)| *on) {
-        unshare(flags).map_err(|cause| {
-            let error = SandboxError::new(layer, "enter a new namespace", cause);
-            match (layer, identity.root, layers.user_ns) {
-                ("user_ns", ..) => error.hint("allow user namespaces, see `umbra doctor`"),
-                (_, false, false) => error.hint("without root it needs the layer user_ns"),
-                _ => error.hint("containers often forbid it, see `umbra doctor`"),
-            }
-        })?;
+        enter(layer, flags, policy, identity)?;
         if layer == "user_ns" {
             let (uid, gid) = (identity.host_uid, identity.host_gid);
             dumpable(true)?;
@@ -77,6 +70,23 @@ pub fn enter_namespaces(policy: &Policy, identity: &Identity) -> Result<(), Sand
         }
     }
     Ok(())
+}
+
+/// Enters new namespaces of one layer.
+pub fn enter(
+    layer: &str,
+    flags: CloneFlags,
+    policy: &Policy,
+    identity: &Identity,
+) -> Result<(), SandboxError> {
+    unshare(flags).map_err(|cause| {
+        let error = SandboxError::new(layer, "enter a new namespace", cause);
+        match (layer, identity.root, policy.layers.user_ns) {
+            ("user_ns", ..) => error.hint("allow user namespaces, see `umbra doctor`"),
+            (_, false, false) => error.hint("without root it needs the layer user_ns"),
+            _ => error.hint("containers often forbid it, see `umbra doctor`"),
+        }
+    })
 }
 
 /// The files of this process in `/proc`, to be reached when `/proc` no longer is.
@@ -128,8 +138,7 @@ pub fn drop_all(
         }
     }
     if identity.root && policy.layers.user_ns {
-        unshare(CloneFlags::CLONE_NEWUSER)
-            .map_err(|cause| SandboxError::new("user_ns", "enter a new namespace", cause))?;
+        enter("user_ns", CloneFlags::CLONE_NEWUSER, policy, identity)?;
         dumpable(true)?;
         let (uid, gid) = (identity.host_uid, identity.host_gid);
         map_ids(own_proc, (uid, uid), (gid, gid))?;

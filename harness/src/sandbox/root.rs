@@ -7,11 +7,12 @@ use nix::errno::Errno;
 use nix::fcntl::{AT_FDCWD, OFlag, open};
 use nix::libc;
 use nix::mount::{MntFlags, MsFlags, mount, umount2};
+use nix::sched::CloneFlags;
 use nix::sys::stat::Mode;
 use nix::unistd::{Gid, Uid, fchown, pivot_root};
 
 use super::policy::SCRATCH;
-use super::privileges::{Identity, through_proc};
+use super::privileges::{self, Identity, through_proc};
 use super::{Bind, Policy, SandboxError};
 
 /// Where the new root is put together. Any folder that every system has; what it hides stays
@@ -42,6 +43,7 @@ enum What {
 
 /// Makes the new root and moves there. Host paths mean nothing afterwards.
 pub fn enter(policy: &Policy, identity: &Identity) -> Result<(), SandboxError> {
+    privileges::enter("mount_ns", CloneFlags::CLONE_NEWNS, policy, identity)?;
     let none = None::<&str>;
     mount(none, "/", none, MsFlags::MS_REC | MsFlags::MS_PRIVATE, none)
         .map_err(failed("make mounts private".to_owned()))?;

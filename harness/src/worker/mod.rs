@@ -22,4 +22,4 @@ pub use job::{
     Stage,
 };
 pub use outcome::{Answer, JobReport, Matter, Outcome, WitnessUse, WorkerRun};
-pub use supervise::{Progress, Supervisor};
+pub use supervise::{MAX_TIMEOUTS, Progress, Supervisor, not_asked};

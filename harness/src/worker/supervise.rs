@@ -30,6 +30,10 @@ pub struct Supervisor {
     pub scratch: PathBuf,
 }
 
+/// After so many requests of a job ran out of time, the rest is not asked any more: a renderer
+/// that hangs would otherwise cost its limit for every question.
+pub const MAX_TIMEOUTS: usize = 2;
+
 /// How far a job is, by the worker's word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
@@ -39,6 +43,12 @@ pub struct Progress {
     pub requests: usize,
     /// Finished and total rows of the image that is being rendered; 0 of 0 otherwise.
     pub rows: (u32, u32),
+}
+
+/// The outcome of a request that is not asked any more.
+pub fn not_asked() -> Outcome {
+    let reason = "not asked: the renderer ran out of time before".to_owned();
+    Outcome::NotRun { reason, matter: Matter::Submission }
 }
 
 impl Supervisor {
@@ -87,6 +97,12 @@ impl Supervisor {
             }
             // Each worker settles one request at least, so this ends.
             pending.retain(|&index| outcomes[index].is_none());
+            let timeouts = outcomes.iter().filter(|outcome| matches!(outcome, Some(Outcome::TimedOut)));
+            if timeouts.count() >= MAX_TIMEOUTS {
+                for index in std::mem::take(&mut pending) {
+                    outcomes[index] = Some(not_asked());
+                }
+            }
         }
         report.outcomes = outcomes.into_iter().flatten().collect();
         report

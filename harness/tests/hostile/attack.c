@@ -187,6 +187,9 @@ int attack(int argc, char **argv) {
     if (!strcmp(what, "mount")) return say(mount("x", arg, "tmpfs", 0, NULL));
     if (!strcmp(what, "chroot")) return say(chroot(arg));
     if (!strcmp(what, "unshare")) return say(unshare(CLONE_NEWUSER));
+    if (!strcmp(what, "traceable")) return say(prctl(PR_SET_DUMPABLE, 1));
+    /* As what `exec` above becomes. */
+    if (!strcmp(what, "-c")) return say(0);
     if (!strcmp(what, "mknod")) {
         int made = mknod(arg, S_IFCHR | 0600, 0x103);
         if (made == 0) unlink(arg);

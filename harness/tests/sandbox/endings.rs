@@ -19,7 +19,11 @@ fn endings_are_mirrored() {
         let ground = Ground::new(who);
         for kind in [Kind::Worker, Kind::Build] {
             let policy = ground.policy(kind, Layers::full());
-            let status = |args: &[&str]| ground.attack(&policy, args).status;
+            let status = |args: &[&str]| {
+                let outcome = ground.attack(&policy, args);
+                assert!(outcome.report.is_ok(), "{outcome:?}");
+                outcome.status
+            };
             assert_eq!(status(&["exit", "0"]).code(), Some(0));
             assert_eq!(status(&["exit", "3"]).code(), Some(3));
             assert_eq!(status(&["abort"]).signal(), Some(6));
@@ -42,7 +46,8 @@ fn a_daemon_dies_with_its_child_and_lets_go_of_the_pipe() {
             let policy = ground.policy(Kind::Build, layers);
             let mut child = piped(&mut ground.command(&policy, &["daemon"]));
             let mut pipe = child.stdout.take().expect("a pipe");
-            assert!(wait(child).success());
+            let status = wait(child);
+            assert!(status.success(), "{who:?}, pid_ns {pid_ns}: {status}");
             let (text, closed) = drain(&mut pipe, Duration::from_millis(500));
             assert_eq!(closed, pid_ns, "{who:?}, pid_ns {pid_ns}: {text}");
             let left = survivors(&ground.path("")).len();
@@ -200,7 +205,7 @@ fn what_cannot_be_had_is_an_error() {
         if who == Who::User {
             let mut policy = full.clone();
             policy.layers.user_ns = false;
-            broken.push(("mount_ns", policy));
+            broken.push(("pid_ns", policy));
         }
         for (layer, policy) in broken {
             let outcome = ground.attack(&policy, &["write", "/scratch/mine"]);

@@ -31,9 +31,12 @@ static ATTACKS: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hostile/attack.c");
     for (name, flags) in [("attack.so", &["-shared", "-fPIC"][..]), ("attack", &[])] {
+        // Another run of the tests may be reading the file.
+        let new = folder.join(format!("{name}.{}", std::process::id()));
         let mut cc = Command::new("cc");
-        cc.args(["-O1", "-o"]).arg(folder.join(name)).arg(&source).arg("-pthread").args(flags);
+        cc.args(["-O1", "-o"]).arg(&new).arg(&source).arg("-pthread").args(flags);
         assert!(cc.status().expect("a C compiler").success());
+        fs::rename(new, folder.join(name)).expect("one file system");
     }
     folder
 });

@@ -132,7 +132,7 @@ fn landlock_guards_files_ports_and_signals() {
         let victim = ground.victim.id().to_string();
         let environ = format!("/proc/{victim}/environ");
         let (secret, expected) = (ground.path("secret"), ground.path("expected"));
-        let new = ground.path("new");
+        let (new, program) = (ground.path("new"), ground.path("attack"));
         let version = ground
             .attack(&ground.policy(Kind::Worker, only("landlock", who)), &["pid"])
             .report
@@ -145,6 +145,8 @@ fn landlock_guards_files_ports_and_signals() {
             (words(&["change", &secret]), "EACCES"),
             (words(&["write", &new]), "EACCES"),
             (words(&["exec", "/bin/sh"]), "EACCES"),
+            // One that it may read.
+            (words(&["exec", &program]), "EACCES"),
             (words(&["ptrace", &victim]), "EPERM"),
         ];
         if version >= 4 {
@@ -179,6 +181,7 @@ fn filter_refuses_calls() {
             (words(&["reach", &victim]), "EPERM"),
             (words(&["reach", "-1"]), "EPERM"),
             (words(&["lower_limit"]), "EPERM"),
+            (words(&["traceable"]), "ENOSYS"),
             (words(&["unshare"]), "EPERM"),
             (words(&["shm"]), "EPERM"),
             (words(&["call", &personality]), "EPERM"),

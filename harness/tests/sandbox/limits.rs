@@ -1,8 +1,10 @@
 //! Limits: of each process, of the scratch, of all together.
 
+use std::path::Path;
+
 use umbra::sandbox::{Kind, Layers, Limits};
 
-use crate::ground::{Ground, Who, everyone};
+use crate::ground::{Ground, Who, everyone, piped};
 
 fn small() -> Limits {
     Limits { cpu_s: 1, memory_mib: 1024, file_size_mib: 1, open_files: 64, tasks: 16 }
@@ -62,7 +64,11 @@ fn the_scratch_has_a_quota() {
         for attack in ["fill", "many"] {
             let mut policy = ground.policy(Kind::Worker, layers);
             assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
-            (policy.scratch.quota_mib, policy.scratch.files) = (0, 0);
+            // To the kernel, 0 would mean without limit.
+            match attack {
+                "fill" => policy.scratch.quota_mib = 0,
+                _ => policy.scratch.files = 0,
+            }
             assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
             policy.scratch.quota_mib = 32;
             policy.scratch.files = 30_000;
@@ -88,6 +94,13 @@ fn a_control_group_counts_all_together() {
         assert_eq!(ground.attack(&policy, &["touch", "20"]).verdict(), "ok");
         policy.layers.pid_ns = true;
         assert_eq!(ground.attack(&policy, &["fork_forever"]).verdict(), "EAGAIN");
+        let full = Layers { cgroup: true, ..Layers::full() };
+        let mut child = piped(&mut ground.command(&ground.policy(Kind::Build, full), &["fork"]));
+        assert!(child.wait().expect("our child").success());
+        for controller in ["", "memory", "pids"] {
+            let group = format!("/sys/fs/cgroup/{controller}/umbra-{}", child.id());
+            assert!(!Path::new(&group).exists(), "{group} is left");
+        }
         policy.layers.cgroup = false;
         assert_eq!(ground.attack(&policy, &["touch", "200"]).verdict(), "ok");
     }

@@ -64,7 +64,7 @@ fn attacks(ground: &Ground, kind: Kind) -> Vec<(Vec<String>, &'static str)> {
     add(&["change", "/plugin/attack.so"], "EROFS");
     add(&["chmod", "/plugin/attack.so"], "EROFS");
     add(&["exec", "/bin/bash"], if executes { "ok" } else { "EPERM" });
-    add(&["exec", "/plugin/attack"], if executes { "-c" } else { "EPERM" });
+    add(&["exec", "/plugin/attack"], if executes { "ok" } else { "EPERM" });
     add(&["fork"], if executes { "ok" } else { "EPERM" });
     add(&["clone3"], "ENOSYS");
     add(&["tcp", &port], "EPERM");
@@ -80,6 +80,7 @@ fn attacks(ground: &Ground, kind: Kind) -> Vec<(Vec<String>, &'static str)> {
     add(&["memory", "1", "0x1000"], "EPERM");
     add(&["raise_limit"], "EPERM");
     add(&["lower_limit"], "EPERM");
+    add(&["traceable"], "ENOSYS");
     add(&["mount", "/scratch"], "EPERM");
     add(&["chroot", "/scratch"], "EPERM");
     add(&["unshare"], "EPERM");

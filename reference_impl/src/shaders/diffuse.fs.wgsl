@@ -19,9 +19,9 @@ struct Shadow {
     light_view_projection: array<mat4x4f, 6>,
 }
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(2) @binding(0) var<uniform> material: Material;
-@group(3) @binding(0) var<uniform> shadow: Shadow;
+@group(0) @binding(0) var<storage, read> frame: Frame;
+@group(2) @binding(0) var<storage, read> material: Material;
+@group(3) @binding(0) var<storage, read> shadow: Shadow;
 @group(3) @binding(1) var shadow_map: texture_depth_2d_array;
 @group(3) @binding(2) var shadow_sampler: sampler_comparison;
 

@@ -14,8 +14,8 @@ struct Material {
     exponent: vec4f,
 }
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(2) @binding(0) var<uniform> material: Material;
+@group(0) @binding(0) var<storage, read> frame: Frame;
+@group(2) @binding(0) var<storage, read> material: Material;
 
 // TODO(A2) 2.5 (bonus): group 3 holds the shadow map; docs/shader_contract.md shows how to declare it.
 

@@ -44,7 +44,7 @@ impl Layouts {
             entry(
                 0,
                 wgpu::BindingType::Buffer {
-                    ty: wgpu::BufferBindingType::Uniform,
+                    ty: wgpu::BufferBindingType::Storage { read_only: true },
                     has_dynamic_offset: false,
                     min_binding_size: std::num::NonZeroU64::new(size as u64),
                 },

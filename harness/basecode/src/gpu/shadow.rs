@@ -98,7 +98,7 @@ impl ShadowMap {
             ..wgpu::SamplerDescriptor::default()
         });
         let bytes = bytemuck::bytes_of(values);
-        let buffer = filled_buffer(gpu, "shadow", bytes, wgpu::BufferUsages::UNIFORM);
+        let buffer = filled_buffer(gpu, "shadow", bytes, wgpu::BufferUsages::STORAGE);
         let all = view(wgpu::TextureViewDimension::D2Array, 0, count);
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {

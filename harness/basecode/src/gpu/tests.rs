@@ -93,10 +93,10 @@ fn the_page_names_the_constants_of_the_code() {
         assert!(page.contains(&text), "the page lacks {text:?}");
     }
     for (group, line) in [
-        (FRAME_GROUP, "@group(0) @binding(0) var<uniform> frame"),
-        (OBJECT_GROUP, "@group(1) @binding(0) var<uniform> object"),
-        (MATERIAL_GROUP, "@group(2) @binding(0) var<uniform> material"),
-        (SHADOW_GROUP, "@group(3) @binding(0) var<uniform> shadow"),
+        (FRAME_GROUP, "@group(0) @binding(0) var<storage, read> frame"),
+        (OBJECT_GROUP, "@group(1) @binding(0) var<storage, read> object"),
+        (MATERIAL_GROUP, "@group(2) @binding(0) var<storage, read> material"),
+        (SHADOW_GROUP, "@group(3) @binding(0) var<storage, read> shadow"),
     ] {
         assert!(line.starts_with(&format!("@group({group})")) && page.contains(line), "{line}");
     }

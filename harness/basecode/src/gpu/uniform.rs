@@ -31,7 +31,7 @@ impl Uniform {
     }
 
     fn new(gpu: &Gpu, name: &str, layout: &wgpu::BindGroupLayout, bytes: &[u8]) -> Self {
-        let buffer = filled_buffer(gpu, name, bytes, wgpu::BufferUsages::UNIFORM);
+        let buffer = filled_buffer(gpu, name, bytes, wgpu::BufferUsages::STORAGE);
         let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(name),
             layout,

@@ -17,6 +17,6 @@ struct Material {
     exponent: vec4f,
 }
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(1) @binding(0) var<uniform> object: Object;
-@group(2) @binding(0) var<uniform> material: Material;
+@group(0) @binding(0) var<storage, read> frame: Frame;
+@group(1) @binding(0) var<storage, read> object: Object;
+@group(2) @binding(0) var<storage, read> material: Material;

@@ -14,15 +14,15 @@ struct Material {
     exponent: vec4f,
 }
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(2) @binding(0) var<uniform> material: Material;
+@group(0) @binding(0) var<storage, read> frame: Frame;
+@group(2) @binding(0) var<storage, read> material: Material;
 
 struct Shadow {
     params: vec4f,
     light_view_projection: array<mat4x4f, 6>,
 }
 
-@group(3) @binding(0) var<uniform> shadow: Shadow;
+@group(3) @binding(0) var<storage, read> shadow: Shadow;
 @group(3) @binding(1) var shadow_map: texture_depth_2d_array;
 @group(3) @binding(2) var shadow_sampler: sampler_comparison;
 

@@ -1,9 +1,9 @@
 struct Globals { view: mat4x4f, projection: mat4x4f, eye: vec4f, light: vec4f, intensity: vec4f }
 struct Surface { kd: vec4f, ks: vec4f, n: vec4f }
 struct Faces { info: vec4f, clip: array<mat4x4f, 6> }
-@group(0) @binding(0) var<uniform> globals: Globals;
-@group(2) @binding(0) var<uniform> surface: Surface;
-@group(3) @binding(0) var<uniform> faces: Faces;
+@group(0) @binding(0) var<storage, read> globals: Globals;
+@group(2) @binding(0) var<storage, read> surface: Surface;
+@group(3) @binding(0) var<storage, read> faces: Faces;
 @group(3) @binding(1) var depths: texture_depth_2d_array;
 
 const inv_pi = 0.318309886;

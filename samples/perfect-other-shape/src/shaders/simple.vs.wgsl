@@ -1,7 +1,7 @@
 struct Globals { view: mat4x4f, projection: mat4x4f, eye: vec4f, light: vec4f, intensity: vec4f }
 struct Placement { model: mat4x4f, normals: mat4x4f }
-@group(0) @binding(0) var<uniform> globals: Globals;
-@group(1) @binding(0) var<uniform> placement: Placement;
+@group(0) @binding(0) var<storage, read> globals: Globals;
+@group(1) @binding(0) var<storage, read> placement: Placement;
 
 struct Out {
     @location(0) p: vec3f,

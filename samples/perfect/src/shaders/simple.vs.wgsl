@@ -13,8 +13,8 @@ struct Object {
     normal_matrix: mat4x4f,
 }
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(1) @binding(0) var<uniform> object: Object;
+@group(0) @binding(0) var<storage, read> frame: Frame;
+@group(1) @binding(0) var<storage, read> object: Object;
 
 struct Varyings {
     @builtin(position) clip_position: vec4f,
