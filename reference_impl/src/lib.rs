@@ -11,6 +11,7 @@ use basecode::{
 };
 
 /// Point lights and shadows, offline and realtime.
+#[derive(Default)]
 struct Reference {
     /// Whether offline images show materials as realtime does: a texture is its average.
     realtime_materials: bool,

@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize};
 pub struct Limits {
     /// Entries in the archive or folder, folders and ignored ones included.
     pub max_entries: u64,
-    /// Size of the archive itself, and of all its contents together [MiB].
+    /// Size of the archive itself, and of all its contents together (MiB).
     pub max_total_mib: u64,
-    /// Size of one file [MiB].
+    /// Size of one file (MiB).
     pub max_file_mib: u64,
     /// Unpacked over packed size, of one entry and of a whole `.tar.gz`.
     pub max_ratio: u64,
-    /// The ratio counts from this unpacked size on [MiB]: an honest black image packs 1000 to 1.
+    /// The ratio counts from this unpacked size on (MiB): an honest black image packs 1000 to 1.
     pub ratio_from_mib: u64,
     /// Components of a path.
     pub max_depth: u64,

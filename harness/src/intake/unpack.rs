@@ -31,7 +31,7 @@ pub enum Format {
 pub struct HandInFile {
     /// Path from the root of the hand-in.
     pub path: String,
-    /// Size [bytes].
+    /// Size in bytes.
     pub bytes: u64,
     /// SHA-256 of the content, lower-case hexadecimal.
     pub sha256: String,

@@ -1,6 +1,6 @@
 //! The scenes of the second assignment, made from closed forms and published data.
 //!
-//! Everything is a pure function: [`files`] returns every file with its bytes, [`write`] puts them on disk, [`check`]
+//! Everything is a pure function: [`files`] returns every file with its bytes, [`write()`] puts them on disk, [`check`]
 //! compares them with what is committed. World space is right-handed with y up; lengths have no unit.
 
 mod bezier;
