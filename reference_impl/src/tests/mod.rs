@@ -110,7 +110,8 @@ impl Build {
         std::fs::write(folder.join("s.toml"), "[input]\nobjfile = \"s.obj\"\n").unwrap();
         std::fs::write(folder.join("s.obj"), &self.obj).unwrap();
         std::fs::write(folder.join("s.mtl"), &self.mtl).unwrap();
-        let scene = Scene::load(&folder.join("s.toml"), &|material| Reference.bsdf(material));
+        let scene =
+            Scene::load(&folder.join("s.toml"), &|material| Reference::default().bsdf(material));
         std::fs::remove_dir_all(&folder).unwrap();
         scene.unwrap()
     }
@@ -136,7 +137,7 @@ fn draw(
     let gpu = Gpu::open(AdapterKind::Any, "").expect("these tests need a graphics adapter");
     let target = Target::new(&gpu, width, height).unwrap();
     let mut pass = gpu
-        .checked(&mut || Reference.render_pass(kind, &gpu, scene, shadow_map))
+        .checked(&mut || Reference::default().render_pass(kind, &gpu, scene, shadow_map))
         .expect("the pass opens");
     let mut draw = |camera: &Camera| {
         gpu.checked(&mut || pass.draw(&gpu, camera, &target)).expect("the pass draws");
@@ -153,7 +154,7 @@ fn trace(
     camera: &Camera,
     (width, height): (usize, usize),
 ) -> Image {
-    let integrator = Reference.integrator(kind, shadows).unwrap();
+    let integrator = Reference::default().integrator(kind, shadows).unwrap();
     let mut image = Image::new(width, height);
     let sampler = basecode::Sampler::new(1);
     for (index, pixel) in image.pixels.iter_mut().enumerate() {
