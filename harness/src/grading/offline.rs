@@ -41,7 +41,7 @@ pub struct Drawn {
 pub fn probe_bsdfs(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
     let Some(case) = cases.first() else { return Vec::new() };
     let request = |scene: &Path, probes: &[BsdfProbe]| Request::EvalBsdf {
-        scene: ask::scene(scene),
+        scene: asker.scene(scene),
         queries: probes.iter().map(|probe| ask::query(&probe.query)).collect(),
     };
     let mut asked = Vec::new();
@@ -120,7 +120,7 @@ pub fn judge_scene(
 ) -> (Vec<Check>, Option<Drawn>) {
     let name = &case.entry.name;
     let small = &case.small;
-    let scene = ask::scene(&case.offline);
+    let scene = asker.scene(&case.offline);
     let chosen: Vec<_> = small.batch.rays.iter().map(ask::ray).collect();
     let radiance = |rays: &[_], witness, shadows| Request::Radiance {
         scene: scene.clone(),

@@ -234,7 +234,7 @@ fn draw(
         Err(reason) => return Outcome::NoAdapter(reason.clone()),
     };
     let request = Request::RenderRealtime {
-        scene: ask::scene(toml),
+        scene: asker.scene(toml),
         width,
         height,
         shadow_map,
