@@ -85,6 +85,13 @@ pub fn main() -> ExitCode {
         (Some("__exec"), Some(program)) => return crate::process::exec_main(program, &args[2..]),
         _ => {}
     }
+    // A reader that has seen enough (`umbra ... | head`) is no error and no panic.
+    #[cfg(unix)]
+    // SAFETY: the default action replaces an ignored signal; no handler runs.
+    let _ = unsafe {
+        use nix::sys::signal::{SigHandler, Signal, signal};
+        signal(Signal::SIGPIPE, SigHandler::SigDfl)
+    };
     let Arguments { command, root } = Arguments::parse();
     match run(command, root.as_deref()) {
         Ok(code) => ExitCode::from(code),

@@ -4,7 +4,7 @@ use super::super::harmless::harmless_lines;
 use super::super::number::{self, hints, is_failure, is_range, of_part, points, seconds, total};
 use super::super::{Entry, Sheet};
 use super::page::{Page, Style, columns, left, wrap};
-use crate::evidence::{Check, Verdict};
+use crate::evidence::{Check, Measure, Verdict};
 use crate::intake::{Finding, Severity};
 
 /// So many lines of the compiler's are shown.
@@ -75,56 +75,86 @@ fn parts(page: &mut Page, Entry { record, grade }: &Entry) {
     }
 }
 
-/// What failed in full, then what could not be judged, then what passed in short.
+/// What failed, then what could not be judged, then what passed; one entry for each question and
+/// answer, whatever the number of scenes: the worst in full, the others by name. The page
+/// `report.html` shows every one.
 fn checks(page: &mut Page, checks: &[Check]) {
     heading(page, "checks");
     if checks.is_empty() {
         page.wrapped(&[(Style::Plain, "  ")], Style::Plain, "none were made");
     }
-    let order = |check: &&Check| match check.verdict {
+    let order = |check: &Check| match check.verdict {
         Verdict::Fail | Verdict::NotImplemented => 0,
         Verdict::NotJudged | Verdict::NotRun => 1,
         Verdict::Pass => 2,
     };
-    let mut sorted: Vec<&Check> = checks.iter().collect();
-    sorted.sort_by_key(order);
-    for check in sorted {
-        let style = match check.verdict {
-            Verdict::Pass => Style::Good,
-            Verdict::NotJudged | Verdict::NotRun => Style::Open,
-            Verdict::Fail | Verdict::NotImplemented => Style::Bad,
+    let mut groups: Vec<Vec<&Check>> = Vec::new();
+    for check in checks {
+        let alike = |other: &Check| {
+            (&other.id, other.verdict, other.held_back)
+                == (&check.id, check.verdict, check.held_back)
         };
-        let verdict = format!("  {}", left(number::verdict(check.verdict), VERDICT_WIDTH));
-        let held_back = if check.held_back { " (held back)" } else { "" };
-        let name = format!("{}{held_back}: ", check.name());
-        if check.verdict == Verdict::Pass && !check.measures.is_empty() {
-            let measures = check.measures.iter();
-            let measures =
-                measures.map(|measure| format!("{} {}", measure.name, number::measure(measure)));
-            let text = format!("{name}{}", measures.collect::<Vec<_>>().join("; "));
-            page.wrapped(&[(style, &verdict)], Style::Plain, &text);
-            continue;
+        match groups.iter_mut().find(|group| alike(group[0])) {
+            Some(group) => group.push(check),
+            None => groups.push(vec![check]),
         }
-        page.wrapped(&[(style, &verdict)], Style::Plain, &format!("{name}{}", check.summary));
-        let indent = " ".repeat(columns(&verdict));
-        for measure in &check.measures {
-            let (style, word) =
-                if measure.passed { (Style::Faint, "pass: ") } else { (Style::Bad, "fail: ") };
-            let text = format!("{}: {}", measure.name, number::measure(measure));
-            page.wrapped(&[(Style::Plain, &indent), (style, word)], Style::Plain, &text);
-        }
-        if !check.hint.is_empty() {
-            page.wrapped(
-                &[(Style::Plain, &indent), (Style::Heading, "hint: ")],
-                Style::Plain,
-                &check.hint,
-            );
-        }
-        if is_failure(check) && !check.pictures.is_empty() {
-            let files: Vec<&str> = check.pictures.iter().map(|p| p.file.as_str()).collect();
-            let text = format!("pictures: {}", files.join(", "));
-            page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &text);
-        }
+    }
+    groups.sort_by_key(|group| order(group[0]));
+    for group in &mut groups {
+        // Stable: among equals the scenes keep the assignment's order.
+        group.sort_by(|a, b| closeness(b).total_cmp(&closeness(a)));
+        group_of_checks(page, group);
+    }
+}
+
+/// How far a check is from passing or, when it passed, how near it came to failing.
+fn closeness(check: &Check) -> f64 {
+    let tightest = check.measures.iter().map(tightness).fold(0.0, f64::max);
+    if is_failure(check) { check.error } else { tightest }
+}
+
+/// A measure's value as a fraction of its bound.
+fn tightness(measure: &Measure) -> f64 {
+    if measure.bound > 0.0 { (measure.value / measure.bound).abs() } else { 0.0 }
+}
+
+fn group_of_checks(page: &mut Page, group: &[&Check]) {
+    let worst = group[0];
+    let style = match worst.verdict {
+        Verdict::Pass => Style::Good,
+        Verdict::NotJudged | Verdict::NotRun => Style::Open,
+        Verdict::Fail | Verdict::NotImplemented => Style::Bad,
+    };
+    let verdict = format!("  {}", left(number::verdict(worst.verdict), VERDICT_WIDTH));
+    let indent = " ".repeat(columns(&verdict));
+    let held_back = if worst.held_back { " (held back)" } else { "" };
+    let text = format!("{}{held_back}: {}", worst.name(), worst.summary);
+    page.wrapped(&[(style, &verdict)], Style::Plain, &text);
+    let passed = worst.verdict == Verdict::Pass;
+    let tightest = worst.measures.iter().max_by(|a, b| tightness(a).total_cmp(&tightness(b)));
+    let shown = worst.measures.iter().filter(|measure| !passed || Some(*measure) == tightest);
+    for measure in shown {
+        let (style, word) = match (measure.passed, passed) {
+            (true, true) => (Style::Faint, "closest: "),
+            (true, false) => (Style::Faint, "pass: "),
+            (false, _) => (Style::Bad, "fail: "),
+        };
+        let text = format!("{}: {}", measure.name, number::measure(measure));
+        page.wrapped(&[(Style::Plain, &indent), (style, word)], Style::Faint, &text);
+    }
+    if !worst.hint.is_empty() {
+        let lead = [(Style::Plain, indent.as_str()), (Style::Heading, "hint: ")];
+        page.wrapped(&lead, Style::Plain, &worst.hint);
+    }
+    if is_failure(worst) && !worst.pictures.is_empty() {
+        let files: Vec<&str> = worst.pictures.iter().map(|p| p.file.as_str()).collect();
+        let text = format!("pictures: {}", files.join(", "));
+        page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &text);
+    }
+    let others: Vec<&str> = group[1..].iter().map(|check| check.scene.as_str()).collect();
+    if !others.is_empty() {
+        let text = format!("likewise on {}", others.join(", "));
+        page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &text);
     }
 }
 
