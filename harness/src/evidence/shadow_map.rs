@@ -16,6 +16,30 @@ const LEAST_KNOWN: f64 = 0.25;
 /// An image has shadows when so much of what lies in shadow is black.
 const MOSTLY: f64 = 0.95;
 
+/// The measure of a check that was judged by visibility.
+const VISIBILITY: &str = "lit pixels that are not lit (fraction)";
+
+/// An image that is wrong and so dark that it tells nothing of its shadows leaves the verdict to
+/// another scene that does, if there is one.
+pub fn set_apart(checks: &mut [Check]) {
+    let tells = |check: &Check| {
+        let visibility = check.measures.iter().any(|measure| measure.name == VISIBILITY);
+        check.id == "bonus.image" && (check.verdict == Verdict::Pass || visibility)
+    };
+    if !checks.iter().any(tells) {
+        return;
+    }
+    for check in checks.iter_mut() {
+        if check.id == "bonus.image" && check.verdict == Verdict::Fail && !tells(check) {
+            check.verdict = Verdict::NotJudged;
+            check.summary = format!(
+                "too dark to tell where shadows fall; another scene does ({})",
+                check.summary
+            );
+        }
+    }
+}
+
 /// The masks of one film: which pixels lie in shadow.
 #[derive(Clone, Copy)]
 pub struct Shadows<'a> {
@@ -88,7 +112,8 @@ impl Shadows<'_> {
                 first = first.or(Some(index));
             }
         }
-        let told = |[all, known, _]: [usize; 3]| all > 0 && known as f64 >= LEAST_KNOWN * all as f64;
+        let told =
+            |[all, known, _]: [usize; 3]| all > 0 && known as f64 >= LEAST_KNOWN * all as f64;
         if !counts.iter().all(|count| told(*count)) {
             return None;
         }
@@ -98,13 +123,18 @@ impl Shadows<'_> {
         };
         let [dark, lit] = counts;
         let measures = vec![
-            Measure::at_most("lit pixels that are not lit (fraction)", fraction(lit), bound(lit)),
-            Measure::at_most("shadowed pixels that are not dark (fraction)", fraction(dark), bound(dark)),
+            Measure::at_most(VISIBILITY, fraction(lit), bound(lit)),
+            Measure::at_most(
+                "shadowed pixels that are not dark (fraction)",
+                fraction(dark),
+                bound(dark),
+            ),
         ];
         let id = "bonus.image";
         let mut check = match first.filter(|_| measures.iter().any(|measure| !measure.passed)) {
             None => {
-                let summary = "shadows fall where they should; how surfaces are shaded is judged elsewhere";
+                let summary =
+                    "shadows fall where they should; how surfaces are shaded is judged elsewhere";
                 Check::new(id, scene, Verdict::Pass, summary)
             }
             Some(index) => {
@@ -119,8 +149,12 @@ impl Shadows<'_> {
                 );
                 let hint = match (measures[0].passed, measures[1].passed) {
                     (true, _) if fraction(dark) > 0.99 => "no point is in shadow",
-                    (true, _) => "shadows are missing or come loose from what casts them: too much bias?",
-                    (_, true) => "lit points are in shadow: too little bias, or the light's frustum is too small",
+                    (true, _) => {
+                        "shadows are missing or come loose from what casts them: too much bias?"
+                    }
+                    (_, true) => {
+                        "lit points are in shadow: too little bias, or the light's frustum is too small"
+                    }
                     _ => "",
                 };
                 let error = fraction(lit) + fraction(dark);
@@ -176,6 +210,22 @@ mod tests {
         assert_eq!(judge(&not_a_number, &without), Some(Verdict::Fail));
         // A black renderer tells nothing, and earns nothing by it.
         assert_eq!(judge(&right, &image(|_| 0.0)), None);
+    }
+
+    #[test]
+    fn what_is_too_dark_leaves_the_verdict_to_another_scene() {
+        let (mask, unshadowed) = masks();
+        let shadows = Shadows { mask: &mask, unshadowed: &unshadowed, median_lit: 1.0 };
+        let lit = image(|_| 1.0);
+        let wrong = shadows.judge("teapot", &lit, &lit, &Tolerances::default()).unwrap();
+        let dark = Check::new("bonus.image", "cbox", Verdict::Fail, "black");
+        let verdicts = |checks: &[Check]| {
+            let mut checks = checks.to_vec();
+            set_apart(&mut checks);
+            checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
+        };
+        assert_eq!(verdicts(&[wrong, dark.clone()]), [Verdict::Fail, Verdict::NotJudged]);
+        assert_eq!(verdicts(&[dark.clone(), dark]), [Verdict::Fail, Verdict::Fail]);
     }
 
     #[test]

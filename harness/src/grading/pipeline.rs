@@ -15,7 +15,7 @@ use super::record::{Conditions, Record, StageCost, Student};
 use super::{handed_in, pictures, sampler};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
-use crate::evidence::{Check, Evidence, Verdict, rays};
+use crate::evidence::{Check, Evidence, Verdict, rays, shadow_map};
 use crate::expected::Store;
 use crate::intake::{self, HandIn, HandInConfig, IntakeError, Validation};
 use crate::rubric::BUILD;
@@ -282,6 +282,7 @@ impl<'a> Grading<'a> {
             checks.extend(found);
             drawn.extend(images);
         }
+        shadow_map::set_apart(checks);
         // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
         for case in wrong {
             self.stop_if_interrupted()?;
