@@ -57,7 +57,11 @@ pub fn judge(
             };
             compare_offline(actual, &reference, spp, tolerances)
         }
-        Kind::Realtime | Kind::RealtimeShadows => {
+        Kind::Realtime => {
+            let raw = expected.raw_normals.as_ref();
+            return judge_shaded(id, scene, actual, (reference, raw), &mask, tolerances);
+        }
+        Kind::RealtimeShadows => {
             return judge_realtime(id, scene, actual, reference, &mask, tolerances);
         }
         Kind::HandedInRealtime | Kind::HandedInShadows => {
@@ -115,6 +119,33 @@ pub fn judge_realtime(
         Ok(found) => describe(id, scene, &found, actual, centre, mask),
         Err(error) => Check::new(id, scene, Verdict::NotJudged, error.to_string()),
     }
+}
+
+/// As [`judge_realtime`], but what stages draw that do not renormalise the interpolated normal
+/// (`raw`) is as good, for all materials or for the diffuse or Phong ones alone.
+pub fn judge_shaded(
+    id: &str,
+    scene: &str,
+    actual: &Image,
+    (centre, raw): (&Image, Option<&Image>),
+    mask: &RegionMask,
+    tolerances: &Tolerances,
+) -> Check {
+    let check = judge_realtime(id, scene, actual, centre, mask, tolerances);
+    let Some(raw) = raw.filter(|_| check.verdict == Verdict::Fail) else { return check };
+    let taken: [&dyn Fn(&Region) -> bool; 3] =
+        [&|_| true, &|region| region.exponent == 0.0, &|region| region.exponent > 0.0];
+    for taken in taken {
+        let pixels = centre.pixels.iter().zip(&raw.pixels).zip(&mask.pixels);
+        let mixed = pixels.map(|((a, b), value)| if taken(mask.region(*value)) { *b } else { *a });
+        let mixed = Image { pixels: mixed.collect(), ..*centre };
+        let accepted = judge_realtime(id, scene, actual, &mixed, mask, tolerances);
+        if accepted.verdict == Verdict::Pass {
+            let summary = "the image is what is expected of a normal that is not renormalised (accepted)";
+            return Check { summary: summary.into(), ..accepted };
+        }
+    }
+    check
 }
 
 /// A mask in which all but the wanted regions are never compared.

@@ -6,6 +6,7 @@ pub mod bsdf;
 mod check;
 pub mod images;
 pub mod rays;
+pub mod shadow_map;
 pub mod stages;
 
 pub use check::{Check, Evidence, Measure, Picture, Verdict};

@@ -280,6 +280,33 @@ pub fn judge_shadows(
     check
 }
 
+/// Where the light stands elsewhere than it should, shadows fall elsewhere too. So on a scene whose
+/// unshadowed radiance is wrong (1.3) shadows are not judged (1.4), as long as there is another
+/// scene whose radiance is right and whose shadows are judged.
+pub fn set_apart(checks: &mut [Check]) {
+    let is = |check: &Check, id: &str, verdict| check.id == id && check.verdict == verdict;
+    let scenes = |verdict| -> Vec<String> {
+        let radiance = checks.iter().filter(|check| is(check, "radiance.lit", verdict));
+        radiance.map(|check| check.scene.clone()).collect()
+    };
+    let (right, wrong) = (scenes(Verdict::Pass), scenes(Verdict::Fail));
+    let judged = |check: &Check| {
+        is(check, "shadow.rays", Verdict::Pass) || is(check, "shadow.rays", Verdict::Fail)
+    };
+    if !checks.iter().any(|check| judged(check) && right.contains(&check.scene)) {
+        return;
+    }
+    for check in checks.iter_mut().filter(|check| is(check, "shadow.rays", Verdict::Fail)) {
+        if wrong.contains(&check.scene) {
+            check.verdict = Verdict::NotJudged;
+            check.summary = format!(
+                "unshadowed radiance is wrong here and right elsewhere: shadows are judged there ({})",
+                check.summary
+            );
+        }
+    }
+}
+
 /// Visibility as the renderer has it: radiance with over without shadows. Where there is none
 /// without (a renderer that ignores the switch), no radiance with shadows is darkness.
 fn visibility(with: [f32; 3], without: [f32; 3], expected: [f64; 3]) -> f64 {

@@ -13,7 +13,7 @@ use super::regions::regions;
 use crate::assignment::{Assignment, SceneEntry};
 use crate::imaging::reference::{ReferenceImage, RegionMask};
 use crate::process::Limits;
-use crate::worker::{Job, Outcome, Request, SceneRef, Supervisor};
+use crate::worker::{Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef, Supervisor};
 
 /// Batches that an expected image is the mean of; their spread is its variance.
 const BATCHES: u32 = 64;
@@ -36,6 +36,9 @@ pub struct Expected {
     pub unshadowed: Image,
     /// The regions of `unshadowed`.
     pub unshadowed_mask: RegionMask,
+    /// As `unshadowed`, by stages that do not renormalise the interpolated normal: as good. Absent
+    /// where it was neither kept nor can be drawn.
+    pub raw_normals: Option<Image>,
 }
 
 /// Finds, makes and keeps expected images.
@@ -99,7 +102,9 @@ impl Store<'_> {
         let [mask, unshadowed_mask] = masks.map(|image| as_mask(&scene, &image));
         let offline = ReferenceImage::new(mean, variance, n, centre, mask)
             .with_context(|| format!("scene \"{}\"", entry.name))?;
-        Ok(Expected { scene, offline, unshadowed, unshadowed_mask })
+        let realtime = self.assignment.root.join(&entry.realtime);
+        let raw_normals = self.raw_normals(&realtime, width, height)?;
+        Ok(Expected { scene, offline, unshadowed, unshadowed_mask, raw_normals })
     }
 
     /// The pixel-centre image of a scene without shadows.
@@ -115,6 +120,36 @@ impl Store<'_> {
             Ok(ExrLayers { layers: [("unshadowed".into(), image)].into(), ..Default::default() })
         })?;
         Ok(image)
+    }
+
+    /// What the reference draws of a realtime scene without shadows when its fragment stages do not
+    /// renormalise the interpolated normal; nothing when it is not kept and cannot be drawn here.
+    ///
+    /// # Errors
+    /// When the scene or the cache cannot be used.
+    pub fn raw_normals(&self, toml: &Path, width: u32, height: u32) -> anyhow::Result<Option<Image>> {
+        let file = self.cached(toml, width, height, "raw-normals")?;
+        let camera = basecode::scene::SceneConfig::load(toml)?.camera;
+        let draw = || {
+            let request = Request::RenderRealtime {
+                scene: SceneRef { path: toml.to_owned(), options: "mistake=normals-raw".into() },
+                width,
+                height,
+                shadow_map: false,
+                adapter: Adapter { kind: AdapterKind::Any, name: String::new() },
+                stages: Vec::new(),
+                cameras: vec![CameraValue {
+                    eye: camera.eye.into(),
+                    at: camera.at.into(),
+                    up: camera.up.into(),
+                    fov_y_deg: camera.fov_y_deg,
+                }],
+            };
+            let image = self.render(request)?;
+            Ok(ExrLayers { layers: [("raw".into(), image)].into(), ..Default::default() })
+        };
+        // Without an adapter nothing realtime is judged, so that nobody misses it.
+        Ok(self.layers(&file, &["raw"], draw).ok().map(|[image]| image))
     }
 
     /// Renders the expected image of a stored scene anew and replaces the file.
@@ -268,8 +303,9 @@ impl Store<'_> {
     }
 
     fn render(&self, request: Request) -> anyhow::Result<Image> {
-        let Request::RenderOffline { width, height, .. } = request else {
-            bail!("only offline images are made here");
+        let (Request::RenderOffline { width, height, .. } | Request::RenderRealtime { width, height, .. }) = request
+        else {
+            bail!("only images are made here");
         };
         let answers = self.ask(vec![request])?;
         let pixels = answers[0].as_chunks::<3>().0.iter().map(|&value| Vec3::from(value)).collect();

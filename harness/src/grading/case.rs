@@ -50,6 +50,8 @@ pub struct Small {
     pub batch: RayBatch,
     /// What a stage that shades is compared with: centres, without shadows.
     pub unshadowed: Image,
+    /// The same without renormalised normals; see [`Expected::raw_normals`].
+    pub raw_normals: Option<Image>,
 }
 
 impl Case {
@@ -59,7 +61,7 @@ impl Case {
     /// When the scene cannot be loaded or its expected images cannot be had.
     pub fn new(store: &Store, entry: &SceneEntry) -> anyhow::Result<Self> {
         let at = |path: &PathBuf| std::path::absolute(store.assignment.root.join(path));
-        let offline = at(&entry.offline)?;
+        let (offline, realtime) = (at(&entry.offline)?, at(&entry.realtime)?);
         let config = SceneConfig::load(&offline)?;
         let expected = store.expected(entry)?;
         let (full_width, full_height) = (expected.unshadowed.width as u32, expected.unshadowed.height as u32);
@@ -75,6 +77,7 @@ impl Case {
             height,
             unshadowed_mask: regions(scene, w, h, false)?,
             unshadowed: store.unshadowed(&offline, width, height)?,
+            raw_normals: store.raw_normals(&realtime, width, height)?,
             surface,
             mask,
             batch,
@@ -82,7 +85,7 @@ impl Case {
         let camera = &config.camera;
         Ok(Self {
             offline,
-            realtime: at(&entry.realtime)?,
+            realtime,
             bonus: entry.bonus.as_ref().map(at).transpose()?,
             spp: config.spp as u32,
             camera: CameraValue {

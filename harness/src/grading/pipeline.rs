@@ -15,7 +15,7 @@ use super::record::{Conditions, Record, StageCost, Student};
 use super::{handed_in, pictures, sampler};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
-use crate::evidence::{Check, Evidence, Verdict};
+use crate::evidence::{Check, Evidence, Verdict, rays, shadow_map};
 use crate::expected::Store;
 use crate::intake::{self, HandIn, HandInConfig, IntakeError, Validation};
 use crate::rubric::BUILD;
@@ -23,6 +23,10 @@ use crate::worker::{Adapter, Supervisor};
 
 /// The check that says whether the hand-in follows the tree.
 pub const TREE: &str = "hand_in.tree";
+
+/// By how much the standard error of a region's mean grows when its rows share their noise: the
+/// root of its height in pixels; the highlights that are judged apart are about 9 pixels high.
+const DEPENDENT_PIXELS: f64 = 3.0;
 
 /// Everything that is the same for all hand-ins of a batch.
 pub struct Grading<'a> {
@@ -238,16 +242,24 @@ impl<'a> Grading<'a> {
         checks: &mut Vec<Check>,
         drawn: &mut Vec<Drawn>,
     ) -> anyhow::Result<()> {
+        let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
+        let findings = sampler::judge(asker, plugin, &scene)?;
+        let mut tolerances = self.assignment.tolerances.clone();
+        if findings.iter().any(|found| found.id != "sampler.seed" && found.verdict == Verdict::Fail) {
+            // Pixels are as noisy as they should be, but not independent, so that the mean of a
+            // region is noisier than they tell: a finding, no wrong image.
+            tolerances.bias_standard_errors *= DEPENDENT_PIXELS;
+        }
+        checks.extend(findings);
         checks.extend(offline::probe_bsdfs(asker, plugin, &self.cases));
         for case in &self.cases {
             self.stop_if_interrupted()?;
             let (found, image) =
-                offline::judge_scene(asker, plugin, case, seed, self.threads, &self.assignment.tolerances);
+                offline::judge_scene(asker, plugin, case, seed, self.threads, &tolerances);
             checks.extend(found);
             drawn.extend(image);
         }
-        let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
-        checks.extend(sampler::judge(asker, plugin, &scene)?);
+        rays::set_apart(checks);
         Ok(())
     }
 
@@ -271,6 +283,7 @@ impl<'a> Grading<'a> {
             checks.extend(found);
             drawn.extend(images);
         }
+        shadow_map::set_apart(checks);
         // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
         for case in wrong {
             self.stop_if_interrupted()?;

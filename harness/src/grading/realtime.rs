@@ -8,10 +8,12 @@ use super::ask::{self, Asker};
 use super::case::Case;
 use super::offline::Drawn;
 use crate::evidence::images::{self, Kind};
+use crate::evidence::shadow_map::Shadows;
 use crate::evidence::stages::{
-    BoundValue, SHOW_NORMAL, SHOW_NOTHING, SHOW_POSITION, VERTEX, is_template, judge_pass, judge_vertex,
+    BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, is_template, judge_pass, judge_vertex,
 };
 use crate::evidence::{Check, Verdict};
+use crate::expected::Expected;
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::{Region, RegionMask};
 use crate::worker::{Outcome, Request, Stage};
@@ -75,17 +77,82 @@ pub fn judge_images(
             continue;
         };
         let image = ask::image(&answer.values, width, height);
+        let judge = |id, wanted| images::judge(id, name, kind, &image, &case.expected, wanted, tolerances);
         if kind == Kind::Realtime {
-            for (id, wanted) in VIEWS {
-                checks.push(images::judge(id, name, kind, &image, &case.expected, wanted, tolerances));
-            }
+            let views = VIEWS.map(|(id, wanted)| judge(id, wanted));
+            checks.extend(if views[0].verdict == Verdict::Fail { plain_but_for_shadows(case, &image, tolerances) } else { None }
+                .unwrap_or(views.to_vec()));
             checks.push(judge_coverage(case, &image));
         } else {
-            checks.push(images::judge(id, name, kind, &image, &case.expected, &|_| true, tolerances));
+            let check = judge(id, &|_| true);
+            let plain = drawn.iter().find(|drawn: &&Drawn| drawn.kind == Kind::Realtime).map(|drawn| &drawn.image);
+            checks.push(if check.verdict == Verdict::Fail {
+                judge_visibility(asker, plugin, case, (&image, plain), check, tolerances)
+            } else {
+                check
+            });
         }
         drawn.push(Drawn { scene: name.clone(), kind, image });
     }
     (checks, drawn)
+}
+
+/// The masks that tell where shadows fall.
+fn shadows(case: &Case) -> Shadows<'_> {
+    let Expected { offline, unshadowed_mask, .. } = &case.expected;
+    Shadows { mask: &offline.mask, unshadowed: unshadowed_mask, median_lit: offline.median_lit }
+}
+
+/// A default run that is wrong by its shadows alone is the bonus' fault, not that of pass and
+/// stages: the checks that say so, if it is.
+fn plain_but_for_shadows(case: &Case, image: &Image, tolerances: &Tolerances) -> Option<Vec<Check>> {
+    let (name, shadows) = (&case.entry.name, shadows(case));
+    if !shadows.are_in(image) {
+        return None;
+    }
+    let Expected { unshadowed, raw_normals, .. } = &case.expected;
+    let mask = shadows.lit_alone();
+    let judged = VIEWS.map(|(id, wanted)| {
+        let expected = (unshadowed, raw_normals.as_ref());
+        images::judge_shaded(id, name, image, expected, &images::only(&mask, wanted), tolerances)
+    });
+    if judged[0].verdict != Verdict::Pass {
+        return None;
+    }
+    let summary = "the default run draws shadows: only the bonus scene may";
+    let mut checks = judged.to_vec();
+    checks.push(Check::new("bonus.default", name, Verdict::Fail, summary));
+    Some(checks)
+}
+
+/// Judges shadows that are wrong as an image by visibility alone: against the student's own image
+/// without shadows, or else against that drawn under a vertex stage of ours. `check` is the
+/// verdict on the image, which stands when neither tells.
+fn judge_visibility(
+    asker: &Asker,
+    plugin: &Path,
+    case: &Case,
+    (with, without): (&Image, Option<&Image>),
+    check: Check,
+    tolerances: &Tolerances,
+) -> Check {
+    let (name, shadows) = (&case.entry.name, shadows(case));
+    let judge = |with: &Image, without: &Image| shadows.judge(name, with, without, tolerances);
+    let own = without.and_then(|without| judge(with, without));
+    if let Some(own) = own.as_ref().filter(|own| own.verdict == Verdict::Pass) {
+        return own.clone();
+    }
+    let (width, height) = case.film();
+    let vertex = [Stage { name: NAMES[0].to_owned(), text: VERTEX.to_owned() }];
+    let drawn = |toml, shadow_map| match draw(asker, Some(plugin), case, toml, (width, height), shadow_map, &vertex) {
+        Outcome::Done(answer) => Some(ask::image(&answer.values, width, height)),
+        _ => None,
+    };
+    let swapped = case.bonus.as_ref().and_then(|bonus| judge(&drawn(bonus, true)?, &drawn(&case.realtime, false)?));
+    match swapped {
+        Some(swapped) if swapped.verdict == Verdict::Pass => swapped,
+        _ => own.unwrap_or(check),
+    }
 }
 
 /// Where the image shows a surface and where not, whatever its colours.
@@ -142,9 +209,10 @@ fn untouched(id: &str, case: &Case, task: &str) -> Check {
 fn isolate_pass(asker: &Asker, plugin: &Path, case: &Case) -> Check {
     let size = (case.small.width, case.small.height);
     let mut frames = Vec::new();
-    for bound in BoundValue::ALL {
-        let texts = [VERTEX.to_owned(), bound.stage(false), bound.stage(true)];
-        match draw(asker, Some(plugin), case, &case.realtime, size, false, &named(texts)) {
+    let shown = BoundValue::ALL.map(|bound| named([VERTEX.to_owned(), bound.stage(false), bound.stage(true)]));
+    let outcomes = draw_each(asker, Some(plugin), case, &case.realtime, size, false, &shown);
+    for (bound, outcome) in BoundValue::ALL.into_iter().zip(outcomes) {
+        match outcome {
             Outcome::Done(answer) => frames.push((bound, ask::image(&answer.values, size.0, size.1))),
             other => return swap_failed("pass.uniforms", case, &["2.1"], &other),
         }
@@ -158,9 +226,9 @@ fn isolate_vertex(asker: &Asker, case: &Case, stages: &Stages) -> Check {
     let Some(own) = &stages.own[0] else { return absent(id, case, NAMES[0]) };
     let size = (case.small.width, case.small.height);
     let mut images = Vec::new();
-    for show in [SHOW_POSITION, SHOW_NORMAL] {
-        let texts = [own.clone(), show.to_owned(), show.to_owned()];
-        match draw(asker, None, case, &case.realtime, size, false, &named(texts)) {
+    let shown = [SHOW_POSITION, SHOW_NORMAL].map(|show| named([own.clone(), show.to_owned(), show.to_owned()]));
+    for outcome in draw_each(asker, None, case, &case.realtime, size, false, &shown) {
+        match outcome {
             Outcome::Done(answer) => images.push(ask::image(&answer.values, size.0, size.1)),
             other => return swap_failed(id, case, &[], &other),
         }
@@ -178,17 +246,17 @@ fn isolate_fragment(
 ) -> Check {
     let Some(own) = &stages.own[index] else { return absent(id, case, NAMES[index]) };
     let (width, height) = (case.small.width, case.small.height);
-    let mut texts = [VERTEX, SHOW_NOTHING, SHOW_NOTHING].map(str::to_owned);
+    let mut texts = [VERTEX, BLACK, BLACK].map(str::to_owned);
     texts[index].clone_from(own);
     match draw(asker, None, case, &case.realtime, (width, height), false, &named(texts)) {
         Outcome::Done(answer) => {
             let image = ask::image(&answer.values, width, height);
             let small = &case.small;
-            images::judge_realtime(
+            images::judge_shaded(
                 id,
                 &case.entry.name,
                 &image,
-                &small.unshadowed,
+                (&small.unshadowed, small.raw_normals.as_ref()),
                 &images::only(&small.unshadowed_mask, &|region| (region.exponent > 0.0) == phong),
                 tolerances,
             )
@@ -220,41 +288,54 @@ fn named(texts: [String; 3]) -> Vec<Stage> {
     named.map(|(&name, text)| Stage { name: name.to_owned(), text }).collect()
 }
 
+/// Draws one frame.
 fn draw(
+    asker: &Asker,
+    plugin: Option<&Path>,
+    case: &Case,
+    toml: &Path,
+    size: (u32, u32),
+    shadow_map: bool,
+    stages: &[Stage],
+) -> Outcome {
+    let outcome = draw_each(asker, plugin, case, toml, size, shadow_map, &[stages.to_vec()]).pop();
+    outcome.unwrap_or_else(|| Outcome::NoAdapter("the worker gave no outcome: a bug of Umbra's".into()))
+}
+
+/// Draws a frame under each set of stages, all in one worker.
+fn draw_each(
     asker: &Asker,
     plugin: Option<&Path>,
     case: &Case,
     toml: &Path,
     (width, height): (u32, u32),
     shadow_map: bool,
-    stages: &[Stage],
-) -> Outcome {
+    sets: &[Vec<Stage>],
+) -> Vec<Outcome> {
     let adapter = match &asker.adapter {
-        Ok(adapter) => adapter.clone(),
-        Err(reason) => return Outcome::NoAdapter(reason.clone()),
+        Ok(adapter) => adapter,
+        Err(reason) => return vec![Outcome::NoAdapter(reason.clone()); sets.len()],
     };
-    let request = Request::RenderRealtime {
+    let request = |stages: &Vec<Stage>| Request::RenderRealtime {
         scene: asker.scene(toml),
         width,
         height,
         shadow_map,
-        adapter,
-        stages: stages.to_vec(),
+        adapter: adapter.clone(),
+        stages: stages.clone(),
         cameras: vec![case.camera],
     };
-    let outcome = asker.ask(plugin, vec![request.clone()]).pop();
-    let outcome = match outcome {
+    let requests: Vec<Request> = sets.iter().map(request).collect();
+    let mut outcomes = asker.ask(plugin, requests.clone());
+    if outcomes.iter().any(|outcome| matches!(outcome, Outcome::NoAdapter(_))) {
         // The adapter was there when the batch began: believe its loss only twice.
-        Some(Outcome::NoAdapter(_)) => asker.ask(plugin, vec![request]).pop(),
-        other => other,
-    };
-    match outcome {
-        Some(Outcome::NoAdapter(message)) => {
-            Outcome::Failed(format!("{message} (but this machine's adapter works)"))
-        }
-        Some(outcome) => outcome,
-        None => Outcome::NoAdapter("the worker gave no outcome: a bug of Umbra's".into()),
+        outcomes = asker.ask(plugin, requests);
     }
+    let believed = outcomes.into_iter().map(|outcome| match outcome {
+        Outcome::NoAdapter(message) => Outcome::Failed(format!("{message} (but this machine's adapter works)")),
+        outcome => outcome,
+    });
+    believed.collect()
 }
 
 /// Whether this machine can draw at all: asks Umbra's own pass for one small frame.

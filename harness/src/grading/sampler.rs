@@ -8,6 +8,10 @@ use super::ask::Asker;
 use crate::evidence::{Check, Verdict};
 use crate::worker::{Outcome, Request};
 
+/// Rows whose noise is correlated by this much or more share their seeds: 1 when they do, 0 but for
+/// chance when they do not.
+const CORRELATED: f64 = 0.5;
+
 /// Renders the scene of vertical stripes with one and several threads, one seed and two, and looks
 /// at what may differ and what may not.
 pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<Check>> {
@@ -36,8 +40,7 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
     };
     let bits = |image: &[f32]| image.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
     let same = bits(one) == bits(four) && bits(four) == bits(again);
-    let row = |y: u32| &one[(3 * width * y) as usize..(3 * width * (y + 1)) as usize];
-    let repeated = (1..height).filter(|&y| row(y) == row(y - 1)).count();
+    let correlation = row_correlation(one, other, 3 * width as usize);
     Ok(vec![
         check(
             "sampler.threads",
@@ -47,8 +50,8 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
         ),
         check(
             "sampler.rows",
-            (repeated as u32) < height / 2,
-            &format!("{repeated} of {} rows repeat the one above", height - 1),
+            correlation < CORRELATED,
+            &format!("the noise of a row has a correlation of {correlation:.2} with the row above"),
             "every row starts with the same seed: offset it by the row",
         ),
         check(
@@ -58,4 +61,37 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
             "seed the samplers with the job's seed, the student id",
         ),
     ])
+}
+
+/// How alike the noise of neighbouring rows is: 0 when it is independent, 1 when it is the same.
+/// The difference of two images of other seeds is noise alone.
+fn row_correlation(one: &[f32], other: &[f32], row_floats: usize) -> f64 {
+    let noise: Vec<f64> = one.iter().zip(other).map(|(a, b)| f64::from(a - b)).collect();
+    let rows = || noise.chunks_exact(row_floats);
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (mut shared, mut own) = (0.0, 0.0);
+    for (row, next) in rows().zip(rows().skip(1)) {
+        shared += product(row, next);
+        own += 0.5 * (product(row, row) + product(next, next));
+    }
+    if own > 0.0 { shared / own } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_one_seed_are_told_from_rows_of_their_own() {
+        let sampler = basecode::Sampler::new(1);
+        let mut noise = || (0..64).map(|_| sampler.next_1d()).collect::<Vec<f32>>();
+        let independent = |noise: &mut dyn FnMut() -> Vec<f32>| -> Vec<f32> { (0..32).flat_map(|_| noise()).collect() };
+        let (a, b) = (independent(&mut noise), independent(&mut noise));
+        assert!(row_correlation(&a, &b, 64).abs() < 0.1);
+        // Rows that differ in brightness but not in noise.
+        let rows = |row: &[f32]| (0..32).flat_map(|y| row.iter().map(move |v| v * (1.0 + 0.01 * y as f32))).collect();
+        let (a, b): (Vec<f32>, Vec<f32>) = (rows(&noise()), rows(&noise()));
+        assert!(row_correlation(&a, &b, 64) > 0.99);
+        assert_eq!(row_correlation(&a, &a, 64), 0.0);
+    }
 }

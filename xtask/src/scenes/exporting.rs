@@ -91,10 +91,10 @@ fn toml(scene: &Scene, realtime: bool, bonus: bool) -> String {
         vector(camera.at),
         float(camera.fov_deg),
     );
-    text += if realtime {
-        "type = \"direct\"\n"
+    text += &if realtime {
+        "type = \"direct\"\n".to_string()
     } else {
-        "type = \"simple\"\nspp = 16\n"
+        format!("type = \"simple\"\nspp = {}\n", scene.spp)
     };
     if bonus {
         text += "bonus = true\n";

@@ -71,6 +71,8 @@ pub struct Scene {
     pub camera: Camera,
     /// Width and height in pixels.
     pub film: [u32; 2],
+    /// Samples per pixel offline.
+    pub spp: u32,
     pub shapes: Vec<Shape>,
     pub textures: Vec<Texture>,
 }
@@ -86,6 +88,7 @@ impl Scene {
             bonus: false,
             camera,
             film,
+            spp: 16,
             shapes: Vec::new(),
             textures: Vec::new(),
         }

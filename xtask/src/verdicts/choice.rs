@@ -67,7 +67,8 @@ impl Subject {
         if !self.parts.is_empty() || !self.findings.is_empty() {
             return self.mistakes.join(" + ");
         }
-        let mut name = if self.mistakes.is_empty() { "plain".into() } else { self.mistakes.join(" + ") };
+        let mut name =
+            if self.mistakes.is_empty() { "plain".into() } else { self.mistakes.join(" + ") };
         if let Some(spp) = self.spp {
             name += &format!(" {spp} spp");
         }
@@ -80,11 +81,17 @@ pub fn variants(spp: Option<u32>) -> Vec<Subject> {
     if spp.is_none() {
         // What is no mistake, once each.
         let harmless = super::stages::HARMLESS.iter();
-        return harmless.map(|switch| Subject::right(Some(switch.name), 1, THREADS[0], None)).collect();
+        return harmless
+            .map(|switch| Subject::right(Some(switch.name), 1, THREADS[0], None))
+            .collect();
     }
     let each = THREADS.iter().flat_map(|&threads| {
         // One thread draws with one seed more than the others: 5 + 5 + 5 of each.
-        SEEDS.iter().chain(&[260_555_000 + u64::from(threads)]).map(move |&seed| (seed, threads)).collect::<Vec<_>>()
+        SEEDS
+            .iter()
+            .chain(&[260_555_000 + u64::from(threads)])
+            .map(move |&seed| (seed, threads))
+            .collect::<Vec<_>>()
     });
     each.map(|(seed, threads)| Subject::right(None, seed, threads, spp)).collect()
 }
@@ -108,7 +115,9 @@ pub fn singles(catalogue: &Catalogue) -> Vec<Subject> {
 /// When the catalogue lacks a name.
 pub fn pairs(catalogue: &Catalogue) -> Result<Vec<Subject>> {
     let pair = |names: &[&str; 2]| {
-        let [a, b] = names.map(|name| catalogue.named(name).with_context(|| format!("there is no mistake {name}")));
+        let [a, b] = names.map(|name| {
+            catalogue.named(name).with_context(|| format!("there is no mistake {name}"))
+        });
         let (a, b) = (a?, b?);
         let mut parts = [a.parts.as_slice(), b.parts.as_slice()].concat();
         parts.sort();

@@ -36,7 +36,12 @@ impl Row {
         for part in &self.grade.parts {
             let declared = self.declared.contains(&part.id);
             if part.points_max < part.out_of && !declared {
-                complaints.push(format!("{} loses {:.2} ({})", part.id, part.out_of - part.points_max, part.reason));
+                complaints.push(format!(
+                    "{} loses {:.2} ({})",
+                    part.id,
+                    part.out_of - part.points_max,
+                    part.reason
+                ));
             } else if part.points_max == part.out_of && declared {
                 complaints.push(format!("{} loses nothing ({})", part.id, part.reason));
             } else if part.points < part.points_max {
@@ -58,7 +63,12 @@ impl Row {
             format!("{cell:>5}")
         });
         let verdict = if self.as_declared() { "" } else { "  WRONG" };
-        let line = format!("{:<56}{}  {:4.1} s{verdict}", self.name, cells.collect::<String>(), self.seconds);
+        let line = format!(
+            "{:<56}{}  {:4.1} s{verdict}",
+            self.name,
+            cells.collect::<String>(),
+            self.seconds
+        );
         println!("{line}");
         if explain {
             for part in self.grade.parts.iter().filter(|part| part.points < part.out_of) {

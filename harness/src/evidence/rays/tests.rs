@@ -109,3 +109,24 @@ fn an_image_that_is_not_its_rays_is_found() {
     let black = [[0.0; 3]; 12];
     assert_eq!(judge_agreement("s", &mask, &black, &black).verdict, Verdict::NotJudged);
 }
+
+#[test]
+fn shadows_are_judged_where_radiance_is_right() {
+    let check = |id: &str, scene: &str, verdict| Check::new(id, scene, verdict, "");
+    let verdicts = |checks: &[Check]| {
+        let mut checks = checks.to_vec();
+        set_apart(&mut checks);
+        checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
+    };
+    let (pass, fail) = (Verdict::Pass, Verdict::Fail);
+    let emitter =
+        [check("radiance.lit", "emitter", fail), check("shadow.rays", "emitter", fail)];
+    // Wrong everywhere: shadows are judged all the same.
+    assert_eq!(verdicts(&emitter), [fail, fail]);
+    let right = [check("radiance.lit", "cbox", pass), check("shadow.rays", "cbox", fail)];
+    let both = [emitter.as_slice(), right.as_slice()].concat();
+    assert_eq!(verdicts(&both), [fail, Verdict::NotJudged, pass, fail]);
+    // A scene without shadows is no other scene to judge them on.
+    let open = [emitter.as_slice(), &[check("radiance.lit", "open", pass)]].concat();
+    assert_eq!(verdicts(&open), [fail, fail, pass]);
+}

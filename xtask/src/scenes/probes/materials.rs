@@ -154,7 +154,8 @@ pub fn textured() -> Scene {
     scene
 }
 
-/// Three strips of a bumpy floor, so flat that neither light nor camera is ever hidden.
+/// Three strips of a bumpy floor, so flat that neither light nor camera is ever hidden. At 1 spp, so
+/// that it shows where a pixel's only sample lies.
 pub fn open() -> Scene {
     let height = |x: f64, z: f64| 0.1 * (2.1 * x + 0.4).sin() + 0.09 * (2.4 * z - 0.7 * x).cos();
     let slope = |x: f64, z: f64| {
@@ -162,7 +163,7 @@ pub fn open() -> Scene {
         dvec2(0.21 * (2.1 * x + 0.4).cos() - 0.7 * ripple, 2.4 * ripple)
     };
     let strip = |x0: f64, x1: f64| height_field([x0, -4.0], [x1, 3.0], [16, 48], height, slope);
-    probe("open", dvec3(0.0, 4.5, 6.0), dvec3(0.0, 0.0, -0.2), 26.0)
+    let mut scene = probe("open", dvec3(0.0, 4.5, 6.0), dvec3(0.0, 0.0, -0.2), 26.0)
         .with(
             "diffuse",
             Material::diffuse([0.7, 0.5, 0.4]),
@@ -178,5 +179,7 @@ pub fn open() -> Scene {
             Material::phong([0.2, 0.25, 0.5], [0.45, 0.45, 0.45], 60.5),
             strip(0.9, 4.0),
         )
-        .lit_by(dvec3(0.9, 5.0, -1.5), [45.0, 45.0, 45.0])
+        .lit_by(dvec3(0.9, 5.0, -1.5), [45.0, 45.0, 45.0]);
+    scene.spp = 1;
+    scene
 }

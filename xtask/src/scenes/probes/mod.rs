@@ -34,7 +34,7 @@ const PROBES: [Probe; 10] = [
     ),
     (
         materials::open,
-        "bumpy diffuse and Phong strips without any occluder, everything in view lit: unshadowed radiance alone, whatever the shadows do",
+        "bumpy diffuse and Phong strips without any occluder, everything in view lit: unshadowed radiance alone, whatever the shadows do; a sample that is not at the pixel's centre",
     ),
     (
         geometry::behind,
@@ -66,7 +66,7 @@ pub fn all() -> Vec<Scene> {
 /// The table of the probes.
 pub fn readme() -> File {
     let mut text = String::from(
-        "# Probe scenes\n\nMade by `xtask scenes`. Each shows faults that the four scenes of the assignment hide. One point light each, offline at 16 spp and realtime.\n\n\
+        "# Probe scenes\n\nMade by `xtask scenes`. Each shows faults that the four scenes of the assignment hide. One point light each, offline at 16 spp (`open`: 1) and realtime.\n\n\
          | scene | film | light at | what it shows |\n|---|---|---|---|\n",
     );
     for (scene, shows) in PROBES {

@@ -1,0 +1,241 @@
+//! Part 2.5: whether realtime shadows fall where they should, apart from how surfaces are shaded.
+
+use basecode::Image;
+
+use super::{Check, Measure, Verdict};
+use crate::imaging::evidence::Tolerances;
+use crate::imaging::reference::RegionMask;
+
+/// A pixel is lit when it differs from the image without shadows by less than this fraction, dark
+/// when less than this fraction is left.
+const HALF_LIGHT: f32 = 0.02;
+/// What is dimmer than this fraction of the scene's median tells nothing about shadows.
+const DIM: f32 = 1e-5;
+/// So much of the lit and of the shadowed surface must tell something.
+const LEAST_KNOWN: f64 = 0.25;
+/// An image has shadows when so much of what lies in shadow is black.
+const MOSTLY: f64 = 0.95;
+
+/// The measure of a check that was judged by visibility.
+const VISIBILITY: &str = "lit pixels that are not lit (fraction)";
+
+/// An image that is wrong and so dark that it tells nothing of its shadows leaves the verdict to
+/// another scene that does, if there is one.
+pub fn set_apart(checks: &mut [Check]) {
+    let tells = |check: &Check| {
+        let visibility = check.measures.iter().any(|measure| measure.name == VISIBILITY);
+        check.id == "bonus.image" && (check.verdict == Verdict::Pass || visibility)
+    };
+    if !checks.iter().any(tells) {
+        return;
+    }
+    for check in checks.iter_mut() {
+        if check.id == "bonus.image" && check.verdict == Verdict::Fail && !tells(check) {
+            check.verdict = Verdict::NotJudged;
+            check.summary = format!(
+                "too dark to tell where shadows fall; another scene does ({})",
+                check.summary
+            );
+        }
+    }
+}
+
+/// The masks of one film: which pixels lie in shadow.
+#[derive(Clone, Copy)]
+pub struct Shadows<'a> {
+    /// With shadows.
+    pub mask: &'a RegionMask,
+    /// Without.
+    pub unshadowed: &'a RegionMask,
+    /// Median lit value of the scene.
+    pub median_lit: f32,
+}
+
+impl Shadows<'_> {
+    /// Pixels that face light and viewer, away from edges: index, and whether they are in the light.
+    fn pixels(&self) -> impl Iterator<Item = (usize, bool)> {
+        let clear = |value: u16| value & (RegionMask::EDGE | RegionMask::EMITTER) == 0;
+        let both = self.mask.pixels.iter().zip(&self.unshadowed.pixels).enumerate();
+        both.filter(move |(_, (with, without))| {
+            clear(**with) && self.unshadowed.is_lit_interior(**without)
+        })
+        .map(|(index, (with, _))| (index, self.mask.region(*with).lit))
+    }
+
+    /// Whether a frame that should be without shadows has them: what lies in shadow is black.
+    pub fn are_in(&self, frame: &Image) -> bool {
+        let (mut dark, mut black) = (0usize, 0usize);
+        for (index, _) in self.pixels().filter(|(_, lit)| !lit) {
+            dark += 1;
+            black += usize::from(frame.pixels[index].abs().max_element() <= DIM * self.median_lit);
+        }
+        dark > 0 && black as f64 > MOSTLY * dark as f64
+    }
+
+    /// The mask without shadows, in which nothing that lies in shadow is compared.
+    pub fn lit_alone(&self) -> RegionMask {
+        let mut mask = self.unshadowed.clone();
+        for (value, with) in mask.pixels.iter_mut().zip(&self.mask.pixels) {
+            let in_light = self.mask.region(*with).lit && with & RegionMask::EDGE == 0;
+            let faces = self.unshadowed.region(*value).lit;
+            if faces && !in_light {
+                *value |= RegionMask::EMITTER;
+            }
+        }
+        mask
+    }
+
+    /// Judges visibility from the renderer's own frames with and without shadows, so that a fault
+    /// in shading is not paid twice. Nothing when too little of the frame without shadows is lit.
+    pub fn judge(
+        &self,
+        scene: &str,
+        with: &Image,
+        without: &Image,
+        tolerances: &Tolerances,
+    ) -> Option<Check> {
+        // For shadowed and for lit pixels: all, those that tell something, those that are wrong.
+        let mut counts = [[0usize; 3]; 2];
+        let mut first = None;
+        for (index, lit) in self.pixels() {
+            let (a, b) = (with.pixels[index], without.pixels[index]);
+            let [all, known, wrong] = &mut counts[usize::from(lit)];
+            *all += 1;
+            if !(b.is_finite() && b.abs().max_element() > DIM * self.median_lit) {
+                continue;
+            }
+            *known += 1;
+            let off = if lit { (a - b).abs() } else { a.abs() };
+            // Written so that a NaN is wrong.
+            if !(off.max_element() <= HALF_LIGHT * b.abs().max_element()) {
+                *wrong += 1;
+                first = first.or(Some(index));
+            }
+        }
+        let told =
+            |[all, known, _]: [usize; 3]| all > 0 && known as f64 >= LEAST_KNOWN * all as f64;
+        if !counts.iter().all(|count| told(*count)) {
+            return None;
+        }
+        let fraction = |[_, known, wrong]: [usize; 3]| wrong as f64 / known as f64;
+        let bound = |[_, known, _]: [usize; 3]| {
+            tolerances.interior_fraction + f64::from(tolerances.spare_pixels) / known as f64
+        };
+        let [dark, lit] = counts;
+        let measures = vec![
+            Measure::at_most(VISIBILITY, fraction(lit), bound(lit)),
+            Measure::at_most(
+                "shadowed pixels that are not dark (fraction)",
+                fraction(dark),
+                bound(dark),
+            ),
+        ];
+        let id = "bonus.image";
+        let mut check = match first.filter(|_| measures.iter().any(|measure| !measure.passed)) {
+            None => {
+                let summary =
+                    "shadows fall where they should; how surfaces are shaded is judged elsewhere";
+                Check::new(id, scene, Verdict::Pass, summary)
+            }
+            Some(index) => {
+                let summary = format!(
+                    "{} of {} lit pixels are not lit and {} of {} shadowed pixels are not dark; first at ({}, {})",
+                    lit[2],
+                    lit[1],
+                    dark[2],
+                    dark[1],
+                    index % self.mask.width,
+                    index / self.mask.width
+                );
+                let hint = match (measures[0].passed, measures[1].passed) {
+                    (true, _) if fraction(dark) > 0.99 => "no point is in shadow",
+                    (true, _) => {
+                        "shadows are missing or come loose from what casts them: too much bias?"
+                    }
+                    (_, true) => {
+                        "lit points are in shadow: too little bias, or the light's frustum is too small"
+                    }
+                    _ => "",
+                };
+                let error = fraction(lit) + fraction(dark);
+                Check { error, ..Check::new(id, scene, Verdict::Fail, summary) }.with_hint(hint)
+            }
+        };
+        check.measures = measures;
+        Some(check)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use basecode::Vec3;
+
+    use super::*;
+    use crate::imaging::reference::Region;
+
+    /// 20 pixels in a row, the last 10 in shadow.
+    fn masks() -> (RegionMask, RegionMask) {
+        let mut unshadowed = RegionMask::background(20, 1);
+        for lit in [true, false] {
+            unshadowed.regions.push(Region { name: "floor".into(), lit, exponent: 0.0 });
+        }
+        unshadowed.pixels = vec![1; 20];
+        let mut mask = unshadowed.clone();
+        mask.pixels[10..].fill(2);
+        (mask, unshadowed)
+    }
+
+    fn image(value: impl Fn(usize) -> f32) -> Image {
+        Image { width: 20, height: 1, pixels: (0..20).map(|i| Vec3::splat(value(i))).collect() }
+    }
+
+    fn judge(with: &Image, without: &Image) -> Option<Verdict> {
+        let (mask, unshadowed) = masks();
+        let shadows = Shadows { mask: &mask, unshadowed: &unshadowed, median_lit: 1.0 };
+        let tolerances = Tolerances { spare_pixels: 0, ..Tolerances::default() };
+        shadows.judge("s", with, without, &tolerances).map(|check| check.verdict)
+    }
+
+    #[test]
+    fn visibility_is_judged_apart_from_shading() {
+        let shading = |i: usize| 3.0 + i as f32;
+        let without = image(shading);
+        let right = image(|i| if i < 10 { shading(i) } else { 0.0 });
+        assert_eq!(judge(&right, &without), Some(Verdict::Pass));
+        assert_eq!(judge(&without, &without), Some(Verdict::Fail));
+        assert_eq!(judge(&image(|_| 0.0), &without), Some(Verdict::Fail));
+        let acne = image(|i| if i < 9 { shading(i) } else { 0.0 });
+        assert_eq!(judge(&acne, &without), Some(Verdict::Fail));
+        let not_a_number = image(|i| if i < 10 { f32::NAN } else { 0.0 });
+        assert_eq!(judge(&not_a_number, &without), Some(Verdict::Fail));
+        // A black renderer tells nothing, and earns nothing by it.
+        assert_eq!(judge(&right, &image(|_| 0.0)), None);
+    }
+
+    #[test]
+    fn what_is_too_dark_leaves_the_verdict_to_another_scene() {
+        let (mask, unshadowed) = masks();
+        let shadows = Shadows { mask: &mask, unshadowed: &unshadowed, median_lit: 1.0 };
+        let lit = image(|_| 1.0);
+        let wrong = shadows.judge("teapot", &lit, &lit, &Tolerances::default()).unwrap();
+        let dark = Check::new("bonus.image", "cbox", Verdict::Fail, "black");
+        let verdicts = |checks: &[Check]| {
+            let mut checks = checks.to_vec();
+            set_apart(&mut checks);
+            checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
+        };
+        assert_eq!(verdicts(&[wrong, dark.clone()]), [Verdict::Fail, Verdict::NotJudged]);
+        assert_eq!(verdicts(&[dark.clone(), dark]), [Verdict::Fail, Verdict::Fail]);
+    }
+
+    #[test]
+    fn shadows_where_none_belong_are_seen() {
+        let (mask, unshadowed) = masks();
+        let shadows = Shadows { mask: &mask, unshadowed: &unshadowed, median_lit: 1.0 };
+        assert!(shadows.are_in(&image(|i| if i < 10 { 1.0 } else { 0.0 })));
+        assert!(!shadows.are_in(&image(|_| 1.0)));
+        let lit = shadows.lit_alone();
+        let compared = |value: &&u16| **value & RegionMask::EMITTER == 0;
+        assert_eq!(lit.pixels.iter().filter(compared).count(), 10);
+    }
+}
