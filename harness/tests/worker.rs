@@ -78,7 +78,7 @@ impl House {
             output_kib: 256,
             ..Limits::default()
         };
-        Self { dir, supervisor: Supervisor { umbra, scratch }, limits }
+        Self { dir, supervisor: Supervisor::new(umbra, scratch), limits }
     }
 
     fn scene(&self, options: &str) -> SceneRef {
