@@ -72,7 +72,7 @@ pub fn run(
         }
     };
     if ended_by_us.is_some() {
-        running.end_inside(Instant::now() + DRAIN);
+        running.end_inside();
     }
     let (status, usage) = group.end()?;
     let wall_s = begin.elapsed().as_secs_f64();
@@ -149,15 +149,18 @@ impl Running {
 
     /// Ends what is inside first, so that the launcher reaps it: its usage counts it then, and
     /// nothing is alive when the launcher is gone.
-    fn end_inside(&self, until: Instant) {
+    fn end_inside(&self) {
         #[cfg(target_os = "linux")]
-        if self.sandboxed && crate::sandbox::kill_init(self.child.as_raw() as u32) {
+        for at_once in [false, true] {
+            let launcher = self.child.as_raw() as u32;
+            if !self.sandboxed || !crate::sandbox::kill_inside(launcher, at_once) {
+                return;
+            }
+            let until = Instant::now() + DRAIN;
             while Instant::now() < until && matches!(has_exited(self.child), Ok(false)) {
                 std::thread::sleep(Duration::from_millis(1));
             }
         }
-        #[cfg(not(target_os = "linux"))]
-        let _ = until;
     }
 }
 

@@ -104,19 +104,26 @@ pub fn locked_pid(launcher: u32) -> Option<u32> {
     child_of(child_of(launcher)?)
 }
 
-/// Ends everything inside by killing process 1, which the launcher then reaps. False when there
-/// is none (any more).
-pub fn kill_init(launcher: u32) -> bool {
+/// Ends everything inside by killing the locked process: process 1 then ends and reaps the others,
+/// so that the launcher's usage counts all. With `at_once`, or before there is one, process 1 itself is
+/// killed. False when there is nothing to kill (any more).
+pub fn kill_inside(launcher: u32, at_once: bool) -> bool {
     let Some(init) = child_of(launcher) else { return false };
+    (!at_once && kill_child(init)) || kill_child(launcher)
+}
+
+/// Kills a process's first child.
+fn kill_child(parent: u32) -> bool {
+    let Some(child) = child_of(parent) else { return false };
     // SAFETY: plain integers.
-    let fd = unsafe { libc::syscall(libc::SYS_pidfd_open, init, 0) };
+    let fd = unsafe { libc::syscall(libc::SYS_pidfd_open, child, 0) };
     if fd < 0 {
         return false;
     }
     // SAFETY: a new descriptor that nobody else knows.
     let fd = unsafe { OwnedFd::from_raw_fd(fd as i32) };
     // Only now is it certain whom the descriptor means: the id may have gone to another before.
-    if child_of(launcher) != Some(init) {
+    if child_of(parent) != Some(child) {
         return false;
     }
     let (fd, info) = (fd.as_raw_fd(), std::ptr::null::<libc::siginfo_t>());

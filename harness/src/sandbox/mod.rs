@@ -33,7 +33,7 @@ mod privileges;
 mod root;
 
 #[cfg(target_os = "linux")]
-pub use launch::{command, kill_init, launch_main, lock_self, locked_pid, orders};
+pub use launch::{command, kill_inside, launch_main, lock_self, locked_pid, orders};
 pub use policy::{
     Bind, Gpu, InForce, Isolation, Kind, Layers, Limits, Policy, SandboxError, Scratch, read_report,
 };

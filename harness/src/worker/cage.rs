@@ -99,7 +99,8 @@ fn scene(toml: &Path, roots: &mut Vec<PathBuf>, policy: &mut Policy) -> io::Resu
     // Without a mesh folder it is no scene: the plugin is to say so, or that there is no such file.
     if let Some(mesh) = mesh {
         // A path that ends in a slash would name the folder itself otherwise.
-        let at = if mesh == root { Path::new(SCENE).join(number.to_string()) } else { inside(&mesh) };
+        let at =
+            if mesh == root { Path::new(SCENE).join(number.to_string()) } else { inside(&mesh) };
         add(policy, Bind::new(&mesh, at));
         if !toml.starts_with(&mesh) && toml.is_file() {
             add(policy, Bind::new(&toml, inside(&toml)));
