@@ -22,7 +22,8 @@ fn recording() -> &'static Recording {
 }
 
 fn build(src: &Path, out: &Path, limits: &Limits) -> BuildReport {
-    compile(recording(), umbra(), src, out, limits, &AtomicBool::new(false)).unwrap()
+    let supervisor = Supervisor::new(umbra().to_owned(), out.to_owned());
+    compile(recording(), &supervisor, src, out, limits, &AtomicBool::new(false)).unwrap()
 }
 
 /// Compiles a crate of one file.
@@ -87,7 +88,7 @@ fn cargo_and_the_replay_build_renderers_that_draw_the_same() {
         },
         Request::EvalBsdf { scene, queries: vec![query] },
     ];
-    let supervisor = Supervisor { umbra: umbra().to_owned(), scratch: dir.path().to_owned() };
+    let supervisor = Supervisor::new(umbra().to_owned(), dir.path().to_owned());
     let draw = |plugin: &Path| {
         let job = Job { plugin: Some(plugin.to_owned()), requests: requests.clone() };
         let cancel = AtomicBool::new(false);

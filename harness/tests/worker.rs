@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use umbra::plugin::{Witness, WitnessQuery};
 use umbra::process::{Exit, Limits};
+use umbra::sandbox::Layers;
 use umbra::worker::{
     Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, JobReport, Matter, Outcome,
     RayQuery, Request, SceneRef, Supervisor,
@@ -78,7 +79,7 @@ impl House {
             output_kib: 256,
             ..Limits::default()
         };
-        Self { dir, supervisor: Supervisor { umbra, scratch }, limits }
+        Self { dir, supervisor: Supervisor::new(umbra, scratch), limits }
     }
 
     fn scene(&self, options: &str) -> SceneRef {
@@ -307,6 +308,7 @@ fn each_fault_has_its_outcome_and_the_requests_around_it_are_answered() {
     house.limits.wall_s = 1.0;
     house.limits.memory_mib = 400;
     let plugin = house.compile("fault.c", &[]);
+    let full = house.supervisor.isolation;
     let crashed = |name: &str| Outcome::CrashedBySignal(name.to_owned());
     let before_start = "the plugin wrote before the start of its output buffer, or cut the file \
                         short";
@@ -333,20 +335,24 @@ fn each_fault_has_its_outcome_and_the_requests_around_it_are_answered() {
             ),
         ),
     ] {
-        let begin = Instant::now();
-        let requests = ["", mode, ""].map(|mode| house.offline(mode, 1, 1)).to_vec();
-        let report = house.run(&plugin, requests);
-        assert_eq!(report.outcomes[1], expected, "{mode}: {:#?}", report.runs);
-        for index in [0, 2] {
-            assert_eq!(values(&report.outcomes[index]), [0.0; 135], "{mode}, request {index}");
-        }
-        assert!(begin.elapsed() < Duration::from_secs(4), "{mode} took {:?}", begin.elapsed());
-        let daemon = report.runs.iter().any(|run| run.ended.left_process);
-        assert_eq!(daemon, mode == "daemon", "{mode}");
-        if mode == "flood" {
-            let stdout = &report.runs[0].ended.stdout;
-            assert!(stdout.head.starts_with("all work") && stdout.tail.contains("dull boy"));
-            assert!(stdout.head.len() + stdout.tail.len() < 64 << 10);
+        for isolation in [full, Layers::NONE] {
+            house.supervisor.isolation = isolation;
+            let begin = Instant::now();
+            let requests = ["", mode, ""].map(|mode| house.offline(mode, 1, 1)).to_vec();
+            let report = house.run(&plugin, requests);
+            assert_eq!(report.outcomes[1], expected, "{mode}: {:#?}", report.runs);
+            for index in [0, 2] {
+                assert_eq!(values(&report.outcomes[index]), [0.0; 135], "{mode}, request {index}");
+            }
+            assert!(begin.elapsed() < Duration::from_secs(4), "{mode} took {:?}", begin.elapsed());
+            let daemon = report.runs.iter().any(|run| run.ended.left_process);
+            // In the sandbox no process can be made at all.
+            assert_eq!(daemon, mode == "daemon" && isolation == Layers::NONE, "{mode}");
+            if mode == "flood" {
+                let stdout = &report.runs[0].ended.stdout;
+                assert!(stdout.head.starts_with("all work") && stdout.tail.contains("dull boy"));
+                assert!(stdout.head.len() + stdout.tail.len() < 64 << 10);
+            }
         }
     }
 }

@@ -112,7 +112,7 @@ impl Packer {
         let out = assignment.cache().join("samples");
         fs::create_dir_all(&out)?;
         let recording = Recording::obtain(root, &umbra)?;
-        let supervisor = Supervisor { umbra, scratch };
+        let supervisor = Supervisor::available(umbra, scratch);
         Ok(Self { root: root.to_owned(), out, recipes, assignment, supervisor, recording })
     }
 
@@ -219,7 +219,7 @@ impl Packer {
         }
         let cancel = AtomicBool::new(false);
         let limits = &self.assignment.limits;
-        let report = build::compile(&self.recording, &self.supervisor.umbra, &src, &out, &limits.build, &cancel)?;
+        let report = build::compile(&self.recording, &self.supervisor, &src, &out, &limits.build, &cancel)?;
         let library = match report.outcome {
             BuildOutcome::Built { library } => library,
             BuildOutcome::CompileError { errors } => {

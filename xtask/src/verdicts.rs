@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     }
     let scratch = assignment.cache().join("scratch");
     std::fs::create_dir_all(&scratch)?;
-    let supervisor = Supervisor { umbra, scratch };
+    let supervisor = Supervisor::available(umbra, scratch);
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let store = Store {
         assignment: &assignment,

@@ -3,7 +3,6 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
@@ -11,7 +10,13 @@ use serde::{Deserialize, Serialize};
 use super::diagnostics::parse;
 use super::record::externs;
 use super::{Diagnostic, Recording, TEMPLATE};
-use crate::process::{self, Exit, Limits, Lock, Policy, Purpose, signal_name};
+use crate::process::{self, Exit, Limits, Lock, signal_name};
+use crate::sandbox::policy::{CLOSURE, SCRATCH, SRC, TOOLCHAIN};
+use crate::sandbox::{Bind, Kind, Policy};
+use crate::worker::Supervisor;
+
+/// How much the compiler, the linker and the plugin may write in all, in MiB.
+const SCRATCH_MIB: u64 = 1024;
 
 /// What became of a compiler call.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,13 +70,13 @@ pub fn default_limits() -> Limits {
 }
 
 /// Compiles the hand-in whose `src` folder is `src` into a plugin in `out`, an existing folder.
-/// `umbra` is this program. Nothing of the hand-in besides `src` is named to the compiler.
+/// `supervisor` says which program is Umbra and what isolates the compiler. Nothing of the hand-in besides `src` is named to the compiler.
 ///
 /// # Errors
-/// When the compiler cannot be started or `out` cannot be used.
+/// When the compiler cannot be started or isolated, or `out` cannot be used.
 pub fn compile(
     recording: &Recording,
-    umbra: &Path,
+    supervisor: &Supervisor,
     src: &Path,
     out: &Path,
     limits: &Limits,
@@ -79,36 +84,49 @@ pub fn compile(
 ) -> io::Result<BuildReport> {
     let (src, out) = (std::path::absolute(src)?, std::path::absolute(out)?);
     let scratch = tempfile::Builder::new().prefix("rustc-").tempdir_in(&out)?;
-    let mut command = Command::new(umbra);
-    command.arg("__exec").arg(&recording.rustc).args(replayed(recording, &src, &out));
-    command.current_dir(scratch.path()).env_clear();
+    let file = format!("{}{TEMPLATE}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let library = out.join(&file);
+    let report = tempfile::NamedTempFile::new_in(&out)?;
+    let mut policy = Policy::new(Kind::Build);
+    policy.layers = supervisor.isolation;
+    policy.read_only.push(Bind::new(&recording.sysroot, TOOLCHAIN));
+    policy.read_only.push(Bind::new(&recording.closure, CLOSURE));
+    policy.read_only.push(Bind::new(&src, SRC));
+    policy.collect.push(Bind::new(&library, Path::new(SCRATCH).join(&file)));
+    policy.scratch.quota_mib = SCRATCH_MIB;
+    policy.scratch.without_mount = Some(scratch.path().to_owned());
+    policy.report = Some(report.path().to_owned());
+    let lock = Lock::new(limits, policy.clone());
+    let sandboxed = lock.sandbox.is_some();
+    // What the compiler is told: where it sees things, and where it may write.
+    let (seen_src, temporary) = (policy.seen(&src), policy.scratch_path());
+    let into = if sandboxed { &temporary } else { &out };
+    if sandboxed {
+        make_empty(&library)?;
+    }
+    let mut command = process::command(&supervisor.umbra, &lock, &policy.seen(&recording.rustc));
+    command.args(replayed(recording, &policy.seen(&recording.closure), &seen_src, into));
+    command.current_dir(scratch.path());
     // The linker is found through PATH.
     command.env("PATH", "/usr/local/bin:/usr/bin:/bin").env("LANG", "C");
-    command.env("HOME", "/nonexistent").env("TMPDIR", scratch.path());
+    command.env("HOME", "/nonexistent").env("TMPDIR", &temporary);
     let told = |name: &str| name.starts_with("CARGO_PKG_") || name == "CARGO_CRATE_NAME";
     command.envs(recording.env.iter().filter(|(name, _)| told(name)));
-    if let Some(root) = src.parent() {
+    if let Some(root) = seen_src.parent() {
         command.env("CARGO_MANIFEST_DIR", root);
     }
-    let readable = vec![recording.sysroot.clone(), recording.closure.clone(), src.clone()];
-    let policy = Policy { purpose: Purpose::Compiler, readable, writable: vec![out.clone()] };
-    let lock = Lock { limits: limits.clone(), policy };
     let keep = (limits.output_kib as usize) << 10;
     let ended = process::run(command, &lock, keep, cancel, &mut || {})?;
     let said = parse(&ended.stderr.head);
-    let library = out.join(format!(
-        "{}{TEMPLATE}{}",
-        std::env::consts::DLL_PREFIX,
-        std::env::consts::DLL_SUFFIX
-    ));
     let out_of_memory = ended.stderr.contains("memory allocation of ")
         || ended.stderr.contains("LLVM ERROR: out of memory")
         || ended.peak_address_mib >= limits.memory_mib - limits.memory_mib / 10;
     let outcome = match ended.exit {
-        Exit::Code(0) if fs::metadata(&library).is_ok_and(|file| file.is_file()) => {
+        Exit::Code(0) if fs::metadata(&library).is_ok_and(|file| file.is_file() && file.len() > 0) => {
             BuildOutcome::Built { library }
         }
-        Exit::Code(code) if code == i32::from(process::EXIT_NOT_LOCKED) => {
+        // In a sandbox foreign code could end with this code; there the report tells.
+        Exit::Code(code) if !sandboxed && code == i32::from(process::EXIT_NOT_LOCKED) => {
             return Err(io::Error::other(ended.stderr.head));
         }
         Exit::Code(_) if said.errors.is_empty() && out_of_memory => BuildOutcome::OutOfMemory,
@@ -131,9 +149,20 @@ pub fn compile(
     Ok(BuildReport { outcome, warnings: said.warnings, wall_s, cpu_s })
 }
 
+/// An empty file to be written over with what the sandbox collects. Whoever loads it later may be
+/// another user.
+fn make_empty(library: &Path) -> io::Result<()> {
+    fs::File::create(library)?;
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        fs::set_permissions(library, fs::Permissions::from_mode(0o755))?;
+    }
+    Ok(())
+}
+
 /// The recorded arguments with source, output and libraries replaced.
-fn replayed(recording: &Recording, src: &Path, out: &Path) -> Vec<String> {
-    let closure = &recording.closure;
+fn replayed(recording: &Recording, closure: &Path, src: &Path, out: &Path) -> Vec<String> {
     let staged = |name: &str, path: &str| {
         let file = Path::new(path).file_name().unwrap_or_default();
         format!("{name}={}", closure.join(file).display())

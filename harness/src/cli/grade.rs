@@ -9,10 +9,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context as _, bail, ensure};
 
 use super::context::{Context, INTERRUPTED, cores};
+use super::MachineLacks;
 use super::render::AdapterChoice;
 use crate::grading::{Grading, Purpose, Record};
 use crate::report::{self, Entry, Sheet};
 use crate::rubric;
+use crate::sandbox::Isolation;
 
 /// What `umbra check` is told.
 #[derive(clap::Args)]
@@ -45,9 +47,22 @@ pub struct GradeArguments {
     /// Hand-ins that are graded at the same time [default: one for each core]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
+    /// What must isolate hand-ins: full refuses a machine that cannot, reduced takes what there is
+    /// and says so in the report (see `umbra doctor`)
+    #[arg(long, value_enum, default_value_t = IsolationChoice::Full)]
+    isolation: IsolationChoice,
     /// Print what each stage cost
     #[arg(long)]
     timings: bool,
+}
+
+/// How much isolation is demanded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum IsolationChoice {
+    /// Every layer
+    Full,
+    /// What this machine has
+    Reduced,
 }
 
 /// Checks one working folder and prints everything about it; exit 1 when points are missing.
@@ -58,6 +73,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         adapter: arguments.adapter,
         jobs: 1,
         purpose: Purpose::Check,
+        isolation: IsolationChoice::Reduced,
         timings: arguments.timings,
     };
     let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
@@ -77,6 +93,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         adapter: arguments.adapter,
         jobs: arguments.jobs.unwrap_or(cores() as usize).max(1),
         purpose: Purpose::Grade,
+        isolation: arguments.isolation,
         timings: arguments.timings,
     };
     let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
@@ -146,6 +163,7 @@ struct Batch<'a> {
     adapter: AdapterChoice,
     jobs: usize,
     purpose: Purpose,
+    isolation: IsolationChoice,
     timings: bool,
 }
 
@@ -156,6 +174,14 @@ impl Batch<'_> {
             ensure!(source.exists(), "{} does not exist", source.display());
         }
         let context = Context::new(root)?;
+        let isolation = context.supervisor.isolation.isolation();
+        if self.isolation == IsolationChoice::Full && isolation != Isolation::Full {
+            return Err(MachineLacks(format!(
+                "hand-ins are not run here, isolation would be {isolation}; hint: `umbra doctor` says \
+                 what to do, `--isolation reduced` grades all the same"
+            ))
+            .into());
+        }
         let result = context.with_store(|store| {
             let grading = Grading::prepare(store, self.adapter.adapter(), &INTERRUPTED)?;
             self.grade_all(&context, grading)

@@ -3,6 +3,8 @@
 mod bless;
 mod compare;
 mod context;
+#[cfg(target_os = "linux")]
+mod doctor;
 mod grade;
 mod render;
 mod tree;
@@ -57,6 +59,9 @@ enum Command {
     Render(render::RenderArguments),
     /// Compare two EXR images
     Compare(compare::CompareArguments),
+    /// Say what this machine has: isolation, graphics adapters, compiler; exit 0 when it can grade
+    #[cfg(target_os = "linux")]
+    Doctor,
     /// Render the stored expected images anew with the reference renderer, and replace them
     Bless(bless::BlessArguments),
 }
@@ -97,10 +102,16 @@ pub fn main() -> ExitCode {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
             eprintln!("umbra: {error:#}");
-            ExitCode::from(EXIT_USAGE)
+            let machine = error.downcast_ref::<MachineLacks>().is_some();
+            ExitCode::from(if machine { EXIT_MACHINE } else { EXIT_USAGE })
         }
     }
 }
+
+/// An error of the machine, not of the command line.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct MachineLacks(String);
 
 fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
     match command {
@@ -110,6 +121,8 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Pack(arguments) => tree::pack(&arguments, root),
         Command::Render(arguments) => render::run(&arguments, root),
         Command::Compare(arguments) => compare::run(&arguments),
+        #[cfg(target_os = "linux")]
+        Command::Doctor => doctor::run(),
         Command::Bless(arguments) => bless::run(&arguments, root),
     }
 }

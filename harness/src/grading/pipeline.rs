@@ -210,7 +210,7 @@ impl<'a> Grading<'a> {
         std::fs::create_dir(&out)?;
         let limits = &self.assignment.limits.build;
         let report =
-            build::compile(&self.recording, &self.supervisor.umbra, &src, &out, limits, self.cancel)?;
+            build::compile(&self.recording, self.supervisor, &src, &out, limits, self.cancel)?;
         costs.end("build", report.cpu_s);
         let (plugin, summary) = match report.outcome {
             BuildOutcome::Built { library } => (Some(library), "the source builds".to_owned()),
@@ -300,7 +300,7 @@ impl<'a> Grading<'a> {
     fn conditions(&self) -> Conditions {
         Conditions {
             umbra: env!("CARGO_PKG_VERSION").to_owned(),
-            isolation: "processes with limits".to_owned(),
+            isolation: self.supervisor.isolation.isolation().to_string(),
             adapter: match &self.adapter {
                 Ok(adapter) => format!("{:?} {}", adapter.kind, adapter.name).trim().to_owned(),
                 Err(why) => format!("none: {why}"),

@@ -1,8 +1,8 @@
 //! What a child may use and see.
 
-use std::path::PathBuf;
-
 use serde::{Deserialize, Serialize};
+
+use crate::sandbox::{self, Isolation, Policy};
 
 /// What a child may use.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,31 +38,41 @@ impl Default for Limits {
     }
 }
 
-/// What a child is started for; a sandbox permits different system calls to each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Purpose {
-    /// Loads a plugin and calls it.
-    Worker,
-    /// Executes the compiler, which starts the linker.
-    Compiler,
-}
-
-/// What a child may see. Not enforced until a sandbox does.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Policy {
-    /// What the child is for.
-    pub purpose: Purpose,
-    /// Files and folders it reads, besides the system's libraries.
-    pub readable: Vec<PathBuf>,
-    /// Folders it writes.
-    pub writable: Vec<PathBuf>,
-}
-
-/// What a child does to itself before anything else: [`crate::process::lock_self`].
+/// What a child does to itself before anything else.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lock {
     /// What it may use.
     pub limits: Limits,
-    /// What it may see.
-    pub policy: Policy,
+    /// What it may see: the sandbox locks it. None where there is no isolation at all: then it gets
+    /// a session and limits only, by [`crate::process::lock_self`].
+    pub sandbox: Option<Policy>,
+}
+
+impl Lock {
+    /// A lock that isolates by `policy`, or by limits alone when the policy has no layer.
+    /// The policy's limits are replaced by these.
+    pub fn new(limits: &Limits, mut policy: Policy) -> Self {
+        let none = policy.layers.isolation() == Isolation::None;
+        policy.limits = sandbox::Limits {
+            cpu_s: limits.cpu_s,
+            memory_mib: limits.memory_mib,
+            file_size_mib: limits.file_size_mib,
+            open_files: limits.open_files,
+            tasks: tasks(limits.threads, policy.layers.user_ns),
+        };
+        Self { limits: limits.clone(), sandbox: (!none).then_some(policy) }
+    }
+}
+
+/// How many processes and threads together: a compiler and a graphics driver have some of their own.
+/// Without a user namespace every process of the user counts, and only the session's limit fits.
+fn tasks(threads: u32, counted_apart: bool) -> u64 {
+    if counted_apart {
+        return 128 + 4 * u64::from(threads);
+    }
+    #[cfg(target_os = "linux")]
+    if let Ok((_, hard)) = nix::sys::resource::getrlimit(nix::sys::resource::Resource::RLIMIT_NPROC) {
+        return hard;
+    }
+    1 << 15
 }

@@ -3,7 +3,7 @@
 //!
 //! Everything of Umbra that runs foreign code (the compiler, the worker) goes through [`run`].
 //! [`start`] is the one place where a process is made; what the child does to itself first is
-//! [`lock_self`]. A sandbox extends these two and nothing else.
+//! [`crate::sandbox::lock_self`] or, without any isolation, [`lock_self`].
 
 mod capture;
 mod limits;
@@ -15,11 +15,13 @@ mod watch;
 mod watch;
 
 pub use capture::Captured;
-pub use limits::{Limits, Lock, Policy, Purpose};
-pub use start::{EXIT_NOT_LOCKED, exec_main, exit_now, lock_self, start};
+pub use limits::{Limits, Lock};
+pub use start::{EXIT_NOT_LOCKED, command, exec_main, exit_now, is_plain, lock_self, start};
 pub use watch::run;
 
 use serde::{Deserialize, Serialize};
+
+use crate::sandbox::InForce;
 
 /// How a child ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,6 +57,8 @@ pub struct Ended {
     pub peak_resident_mib: u64,
     /// Largest address space that was seen in MiB, by sampling; 0 when unknown.
     pub peak_address_mib: u64,
+    /// The isolation that was in force; none without any, and when it ended before it was locked.
+    pub in_force: Option<InForce>,
     /// Whether some process outside the child's group still held its output open in the end.
     pub left_process: bool,
 }

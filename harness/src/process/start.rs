@@ -3,9 +3,11 @@
 
 use std::ffi::{OsStr, OsString};
 use std::io;
-use std::process::{Child, Command, ExitCode};
+use std::path::Path;
+use std::process::{Child, Command, ExitCode, Stdio};
 
 use super::{Limits, Lock};
+use crate::sandbox;
 
 /// Carries the [`Lock`] to the child, which removes it.
 const LOCK_VARIABLE: &str = "UMBRA_LOCK";
@@ -15,16 +17,41 @@ const PARENT_VARIABLE: &str = "UMBRA_PARENT";
 /// The exit code of a child that could not lock itself or could not execute its program.
 pub const EXIT_NOT_LOCKED: u8 = 70;
 
+/// A command that locks itself by `lock`, then executes `program`, a path as the child sees it.
+/// `umbra` is this program. The environment is empty but for what the caller adds.
+pub fn command(umbra: &Path, lock: &Lock, program: &Path) -> Command {
+    let hidden = if lock.sandbox.is_some() { sandbox::LAUNCH_COMMAND } else { "__exec" };
+    let mut command = Command::new(umbra);
+    command.arg(hidden).arg(program).env_clear();
+    command
+}
+
 /// Starts `command`, which must be Umbra itself with a hidden command that calls [`lock_self`]
-/// before anything hostile is touched. The child must be waited for on the thread that calls this:
+/// (either module's) before anything hostile is touched. Its standard input is taken. The child must be waited for on the thread that calls this:
 /// it is killed when that thread ends.
 ///
 /// # Errors
 /// When the process cannot be made.
 pub fn start(mut command: Command, lock: &Lock) -> io::Result<Child> {
+    command.stdin(Stdio::null());
+    #[cfg(target_os = "linux")]
+    if let Some(policy) = &lock.sandbox {
+        use std::os::unix::process::CommandExt;
+        // A group of its own: the terminal's Ctrl-C is for Umbra, which ends its children itself.
+        return command.stdin(sandbox::orders(policy)?).process_group(0).spawn();
+    }
+    if lock.sandbox.is_some() {
+        return Err(io::Error::other("there is no isolation on this system"));
+    }
     command.env(LOCK_VARIABLE, serde_json::to_string(lock)?);
     command.env(PARENT_VARIABLE, std::process::id().to_string());
     command.spawn()
+}
+
+/// Whether [`start`] was told of no isolation: then [`lock_self`] is this child's, otherwise
+/// the sandbox's of the same name.
+pub fn is_plain() -> bool {
+    std::env::var_os(LOCK_VARIABLE).is_some()
 }
 
 /// Locks this process by what [`start`] was given: a session and process group of its own, death

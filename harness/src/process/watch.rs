@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{self, Read};
 use std::os::fd::{AsFd, OwnedFd};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -17,19 +18,20 @@ use nix::unistd::Pid;
 
 use super::capture::Capture;
 use super::{Ended, Exit, Lock, start};
+use crate::sandbox::{InForce, Policy, SandboxError, read_report};
 
 /// How often the deadline, the user's wish to stop and the memory in use are looked at.
 const TICK: Duration = Duration::from_millis(20);
 /// How long the output of a process that is gone may still be held open by another.
 const DRAIN: Duration = Duration::from_millis(200);
 
-/// Runs `command` (see [`start`]) to its end and reaps it. Standard input is empty; of each output
+/// Runs `command` (see [`start`]) to its end and reaps it. Of each output
 /// stream the first `keep` bytes and a short tail are kept. `tick` is called now and then.
 ///
 /// However it ends, its process group is killed and it is reaped before this returns.
 ///
 /// # Errors
-/// When the child cannot be started or watched.
+/// When the child cannot be started, locked or watched.
 pub fn run(
     mut command: Command,
     lock: &Lock,
@@ -37,7 +39,7 @@ pub fn run(
     cancel: &AtomicBool,
     tick: &mut dyn FnMut(),
 ) -> io::Result<Ended> {
-    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let begin = Instant::now();
     let mut child = start(command, lock)?;
     let pid = Pid::from_raw(child.id() as i32);
@@ -49,11 +51,12 @@ pub fn run(
     let cap = lock.limits.output_kib << 10;
     let deadline = begin + Duration::from_secs_f64(lock.limits.wall_s);
     let mut peak_address_mib = 0;
+    let mut running = Running { child: pid, sandboxed: lock.sandbox.is_some(), locked: None };
     let ended_by_us = loop {
         let now = Instant::now();
         wait_readable(&pipes, TICK.min(deadline.saturating_duration_since(now)));
         pipes.iter_mut().for_each(Pipe::read);
-        peak_address_mib = peak_address_mib.max(address_space_mib(pid));
+        peak_address_mib = peak_address_mib.max(running.address_space_mib());
         tick();
         if total(&pipes) > cap {
             break Some(Exit::Flooded);
@@ -68,6 +71,9 @@ pub fn run(
             break Some(Exit::TimedOut);
         }
     };
+    if ended_by_us.is_some() {
+        running.end_inside();
+    }
     let (status, usage) = group.end()?;
     let wall_s = begin.elapsed().as_secs_f64();
     let drained = Instant::now() + DRAIN;
@@ -86,6 +92,12 @@ pub fn run(
         (None, Some(signal)) => Exit::Signal(signal),
         (None, None) => Exit::Code(libc::WEXITSTATUS(status)),
     };
+    let in_force = match lock.sandbox.as_ref().map(|policy| in_force(policy)) {
+        // It was not locked, and nothing foreign ran: that is nobody's fault but the machine's.
+        Some(Err(error)) if ended_by_us.is_none() => return Err(io::Error::other(error)),
+        Some(in_force) => in_force.ok(),
+        None => None,
+    };
     let mut captured = pipes.into_iter().map(|pipe| pipe.capture.finish());
     Ok(Ended {
         exit,
@@ -97,8 +109,59 @@ pub fn run(
         // Kilobytes on Linux.
         peak_resident_mib: usage.ru_maxrss as u64 >> 10,
         peak_address_mib,
+        in_force,
         left_process,
     })
+}
+
+/// What was in force, if it was what had been asked for.
+fn in_force(policy: &Policy) -> Result<InForce, SandboxError> {
+    let report = policy.report.as_deref().unwrap_or(Path::new(""));
+    let in_force = read_report(report)?;
+    if in_force.layers == policy.layers {
+        Ok(in_force)
+    } else {
+        Err(SandboxError::new("launcher", "isolate its child", "other layers than asked for"))
+    }
+}
+
+/// A child, and what runs inside when it is a sandbox's launcher.
+struct Running {
+    child: Pid,
+    sandboxed: bool,
+    /// The locked process, once it is known.
+    locked: Option<Pid>,
+}
+
+impl Running {
+    /// The address space of whoever runs foreign code now; 0 when it is not known.
+    fn address_space_mib(&mut self) -> u64 {
+        if !self.sandboxed {
+            return address_space_mib(self.child);
+        }
+        #[cfg(target_os = "linux")]
+        if self.locked.is_none() {
+            let locked = crate::sandbox::locked_pid(self.child.as_raw() as u32);
+            self.locked = locked.map(|pid| Pid::from_raw(pid as i32));
+        }
+        self.locked.map_or(0, address_space_mib)
+    }
+
+    /// Ends what is inside first, so that the launcher reaps it: its usage counts it then, and
+    /// nothing is alive when the launcher is gone.
+    fn end_inside(&self) {
+        #[cfg(target_os = "linux")]
+        for at_once in [false, true] {
+            let launcher = self.child.as_raw() as u32;
+            if !self.sandboxed || !crate::sandbox::kill_inside(launcher, at_once) {
+                return;
+            }
+            let until = Instant::now() + DRAIN;
+            while Instant::now() < until && matches!(has_exited(self.child), Ok(false)) {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
 }
 
 /// A child and its process group; both are ended when this is dropped, on error paths too.

@@ -20,7 +20,7 @@ pub fn run(
     cancel: &AtomicBool,
     tick: &mut dyn FnMut(),
 ) -> io::Result<Ended> {
-    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let begin = Instant::now();
     let mut child = start(command, lock)?;
     let stdout = child.stdout.take().map(|pipe| collect(pipe, keep));
@@ -57,6 +57,7 @@ pub fn run(
         cpu_s: 0.0,
         peak_resident_mib: 0,
         peak_address_mib: 0,
+        in_force: None,
         left_process: out_held || err_held,
     })
 }

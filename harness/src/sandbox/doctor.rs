@@ -37,6 +37,18 @@ pub struct Examination {
     pub isolation: Isolation,
 }
 
+impl Examination {
+    /// The layers to ask for. The optional group is left out: it only adds where all else is. Without
+    /// a root of its own, a child that is no longer root could not reach root's private files.
+    pub fn usable(&self) -> Layers {
+        let mut layers = Layers { cgroup: false, ..self.layers };
+        if !layers.mount_ns && nix::unistd::geteuid().is_root() {
+            layers.drop_privileges = false;
+        }
+        layers
+    }
+}
+
 /// Tries every layer by itself, then all that worked together. `umbra` is the binary that knows
 /// the hidden commands. Takes some tens of milliseconds.
 pub fn examine(umbra: &Path) -> Examination {

@@ -3,10 +3,12 @@
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{self, Read, Seek, Write};
+use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 
+use nix::libc;
 use nix::sys::memfd::{MFdFlags, memfd_create};
 use serde::{Deserialize, Serialize};
 
@@ -99,9 +101,37 @@ fn receive() -> Result<Policy, SandboxError> {
 /// The host's process id of the locked process behind a launcher, once there is one: its
 /// `/proc/PID` shows the memory in use.
 pub fn locked_pid(launcher: u32) -> Option<u32> {
-    let child = |pid: u32| -> Option<u32> {
-        let list = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).ok()?;
-        list.split_whitespace().next()?.parse().ok()
-    };
-    child(child(launcher)?)
+    child_of(child_of(launcher)?)
+}
+
+/// Ends everything inside by killing the locked process: process 1 then ends and reaps the others,
+/// so that the launcher's usage counts all. With `at_once`, or before there is one, process 1 itself is
+/// killed. False when there is nothing to kill (any more).
+pub fn kill_inside(launcher: u32, at_once: bool) -> bool {
+    let Some(init) = child_of(launcher) else { return false };
+    (!at_once && kill_child(init)) || kill_child(launcher)
+}
+
+/// Kills a process's first child.
+fn kill_child(parent: u32) -> bool {
+    let Some(child) = child_of(parent) else { return false };
+    // SAFETY: plain integers.
+    let fd = unsafe { libc::syscall(libc::SYS_pidfd_open, child, 0) };
+    if fd < 0 {
+        return false;
+    }
+    // SAFETY: a new descriptor that nobody else knows.
+    let fd = unsafe { OwnedFd::from_raw_fd(fd as i32) };
+    // Only now is it certain whom the descriptor means: the id may have gone to another before.
+    if child_of(parent) != Some(child) {
+        return false;
+    }
+    let (fd, info) = (fd.as_raw_fd(), std::ptr::null::<libc::siginfo_t>());
+    // SAFETY: the descriptor is open, and no information is passed.
+    unsafe { libc::syscall(libc::SYS_pidfd_send_signal, fd, libc::SIGKILL, info, 0) == 0 }
+}
+
+fn child_of(pid: u32) -> Option<u32> {
+    let list = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).ok()?;
+    list.split_whitespace().next()?.parse().ok()
 }

@@ -33,10 +33,22 @@ mod privileges;
 mod root;
 
 #[cfg(target_os = "linux")]
-pub use launch::{command, launch_main, lock_self, locked_pid, orders};
+pub use launch::{command, kill_inside, launch_main, lock_self, locked_pid, orders};
 pub use policy::{
     Bind, Gpu, InForce, Isolation, Kind, Layers, Limits, Policy, SandboxError, Scratch, read_report,
 };
+
+/// The layers that this machine gives and that work with each other, tried for real with `umbra`,
+/// the binary that knows the hidden commands. Takes some tens of milliseconds.
+pub fn available(umbra: &std::path::Path) -> Layers {
+    #[cfg(target_os = "linux")]
+    return doctor::examine(umbra).usable();
+    #[cfg(not(target_os = "linux"))]
+    {
+        let _ = umbra;
+        Layers::NONE
+    }
+}
 
 /// The exit code of a child that could not lock itself. Foreign code can exit with it too:
 /// [`read_report`] tells which it was.

@@ -97,6 +97,25 @@ pub struct Gpu {
     pub files: Vec<PathBuf>,
 }
 
+impl Gpu {
+    /// What this machine has of the usual drivers'; none when there is no device.
+    pub fn of_this_machine() -> Option<Self> {
+        let named = |folder: &str, starts: &[&str]| -> Vec<PathBuf> {
+            let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+            let known = |path: &PathBuf| {
+                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                starts.iter().any(|start| name.starts_with(start)) && !path.is_dir()
+            };
+            entries.map(|entry| entry.path()).filter(known).collect()
+        };
+        let mut nodes = named("/dev/dri", &["renderD"]);
+        nodes.extend(named("/dev", &["nvidia"]));
+        let files = ["/sys/dev/char", "/sys/devices", "/etc/vulkan", "/usr/share/nvidia"];
+        let files = files.iter().map(PathBuf::from).filter(|path| path.exists()).collect();
+        (!nodes.is_empty()).then_some(Self { nodes, files })
+    }
+}
+
 /// One switch per layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Layers {
@@ -148,6 +167,11 @@ impl Layers {
             rlimits: true,
             cgroup: false,
         }
+    }
+
+    /// [`Self::full`] where there is a sandbox, nothing elsewhere.
+    pub fn of_this_system() -> Self {
+        if cfg!(target_os = "linux") { Self::full() } else { Self::NONE }
     }
 
     /// The layers by name, in the order in which they are described.
@@ -209,6 +233,16 @@ pub enum Isolation {
     },
     /// None of them.
     None,
+}
+
+impl std::fmt::Display for Isolation {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Self::Full => f.write_str("full"),
+            Self::Reduced { missing } => write!(f, "reduced: no {}", missing.join(", no ")),
+            Self::None => f.write_str("none: processes with limits"),
+        }
+    }
 }
 
 /// What a child may see and use.

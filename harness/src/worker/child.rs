@@ -15,11 +15,11 @@ use crate::plugin::{
     CallError, CallErrorKind, HostPlugin, LoadedScene, OfflineJob, RealtimeJob, Witness,
     WitnessState,
 };
-use crate::process::{exit_now, lock_self};
+use crate::process::{self, exit_now};
 
 /// Locks this process, then answers the job in `dir`. Does not return when it worked.
 pub fn child_main(dir: &Path) -> ExitCode {
-    let failure = match lock_self() {
+    let failure = match lock() {
         Ok(()) => work(dir).err(),
         Err(error) => Some(error),
     };
@@ -29,6 +29,15 @@ pub fn child_main(dir: &Path) -> ExitCode {
     }
     // The answers are in place; what a plugin wants to do at exit concerns nobody.
     exit_now(0)
+}
+
+/// The parent says which lock; one it is always.
+fn lock() -> std::io::Result<()> {
+    #[cfg(target_os = "linux")]
+    if !process::is_plain() {
+        return crate::sandbox::lock_self().map(drop).map_err(std::io::Error::other);
+    }
+    process::lock_self()
 }
 
 fn work(dir: &Path) -> std::io::Result<()> {

@@ -8,6 +8,7 @@
 //! shares the worker's address space and can write anything there.
 
 mod arena;
+mod cage;
 mod child;
 mod job;
 mod neutral_pass;

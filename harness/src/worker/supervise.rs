@@ -9,12 +9,14 @@ use std::time::{Duration, Instant};
 
 use renderer_api as api;
 
+use super::cage::Cage;
 use super::job::{AdapterKind, Job, Request};
 use super::outcome::{Answer, JobReport, Matter, Outcome, WitnessUse, WorkerRun};
 use super::table::{Noted, RECORD, STATUS_OURS, STATUS_REJECTED};
 use super::wire::{Folder, Place, WireJob, WireRequest, take_input};
 use crate::plugin::Witness;
-use crate::process::{self, Ended, Exit, Limits, Lock, Policy, Purpose, signal_name};
+use crate::process::{self, Ended, Exit, Limits, Lock, signal_name};
+use crate::sandbox::{self, Bind, Layers};
 
 /// Bytes of a worker's output that are kept, besides a tail.
 const KEEP_OUTPUT: usize = 16 << 10;
@@ -28,6 +30,8 @@ pub struct Supervisor {
     pub umbra: PathBuf,
     /// Where each worker's private folder is made, and removed in the end.
     pub scratch: PathBuf,
+    /// What isolates workers and compilers. A layer that cannot be had is an error of the machine.
+    pub isolation: Layers,
 }
 
 /// After so many requests of a job ran out of time, the rest is not asked any more: a renderer
@@ -52,12 +56,23 @@ pub fn not_asked() -> Outcome {
 }
 
 impl Supervisor {
-    /// Starts workers of the running program.
+    /// Starts workers of the running program, with as much isolation as this machine gives.
     ///
     /// # Errors
     /// When its path cannot be found out.
     pub fn of_this_program(scratch: PathBuf) -> io::Result<Self> {
-        Ok(Self { umbra: std::env::current_exe()?, scratch })
+        Ok(Self::available(std::env::current_exe()?, scratch))
+    }
+
+    /// Starts workers of the program `umbra`, with full isolation where there is a sandbox.
+    pub fn new(umbra: PathBuf, scratch: PathBuf) -> Self {
+        Self { umbra, scratch, isolation: Layers::of_this_system() }
+    }
+
+    /// The same with as much isolation as this machine gives, tried for real.
+    pub fn available(umbra: PathBuf, scratch: PathBuf) -> Self {
+        let isolation = sandbox::available(&umbra);
+        Self { umbra, scratch, isolation }
     }
 
     /// Asks all requests of `job` in one worker. When it dies, the request it was at gets the
@@ -118,9 +133,15 @@ impl Supervisor {
     ) -> io::Result<Run> {
         let private = tempfile::Builder::new().prefix("umbra-worker-").tempdir_in(&self.scratch)?;
         let requests: Vec<_> = pending.iter().map(|&index| &job.requests[index]).collect();
-        let mut files = Files::prepare(private.path(), job, &requests)?;
-        let lock = Lock { limits: limits.clone(), policy: policy(private.path(), job) };
-        let command = self.command(private.path(), &requests, limits)?;
+        fs::create_dir(Folder(private.path()).scratch())?;
+        let cage = Cage::new(private.path(), job, &requests, self.isolation)?;
+        let mut files = Files::prepare(private.path(), &cage, &requests)?;
+        let driver = software_driver();
+        let elsewhere = |driver: &PathBuf| !driver.starts_with("/usr/share/vulkan");
+        let command = self.command(private.path(), &cage, &requests, limits, driver.as_deref());
+        let mut policy = cage.policy;
+        policy.read_only.extend(driver.filter(elsewhere).map(Bind::same));
+        let lock = Lock::new(limits, policy);
         let mut last = Instant::now();
         let ended = process::run(command, &lock, KEEP_OUTPUT, cancel, &mut || {
             if last.elapsed() >= PROGRESS_INTERVAL {
@@ -165,9 +186,16 @@ impl Supervisor {
         Ok(run)
     }
 
-    fn command(&self, dir: &Path, requests: &[&Request], limits: &Limits) -> io::Result<Command> {
+    fn command(
+        &self,
+        dir: &Path,
+        cage: &Cage,
+        requests: &[&Request],
+        limits: &Limits,
+        driver: Option<&Path>,
+    ) -> Command {
         let mut command = Command::new(&self.umbra);
-        command.arg("__worker").arg(dir).current_dir(Folder(dir).scratch()).env_clear();
+        command.arg("__worker").arg(&cage.job).current_dir(Folder(dir).scratch()).env_clear();
         command.env("LANG", "C").env("HOME", "/nonexistent");
         command.env("LP_NUM_THREADS", limits.threads.to_string());
         command.env("RAYON_NUM_THREADS", limits.threads.to_string());
@@ -176,14 +204,14 @@ impl Supervisor {
             adapter.kind == AdapterKind::Software
         });
         if software {
-            let driver = software_driver().unwrap_or_else(|| "/nonexistent".into());
-            command.env("VK_ICD_FILENAMES", &driver).env("VK_DRIVER_FILES", &driver);
+            let driver = driver.unwrap_or(Path::new("/nonexistent"));
+            command.env("VK_ICD_FILENAMES", driver).env("VK_DRIVER_FILES", driver);
         }
         if cfg!(windows) {
             // Without it, no library of the system can be found.
             command.envs(std::env::var_os("SystemRoot").map(|root| ("SystemRoot", root)));
         }
-        Ok(command)
+        command
     }
 }
 
@@ -192,15 +220,6 @@ struct Run {
     outcomes: Vec<Option<Outcome>>,
     renderer: Option<String>,
     ended: Ended,
-}
-
-fn policy(dir: &Path, job: &Job) -> Policy {
-    let folders = job.requests.iter().filter_map(|request| request.scene().path.parent());
-    let mut readable: Vec<PathBuf> = folders.map(Path::to_owned).collect();
-    readable.extend(job.plugin.clone());
-    readable.sort();
-    readable.dedup();
-    Policy { purpose: Purpose::Worker, readable, writable: vec![dir.to_owned()] }
 }
 
 /// Where Mesa's lavapipe describes itself to the Vulkan loader.
@@ -223,17 +242,15 @@ struct Files {
 }
 
 impl Files {
-    fn prepare(dir: &Path, job: &Job, requests: &[&Request]) -> io::Result<Self> {
+    fn prepare(dir: &Path, cage: &Cage, requests: &[&Request]) -> io::Result<Self> {
         let folder = Folder(dir);
-        fs::create_dir(folder.scratch())?;
         let new = |path| File::options().create_new(true).read(true).write(true).open(path);
         let (mut input, mut output) = (new(folder.input())?, new(folder.output())?);
         let (mut input_end, mut output_end) = (0, 0);
         let mut wired = Vec::new();
-        for request in requests {
+        for (request, scene) in requests.iter().zip(&cage.scenes) {
             let (mut rest, words) = take_input(request);
-            let scene = rest.scene_mut();
-            scene.path = std::path::absolute(&scene.path)?;
+            rest.scene_mut().path.clone_from(scene);
             let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_ne_bytes()).collect();
             input.write_all(&bytes)?;
             let place = Place::new(output_end, request.answer_floats());
@@ -249,9 +266,14 @@ impl Files {
         let mut table = new(folder.table())?;
         table.write_all(&vec![0; RECORD * (1 + requests.len())])?;
         let places = wired.iter().map(|request| request.output).collect();
-        let plugin = job.plugin.as_ref().map(std::path::absolute).transpose()?;
-        let wired = WireJob { plugin, requests: wired };
+        let wired = WireJob { plugin: cage.plugin.clone(), requests: wired };
         fs::write(folder.job(), serde_json::to_vec(&wired)?)?;
+        // As root, the worker is another user; the folder above lets nobody else in.
+        #[cfg(unix)]
+        for path in [folder.job(), folder.input()] {
+            use std::os::unix::fs::PermissionsExt;
+            fs::set_permissions(path, fs::Permissions::from_mode(0o644))?;
+        }
         Ok(Self { table, output, places })
     }
 

@@ -1,5 +1,7 @@
 /* A plugin that misbehaves on purpose. What it does in render_offline is the scene's options
- * text; without options it draws zeros. FAULT_AT_LOAD makes a constructor that ends the worker. */
+ * text; without options it draws zeros. FAULT_AT_LOAD makes a constructor that ends the worker.
+ * With ATTACKS it is linked with hostile/attack.c, and options of several words are an attack;
+ * ATTACK_AT_LOAD is one for the constructor. */
 #include "umbra_renderer.h"
 
 #include <stdio.h>
@@ -10,7 +12,7 @@
 #define TEXT(s) {(const uint8_t *)(s), sizeof(s) - 1}
 
 typedef struct {
-    char mode[64];
+    char mode[512];
 } Loaded;
 
 static int is(UmbraScene scene, const char *mode)
@@ -25,13 +27,35 @@ __attribute__((constructor)) static void at_load(void)
 }
 #endif
 
+#ifdef ATTACKS
+int attack(int argc, char **argv);
+
+static void attack_by(const char *text)
+{
+    char copy[512], *words[8], *rest = copy;
+    int count = 0;
+    snprintf(copy, sizeof copy, "%s", text);
+    while (count < 7 && (words[count] = strsep(&rest, " ")) != NULL)
+        count++;
+    words[count] = NULL;
+    attack(count, words);
+}
+#endif
+
+#ifdef ATTACK_AT_LOAD
+__attribute__((constructor)) static void attack_at_load(void)
+{
+    attack_by(ATTACK_AT_LOAD);
+}
+#endif
+
 static UmbraStatus load_scene(const UmbraSceneRequest *request, UmbraScene *scene,
                               UmbraMessage *message)
 {
     size_t length = request->options.length;
     Loaded *loaded = calloc(1, sizeof *loaded);
     (void)message;
-    memcpy(loaded->mode, request->options.data, length < 63 ? length : 63);
+    memcpy(loaded->mode, request->options.data, length < 511 ? length : 511);
     *scene = is(loaded, "null_scene") ? NULL : (UmbraScene)loaded;
     return UMBRA_STATUS_OK;
 }
@@ -64,6 +88,10 @@ static UmbraStatus render_offline(UmbraScene scene, const UmbraOfflineSettings *
     static int start[1];
     (void)settings;
     memset(pixels, 0, float_count * sizeof(float));
+#ifdef ATTACKS
+    if (strchr(((Loaded *)scene)->mode, ' ') != NULL)
+        attack_by(((Loaded *)scene)->mode);
+#endif
     if (is(scene, "abort"))
         abort();
     if (is(scene, "segv"))
@@ -107,7 +135,7 @@ static UmbraStatus render_offline(UmbraScene scene, const UmbraOfflineSettings *
     if (is(scene, "daemon"))
         daemon_that_holds_the_pipe();
     if (is(scene, "truncate")) {
-        if (truncate("../output", 0) != 0)
+        if (truncate("/job/output", 0) != 0 && truncate("../output", 0) != 0)
             abort();
     }
     return UMBRA_STATUS_OK;

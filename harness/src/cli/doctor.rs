@@ -1,0 +1,65 @@
+//! `umbra doctor`: what this machine can do for Umbra, and what to do about the rest.
+
+use std::process::Command;
+
+use basecode::gpu::{AdapterKind, Gpu};
+
+use crate::sandbox::{Isolation, doctor::examine};
+
+/// Prints what there is; exit 0 when hand-ins can be graded with full isolation.
+pub fn run() -> anyhow::Result<u8> {
+    let examination = examine(&std::env::current_exe()?);
+    println!("isolation");
+    for finding in &examination.findings {
+        let there = if finding.available { "yes" } else { "no" };
+        println!("  {:<16} {there:<4} {}", finding.layer, finding.detail);
+        if !finding.remedy.is_empty() {
+            println!("  {:<16}      to do: {}", "", finding.remedy);
+        }
+    }
+    let isolation = examination.usable().isolation();
+    println!("  {:<16} {isolation}", "together");
+    println!("graphics adapters");
+    let software = adapter("software", AdapterKind::Software);
+    adapter("hardware", AdapterKind::Hardware);
+    println!("compiler");
+    let programs = ["rustc", "cargo", "cc"].map(compiler);
+    let whole = isolation == Isolation::Full && software && programs == [true; 3];
+    println!("{}", if whole { "ready to grade" } else { "not ready to grade: see above" });
+    Ok(if whole { super::EXIT_OK } else { super::EXIT_MACHINE })
+}
+
+/// Opens the best adapter of a kind, and says which it is or why there is none.
+fn adapter(name: &str, kind: AdapterKind) -> bool {
+    match Gpu::open(kind, "") {
+        Ok(gpu) => {
+            let info = &gpu.adapter;
+            println!("  {name:<16} yes  {} ({} {})", info.name, info.driver, info.driver_info);
+            true
+        }
+        Err(error) => {
+            println!("  {name:<16} no   {error}");
+            false
+        }
+    }
+}
+
+/// Asks a program for its version.
+fn compiler(program: &str) -> bool {
+    let output = Command::new(program).arg("--version").output();
+    match output {
+        Ok(output) if output.status.success() => {
+            let text = String::from_utf8_lossy(&output.stdout);
+            println!("  {program:<16} yes  {}", text.lines().next().unwrap_or_default());
+            true
+        }
+        Ok(output) => {
+            println!("  {program:<16} no   it ends with {}", output.status);
+            false
+        }
+        Err(error) => {
+            println!("  {program:<16} no   {error}; to do: install it (rustup, a C compiler)");
+            false
+        }
+    }
+}

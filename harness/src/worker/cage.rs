@@ -1,0 +1,143 @@
+//! What a worker sees: the plugin, the scenes it is asked about, its own files, and the system's
+//! libraries, all under neutral names.
+
+use std::fs;
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use basecode::scene::SceneConfig;
+
+use super::job::{AdapterKind, Job, Request};
+use super::wire::Folder;
+use crate::sandbox::policy::{JOB, PLUGIN, SCENE};
+use crate::sandbox::{Bind, Gpu, Kind, Layers, Policy};
+
+/// How much a worker may keep in its scratch, in MiB.
+const SCRATCH_MIB: u64 = 64;
+
+/// A policy, and the names by which the worker is told of things.
+pub struct Cage {
+    /// What it sees.
+    pub policy: Policy,
+    /// The plugin, when there is one.
+    pub plugin: Option<PathBuf>,
+    /// The TOML file of each request's scene.
+    pub scenes: Vec<PathBuf>,
+    /// The folder with its own files.
+    pub job: PathBuf,
+}
+
+impl Cage {
+    /// For a worker with the private folder `dir`.
+    ///
+    /// # Errors
+    /// When the current folder is not known, or the plugin's path names no file.
+    pub fn new(dir: &Path, job: &Job, requests: &[&Request], layers: Layers) -> io::Result<Self> {
+        let mut policy = Policy::new(Kind::Worker);
+        policy.layers = layers;
+        policy.scratch.quota_mib = SCRATCH_MIB;
+        policy.scratch.without_mount = Some(Folder(dir).scratch());
+        policy.report = Some(dir.join("report"));
+        let inside = Folder(Path::new(JOB));
+        let folder = Folder(dir);
+        policy.read_only.push(Bind::new(folder.job(), inside.job()));
+        policy.read_only.push(Bind::new(folder.input(), inside.input()));
+        policy.read_write.push(Bind::new(folder.output(), inside.output()));
+        policy.read_write.push(Bind::new(folder.table(), inside.table()));
+        let plugin = match &job.plugin {
+            Some(plugin) => {
+                let plugin = std::path::absolute(plugin)?;
+                let name = plugin.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
+                // A plugin that is not there is for the worker to miss.
+                if plugin.exists() {
+                    policy.read_only.push(Bind::new(&plugin, Path::new(PLUGIN).join(name)));
+                }
+                Some(policy.seen(&plugin))
+            }
+            None => None,
+        };
+        let mut roots = Vec::new();
+        let mut scenes = Vec::new();
+        for request in requests {
+            scenes.push(scene(&request.scene().path, &mut roots, &mut policy)?);
+        }
+        let hardware = requests.iter().any(|request| {
+            matches!(request, Request::RenderRealtime { adapter, .. } if adapter.kind != AdapterKind::Software)
+        });
+        if hardware {
+            policy.gpu = Gpu::of_this_machine();
+        }
+        let job = if layers.mount_ns { PathBuf::from(JOB) } else { dir.to_owned() };
+        Ok(Self { policy, plugin, scenes, job })
+    }
+}
+
+/// Binds a scene's TOML file and the folder of its mesh, which lie to each other as on the host, and
+/// answers the former's name inside. `roots` are the folders that hold both, of scenes so far.
+fn scene(toml: &Path, roots: &mut Vec<PathBuf>, policy: &mut Policy) -> io::Result<PathBuf> {
+    let toml = std::path::absolute(toml)?;
+    if !policy.layers.mount_ns {
+        // Landlock needs the folders all the same.
+        let given = mesh_folder(&toml).into_iter().chain(Some(toml.clone()));
+        given.filter(|path| path.exists()).for_each(|path| add(policy, Bind::same(path)));
+        return Ok(toml);
+    }
+    // The kernel goes from the true folder to `..`, not from a link to it.
+    let folder = toml.parent().and_then(|folder| fs::canonicalize(folder).ok());
+    let (Some(folder), Some(name)) = (folder, toml.file_name()) else { return Ok(toml) };
+    let toml = folder.join(name);
+    let mesh = mesh_folder(&toml);
+    let root = common(&folder, mesh.as_deref().unwrap_or(&folder));
+    let number = roots.iter().position(|known| *known == root).unwrap_or_else(|| {
+        roots.push(root.clone());
+        roots.len() - 1
+    });
+    let inside = |path: &Path| {
+        let rest = path.strip_prefix(&root).unwrap_or(Path::new(""));
+        Path::new(SCENE).join(number.to_string()).join(rest)
+    };
+    // Without a mesh folder it is no scene: the plugin is to say so, or that there is no such file.
+    if let Some(mesh) = mesh {
+        // A path that ends in a slash would name the folder itself otherwise.
+        let at =
+            if mesh == root { Path::new(SCENE).join(number.to_string()) } else { inside(&mesh) };
+        add(policy, Bind::new(&mesh, at));
+        if !toml.starts_with(&mesh) && toml.is_file() {
+            add(policy, Bind::new(&toml, inside(&toml)));
+        }
+    } else if toml.is_file() {
+        add(policy, Bind::new(&toml, inside(&toml)));
+    }
+    Ok(inside(&toml))
+}
+
+fn add(policy: &mut Policy, bind: Bind) {
+    if !policy.read_only.contains(&bind) {
+        policy.read_only.push(bind);
+    }
+}
+
+/// The folder of a scene's mesh, materials and textures, when there is one.
+fn mesh_folder(toml: &Path) -> Option<PathBuf> {
+    let mesh = plain(&SceneConfig::load(toml).ok()?.mesh);
+    mesh.parent().filter(|folder| folder.is_dir()).map(Path::to_owned)
+}
+
+/// A path without `.` and `..`, by its text.
+fn plain(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => drop(plain.pop()),
+            part => plain.push(part),
+        }
+    }
+    plain
+}
+
+/// The deepest folder that holds both.
+fn common(a: &Path, b: &Path) -> PathBuf {
+    let pairs = a.components().zip(b.components());
+    pairs.take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
+}

@@ -1,0 +1,337 @@
+//! The sandbox as workers and builds use it: what a hand-in must not reach it does not reach, and
+//! what it draws is the same as without. Each attack is run without isolation, too, and succeeds
+//! there: a test that passes without a sandbox proves nothing.
+#![cfg(target_os = "linux")]
+
+use std::net::TcpListener;
+use std::os::unix::net::UnixListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, MutexGuard};
+use std::time::Duration;
+
+use umbra::build::{BuildOutcome, Recording, compile, default_limits};
+use umbra::process::Limits;
+use umbra::sandbox::{Isolation, Layers};
+use umbra::worker::{
+    Adapter, AdapterKind, CameraValue, Job, JobReport, Matter, Outcome, Request, SceneRef,
+    Supervisor,
+};
+
+const UMBRA: &str = env!("CARGO_BIN_EXE_umbra");
+
+/// One test at a time: they look for survivors among all workers of this binary.
+static ONE: Mutex<()> = Mutex::new(());
+
+fn workspace() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the harness lies in the repository")
+}
+
+fn reference() -> PathBuf {
+    let path = workspace().join("target/release/libreference_impl.so");
+    assert!(path.is_file(), "run `cargo build --release --workspace` first");
+    path
+}
+
+struct House {
+    dir: tempfile::TempDir,
+    supervisor: Supervisor,
+    victim: Child,
+    tcp: TcpListener,
+    _unix: UnixListener,
+    _one: MutexGuard<'static, ()>,
+}
+
+impl Drop for House {
+    fn drop(&mut self) {
+        let _ = self.victim.kill();
+        let _ = self.victim.wait();
+    }
+}
+
+impl House {
+    fn new() -> Self {
+        let one = ONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let dir = tempfile::tempdir().unwrap();
+        for folder in ["scratch", "scene", "other"] {
+            std::fs::create_dir(dir.path().join(folder)).unwrap();
+        }
+        let toml = "[input]\nobjfile = \"s.obj\"\n";
+        std::fs::write(dir.path().join("scene/s.toml"), toml).unwrap();
+        std::fs::write(dir.path().join("other/secret"), "another hand-in's").unwrap();
+        let unix = UnixListener::bind(dir.path().join("other/socket")).unwrap();
+        let supervisor = Supervisor::new(UMBRA.into(), dir.path().join("scratch"));
+        let victim = Command::new("sleep").arg("60").spawn().unwrap();
+        let tcp = TcpListener::bind("127.0.0.1:0").unwrap();
+        Self { dir, supervisor, victim, tcp, _unix: unix, _one: one }
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.dir.path().join(name).display().to_string()
+    }
+
+    fn isolated(&self, isolation: Layers) -> Supervisor {
+        Supervisor { isolation, ..self.supervisor.clone() }
+    }
+
+    fn plugin(&self, name: &str, flags: &[&str]) -> PathBuf {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let library = self.dir.path().join(name);
+        let mut cc = Command::new("cc");
+        cc.args([
+            "-shared",
+            "-fPIC",
+            "-O1",
+            "-std=gnu11",
+            "-D_GNU_SOURCE",
+            "-DATTACKS",
+            "-w",
+            "-I",
+        ])
+        .arg(root.join("api/include"))
+        .args(flags)
+        .args(["tests/c_plugin/fault.c", "tests/hostile/attack.c"].map(|file| root.join(file)))
+        .args(["-pthread", "-o"])
+        .arg(&library);
+        assert!(cc.status().expect("a C compiler").success());
+        library
+    }
+
+    fn offline(&self, options: &str) -> Request {
+        let path = self.dir.path().join("scene/s.toml");
+        let scene = SceneRef { path, options: options.to_owned() };
+        let (width, height, spp, seed, threads, shadows) = (9, 5, 1, 1, 1, true);
+        Request::RenderOffline { scene, width, height, spp, seed, threads, shadows }
+    }
+}
+
+fn run(supervisor: &Supervisor, plugin: &Path, requests: Vec<Request>) -> JobReport {
+    let job = Job { plugin: Some(plugin.to_owned()), requests };
+    let limits = Limits { wall_s: 20.0, ..Limits::default() };
+    let report = supervisor.run_job(&job, &limits, &AtomicBool::new(false), &mut |_| {});
+    let wanted = supervisor.isolation.isolation();
+    for run in &report.runs {
+        let in_force = run.ended.in_force.as_ref().map(|in_force| in_force.isolation.clone());
+        assert_eq!(in_force.unwrap_or(Isolation::None), wanted);
+    }
+    if wanted == Isolation::Full {
+        assert_eq!(workers(), Vec::<String>::new(), "survivors");
+    }
+    report
+}
+
+/// Command lines of all processes of this very binary, none to be expected between two jobs.
+fn workers() -> Vec<String> {
+    let entries = std::fs::read_dir("/proc").unwrap().flatten();
+    let lines = entries.filter_map(|entry| {
+        let line = std::fs::read(entry.path().join("cmdline")).ok()?;
+        Some(String::from_utf8_lossy(&line).replace('\0', " "))
+    });
+    lines.filter(|line| line.contains(UMBRA)).collect()
+}
+
+/// The last word that an attack printed: "ok" or an errno.
+fn word(report: &JobReport) -> String {
+    let stdout = report.runs.iter().map(|run| &*run.ended.stdout.head);
+    let stdout: String = stdout.collect();
+    stdout.split_whitespace().next_back().unwrap_or("nothing").to_owned()
+}
+
+#[test]
+fn a_plugin_reaches_nothing_of_the_host() {
+    let house = House::new();
+    let plugin = house.plugin("attack.so", &[]);
+    let expected = workspace().join("expected/a2/cbox.exr").display().to_string();
+    assert!(Path::new(&expected).is_file());
+    let reference = reference().display().to_string();
+    let port = house.tcp.local_addr().unwrap().port().to_string();
+    let (own, victim) = (std::process::id().to_string(), house.victim.id().to_string());
+    let root = nix::unistd::geteuid().is_root();
+    // The attack, what stops it, and whether it is tried without isolation.
+    let attacks = [
+        (format!("read {expected}"), "ENOENT", true),
+        (format!("read {reference}"), "ENOENT", true),
+        ("read /etc/shadow".into(), "ENOENT", root),
+        (format!("read {}", house.path("other/secret")), "ENOENT", true),
+        (format!("list {}", house.path("scratch")), "ENOENT", true),
+        (format!("write {}", house.path("other/new")), "ENOENT", true),
+        (format!("change {}", house.path("other/secret")), "ENOENT", true),
+        ("write /job/new".into(), "EROFS", false),
+        ("change /job/job.json".into(), "EROFS or EACCES", false),
+        ("change /scene/0/s.toml".into(), "EROFS or EACCES", false),
+        ("change /plugin/attack.so".into(), "EROFS or EACCES", false),
+        ("read /job/report".into(), "ENOENT", false),
+        ("exec /bin/sh".into(), "EPERM", true),
+        ("fork now".into(), "EPERM", true),
+        (format!("tcp {port}"), "EPERM", true),
+        (format!("unix {}", house.path("other/socket")), "EPERM", true),
+        (format!("reach {own}"), "EPERM", true),
+        ("reach 1".into(), "EPERM", root),
+        ("kill -1".into(), "EPERM", false),
+        (format!("kill {victim}"), "EPERM", true),
+        // Its success would outlive the test; see `daemon` in worker.rs.
+        ("daemon now".into(), "EPERM", false),
+        // What is useful stays possible.
+        ("write /scratch/mine".into(), "ok", false),
+        ("read /scene/0/s.toml".into(), "ok", false),
+    ];
+    for (attack, errno, control) in attacks {
+        let requests = ["", &*attack, ""].map(|options| house.offline(options)).to_vec();
+        let report = run(&house.supervisor, &plugin, requests.clone());
+        let said = word(&report);
+        assert!(errno.split(" or ").any(|errno| said == errno), "{attack}: {said} {report:#?}");
+        for outcome in &report.outcomes {
+            let answer = outcome.answer().unwrap_or_else(|| panic!("{attack}: {outcome:?}"));
+            assert_eq!(answer.values, [0.0; 135], "{attack}");
+        }
+        if control {
+            let report = run(&house.isolated(Layers::NONE), &plugin, requests);
+            let said = word(&report);
+            assert_eq!(said, "ok", "without isolation, {attack}");
+        }
+    }
+}
+
+#[test]
+fn attacks_while_a_plugin_is_loaded_fail_as_well() {
+    let house = House::new();
+    let secret = format!("-DATTACK_AT_LOAD=\"read {}\"", house.path("other/secret"));
+    for (index, flag) in ["-DATTACK_AT_LOAD=\"exec /bin/sh\"", &secret].iter().enumerate() {
+        let plugin = house.plugin(&format!("load{index}.so"), &[flag]);
+        let report = run(&house.supervisor, &plugin, vec![house.offline("")]);
+        assert_eq!(word(&report), ["EPERM", "ENOENT"][index], "{report:#?}");
+        assert_eq!(report.outcomes[0].answer().expect("an answer").values, [0.0; 135]);
+        let report = run(&house.isolated(Layers::NONE), &plugin, vec![house.offline("")]);
+        assert_eq!(word(&report), "ok", "{report:#?}");
+    }
+}
+
+#[test]
+fn nothing_is_left_of_a_worker_that_is_ended() {
+    let house = House::new();
+    let plugin = house.plugin("attack.so", &[]);
+    let job = Job { plugin: Some(plugin), requests: vec![house.offline("sleep 60")] };
+    let limits = Limits { wall_s: 0.5, ..Limits::default() };
+    let never = AtomicBool::new(false);
+    let report = house.supervisor.run_job(&job, &limits, &never, &mut |_| {});
+    assert_eq!(report.outcomes, [Outcome::TimedOut]);
+    assert_eq!(workers(), Vec::<String>::new());
+    let job = Job { requests: vec![house.offline("loop")], ..job };
+    let report = house.supervisor.run_job(&job, &limits, &never, &mut |_| {});
+    assert_eq!(report.outcomes, [Outcome::TimedOut]);
+    // The usage of what ran inside is known although it was killed.
+    assert!(report.runs[0].ended.cpu_s > 0.2, "{:?}", report.runs[0].ended);
+    assert!(report.runs[0].ended.peak_address_mib > 0);
+    std::thread::sleep(Duration::from_millis(20));
+    assert_eq!(workers(), Vec::<String>::new());
+}
+
+#[test]
+fn a_layer_that_cannot_be_had_is_the_machines_matter() {
+    let house = House::new();
+    let plugin = house.plugin("attack.so", &[]);
+    // Not this program: it ends well and has locked nothing.
+    let liar = Supervisor { umbra: "/bin/true".into(), ..house.supervisor.clone() };
+    let job = Job { plugin: Some(plugin), requests: vec![house.offline("")] };
+    let never = AtomicBool::new(false);
+    let report = liar.run_job(&job, &Limits::default(), &never, &mut |_| {});
+    assert!(
+        matches!(&report.outcomes[0], Outcome::NotRun { matter: Matter::Machine, .. }),
+        "{report:?}"
+    );
+}
+
+#[test]
+fn messages_name_no_path_of_the_host() {
+    let house = House::new();
+    let missing = Request::EvalBsdf {
+        scene: SceneRef { path: house.path("scene/missing.toml").into(), options: String::new() },
+        queries: Vec::new(),
+    };
+    let report = run(&house.supervisor, &reference(), vec![missing, house.offline("")]);
+    for outcome in &report.outcomes {
+        let Outcome::Failed(message) = outcome else { panic!("{outcome:?}") };
+        assert!(message.contains("/scene/0/"), "{message}");
+        assert!(!message.contains(&house.path("")), "{message}");
+    }
+}
+
+#[test]
+fn the_reference_draws_the_same_bits_inside_and_outside() {
+    let house = House::new();
+    let scene = |name: &str| {
+        let path = workspace().join("scenes/a2/cbox/tinyrender").join(name);
+        assert!(path.is_file(), "{}", path.display());
+        SceneRef { path, options: String::new() }
+    };
+    let offline = Request::RenderOffline {
+        scene: scene("cbox_simple_offline.toml"),
+        width: 40,
+        height: 30,
+        spp: 2,
+        seed: 7,
+        threads: 2,
+        shadows: true,
+    };
+    let realtime = Request::RenderRealtime {
+        scene: scene("cbox_simple_realtime.toml"),
+        width: 40,
+        height: 30,
+        shadow_map: false,
+        adapter: Adapter { kind: AdapterKind::Software, name: String::new() },
+        stages: Vec::new(),
+        cameras: vec![CameraValue {
+            eye: [0.0, 1.0, 6.8],
+            at: [0.0, 1.0, 0.0],
+            up: [0.0, 1.0, 0.0],
+            fov_y_deg: 20.0,
+        }],
+    };
+    let draw = |isolation| {
+        let requests = vec![offline.clone(), realtime.clone()];
+        let report = run(&house.isolated(isolation), &reference(), requests);
+        let bits = |outcome: &Outcome| match outcome {
+            Outcome::Done(answer) => answer.values.iter().map(|value| value.to_bits()).collect(),
+            Outcome::NoAdapter(_) => vec![],
+            other => panic!("{other:?}"),
+        };
+        report.outcomes.iter().map(bits).collect::<Vec<Vec<u32>>>()
+    };
+    let (inside, outside) = (draw(Layers::full()), draw(Layers::NONE));
+    assert!(inside == outside, "isolation changes a picture");
+    assert!(inside[0].iter().any(|bits| f32::from_bits(*bits) > 0.05), "something is lit");
+    if outside[1].is_empty() {
+        eprintln!("no software adapter here: realtime was not compared");
+    } else {
+        assert!(inside[1].iter().any(|bits| f32::from_bits(*bits) > 0.05), "something is lit");
+    }
+}
+
+#[test]
+fn a_build_reads_nothing_but_its_own_source() {
+    let house = House::new();
+    let recording = Recording::obtain(workspace(), Path::new(UMBRA)).unwrap();
+    let secret = house.path("other/secret");
+    let foreign = workspace().join("reference_impl/src/lib.rs").display().to_string();
+    for path in ["/etc/passwd", &secret, &foreign] {
+        let (src, out) = (house.dir.path().join("src"), house.dir.path().join("out"));
+        let _ = std::fs::remove_dir_all(&out);
+        std::fs::create_dir_all(&src).unwrap();
+        std::fs::create_dir_all(&out).unwrap();
+        let text = format!("pub static STOLEN: &[u8] = include_bytes!({path:?});\n");
+        std::fs::write(src.join("lib.rs"), text).unwrap();
+        let build = |supervisor: &Supervisor| {
+            let never = AtomicBool::new(false);
+            let report =
+                compile(&recording, supervisor, &src, &out, &default_limits(), &never).unwrap();
+            report.outcome
+        };
+        let outcome = build(&house.supervisor);
+        let BuildOutcome::CompileError { errors } = outcome else { panic!("{path}: {outcome:?}") };
+        assert!(errors[0].message.contains("couldn't read"), "{errors:#?}");
+        assert_eq!(errors[0].place.as_ref().expect("a place").file, "src/lib.rs");
+        let outcome = build(&house.isolated(Layers::NONE));
+        assert!(matches!(outcome, BuildOutcome::Built { .. }), "{path}: {outcome:?}");
+    }
+}
