@@ -2,6 +2,7 @@
 
 mod bsdfs;
 mod integrators;
+mod mistakes;
 mod renderer;
 mod renderpasses;
 
@@ -10,20 +11,25 @@ use basecode::{
     Bsdf, Error, Film, Integrator, Material, MaterialModel, RenderJob, Renderer, Result, Scene,
 };
 
+use mistakes::Mistakes;
+
 /// Point lights and shadows, offline and realtime.
 #[derive(Default)]
 struct Reference {
     /// Whether offline images show materials as realtime does: a texture is its average.
     realtime_materials: bool,
+    /// What it gets wrong on purpose.
+    mistakes: Mistakes,
 }
 
 impl Renderer for Reference {
-    /// Options are words separated by commas: `materials=realtime`.
+    /// Options are words separated by commas: `materials=realtime`, `mistake=NAME`.
     fn new(options: &str) -> Result<Self> {
-        let mut reference = Self { realtime_materials: false };
+        let mut reference = Self::default();
         for option in options.split(',').filter(|option| !option.is_empty()) {
-            match option {
-                "materials=realtime" => reference.realtime_materials = true,
+            match option.split_once('=') {
+                Some(("materials", "realtime")) => reference.realtime_materials = true,
+                Some(("mistake", name)) => reference.mistakes.add(name)?,
                 _ => return Err(Error::Argument(format!("unknown option \"{option}\""))),
             }
         }
@@ -33,6 +39,9 @@ impl Renderer for Reference {
     fn bsdf(&self, material: &Material) -> Box<dyn Bsdf> {
         let averaged = self.realtime_materials.then(|| average(material));
         let material = averaged.as_ref().unwrap_or(material);
+        if let Some(mistaken) = self.mistakes.bsdf(material) {
+            return mistaken;
+        }
         match material.model {
             MaterialModel::Diffuse => Box::new(bsdfs::DiffuseBsdf::new(material)),
             _ => Box::new(bsdfs::PhongBsdf::new(material)),
@@ -40,9 +49,11 @@ impl Renderer for Reference {
     }
 
     fn integrator(&self, kind: &str, shadows: bool) -> Result<Box<dyn Integrator>> {
-        match kind {
-            "simple" | "direct" => Ok(Box::new(integrators::SimpleIntegrator { shadows })),
-            "normal" => Ok(Box::new(integrators::NormalIntegrator)),
+        let mistaken = self.mistakes.integrator(shadows);
+        match (kind, mistaken) {
+            ("simple" | "direct", Some(mistaken)) => Ok(mistaken),
+            ("simple" | "direct", None) => Ok(Box::new(integrators::SimpleIntegrator { shadows })),
+            ("normal", _) => Ok(Box::new(integrators::NormalIntegrator)),
             _ => Err(Error::Argument(format!("there is no integrator \"{kind}\""))),
         }
     }
@@ -54,7 +65,8 @@ impl Renderer for Reference {
         job: &RenderJob,
         film: &mut Film,
     ) -> Result<()> {
-        renderer::render(scene, integrator, job, film)
+        let mistaken = self.mistakes.render(scene, integrator, job, film);
+        mistaken.unwrap_or_else(|| renderer::render(scene, integrator, job, film))
     }
 
     fn render_pass(
@@ -66,7 +78,7 @@ impl Renderer for Reference {
     ) -> Result<Box<dyn RenderPass>> {
         match kind {
             "simple" | "direct" => {
-                Ok(Box::new(renderpasses::SimplePass::new(gpu, scene, shadow_map)?))
+                Ok(Box::new(renderpasses::SimplePass::new(gpu, scene, shadow_map, &self.mistakes)?))
             }
             "normal" => Ok(Box::new(renderpasses::NormalPass::new(gpu, scene)?)),
             _ => Err(Error::Argument(format!("there is no render pass \"{kind}\""))),

@@ -2,6 +2,7 @@
 
 mod samples;
 mod scenes;
+mod verdicts;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -24,6 +25,8 @@ enum Command {
     },
     /// Pack the sample hand-ins into target/umbra/samples, with the images that their code draws.
     Samples,
+    /// Grade the reference with known mistakes on, and without: print the matrix part x mistake.
+    Verdicts(verdicts::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -31,6 +34,7 @@ fn main() -> ExitCode {
         Command::Scenes { check: true } => scenes::check(),
         Command::Scenes { check: false } => scenes::write(),
         Command::Samples => samples::pack(),
+        Command::Verdicts(arguments) => verdicts::run(&arguments),
     };
     match result {
         Ok(summary) => {

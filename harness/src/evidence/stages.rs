@@ -19,6 +19,13 @@ pub const SHOW_POSITION: &str =
 pub const SHOW_NORMAL: &str =
     concat!(include_str!("shaders/contract.wgsl"), include_str!("shaders/normal.wgsl"));
 
+/// A fragment stage that writes black, for what is not asked about.
+pub const SHOW_NOTHING: &str = "@fragment
+fn fs_main() -> @location(0) vec4f {
+    return vec4f(0.0, 0.0, 0.0, 1.0);
+}
+";
+
 /// A uniform that a render pass must set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoundValue {

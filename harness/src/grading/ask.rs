@@ -24,6 +24,8 @@ pub struct Asker<'a> {
     pub cancel: &'a AtomicBool,
     /// What realtime is drawn with, or why nothing can be.
     pub adapter: Result<Adapter, String>,
+    /// What scenes are loaded with: empty for every hand-in; the reference knows some.
+    pub options: String,
     /// CPU seconds of all workers so far.
     pub cpu_s: Mutex<f64>,
     /// Questions of this path that ran out of time so far.
@@ -50,16 +52,16 @@ impl Asker<'_> {
         outcomes
     }
 
+    /// A scene file for a request.
+    pub fn scene(&self, path: &Path) -> SceneRef {
+        SceneRef { path: path.to_owned(), options: self.options.clone() }
+    }
+
     /// Ends a path: answers the CPU seconds of its workers, and forgets its timeouts.
     pub fn end_path(&self) -> f64 {
         self.timeouts.store(0, Ordering::Relaxed);
         self.cpu_s.lock().map_or(0.0, |mut cpu_s| std::mem::take(&mut *cpu_s))
     }
-}
-
-/// A scene file for a request.
-pub fn scene(path: &Path) -> SceneRef {
-    SceneRef { path: path.to_owned(), options: String::new() }
 }
 
 /// A ray for a request.

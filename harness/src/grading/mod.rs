@@ -12,4 +12,5 @@ mod sampler;
 
 pub use case::Case;
 pub use pipeline::{Grading, Purpose, TREE};
+pub use realtime::Stages;
 pub use record::{Conditions, Record, StageCost, Student};

@@ -24,6 +24,9 @@ const WITNESSES: [(Witness, &str); 4] = [
     (Witness::OfAngle, "a function of the angle between wi and wo"),
 ];
 
+/// The witness that visibility is judged under: a wrong frame must not look like a shadow.
+const FLAT: Witness = Witness::Flat([0.3, 0.2, 0.1]);
+
 /// An image that was drawn, kept for pictures and for the comparison with what was handed in.
 pub struct Drawn {
     /// Name of the scene.
@@ -38,7 +41,7 @@ pub struct Drawn {
 pub fn probe_bsdfs(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
     let Some(case) = cases.first() else { return Vec::new() };
     let request = |scene: &Path, probes: &[BsdfProbe]| Request::EvalBsdf {
-        scene: ask::scene(scene),
+        scene: asker.scene(scene),
         queries: probes.iter().map(|probe| ask::query(&probe.query)).collect(),
     };
     let mut asked = Vec::new();
@@ -117,7 +120,7 @@ pub fn judge_scene(
 ) -> (Vec<Check>, Option<Drawn>) {
     let name = &case.entry.name;
     let small = &case.small;
-    let scene = ask::scene(&case.offline);
+    let scene = asker.scene(&case.offline);
     let chosen: Vec<_> = small.batch.rays.iter().map(ask::ray).collect();
     let radiance = |rays: &[_], witness, shadows| Request::Radiance {
         scene: scene.clone(),
@@ -138,7 +141,8 @@ pub fn judge_scene(
     let centres: Vec<_> = small.surface.pixels.iter().map(|(centre, _)| ask::ray(centre)).collect();
     let mut requests: Vec<Request> =
         WITNESSES.iter().map(|(witness, _)| radiance(&chosen, *witness, false)).collect();
-    requests.push(radiance(&chosen, WITNESSES[0].0, true));
+    requests.push(radiance(&chosen, FLAT, false));
+    requests.push(radiance(&chosen, FLAT, true));
     requests.push(radiance(&chosen, Witness::True, false));
     requests.push(radiance(&chosen, Witness::True, true));
     requests.push(radiance(&centres, Witness::True, true));
@@ -146,7 +150,7 @@ pub fn judge_scene(
     let (width, height) = case.film();
     requests.push(render(width, height, case.spp, seed, threads));
     let outcomes = asker.ask(Some(plugin), requests);
-    let [w0, w1, w2, w3, constant_on, true_off, true_on, at_centres, one_spp, full] =
+    let [w0, w1, w2, w3, flat_off, flat_on, true_off, true_on, at_centres, one_spp, full] =
         outcomes.as_slice()
     else {
         let summary = "the worker gave no outcomes: a bug of Umbra's";
@@ -167,7 +171,8 @@ pub fn judge_scene(
             .map(|i| (witnessed[i], WITNESSES[i].1, &values[i] as &dyn Fn(&SurfacePoint) -> [f64; 3]))
             .collect();
         checks.push(judge_unshadowed(case, &asked));
-        checks.push(judge_shadows(case, &values[0], constant_on, w0));
+        let flat = |point: &SurfacePoint| witness_value(FLAT, point);
+        checks.push(judge_shadows(case, &flat, flat_on, flat_off));
     }
     checks.push(match (one_spp, at_centres) {
         (Outcome::Done(image), Outcome::Done(along)) => {

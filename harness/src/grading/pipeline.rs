@@ -70,14 +70,14 @@ impl<'a> Grading<'a> {
         let mut grading =
             Self { assignment, supervisor, recording, cases, adapter: Ok(adapter), threads: store.threads, cancel };
         if let Some(case) = grading.cases.first()
-            && let Err(why) = realtime::probe_adapter(&grading.asker(), case)
+            && let Err(why) = realtime::probe_adapter(&grading.asker(""), case)
         {
             grading.adapter = Err(why);
         }
         Ok(grading)
     }
 
-    fn asker(&self) -> Asker<'_> {
+    fn asker(&self, options: &str) -> Asker<'_> {
         let mut limits = self.assignment.limits.run.clone();
         limits.threads = self.threads;
         Asker {
@@ -85,6 +85,7 @@ impl<'a> Grading<'a> {
             limits,
             cancel: self.cancel,
             adapter: self.adapter.clone(),
+            options: options.to_owned(),
             cpu_s: Mutex::new(0.0),
             timeouts: AtomicUsize::new(0),
         }
@@ -103,7 +104,7 @@ impl<'a> Grading<'a> {
         purpose: Purpose,
         say: &dyn Fn(&str),
     ) -> anyhow::Result<Record> {
-        let asker = self.asker();
+        let asker = self.asker("");
         let mut costs = Costs { since: Instant::now(), stages: Vec::new() };
         let scratch = tempfile::Builder::new().prefix("hand-in-").tempdir_in(&self.supervisor.scratch)?;
         let mut record = Record {
@@ -167,6 +168,25 @@ impl<'a> Grading<'a> {
         record.stages = costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
         Ok(record)
+    }
+
+    /// What is found out about a library that is there already, without a hand-in around it.
+    /// `options` are told to it with every scene, `seed` to its samplers; `stages` are its texts.
+    ///
+    /// # Errors
+    /// The machine's matters and Ctrl-C.
+    pub fn plugin(
+        &self,
+        library: &Path,
+        options: &str,
+        seed: u64,
+        stages: &Stages,
+    ) -> anyhow::Result<Evidence> {
+        let asker = self.asker(options);
+        let (mut checks, mut drawn) = (Vec::new(), Vec::new());
+        self.offline(&asker, library, seed, &mut checks, &mut drawn)?;
+        self.realtime(&asker, library, stages, &mut checks, &mut drawn)?;
+        Ok(Evidence { checks })
     }
 
     fn build(

@@ -9,7 +9,7 @@ use super::case::Case;
 use super::offline::Drawn;
 use crate::evidence::images::{self, Kind};
 use crate::evidence::stages::{
-    BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, is_template, judge_pass, judge_vertex,
+    BoundValue, SHOW_NORMAL, SHOW_NOTHING, SHOW_POSITION, VERTEX, is_template, judge_pass, judge_vertex,
 };
 use crate::evidence::{Check, Verdict};
 use crate::imaging::evidence::Tolerances;
@@ -178,7 +178,7 @@ fn isolate_fragment(
 ) -> Check {
     let Some(own) = &stages.own[index] else { return absent(id, case, NAMES[index]) };
     let (width, height) = (case.small.width, case.small.height);
-    let mut texts = [VERTEX, SHOW_POSITION, SHOW_POSITION].map(str::to_owned);
+    let mut texts = [VERTEX, SHOW_NOTHING, SHOW_NOTHING].map(str::to_owned);
     texts[index].clone_from(own);
     match draw(asker, None, case, &case.realtime, (width, height), false, &named(texts)) {
         Outcome::Done(answer) => {
@@ -234,7 +234,7 @@ fn draw(
         Err(reason) => return Outcome::NoAdapter(reason.clone()),
     };
     let request = Request::RenderRealtime {
-        scene: ask::scene(toml),
+        scene: asker.scene(toml),
         width,
         height,
         shadow_map,

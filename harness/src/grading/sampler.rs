@@ -4,7 +4,7 @@ use std::path::Path;
 
 use basecode::scene::SceneConfig;
 
-use super::ask::{self, Asker};
+use super::ask::Asker;
 use crate::evidence::{Check, Verdict};
 use crate::worker::{Outcome, Request};
 
@@ -14,7 +14,7 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
     let config = SceneConfig::load(scene)?;
     let (width, height) = (config.width as u32, config.height as u32);
     let render = |seed, threads| Request::RenderOffline {
-        scene: ask::scene(scene),
+        scene: asker.scene(scene),
         width,
         height,
         spp: 4,

@@ -11,14 +11,16 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use renderer_api as api;
 use serde::{Deserialize, Serialize};
 
-/// Which BSDF an integrator meets. All values include the cosine [sr^-1] and are zero unless `wi`
-/// and `wo` both lie above the surface; there they are smooth, and positive if the constant is.
+/// Which BSDF an integrator meets. All values include the cosine [sr^-1] and, but for
+/// `Flat`, are zero unless `wi` and `wo` both lie above the surface; there they are smooth, and positive if the constant is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Witness {
     /// The renderer's own.
     True,
     /// This value wherever both directions are above the surface.
     Constant([f32; 3]),
+    /// This value everywhere, below the surface too: for visibility, whatever the frame.
+    Flat([f32; 3]),
     /// A function of cos theta_i alone, another for each channel.
     OfWi,
     /// A function of cos theta_o alone, another for each channel.
@@ -40,6 +42,9 @@ impl Witness {
     /// The witness' value; none for [`Witness::True`].
     pub fn value(&self, query: &WitnessQuery) -> Option<[f32; 3]> {
         let WitnessQuery { wi, wo } = *query;
+        if let Self::Flat(value) = self {
+            return Some(*value);
+        }
         if *self == Self::True {
             return None;
         }
@@ -49,7 +54,7 @@ impl Witness {
         }
         Some(match self {
             Self::True => return None,
-            Self::Constant(value) => *value,
+            Self::Constant(value) | Self::Flat(value) => *value,
             Self::OfWi => polynomial(wi[2]),
             Self::OfWo => polynomial(wo[2]),
             // From [-1, 1] to [0, 1].

@@ -21,6 +21,8 @@ use basecode::gpu::{
 };
 use basecode::{Mat4, Result, Scene, Vec3, Vec4, vec4, wgpu};
 
+use crate::mistakes::{Mistake, Mistakes};
+
 const SHADOW_VS: Stage =
     Stage { name: "shadow.vs", text: include_str!("../shaders/shadow.vs.wgsl") };
 
@@ -45,9 +47,12 @@ const FACES: [(Vec3, Vec3); 6] = [
 ];
 
 /// Draws what blocks the scene's light.
-pub fn draw_shadow_map(gpu: &Gpu, scene: &Scene) -> Result<ShadowMap> {
+pub fn draw_shadow_map(gpu: &Gpu, scene: &Scene, mistakes: &Mistakes) -> Result<ShadowMap> {
     let light = scene.first_light_position();
-    let projection = face_projection(scene);
+    let mut projection = face_projection(scene);
+    if mistakes.has(Mistake::ShadowMapHalf) {
+        (projection.x_axis, projection.y_axis) = (2.0 * projection.x_axis, 2.0 * projection.y_axis);
+    }
     let views = FACES.map(|(direction, up)| face_view(light, direction, up));
     let map = ShadowMap::new(gpu, RESOLUTION, &views.map(|v| projection * v), NORMAL_OFFSET)?;
     let pipeline = gpu.depth_pipeline(SHADOW_VS);

@@ -7,47 +7,57 @@ use basecode::gpu::{
 use basecode::{Camera, Mat4, Material, MaterialModel, Result, Scene, Vec3, wgpu};
 
 use super::shadow;
+use crate::mistakes::{self, Mistake, Mistakes};
 
-const SIMPLE_VS: Stage =
+pub(crate) const SIMPLE_VS: Stage =
     Stage { name: "simple.vs", text: include_str!("../shaders/simple.vs.wgsl") };
-const DIFFUSE_FS: Stage =
+pub(crate) const DIFFUSE_FS: Stage =
     Stage { name: "diffuse.fs", text: include_str!("../shaders/diffuse.fs.wgsl") };
-const PHONG_FS: Stage = Stage { name: "phong.fs", text: include_str!("../shaders/phong.fs.wgsl") };
+pub(crate) const PHONG_FS: Stage =
+    Stage { name: "phong.fs", text: include_str!("../shaders/phong.fs.wgsl") };
 
 /// A pipeline for each way to shade.
-struct Pipelines {
+pub(crate) struct Pipelines {
     diffuse: wgpu::RenderPipeline,
-    phong: wgpu::RenderPipeline,
+    pub(crate) phong: wgpu::RenderPipeline,
     emitter: wgpu::RenderPipeline,
 }
 
 /// A shape on the device.
-struct Object {
+pub(crate) struct Object {
     mesh: Mesh,
     placement: Uniform,
-    material: Material,
-    surface: Uniform,
+    pub(crate) material: Material,
+    pub(crate) surface: Uniform,
 }
 
 /// Shades every object by its material under the scene's point light.
 pub struct SimplePass {
-    pipelines: Pipelines,
+    pub(crate) pipelines: Pipelines,
     frame: Uniform,
-    objects: Vec<Object>,
+    pub(crate) objects: Vec<Object>,
     shadow: ShadowMap,
-    light_position: Vec3,
-    light_intensity: Vec3,
+    pub(crate) light_position: Vec3,
+    pub(crate) light_intensity: Vec3,
 }
 
 impl SimplePass {
     /// Copies the scene to the device, makes the pipelines and, for shadows, draws the shadow map.
-    pub fn new(gpu: &Gpu, scene: &Scene, shadow_map: bool) -> Result<Self> {
-        let shadow =
-            if shadow_map { shadow::draw_shadow_map(gpu, scene)? } else { ShadowMap::off(gpu) };
+    pub fn new(gpu: &Gpu, scene: &Scene, shadow_map: bool, mistakes: &Mistakes) -> Result<Self> {
+        let shadow_map = (shadow_map || mistakes.has(Mistake::ShadowMapAlways))
+            && !mistakes.has(Mistake::ShadowMapNone);
+        let shadow = if shadow_map {
+            shadow::draw_shadow_map(gpu, scene, mistakes)?
+        } else {
+            ShadowMap::off(gpu)
+        };
+        let (vs, diffuse, phong) =
+            (mistakes.text(SIMPLE_VS)?, mistakes.text(DIFFUSE_FS)?, mistakes.text(PHONG_FS)?);
+        let vs = Stage { text: &vs, ..SIMPLE_VS };
         let pipelines = Pipelines {
-            diffuse: gpu.pipeline(SIMPLE_VS, DIFFUSE_FS),
-            phong: gpu.pipeline(SIMPLE_VS, PHONG_FS),
-            emitter: gpu.pipeline(SIMPLE_VS, EMITTER_FS),
+            diffuse: gpu.pipeline(vs, Stage { text: &diffuse, ..DIFFUSE_FS }),
+            phong: gpu.pipeline(vs, Stage { text: &phong, ..PHONG_FS }),
+            emitter: gpu.pipeline(vs, EMITTER_FS),
         };
         let camera = scene.camera(1, 1)?;
         let mut objects = Vec::new();
@@ -61,14 +71,16 @@ impl SimplePass {
                 surface: Uniform::material(gpu, &material_uniforms(material)),
             });
         }
-        Ok(Self {
+        let mut pass = Self {
             pipelines,
             frame: Uniform::frame(gpu, &FrameUniforms::new(&camera)),
             objects,
             shadow,
             light_position: scene.first_light_position(),
             light_intensity: scene.first_light_intensity(),
-        })
+        };
+        mistakes::spoil_pass(mistakes, gpu, &mut pass)?;
+        Ok(pass)
     }
 
     /// Sets the light's share of the frame uniforms.

@@ -1,0 +1,115 @@
+//! The known mistakes, as `harness/data/mistakes.json` lists them.
+//!
+//! Each is a switch of the reference renderer (`mistake=NAME` in its options); that both know the
+//! same names is tested in `reference_impl`.
+
+use serde::{Deserialize, Serialize};
+
+/// The text that [`Catalogue::known`] reads.
+const TEXT: &str = include_str!("../../data/mistakes.json");
+
+/// All known mistakes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Catalogue {
+    /// The mistakes, by family.
+    pub mistakes: Vec<KnownMistake>,
+}
+
+/// One thing that students get wrong.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KnownMistake {
+    /// The reference's switch.
+    pub name: String,
+    /// What it concerns: a BSDF, the frame, the light, a stage.
+    pub family: String,
+    /// The parts that it belongs to, such as `1.3`: what it must cost, and all that it may.
+    pub parts: Vec<String>,
+    /// The findings that it leads to although it costs nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<String>,
+    /// For the student, after the words "looks like:".
+    pub looks_like: String,
+}
+
+/// Why a catalogue cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CatalogueError {
+    /// It is not what it should be.
+    #[error("catalogue of mistakes: {0}")]
+    Parse(#[from] serde_json::Error),
+    /// A name is there twice.
+    #[error("catalogue of mistakes: \"{0}\" is there twice")]
+    Twice(String),
+    /// A mistake that nothing can show.
+    #[error("catalogue of mistakes: \"{0}\" belongs to no part and leads to no finding")]
+    Harmless(String),
+}
+
+impl Catalogue {
+    /// The catalogue that this program was built with.
+    ///
+    /// # Errors
+    /// When the file contradicts itself: a bug of Umbra's.
+    pub fn known() -> Result<Self, CatalogueError> {
+        Self::parse(TEXT)
+    }
+
+    fn parse(text: &str) -> Result<Self, CatalogueError> {
+        let catalogue: Self = serde_json::from_str(text)?;
+        for (index, mistake) in catalogue.mistakes.iter().enumerate() {
+            let name = &mistake.name;
+            if catalogue.mistakes[..index].iter().any(|other| other.name == *name) {
+                return Err(CatalogueError::Twice(name.clone()));
+            }
+            if mistake.parts.is_empty() && mistake.findings.is_empty() {
+                return Err(CatalogueError::Harmless(name.clone()));
+            }
+        }
+        Ok(catalogue)
+    }
+
+    /// The mistake of this name.
+    pub fn named(&self, name: &str) -> Option<&KnownMistake> {
+        self.mistakes.iter().find(|mistake| mistake.name == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_catalogue_is_whole() {
+        let catalogue = Catalogue::known().unwrap();
+        assert!(catalogue.mistakes.len() >= 40, "{}", catalogue.mistakes.len());
+        let families: std::collections::BTreeSet<_> =
+            catalogue.mistakes.iter().map(|mistake| mistake.family.as_str()).collect();
+        assert!(families.len() >= 10, "{families:?}");
+        let parts = ["1.1", "1.2", "1.3", "1.4", "2.1", "2.2", "2.3", "2.4", "2.5"];
+        for part in parts {
+            let belongs = |mistake: &&KnownMistake| mistake.parts.iter().any(|own| own == part);
+            let count = catalogue.mistakes.iter().filter(belongs).count();
+            assert!(count >= 5, "{part}: {count}");
+        }
+        for mistake in &catalogue.mistakes {
+            assert!(mistake.parts.iter().all(|part| parts.contains(&part.as_str())), "{mistake:?}");
+        }
+    }
+
+    #[test]
+    fn contradictions_are_refused() {
+        let entry = |parts: &str| {
+            format!(r#"{{"name": "a", "family": "f", "parts": [{parts}], "looks_like": "x"}}"#)
+        };
+        let list = |entries: &[String]| format!(r#"{{"mistakes": [{}]}}"#, entries.join(","));
+        let right = entry(r#""1.1""#);
+        assert!(Catalogue::parse(&list(std::slice::from_ref(&right))).is_ok());
+        let twice = Catalogue::parse(&list(&[right.clone(), right]));
+        assert!(matches!(twice, Err(CatalogueError::Twice(name)) if name == "a"));
+        let harmless = Catalogue::parse(&list(&[entry("")]));
+        assert!(matches!(harmless, Err(CatalogueError::Harmless(_))));
+        assert!(Catalogue::parse("{").unwrap_err().to_string().contains("line 1"));
+    }
+}
