@@ -89,7 +89,7 @@ fn textured_probes(kind: BsdfKind, case: &Case) -> Vec<BsdfProbe> {
         for _ in 0..200 {
             let uv = [sampler.next_1d() * 3.0 - 1.0, sampler.next_1d() * 3.0 - 1.0];
             let primitive = (sampler.next_1d() * shape.triangles.len() as f32) as usize;
-            let mut direction = || {
+            let direction = || {
                 let z = 0.05 + 0.95 * sampler.next_1d();
                 let (sin, cos) = (std::f32::consts::TAU * sampler.next_1d()).sin_cos();
                 let r = (1.0 - z * z).sqrt();
