@@ -1,5 +1,7 @@
 //! EXR files in and out: round trips, and files that are wrong in every way a hand-in can be.
 
+#![allow(clippy::unwrap_used)] // its helpers are tests too
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -191,8 +191,8 @@ pub fn judge(kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Check
     let mut ratios = Vec::new();
     for (index, (probe, value)) in probes.iter().zip(values).enumerate() {
         let mut excess = 0.0f64;
-        for c in 0..3 {
-            let (a, b) = (f64::from(value[c]), probe.expected[c]);
+        for (c, &answer) in value.iter().enumerate() {
+            let (a, b) = (f64::from(answer), probe.expected[c]);
             // What is no number is as far off as the largest value.
             let difference = if a.is_finite() { (a - b).abs() } else { probe.peak };
             not_finite += usize::from(!a.is_finite());

@@ -235,11 +235,9 @@ pub fn judge_shadows(
         let expected = batch.unshadowed(index, bsdf(&batch.points[index]));
         let visibility = visibility(with[index], without[index], expected);
         let is_lit = index < batch.lit;
-        let wrong = match is_lit {
-            true => !((visibility - 1.0).abs() < HALF_LIGHT),
-            false => !(visibility.abs() < HALF_LIGHT),
-        };
-        if wrong {
+        // What is no number is never right.
+        let right = (visibility - f64::from(u8::from(is_lit))).abs() < HALF_LIGHT;
+        if !right {
             let count = if is_lit { &mut lit_wrong } else { &mut dark_wrong };
             *count += 1;
             first = first.or(Some((index, visibility)));

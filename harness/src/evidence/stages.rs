@@ -189,8 +189,11 @@ pub fn judge_vertex(
         let (p, n) = (positions.pixels[index], normals.pixels[index]);
         let reach = POSITION_RELATIVE * (point.position - ray.origin).length();
         missing += usize::from(p == Vec3::ZERO && n == Vec3::ZERO);
-        wrong_position += usize::from(!((p - point.position).length() <= reach));
-        wrong_normal += usize::from(!((n - point.normal).length() <= NORMAL_ABSOLUTE));
+        // What is no number is never right.
+        let right_position = (p - point.position).length() <= reach;
+        let right_normal = (n - point.normal).length() <= NORMAL_ABSOLUTE;
+        wrong_position += usize::from(!right_position);
+        wrong_normal += usize::from(!right_normal);
     }
     if counted == 0 {
         return Check::new(id, scene_name, Verdict::NotJudged, "no pixel away from edges shows a surface");
