@@ -70,8 +70,14 @@ fn stored_images_agree_with_a_reduced_render_of_another_seed() {
             let (accepted, said) = verdict(&image);
             assert_eq!(accepted, Verdict::Pass, "{} at {spp} spp: {said}", entry.name);
             // The same render 2 % too bright would be no reference.
-            let brighter = Image { pixels: image.pixels.iter().map(|&p| 1.02 * p).collect(), ..image };
-            assert_eq!(verdict(&brighter).0, Verdict::Fail, "{} at {spp} spp, brighter", entry.name);
+            let brighter =
+                Image { pixels: image.pixels.iter().map(|&p| 1.02 * p).collect(), ..image };
+            assert_eq!(
+                verdict(&brighter).0,
+                Verdict::Fail,
+                "{} at {spp} spp, brighter",
+                entry.name
+            );
         }
     }
     assert!(stored >= 4, "only {stored} scenes are stored");
