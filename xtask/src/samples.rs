@@ -184,7 +184,7 @@ impl Packer {
             for path in moved {
                 let rest = path[from.len()..].to_owned();
                 let bytes = files.remove(&path).unwrap_or_default();
-                files.insert(format!("{to}{rest}"), bytes);
+                files.insert(format!("{to}{rest}").trim_start_matches('/').to_owned(), bytes);
             }
         }
         for path in &recipe.omit {

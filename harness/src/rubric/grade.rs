@@ -125,14 +125,14 @@ fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
             };
         }
     }
-    by_checks(rules, evidence, &part.evidence)
-        .or_else(|| by_checks(rules, evidence, &part.fallback))
+    by_checks(rules, evidence, &part.evidence, part.any_scene)
+        .or_else(|| by_checks(rules, evidence, &part.fallback, part.any_scene))
         .unwrap_or_else(|| unjudged(evidence, part))
 }
 
 /// A part of a hand-in that does not build.
 fn by_images(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
-    let mut worth = match by_checks(rules, evidence, &part.images_only) {
+    let mut worth = match by_checks(rules, evidence, &part.images_only, part.any_scene) {
         Some(worth) => worth,
         None => Worth {
             least: 0.0,
@@ -146,8 +146,9 @@ fn by_images(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
     worth
 }
 
-/// What the checks named `ids` say together: the worst counts. `None` when none of them judges.
-fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String]) -> Option<Worth> {
+/// What the checks named `ids` say together: the worst counts, or the best where any scene will
+/// do. `None` when none of them judges.
+fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String], any_scene: bool) -> Option<Worth> {
     let judging = |check: &&Check| {
         matches!(check.verdict, Verdict::Pass | Verdict::Fail | Verdict::NotImplemented)
     };
@@ -157,11 +158,17 @@ fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String]) -> Option<Worth
     }
     let judged: Vec<&Check> = checks.into_iter().filter(judging).collect();
     // Ties are broken by the words, so that the order of the checks does not matter.
-    let worst = judged.iter().copied().min_by(|a, b| {
+    let order = |a: &&Check, b: &&Check| {
         let (fa, fb) = (fraction(rules, a), fraction(rules, b));
-        fa.total_cmp(&fb).then_with(|| (&a.id, &a.scene).cmp(&(&b.id, &b.scene)))
-    })?;
-    let least = fraction(rules, worst);
+        fa.total_cmp(&fb).then_with(|| (&b.id, &b.scene).cmp(&(&a.id, &a.scene)))
+    };
+    let of = |id: &String| judged.iter().copied().filter(|check| check.id == **id).collect();
+    let deciding = ids.iter().filter_map(|id| {
+        let checks: Vec<&Check> = of(id);
+        if any_scene { checks.into_iter().max_by(order) } else { checks.into_iter().min_by(order) }
+    });
+    let deciding = deciding.min_by(order)?;
+    let least = fraction(rules, deciding);
     let mut evidence: Vec<String> = judged
         .iter()
         .filter(|check| check.verdict != Verdict::Pass || least == 1.0)
@@ -169,7 +176,7 @@ fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String]) -> Option<Worth
         .collect();
     evidence.sort();
     evidence.dedup();
-    let reason = worst.summary.clone();
+    let reason = deciding.summary.clone();
     Some(Worth { least, most: least, reason, evidence })
 }
 

@@ -60,8 +60,11 @@ pub struct Part {
     /// The path it belongs to; empty when it stands for itself.
     #[serde(default)]
     pub path: String,
-    /// The checks that isolate it; the worst counts.
+    /// The checks that isolate it; the worst scene counts.
     pub evidence: Vec<String>,
+    /// Whether the best scene counts instead: the student was free to choose one.
+    #[serde(default)]
+    pub any_scene: bool,
     /// The checks that decide when the evidence does not apply.
     #[serde(default)]
     pub fallback: Vec<String>,

@@ -11,6 +11,7 @@ fn rules() -> Rules {
         title: format!("part {id}"),
         points,
         bonus: path.is_empty(),
+        any_scene: path.is_empty(),
         path: path.into(),
         evidence: vec![evidence.into()],
         fallback: fallback.iter().map(|&f| f.into()).collect(),
@@ -60,6 +61,18 @@ fn the_worst_scene_counts_and_the_curve_gives_partial_points() {
         checks.extend([check("bsdf", Pass, 0.0), check("bsdf", Fail, error)]);
         assert_eq!(points(&checks), [expected, 30.0, 20.0], "error {error}");
     }
+}
+
+#[test]
+fn one_right_scene_is_enough_where_the_student_may_choose() {
+    let at = |scene: &str, verdict, error| Check {
+        scene: scene.into(),
+        ..check("bonus", verdict, error)
+    };
+    let checks = [at("teapot", Fail, 1.0), at("cbox", Pass, 0.0)];
+    assert_eq!(points(&checks)[2], 20.0);
+    let checks = [at("teapot", NotImplemented, 1.0), at("cbox", Fail, 0.1)];
+    assert_eq!(points(&checks)[2], 10.0);
 }
 
 #[test]
