@@ -33,11 +33,7 @@ impl Rng {
 }
 
 fn lit(name: &str) -> Region {
-    Region {
-        name: name.into(),
-        lit: true,
-        exponent: 0.0,
-    }
+    Region { name: name.into(), lit: true, exponent: 0.0 }
 }
 
 /// One lit region everywhere, a constant colour, the given variance of one sample.
@@ -58,12 +54,7 @@ fn offline(actual: &Image, reference: &ReferenceImage, spp: u32) -> ImageEvidenc
 
 /// The names of the checks that failed.
 fn failed(evidence: &ImageEvidence) -> Vec<&str> {
-    evidence
-        .checks
-        .iter()
-        .filter(|c| !c.passed)
-        .map(|c| c.id.as_str())
-        .collect()
+    evidence.checks.iter().filter(|c| !c.passed).map(|c| c.id.as_str()).collect()
 }
 
 /// A disc on a background: lit, but for the right part that lies in shadow, with a bright spot. 96x64 pixels.
@@ -133,16 +124,9 @@ impl Disc {
         }
         let mut mask = RegionMask::background(Self::WIDTH, Self::HEIGHT);
         mask.regions.push(lit("disc, lit"));
-        mask.regions.push(Region {
-            name: "disc, shadowed".into(),
-            lit: false,
-            exponent: 0.0,
-        });
+        mask.regions.push(Region { name: "disc, shadowed".into(), lit: false, exponent: 0.0 });
         for (i, m) in mask.pixels.iter_mut().enumerate() {
-            let (x, y) = (
-                (i % Self::WIDTH) as f32 + 0.5,
-                (i / Self::WIDTH) as f32 + 0.5,
-            );
+            let (x, y) = ((i % Self::WIDTH) as f32 + 0.5, (i / Self::WIDTH) as f32 + 0.5);
             let rim = Self::distance(x, y, Self::CENTRE) - Self::RADIUS;
             *m = match (rim > 0.0, x > Self::SHADOW) {
                 (true, _) => 0,
@@ -187,12 +171,7 @@ fn four_pixels_by_hand() {
     assert_eq!(negative.detail, "1 pixel is negative; first at (1, 0)");
     assert!(!negative.passed);
     actual.pixels[1].y = -0.9e-6;
-    assert!(
-        offline(&actual, &reference, 16)
-            .check("negative")
-            .unwrap()
-            .passed
-    );
+    assert!(offline(&actual, &reference, 16).check("negative").unwrap().passed);
 }
 
 /// On an edge every other rule is lenient: a single NaN there must still fail, alone.
@@ -215,16 +194,8 @@ fn a_tiny_region_has_no_bias() {
         let mut actual = reference.mean.clone();
         actual.pixels[..pixels].fill(Vec3::splat(0.503));
         let evidence = offline(&actual, &reference, 16);
-        assert_eq!(
-            failed(&evidence).contains(&"bias: speck"),
-            judged,
-            "{pixels} pixels"
-        );
-        let said = evidence
-            .check("bias: speck")
-            .unwrap()
-            .detail
-            .contains("too few");
+        assert_eq!(failed(&evidence).contains(&"bias: speck"), judged, "{pixels} pixels");
+        let said = evidence.check("bias: speck").unwrap().detail.contains("too few");
         assert_eq!(said, !judged);
     }
 }
@@ -252,11 +223,7 @@ fn z_is_what_the_formula_says() {
         let mut actual = reference.mean.clone();
         actual.pixels[12].x += 3.99 * standard_error;
         let near = (1..4).contains(&(noisy % 5)) && (1..4).contains(&(noisy / 5));
-        let failing = offline(&actual, &quiet, 16)
-            .check("interior")
-            .unwrap()
-            .value
-            > 0.0;
+        let failing = offline(&actual, &quiet, 16).check("interior").unwrap().value > 0.0;
         assert_eq!(failing, !near, "noise at {noisy}");
     }
 }
@@ -266,17 +233,8 @@ fn another_size_is_an_outcome() {
     let reference = flat(4, 2, Vec3::ONE, 0.0);
     let t = Tolerances::default();
     let error = compare_offline(&Image::new(2, 4), &reference, 16, &t).unwrap_err();
-    assert_eq!(
-        error,
-        CompareError::Size {
-            actual: (2, 4),
-            expected: (4, 2)
-        }
-    );
-    assert_eq!(
-        error.to_string(),
-        "image is 2x4 but 4x2 is expected; hint: width comes first"
-    );
+    assert_eq!(error, CompareError::Size { actual: (2, 4), expected: (4, 2) });
+    assert_eq!(error.to_string(), "image is 2x4 but 4x2 is expected; hint: width comes first");
     let none = compare_offline(&Image::new(4, 2), &reference, 0, &t);
     assert_eq!(none.unwrap_err(), CompareError::NoSamples);
 }
@@ -289,36 +247,18 @@ fn a_reference_that_proves_nothing_is_refused() {
         ReferenceImage::new(image.clone(), image.clone(), 16, image, mask).map(|r| r.median_lit)
     };
     let mut mask = RegionMask::background(2, 2);
-    assert_eq!(
-        parts(Vec3::ONE, mask.clone()),
-        Err(ReferenceError::NothingLit)
-    );
+    assert_eq!(parts(Vec3::ONE, mask.clone()), Err(ReferenceError::NothingLit));
     mask.regions.push(lit("wall"));
     mask.pixels.fill(1);
     assert_eq!(parts(Vec3::ONE, mask.clone()), Ok(1.0));
-    assert_eq!(
-        parts(Vec3::ZERO, mask.clone()),
-        Err(ReferenceError::NothingLit)
-    );
-    assert!(matches!(
-        parts(Vec3::NAN, mask.clone()),
-        Err(ReferenceError::Value { .. })
-    ));
+    assert_eq!(parts(Vec3::ZERO, mask.clone()), Err(ReferenceError::NothingLit));
+    assert!(matches!(parts(Vec3::NAN, mask.clone()), Err(ReferenceError::Value { .. })));
     mask.pixels[2] = 5;
-    assert!(matches!(
-        parts(Vec3::ONE, mask.clone()),
-        Err(ReferenceError::Region { index: 5, .. })
-    ));
+    assert!(matches!(parts(Vec3::ONE, mask.clone()), Err(ReferenceError::Region { index: 5, .. })));
     mask.pixels.fill(1 | RegionMask::EDGE);
-    assert_eq!(
-        parts(Vec3::ONE, mask.clone()),
-        Err(ReferenceError::NothingLit)
-    );
+    assert_eq!(parts(Vec3::ONE, mask.clone()), Err(ReferenceError::NothingLit));
     mask.width = 3;
-    assert!(matches!(
-        parts(Vec3::ONE, mask),
-        Err(ReferenceError::Size { .. })
-    ));
+    assert!(matches!(parts(Vec3::ONE, mask), Err(ReferenceError::Size { .. })));
 }
 
 #[test]
@@ -347,17 +287,10 @@ fn known_variance_gives_the_known_fraction() {
         let mut noise = |p: &mut Vec3, sigma: f32| {
             *p += sigma * vec3(rng.gaussian(), rng.gaussian(), rng.gaussian());
         };
-        reference
-            .mean
-            .pixels
-            .iter_mut()
-            .for_each(|p| noise(p, (v / big_n).sqrt()));
+        reference.mean.pixels.iter_mut().for_each(|p| noise(p, (v / big_n).sqrt()));
         let mut actual = Image::new(width, height);
         actual.pixels.fill(Vec3::ONE);
-        actual
-            .pixels
-            .iter_mut()
-            .for_each(|p| noise(p, (v / n).sqrt()));
+        actual.pixels.iter_mut().for_each(|p| noise(p, (v / n).sqrt()));
         let evidence = offline(&actual, &reference, 16);
         failing += evidence.check("interior").unwrap().value * (width * height) as f64;
         pixels += (width * height) as f64;
@@ -378,11 +311,7 @@ fn correct_renders_pass_at_every_seed_and_spp() {
     for spp in [4, 16, 64] {
         for seed in 0..200 {
             let evidence = offline(&Disc::render(spp, seed), &reference, spp);
-            assert!(
-                evidence.passed(),
-                "spp {spp}, seed {seed}: {:?}",
-                evidence.checks
-            );
+            assert!(evidence.passed(), "spp {spp}, seed {seed}: {:?}", evidence.checks);
             for check in &evidence.checks {
                 let used = check.value.abs() / check.bound.max(1e-300);
                 match check.id.as_str() {
@@ -393,10 +322,7 @@ fn correct_renders_pass_at_every_seed_and_spp() {
                 }
             }
             let ratio = evidence.noise_ratio.unwrap();
-            assert!(
-                (0.7..1.5).contains(&ratio),
-                "spp {spp}, seed {seed}: {ratio}"
-            );
+            assert!((0.7..1.5).contains(&ratio), "spp {spp}, seed {seed}: {ratio}");
         }
     }
     println!(
@@ -416,26 +342,16 @@ fn one_percent_of_gain_is_caught_by_the_bias() {
             let mut image = Disc::render(16, seed);
             image.pixels.iter_mut().for_each(|p| *p *= gain);
             let evidence = offline(&image, &reference, 16);
-            assert!(
-                failed(&evidence).contains(&"bias: disc, lit"),
-                "{:?}",
-                failed(&evidence)
-            );
+            assert!(failed(&evidence).contains(&"bias: disc, lit"), "{:?}", failed(&evidence));
             assert!(!failed(&evidence).contains(&"bias: background"));
             let bias = evidence.check("bias: disc, lit").unwrap();
-            assert!(
-                (bias.value - f64::from(gain - 1.0)).abs() < 2e-3,
-                "{bias:?}"
-            );
+            assert!((bias.value - f64::from(gain - 1.0)).abs() < 2e-3, "{bias:?}");
         }
     }
     let mut blue = Disc::render(16, 1);
     blue.pixels.iter_mut().for_each(|p| p.z *= 0.98);
     let evidence = offline(&blue, &reference, 16);
-    assert!(
-        failed(&evidence).contains(&"bias: disc, lit"),
-        "one channel is enough"
-    );
+    assert!(failed(&evidence).contains(&"bias: disc, lit"), "one channel is enough");
 }
 
 #[test]
@@ -448,11 +364,7 @@ fn a_wrong_highlight_is_only_the_highlights_fault() {
         }
     }
     let evidence = offline(&image, &reference, 16);
-    assert!(
-        failed(&evidence).contains(&"bias: disc, lit, highlight"),
-        "{:?}",
-        failed(&evidence)
-    );
+    assert!(failed(&evidence).contains(&"bias: disc, lit, highlight"), "{:?}", failed(&evidence));
     assert!(!failed(&evidence).contains(&"bias: disc, lit"));
 }
 
@@ -464,13 +376,7 @@ fn black_nan_and_constant_images_never_pass() {
         image.pixels.fill(value);
         image
     };
-    for value in [
-        Vec3::ZERO,
-        Vec3::NAN,
-        Vec3::INFINITY,
-        Vec3::splat(0.4),
-        Vec3::splat(-1.0),
-    ] {
+    for value in [Vec3::ZERO, Vec3::NAN, Vec3::INFINITY, Vec3::splat(0.4), Vec3::splat(-1.0)] {
         for spp in [1, 16, 1_000_000] {
             let evidence = offline(&fill(value), &reference, spp);
             for rule in ["interior", "blob", "bias: disc, lit"] {
@@ -479,16 +385,8 @@ fn black_nan_and_constant_images_never_pass() {
             }
         }
         let (centre, mask, t) = (&reference.centre, &reference.mask, Tolerances::default());
-        assert!(
-            !compare_realtime_linear(&fill(value), centre, mask, &t)
-                .unwrap()
-                .passed()
-        );
-        assert!(
-            !compare_srgb8(&fill(value), centre, mask, &t)
-                .unwrap()
-                .passed()
-        );
+        assert!(!compare_realtime_linear(&fill(value), centre, mask, &t).unwrap().passed());
+        assert!(!compare_srgb8(&fill(value), centre, mask, &t).unwrap().passed());
     }
     // A copy of the reference passes every rule, and its missing noise shows.
     let copy = offline(&reference.mean, &reference, 16);
@@ -516,16 +414,9 @@ fn a_silhouette_may_move_inside_its_mask_but_a_blob_may_not_appear() {
         blob.pixels[y * Disc::WIDTH + x] *= 0.8;
     }
     let evidence = offline(&blob, &reference, 1);
-    assert_eq!(
-        failed(&evidence),
-        ["blob"],
-        "four pixels are too few for any other rule"
-    );
+    assert_eq!(failed(&evidence), ["blob"], "four pixels are too few for any other rule");
     let area = evidence.largest_failing.as_ref().unwrap();
-    assert_eq!(
-        (area.x, area.y, area.width, area.height, area.pixels),
-        (30, 40, 2, 2, 4)
-    );
+    assert_eq!((area.x, area.y, area.width, area.height, area.pixels), (30, 40, 2, 2, 4));
     assert_eq!(
         evidence.check("blob").unwrap().detail,
         "4 pixels that touch differ, in columns 30 to 31 and rows 40 to 41"
@@ -533,11 +424,7 @@ fn a_silhouette_may_move_inside_its_mask_but_a_blob_may_not_appear() {
 
     // Half a pixel off, the whole rim moves.
     let evidence = offline(&Disc::fixed(0.0), &reference, 1);
-    assert!(
-        failed(&evidence).contains(&"edge"),
-        "{:?}",
-        failed(&evidence)
-    );
+    assert!(failed(&evidence).contains(&"edge"), "{:?}", failed(&evidence));
 }
 
 #[test]
@@ -608,13 +495,7 @@ fn evidence_survives_json_with_nan_in_it() {
     assert!(back.worst.unwrap().actual[0].is_nan());
 
     let tolerances: Tolerances = toml::from_str("z_limit = 5.0").unwrap();
-    assert_eq!(
-        tolerances,
-        Tolerances {
-            z_limit: 5.0,
-            ..Tolerances::default()
-        }
-    );
+    assert_eq!(tolerances, Tolerances { z_limit: 5.0, ..Tolerances::default() });
     assert!(toml::from_str::<Tolerances>("z_limt = 5.0").is_err());
 }
 
@@ -640,13 +521,7 @@ fn cost_at_768x576() {
         println!("{what}: {:.1} ms", best.unwrap().as_secs_f64() * 1e3);
     };
     let (centre, mask) = (&reference.centre, &reference.mask);
-    time("offline", &|| {
-        compare_offline(&actual, &reference, 16, &t).unwrap()
-    });
-    time("realtime linear", &|| {
-        compare_realtime_linear(&actual, centre, mask, &t).unwrap()
-    });
-    time("realtime srgb8", &|| {
-        compare_srgb8(&actual, centre, mask, &t).unwrap()
-    });
+    time("offline", &|| compare_offline(&actual, &reference, 16, &t).unwrap());
+    time("realtime linear", &|| compare_realtime_linear(&actual, centre, mask, &t).unwrap());
+    time("realtime srgb8", &|| compare_srgb8(&actual, centre, mask, &t).unwrap());
 }

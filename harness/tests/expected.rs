@@ -31,7 +31,7 @@ fn stored_images_agree_with_a_reduced_render_of_another_seed() {
     assert!(reference.is_file(), "run `cargo build --release --workspace` first");
     let scratch = tempfile::tempdir().unwrap();
     let supervisor =
-        Supervisor { umbra: env!("CARGO_BIN_EXE_umbra").into(), scratch: scratch.path().into() };
+        Supervisor::available(env!("CARGO_BIN_EXE_umbra").into(), scratch.path().into());
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
     let store = Store {
         assignment: &assignment,
@@ -70,8 +70,14 @@ fn stored_images_agree_with_a_reduced_render_of_another_seed() {
             let (accepted, said) = verdict(&image);
             assert_eq!(accepted, Verdict::Pass, "{} at {spp} spp: {said}", entry.name);
             // The same render 2 % too bright would be no reference.
-            let brighter = Image { pixels: image.pixels.iter().map(|&p| 1.02 * p).collect(), ..image };
-            assert_eq!(verdict(&brighter).0, Verdict::Fail, "{} at {spp} spp, brighter", entry.name);
+            let brighter =
+                Image { pixels: image.pixels.iter().map(|&p| 1.02 * p).collect(), ..image };
+            assert_eq!(
+                verdict(&brighter).0,
+                Verdict::Fail,
+                "{} at {spp} spp, brighter",
+                entry.name
+            );
         }
     }
     assert!(stored >= 4, "only {stored} scenes are stored");

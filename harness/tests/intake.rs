@@ -37,29 +37,19 @@ fn perfect() -> Vec<(String, Vec<u8>)> {
         image("offline/teapot_simple_offline.exr"),
         image("realtime/cbox_simple_realtime.exr"),
         image("realtime/teapot_simple_realtime.exr"),
-        (
-            "src/bsdfs/phong.rs".to_owned(),
-            b"pub struct Phong;\n".to_vec(),
-        ),
+        ("src/bsdfs/phong.rs".to_owned(), b"pub struct Phong;\n".to_vec()),
         ("src/lib.rs".to_owned(), b"mod bsdfs;\n".to_vec()),
         ("src/shaders/phong.wgsl".to_owned(), b"// phong\n".to_vec()),
     ]
 }
 
 fn zip_of(files: &[(String, Vec<u8>)]) -> Vec<u8> {
-    Zip::of(
-        files
-            .iter()
-            .map(|(name, content)| Entry::deflated(name, content)),
-    )
-    .bytes()
+    Zip::of(files.iter().map(|(name, content)| Entry::deflated(name, content))).bytes()
 }
 
 fn tar_of(files: &[(String, Vec<u8>)]) -> Vec<u8> {
-    let entries: Vec<_> = files
-        .iter()
-        .map(|(name, content)| tar_bytes::Entry::file(name, content))
-        .collect();
+    let entries: Vec<_> =
+        files.iter().map(|(name, content)| tar_bytes::Entry::file(name, content)).collect();
     tar(&entries)
 }
 
@@ -73,17 +63,11 @@ fn write_folder(folder: &Path, files: &[(String, Vec<u8>)]) {
 
 /// Each path moved by `change`; `None` drops the file.
 fn moved(change: impl Fn(&str) -> Option<String>) -> Vec<(String, Vec<u8>)> {
-    perfect()
-        .into_iter()
-        .filter_map(|(name, content)| Some((change(&name)?, content)))
-        .collect()
+    perfect().into_iter().filter_map(|(name, content)| Some((change(&name)?, content))).collect()
 }
 
 fn codes(findings: &[Finding]) -> Vec<String> {
-    findings
-        .iter()
-        .map(|f| format!("{} {}", f.code, f.path.as_deref().unwrap_or("-")))
-        .collect()
+    findings.iter().map(|f| format!("{} {}", f.code, f.path.as_deref().unwrap_or("-"))).collect()
 }
 
 fn validate_bytes(bytes: &[u8], name: &str) -> Validation {
@@ -106,13 +90,8 @@ fn every_format_gives_the_same_copy() {
     let source = folder.path().join("a2_ada_lovelace");
     write_folder(&source, &files);
     let scratch = Scratch::new();
-    let from_folder = unpack(
-        &source,
-        &scratch.dest,
-        &TreeSpec::default(),
-        &Limits::default(),
-    )
-    .unwrap();
+    let from_folder =
+        unpack(&source, &scratch.dest, &TreeSpec::default(), &Limits::default()).unwrap();
     assert_eq!(from_folder.format, Format::Folder);
     assert_eq!(from_folder.name, "a2_ada_lovelace");
     assert_eq!(from_folder.findings, []);
@@ -126,14 +105,9 @@ fn every_format_gives_the_same_copy() {
         (gz(&tar_of(&wrapped)), "a.tar.gz", Format::TarGz),
     ] {
         let scratch = Scratch::new();
-        let hand_in = unpack_bytes(
-            &bytes,
-            name,
-            &scratch.dest,
-            &TreeSpec::default(),
-            &Limits::default(),
-        )
-        .unwrap();
+        let hand_in =
+            unpack_bytes(&bytes, name, &scratch.dest, &TreeSpec::default(), &Limits::default())
+                .unwrap();
         assert_eq!(hand_in.format, format);
         assert_eq!(hand_in.files, from_folder.files);
         assert_eq!(hand_in.digest, from_folder.digest);
@@ -146,11 +120,8 @@ fn every_format_gives_the_same_copy() {
 
 #[test]
 fn hash_is_sha256_of_the_content() {
-    let (hand_in, _scratch) = assert_accepted(
-        &Zip::of([Entry::stored("abc", b"abc")]).bytes(),
-        "a.zip",
-        "",
-    );
+    let (hand_in, _scratch) =
+        assert_accepted(&Zip::of([Entry::stored("abc", b"abc")]).bytes(), "a.zip", "");
     // FIPS 180-2, appendix B.1.
     assert_eq!(
         hand_in.files[0].sha256,
@@ -161,11 +132,8 @@ fn hash_is_sha256_of_the_content() {
 #[test]
 fn digest_depends_on_paths_and_contents() {
     let digest = |entries: &[(&str, &str)]| {
-        let zip = Zip::of(
-            entries
-                .iter()
-                .map(|(name, content)| Entry::stored(name, content.as_bytes())),
-        );
+        let zip =
+            Zip::of(entries.iter().map(|(name, content)| Entry::stored(name, content.as_bytes())));
         assert_accepted(&zip.bytes(), "a.zip", "").0.digest
     };
     let base = digest(&[("a", "1"), ("b", "2")]);
@@ -212,9 +180,8 @@ fn junk_of_macos_and_windows_is_ignored() {
 
 #[test]
 fn streamed_zip_of_macos_is_fine() {
-    let entries = perfect()
-        .into_iter()
-        .map(|(name, content)| Entry::deflated(&name, &content).streamed());
+    let entries =
+        perfect().into_iter().map(|(name, content)| Entry::deflated(&name, &content).streamed());
     assert_accepted(&Zip::of(entries).bytes(), "a.zip", "");
 }
 
@@ -275,9 +242,7 @@ fn tar_of_the_tar_crate_is_fine() {
         let mut header = ::tar::Header::new_gnu();
         header.set_size(content.len() as u64);
         header.set_mode(0o644);
-        builder
-            .append_data(&mut header, &name, content.as_slice())
-            .unwrap();
+        builder.append_data(&mut header, &name, content.as_slice()).unwrap();
     }
     let bytes = builder.into_inner().unwrap();
     let (hand_in, _scratch) = assert_accepted(&bytes, "a.tar", "");
@@ -294,23 +259,9 @@ fn black_images_pack_well_and_are_no_bomb() {
     }
     let scratch = Scratch::new();
     let tree = TreeSpec::default();
-    unpack_bytes(
-        &zip_of(&files),
-        "a.zip",
-        &scratch.dest,
-        &tree,
-        &Limits::default(),
-    )
-    .unwrap();
+    unpack_bytes(&zip_of(&files), "a.zip", &scratch.dest, &tree, &Limits::default()).unwrap();
     let scratch = Scratch::new();
-    unpack_bytes(
-        &gz(&tar_of(&files)),
-        "a.tgz",
-        &scratch.dest,
-        &tree,
-        &Limits::default(),
-    )
-    .unwrap();
+    unpack_bytes(&gz(&tar_of(&files)), "a.tgz", &scratch.dest, &tree, &Limits::default()).unwrap();
 }
 
 #[test]
@@ -318,25 +269,15 @@ fn destination_must_be_empty() {
     let scratch = Scratch::new();
     fs::write(scratch.dest.join("mine"), "x").unwrap();
     let result = scratch.unpack(&zip_of(&perfect()), "a.zip", &Limits::default());
-    assert!(matches!(
-        result,
-        Err(IntakeError::DestinationNotEmpty { .. })
-    ));
+    assert!(matches!(result, Err(IntakeError::DestinationNotEmpty { .. })));
     assert_eq!(fs::read_to_string(scratch.dest.join("mine")).unwrap(), "x");
 }
 
 #[test]
 fn missing_source_is_an_error_of_the_machine() {
-    let result = validate(
-        Path::new("/nowhere/a.zip"),
-        &TreeSpec::default(),
-        &Limits::default(),
-    );
+    let result = validate(Path::new("/nowhere/a.zip"), &TreeSpec::default(), &Limits::default());
     let message = result.unwrap_err().to_string();
-    assert!(
-        message.starts_with("cannot read '/nowhere/a.zip': "),
-        "{message}"
-    );
+    assert!(message.starts_with("cannot read '/nowhere/a.zip': "), "{message}");
 }
 
 // --- folders ---
@@ -350,16 +291,8 @@ fn links_in_a_folder_are_refused() {
         symlink("/etc/passwd", folder.join("src/lib.rs")).unwrap();
     };
     assert_folder_refused(file, "link", "src/lib.rs");
-    assert_folder_refused(
-        |folder| symlink("/", folder.join("src")).unwrap(),
-        "link",
-        "src",
-    );
-    assert_folder_refused(
-        |folder| symlink("nowhere", folder.join("x")).unwrap(),
-        "link",
-        "x",
-    );
+    assert_folder_refused(|folder| symlink("/", folder.join("src")).unwrap(), "link", "src");
+    assert_folder_refused(|folder| symlink("nowhere", folder.join("x")).unwrap(), "link", "x");
 }
 
 #[cfg(unix)]
@@ -399,12 +332,8 @@ fn limits_hold_for_folders() {
 #[cfg(unix)]
 #[test]
 fn sparse_file_in_a_folder_counts_its_apparent_size() {
-    let sparse = |folder: &Path| {
-        fs::File::create(folder.join("sparse"))
-            .unwrap()
-            .set_len(3 << 20)
-            .unwrap()
-    };
+    let sparse =
+        |folder: &Path| fs::File::create(folder.join("sparse")).unwrap().set_len(3 << 20).unwrap();
     assert_folder_refused(sparse, "limit_file", "sparse");
 }
 
@@ -487,10 +416,8 @@ note: renders/teapot_bonus.exr: accepted for 'realtime/teapot_bonus.exr'
 #[test]
 fn text_of_a_broken_config() {
     let mut files = perfect();
-    files[0].1 = CONFIG
-        .replace("\"Ada\"", "\"\"")
-        .replace("exr\" }\n  ]", "exr\" },\n  ]")
-        .into_bytes();
+    files[0].1 =
+        CONFIG.replace("\"Ada\"", "\"\"").replace("exr\" }\n  ]", "exr\" },\n  ]").into_bytes();
     let text = validate_files(&files).to_text();
     let (_, said) = text.split_once("further files\n").unwrap();
     assert_eq!(
@@ -507,10 +434,8 @@ error: config.json:2: \"firstName\" is empty
 
 #[test]
 fn text_of_a_refused_archive() {
-    let mut entries: Vec<Entry> = perfect()
-        .iter()
-        .map(|(name, content)| Entry::deflated(name, content))
-        .collect();
+    let mut entries: Vec<Entry> =
+        perfect().iter().map(|(name, content)| Entry::deflated(name, content)).collect();
     entries.push(Entry::stored("../x", b"x"));
     entries.push(Entry::stored("link", b"x").mode(0o120777));
     assert_eq!(
@@ -533,18 +458,13 @@ fn wrong_levels_are_told_apart() {
     let deep = validate_files(&moved(|path| Some(format!("a/b/{path}"))));
     assert!(!deep.conforms);
     assert!(
-        deep.findings
-            .iter()
-            .filter(|f| f.code == "tree_wrong_place")
-            .count()
-            == 8,
+        deep.findings.iter().filter(|f| f.code == "tree_wrong_place").count() == 8,
         "{}",
         deep.to_text()
     );
     // The content of src/ at the root.
-    let flat = validate_files(&moved(|path| {
-        Some(path.strip_prefix("src/").unwrap_or(path).to_owned())
-    }));
+    let flat =
+        validate_files(&moved(|path| Some(path.strip_prefix("src/").unwrap_or(path).to_owned())));
     assert!(
         flat.findings
             .iter()
@@ -553,16 +473,8 @@ fn wrong_levels_are_told_apart() {
         flat.to_text()
     );
     // Only the source.
-    let bare = validate_files(&moved(|path| {
-        path.starts_with("src/").then(|| path.to_owned())
-    }));
-    assert_eq!(
-        bare.findings
-            .iter()
-            .filter(|f| f.code == "tree_missing")
-            .count(),
-        5
-    );
+    let bare = validate_files(&moved(|path| path.starts_with("src/").then(|| path.to_owned())));
+    assert_eq!(bare.findings.iter().filter(|f| f.code == "tree_missing").count(), 5);
 }
 
 // --- pack and fix ---
@@ -611,10 +523,8 @@ fn packed_archives_conform_and_hold_only_what_is_needed() {
     assert_eq!(validation, packed.validation);
     // A second reader of zip sees the same.
     let mut archive = zip::ZipArchive::new(fs::File::open(&packed.archive).unwrap()).unwrap();
-    let mut theirs: Vec<String> = archive
-        .file_names()
-        .map(|name| name.unwrap().into_owned())
-        .collect();
+    let mut theirs: Vec<String> =
+        archive.file_names().map(|name| name.unwrap().into_owned()).collect();
     theirs.sort();
     assert_eq!(theirs, want);
     let mut content = String::new();
@@ -622,10 +532,8 @@ fn packed_archives_conform_and_hold_only_what_is_needed() {
         .unwrap();
     assert_eq!(content, CONFIG);
     // Nothing else was written.
-    let beside: Vec<PathBuf> = listing(folder.path())
-        .into_keys()
-        .filter(|p| p.parent() == Some(folder.path()))
-        .collect();
+    let beside: Vec<PathBuf> =
+        listing(folder.path()).into_keys().filter(|p| p.parent() == Some(folder.path())).collect();
     assert_eq!(beside, [packed.archive]);
 }
 
@@ -650,22 +558,12 @@ fn pack_refuses_what_would_not_conform() {
     let folder = tempfile::tempdir().unwrap();
     let files = moved(|path| (path != "offline/cbox_simple_offline.exr").then(|| path.to_owned()));
     let result = pack_in(folder.path(), &files);
-    assert_eq!(
-        refusal_codes(result),
-        ["tree_missing offline/cbox_simple_offline.exr"]
-    );
+    assert_eq!(refusal_codes(result), ["tree_missing offline/cbox_simple_offline.exr"]);
     let folder = tempfile::tempdir().unwrap();
     let mut files = perfect();
     files[0].1 = CONFIG.replace("260123456", "not yet").into_bytes();
-    assert_eq!(
-        refusal_codes(pack_in(folder.path(), &files)),
-        ["config_student_id config.json"]
-    );
-    assert_eq!(
-        fs::read_dir(folder.path()).unwrap().count(),
-        1,
-        "only the working folder"
-    );
+    assert_eq!(refusal_codes(pack_in(folder.path(), &files)), ["config_student_id config.json"]);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "only the working folder");
 }
 
 fn fix_files(files: &[(String, Vec<u8>)]) -> Result<HandIn, IntakeError> {
@@ -676,12 +574,7 @@ fn fix_files(files: &[(String, Vec<u8>)]) -> Result<HandIn, IntakeError> {
     assert_eq!(result.is_ok(), out.exists());
     result?;
     let scratch = Scratch::new();
-    let hand_in = unpack(
-        &out,
-        &scratch.dest,
-        &TreeSpec::default(),
-        &Limits::default(),
-    )?;
+    let hand_in = unpack(&out, &scratch.dest, &TreeSpec::default(), &Limits::default())?;
     assert!(validate_hand_in(&hand_in, &TreeSpec::default())?.conforms);
     Ok(hand_in)
 }
@@ -695,22 +588,13 @@ fn fix_mends_levels_folders_aliases_and_junk() {
         files
     };
     for (what, files) in [
-        (
-            "two folders around it",
-            moved(|path| Some(format!("a/b/{path}"))),
-        ),
-        (
-            "a stray file beside the wrapping folder",
-            stray(moved(|path| Some(format!("a/{path}")))),
-        ),
+        ("two folders around it", moved(|path| Some(format!("a/b/{path}")))),
+        ("a stray file beside the wrapping folder", stray(moved(|path| Some(format!("a/{path}"))))),
         (
             "the source flat",
             moved(|path| Some(path.strip_prefix("src/").unwrap_or(path).to_owned())),
         ),
-        (
-            "the source elsewhere",
-            moved(|path| Some(path.replace("src/", "code/rust/"))),
-        ),
+        ("the source elsewhere", moved(|path| Some(path.replace("src/", "code/rust/")))),
         (
             "other case",
             moved(|path| Some(path.replace("src/", "Src/").replace("offline/", "Offline/"))),
@@ -719,10 +603,7 @@ fn fix_mends_levels_folders_aliases_and_junk() {
             "images at the root",
             moved(|path| Some(path.replace("offline/", "").replace("realtime/", ""))),
         ),
-        (
-            "inside a folder named src",
-            moved(|path| Some(format!("src/{path}"))),
-        ),
+        ("inside a folder named src", moved(|path| Some(format!("src/{path}")))),
     ] {
         match fix_files(&files) {
             Ok(hand_in) => assert_eq!(hand_in.digest, digest, "{what}"),
@@ -759,11 +640,8 @@ fn source_rules_name_file_and_line() {
         b"// unsafe\nfn f() {\n  unsafe { std::process::exit(0) }\n}\n".to_vec(),
     ));
     let (hand_in, _scratch) = assert_accepted(&zip_of(&files), "a.zip", "");
-    let found: Vec<String> = scan_source(&hand_in)
-        .unwrap()
-        .iter()
-        .map(ToString::to_string)
-        .collect();
+    let found: Vec<String> =
+        scan_source(&hand_in).unwrap().iter().map(ToString::to_string).collect();
     assert_eq!(
         found,
         [
@@ -781,8 +659,5 @@ fn hand_in_and_validation_survive_json() {
     assert_eq!(serde_json::from_str::<HandIn>(&text).unwrap(), hand_in);
     let validation = validate_files(&perfect());
     let text = serde_json::to_string(&validation).unwrap();
-    assert_eq!(
-        serde_json::from_str::<Validation>(&text).unwrap(),
-        validation
-    );
+    assert_eq!(serde_json::from_str::<Validation>(&text).unwrap(), validation);
 }

@@ -14,11 +14,7 @@ fn image(width: usize, height: usize, value: impl Fn(i64, i64, i64) -> f64) -> I
     let mut image = Image::new(width, height);
     for (i, p) in image.pixels.iter_mut().enumerate() {
         let (x, y) = ((i % width) as i64, (i / width) as i64);
-        *p = vec3(
-            value(x, y, 0) as f32,
-            value(x, y, 1) as f32,
-            value(x, y, 2) as f32,
-        );
+        *p = vec3(value(x, y, 0) as f32, value(x, y, 1) as f32, value(x, y, 2) as f32);
     }
     image
 }
@@ -84,12 +80,7 @@ fn agrees_with_published_implementations() {
                 println!("{section} {key}: {found:.9} expected {wanted:.9}, {off:.1e} off");
                 assert!(off < relative, "{section} {key}: {found} expected {wanted}");
             };
-            let peak = expected
-                .pixels
-                .iter()
-                .map(|p| p.max_element())
-                .fold(0.0, f32::max)
-                .into();
+            let peak = expected.pixels.iter().map(|p| p.max_element()).fold(0.0, f32::max).into();
             check("mae", mae(&actual, &expected), 1e-8);
             check("mse", mse(&actual, &expected), 1e-8);
             check("rel_mse", rel_mse(&actual, &expected), 1e-8);
@@ -138,13 +129,7 @@ fn what_has_no_value_has_none() {
     let (mut actual, expected) = hdr(16, 16);
     actual.pixels[5].y = f32::NAN;
     let metrics = Metrics::measure(&actual, &expected).unwrap();
-    assert_eq!(
-        metrics,
-        Metrics {
-            peak: metrics.peak,
-            ..Metrics::default()
-        }
-    );
+    assert_eq!(metrics, Metrics { peak: metrics.peak, ..Metrics::default() });
     assert_eq!(Metrics::measure(&Image::new(16, 15), &expected), None);
     let (small, tiny) = hdr(10, 20);
     assert_eq!(ssim(&small, &tiny, 1.0), None);
@@ -165,8 +150,5 @@ fn cost_at_768x576() {
     let (actual, expected) = hdr(768, 576);
     let start = Instant::now();
     let metrics = Metrics::measure(&actual, &expected).unwrap();
-    println!(
-        "all metrics: {:.2} s, {metrics:?}",
-        start.elapsed().as_secs_f64()
-    );
+    println!("all metrics: {:.2} s, {metrics:?}", start.elapsed().as_secs_f64());
 }

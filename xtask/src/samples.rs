@@ -15,7 +15,9 @@ use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use umbra::assignment::Assignment;
 use umbra::build::{self, BuildOutcome, Recording};
-use umbra::worker::{Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef, Supervisor};
+use umbra::worker::{
+    Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef, Supervisor,
+};
 
 /// How one sample is made; `samples/README.md` explains the fields.
 #[derive(Clone, Debug, Deserialize)]
@@ -72,11 +74,14 @@ fn template() -> String {
 
 /// Packs every sample whose archive is missing or older than its sources; answers their paths.
 pub fn pack() -> Result<String> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask lies in the repository")?;
+    let root =
+        Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask lies in the repository")?;
     let packer = Packer::new(root)?;
     let mut lines = Vec::new();
     for name in packer.recipes.keys() {
-        lines.push(packer.pack(name).with_context(|| format!("sample {name}"))?.display().to_string());
+        lines.push(
+            packer.pack(name).with_context(|| format!("sample {name}"))?.display().to_string(),
+        );
     }
     Ok(lines.join("\n"))
 }
@@ -93,7 +98,11 @@ struct Packer {
 impl Packer {
     fn new(root: &Path) -> Result<Self> {
         let umbra = root.join(format!("target/release/umbra{}", std::env::consts::EXE_SUFFIX));
-        ensure!(umbra.is_file(), "{} is missing; hint: cargo build --release --workspace", umbra.display());
+        ensure!(
+            umbra.is_file(),
+            "{} is missing; hint: cargo build --release --workspace",
+            umbra.display()
+        );
         let mut recipes = BTreeMap::new();
         for entry in root.join("samples").read_dir()? {
             let path = entry?.path();
@@ -118,7 +127,8 @@ impl Packer {
 
     /// The source files of a sample, relative to `src/`, with their contents.
     fn source(&self, name: &str) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
-        let recipe = self.recipes.get(name).with_context(|| format!("there is no sample {name}"))?;
+        let recipe =
+            self.recipes.get(name).with_context(|| format!("there is no sample {name}"))?;
         let mut files = match recipe.base.as_str() {
             "nothing" => BTreeMap::new(),
             "template" => read_tree(&self.root.join("student_template/src"))?,
@@ -129,7 +139,8 @@ impl Packer {
         }
         let template = self.root.join("student_template/src");
         for path in &recipe.restore {
-            let bytes = fs::read(template.join(path)).with_context(|| format!("restore: {}", path.display()))?;
+            let bytes = fs::read(template.join(path))
+                .with_context(|| format!("restore: {}", path.display()))?;
             files.insert(path.clone(), bytes);
         }
         files.extend(read_tree(&self.root.join("samples").join(name).join("src"))?);
@@ -167,7 +178,8 @@ impl Packer {
         }
         files.insert("config.json".into(), config(recipe, &renders)?);
         for (from, to) in &recipe.moves {
-            let moved: Vec<String> = files.keys().filter(|path| path.starts_with(from.as_str())).cloned().collect();
+            let moved: Vec<String> =
+                files.keys().filter(|path| path.starts_with(from.as_str())).cloned().collect();
             ensure!(!moved.is_empty(), "moves: nothing lies at {from}");
             for path in moved {
                 let rest = path[from.len()..].to_owned();
@@ -208,7 +220,11 @@ impl Packer {
     }
 
     /// Builds a source and draws the images that a hand-in must contain.
-    fn draw(&self, source: &BTreeMap<PathBuf, Vec<u8>>, recipe: &Recipe) -> Result<Vec<(String, Vec<u8>)>> {
+    fn draw(
+        &self,
+        source: &BTreeMap<PathBuf, Vec<u8>>,
+        recipe: &Recipe,
+    ) -> Result<Vec<(String, Vec<u8>)>> {
         let scratch = tempfile::tempdir_in(&self.supervisor.scratch)?;
         let (src, out) = (scratch.path().join("src"), scratch.path().join("out"));
         fs::create_dir(&out)?;
@@ -219,7 +235,8 @@ impl Packer {
         }
         let cancel = AtomicBool::new(false);
         let limits = &self.assignment.limits;
-        let report = build::compile(&self.recording, &self.supervisor, &src, &out, &limits.build, &cancel)?;
+        let report =
+            build::compile(&self.recording, &self.supervisor, &src, &out, &limits.build, &cancel)?;
         let library = match report.outcome {
             BuildOutcome::Built { library } => library,
             BuildOutcome::CompileError { errors } => {
@@ -241,8 +258,8 @@ impl Packer {
         }
         let mut images = Vec::new();
         for (path, request) in asked {
-            let (Request::RenderOffline { width, height, .. } | Request::RenderRealtime { width, height, .. }) =
-                request
+            let (Request::RenderOffline { width, height, .. }
+            | Request::RenderRealtime { width, height, .. }) = request
             else {
                 bail!("only images are asked for");
             };
@@ -288,7 +305,15 @@ impl Packer {
             }
         } else {
             let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
-            Request::RenderOffline { scene, width, height, spp: config.spp as u32, seed, threads, shadows: true }
+            Request::RenderOffline {
+                scene,
+                width,
+                height,
+                spp: config.spp as u32,
+                seed,
+                threads,
+                shadows: true,
+            }
         })
     }
 }

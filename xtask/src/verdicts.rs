@@ -50,7 +50,8 @@ pub struct Arguments {
 /// # Errors
 /// When a verdict is not what the catalogue says, with the figures, or nothing can be graded here.
 pub fn run(arguments: &Arguments) -> Result<String> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask lies in the repository")?;
+    let root =
+        Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask lies in the repository")?;
     let catalogue = Catalogue::known()?;
     let mut assignment = Assignment::load(root)?;
     for scene in &mut assignment.scenes {
@@ -64,7 +65,11 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let library = release(format!("{prefix}reference_impl{suffix}"));
     for file in [&umbra, &library] {
-        ensure!(file.is_file(), "{} is missing; hint: cargo build --release --workspace", file.display());
+        ensure!(
+            file.is_file(),
+            "{} is missing; hint: cargo build --release --workspace",
+            file.display()
+        );
     }
     let scratch = assignment.cache().join("scratch");
     std::fs::create_dir_all(&scratch)?;
@@ -83,9 +88,12 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     if let Err(why) = &grading.adapter {
         anyhow::bail!("realtime cannot be judged here: {why}");
     }
-    let mut bench = Bench { root, assignment: &assignment, grading, library, explain: arguments.explain };
+    let mut bench =
+        Bench { root, assignment: &assignment, grading, library, explain: arguments.explain };
     let jobs = arguments.jobs.unwrap_or(cores).max(1);
-    let wanted = |subject: &Subject| arguments.only.as_ref().is_none_or(|only| subject.name().contains(only));
+    let wanted = |subject: &Subject| {
+        arguments.only.as_ref().is_none_or(|only| subject.name().contains(only))
+    };
 
     row::print_header(&assignment);
     let (mut rejected, mut accepted) = (0, 0);
@@ -95,7 +103,8 @@ pub fn run(arguments: &Arguments) -> Result<String> {
             case.spp = spp.unwrap_or(case.spp);
         }
         for threads in choice::THREADS {
-            let chosen: Vec<_> = chosen.iter().filter(|subject| subject.threads == threads).collect();
+            let chosen: Vec<_> =
+                chosen.iter().filter(|subject| subject.threads == threads).collect();
             bench.grading.threads = threads;
             let rows = bench.grade_all(&chosen, jobs)?;
             rejected += rows.iter().filter(|row| !row.as_declared()).count();
@@ -103,8 +112,10 @@ pub fn run(arguments: &Arguments) -> Result<String> {
         }
     }
     bench.reset(&store)?;
-    let singles = bench.grade_all(&singles(&catalogue).iter().filter(|s| wanted(s)).collect::<Vec<_>>(), jobs)?;
-    let pairs = bench.grade_all(&pairs(&catalogue)?.iter().filter(|s| wanted(s)).collect::<Vec<_>>(), jobs)?;
+    let singles = bench
+        .grade_all(&singles(&catalogue).iter().filter(|s| wanted(s)).collect::<Vec<_>>(), jobs)?;
+    let pairs = bench
+        .grade_all(&pairs(&catalogue)?.iter().filter(|s| wanted(s)).collect::<Vec<_>>(), jobs)?;
     let good = |rows: &[Row]| rows.iter().filter(|row| row.as_declared()).count();
     let figures = format!(
         "verdicts: false_rejects={rejected}/{accepted} singles={}/{} pairs={}/{}",
@@ -168,9 +179,11 @@ impl<'a> Bench<'a> {
 
     fn grade(&self, subject: &Subject) -> Result<Row> {
         let since = Instant::now();
-        let options: Vec<String> = subject.mistakes.iter().map(|name| format!("mistake={name}")).collect();
+        let options: Vec<String> =
+            subject.mistakes.iter().map(|name| format!("mistake={name}")).collect();
         let stages = self.stages(&subject.mistakes)?;
-        let evidence = self.grading.plugin(&self.library, &options.join(","), subject.seed, &stages)?;
+        let evidence =
+            self.grading.plugin(&self.library, &options.join(","), subject.seed, &stages)?;
         let grade = rubric::grade(&self.assignment.rules, &evidence);
         Ok(Row::new(subject, grade, &evidence, since.elapsed().as_secs_f64()))
     }
@@ -182,7 +195,8 @@ impl<'a> Bench<'a> {
         let mut own = Stages::read(&source("reference_impl"), &source("student_template"));
         for (name, text) in STAGES.iter().zip(&mut own.own) {
             let right = text.take().with_context(|| format!("the reference has no {name}"))?;
-            *text = Some(stages::apply(name, &right, &names).map_err(anyhow::Error::msg)?.into_owned());
+            *text =
+                Some(stages::apply(name, &right, &names).map_err(anyhow::Error::msg)?.into_owned());
         }
         Ok(own)
     }

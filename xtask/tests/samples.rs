@@ -78,10 +78,13 @@ fn every_sample_is_worth_what_its_recipe_says() {
 
 /// What is wrong with the points of a part or a total, if anything.
 fn compare(name: &str, what: &str, earned: &Value, Range { min, max }: Range) -> Option<String> {
-    let (least, most) = (earned["points"].as_f64().unwrap(), earned["points_max"].as_f64().unwrap());
+    let (least, most) =
+        (earned["points"].as_f64().unwrap(), earned["points_max"].as_f64().unwrap());
     let fits = least >= min - 5e-3 && most <= max + 5e-3;
     let reason = earned["reason"].as_str().unwrap_or_default();
-    (!fits).then(|| format!("{name}: {what}: expected {min} to {max}, found {least} to {most}: {reason}"))
+    (!fits).then(|| {
+        format!("{name}: {what}: expected {min} to {max}, found {least} to {most}: {reason}")
+    })
 }
 
 fn expect(recipe: &toml::Table) -> Expect {

@@ -167,17 +167,9 @@ pub fn write_exr(
     attributes: &[(&str, &str)],
 ) -> Result<(), ImageError> {
     let path = path.as_ref();
-    let attributes = attributes
-        .iter()
-        .map(|&(k, v)| (k.to_owned(), v.to_owned()))
-        .collect();
-    let bytes = encode::encode(
-        &[("", image)],
-        &attributes,
-        precision,
-        Compression::Uncompressed,
-        path,
-    )?;
+    let attributes = attributes.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
+    let bytes =
+        encode::encode(&[("", image)], &attributes, precision, Compression::Uncompressed, path)?;
     write_file(path, &bytes)
 }
 
@@ -191,18 +183,9 @@ pub fn write_exr_layers(
     precision: Precision,
 ) -> Result<(), ImageError> {
     let path = path.as_ref();
-    let layers: Vec<_> = content
-        .layers
-        .iter()
-        .map(|(name, image)| (name.as_str(), image))
-        .collect();
-    let bytes = encode::encode(
-        &layers,
-        &content.attributes,
-        precision,
-        Compression::ZIP16,
-        path,
-    )?;
+    let layers: Vec<_> =
+        content.layers.iter().map(|(name, image)| (name.as_str(), image)).collect();
+    let bytes = encode::encode(&layers, &content.attributes, precision, Compression::ZIP16, path)?;
     write_file(path, &bytes)
 }
 
@@ -222,36 +205,23 @@ pub fn decode_exr(bytes: &[u8], path: &Path) -> Result<ExrLayers, ImageError> {
 
 /// The unnamed layer of a decoded file.
 fn single_layer(mut content: ExrLayers, path: &Path) -> Result<Image, ImageError> {
-    content
-        .layers
-        .remove("")
-        .ok_or_else(|| ImageError::MissingChannel {
-            path: path.into(),
-            channel: "R".into(),
-            found: format!(
-                "only the layers {}",
-                content
-                    .layers
-                    .keys()
-                    .cloned()
-                    .collect::<Vec<_>>()
-                    .join(", ")
-            ),
-        })
+    content.layers.remove("").ok_or_else(|| ImageError::MissingChannel {
+        path: path.into(),
+        channel: "R".into(),
+        found: format!(
+            "only the layers {}",
+            content.layers.keys().cloned().collect::<Vec<_>>().join(", ")
+        ),
+    })
 }
 
 fn read_file(path: &Path) -> Result<Vec<u8>, ImageError> {
     use std::io::Read;
-    let io = |source| ImageError::Io {
-        path: path.into(),
-        source,
-    };
+    let io = |source| ImageError::Io { path: path.into(), source };
     let file = std::fs::File::open(path).map_err(io)?;
     let mut bytes = Vec::new();
     // One byte past the limit tells a file that is too long, even if it grows meanwhile.
-    file.take(MAX_FILE_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(io)?;
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(ImageError::Size {
             path: path.into(),
@@ -263,8 +233,5 @@ fn read_file(path: &Path) -> Result<Vec<u8>, ImageError> {
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
-    std::fs::write(path, bytes).map_err(|source| ImageError::Io {
-        path: path.into(),
-        source,
-    })
+    std::fs::write(path, bytes).map_err(|source| ImageError::Io { path: path.into(), source })
 }

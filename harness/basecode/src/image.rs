@@ -16,11 +16,7 @@ pub struct Image {
 impl Image {
     /// A black image.
     pub fn new(width: usize, height: usize) -> Self {
-        Self {
-            width,
-            height,
-            pixels: vec![Vec3::ZERO; width * height],
-        }
+        Self { width, height, pixels: vec![Vec3::ZERO; width * height] }
     }
 
     /// The colour at column `x`, row `y` (0 is the top).

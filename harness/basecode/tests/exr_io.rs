@@ -110,37 +110,29 @@ fn foreign(
     header.own_attributes.layer_name = None;
     change(&mut header);
     let mut file = std::io::Cursor::new(Vec::new());
-    block::write(
-        &mut file,
-        std::iter::once(header).collect(),
-        false,
-        |meta, writer| {
-            for (index, position) in block::enumerate_ordered_header_block_indices(&meta.headers) {
-                let block =
-                    UncompressedBlock::from_lines(&meta.headers[0].channels, position, |line| {
-                        let value = line.location.channel as f32;
-                        match channels[line.location.channel].1 {
-                            SampleType::F16 => line
-                                .write_samples(|_| exr::prelude::f16::from_f32(value))
-                                .unwrap(),
-                            SampleType::F32 => line.write_samples(|_| value).unwrap(),
-                            SampleType::U32 => line.write_samples(|_| value as u32).unwrap(),
+    block::write(&mut file, std::iter::once(header).collect(), false, |meta, writer| {
+        for (index, position) in block::enumerate_ordered_header_block_indices(&meta.headers) {
+            let block =
+                UncompressedBlock::from_lines(&meta.headers[0].channels, position, |line| {
+                    let value = line.location.channel as f32;
+                    match channels[line.location.channel].1 {
+                        SampleType::F16 => {
+                            line.write_samples(|_| exr::prelude::f16::from_f32(value)).unwrap()
                         }
-                    });
-                writer.write_chunk(index, block.compress_to_chunk(&meta.headers)?)?;
-            }
-            Ok(())
-        },
-    )
+                        SampleType::F32 => line.write_samples(|_| value).unwrap(),
+                        SampleType::U32 => line.write_samples(|_| value as u32).unwrap(),
+                    }
+                });
+            writer.write_chunk(index, block.compress_to_chunk(&meta.headers)?)?;
+        }
+        Ok(())
+    })
     .unwrap();
     file.into_inner()
 }
 
-const BGR: [(&str, SampleType); 3] = [
-    ("B", SampleType::F16),
-    ("G", SampleType::F16),
-    ("R", SampleType::F16),
-];
+const BGR: [(&str, SampleType); 3] =
+    [("B", SampleType::F16), ("G", SampleType::F16), ("R", SampleType::F16)];
 const LINES: BlockDescription = BlockDescription::ScanLines;
 
 fn plain() -> Vec<u8> {
@@ -149,11 +141,8 @@ fn plain() -> Vec<u8> {
 
 /// Overwrites the bytes that follow the one place where `after` occurs.
 fn patched(mut bytes: Vec<u8>, after: &[u8], skip: usize, with: &[u8]) -> Vec<u8> {
-    let found: Vec<_> = bytes
-        .windows(after.len())
-        .enumerate()
-        .filter(|(_, w)| *w == after)
-        .collect();
+    let found: Vec<_> =
+        bytes.windows(after.len()).enumerate().filter(|(_, w)| *w == after).collect();
     let at = found.first().expect("the pattern is there").0 + after.len() + skip;
     bytes[at..at + with.len()].copy_from_slice(with);
     bytes
@@ -189,33 +178,17 @@ fn half_round_trip_keeps_nan_infinity_and_the_sign_of_zero() {
 fn a_written_file_is_what_the_course_hands_out() {
     let folder = Folder::new("course");
     let path = folder.0.join("a.exr");
-    write_exr(
-        &path,
-        &difficult(),
-        Precision::Half,
-        &[("seed", "260000000")],
-    )
-    .unwrap();
+    write_exr(&path, &difficult(), Precision::Half, &[("seed", "260000000")]).unwrap();
     let meta = exr::meta::MetaData::read_from_file(&path, true).unwrap();
     let header = &meta.headers[0];
     assert_eq!(meta.headers.len(), 1);
     assert_eq!(header.compression, Compression::Uncompressed);
     assert_eq!(header.blocks, LINES);
     assert_eq!(header.line_order, LineOrder::Increasing);
-    let channels: Vec<_> = header
-        .channels
-        .list
-        .iter()
-        .map(|c| (c.name.to_string(), c.sample_type))
-        .collect();
-    assert_eq!(
-        channels,
-        ["B", "G", "R"].map(|n| (n.to_owned(), SampleType::F16))
-    );
-    assert_eq!(
-        read_exr_layers(&path).unwrap().attributes["seed"],
-        "260000000"
-    );
+    let channels: Vec<_> =
+        header.channels.list.iter().map(|c| (c.name.to_string(), c.sample_type)).collect();
+    assert_eq!(channels, ["B", "G", "R"].map(|n| (n.to_owned(), SampleType::F16)));
+    assert_eq!(read_exr_layers(&path).unwrap().attributes["seed"], "260000000");
 }
 
 #[test]
@@ -229,25 +202,16 @@ fn layers_come_back_with_their_provenance_and_the_same_bytes() {
         image.pixels[7] = vec3(1.0, 2.0, 3.0);
         content.layers.insert(name.into(), image);
     }
-    content
-        .attributes
-        .insert("scene".into(), "sphere = 1".into());
+    content.attributes.insert("scene".into(), "sphere = 1".into());
     content.attributes.insert("spp".into(), "256".into());
     write_exr_layers(&a, &content, Precision::Float).unwrap();
     write_exr_layers(&b, &content, Precision::Float).unwrap();
     assert_eq!(read_exr_layers(&a).unwrap(), content);
     let bytes = std::fs::read(&a).unwrap();
     assert_eq!(bytes, std::fs::read(&b).unwrap());
-    assert!(
-        bytes.len() < 40 * 33 * 12,
-        "compressed: {} bytes",
-        bytes.len()
-    );
+    assert!(bytes.len() < 40 * 33 * 12, "compressed: {} bytes", bytes.len());
     let error = read_exr(&a).unwrap_err().to_string();
-    assert!(
-        error.contains("no channel R") && error.contains("centre, mean, variance"),
-        "{error}"
-    );
+    assert!(error.contains("no channel R") && error.contains("centre, mean, variance"), "{error}");
 }
 
 #[test]
@@ -258,26 +222,15 @@ fn what_has_no_valid_form_is_not_written() {
         assert!(matches!(error, ImageError::Unwritable { .. }), "{error}");
         error.to_string()
     };
-    assert_eq!(
-        refuse(&Image::new(0, 4), &[]),
-        "never.exr: cannot be written: the image is 0x4"
-    );
+    assert_eq!(refuse(&Image::new(0, 4), &[]), "never.exr: cannot be written: the image is 0x4");
     refuse(&difficult(), &[("a", "two\nlines")]);
     refuse(&difficult(), &[("a", "\u{1F600}")]);
     let mut content = ExrLayers::default();
-    assert!(
-        write_exr_layers(path, &content, Precision::Half).is_err(),
-        "no layer"
-    );
+    assert!(write_exr_layers(path, &content, Precision::Half).is_err(), "no layer");
     content.layers.insert("a".into(), Image::new(2, 2));
     content.layers.insert("b".into(), Image::new(2, 3));
-    let error = write_exr_layers(path, &content, Precision::Half)
-        .unwrap_err()
-        .to_string();
-    assert_eq!(
-        error,
-        "never.exr: cannot be written: layer \"b\" is not 2x2"
-    );
+    let error = write_exr_layers(path, &content, Precision::Half).unwrap_err().to_string();
+    assert_eq!(error, "never.exr: cannot be written: layer \"b\" is not 2x2");
     assert!(!path.exists());
 }
 
@@ -292,19 +245,11 @@ fn every_lossless_coding_and_plain_tiles_are_read() {
     for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ] {
         for blocks in [LINES, tiles] {
             let file = decode(&foreign(&BGR, compression, blocks, |_| ())).unwrap();
-            assert_eq!(
-                file.layers[""].pixels,
-                vec![vec3(2.0, 1.0, 0.0); 12],
-                "{compression}"
-            );
+            assert_eq!(file.layers[""].pixels, vec![vec3(2.0, 1.0, 0.0); 12], "{compression}");
             assert!(file.notes.is_empty());
         }
     }
-    let mixed = [
-        ("B", SampleType::F32),
-        ("G", SampleType::F16),
-        ("R", SampleType::F32),
-    ];
+    let mixed = [("B", SampleType::F32), ("G", SampleType::F16), ("R", SampleType::F32)];
     let file = decode(&foreign(&mixed, Uncompressed, LINES, |_| ())).unwrap();
     assert_eq!(file.layers[""].pixels, vec![vec3(2.0, 1.0, 0.0); 12]);
 }
@@ -342,10 +287,7 @@ fn wrong_kinds_of_file_are_named() {
             && missing.to_string().contains("/nonexistent/a.exr")
     );
     let lossy = message(&foreign(&BGR, Compression::B44, LINES, |_| ()));
-    assert_eq!(
-        lossy,
-        "hand-in.exr: b44 compression, expected none, RLE, ZIP or PIZ"
-    );
+    assert_eq!(lossy, "hand-in.exr: b44 compression, expected none, RLE, ZIP or PIZ");
     let mip = BlockDescription::Tiles(TileDescription {
         tile_size: Vec2(2, 2),
         level_mode: LevelMode::MipMap,
@@ -373,23 +315,13 @@ fn wrong_channels_are_named() {
     );
     assert!(file(&[("Z", half)]).contains("no channel R"));
     assert!(
-        file(&[
-            ("B", half),
-            ("G", half),
-            ("R", half),
-            ("x.B", half),
-            ("x.R", half)
-        ])
-        .contains("no channel x.G")
+        file(&[("B", half), ("G", half), ("R", half), ("x.B", half), ("x.R", half)])
+            .contains("no channel x.G")
     );
     assert!(file(&[("B", half), ("G", half), ("R", SampleType::U32)]).contains("holds integers"));
     // name, type, linear flag, then the sampling rates in x and y
     let subsampled = patched(plain(), b"G\0\x01\0\0\0", 4, &[2, 0, 0, 0]);
-    assert!(
-        message(&subsampled).contains("subsampling"),
-        "{}",
-        message(&subsampled)
-    );
+    assert!(message(&subsampled).contains("subsampling"), "{}", message(&subsampled));
 }
 
 #[test]
@@ -412,10 +344,7 @@ fn windows_must_agree() {
         h.shared_attributes.display_window.position = Vec2(-5, 7);
     });
     let moved = decode(&moved).unwrap();
-    assert_eq!(
-        moved.notes,
-        ["both windows start at (-5, 7) instead of (0, 0)"]
-    );
+    assert_eq!(moved.notes, ["both windows start at (-5, 7) instead of (0, 0)"]);
     assert_eq!(moved.layers[""].pixels, vec![vec3(2.0, 1.0, 0.0); 12]);
 }
 
@@ -429,23 +358,13 @@ fn a_claim_of_many_pixels_takes_no_memory() {
         let bytes = patched(bytes, b"dataWindow\0box2i\0", 12, &corner);
         patched(bytes, b"displayWindow\0box2i\0", 12, &corner)
     };
-    for (compression, n) in [
-        (Compression::Uncompressed, 1),
-        (Compression::ZIP16, 16),
-        (Compression::PIZ, 32),
-    ] {
+    for (compression, n) in
+        [(Compression::Uncompressed, 1), (Compression::ZIP16, 16), (Compression::PIZ, 32)]
+    {
         let small = || foreign(&BGR, compression, LINES, |_| ());
         let error = message(&claim(small(), n, 16_384, 4096));
-        assert!(
-            error.contains("truncated") && error.contains("16384x4096"),
-            "{error}"
-        );
-        for (w, h) in [
-            (16_385, 1),
-            (1, i32::MAX),
-            (16_384, 4097),
-            (i32::MAX, i32::MAX),
-        ] {
+        assert!(error.contains("truncated") && error.contains("16384x4096"), "{error}");
+        for (w, h) in [(16_385, 1), (1, i32::MAX), (16_384, 4097), (i32::MAX, i32::MAX)] {
             let error = message(&claim(small(), n, w, h));
             // The decoder itself refuses a window whose corners overflow.
             let named = error.contains("at most 67108864 pixels") || error.contains("window size");
@@ -454,33 +373,20 @@ fn a_claim_of_many_pixels_takes_no_memory() {
         assert!(decode(&claim(small(), n, 0, 3)).is_err());
         assert!(decode(&claim(small(), n, -7, 3)).is_err());
     }
-    assert!(
-        LARGEST.load(Ordering::Relaxed) < 16 << 20,
-        "{LARGEST:?} bytes asked for at once"
-    );
+    assert!(LARGEST.load(Ordering::Relaxed) < 16 << 20, "{LARGEST:?} bytes asked for at once");
 }
 
 #[test]
 fn truncated_at_every_length_is_an_error() {
-    for compression in [
-        Compression::Uncompressed,
-        Compression::RLE,
-        Compression::ZIP16,
-        Compression::PIZ,
-    ] {
+    for compression in
+        [Compression::Uncompressed, Compression::RLE, Compression::ZIP16, Compression::PIZ]
+    {
         let whole = foreign(&BGR, compression, LINES, |_| ());
         assert!(decode(&whole).is_ok());
         for length in 0..whole.len() {
             let error = decode(&whole[..length]).expect_err("cut off");
-            let named = matches!(
-                error,
-                ImageError::Truncated { .. } | ImageError::NotExr { .. }
-            );
-            assert!(
-                named,
-                "{compression}, cut at {length} of {}: {error}",
-                whole.len()
-            );
+            let named = matches!(error, ImageError::Truncated { .. } | ImageError::NotExr { .. });
+            assert!(named, "{compression}, cut at {length} of {}: {error}", whole.len());
         }
     }
 }
@@ -520,14 +426,8 @@ fn changed_bytes_never_panic() {
             }
         }
     }
-    assert!(
-        accepted > 1000 && refused > 1000,
-        "{accepted} accepted, {refused} refused"
-    );
-    assert!(
-        LARGEST.load(Ordering::Relaxed) < 16 << 20,
-        "{LARGEST:?} bytes asked for at once"
-    );
+    assert!(accepted > 1000 && refused > 1000, "{accepted} accepted, {refused} refused");
+    assert!(LARGEST.load(Ordering::Relaxed) < 16 << 20, "{LARGEST:?} bytes asked for at once");
 }
 
 #[test]
@@ -537,9 +437,5 @@ fn a_block_stored_twice_is_refused() {
     let at = bytes.len() - (8 + 24);
     assert_eq!(bytes[at..at + 4], 2i32.to_le_bytes());
     bytes[at] = 1;
-    assert!(
-        message(&bytes).contains("row 1 are stored twice"),
-        "{}",
-        message(&bytes)
-    );
+    assert!(message(&bytes).contains("row 1 are stored twice"), "{}", message(&bytes));
 }

@@ -84,7 +84,8 @@ pub fn compile(
 ) -> io::Result<BuildReport> {
     let (src, out) = (std::path::absolute(src)?, std::path::absolute(out)?);
     let scratch = tempfile::Builder::new().prefix("rustc-").tempdir_in(&out)?;
-    let file = format!("{}{TEMPLATE}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let file =
+        format!("{}{TEMPLATE}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let library = out.join(&file);
     let report = tempfile::NamedTempFile::new_in(&out)?;
     let mut policy = Policy::new(Kind::Build);
@@ -122,7 +123,9 @@ pub fn compile(
         || ended.stderr.contains("LLVM ERROR: out of memory")
         || ended.peak_address_mib >= limits.memory_mib - limits.memory_mib / 10;
     let outcome = match ended.exit {
-        Exit::Code(0) if fs::metadata(&library).is_ok_and(|file| file.is_file() && file.len() > 0) => {
+        Exit::Code(0)
+            if fs::metadata(&library).is_ok_and(|file| file.is_file() && file.len() > 0) =>
+        {
             BuildOutcome::Built { library }
         }
         // In a sandbox foreign code could end with this code; there the report tells.

@@ -56,7 +56,10 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
     });
     if let Some(index) = largest {
         let (x, y) = place(index);
-        println!("largest at ({x}, {y}): actual {}, expected {}", actual.pixels[index], expected.pixels[index]);
+        println!(
+            "largest at ({x}, {y}): actual {}, expected {}",
+            actual.pixels[index], expected.pixels[index]
+        );
     }
     if let Some(metrics) = Metrics::measure(&actual, &expected) {
         println!("{}", serde_json::to_string_pretty(&metrics)?);

@@ -40,7 +40,10 @@ impl Context {
         std::fs::create_dir_all(&scratch)
             .with_context(|| format!("cannot make {}", scratch.display()))?;
         let line = ProgressBar::new_spinner();
-        line.set_style(ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        line.set_style(
+            ProgressStyle::with_template("{spinner} {msg}")
+                .unwrap_or_else(|_| ProgressStyle::default_spinner()),
+        );
         catch_interrupts();
         Ok(Self { assignment, supervisor: Supervisor::of_this_program(scratch)?, line })
     }
@@ -94,7 +97,8 @@ fn catch_interrupts() {
             }
         }
         use nix::sys::signal::{SaFlags, SigAction, SigHandler, SigSet, Signal, sigaction};
-        let action = SigAction::new(SigHandler::Handler(interrupted), SaFlags::SA_RESTART, SigSet::empty());
+        let action =
+            SigAction::new(SigHandler::Handler(interrupted), SaFlags::SA_RESTART, SigSet::empty());
         for signal in [Signal::SIGINT, Signal::SIGTERM] {
             // SAFETY: the handler touches one atomic and may call `_exit`: both are allowed there.
             let _ = unsafe { sigaction(signal, &action) };

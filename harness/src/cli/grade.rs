@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Context as _, bail, ensure};
 
-use super::context::{Context, INTERRUPTED, cores};
 use super::MachineLacks;
+use super::context::{Context, INTERRUPTED, cores};
 use super::render::AdapterChoice;
 use crate::grading::{Grading, Purpose, Record};
 use crate::report::{self, Entry, Sheet};
@@ -80,7 +80,10 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let (width, colours) = terminal();
     let entry = &sheet.entries[0];
     print!("{}", report::text_detail(&sheet, entry, width, colours));
-    println!("report: {}", arguments.output.join(&entry.record.slug).join(report::HTML_FILE).display());
+    println!(
+        "report: {}",
+        arguments.output.join(&entry.record.slug).join(report::HTML_FILE).display()
+    );
     let whole = entry.grade.points >= entry.grade.out_of;
     Ok(if whole { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
 }
@@ -116,7 +119,8 @@ fn terminal() -> (usize, bool) {
 fn collect(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     let mut sources = Vec::new();
     for path in paths {
-        let is_hand_in = path.is_file() || path.join("src").exists() || path.join("config.json").exists();
+        let is_hand_in =
+            path.is_file() || path.join("src").exists() || path.join("config.json").exists();
         if is_hand_in {
             sources.push(path.clone());
             continue;
@@ -129,7 +133,11 @@ fn collect(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
                 inside.push(entry.path());
             }
         }
-        ensure!(!inside.is_empty(), "{} is empty: expected archives or hand-in folders", path.display());
+        ensure!(
+            !inside.is_empty(),
+            "{} is empty: expected archives or hand-in folders",
+            path.display()
+        );
         inside.sort();
         sources.append(&mut inside);
     }
@@ -248,7 +256,11 @@ impl Batch<'_> {
         let records = records.into_inner().unwrap_or_default();
         let records: Vec<Record> = records.into_iter().flatten().collect();
         if records.len() != self.sources.len() {
-            bail!("{} of {} hand-ins have no record: a bug of Umbra's", self.sources.len() - records.len(), self.sources.len());
+            bail!(
+                "{} of {} hand-ins have no record: a bug of Umbra's",
+                self.sources.len() - records.len(),
+                self.sources.len()
+            );
         }
         Ok(records)
     }
@@ -263,6 +275,9 @@ fn print_timings(sheet: &Sheet) {
             wall_s += stage.wall_s;
             cpu_s += stage.cpu_s;
         }
-        eprintln!("  {:<10} {wall_s:7.2} s wall {cpu_s:7.2} s cpu (of child processes)", "together");
+        eprintln!(
+            "  {:<10} {wall_s:7.2} s wall {cpu_s:7.2} s cpu (of child processes)",
+            "together"
+        );
     }
 }

@@ -124,7 +124,15 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     let request = if config.realtime {
         let shadow_map = arguments.shadows.map_or(config.bonus, |Switch(on)| on);
         let (adapter, cameras) = (arguments.adapter.adapter(), vec![camera_of(&config)]);
-        Request::RenderRealtime { scene, width, height, shadow_map, adapter, stages: vec![], cameras }
+        Request::RenderRealtime {
+            scene,
+            width,
+            height,
+            shadow_map,
+            adapter,
+            stages: vec![],
+            cameras,
+        }
     } else {
         Request::RenderOffline {
             scene,
@@ -138,7 +146,13 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     };
     let job = Job { plugin: Some(plugin), requests: vec![request] };
     // Whoever renders by hand may wait as long as he likes; Ctrl-C ends it.
-    let limits = Limits { wall_s: 86_400.0, cpu_s: 1 << 20, file_size_mib: 8192, memory_mib: 16_384, ..Limits::default() };
+    let limits = Limits {
+        wall_s: 86_400.0,
+        cpu_s: 1 << 20,
+        file_size_mib: 8192,
+        memory_mib: 16_384,
+        ..Limits::default()
+    };
     let mut report = context.supervisor.run_job(&job, &limits, &INTERRUPTED, &mut |progress| {
         let (done, rows) = progress.rows;
         context.say(&format!("rendering: {done} of {rows} rows"));
@@ -147,7 +161,11 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     if INTERRUPTED.load(std::sync::atomic::Ordering::Relaxed) {
         return Ok(super::EXIT_INTERRUPTED);
     }
-    let printed = report.runs.iter().map(|run| run.ended.stderr.head.clone() + &run.ended.stderr.tail).collect::<String>();
+    let printed = report
+        .runs
+        .iter()
+        .map(|run| run.ended.stderr.head.clone() + &run.ended.stderr.tail)
+        .collect::<String>();
     match report.outcomes.pop() {
         Some(Outcome::Done(answer)) => {
             let pixels = answer.values.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v)).collect();

@@ -42,7 +42,9 @@ pub fn judge(
             (&expected.offline.centre, &expected.offline.mask)
         }
         Kind::Offline { .. } => (&expected.offline.mean, &expected.offline.mask),
-        Kind::Realtime | Kind::HandedInRealtime => (&expected.unshadowed, &expected.unshadowed_mask),
+        Kind::Realtime | Kind::HandedInRealtime => {
+            (&expected.unshadowed, &expected.unshadowed_mask)
+        }
     };
     let mask = only(mask, wanted);
     if !mask.pixels.iter().any(|value| value & (RegionMask::EDGE | RegionMask::EMITTER) == 0) {
@@ -141,7 +143,8 @@ pub fn judge_shaded(
         let mixed = Image { pixels: mixed.collect(), ..*centre };
         let accepted = judge_realtime(id, scene, actual, &mixed, mask, tolerances);
         if accepted.verdict == Verdict::Pass {
-            let summary = "the image is what is expected of a normal that is not renormalised (accepted)";
+            let summary =
+                "the image is what is expected of a normal that is not renormalised (accepted)";
             return Check { summary: summary.into(), ..accepted };
         }
     }

@@ -10,7 +10,8 @@ use crate::expected::SurfaceBuffer;
 use crate::imaging::reference::RegionMask;
 
 /// A vertex stage that does what the contract says, for use with a student's fragment stages.
-pub const VERTEX: &str = concat!(include_str!("shaders/contract.wgsl"), include_str!("shaders/vertex.wgsl"));
+pub const VERTEX: &str =
+    concat!(include_str!("shaders/contract.wgsl"), include_str!("shaders/vertex.wgsl"));
 
 /// A fragment stage that writes the interpolated world position.
 pub const SHOW_POSITION: &str =
@@ -140,16 +141,23 @@ pub fn judge_pass(
         }
         (wrong_total, total) = (wrong_total + wrong, total + counted);
         let fraction = wrong as f64 / counted as f64;
-        let measure = Measure::at_most(format!("{} wrong (fraction of pixels)", bound.name()), fraction, STRAY_FRACTION);
+        let measure = Measure::at_most(
+            format!("{} wrong (fraction of pixels)", bound.name()),
+            fraction,
+            STRAY_FRACTION,
+        );
         if let Some(example) = example.filter(|_| !measure.passed) {
             first_wrong = first_wrong.or(Some((*bound, example, fraction)));
         }
         measures.push(measure);
     }
     let mut check = match first_wrong {
-        None if total == 0 => {
-            Check::new(id, scene_name, Verdict::NotJudged, "no pixel away from edges shows a surface")
-        }
+        None if total == 0 => Check::new(
+            id,
+            scene_name,
+            Verdict::NotJudged,
+            "no pixel away from edges shows a surface",
+        ),
         None => {
             let summary = format!("{} uniforms reach the shaders on every object", measures.len());
             Check::new(id, scene_name, Verdict::Pass, summary)
@@ -163,7 +171,11 @@ pub fn judge_pass(
                 index % surface.width,
                 index / surface.width
             );
-            let hint = if found == Vec3::ZERO { "it was never set, or nothing was drawn there" } else { "" };
+            let hint = if found == Vec3::ZERO {
+                "it was never set, or nothing was drawn there"
+            } else {
+                ""
+            };
             let error = wrong_total as f64 / total as f64;
             Check { error, ..Check::new(id, scene_name, Verdict::Fail, summary) }.with_hint(hint)
         }
@@ -182,7 +194,8 @@ pub fn judge_vertex(
     normals: &Image,
 ) -> Check {
     let id = "stage.vertex";
-    let (mut counted, mut wrong_position, mut wrong_normal, mut missing) = (0usize, 0usize, 0usize, 0usize);
+    let (mut counted, mut wrong_position, mut wrong_normal, mut missing) =
+        (0usize, 0usize, 0usize, 0usize);
     for (index, _) in interior(surface, mask) {
         let (ray, Some(point)) = &surface.pixels[index] else { continue };
         counted += 1;
@@ -196,12 +209,25 @@ pub fn judge_vertex(
         wrong_normal += usize::from(!right_normal);
     }
     if counted == 0 {
-        return Check::new(id, scene_name, Verdict::NotJudged, "no pixel away from edges shows a surface");
+        return Check::new(
+            id,
+            scene_name,
+            Verdict::NotJudged,
+            "no pixel away from edges shows a surface",
+        );
     }
     let fraction = |wrong: usize| wrong as f64 / counted as f64;
     let measures = vec![
-        Measure::at_most("world positions wrong (fraction of pixels)", fraction(wrong_position), STRAY_FRACTION),
-        Measure::at_most("world normals wrong (fraction of pixels)", fraction(wrong_normal), STRAY_FRACTION),
+        Measure::at_most(
+            "world positions wrong (fraction of pixels)",
+            fraction(wrong_position),
+            STRAY_FRACTION,
+        ),
+        Measure::at_most(
+            "world normals wrong (fraction of pixels)",
+            fraction(wrong_normal),
+            STRAY_FRACTION,
+        ),
     ];
     let passed = measures.iter().all(|measure| measure.passed);
     let mut check = if passed {
@@ -229,10 +255,12 @@ fn interior<'a>(
     surface: &'a SurfaceBuffer,
     mask: &'a RegionMask,
 ) -> impl Iterator<Item = (usize, usize)> + 'a {
-    surface.pixels.iter().zip(&mask.pixels).enumerate().filter_map(|(index, ((_, point), value))| {
-        let clear = value & (RegionMask::EDGE | RegionMask::EMITTER) == 0;
-        point.as_ref().filter(|_| clear).map(|point| (index, point.shape))
-    })
+    surface.pixels.iter().zip(&mask.pixels).enumerate().filter_map(
+        |(index, ((_, point), value))| {
+            let clear = value & (RegionMask::EDGE | RegionMask::EMITTER) == 0;
+            point.as_ref().filter(|_| clear).map(|point| (index, point.shape))
+        },
+    )
 }
 
 /// Whether a student's stage is still the template's: equal apart from comments and white space.

@@ -13,7 +13,9 @@ use super::regions::regions;
 use crate::assignment::{Assignment, SceneEntry};
 use crate::imaging::reference::{ReferenceImage, RegionMask};
 use crate::process::Limits;
-use crate::worker::{Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef, Supervisor};
+use crate::worker::{
+    Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef, Supervisor,
+};
 
 /// Batches that an expected image is the mean of; their spread is its variance.
 const BATCHES: u32 = 64;
@@ -95,7 +97,14 @@ impl Store<'_> {
         let unshadowed = self.unshadowed(&toml, width, height)?;
         let file = self.cached(&toml, width, height, "masks")?;
         let masks = self.layers(&file, &["shadowed", "unshadowed"], || {
-            let image = |shadows| Ok::<_, anyhow::Error>(as_image(&regions(&scene, width as usize, height as usize, shadows)?));
+            let image = |shadows| {
+                Ok::<_, anyhow::Error>(as_image(&regions(
+                    &scene,
+                    width as usize,
+                    height as usize,
+                    shadows,
+                )?))
+            };
             let layers = [("shadowed".into(), image(true)?), ("unshadowed".into(), image(false)?)];
             Ok(ExrLayers { layers: layers.into(), ..Default::default() })
         })?;
@@ -127,7 +136,12 @@ impl Store<'_> {
     ///
     /// # Errors
     /// When the scene or the cache cannot be used.
-    pub fn raw_normals(&self, toml: &Path, width: u32, height: u32) -> anyhow::Result<Option<Image>> {
+    pub fn raw_normals(
+        &self,
+        toml: &Path,
+        width: u32,
+        height: u32,
+    ) -> anyhow::Result<Option<Image>> {
         let file = self.cached(toml, width, height, "raw-normals")?;
         let camera = basecode::scene::SceneConfig::load(toml)?.camera;
         let draw = || {
@@ -208,7 +222,11 @@ impl Store<'_> {
             file.display()
         );
         let n = attribute("samples_per_pixel").parse().with_context(|| {
-            format!("{}: samples_per_pixel is \"{}\"", file.display(), attribute("samples_per_pixel"))
+            format!(
+                "{}: samples_per_pixel is \"{}\"",
+                file.display(),
+                attribute("samples_per_pixel")
+            )
         })?;
         let mut take = |name: &str| {
             let image = content.layers.remove(name);
@@ -229,7 +247,10 @@ impl Store<'_> {
     fn cached(&self, toml: &Path, width: u32, height: u32, what: &str) -> anyhow::Result<PathBuf> {
         let mut hash = Sha256::new();
         hash.update(scene_digest(toml)?);
-        hash.update(format!("{width} {height} {what} {BATCHES} {CACHED_SPP} {}", env!("CARGO_PKG_VERSION")));
+        hash.update(format!(
+            "{width} {height} {what} {BATCHES} {CACHED_SPP} {}",
+            env!("CARGO_PKG_VERSION")
+        ));
         let name = format!("{what}-{}.exr", &hex(&hash.finalize())[..24]);
         Ok(self.assignment.cache().join("expected").join(name))
     }
@@ -262,9 +283,16 @@ impl Store<'_> {
         images.try_into().map_err(|_| anyhow::anyhow!("as many layers as names"))
     }
 
-    fn render_offline(&self, toml: &Path, width: u32, height: u32, spp: u32) -> anyhow::Result<ExrLayers> {
+    fn render_offline(
+        &self,
+        toml: &Path,
+        width: u32,
+        height: u32,
+        spp: u32,
+    ) -> anyhow::Result<ExrLayers> {
         let count = (width * height) as usize;
-        let (mut sum, mut square) = (vec![glam::DVec3::ZERO; count], vec![glam::DVec3::ZERO; count]);
+        let (mut sum, mut square) =
+            (vec![glam::DVec3::ZERO; count], vec![glam::DVec3::ZERO; count]);
         for first in (0..BATCHES).step_by(BATCHES_PER_JOB as usize) {
             (self.progress)(&format!(
                 "reference: {} at {width}x{height}, {} of {} spp",
@@ -303,7 +331,8 @@ impl Store<'_> {
     }
 
     fn render(&self, request: Request) -> anyhow::Result<Image> {
-        let (Request::RenderOffline { width, height, .. } | Request::RenderRealtime { width, height, .. }) = request
+        let (Request::RenderOffline { width, height, .. }
+        | Request::RenderRealtime { width, height, .. }) = request
         else {
             bail!("only images are made here");
         };
@@ -312,7 +341,15 @@ impl Store<'_> {
         Ok(Image { width: width as usize, height: height as usize, pixels })
     }
 
-    fn request(&self, toml: &Path, width: u32, height: u32, spp: u32, seed: u64, shadows: bool) -> Request {
+    fn request(
+        &self,
+        toml: &Path,
+        width: u32,
+        height: u32,
+        spp: u32,
+        seed: u64,
+        shadows: bool,
+    ) -> Request {
         Request::RenderOffline {
             scene: SceneRef { path: toml.to_owned(), options: String::new() },
             width,
@@ -332,10 +369,13 @@ impl Store<'_> {
             );
         };
         let job = Job { plugin: Some(reference.clone()), requests };
-        let limits = Limits { wall_s: 600.0, cpu_s: 1200, file_size_mib: 1024, ..Limits::default() };
+        let limits =
+            Limits { wall_s: 600.0, cpu_s: 1200, file_size_mib: 1024, ..Limits::default() };
         let report = self.supervisor.run_job(&job, &limits, &AtomicBool::new(false), &mut |_| ());
         let answers = report.outcomes.into_iter().map(|outcome| match outcome {
-            Outcome::Done(answer) if answer.values.iter().all(|v| v.is_finite()) => Ok(answer.values),
+            Outcome::Done(answer) if answer.values.iter().all(|v| v.is_finite()) => {
+                Ok(answer.values)
+            }
             Outcome::Done(_) => bail!("the reference renderer drew a value that is not finite"),
             other => bail!("the reference renderer failed: {other:?}"),
         });

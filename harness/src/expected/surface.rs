@@ -78,7 +78,9 @@ fn sight(scene: &Scene, hit: &SurfaceInteraction, direction: Vec3, distance: f32
     let near = NEAREST_START * distance.max(1.0);
     let far = FARTHEST_START * distance.max(1.0);
     let outside = hit.ng * hit.ng.dot(hit.frame_ns.n).signum();
-    if outside.dot(direction) < TERMINATOR && Frame::cos_theta(hit.frame_ns.to_local(direction)) > 0.0 {
+    if outside.dot(direction) < TERMINATOR
+        && Frame::cos_theta(hit.frame_ns.to_local(direction)) > 0.0
+    {
         return Sight::Unsure;
     }
     // Some students lift the origin along the normal instead of starting later on the ray.

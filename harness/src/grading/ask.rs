@@ -116,13 +116,22 @@ pub fn unanswered(id: &str, scene: &str, parts: &[&str], outcome: &Outcome) -> C
             };
             check(verdict, format!("not implemented yet: {task}"))
         }
-        Outcome::Failed(message) => check(Verdict::Fail, format!("the renderer reports an error: {message}")),
-        Outcome::Panicked(message) => check(Verdict::Fail, format!("the renderer panicked: {message}")),
-        Outcome::Rejected(message) => check(Verdict::Fail, format!("the plugin was rejected: {message}")),
-        Outcome::CrashedBySignal(signal) => check(Verdict::Fail, format!("the renderer crashed: {signal}")),
-        Outcome::ExitedEarly(code) => {
-            check(Verdict::Fail, format!("the renderer exited early, with code {code} and no answer"))
+        Outcome::Failed(message) => {
+            check(Verdict::Fail, format!("the renderer reports an error: {message}"))
         }
+        Outcome::Panicked(message) => {
+            check(Verdict::Fail, format!("the renderer panicked: {message}"))
+        }
+        Outcome::Rejected(message) => {
+            check(Verdict::Fail, format!("the plugin was rejected: {message}"))
+        }
+        Outcome::CrashedBySignal(signal) => {
+            check(Verdict::Fail, format!("the renderer crashed: {signal}"))
+        }
+        Outcome::ExitedEarly(code) => check(
+            Verdict::Fail,
+            format!("the renderer exited early, with code {code} and no answer"),
+        ),
         Outcome::TimedOut => check(Verdict::Fail, "the renderer ran out of time".into()),
         Outcome::OutOfMemory => check(Verdict::Fail, "the renderer ran out of memory".into()),
         Outcome::FloodedOutput => {

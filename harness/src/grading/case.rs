@@ -64,7 +64,8 @@ impl Case {
         let (offline, realtime) = (at(&entry.offline)?, at(&entry.realtime)?);
         let config = SceneConfig::load(&offline)?;
         let expected = store.expected(entry)?;
-        let (full_width, full_height) = (expected.unshadowed.width as u32, expected.unshadowed.height as u32);
+        let (full_width, full_height) =
+            (expected.unshadowed.width as u32, expected.unshadowed.height as u32);
         let width = full_width.min(SMALL_WIDTH);
         let height = (full_height * width / full_width).max(1);
         let (w, h) = (width as usize, height as usize);

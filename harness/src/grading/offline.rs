@@ -56,17 +56,18 @@ pub fn probe_bsdfs(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
     }
     let requests = asked.iter().map(|(_, _, scene, probes)| request(scene, probes)).collect();
     let outcomes = asker.ask(Some(plugin), requests);
-    let judged = asked.iter().zip(&outcomes).map(|((kind, scene, _, probes), outcome)| match outcome {
-        Outcome::Done(answer) => {
-            let mut check = bsdf::judge(*kind, probes, ask::colours(&answer.values));
-            check.scene.clone_from(scene);
-            check
-        }
-        other => match kind {
-            BsdfKind::Diffuse => ask::unanswered("bsdf.diffuse", scene, &["1.1"], other),
-            BsdfKind::Phong => ask::unanswered("bsdf.phong", scene, &["1.2"], other),
-        },
-    });
+    let judged =
+        asked.iter().zip(&outcomes).map(|((kind, scene, _, probes), outcome)| match outcome {
+            Outcome::Done(answer) => {
+                let mut check = bsdf::judge(*kind, probes, ask::colours(&answer.values));
+                check.scene.clone_from(scene);
+                check
+            }
+            other => match kind {
+                BsdfKind::Diffuse => ask::unanswered("bsdf.diffuse", scene, &["1.1"], other),
+                BsdfKind::Phong => ask::unanswered("bsdf.phong", scene, &["1.2"], other),
+            },
+        });
     judged.collect()
 }
 
@@ -163,12 +164,18 @@ pub fn judge_scene(
     let mut checks = Vec::new();
     let own = |point: &SurfacePoint| own_bsdf(case, point);
     if bypassed {
-        checks.push(judge_unshadowed(case, &[(true_off, "the scene's own: the integrator asks for none", &own)]));
+        checks.push(judge_unshadowed(
+            case,
+            &[(true_off, "the scene's own: the integrator asks for none", &own)],
+        ));
         checks.push(judge_shadows(case, &own, true_on, true_off));
     } else {
-        let values = WITNESSES.map(|(witness, _)| move |point: &SurfacePoint| witness_value(witness, point));
+        let values =
+            WITNESSES.map(|(witness, _)| move |point: &SurfacePoint| witness_value(witness, point));
         let asked: Vec<Asked> = (0..WITNESSES.len())
-            .map(|i| (witnessed[i], WITNESSES[i].1, &values[i] as &dyn Fn(&SurfacePoint) -> [f64; 3]))
+            .map(|i| {
+                (witnessed[i], WITNESSES[i].1, &values[i] as &dyn Fn(&SurfacePoint) -> [f64; 3])
+            })
             .collect();
         checks.push(judge_unshadowed(case, &asked));
         let flat = |point: &SurfacePoint| witness_value(FLAT, point);
@@ -195,7 +202,15 @@ pub fn judge_scene(
             let image = ask::image(&answer.values, width, height);
             let kind = Kind::Offline { spp: case.spp };
             for (id, wanted) in OFFLINE_VIEWS {
-                checks.push(images::judge(id, name, kind, &image, &case.expected, wanted, tolerances));
+                checks.push(images::judge(
+                    id,
+                    name,
+                    kind,
+                    &image,
+                    &case.expected,
+                    wanted,
+                    tolerances,
+                ));
             }
             (checks, Some(Drawn { scene: name.clone(), kind, image }))
         }

@@ -18,10 +18,18 @@ const FULL_SCALE: f32 = 0.1;
 ///
 /// # Errors
 /// When a file cannot be written.
-pub fn draw(checks: &mut [Check], cases: &[Case], drawn: &[Drawn], root: &Path, out: &Path) -> anyhow::Result<()> {
+pub fn draw(
+    checks: &mut [Check],
+    cases: &[Case],
+    drawn: &[Drawn],
+    root: &Path,
+    out: &Path,
+) -> anyhow::Result<()> {
     for check in checks.iter_mut().filter(|check| check.verdict == Verdict::Fail) {
         let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
-        let own = |kind: Kind| drawn.iter().find(|d| d.scene == check.scene && d.kind == kind).map(|d| d.image.clone());
+        let own = |kind: Kind| {
+            drawn.iter().find(|d| d.scene == check.scene && d.kind == kind).map(|d| d.image.clone())
+        };
         let handed_in = |path: fn(&crate::assignment::HandInImages) -> &String| {
             let path = path(case.entry.hand_in.as_ref()?);
             read_exr(root.join(path)).ok()
@@ -44,7 +52,9 @@ pub fn draw(checks: &mut [Check], cases: &[Case], drawn: &[Drawn], root: &Path, 
 fn triple(id: &str, case: &Case, actual: &Image, out: &Path) -> anyhow::Result<Vec<Picture>> {
     let expected = &case.expected;
     let (reference, mask) = match id {
-        "image.realtime" | "handed_in.realtime.all" => (&expected.unshadowed, &expected.unshadowed_mask),
+        "image.realtime" | "handed_in.realtime.all" => {
+            (&expected.unshadowed, &expected.unshadowed_mask)
+        }
         "bonus.image" => (&expected.offline.centre, &expected.offline.mask),
         _ => (&expected.offline.mean, &expected.offline.mask),
     };

@@ -60,7 +60,11 @@ impl<'a> Grading<'a> {
     ///
     /// # Errors
     /// When the template cannot be built or expected images cannot be had: the machine's matter.
-    pub fn prepare(store: &Store<'a>, adapter: Adapter, cancel: &'a AtomicBool) -> anyhow::Result<Self> {
+    pub fn prepare(
+        store: &Store<'a>,
+        adapter: Adapter,
+        cancel: &'a AtomicBool,
+    ) -> anyhow::Result<Self> {
         let assignment = store.assignment;
         (store.progress)("preparing the compiler");
         let recording = Recording::obtain(&assignment.root, &store.supervisor.umbra)?;
@@ -71,8 +75,15 @@ impl<'a> Grading<'a> {
             cases.push(case.with_context(|| format!("scene \"{}\" cannot be used", entry.name))?);
         }
         let supervisor = store.supervisor;
-        let mut grading =
-            Self { assignment, supervisor, recording, cases, adapter: Ok(adapter), threads: store.threads, cancel };
+        let mut grading = Self {
+            assignment,
+            supervisor,
+            recording,
+            cases,
+            adapter: Ok(adapter),
+            threads: store.threads,
+            cancel,
+        };
         if let Some(case) = grading.cases.first()
             && let Err(why) = realtime::probe_adapter(&grading.asker(""), case)
         {
@@ -110,7 +121,8 @@ impl<'a> Grading<'a> {
     ) -> anyhow::Result<Record> {
         let asker = self.asker("");
         let mut costs = Costs { since: Instant::now(), stages: Vec::new() };
-        let scratch = tempfile::Builder::new().prefix("hand-in-").tempdir_in(&self.supervisor.scratch)?;
+        let scratch =
+            tempfile::Builder::new().prefix("hand-in-").tempdir_in(&self.supervisor.scratch)?;
         let mut record = Record {
             name: source.file_name().unwrap_or(source.as_os_str()).to_string_lossy().into_owned(),
             slug: slug.to_owned(),
@@ -131,7 +143,12 @@ impl<'a> Grading<'a> {
             Err(IntakeError::Refused(refusal)) => {
                 let validation = intake::validate_refusal(&refusal);
                 record.evidence.checks.push(tree_check(&validation, purpose));
-                record.evidence.checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no source to build"));
+                record.evidence.checks.push(Check::new(
+                    BUILD,
+                    "",
+                    Verdict::Fail,
+                    "there is no source to build",
+                ));
                 record.findings = validation.findings;
                 record.stages = costs.end("intake", 0.0);
                 return Ok(record);
@@ -165,7 +182,12 @@ impl<'a> Grading<'a> {
         }
         say("comparing the images handed in");
         for case in &self.cases {
-            checks.extend(handed_in::judge(&hand_in.root, case, &drawn, &self.assignment.tolerances));
+            checks.extend(handed_in::judge(
+                &hand_in.root,
+                case,
+                &drawn,
+                &self.assignment.tolerances,
+            ));
         }
         costs.end("images", 0.0);
         pictures::draw(&mut checks, &self.cases, &drawn, &hand_in.root, out)?;
@@ -215,8 +237,11 @@ impl<'a> Grading<'a> {
         let (plugin, summary) = match report.outcome {
             BuildOutcome::Built { library } => (Some(library), "the source builds".to_owned()),
             BuildOutcome::CompileError { errors } => {
-                record.diagnostics =
-                    errors.iter().map(|error| error.rendered.as_str()).collect::<Vec<_>>().join("\n");
+                record.diagnostics = errors
+                    .iter()
+                    .map(|error| error.rendered.as_str())
+                    .collect::<Vec<_>>()
+                    .join("\n");
                 let first = errors.first().map(|error| match &error.place {
                     Some(place) => format!("{}:{}: {}", place.file, place.line, error.message),
                     None => error.message.clone(),
@@ -225,7 +250,9 @@ impl<'a> Grading<'a> {
             }
             BuildOutcome::TimedOut => (None, "the compiler ran out of time".to_owned()),
             BuildOutcome::OutOfMemory => (None, "the compiler ran out of memory".to_owned()),
-            BuildOutcome::FloodedOutput => (None, "the compiler said more than is allowed".to_owned()),
+            BuildOutcome::FloodedOutput => {
+                (None, "the compiler said more than is allowed".to_owned())
+            }
             BuildOutcome::Crashed(signal) => (None, format!("the compiler crashed: {signal}")),
             BuildOutcome::Cancelled => anyhow::bail!("interrupted"),
         };
@@ -245,7 +272,8 @@ impl<'a> Grading<'a> {
         let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
         let findings = sampler::judge(asker, plugin, &scene)?;
         let mut tolerances = self.assignment.tolerances.clone();
-        if findings.iter().any(|found| found.id != "sampler.seed" && found.verdict == Verdict::Fail) {
+        if findings.iter().any(|found| found.id != "sampler.seed" && found.verdict == Verdict::Fail)
+        {
             // Pixels are as noisy as they should be, but not independent, so that the mean of a
             // region is noisier than they tell: a finding, no wrong image.
             tolerances.bias_standard_errors *= DEPENDENT_PIXELS;
@@ -276,7 +304,8 @@ impl<'a> Grading<'a> {
         for case in &self.cases {
             self.stop_if_interrupted()?;
             let (found, images) = realtime::judge_images(asker, plugin, case, tolerances);
-            let proof = |check: &Check| check.id == "image.realtime" && check.verdict != Verdict::Pass;
+            let proof =
+                |check: &Check| check.id == "image.realtime" && check.verdict != Verdict::Pass;
             if found.iter().any(proof) {
                 wrong.push(case);
             }
@@ -327,7 +356,8 @@ impl Costs {
 }
 
 fn student(config: &HandInConfig) -> Student {
-    let text = |field: &Option<intake::Field>| field.as_ref().map_or(String::new(), |f| f.text.clone());
+    let text =
+        |field: &Option<intake::Field>| field.as_ref().map_or(String::new(), |f| f.text.clone());
     Student {
         first_name: text(&config.first_name),
         last_name: text(&config.last_name),
@@ -339,11 +369,17 @@ fn tree_check(validation: &Validation, purpose: Purpose) -> Check {
     let error = validation.findings.iter().find(|f| f.severity == intake::Severity::Error);
     let (verdict, summary) = match (validation.conforms, purpose) {
         (true, _) => (Verdict::Pass, "the hand-in follows the tree of the handout".to_owned()),
-        (false, Purpose::Grade) => (Verdict::Fail, error.map(ToString::to_string).unwrap_or_default()),
+        (false, Purpose::Grade) => {
+            (Verdict::Fail, error.map(ToString::to_string).unwrap_or_default())
+        }
         (false, Purpose::Check) => (
             Verdict::NotJudged,
             format!("not ready to hand in: {}", error.map(ToString::to_string).unwrap_or_default()),
         ),
     };
-    Check::new(TREE, "", verdict, summary).with_hint(if validation.conforms { "" } else { "umbra validate shows the whole tree" })
+    Check::new(TREE, "", verdict, summary).with_hint(if validation.conforms {
+        ""
+    } else {
+        "umbra validate shows the whole tree"
+    })
 }

@@ -33,7 +33,8 @@ impl Stages {
     /// Reads the stages below a hand-in's and the template's `src` folder. A file that is no text
     /// counts as absent.
     pub fn read(src: &Path, template: &Path) -> Self {
-        let stage = |src: &Path, name| std::fs::read_to_string(src.join(format!("shaders/{name}.wgsl")));
+        let stage =
+            |src: &Path, name| std::fs::read_to_string(src.join(format!("shaders/{name}.wgsl")));
         Self {
             own: NAMES.map(|name| stage(src, name).ok()),
             template: NAMES.map(|name| stage(template, name).unwrap_or_default()),
@@ -70,22 +71,40 @@ pub fn judge_images(
     let (mut checks, mut drawn) = (Vec::new(), Vec::new());
     // One worker for each image: the bonus may crash without a trace on the other.
     for (kind, toml, id) in asked {
-        let outcome = draw(asker, Some(plugin), case, toml, (width, height), kind == Kind::RealtimeShadows, &[]);
+        let outcome = draw(
+            asker,
+            Some(plugin),
+            case,
+            toml,
+            (width, height),
+            kind == Kind::RealtimeShadows,
+            &[],
+        );
         let parts = ["2.1", "2.2", "2.3", "2.4", "2.5"];
         let Outcome::Done(answer) = &outcome else {
             checks.push(ask::unanswered(id, name, &parts, &outcome));
             continue;
         };
         let image = ask::image(&answer.values, width, height);
-        let judge = |id, wanted| images::judge(id, name, kind, &image, &case.expected, wanted, tolerances);
+        let judge =
+            |id, wanted| images::judge(id, name, kind, &image, &case.expected, wanted, tolerances);
         if kind == Kind::Realtime {
             let views = VIEWS.map(|(id, wanted)| judge(id, wanted));
-            checks.extend(if views[0].verdict == Verdict::Fail { plain_but_for_shadows(case, &image, tolerances) } else { None }
-                .unwrap_or(views.to_vec()));
+            checks.extend(
+                if views[0].verdict == Verdict::Fail {
+                    plain_but_for_shadows(case, &image, tolerances)
+                } else {
+                    None
+                }
+                .unwrap_or(views.to_vec()),
+            );
             checks.push(judge_coverage(case, &image));
         } else {
             let check = judge(id, &|_| true);
-            let plain = drawn.iter().find(|drawn: &&Drawn| drawn.kind == Kind::Realtime).map(|drawn| &drawn.image);
+            let plain = drawn
+                .iter()
+                .find(|drawn: &&Drawn| drawn.kind == Kind::Realtime)
+                .map(|drawn| &drawn.image);
             checks.push(if check.verdict == Verdict::Fail {
                 judge_visibility(asker, plugin, case, (&image, plain), check, tolerances)
             } else {
@@ -105,7 +124,11 @@ fn shadows(case: &Case) -> Shadows<'_> {
 
 /// A default run that is wrong by its shadows alone is the bonus' fault, not that of pass and
 /// stages: the checks that say so, if it is.
-fn plain_but_for_shadows(case: &Case, image: &Image, tolerances: &Tolerances) -> Option<Vec<Check>> {
+fn plain_but_for_shadows(
+    case: &Case,
+    image: &Image,
+    tolerances: &Tolerances,
+) -> Option<Vec<Check>> {
     let (name, shadows) = (&case.entry.name, shadows(case));
     if !shadows.are_in(image) {
         return None;
@@ -144,11 +167,22 @@ fn judge_visibility(
     }
     let (width, height) = case.film();
     let vertex = [Stage { name: NAMES[0].to_owned(), text: VERTEX.to_owned() }];
-    let drawn = |toml, shadow_map| match draw(asker, Some(plugin), case, toml, (width, height), shadow_map, &vertex) {
+    let drawn = |toml, shadow_map| match draw(
+        asker,
+        Some(plugin),
+        case,
+        toml,
+        (width, height),
+        shadow_map,
+        &vertex,
+    ) {
         Outcome::Done(answer) => Some(ask::image(&answer.values, width, height)),
         _ => None,
     };
-    let swapped = case.bonus.as_ref().and_then(|bonus| judge(&drawn(bonus, true)?, &drawn(&case.realtime, false)?));
+    let swapped = case
+        .bonus
+        .as_ref()
+        .and_then(|bonus| judge(&drawn(bonus, true)?, &drawn(&case.realtime, false)?));
     match swapped {
         Some(swapped) if swapped.verdict == Verdict::Pass => swapped,
         _ => own.unwrap_or(check),
@@ -161,7 +195,9 @@ fn judge_coverage(case: &Case, image: &Image) -> Check {
     let (mut counted, mut wrong) = (0usize, 0usize);
     for (pixel, &value) in image.pixels.iter().zip(&mask.pixels) {
         let background = value & RegionMask::INDEX == 0;
-        if value & (RegionMask::EDGE | RegionMask::EMITTER) != 0 || !(background || mask.region(value).lit) {
+        if value & (RegionMask::EDGE | RegionMask::EMITTER) != 0
+            || !(background || mask.region(value).lit)
+        {
             continue;
         }
         counted += 1;
@@ -172,7 +208,8 @@ fn judge_coverage(case: &Case, image: &Image) -> Check {
     if error <= 5e-3 {
         return Check::new(id, name, Verdict::Pass, "surfaces lie where they should");
     }
-    let summary = format!("{wrong} of {counted} pixels show a surface where none is, or none where one is");
+    let summary =
+        format!("{wrong} of {counted} pixels show a surface where none is, or none where one is");
     Check { error, ..Check::new(id, name, Verdict::Fail, summary) }
 }
 
@@ -190,9 +227,10 @@ pub fn isolate(
         true => untouched("stage.vertex", case, "2.2 vertex shader"),
         false => isolate_vertex(asker, case, stages),
     });
-    for (index, id, task, phong) in
-        [(1, "stage.diffuse", "2.3 diffuse fragment shader", false), (2, "stage.phong", "2.4 Phong fragment shader", true)]
-    {
+    for (index, id, task, phong) in [
+        (1, "stage.diffuse", "2.3 diffuse fragment shader", false),
+        (2, "stage.phong", "2.4 Phong fragment shader", true),
+    ] {
         checks.push(match stages.is_template(index) {
             true => untouched(id, case, task),
             false => isolate_fragment(asker, case, stages, (index, id, phong), tolerances),
@@ -209,11 +247,14 @@ fn untouched(id: &str, case: &Case, task: &str) -> Check {
 fn isolate_pass(asker: &Asker, plugin: &Path, case: &Case) -> Check {
     let size = (case.small.width, case.small.height);
     let mut frames = Vec::new();
-    let shown = BoundValue::ALL.map(|bound| named([VERTEX.to_owned(), bound.stage(false), bound.stage(true)]));
+    let shown = BoundValue::ALL
+        .map(|bound| named([VERTEX.to_owned(), bound.stage(false), bound.stage(true)]));
     let outcomes = draw_each(asker, Some(plugin), case, &case.realtime, size, false, &shown);
     for (bound, outcome) in BoundValue::ALL.into_iter().zip(outcomes) {
         match outcome {
-            Outcome::Done(answer) => frames.push((bound, ask::image(&answer.values, size.0, size.1))),
+            Outcome::Done(answer) => {
+                frames.push((bound, ask::image(&answer.values, size.0, size.1)))
+            }
             other => return swap_failed("pass.uniforms", case, &["2.1"], &other),
         }
     }
@@ -226,7 +267,8 @@ fn isolate_vertex(asker: &Asker, case: &Case, stages: &Stages) -> Check {
     let Some(own) = &stages.own[0] else { return absent(id, case, NAMES[0]) };
     let size = (case.small.width, case.small.height);
     let mut images = Vec::new();
-    let shown = [SHOW_POSITION, SHOW_NORMAL].map(|show| named([own.clone(), show.to_owned(), show.to_owned()]));
+    let shown = [SHOW_POSITION, SHOW_NORMAL]
+        .map(|show| named([own.clone(), show.to_owned(), show.to_owned()]));
     for outcome in draw_each(asker, None, case, &case.realtime, size, false, &shown) {
         match outcome {
             Outcome::Done(answer) => images.push(ask::image(&answer.values, size.0, size.1)),
@@ -299,7 +341,9 @@ fn draw(
     stages: &[Stage],
 ) -> Outcome {
     let outcome = draw_each(asker, plugin, case, toml, size, shadow_map, &[stages.to_vec()]).pop();
-    outcome.unwrap_or_else(|| Outcome::NoAdapter("the worker gave no outcome: a bug of Umbra's".into()))
+    outcome.unwrap_or_else(|| {
+        Outcome::NoAdapter("the worker gave no outcome: a bug of Umbra's".into())
+    })
 }
 
 /// Draws a frame under each set of stages, all in one worker.
@@ -332,7 +376,9 @@ fn draw_each(
         outcomes = asker.ask(plugin, requests);
     }
     let believed = outcomes.into_iter().map(|outcome| match outcome {
-        Outcome::NoAdapter(message) => Outcome::Failed(format!("{message} (but this machine's adapter works)")),
+        Outcome::NoAdapter(message) => {
+            Outcome::Failed(format!("{message} (but this machine's adapter works)"))
+        }
         outcome => outcome,
     });
     believed.collect()

@@ -26,8 +26,8 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
         threads,
         shadows: true,
     };
-    let outcomes =
-        asker.ask(Some(plugin), vec![render(7, 1), render(7, 4), render(7, 4), render(1_000_007, 1)]);
+    let outcomes = asker
+        .ask(Some(plugin), vec![render(7, 1), render(7, 4), render(7, 4), render(1_000_007, 1)]);
     let images: Vec<&[f32]> = outcomes
         .iter()
         .filter_map(Outcome::answer)
@@ -45,7 +45,11 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
         check(
             "sampler.threads",
             same,
-            if same { "the image does not depend on the number of threads" } else { "the same seed gives another image with several threads" },
+            if same {
+                "the image does not depend on the number of threads"
+            } else {
+                "the same seed gives another image with several threads"
+            },
             "threads share a sampler: give every row one of its own",
         ),
         check(
@@ -57,7 +61,11 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
         check(
             "sampler.seed",
             bits(one) != bits(other),
-            if bits(one) == bits(other) { "two seeds give the same image" } else { "two seeds give two images" },
+            if bits(one) == bits(other) {
+                "two seeds give the same image"
+            } else {
+                "two seeds give two images"
+            },
             "seed the samplers with the job's seed, the student id",
         ),
     ])
@@ -85,11 +93,15 @@ mod tests {
     fn rows_of_one_seed_are_told_from_rows_of_their_own() {
         let sampler = basecode::Sampler::new(1);
         let mut noise = || (0..64).map(|_| sampler.next_1d()).collect::<Vec<f32>>();
-        let independent = |noise: &mut dyn FnMut() -> Vec<f32>| -> Vec<f32> { (0..32).flat_map(|_| noise()).collect() };
+        let independent = |noise: &mut dyn FnMut() -> Vec<f32>| -> Vec<f32> {
+            (0..32).flat_map(|_| noise()).collect()
+        };
         let (a, b) = (independent(&mut noise), independent(&mut noise));
         assert!(row_correlation(&a, &b, 64).abs() < 0.1);
         // Rows that differ in brightness but not in noise.
-        let rows = |row: &[f32]| (0..32).flat_map(|y| row.iter().map(move |v| v * (1.0 + 0.01 * y as f32))).collect();
+        let rows = |row: &[f32]| {
+            (0..32).flat_map(|y| row.iter().map(move |v| v * (1.0 + 0.01 * y as f32))).collect()
+        };
         let (a, b): (Vec<f32>, Vec<f32>) = (rows(&noise()), rows(&noise()));
         assert!(row_correlation(&a, &b, 64) > 0.99);
         assert_eq!(row_correlation(&a, &a, 64), 0.0);

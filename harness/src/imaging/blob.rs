@@ -62,10 +62,7 @@ mod tests {
     use super::*;
 
     fn map(rows: &[&str]) -> (Vec<bool>, usize) {
-        (
-            rows.concat().bytes().map(|b| b == b'#').collect(),
-            rows[0].len(),
-        )
+        (rows.concat().bytes().map(|b| b == b'#').collect(), rows[0].len())
     }
 
     #[test]
@@ -87,16 +84,10 @@ mod tests {
     fn the_largest_area_has_its_box() {
         let (a, width) = map(&["#..#.", "#..##", "...#.", "##..."]);
         let area = largest_area(&a, width).unwrap();
-        assert_eq!(
-            (area.x, area.y, area.width, area.height, area.pixels),
-            (3, 0, 2, 3, 4)
-        );
+        assert_eq!((area.x, area.y, area.width, area.height, area.pixels), (3, 0, 2, 3, 4));
         let (b, width) = map(&["..#", "#.#", "###"]);
         let area = largest_area(&b, width).unwrap();
-        assert_eq!(
-            (area.x, area.y, area.width, area.height, area.pixels),
-            (0, 0, 3, 3, 6)
-        );
+        assert_eq!((area.x, area.y, area.width, area.height, area.pixels), (0, 0, 3, 3, 6));
         assert_eq!(largest_area(&[false; 6], 3), None);
     }
 }

@@ -30,11 +30,7 @@ pub fn compare_offline(
     let (expected, with, samples) = match spp {
         0 => return Err(CompareError::NoSamples),
         1 => (&reference.centre, ComparedWith::Centre, None),
-        n => (
-            &reference.mean,
-            ComparedWith::Mean,
-            Some(1.0 / n as f32 + 1.0 / reference.n as f32),
-        ),
+        n => (&reference.mean, ComparedWith::Mean, Some(1.0 / n as f32 + 1.0 / reference.n as f32)),
     };
     let floor = (tolerances.floor_of_median * f64::from(reference.median_lit)) as f32;
     let relative = tolerances.floor_relative as f32;
@@ -63,10 +59,8 @@ pub fn compare_offline(
             row.excess2[x] = (d * d / (limit2 * (v + floor * floor))).max_element();
         }
     });
-    let scale = Scale {
-        median_lit: reference.median_lit,
-        interior_fraction: tolerances.interior_fraction,
-    };
+    let scale =
+        Scale { median_lit: reference.median_lit, interior_fraction: tolerances.interior_fraction };
     Ok(walk.judge(&reference.mask, with, &scale, tolerances))
 }
 
@@ -136,10 +130,7 @@ fn check_size(actual: &Image, expected: &Image) -> Result<(), CompareError> {
     let found = (actual.width, actual.height);
     let wanted = (expected.width, expected.height);
     if found != wanted || actual.pixels.len() != expected.pixels.len() {
-        return Err(CompareError::Size {
-            actual: found,
-            expected: wanted,
-        });
+        return Err(CompareError::Size { actual: found, expected: wanted });
     }
     Ok(())
 }
@@ -153,22 +144,13 @@ fn realtime_scale(
     check_size(actual, centre)?;
     let median_lit =
         check_mask(mask, centre).map_err(|e| CompareError::Reference(e.to_string()))?;
-    Ok((
-        centre.width,
-        Scale {
-            median_lit,
-            interior_fraction,
-        },
-    ))
+    Ok((centre.width, Scale { median_lit, interior_fraction }))
 }
 
 /// Per column the largest variance of rows y - 1 to y + 1.
 fn highest_of_rows(variance: &Image, y: usize, out: &mut [Vec3]) {
     let row = |y: usize| &variance.pixels[y * variance.width..][..variance.width];
-    let (above, below) = (
-        row(y.saturating_sub(1)),
-        row((y + 1).min(variance.height - 1)),
-    );
+    let (above, below) = (row(y.saturating_sub(1)), row((y + 1).min(variance.height - 1)));
     for (((out, a), b), c) in out.iter_mut().zip(above).zip(row(y)).zip(below) {
         *out = a.max(*b).max(*c);
     }

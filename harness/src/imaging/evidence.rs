@@ -225,10 +225,7 @@ mod any_float {
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f32; 3], D::Error> {
         let mut values = [0.0; 3];
-        for (value, written) in values
-            .iter_mut()
-            .zip(<[Written; 3]>::deserialize(deserializer)?)
-        {
+        for (value, written) in values.iter_mut().zip(<[Written; 3]>::deserialize(deserializer)?) {
             *value = match written {
                 Written::Number(v) => v,
                 Written::Text(text) => text.parse().map_err(D::Error::custom)?,

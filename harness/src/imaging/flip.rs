@@ -123,11 +123,7 @@ fn opponent(image: &Image, tone: impl Fn(Vec3) -> Vec3 + Sync) -> [Vec<f32>; 3] 
         .par_iter()
         .map(|&p| {
             let xyz = matrix * tone(p) / WHITE;
-            vec3(
-                116.0 * xyz.y - 16.0,
-                500.0 * (xyz.x - xyz.y),
-                200.0 * (xyz.y - xyz.z),
-            )
+            vec3(116.0 * xyz.y - 16.0, 500.0 * (xyz.x - xyz.y), 200.0 * (xyz.y - xyz.z))
         })
         .collect();
     [0, 1, 2].map(|c| colours.iter().map(|p| p[c]).collect())
@@ -136,19 +132,10 @@ fn opponent(image: &Image, tone: impl Fn(Vec3) -> Vec3 + Sync) -> [Vec<f32>; 3] 
 /// CIELAB with Hunt's adjustment: colours count for less where it is dark.
 fn hunt_lab(xyz: Vec3) -> Vec3 {
     const DELTA: f32 = 6.0 / 29.0;
-    let f = (xyz / WHITE).map(|t| {
-        if t > DELTA.powi(3) {
-            t.cbrt()
-        } else {
-            t / (3.0 * DELTA * DELTA) + 4.0 / 29.0
-        }
-    });
+    let f = (xyz / WHITE)
+        .map(|t| if t > DELTA.powi(3) { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 });
     let l = 116.0 * f.y - 16.0;
-    vec3(
-        l,
-        0.01 * l * 500.0 * (f.x - f.y),
-        0.01 * l * 200.0 * (f.y - f.z),
-    )
+    vec3(l, 0.01 * l * 500.0 * (f.x - f.y), 0.01 * l * 200.0 * (f.y - f.z))
 }
 
 /// HyAB, the distance for large differences of colour: city block in lightness, Euclidean in the rest.
@@ -178,13 +165,7 @@ fn normalised(weights: Vec<f32>) -> Vec<f32> {
     let negative: f32 = -weights.iter().filter(|w| **w < 0.0).sum::<f32>();
     weights
         .into_iter()
-        .map(|w| {
-            if w > 0.0 {
-                w / positive
-            } else {
-                w / negative.max(f32::MIN_POSITIVE)
-            }
-        })
+        .map(|w| if w > 0.0 { w / positive } else { w / negative.max(f32::MIN_POSITIVE) })
         .collect()
 }
 
@@ -192,27 +173,19 @@ impl Filters {
     fn new(pixels_per_degree: f32) -> Self {
         use std::f32::consts::PI;
         // (a, b) of a sqrt(pi / b) exp(-pi^2 z / b), z in degrees squared: table 1 of the 2020 paper.
-        let table: [&[(f32, f32)]; 3] = [
-            &[(1.0, 0.0047)],
-            &[(1.0, 0.0053)],
-            &[(34.1, 0.04), (13.5, 0.025)],
-        ];
+        let table: [&[(f32, f32)]; 3] =
+            [&[(1.0, 0.0047)], &[(1.0, 0.0053)], &[(34.1, 0.04), (13.5, 0.025)]];
         // Three standard deviations of the widest of them.
         let radius = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as i32;
         let colour = table.map(|terms| {
             let mut gaussians: Vec<_> = terms
                 .iter()
                 .map(|&(a, b)| {
-                    let g = profile(radius, |x| {
-                        (-(PI * x / pixels_per_degree).powi(2) / b).exp()
-                    });
+                    let g = profile(radius, |x| (-(PI * x / pixels_per_degree).powi(2) / b).exp());
                     (a * (PI / b).sqrt(), g)
                 })
                 .collect();
-            let total: f32 = gaussians
-                .iter()
-                .map(|(w, g)| w * g.iter().sum::<f32>().powi(2))
-                .sum();
+            let total: f32 = gaussians.iter().map(|(w, g)| w * g.iter().sum::<f32>().powi(2)).sum();
             gaussians
                 .drain(..)
                 .map(|(w, g)| {
@@ -264,11 +237,7 @@ impl Filters {
                 colour.powf(1.0 - feature)
             })
             .collect();
-        FlipMap {
-            width,
-            height: like.height,
-            errors,
-        }
+        FlipMap { width, height: like.height, errors }
     }
 
     /// The image as the eye's contrast sensitivity lets it through.
@@ -290,11 +259,8 @@ impl Filters {
         let grey: Vec<f32> = y.iter().map(|y| (y + 16.0) / 116.0).collect();
         let smooth = convolve_across(&grey, width, &self.smooth);
         [&self.first, &self.second].map(|derivative| {
-            let across = convolve_down(
-                &convolve_across(&grey, width, derivative),
-                width,
-                &self.smooth,
-            );
+            let across =
+                convolve_down(&convolve_across(&grey, width, derivative), width, &self.smooth);
             let down = convolve_down(&smooth, width, derivative);
             across.iter().zip(&down).map(|(x, y)| x.hypot(*y)).collect()
         })
@@ -305,18 +271,16 @@ impl Filters {
 fn convolve_across(image: &[f32], width: usize, weights: &[f32]) -> Vec<f32> {
     let radius = weights.len() / 2;
     let mut out = vec![0.0; image.len()];
-    out.par_chunks_mut(width)
-        .zip(image.par_chunks(width))
-        .for_each(|(out, row)| {
-            let mut padded = vec![row[0]; radius];
-            padded.extend_from_slice(row);
-            padded.resize(width + 2 * radius, row[width - 1]);
-            for (k, w) in weights.iter().enumerate() {
-                for (o, p) in out.iter_mut().zip(&padded[k..]) {
-                    *o += w * p;
-                }
+    out.par_chunks_mut(width).zip(image.par_chunks(width)).for_each(|(out, row)| {
+        let mut padded = vec![row[0]; radius];
+        padded.extend_from_slice(row);
+        padded.resize(width + 2 * radius, row[width - 1]);
+        for (k, w) in weights.iter().enumerate() {
+            for (o, p) in out.iter_mut().zip(&padded[k..]) {
+                *o += w * p;
             }
-        });
+        }
+    });
     out
 }
 

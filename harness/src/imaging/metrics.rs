@@ -37,10 +37,7 @@ impl Metrics {
         {
             return None;
         }
-        let peak = expected
-            .pixels
-            .iter()
-            .fold(0.0, |m: f64, p| m.max(f64::from(p.max_element())));
+        let peak = expected.pixels.iter().fold(0.0, |m: f64, p| m.max(f64::from(p.max_element())));
         let mse = mse(actual, expected);
         let finite = |v: f64| v.is_finite().then_some(v);
         let mean = |map: Option<super::flip::FlipMap>| map.and_then(|m| finite(m.mean()));
@@ -122,10 +119,7 @@ pub fn ssim(actual: &Image, expected: &Image, peak: f64) -> Option<f64> {
                     [a, b, a * a, b * b, a * b]
                 })
                 .collect();
-            for (x, out) in smoothed[y * inside..(y + 1) * inside]
-                .iter_mut()
-                .enumerate()
-            {
+            for (x, out) in smoothed[y * inside..(y + 1) * inside].iter_mut().enumerate() {
                 *out = weighted(&weights, |k| &moments[x + k]);
             }
         }

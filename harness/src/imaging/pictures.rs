@@ -54,11 +54,7 @@ impl Picture {
     /// # Errors
     /// When the picture is empty or too large for the format.
     pub fn png(&self) -> Result<Vec<u8>, PictureError> {
-        let fail = |reason: String| PictureError {
-            width: self.width,
-            height: self.height,
-            reason,
-        };
+        let fail = |reason: String| PictureError { width: self.width, height: self.height, reason };
         if self.pixels.is_empty() {
             return Err(fail("it is empty".into()));
         }
@@ -138,23 +134,14 @@ pub fn tone_mapped(image: &Image, median_lit: f32) -> Picture {
 }
 
 /// Stops of a diverging map whose lightness falls evenly to both sides (ColorBrewer's RdBu with 5 classes).
-const DIVERGING: [[u8; 3]; 5] = [
-    [5, 113, 176],
-    [146, 197, 222],
-    [247, 247, 247],
-    [244, 165, 130],
-    [202, 0, 32],
-];
+const DIVERGING: [[u8; 3]; 5] =
+    [[5, 113, 176], [146, 197, 222], [247, 247, 247], [244, 165, 130], [202, 0, 32]];
 
 /// The colour of a value in -1 (blue) to 1 (red).
 fn diverging(value: f32) -> [u8; 3] {
     let position = (value.clamp(-1.0, 1.0) + 1.0) * 2.0;
     let below = (position as usize).min(3);
-    mix(
-        DIVERGING[below],
-        DIVERGING[below + 1],
-        position - below as f32,
-    )
+    mix(DIVERGING[below], DIVERGING[below + 1], position - below as f32)
 }
 
 fn mix(a: [u8; 3], b: [u8; 3], t: f32) -> [u8; 3] {
@@ -185,19 +172,9 @@ pub fn signed_error(
         }
         let (a, b) = (a.element_sum() / 3.0, b.element_sum() / 3.0);
         let colour = diverging((a - b) / b.max(darkest) / full_scale);
-        if flags & RegionMask::EDGE != 0 {
-            mix(colour, GREY, 0.5)
-        } else {
-            colour
-        }
+        if flags & RegionMask::EDGE != 0 { mix(colour, GREY, 0.5) } else { colour }
     };
-    let pixels = actual
-        .pixels
-        .iter()
-        .zip(&expected.pixels)
-        .zip(&mask.pixels)
-        .map(colour)
-        .collect();
+    let pixels = actual.pixels.iter().zip(&expected.pixels).zip(&mask.pixels).map(colour).collect();
     Some(Picture {
         width: size.0,
         height: size.1,
@@ -216,11 +193,7 @@ mod tests {
     use glam::vec3;
 
     fn row(pixels: &[Vec3]) -> Image {
-        Image {
-            width: pixels.len(),
-            height: 1,
-            pixels: pixels.to_vec(),
-        }
+        Image { width: pixels.len(), height: 1, pixels: pixels.to_vec() }
     }
 
     #[test]
@@ -236,10 +209,7 @@ mod tests {
         // 0.25 becomes 0.25 (1 + 0.25/64) / 1.25 = 0.20078, sRGB level 124; white is 8 / 2.5 = 3.2.
         let expected = [[0; 3], [0; 3], [124, 255, 255], MAGENTA, MAGENTA];
         assert_eq!(picture.pixels, expected);
-        assert_eq!(
-            picture.caption,
-            "exposure +1.3 stops, Reinhard curve, white at 3.200"
-        );
+        assert_eq!(picture.caption, "exposure +1.3 stops, Reinhard curve, white at 3.200");
     }
 
     #[test]
@@ -256,15 +226,8 @@ mod tests {
         let picture = signed_error(&actual, &expected, &mask, 1.0, 0.1).unwrap();
         let [blue, _, white, pink, red] = DIVERGING;
         let half = [188; 3];
-        assert_eq!(
-            picture.pixels,
-            [white, red, blue, pink, red, MAGENTA, GREY, half]
-        );
-        assert!(
-            picture.caption.contains("10.000 % darker"),
-            "{}",
-            picture.caption
-        );
+        assert_eq!(picture.pixels, [white, red, blue, pink, red, MAGENTA, GREY, half]);
+        assert!(picture.caption.contains("10.000 % darker"), "{}", picture.caption);
 
         // Where black is expected, errors are relative to a twentieth of the scene's median.
         let dark = signed_error(
@@ -275,50 +238,27 @@ mod tests {
             0.1,
         );
         assert_eq!(dark.unwrap().pixels, [red]);
-        assert_eq!(
-            signed_error(&actual, &row(&[Vec3::ONE]), &mask, 1.0, 0.1),
-            None
-        );
+        assert_eq!(signed_error(&actual, &row(&[Vec3::ONE]), &mask, 1.0, 0.1), None);
     }
 
     #[test]
     fn png_comes_back() {
         let image = row(&[Vec3::ZERO, vec3(1.0, 0.5, 0.25), Vec3::splat(9.0)]);
         let picture = tone_mapped(&image, 0.3);
-        let back = image::load_from_memory(&picture.png().unwrap())
-            .unwrap()
-            .into_rgb8();
+        let back = image::load_from_memory(&picture.png().unwrap()).unwrap().into_rgb8();
         assert_eq!(back.dimensions(), (3, 1));
         assert_eq!(back.into_raw(), picture.pixels.as_flattened());
-        let error = tone_mapped(&Image::new(0, 0), 1.0)
-            .png()
-            .unwrap_err()
-            .to_string();
-        assert_eq!(
-            error,
-            "picture of 0x0 cannot be written as PNG: it is empty"
-        );
+        let error = tone_mapped(&Image::new(0, 0), 1.0).png().unwrap_err().to_string();
+        assert_eq!(error, "picture of 0x0 cannot be written as PNG: it is empty");
     }
 
     #[test]
     fn details_are_enlarged_and_stay_inside() {
         let (width, height) = (40, 30);
-        let pixels = (0..width * height)
-            .map(|i| [(i % width) as u8, (i / width) as u8, 0])
-            .collect();
-        let picture = Picture {
-            width,
-            height,
-            pixels,
-            caption: "x".into(),
-        };
-        let area = |x, y, width, height| FailingArea {
-            x,
-            y,
-            width,
-            height,
-            pixels: 1,
-        };
+        let pixels =
+            (0..width * height).map(|i| [(i % width) as u8, (i / width) as u8, 0]).collect();
+        let picture = Picture { width, height, pixels, caption: "x".into() };
+        let area = |x, y, width, height| FailingArea { x, y, width, height, pixels: 1 };
 
         let detail = picture.detail(&area(20, 10, 2, 2));
         assert_eq!((detail.width, detail.height), (12 * 32, 12 * 32));
@@ -326,10 +266,7 @@ mod tests {
         assert_eq!(detail.pixels[31], [15, 5, 0]);
         assert_eq!(detail.pixels[32], [16, 5, 0]);
         assert_eq!(detail.pixels.last(), Some(&[26, 16, 0]));
-        assert_eq!(
-            detail.caption,
-            "x; 32 times enlarged, columns 15 to 26, rows 5 to 16"
-        );
+        assert_eq!(detail.caption, "x; 32 times enlarged, columns 15 to 26, rows 5 to 16");
 
         let corner = picture.detail(&area(0, 29, 1, 1));
         assert_eq!((corner.width, corner.height), (7 * 54, 7 * 54));

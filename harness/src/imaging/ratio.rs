@@ -26,9 +26,7 @@ pub struct RegionRatio {
 impl RegionRatio {
     /// The factor's name, if it is constant over the region and has one.
     pub fn name(&self) -> Option<&'static str> {
-        (self.spread < 0.05)
-            .then(|| ratio_name(self.median))
-            .flatten()
+        (self.spread < 0.05).then(|| ratio_name(self.median)).flatten()
     }
 }
 
@@ -54,10 +52,7 @@ pub fn ratio_name(ratio: f64) -> Option<&'static str> {
         (0.99, "0.99"),
         (1.0 / 0.99, "1/0.99"),
     ];
-    named
-        .into_iter()
-        .find(|(factor, _)| (ratio / factor - 1.0).abs() < 4e-3)
-        .map(|(_, name)| name)
+    named.into_iter().find(|(factor, _)| (ratio / factor - 1.0).abs() < 4e-3).map(|(_, name)| name)
 }
 
 /// The ratio actual / expected of every lit region, over interior pixels brighter than a hundredth of the brightest.
@@ -83,21 +78,13 @@ pub fn region_ratios(actual: &Image, expected: &Image, mask: &RegionMask) -> Vec
         }
     }
     let mut found = Vec::new();
-    for (i, mut values) in ratios
-        .into_iter()
-        .enumerate()
-        .filter(|(_, v)| !v.is_empty())
-    {
+    for (i, mut values) in ratios.into_iter().enumerate().filter(|(_, v)| !v.is_empty()) {
         values.sort_unstable_by(f32::total_cmp);
         let at = |fraction: f64| {
             f64::from(values[(fraction * (values.len() - 1) as f64).round() as usize])
         };
         let median = at(0.5);
-        let spread = if median > 0.0 {
-            0.5 * (at(0.84) - at(0.16)) / median
-        } else {
-            f64::MAX
-        };
+        let spread = if median > 0.0 { 0.5 * (at(0.84) - at(0.16)) / median } else { f64::MAX };
         found.push(RegionRatio {
             region: mask.regions[i / 2].name.clone(),
             highlight: i % 2 == 1,
@@ -131,11 +118,7 @@ mod tests {
         let (width, height) = (20, 10);
         let mut mask = RegionMask::background(width, height);
         for name in ["left", "right"] {
-            mask.regions.push(Region {
-                name: name.into(),
-                lit: true,
-                exponent: 0.0,
-            });
+            mask.regions.push(Region { name: name.into(), lit: true, exponent: 0.0 });
         }
         let mut expected = Image::new(width, height);
         let mut actual = Image::new(width, height);
@@ -143,11 +126,7 @@ mod tests {
             let left = i % width < 10;
             mask.pixels[i] = if left { 1 } else { 2 };
             expected.pixels[i] = Vec3::splat(0.2 + (i as f32 * 0.7).sin() * 0.1);
-            let factor = if left {
-                std::f32::consts::PI
-            } else {
-                0.2 + 0.05 * (i / width) as f32
-            };
+            let factor = if left { std::f32::consts::PI } else { 0.2 + 0.05 * (i / width) as f32 };
             actual.pixels[i] = expected.pixels[i] * factor;
         }
         actual.pixels[3] = Vec3::NAN;

@@ -42,17 +42,8 @@ impl RegionMask {
 
     /// A mask that is background everywhere.
     pub fn background(width: usize, height: usize) -> Self {
-        let background = Region {
-            name: "background".into(),
-            lit: false,
-            exponent: 0.0,
-        };
-        Self {
-            width,
-            height,
-            regions: vec![background],
-            pixels: vec![0; width * height],
-        }
+        let background = Region { name: "background".into(), lit: false, exponent: 0.0 };
+        Self { width, height, regions: vec![background], pixels: vec![0; width * height] }
     }
 
     /// The region of a pixel's mask value.
@@ -150,35 +141,17 @@ impl ReferenceImage {
             ("mask", (mask.width, mask.height)),
         ];
         if let Some(&(part, found)) = sizes.iter().find(|(_, size)| *size != expected) {
-            return Err(ReferenceError::Size {
-                part,
-                found,
-                expected,
-            });
+            return Err(ReferenceError::Size { part, found, expected });
         }
-        for (part, image) in [
-            ("mean", &mean),
-            ("variance", &variance),
-            ("centre", &centre),
-        ] {
-            let bad = image
-                .pixels
-                .iter()
-                .position(|p| !p.is_finite() || p.min_element() < 0.0);
+        for (part, image) in [("mean", &mean), ("variance", &variance), ("centre", &centre)] {
+            let bad = image.pixels.iter().position(|p| !p.is_finite() || p.min_element() < 0.0);
             if let Some(i) = bad {
                 let (x, y, value) = (i % image.width, i / image.width, image.pixels[i]);
                 return Err(ReferenceError::Value { part, x, y, value });
             }
         }
         let median_lit = check_mask(&mask, &mean)?;
-        Ok(Self {
-            mean,
-            variance,
-            n,
-            centre,
-            mask,
-            median_lit,
-        })
+        Ok(Self { mean, variance, n, centre, mask, median_lit })
     }
 }
 
@@ -187,11 +160,7 @@ impl ReferenceImage {
 /// # Errors
 /// When an index has no region, the sizes differ, or no interior pixel is lit.
 pub(super) fn check_mask(mask: &RegionMask, image: &Image) -> Result<f32, ReferenceError> {
-    let sizes = [
-        (mask.width, mask.height),
-        (mask.pixels.len(), 1),
-        (image.pixels.len(), 1),
-    ];
+    let sizes = [(mask.width, mask.height), (mask.pixels.len(), 1), (image.pixels.len(), 1)];
     let pixels = image.width * image.height;
     if sizes != [(image.width, image.height), (pixels, 1), (pixels, 1)] {
         return Err(ReferenceError::Size {
@@ -201,11 +170,7 @@ pub(super) fn check_mask(mask: &RegionMask, image: &Image) -> Result<f32, Refere
         });
     }
     let index = |value: u16| usize::from(value & RegionMask::INDEX);
-    if let Some(i) = mask
-        .pixels
-        .iter()
-        .position(|&m| index(m) >= mask.regions.len())
-    {
+    if let Some(i) = mask.pixels.iter().position(|&m| index(m) >= mask.regions.len()) {
         return Err(ReferenceError::Region {
             index: index(mask.pixels[i]),
             x: i % mask.width,
@@ -225,9 +190,5 @@ pub(super) fn check_mask(mask: &RegionMask, image: &Image) -> Result<f32, Refere
         return Err(ReferenceError::NothingLit);
     }
     let median = *lit.select_nth_unstable_by(middle, f32::total_cmp).1;
-    if median > 0.0 {
-        Ok(median)
-    } else {
-        Err(ReferenceError::NothingLit)
-    }
+    if median > 0.0 { Ok(median) } else { Err(ReferenceError::NothingLit) }
 }

@@ -146,11 +146,7 @@ pub(super) fn walk(
             walk.interior.pixels += 1;
             walk.interior.failing += u32::from(!within);
             walk.failing[start + x] = !within;
-            let e2 = if finite {
-                row.excess2[x]
-            } else {
-                f32::INFINITY
-            };
+            let e2 = if finite { row.excess2[x] } else { f32::INFINITY };
             if e2 > worst2 {
                 worst2 = e2;
                 walk.worst = Some(WorstPixel {
@@ -178,11 +174,7 @@ pub(super) fn walk(
 
 /// JSON has no infinity: what cannot be measured is the largest number.
 fn presentable(value: f64) -> f64 {
-    if value.is_finite() {
-        value
-    } else {
-        f64::MAX.copysign(value)
-    }
+    if value.is_finite() { value } else { f64::MAX.copysign(value) }
 }
 
 impl Walk {
@@ -216,12 +208,7 @@ impl Walk {
             self.edge_check(tolerances),
         ];
         let mut regions = Vec::new();
-        for (i, sums) in self
-            .regions
-            .iter()
-            .enumerate()
-            .filter(|(_, sums)| sums.pixels > 0)
-        {
+        for (i, sums) in self.regions.iter().enumerate().filter(|(_, sums)| sums.pixels > 0) {
             let region = &mask.regions[i / 2];
             let (check, bias) = sums.judge(&region.name, i % 2 == 1, region.lit, scale, tolerances);
             checks.push(check);
@@ -313,11 +300,7 @@ impl Sums {
         let (mut bias, mut bound, mut worst) = (0.0, tolerances.bias_relative, -1.0);
         for c in 0..3 {
             // What should be black has no scale of its own.
-            let unit = if lit {
-                expected[c].max(DIM * median)
-            } else {
-                median
-            };
+            let unit = if lit { expected[c].max(DIM * median) } else { median };
             let b = (actual[c] - expected[c]) / unit;
             let limit = tolerances
                 .bias_relative
@@ -326,17 +309,9 @@ impl Sums {
                 (bias, bound, worst) = (b, limit, b.abs() / limit);
             }
         }
-        let name = if highlight {
-            format!("{region}, highlight")
-        } else {
-            region.to_owned()
-        };
+        let name = if highlight { format!("{region}, highlight") } else { region.to_owned() };
         let judged = self.pixels >= tolerances.min_region_pixels;
-        let unit = if lit {
-            "than expected"
-        } else {
-            "than expected, in median lit values"
-        };
+        let unit = if lit { "than expected" } else { "than expected, in median lit values" };
         let side = if bias < 0.0 { "darker" } else { "brighter" };
         let detail = match (self.non_finite, judged) {
             (0, true) => format!(
@@ -345,19 +320,14 @@ impl Sums {
                 100.0 * bound,
                 self.pixels
             ),
-            (0, false) => format!(
-                "{name}: {} pixels are too few for a mean; judged one by one",
-                self.pixels
-            ),
+            (0, false) => {
+                format!("{name}: {} pixels are too few for a mean; judged one by one", self.pixels)
+            }
             (n, _) => format!("{name}: {n} of {} pixels are not finite", self.pixels),
         };
         let check = Check {
             id: format!("bias: {name}"),
-            value: if self.non_finite == self.pixels {
-                f64::MAX
-            } else {
-                presentable(bias)
-            },
+            value: if self.non_finite == self.pixels { f64::MAX } else { presentable(bias) },
             bound: presentable(bound),
             passed: self.non_finite == 0 && (!judged || bias.abs() <= bound),
             detail,

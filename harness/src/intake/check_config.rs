@@ -29,19 +29,13 @@ pub fn check_config(
 }
 
 fn error(code: &str, line: u32, message: String, hint: impl Into<String>) -> Finding {
-    Finding::error(code, message)
-        .at(CONFIG_FILE)
-        .on_line(line)
-        .hint(hint)
+    Finding::error(code, message).at(CONFIG_FILE).on_line(line).hint(hint)
 }
 
 /// Whether a value is one that templates ship with.
 fn is_template_value(text: &str) -> bool {
-    let plain: String = text
-        .chars()
-        .filter(|c| c.is_alphanumeric())
-        .flat_map(char::to_lowercase)
-        .collect();
+    let plain: String =
+        text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
     const TEMPLATE: [&str; 15] = [
         "first",
         "last",
@@ -65,12 +59,9 @@ fn is_template_value(text: &str) -> bool {
 fn check_name(field: &Option<Field>, key: &str, findings: &mut Vec<Finding>) {
     let hint = format!("write your name: \"{key}\": \"Ada\"");
     match field {
-        None => findings.push(error(
-            "config_credentials",
-            1,
-            format!("\"{key}\" is missing"),
-            hint,
-        )),
+        None => {
+            findings.push(error("config_credentials", 1, format!("\"{key}\" is missing"), hint))
+        }
         Some(field) if field.text.is_empty() => {
             findings.push(error(
                 "config_credentials",
@@ -80,10 +71,7 @@ fn check_name(field: &Option<Field>, key: &str, findings: &mut Vec<Finding>) {
             ));
         }
         Some(field) if is_template_value(&field.text) => {
-            let message = format!(
-                "\"{key}\" is still the template's: {}",
-                printable(&field.text)
-            );
+            let message = format!("\"{key}\" is still the template's: {}", printable(&field.text));
             findings.push(error("config_credentials", field.line, message, hint));
         }
         Some(_) => {}
@@ -108,10 +96,8 @@ fn check_id(field: &Option<Field>, findings: &mut Vec<Finding>) {
             ));
         }
         Some(field) if is_template_value(&field.text) => {
-            let message = format!(
-                "\"studentID\" is still the template's: {}",
-                printable(&field.text)
-            );
+            let message =
+                format!("\"studentID\" is still the template's: {}", printable(&field.text));
             findings.push(error("config_credentials", field.line, message, hint));
         }
         // A sign would pass `parse`, so digits are asked for first.
@@ -119,10 +105,8 @@ fn check_id(field: &Option<Field>, findings: &mut Vec<Finding>) {
             if !field.text.bytes().all(|b| b.is_ascii_digit())
                 || field.text.parse::<u64>().is_err() =>
         {
-            let message = format!(
-                "\"studentID\": expected digits only, found '{}'",
-                printable(&field.text)
-            );
+            let message =
+                format!("\"studentID\": expected digits only, found '{}'", printable(&field.text));
             findings.push(error("config_student_id", field.line, message, hint));
         }
         Some(field) if field.text.bytes().all(|b| b == b'0') => {
@@ -181,19 +165,11 @@ fn check_renders(
         {
             continue;
         }
-        findings.push(
-            not_found(&written, &name, paths, tree)
-                .at(CONFIG_FILE)
-                .on_line(render.line),
-        );
+        findings.push(not_found(&written, &name, paths, tree).at(CONFIG_FILE).on_line(render.line));
     }
-    for path in paths
-        .iter()
-        .filter(|path| path.to_lowercase().ends_with(".exr"))
-    {
-        let is_listed = listed
-            .keys()
-            .any(|name| name.to_lowercase() == canonical(path, tree).to_lowercase());
+    for path in paths.iter().filter(|path| path.to_lowercase().ends_with(".exr")) {
+        let is_listed =
+            listed.keys().any(|name| name.to_lowercase() == canonical(path, tree).to_lowercase());
         if tree.file_at(path).is_some() && !is_listed {
             findings.push(
                 Finding::warning(
@@ -202,9 +178,7 @@ fn check_renders(
                 )
                 .at(CONFIG_FILE)
                 .on_line(1)
-                .hint(format!(
-                    "add {{ \"scene\": ..., \"render\": \"{path}\" }} to \"renders\""
-                )),
+                .hint(format!("add {{ \"scene\": ..., \"render\": \"{path}\" }} to \"renders\"")),
             );
         }
     }
@@ -214,9 +188,7 @@ fn check_renders(
 fn not_found(written: &str, name: &str, paths: &[&str], tree: &TreeSpec) -> Finding {
     let lower = name.to_lowercase();
     let base = |path: &str| path.rsplit('/').next().unwrap_or(path).to_lowercase();
-    let same_path = paths
-        .iter()
-        .find(|found| canonical(found, tree).to_lowercase() == lower);
+    let same_path = paths.iter().find(|found| canonical(found, tree).to_lowercase() == lower);
     let same_name = || paths.iter().find(|found| base(found) == base(name));
     if let Some(found) = same_path {
         Finding::error(
@@ -231,28 +203,21 @@ fn not_found(written: &str, name: &str, paths: &[&str], tree: &TreeSpec) -> Find
         )
         .hint(format!("write \"{found}\""))
     } else {
-        Finding::error(
-            "config_render_missing",
-            format!("'{written}' is listed, but not handed in"),
-        )
-        .hint("add the image or remove the entry")
+        Finding::error("config_render_missing", format!("'{written}' is listed, but not handed in"))
+            .hint("add the image or remove the entry")
     }
 }
 
 /// The tree's own path of a file that may stand at an alias.
 fn canonical(path: &str, tree: &TreeSpec) -> String {
-    tree.file_at(path)
-        .map_or(path, |file| &file.path)
-        .to_owned()
+    tree.file_at(path).map_or(path, |file| &file.path).to_owned()
 }
 
 /// A listed path as a plain relative path.
 fn resolve(written: &str) -> Result<String, Finding> {
     if written.trim().is_empty() {
-        return Err(
-            Finding::error("config_render_missing", "a render with an empty path")
-                .hint("write the image's path from the root of the hand-in"),
-        );
+        return Err(Finding::error("config_render_missing", "a render with an empty path")
+            .hint("write the image's path from the root of the hand-in"));
     }
     match safe_path(written.trim().as_bytes(), &Limits::default()) {
         Ok(safe) => Ok(safe.path),
@@ -281,15 +246,9 @@ mod tests {
         let (config, mut findings) = HandInConfig::parse(text.as_bytes());
         findings.extend(check_config(&config, paths, &[], &TreeSpec::default()));
         for finding in &findings {
-            assert!(
-                finding.hint.is_some() && finding.line.is_some(),
-                "{finding}"
-            );
+            assert!(finding.hint.is_some() && finding.line.is_some(), "{finding}");
         }
-        findings
-            .iter()
-            .map(|f| format!("{}@{}", f.code, f.line.unwrap_or(0)))
-            .collect()
+        findings.iter().map(|f| format!("{}@{}", f.code, f.line.unwrap_or(0))).collect()
     }
 
     const CBOX: &str = "offline/cbox_simple_offline.exr";
@@ -297,43 +256,29 @@ mod tests {
     #[test]
     fn a_right_list_is_silent() {
         assert_eq!(
-            check(
-                r#"{"scene": "c", "render": "offline/cbox_simple_offline.exr"}"#,
-                &[CBOX]
-            ),
+            check(r#"{"scene": "c", "render": "offline/cbox_simple_offline.exr"}"#, &[CBOX]),
             [""; 0]
         );
     }
 
     #[test]
     fn any_name_of_the_bonus_is_the_bonus() {
-        for handed_in in [
-            "realtime/teapot_bonus.exr",
-            "realtime/teapot_simple_realtime_bonus.exr",
-        ] {
-            assert_eq!(
-                check(r#""renders/teapot_bonus.exr""#, &[handed_in]),
-                [""; 0]
-            );
+        for handed_in in ["realtime/teapot_bonus.exr", "realtime/teapot_simple_realtime_bonus.exr"]
+        {
+            assert_eq!(check(r#""renders/teapot_bonus.exr""#, &[handed_in]), [""; 0]);
         }
     }
 
     #[test]
     fn each_mistake_has_its_code() {
-        assert_eq!(
-            check("\"offline/nothing.exr\"", &[]),
-            ["config_render_missing@3"]
-        );
+        assert_eq!(check("\"offline/nothing.exr\"", &[]), ["config_render_missing@3"]);
         assert_eq!(check("\"../../etc/passwd\"", &[]), ["config_path_escape@3"]);
         assert_eq!(check("\"/etc/passwd\"", &[]), ["config_path_escape@3"]);
         assert_eq!(
             check("\"offline\\\\cbox_simple_offline.exr\"", &[CBOX]),
             ["config_not_listed@1", "config_backslash@3"]
         );
-        assert_eq!(
-            check("\"Offline/cbox_simple_offline.exr\"", &[CBOX]),
-            ["config_wrong_case@3"]
-        );
+        assert_eq!(check("\"Offline/cbox_simple_offline.exr\"", &[CBOX]), ["config_wrong_case@3"]);
         assert_eq!(
             check(&format!("\"{CBOX}\",\n\"./{CBOX}\""), &[CBOX]),
             ["config_listed_twice@4"]
@@ -360,14 +305,7 @@ mod tests {
         assert_eq!(with("", "260123456"), ["config_credentials@1"]);
         assert_eq!(with("First", "260123456"), ["config_credentials@1"]);
         assert_eq!(with("<your name>", "260123456"), ["config_credentials@1"]);
-        for bad in [
-            "26012345x",
-            "-1",
-            "+1",
-            "1.5",
-            "18446744073709551616",
-            "000",
-        ] {
+        for bad in ["26012345x", "-1", "+1", "1.5", "18446744073709551616", "000"] {
             assert_eq!(with("Ada", bad), ["config_student_id@3"], "{bad}");
         }
         assert_eq!(with("Ada", ""), ["config_credentials@3"]);

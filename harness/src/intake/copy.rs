@@ -77,9 +77,7 @@ impl<'a> PrivateCopy<'a> {
     ) -> Result<Self, IntakeError> {
         let mut entries = fs::read_dir(dest).map_err(|e| IntakeError::io("list", dest, e))?;
         if entries.next().is_some() {
-            return Err(IntakeError::DestinationNotEmpty {
-                path: dest.to_owned(),
-            });
+            return Err(IntakeError::DestinationNotEmpty { path: dest.to_owned() });
         }
         Ok(Self {
             dest,
@@ -128,8 +126,7 @@ impl<'a> PrivateCopy<'a> {
             if kind == Kind::Folder {
                 return Admitted::Folder;
             }
-            self.findings
-                .push(Finding::error("name_empty", "a file without a name"));
+            self.findings.push(Finding::error("name_empty", "a file without a name"));
             return Admitted::Refused;
         }
         if let Some(pattern) = self.tree.ignored_by(&path) {
@@ -148,9 +145,7 @@ impl<'a> PrivateCopy<'a> {
         }
         self.note_spelling(&path);
         let parents: Vec<&str> = path.match_indices('/').map(|(i, _)| &path[..i]).collect();
-        let is_both = parents
-            .iter()
-            .any(|parent| self.files.contains_key(*parent))
+        let is_both = parents.iter().any(|parent| self.files.contains_key(*parent))
             || match kind {
                 Kind::File => self.folders.contains(&path),
                 Kind::Folder => self.files.contains_key(&path),
@@ -213,10 +208,8 @@ impl<'a> PrivateCopy<'a> {
     pub(super) fn count_bytes(&mut self, n: u64, path: &str) -> Result<(), Halt> {
         self.total_bytes += n;
         if self.total_bytes > mib(self.limits.max_total_mib) {
-            let message = format!(
-                "contents exceed the limit of {} MiB in total",
-                self.limits.max_total_mib
-            );
+            let message =
+                format!("contents exceed the limit of {} MiB in total", self.limits.max_total_mib);
             return Err(self.refuse(
                 Finding::error("limit_total", message)
                     .at(path)
@@ -238,11 +231,7 @@ impl<'a> PrivateCopy<'a> {
         reader: &mut dyn Read,
         packed_bytes: Option<u64>,
     ) -> Result<io::Result<Written>, Halt> {
-        let mut out = if self.findings.has_errors() {
-            None
-        } else {
-            self.create(path)?
-        };
+        let mut out = if self.findings.has_errors() { None } else { self.create(path)? };
         let mut sha256 = Sha256::new();
         let mut crc = Crc::new();
         let mut bytes = 0u64;
@@ -269,17 +258,13 @@ impl<'a> PrivateCopy<'a> {
             }
             bytes += n as u64;
             if bytes > mib(self.limits.max_file_mib) {
-                let message = format!(
-                    "the file exceeds the limit of {} MiB",
-                    self.limits.max_file_mib
-                );
+                let message =
+                    format!("the file exceeds the limit of {} MiB", self.limits.max_file_mib);
                 return Err(self.refuse(Finding::error("limit_file", message).at(path)));
             }
             if packed_bytes.is_some_and(|packed| self.limits.ratio_exceeded(bytes, packed)) {
-                let message = format!(
-                    "unpacks to more than {} times its packed size",
-                    self.limits.max_ratio
-                );
+                let message =
+                    format!("unpacks to more than {} times its packed size", self.limits.max_ratio);
                 return Err(self.refuse(Finding::error("limit_ratio", message).at(path)));
             }
             self.count_bytes(n as u64, path)?;
@@ -291,18 +276,9 @@ impl<'a> PrivateCopy<'a> {
             }
         }
         let sha256 = hex(&sha256.finalize());
-        self.files.insert(
-            path.to_owned(),
-            Some(HandInFile {
-                path: path.to_owned(),
-                bytes,
-                sha256,
-            }),
-        );
-        Ok(Ok(Written {
-            bytes,
-            crc32: crc.sum(),
-        }))
+        self.files
+            .insert(path.to_owned(), Some(HandInFile { path: path.to_owned(), bytes, sha256 }));
+        Ok(Ok(Written { bytes, crc32: crc.sum() }))
     }
 
     /// Creates a new file; `None` where its name is taken (a file system that ignores case).
@@ -339,10 +315,7 @@ impl<'a> PrivateCopy<'a> {
             return Err(error);
         }
         for (pattern, count) in std::mem::take(&mut self.ignored) {
-            self.findings.push(Finding::note(
-                "ignored",
-                format!("{count} ignored: {pattern}"),
-            ));
+            self.findings.push(Finding::note("ignored", format!("{count} ignored: {pattern}")));
         }
         let mut files: Vec<HandInFile> = self.files.into_values().flatten().collect();
         if files.is_empty() && !self.findings.has_errors() {
@@ -367,11 +340,8 @@ impl<'a> PrivateCopy<'a> {
                 file.path.drain(..=folder.len());
             }
             self.findings.push(
-                Finding::note(
-                    "wrapped",
-                    "one wrapping folder: taken as the root of the hand-in",
-                )
-                .at(format!("{folder}/")),
+                Finding::note("wrapped", "one wrapping folder: taken as the root of the hand-in")
+                    .at(format!("{folder}/")),
             );
         }
         files.sort_by(|a, b| a.path.cmp(&b.path));
@@ -390,10 +360,7 @@ impl<'a> PrivateCopy<'a> {
 /// The single folder that holds everything, unless it is one of the tree's own.
 fn wrapping_folder(files: &[HandInFile], tree: &TreeSpec) -> Option<String> {
     let (top, _) = files.first()?.path.split_once('/')?;
-    let inside = |path: &str| {
-        path.strip_prefix(top)
-            .is_some_and(|rest| rest.starts_with('/'))
-    };
+    let inside = |path: &str| path.strip_prefix(top).is_some_and(|rest| rest.starts_with('/'));
     if !files.iter().all(|file| inside(&file.path)) {
         return None;
     }
@@ -424,11 +391,7 @@ fn clear(dest: &Path) -> Result<(), IntakeError> {
     for entry in entries {
         let path = entry.map_err(|e| IntakeError::io("list", dest, e))?.path();
         let is_dir = path.symlink_metadata().is_ok_and(|m| m.is_dir());
-        let removed = if is_dir {
-            fs::remove_dir_all(&path)
-        } else {
-            fs::remove_file(&path)
-        };
+        let removed = if is_dir { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
         removed.map_err(|e| IntakeError::io("remove", &path, e))?;
     }
     Ok(())

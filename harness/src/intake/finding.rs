@@ -144,17 +144,13 @@ impl Findings {
     /// some were left out.
     pub(super) fn into_vec(mut self) -> Vec<Finding> {
         self.list.sort_by_key(|finding| finding.severity);
-        for (severity, count) in [Severity::Error, Severity::Warning, Severity::Note]
-            .into_iter()
-            .zip(self.counts)
+        for (severity, count) in
+            [Severity::Error, Severity::Warning, Severity::Note].into_iter().zip(self.counts)
         {
             if count > Self::KEPT {
                 self.list.push(Finding::note(
                     "more_findings",
-                    format!(
-                        "{} more of severity {severity} are not shown",
-                        count - Self::KEPT
-                    ),
+                    format!("{} more of severity {severity} are not shown", count - Self::KEPT),
                 ));
             }
         }

@@ -19,30 +19,18 @@ pub(super) fn read(
     let mut open: Vec<(PathBuf, Vec<u8>)> = vec![(source.to_owned(), Vec::new())];
     while let Some((folder, relative)) = open.pop() {
         let mut names = Vec::new();
-        for entry in folder
-            .read_dir()
-            .map_err(|e| IntakeError::io("list", &folder, e))?
-        {
+        for entry in folder.read_dir().map_err(|e| IntakeError::io("list", &folder, e))? {
             copy.count_entry()?;
-            names.push(
-                entry
-                    .map_err(|e| IntakeError::io("list", &folder, e))?
-                    .file_name(),
-            );
+            names.push(entry.map_err(|e| IntakeError::io("list", &folder, e))?.file_name());
         }
         names.sort();
         for name in names {
             let path = folder.join(&name);
             let mut raw = relative.clone();
             raw.extend_from_slice(name.as_encoded_bytes());
-            let metadata = path
-                .symlink_metadata()
-                .map_err(|e| IntakeError::io("read", &path, e))?;
-            let kind = if metadata.is_dir() {
-                Kind::Folder
-            } else {
-                Kind::File
-            };
+            let metadata =
+                path.symlink_metadata().map_err(|e| IntakeError::io("read", &path, e))?;
+            let kind = if metadata.is_dir() { Kind::Folder } else { Kind::File };
             if !is_wanted(&String::from_utf8_lossy(&raw), kind) {
                 continue;
             }
@@ -72,18 +60,13 @@ fn copy_file(
 ) -> Result<(), Halt> {
     let mut file = open_unfollowed(path).map_err(|e| IntakeError::io("read", path, e))?;
     // What was opened must be what was looked at: a folder can change under our feet.
-    let opened = file
-        .metadata()
-        .map_err(|e| IntakeError::io("read", path, e))?;
+    let opened = file.metadata().map_err(|e| IntakeError::io("read", path, e))?;
     if !opened.is_file() || !same_file(listed, &opened) {
-        let finding = Finding::error(
-            "changed_while_read",
-            "the file was exchanged while it was read",
-        );
+        let finding =
+            Finding::error("changed_while_read", "the file was exchanged while it was read");
         return Err(copy.refuse(finding.at(printable_bytes(raw))));
     }
-    copy.write(admitted, &mut file, None)?
-        .map_err(|e| IntakeError::io("read", path, e))?;
+    copy.write(admitted, &mut file, None)?.map_err(|e| IntakeError::io("read", path, e))?;
     Ok(())
 }
 
@@ -91,10 +74,7 @@ fn copy_file(
 fn open_unfollowed(path: &Path) -> io::Result<File> {
     use std::os::unix::fs::OpenOptionsExt;
     // Non-blocking, so that a fifo put in its place cannot hold us.
-    OpenOptions::new()
-        .read(true)
-        .custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK)
-        .open(path)
+    OpenOptions::new().read(true).custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK).open(path)
 }
 
 #[cfg(not(unix))]
@@ -118,11 +98,8 @@ fn special(metadata: &Metadata, raw: &[u8]) -> Finding {
         Finding::error("link", "expected a file or folder, found a symbolic link")
             .hint("put the file itself there")
     } else {
-        Finding::error(
-            "special_file",
-            "expected a file or folder, found a device, fifo or socket",
-        )
-        .hint("remove it")
+        Finding::error("special_file", "expected a file or folder, found a device, fifo or socket")
+            .hint("remove it")
     };
     finding.at(printable_bytes(raw))
 }

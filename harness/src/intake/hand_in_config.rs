@@ -77,11 +77,8 @@ impl HandInConfig {
         };
         for (key, line, node) in members {
             // `studentID`, `student_id` and `Student-Id` are one key.
-            let plain: String = key
-                .chars()
-                .filter(|c| c.is_alphanumeric())
-                .flat_map(char::to_lowercase)
-                .collect();
+            let plain: String =
+                key.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
             match plain.as_str() {
                 "firstname" | "first" | "givenname" => {
                     take(&mut self.first_name, key, *line, node, findings)
@@ -115,10 +112,7 @@ impl HandInConfig {
             return;
         };
         let (first, last) = text.rsplit_once(char::is_whitespace).unwrap_or((&text, ""));
-        let field = |text: &str| Field {
-            text: text.trim().to_owned(),
-            line,
-        };
+        let field = |text: &str| Field { text: text.trim().to_owned(), line };
         self.first_name.get_or_insert(field(first));
         if !last.is_empty() {
             self.last_name.get_or_insert(field(last));
@@ -127,14 +121,10 @@ impl HandInConfig {
 
     fn take_renders(&mut self, list: &Node, findings: &mut Vec<Finding>) {
         let Value::List(items) = &list.value else {
-            let message = format!(
-                "expected a list of renders [ ... ], found {}",
-                list.value.kind()
-            );
+            let message =
+                format!("expected a list of renders [ ... ], found {}", list.value.kind());
             findings.push(
-                Finding::error("config_renders", message)
-                    .on_line(list.line)
-                    .hint(RENDER_HINT),
+                Finding::error("config_renders", message).on_line(list.line).hint(RENDER_HINT),
             );
             return;
         };
@@ -158,19 +148,14 @@ impl HandInConfig {
                             _ => None,
                         })
                     };
-                    let scene = text(&["scene", "name", "title"])
-                        .map(|(text, _)| text)
-                        .unwrap_or_default();
+                    let scene =
+                        text(&["scene", "name", "title"]).map(|(text, _)| text).unwrap_or_default();
                     (scene, text(&["render", "path", "file", "image"]))
                 }
                 _ => (String::new(), None),
             };
             match render {
-                Some((render, line)) => self.renders.push(ListedRender {
-                    scene,
-                    render,
-                    line,
-                }),
+                Some((render, line)) => self.renders.push(ListedRender { scene, render, line }),
                 None => findings.push(
                     Finding::error("config_renders", "a render without a path")
                         .on_line(item.line)
@@ -193,11 +178,7 @@ fn take(slot: &mut Option<Field>, key: &str, line: u32, node: &Node, findings: &
         Value::Text(text) | Value::Number(text) => text.trim().to_owned(),
         Value::Null => String::new(),
         other => {
-            let message = format!(
-                "'{}': expected text, found {}",
-                printable(key),
-                other.kind()
-            );
+            let message = format!("'{}': expected text, found {}", printable(key), other.kind());
             findings.push(
                 Finding::error("config_type", message)
                     .on_line(node.line)
@@ -209,16 +190,9 @@ fn take(slot: &mut Option<Field>, key: &str, line: u32, node: &Node, findings: &
     if let Some(first) = slot
         && first.text != text
     {
-        let message = format!(
-            "'{}' says something else than line {}",
-            printable(key),
-            first.line
-        );
-        findings.push(
-            Finding::error("config_twice", message)
-                .on_line(line)
-                .hint("keep one of them"),
-        );
+        let message = format!("'{}' says something else than line {}", printable(key), first.line);
+        findings
+            .push(Finding::error("config_twice", message).on_line(line).hint("keep one of them"));
         return;
     }
     *slot = Some(Field { text, line });
@@ -232,11 +206,7 @@ mod tests {
         let (config, findings) = HandInConfig::parse(text.as_bytes());
         assert_eq!(findings, [], "{text}");
         let text = |f: &Option<Field>| f.as_ref().map(|f| f.text.clone()).unwrap_or_default();
-        (
-            text(&config.first_name),
-            text(&config.last_name),
-            config.sampler_seed(),
-        )
+        (text(&config.first_name), text(&config.last_name), config.sampler_seed())
     }
 
     #[test]
@@ -259,16 +229,9 @@ mod tests {
         let (config, findings) = HandInConfig::parse(
             b"{\"renders\": [\n{\"scene\": \"T\", \"render\": \"a.exr\"},\n\"b.exr\",\n{\"scene\": \"x\"}\n]}",
         );
-        let listed: Vec<_> = config
-            .renders
-            .iter()
-            .map(|r| (r.render.as_str(), r.line))
-            .collect();
+        let listed: Vec<_> = config.renders.iter().map(|r| (r.render.as_str(), r.line)).collect();
         assert_eq!(listed, [("a.exr", 2), ("b.exr", 3)]);
-        assert_eq!(
-            (findings[0].code.as_str(), findings[0].line),
-            ("config_renders", Some(4))
-        );
+        assert_eq!((findings[0].code.as_str(), findings[0].line), ("config_renders", Some(4)));
         assert_eq!(findings[0].path.as_deref(), Some("config.json"));
     }
 
@@ -282,9 +245,6 @@ mod tests {
     #[test]
     fn two_answers_are_not_one() {
         let (_, findings) = HandInConfig::parse(b"{\"id\": 1,\n\"studentID\": 2}");
-        assert_eq!(
-            (findings[0].code.as_str(), findings[0].line),
-            ("config_twice", Some(2))
-        );
+        assert_eq!((findings[0].code.as_str(), findings[0].line), ("config_twice", Some(2)));
     }
 }

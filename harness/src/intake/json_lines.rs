@@ -71,10 +71,7 @@ pub(super) fn parse(bytes: &[u8]) -> (Option<Node>, Vec<Finding>) {
     let text = match std::str::from_utf8(text) {
         Ok(text) => text.to_owned(),
         Err(e) => {
-            let line = 1 + text[..e.valid_up_to()]
-                .iter()
-                .filter(|b| **b == b'\n')
-                .count() as u32;
+            let line = 1 + text[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count() as u32;
             findings.push(
                 Finding::error("json_encoding", "expected UTF-8, found another encoding")
                     .on_line(line)
@@ -83,12 +80,7 @@ pub(super) fn parse(bytes: &[u8]) -> (Option<Node>, Vec<Finding>) {
             String::from_utf8_lossy(text).into_owned()
         }
     };
-    let mut reader = Reader {
-        chars: text.chars().collect(),
-        at: 0,
-        line: 1,
-        findings,
-    };
+    let mut reader = Reader { chars: text.chars().collect(), at: 0, line: 1, findings };
     let node = reader.document();
     (node, reader.findings)
 }
@@ -110,10 +102,7 @@ impl Reader {
         if let Some(c) = self.peek() {
             self.error(
                 "json_syntax",
-                &format!(
-                    "expected the end of the file, found '{}'",
-                    printable(&c.to_string())
-                ),
+                &format!("expected the end of the file, found '{}'", printable(&c.to_string())),
                 "remove what follows the last '}'",
             );
         }
@@ -136,8 +125,7 @@ impl Reader {
     fn error_on(&mut self, line: u32, code: &str, message: &str, hint: &str) {
         // One mistake may follow from another: a few are enough.
         if self.findings.len() < 8 {
-            self.findings
-                .push(Finding::error(code, message).on_line(line).hint(hint));
+            self.findings.push(Finding::error(code, message).on_line(line).hint(hint));
         }
     }
 
@@ -224,10 +212,7 @@ impl Reader {
     /// A number, keyword or unquoted word.
     fn word(&mut self) -> String {
         let mut word = String::new();
-        while let Some(c) = self
-            .peek()
-            .filter(|c| c.is_alphanumeric() || "+-._".contains(*c))
-        {
+        while let Some(c) = self.peek().filter(|c| c.is_alphanumeric() || "+-._".contains(*c)) {
             word.push(c);
             self.next();
         }
@@ -239,11 +224,7 @@ impl Reader {
         let open = self.next();
         let is_plain = open == Some('"');
         if !is_plain {
-            self.error(
-                "json_quotes",
-                "text needs plain double quotes",
-                "write \"...\" around it",
-            );
+            self.error("json_quotes", "text needs plain double quotes", "write \"...\" around it");
         }
         let mut text = String::new();
         loop {
@@ -285,9 +266,7 @@ impl Reader {
             Some('f') => '\u{c}',
             Some('u') => {
                 let digits: String = self.chars.iter().skip(self.at + 1).take(4).collect();
-                let code = u32::from_str_radix(&digits, 16)
-                    .ok()
-                    .filter(|_| digits.len() == 4);
+                let code = u32::from_str_radix(&digits, 16).ok().filter(|_| digits.len() == 4);
                 if let Some(code) = code {
                     for _ in 0..5 {
                         self.next();
@@ -424,18 +403,12 @@ mod tests {
         let (node, findings) =
             parse(b"{\n \"a\": [1, -2.5e3, true, null],\n \"b\": \"x\\n\\u00e9\"\n}\n");
         assert_eq!(findings, []);
-        let Some(Node {
-            value: Value::Object(members),
-            line: 1,
-        }) = node
-        else {
+        let Some(Node { value: Value::Object(members), line: 1 }) = node else {
             panic!("an object")
         };
         assert_eq!((members[0].1, members[1].1), (2, 3));
         assert_eq!(members[1].2.value, Value::Text("x\n\u{e9}".to_owned()));
-        let Value::List(items) = &members[0].2.value else {
-            panic!("a list")
-        };
+        let Value::List(items) = &members[0].2.value else { panic!("a list") };
         assert_eq!(items[1].value, Value::Number("-2.5e3".to_owned()));
     }
 
@@ -443,10 +416,7 @@ mod tests {
     fn mistakes_have_code_and_line() {
         assert_eq!(codes("\u{feff}{}"), ["json_bom@1"]);
         assert_eq!(codes("{\n\"a\": 1,\n}"), ["json_trailing_comma@2"]);
-        assert_eq!(
-            codes("{\n// x\n\"a\": 1 /* y\n */ }"),
-            ["json_comment@2", "json_comment@3"]
-        );
+        assert_eq!(codes("{\n// x\n\"a\": 1 /* y\n */ }"), ["json_comment@2", "json_comment@3"]);
         assert_eq!(codes("{\"a\": 1\n\"b\": 2}"), ["json_missing_comma@2"]);
         assert_eq!(codes("{'a': 1}"), ["json_quotes@1"]);
         assert_eq!(codes("{a: b}"), ["json_quotes@1", "json_quotes@1"]);

@@ -22,12 +22,7 @@ pub(super) enum TokenKind {
 
 /// Splits `source` into tokens.
 pub(super) fn tokens(source: &str) -> Vec<Token> {
-    let mut lexer = Lexer {
-        chars: source.chars().collect(),
-        at: 0,
-        line: 1,
-        tokens: Vec::new(),
-    };
+    let mut lexer = Lexer { chars: source.chars().collect(), at: 0, line: 1, tokens: Vec::new() };
     // A `#!` line of a script is no attribute.
     if source.starts_with("#!") && !source.starts_with("#![") {
         lexer.skip_line();
@@ -83,10 +78,7 @@ impl Lexer {
             _ if c == '_' || c.is_alphabetic() => self.word(line),
             _ if c.is_ascii_digit() => {
                 // `1..2` is two numbers: the dot is left alone.
-                while self
-                    .peek(0)
-                    .is_some_and(|c| c == '_' || c.is_alphanumeric())
-                {
+                while self.peek(0).is_some_and(|c| c == '_' || c.is_alphanumeric()) {
                     self.next();
                 }
                 self.push(line, TokenKind::Other);
@@ -202,10 +194,7 @@ impl Lexer {
                 self.next();
             }
             _ => {
-                while self
-                    .peek(0)
-                    .is_some_and(|c| c == '_' || c.is_alphanumeric())
-                {
+                while self.peek(0).is_some_and(|c| c == '_' || c.is_alphanumeric()) {
                     self.next();
                 }
             }
@@ -247,10 +236,7 @@ mod tests {
         assert_eq!(words("'\\'' a"), ["a@1"]);
         assert_eq!(words("'\\u{41}' a"), ["a@1"]);
         assert_eq!(words("b'\\\\' a"), ["a@1"]);
-        assert_eq!(
-            words("f<'a>(x: &'a str) { 'outer: loop }"),
-            ["f@1", "x@1", "str@1", "loop@1"]
-        );
+        assert_eq!(words("f<'a>(x: &'a str) { 'outer: loop }"), ["f@1", "x@1", "str@1", "loop@1"]);
         assert_eq!(words("'_' a"), ["a@1"]);
     }
 

@@ -58,24 +58,13 @@ pub(super) fn safe_path(raw: &[u8], limits: &Limits) -> Result<SafePath, Finding
         );
     }
     if raw.len() as u64 > limits.max_path_bytes {
-        let found = format!(
-            "{} bytes, over the limit of {}",
-            raw.len(),
-            limits.max_path_bytes
-        );
+        let found = format!("{} bytes, over the limit of {}", raw.len(), limits.max_path_bytes);
         return refuse("limit_path_bytes", &found, "use shorter names");
     }
     let (text, replaced) = decode(raw);
-    let components: Vec<&str> = text
-        .split('/')
-        .filter(|c| !c.is_empty() && *c != ".")
-        .collect();
+    let components: Vec<&str> = text.split('/').filter(|c| !c.is_empty() && *c != ".").collect();
     if components.contains(&"..") {
-        return refuse(
-            "path_escape",
-            "'..'",
-            "archive the folder itself, without '..'",
-        );
+        return refuse("path_escape", "'..'", "archive the folder itself, without '..'");
     }
     // "Icon\r" is how macOS names a folder's picture; it is ignored later like .DS_Store.
     let hidden = components
@@ -92,24 +81,13 @@ pub(super) fn safe_path(raw: &[u8], limits: &Limits) -> Result<SafePath, Finding
     }
     // Replaced bytes take four; no file system takes components longer than this.
     if components.iter().any(|c| c.len() > 255) {
-        return refuse(
-            "limit_path_bytes",
-            "a name longer than 255 bytes",
-            "use shorter names",
-        );
+        return refuse("limit_path_bytes", "a name longer than 255 bytes", "use shorter names");
     }
     if components.len() as u64 > limits.max_depth {
-        let found = format!(
-            "{} levels, over the limit of {}",
-            components.len(),
-            limits.max_depth
-        );
+        let found = format!("{} levels, over the limit of {}", components.len(), limits.max_depth);
         return refuse("limit_depth", &found, "put the folders nearer to the root");
     }
-    Ok(SafePath {
-        path: components.join("/"),
-        replaced,
-    })
+    Ok(SafePath { path: components.join("/"), replaced })
 }
 
 /// UTF-8 text of `raw`, with every other byte written as `_xHH`.
@@ -142,10 +120,7 @@ mod tests {
         assert_eq!(code(b"src/lib.rs"), "src/lib.rs");
         assert_eq!(code(b"./src//./lib.rs/"), "src/lib.rs");
         assert_eq!(code(b"./"), "");
-        assert_eq!(
-            code("src/\u{e9}t\u{e9}.rs".as_bytes()),
-            "src/\u{e9}t\u{e9}.rs"
-        );
+        assert_eq!(code("src/\u{e9}t\u{e9}.rs".as_bytes()), "src/\u{e9}t\u{e9}.rs");
         assert_eq!(code(b"src/\xe9.rs"), "src/_xE9.rs");
         assert_eq!(code(b"src/..a.rs"), "src/..a.rs");
         assert_eq!(code(b"x/Icon\r"), "x/Icon\r");

@@ -42,10 +42,7 @@ pub fn pack(
     limits: &Limits,
 ) -> Result<Packed, IntakeError> {
     let is_wanted = |path: &str, kind: Kind| {
-        let below = |file: &str| {
-            file.strip_prefix(path)
-                .is_some_and(|rest| rest.starts_with('/'))
-        };
+        let below = |file: &str| file.strip_prefix(path).is_some_and(|rest| rest.starts_with('/'));
         tree.open_folder_of(path).is_some()
             || match kind {
                 Kind::File => tree.file_at(path).is_some(),
@@ -82,27 +79,13 @@ pub fn fix(
 /// `a2_first_last.zip` by the credentials: lower case, other signs than letters and digits as `-`.
 pub fn archive_name(config: &HandInConfig, tree: &TreeSpec) -> String {
     let plain = |field: &Option<Field>| {
-        let text = field
-            .as_ref()
-            .map(|field| field.text.to_lowercase())
-            .unwrap_or_default();
-        let parts: Vec<&str> = text
-            .split(|c: char| !c.is_alphanumeric())
-            .filter(|part| !part.is_empty())
-            .collect();
+        let text = field.as_ref().map(|field| field.text.to_lowercase()).unwrap_or_default();
+        let parts: Vec<&str> =
+            text.split(|c: char| !c.is_alphanumeric()).filter(|part| !part.is_empty()).collect();
         let name: String = parts.join("-").chars().take(40).collect();
-        if name.is_empty() {
-            "unknown".to_owned()
-        } else {
-            name
-        }
+        if name.is_empty() { "unknown".to_owned() } else { name }
     };
-    format!(
-        "{}_{}_{}.zip",
-        tree.name_prefix,
-        plain(&config.first_name),
-        plain(&config.last_name)
-    )
+    format!("{}_{}_{}.zip", tree.name_prefix, plain(&config.first_name), plain(&config.last_name))
 }
 
 fn write_conforming(
@@ -124,11 +107,7 @@ fn write_conforming(
         Some(config) if out.is_dir() => out.join(archive_name(config, tree)),
         _ => out.to_owned(),
     };
-    validation.name = archive
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    validation.name = archive.file_name().unwrap_or_default().to_string_lossy().into_owned();
     // Beside the target, so that a half-written archive is never seen under its name.
     let partial = archive.with_extension("zip.partial");
     fs::write(&partial, &bytes).map_err(|e| IntakeError::io("write", &partial, e))?;
@@ -151,16 +130,10 @@ fn refused(hand_in: &HandIn, mut findings: Vec<Finding>) -> IntakeError {
 
 /// Path in the archive to path in the copy, for everything that belongs to the tree.
 fn places(hand_in: &HandIn, tree: &TreeSpec) -> Result<BTreeMap<String, String>, IntakeError> {
-    let paths: Vec<&str> = hand_in
-        .files
-        .iter()
-        .map(|file| file.path.as_str())
-        .collect();
+    let paths: Vec<&str> = hand_in.files.iter().map(|file| file.path.as_str()).collect();
     let lines = match_tree(&paths, tree);
     if lines.iter().any(|line| line.mark == Mark::Missing) {
-        let errors = tree_findings(&lines)
-            .into_iter()
-            .filter(|f| f.code == "tree_missing");
+        let errors = tree_findings(&lines).into_iter().filter(|f| f.code == "tree_missing");
         return Err(refused(hand_in, errors.collect()));
     }
     let mut moves: Vec<(String, String)> = Vec::new();
@@ -184,10 +157,7 @@ fn places(hand_in: &HandIn, tree: &TreeSpec) -> Result<BTreeMap<String, String>,
                 "fix_collision",
                 format!("'{from}' and '{other}' belong to the same place"),
             );
-            return Err(refused(
-                hand_in,
-                vec![finding.at(to).hint("keep one of them")],
-            ));
+            return Err(refused(hand_in, vec![finding.at(to).hint("keep one of them")]));
         }
     }
     Ok(places)
@@ -196,13 +166,7 @@ fn places(hand_in: &HandIn, tree: &TreeSpec) -> Result<BTreeMap<String, String>,
 /// A zip with fixed times, order and permissions.
 fn zip_bytes(hand_in: &HandIn, places: &BTreeMap<String, String>) -> Result<Vec<u8>, IntakeError> {
     let failed = |e: ::zip::result::ZipError| {
-        refused(
-            hand_in,
-            vec![Finding::error(
-                "pack_failed",
-                format!("cannot be packed: {e}"),
-            )],
-        )
+        refused(hand_in, vec![Finding::error("pack_failed", format!("cannot be packed: {e}"))])
     };
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
@@ -214,9 +178,7 @@ fn zip_bytes(hand_in: &HandIn, places: &BTreeMap<String, String>) -> Result<Vec<
         let path = hand_in.root.join(from);
         let content = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
         writer.start_file(to.as_str(), options).map_err(failed)?;
-        writer
-            .write_all(&content)
-            .map_err(|e| IntakeError::io("pack", &path, e))?;
+        writer.write_all(&content).map_err(|e| IntakeError::io("pack", &path, e))?;
     }
     Ok(writer.finish().map_err(failed)?.into_inner())
 }

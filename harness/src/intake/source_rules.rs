@@ -24,21 +24,16 @@ pub fn scan_source(hand_in: &HandIn) -> Result<Vec<Finding>, IntakeError> {
         let name = file.path.rsplit('/').next().unwrap_or_default();
         if matches!(name, "build.rs" | "Cargo.toml" | "Cargo.lock") {
             findings.push(
-                Finding::note(
-                    "source_manifest",
-                    format!("{name} is handed in, but ours is used"),
-                )
-                .at(file.path.as_str()),
+                Finding::note("source_manifest", format!("{name} is handed in, but ours is used"))
+                    .at(file.path.as_str()),
             );
         }
         if !file.path.starts_with("src/") || !file.path.ends_with(".rs") {
             continue;
         }
         if file.bytes > MAX_SCANNED {
-            let message = format!(
-                "not scanned: {} bytes, over the limit of {MAX_SCANNED}",
-                file.bytes
-            );
+            let message =
+                format!("not scanned: {} bytes, over the limit of {MAX_SCANNED}", file.bytes);
             findings.push(Finding::warning("source_large", message).at(file.path.as_str()));
             continue;
         }
@@ -73,10 +68,8 @@ pub fn scan_text(path: &str, source: &str) -> Vec<Finding> {
             findings.push(finding.at(path).on_line(line));
         }
     }
-    let mut more: Vec<_> = counts
-        .into_iter()
-        .filter(|(_, count)| *count > SHOWN_PER_FILE)
-        .collect();
+    let mut more: Vec<_> =
+        counts.into_iter().filter(|(_, count)| *count > SHOWN_PER_FILE).collect();
     more.sort_unstable();
     findings.extend(more.into_iter().map(|(code, count)| {
         Finding::note(
@@ -96,9 +89,7 @@ fn word(tokens: &[Token], at: usize) -> Option<&str> {
 }
 
 fn is_sign(tokens: &[Token], at: usize, sign: char) -> bool {
-    tokens
-        .get(at)
-        .is_some_and(|token| token.kind == TokenKind::Sign(sign))
+    tokens.get(at).is_some_and(|token| token.kind == TokenKind::Sign(sign))
 }
 
 fn is_path_separator(tokens: &[Token], at: usize) -> bool {
@@ -108,11 +99,7 @@ fn is_path_separator(tokens: &[Token], at: usize) -> bool {
 fn scan_at(path: &str, tokens: &[Token], at: usize, found: &mut Vec<(u32, &'static str, String)>) {
     let line = tokens[at].line;
     if is_sign(tokens, at, '#') {
-        let open = if is_sign(tokens, at + 1, '!') {
-            at + 2
-        } else {
-            at + 1
-        };
+        let open = if is_sign(tokens, at + 1, '!') { at + 2 } else { at + 1 };
         if is_sign(tokens, open, '[') {
             scan_attribute(path, tokens, open, found);
         }
@@ -131,11 +118,7 @@ fn scan_at(path: &str, tokens: &[Token], at: usize, found: &mut Vec<(u32, &'stat
         }
         "extern" => match tokens.get(at + 1).map(|token| &token.kind) {
             Some(TokenKind::Text(abi)) => {
-                found.push((
-                    line,
-                    "source_extern",
-                    format!("extern \"{}\"", printable(abi)),
-                ));
+                found.push((line, "source_extern", format!("extern \"{}\"", printable(abi))));
             }
             Some(TokenKind::Sign('{')) => {
                 found.push((line, "source_extern", "extern block".to_owned()))
@@ -202,19 +185,11 @@ fn include(path: &str, tokens: &[Token], at: usize, name: &str) -> (u32, &'stati
     let target = match tokens.get(at + 3).map(|token| &token.kind) {
         Some(TokenKind::Text(target)) => target,
         _ => {
-            return (
-                line,
-                "source_include",
-                format!("{}! of a computed path", printable(name)),
-            );
+            return (line, "source_include", format!("{}! of a computed path", printable(name)));
         }
     };
     let message = format!("{}! of \"{}\"", printable(name), printable(target));
-    let code = if stays_in_src(path, target) {
-        "source_include_inside"
-    } else {
-        "source_include"
-    };
+    let code = if stays_in_src(path, target) { "source_include_inside" } else { "source_include" };
     (line, code, message)
 }
 
@@ -268,10 +243,8 @@ fn scan_attribute(
                 if let Some(TokenKind::Text(target)) = tokens.get(at + 2).map(|token| &token.kind)
                     && !stays_in_src(path, target)
                 {
-                    let message = format!(
-                        "attribute path leads outside src/: \"{}\"",
-                        printable(target)
-                    );
+                    let message =
+                        format!("attribute path leads outside src/: \"{}\"", printable(target));
                     found.push((line, "source_path", message));
                 }
             }
@@ -310,10 +283,7 @@ mod tests {
             ("include_str!(\"../../x\")", "source_include@1"),
             ("include!(concat!(\"a\", \"b\"))", "source_include@1"),
             ("use core::include_bytes as x;", "source_include@1"),
-            (
-                "include_str!(\"../shaders/phong.wgsl\")",
-                "source_include_inside@1",
-            ),
+            ("include_str!(\"../shaders/phong.wgsl\")", "source_include_inside@1"),
             ("extern \"C\" { fn x(); }", "source_extern@1"),
             ("extern crate wgpu;", "source_extern_crate@1"),
             ("#[link(name = \"c\")]", "source_link@1"),
@@ -324,10 +294,7 @@ mod tests {
             ("std::process::exit(0)", "source_system@1"),
             ("use ::std::fs::File;", "source_system@1"),
             ("use std::{fmt,\nfs::{self, File}};", "source_system@2"),
-            (
-                "use std::{io, collections::{env, x}, net};",
-                "source_system@1",
-            ),
+            ("use std::{io, collections::{env, x}, net};", "source_system@1"),
             ("r#std::r#env::var(\"x\")", "source_system@1"),
             ("use std as s;", "source_system@1"),
             ("libc::fork()", "source_system@1"),
@@ -336,10 +303,7 @@ mod tests {
         ] {
             assert_eq!(codes(source), [want], "{source}");
         }
-        assert_eq!(
-            codes("#[unsafe(no_mangle)]"),
-            ["source_link@1", "source_unsafe@1"]
-        );
+        assert_eq!(codes("#[unsafe(no_mangle)]"), ["source_link@1", "source_unsafe@1"]);
         assert_eq!(codes("#[path = \"../x.rs\"] mod x;"), [""; 0]);
     }
 

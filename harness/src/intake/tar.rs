@@ -30,28 +30,18 @@ pub(super) fn looks_like_tar(bytes: &[u8]) -> bool {
 
 /// The checksum is the sum of the block's bytes with its own field as spaces.
 fn is_header(block: &[u8]) -> bool {
-    let sum = block.iter().enumerate().map(|(i, b)| {
-        if (148..156).contains(&i) {
-            32
-        } else {
-            u32::from(*b)
-        }
-    });
+    let sum = block
+        .iter()
+        .enumerate()
+        .map(|(i, b)| if (148..156).contains(&i) { 32 } else { u32::from(*b) });
     let sum: u32 = sum.sum();
-    block.len() == BLOCK
-        && Header::from_byte_slice(block)
-            .cksum()
-            .is_ok_and(|found| found == sum)
+    block.len() == BLOCK && Header::from_byte_slice(block).cksum().is_ok_and(|found| found == sum)
 }
 
 /// Reads a gzipped tar.
 pub(super) fn read_gz(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Halt> {
-    let mut gz = Gz {
-        packed: bytes.len(),
-        inner: GzDecoder::new(bytes),
-        unpacked: 0,
-        limits: copy.limits,
-    };
+    let mut gz =
+        Gz { packed: bytes.len(), inner: GzDecoder::new(bytes), unpacked: 0, limits: copy.limits };
     read(&mut gz, copy)?;
     let rest = gz.inner.get_ref().len();
     if rest > 0 {
@@ -100,24 +90,17 @@ fn unreadable(error: &io::Error, limits: &Limits) -> Finding {
     const HINT: &str = "hand in only the files of the tree";
     match error.get_ref().and_then(|inner| inner.downcast_ref()) {
         Some(GzLimit::Ratio) => {
-            let message = format!(
-                "unpacks to more than {} times its packed size",
-                limits.max_ratio
-            );
+            let message =
+                format!("unpacks to more than {} times its packed size", limits.max_ratio);
             Finding::error("limit_ratio", message).hint(HINT)
         }
         Some(GzLimit::Total) => {
-            let message = format!(
-                "unpacks to more than the limit of {} MiB",
-                limits.max_total_mib
-            );
+            let message = format!("unpacks to more than the limit of {} MiB", limits.max_total_mib);
             Finding::error("limit_total", message).hint(HINT)
         }
         None => {
-            let message = format!(
-                "the compressed data cannot be read: {}",
-                printable(&error.to_string())
-            );
+            let message =
+                format!("the compressed data cannot be read: {}", printable(&error.to_string()));
             Finding::error("gz_corrupt", message)
                 .hint("the upload may have been cut off; hand in again")
         }
@@ -346,8 +329,7 @@ fn read_entry(
         EntryType::Regular | EntryType::Continuous if name.ends_with(b"/") => Kind::Folder,
         EntryType::Regular | EntryType::Continuous => Kind::File,
         other => {
-            copy.findings
-                .push(special(other).at(printable_bytes(&name)));
+            copy.findings.push(special(other).at(printable_bytes(&name)));
             return skip(reader, padded(size), &name, copy);
         }
     };
@@ -367,9 +349,7 @@ fn read_entry(
         Admitted::Folder if size > 0 => {
             let message = format!("a folder that holds {size} bytes");
             Err(copy.refuse(
-                Finding::error("tar_header", message)
-                    .at(printable_bytes(&name))
-                    .hint(AGAIN),
+                Finding::error("tar_header", message).at(printable_bytes(&name)).hint(AGAIN),
             ))
         }
         _ => skip(reader, padded(size), &name, copy),
@@ -397,9 +377,7 @@ fn entry_name(
                     printable_bytes(&value)
                 );
                 return Err(copy.refuse(
-                    Finding::error("tar_pax_size", message)
-                        .at(printable_bytes(&name))
-                        .hint(AGAIN),
+                    Finding::error("tar_pax_size", message).at(printable_bytes(&name)).hint(AGAIN),
                 ));
             }
             key if key.starts_with("GNU.sparse") => {
@@ -411,11 +389,8 @@ fn entry_name(
     }
     if paths > 1 {
         let message = "two pax headers name the same entry";
-        return Err(copy.refuse(
-            Finding::error("tar_header", message)
-                .at(printable_bytes(&name))
-                .hint(AGAIN),
-        ));
+        return Err(copy
+            .refuse(Finding::error("tar_header", message).at(printable_bytes(&name)).hint(AGAIN)));
     }
     Ok(name)
 }
@@ -426,11 +401,9 @@ fn special(entry_type: EntryType) -> Finding {
         EntryType::Link => ("link", "a hard link", "put the file itself there"),
         EntryType::Char | EntryType::Block => ("special_file", "a device", "leave it out"),
         EntryType::Fifo => ("special_file", "a fifo", "leave it out"),
-        EntryType::GNUSparse => (
-            "tar_sparse",
-            "a sparse file",
-            "make the archive without --sparse",
-        ),
+        EntryType::GNUSparse => {
+            ("tar_sparse", "a sparse file", "make the archive without --sparse")
+        }
         _ => ("tar_type", "an entry of another type", AGAIN),
     };
     Finding::error(code, format!("expected a file or folder, found {found}")).hint(hint)

@@ -37,11 +37,8 @@ pub(super) const CONFIG_FILE: &str = "config.json";
 /// paths that the handout and the course's own template name.
 impl Default for TreeSpec {
     fn default() -> Self {
-        let file = |path: &str| TreeFile {
-            path: path.to_owned(),
-            required: true,
-            aliases: Vec::new(),
-        };
+        let file =
+            |path: &str| TreeFile { path: path.to_owned(), required: true, aliases: Vec::new() };
         let bonus = |scene: &str| TreeFile {
             path: format!("realtime/{scene}_bonus.exr"),
             required: false,
@@ -89,13 +86,10 @@ impl TreeSpec {
         self.ignored.iter().map(String::as_str).find(|pattern| {
             let wanted: Vec<&str> = pattern.split('/').collect();
             components.windows(wanted.len()).any(|window| {
-                window
-                    .iter()
-                    .zip(&wanted)
-                    .all(|(component, want)| match want.strip_suffix('*') {
-                        Some(start) => component.starts_with(start),
-                        None => component.eq_ignore_ascii_case(want),
-                    })
+                window.iter().zip(&wanted).all(|(component, want)| match want.strip_suffix('*') {
+                    Some(start) => component.starts_with(start),
+                    None => component.eq_ignore_ascii_case(want),
+                })
             })
         })
     }
@@ -107,21 +101,18 @@ impl TreeSpec {
 
     /// The open folder that holds `path`.
     pub fn open_folder_of(&self, path: &str) -> Option<&str> {
-        self.open_folders.iter().map(String::as_str).find(|folder| {
-            path.strip_prefix(folder)
-                .is_some_and(|rest| rest.starts_with('/'))
-        })
+        self.open_folders
+            .iter()
+            .map(String::as_str)
+            .find(|folder| path.strip_prefix(folder).is_some_and(|rest| rest.starts_with('/')))
     }
 
     /// Whether a folder of this name may stand at the root, so that it is no wrapping folder.
     pub(super) fn is_top_folder(&self, name: &str) -> bool {
         let starts = |path: &str| {
-            path.split_once('/')
-                .is_some_and(|(top, _)| top.eq_ignore_ascii_case(name))
+            path.split_once('/').is_some_and(|(top, _)| top.eq_ignore_ascii_case(name))
         };
-        self.open_folders
-            .iter()
-            .any(|folder| folder.eq_ignore_ascii_case(name))
+        self.open_folders.iter().any(|folder| folder.eq_ignore_ascii_case(name))
             || self
                 .files
                 .iter()
@@ -155,13 +146,9 @@ mod tests {
         ] {
             assert!(tree.ignored_by(junk).is_some(), "{junk}");
         }
-        for wanted in [
-            "src/target/mod.rs",
-            "src/target.rs",
-            "src/_x.rs",
-            "x.DS_Store",
-            "src/.github",
-        ] {
+        for wanted in
+            ["src/target/mod.rs", "src/target.rs", "src/_x.rs", "x.DS_Store", "src/.github"]
+        {
             assert_eq!(tree.ignored_by(wanted), None, "{wanted}");
         }
     }

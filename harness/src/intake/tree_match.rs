@@ -62,24 +62,16 @@ pub(super) fn match_tree(paths: &[&str], tree: &TreeSpec) -> Vec<TreeLine> {
     }
     for folder in &tree.open_folders {
         let inside = |path: &&&str| {
-            path.strip_prefix(folder.as_str())
-                .is_some_and(|rest| rest.starts_with('/'))
+            path.strip_prefix(folder.as_str()).is_some_and(|rest| rest.starts_with('/'))
         };
-        let count = paths
-            .iter()
-            .filter(inside)
-            .filter(|path| !taken.contains(**path))
-            .count();
+        let count = paths.iter().filter(inside).filter(|path| !taken.contains(**path)).count();
         taken.extend(paths.iter().filter(inside));
         if count > 0 {
             lines.push(TreeLine {
                 expected: Some(format!("{folder}/")),
                 found: Some(format!("{folder}/")),
                 mark: Mark::Ok,
-                advice: format!(
-                    "{count} further {}",
-                    if count == 1 { "file" } else { "files" }
-                ),
+                advice: format!("{count} further {}", if count == 1 { "file" } else { "files" }),
             });
         }
     }
@@ -112,12 +104,7 @@ fn line_of(file: &TreeFile, found: Option<&str>) -> TreeLine {
         None if file.required => (Mark::Missing, "add it".to_owned()),
         None => (Mark::Absent, "optional".to_owned()),
     };
-    TreeLine {
-        expected: Some(file.path.clone()),
-        found: found.map(str::to_owned),
-        mark,
-        advice,
-    }
+    TreeLine { expected: Some(file.path.clone()), found: found.map(str::to_owned), mark, advice }
 }
 
 /// A file that is probably the expected one: the same path in another case, else the same name in
@@ -130,9 +117,8 @@ fn find_lost<'a>(file: &TreeFile, paths: &[&'a str], taken: &BTreeSet<&str>) -> 
         return Some(path);
     }
     let base = |path: &str| path.rsplit('/').next().unwrap_or(path).to_lowercase();
-    let mut candidates: Vec<&str> = free()
-        .filter(|path| names.iter().any(|name| base(name) == base(path)))
-        .collect();
+    let mut candidates: Vec<&str> =
+        free().filter(|path| names.iter().any(|name| base(name) == base(path))).collect();
     candidates.sort_by_key(|path| path.matches('/').count());
     match candidates.as_slice() {
         [one] => Some(one),
@@ -146,27 +132,19 @@ fn find_lost<'a>(file: &TreeFile, paths: &[&'a str], taken: &BTreeSet<&str>) -> 
 /// Where a file belongs that lies beside a source file in the wrong place: `code/lib.rs` found for
 /// `src/lib.rs` means that `code/bsdfs/phong.rs` is `src/bsdfs/phong.rs`.
 fn source_place(path: &str, lines: &[TreeLine], tree: &TreeSpec) -> Option<String> {
-    lines
-        .iter()
-        .filter(|line| line.mark == Mark::WrongPlace)
-        .find_map(|line| {
-            let (expected, found) = (line.expected.as_ref()?, line.found.as_ref()?);
-            let folder = tree.open_folder_of(expected)?;
-            let rest = &expected[folder.len()..];
-            // Where the whole folder moved, the part after it is the same in both.
-            let moved = found
-                .strip_suffix(rest)
-                .or_else(|| found.strip_suffix(&rest[1..]))?;
-            let inside = if moved.is_empty() {
-                path
-            } else {
-                path.strip_prefix(moved)?.strip_prefix('/')?
-            };
-            // At the root only Rust and shader files are surely source.
-            let is_source =
-                !moved.is_empty() || [".rs", ".wgsl"].iter().any(|end| inside.ends_with(end));
-            is_source.then(|| format!("{folder}/{inside}"))
-        })
+    lines.iter().filter(|line| line.mark == Mark::WrongPlace).find_map(|line| {
+        let (expected, found) = (line.expected.as_ref()?, line.found.as_ref()?);
+        let folder = tree.open_folder_of(expected)?;
+        let rest = &expected[folder.len()..];
+        // Where the whole folder moved, the part after it is the same in both.
+        let moved = found.strip_suffix(rest).or_else(|| found.strip_suffix(&rest[1..]))?;
+        let inside =
+            if moved.is_empty() { path } else { path.strip_prefix(moved)?.strip_prefix('/')? };
+        // At the root only Rust and shader files are surely source.
+        let is_source =
+            !moved.is_empty() || [".rs", ".wgsl"].iter().any(|end| inside.ends_with(end));
+        is_source.then(|| format!("{folder}/{inside}"))
+    })
 }
 
 /// What the comparison means for the verdict.

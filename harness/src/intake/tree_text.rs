@@ -13,17 +13,8 @@ impl Validation {
     /// The whole validation as text for a terminal, without colours.
     pub fn to_text(&self) -> String {
         let mut out = String::new();
-        let verdict = if self.conforms {
-            "conforms"
-        } else {
-            "does not conform"
-        };
-        let count = |severity| {
-            self.findings
-                .iter()
-                .filter(|f| f.severity == severity)
-                .count()
-        };
+        let verdict = if self.conforms { "conforms" } else { "does not conform" };
+        let count = |severity| self.findings.iter().filter(|f| f.severity == severity).count();
         let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
         // Writing to a String cannot fail.
         let _ = writeln!(
@@ -53,11 +44,7 @@ fn write_tree(out: &mut String, lines: &[TreeLine]) {
     let rows: Vec<[String; 3]> = lines.iter().take(SHOWN).map(row).collect();
     let header = ["expected", "found", ""].map(str::to_owned);
     let width = |column: usize| {
-        rows.iter()
-            .chain([&header])
-            .map(|row| row[column].chars().count())
-            .max()
-            .unwrap_or(0)
+        rows.iter().chain([&header]).map(|row| row[column].chars().count()).max().unwrap_or(0)
     };
     let (left, middle) = (width(0), width(1));
     let _ = writeln!(out);
@@ -77,11 +64,8 @@ fn row(line: &TreeLine) -> [String; 3] {
         Mark::WrongPlace => "wrong place",
         Mark::Unexpected => "unexpected",
     };
-    let mark = if line.advice.is_empty() {
-        mark.to_owned()
-    } else {
-        format!("{mark}: {}", line.advice)
-    };
+    let mark =
+        if line.advice.is_empty() { mark.to_owned() } else { format!("{mark}: {}", line.advice) };
     let shown = |path: &Option<String>| path.clone().unwrap_or_else(|| "-".to_owned());
     [shown(&line.expected), shown(&line.found), mark]
 }

@@ -100,11 +100,7 @@ pub enum IntakeError {
 
 impl IntakeError {
     pub(super) fn io(doing: &'static str, path: &Path, source: io::Error) -> Self {
-        Self::Io {
-            doing,
-            path: path.to_owned(),
-            source,
-        }
+        Self::Io { doing, path: path.to_owned(), source }
     }
 }
 
@@ -122,9 +118,7 @@ pub fn unpack(
 ) -> Result<HandIn, IntakeError> {
     let name = name_of(source);
     // The path itself was given by whoever grades, so a link there is followed.
-    let metadata = source
-        .metadata()
-        .map_err(|e| IntakeError::io("read", source, e))?;
+    let metadata = source.metadata().map_err(|e| IntakeError::io("read", source, e))?;
     if metadata.is_dir() {
         return copy_folder(source, &|_, _| true, dest, tree, limits);
     }
@@ -159,10 +153,7 @@ pub(super) fn copy_folder(
 /// The last component of a path, also of `.` and `..`.
 fn name_of(source: &Path) -> String {
     let whole = source.canonicalize().unwrap_or_else(|_| source.to_owned());
-    let name = source
-        .file_name()
-        .or(whole.file_name())
-        .unwrap_or(source.as_os_str());
+    let name = source.file_name().or(whole.file_name()).unwrap_or(source.as_os_str());
     name.to_string_lossy().into_owned()
 }
 
@@ -179,10 +170,7 @@ pub fn unpack_bytes(
 ) -> Result<HandIn, IntakeError> {
     let mut copy = PrivateCopy::new(dest, tree, limits)?;
     if bytes.len() as u64 > mib(limits.max_total_mib) {
-        let message = format!(
-            "the archive exceeds the limit of {} MiB",
-            limits.max_total_mib
-        );
+        let message = format!("the archive exceeds the limit of {} MiB", limits.max_total_mib);
         return refused(name, None, Finding::error("limit_total", message));
     }
     let Some(format) = format_of_bytes(bytes) else {
@@ -199,11 +187,7 @@ pub fn unpack_bytes(
 }
 
 fn refused<T>(name: &str, format: Option<Format>, finding: Finding) -> Result<T, IntakeError> {
-    let refusal = Refusal {
-        name: printable(name),
-        format,
-        findings: vec![finding],
-    };
+    let refusal = Refusal { name: printable(name), format, findings: vec![finding] };
     Err(IntakeError::Refused(Box::new(refusal)))
 }
 
@@ -235,10 +219,7 @@ pub(super) fn archive_magic(bytes: &[u8]) -> Option<&'static str> {
         (b"\x28\xb5\x2f\xfd", "zstd"),
         (b"MSCF", "cab"),
     ];
-    MAGIC
-        .iter()
-        .find(|(magic, _)| bytes.starts_with(magic))
-        .map(|(_, kind)| *kind)
+    MAGIC.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, kind)| *kind)
 }
 
 fn unknown_format(bytes: &[u8]) -> Finding {
@@ -249,14 +230,11 @@ fn unknown_format(bytes: &[u8]) -> Finding {
             "format_unsupported",
             format!("this is a {kind} archive, which we cannot open; {EXPECTED}"),
         )
-        .hint(format!(
-            "your files are fine: unpack the {kind} and zip the folder; {HINT}"
-        )),
-        Some(kind) => Finding::error(
-            "format_unsupported",
-            format!("this is {kind} data; {EXPECTED}"),
-        )
-        .hint(format!("pack it again as .tar.gz or .zip; {HINT}")),
+        .hint(format!("your files are fine: unpack the {kind} and zip the folder; {HINT}")),
+        Some(kind) => {
+            Finding::error("format_unsupported", format!("this is {kind} data; {EXPECTED}"))
+                .hint(format!("pack it again as .tar.gz or .zip; {HINT}"))
+        }
         None if bytes.is_empty() => {
             Finding::error("empty", format!("the file is empty (0 bytes); {EXPECTED}"))
                 .hint("the upload may have been cut off; hand in again")
@@ -283,20 +261,14 @@ fn check_extension(name: &str, format: Format, copy: &mut PrivateCopy<'_>) {
     let (fits, what) = match format {
         Format::Zip => (lower.ends_with(".zip"), "a zip archive"),
         Format::Tar => (lower.ends_with(".tar"), "a tar archive"),
-        Format::TarGz => (
-            lower.ends_with(".gz") || lower.ends_with(".tgz"),
-            "gzip data",
-        ),
+        Format::TarGz => (lower.ends_with(".gz") || lower.ends_with(".tgz"), "gzip data"),
         Format::Folder => (true, "a folder"),
     };
     if !fits {
         copy.findings.push(
             Finding::warning(
                 "wrong_extension",
-                format!(
-                    "the content is {what}, which '{}' does not say",
-                    printable(name)
-                ),
+                format!("the content is {what}, which '{}' does not say", printable(name)),
             )
             .hint("name it .zip, .tar or .tar.gz by what it is"),
         );

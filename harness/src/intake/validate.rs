@@ -59,11 +59,7 @@ pub(super) fn scratch_folder() -> Result<tempfile::TempDir, IntakeError> {
 /// # Errors
 /// The copy cannot be read.
 pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation, IntakeError> {
-    let paths: Vec<&str> = hand_in
-        .files
-        .iter()
-        .map(|file| file.path.as_str())
-        .collect();
+    let paths: Vec<&str> = hand_in.files.iter().map(|file| file.path.as_str()).collect();
     let lines = match_tree(&paths, tree);
     let mut findings = hand_in.findings.clone();
     findings.extend(tree_findings(&lines));
@@ -107,9 +103,7 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
     Ok(Validation {
         name: hand_in.name.clone(),
         format: Some(hand_in.format),
-        conforms: findings
-            .iter()
-            .all(|finding| finding.severity != Severity::Error),
+        conforms: findings.iter().all(|finding| finding.severity != Severity::Error),
         tree: lines,
         config,
         findings,

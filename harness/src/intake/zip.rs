@@ -28,9 +28,7 @@ pub(super) fn has_end_record(bytes: &[u8]) -> bool {
 fn end_records(bytes: &[u8]) -> impl Iterator<Item = usize> {
     let first = bytes.len().saturating_sub(END_SIZE + usize::from(u16::MAX));
     let last = bytes.len().saturating_sub(END_SIZE);
-    (first..=last)
-        .rev()
-        .filter(|&i| bytes[i..].starts_with(END) && i + END_SIZE <= bytes.len())
+    (first..=last).rev().filter(|&i| bytes[i..].starts_with(END) && i + END_SIZE <= bytes.len())
 }
 
 /// Reads a zip archive into the copy. Nothing is written before all headers are checked.
@@ -40,17 +38,12 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Halt>
     check_ranges(&entries, directory.start, copy);
     let mut files = Vec::new();
     for entry in &entries {
-        let kind = if entry.name.ends_with(b"/") {
-            Kind::Folder
-        } else {
-            Kind::File
-        };
+        let kind = if entry.name.ends_with(b"/") { Kind::Folder } else { Kind::File };
         match copy.admit(&entry.name, kind) {
             Admitted::File(path) => files.push((entry, path)),
             Admitted::Folder if entry.unpacked_bytes > 0 => {
                 let message = format!("a folder that holds {} bytes", entry.unpacked_bytes);
-                copy.findings
-                    .push(Finding::error("zip_folder_data", message).at(entry.shown()));
+                copy.findings.push(Finding::error("zip_folder_data", message).at(entry.shown()));
             }
             Admitted::Folder | Admitted::Ignored | Admitted::Refused => {}
         }
@@ -99,15 +92,12 @@ fn find_directory(bytes: &[u8], max_entries: u64) -> Result<Directory, Finding> 
     let (size, offset) = (field32(12), field32(16));
     let has_locator = at >= 20 && bytes[at - 20..].starts_with(ZIP64_LOCATOR);
     if has_locator || count == u16::MAX || size == ZIP64 || offset == ZIP64 {
-        return Err(Finding::error(
-            "zip64",
-            "zip64 records, which no hand-in of this size needs",
-        )
-        .hint(AGAIN));
+        return Err(Finding::error("zip64", "zip64 records, which no hand-in of this size needs")
+            .hint(AGAIN));
     }
     if disk != 0 || directory_disk != 0 || count_here != count {
         return Err(
-            Finding::error("zip_multi_disk", "one part of a zip over several disks").hint(AGAIN),
+            Finding::error("zip_multi_disk", "one part of a zip over several disks").hint(AGAIN)
         );
     }
     if u64::from(count) > max_entries {
@@ -132,11 +122,7 @@ fn find_directory(bytes: &[u8], max_entries: u64) -> Result<Directory, Finding> 
         let message = format!("{extra} bytes before or inside the zip belong to no part of it");
         return Err(Finding::error(code, message).hint(AGAIN));
     }
-    Ok(Directory {
-        start: offset,
-        end: at,
-        count: usize::from(count),
-    })
+    Ok(Directory { start: offset, end: at, count: usize::from(count) })
 }
 
 fn read_directory<'a>(
@@ -178,22 +164,14 @@ fn check_ranges(entries: &[Entry<'_>], directory: usize, copy: &mut PrivateCopy<
     let mut gap = 0;
     for (i, entry) in order.iter().enumerate() {
         if entry.start < end {
-            let message = format!(
-                "overlaps '{}' in the archive's bytes",
-                order[i.saturating_sub(1)].shown()
-            );
-            copy.findings.push(
-                Finding::error("zip_overlap", message)
-                    .at(entry.shown())
-                    .hint(AGAIN),
-            );
+            let message =
+                format!("overlaps '{}' in the archive's bytes", order[i.saturating_sub(1)].shown());
+            copy.findings
+                .push(Finding::error("zip_overlap", message).at(entry.shown()).hint(AGAIN));
         } else if i == 0 && entry.start > 0 && !copy.findings.has_errors() {
             let message = format!("{} bytes stand before the first entry", entry.start);
-            copy.findings.push(
-                Finding::error("zip_data_before", message)
-                    .at(entry.shown())
-                    .hint(AGAIN),
-            );
+            copy.findings
+                .push(Finding::error("zip_data_before", message).at(entry.shown()).hint(AGAIN));
         } else {
             gap += entry.start - end;
         }
@@ -216,44 +194,25 @@ fn extract(entry: &Entry<'_>, path: &str, copy: &mut PrivateCopy<'_>) -> Result<
         let written = copy.write(path, &mut decoder, Some(packed))?;
         (written, decoder.into_inner().total_in())
     } else {
-        (
-            copy.write(path, &mut &entry.data[..], Some(packed))?,
-            packed,
-        )
+        (copy.write(path, &mut &entry.data[..], Some(packed))?, packed)
     };
     let refuse = |code: &str, message: String| Finding::error(code, message).at(path).hint(AGAIN);
     let finding = match written {
-        Err(e) => refuse(
-            "zip_corrupt",
-            format!("its compressed data cannot be read: {e}"),
-        ),
+        Err(e) => refuse("zip_corrupt", format!("its compressed data cannot be read: {e}")),
         Ok(written) if written.bytes != entry.unpacked_bytes => {
-            let found = if written.bytes > entry.unpacked_bytes {
-                "more"
-            } else {
-                "fewer"
-            };
+            let found = if written.bytes > entry.unpacked_bytes { "more" } else { "fewer" };
             refuse(
                 "zip_size",
-                format!(
-                    "expected {} unpacked bytes, found {found}",
-                    entry.unpacked_bytes
-                ),
+                format!("expected {} unpacked bytes, found {found}", entry.unpacked_bytes),
             )
         }
         Ok(written) if written.crc32 != entry.crc32 => refuse(
             "zip_crc",
-            format!(
-                "expected checksum {:08x}, found {:08x}",
-                entry.crc32, written.crc32
-            ),
+            format!("expected checksum {:08x}, found {:08x}", entry.crc32, written.crc32),
         ),
         Ok(_) if consumed != packed => refuse(
             "zip_entry_slack",
-            format!(
-                "{} bytes follow its compressed data",
-                packed - consumed.min(packed)
-            ),
+            format!("{} bytes follow its compressed data", packed - consumed.min(packed)),
         ),
         Ok(_) => return Ok(()),
     };

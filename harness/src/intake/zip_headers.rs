@@ -78,9 +78,7 @@ pub(super) fn check_entry<'a>(
 ) -> Result<Entry<'a>, Finding> {
     check_kind(central)?;
     let at = central.local;
-    let header = bytes[..limit]
-        .get(at..)
-        .and_then(|rest| rest.get(..LOCAL_SIZE));
+    let header = bytes[..limit].get(at..).and_then(|rest| rest.get(..LOCAL_SIZE));
     let Some(header) = header.filter(|header| header.starts_with(LOCAL)) else {
         let message = format!("expected the entry's own header at byte {at}, found something else");
         return Err(Finding::error("zip_local_missing", message).hint(AGAIN));
@@ -101,20 +99,16 @@ pub(super) fn check_entry<'a>(
     let name = &bytes[at + LOCAL_SIZE..name_end];
     let extra = &bytes[name_end..data_start];
     if name != central.name {
-        let message = format!(
-            "the directory names it so, its own header '{}'",
-            printable_bytes(name)
-        );
+        let message =
+            format!("the directory names it so, its own header '{}'", printable_bytes(name));
         return Err(disagree(message));
     }
     // Flags that change the meaning of the data or of the header: encryption and descriptor.
     const MEANING: u16 = 1 | 8 | 0x20 | 0x40 | 0x2000;
     let same_flags = flags & MEANING == central.flags & MEANING;
     if !same_flags {
-        let message = format!(
-            "flags: directory {:#06x}, its own header {flags:#06x}",
-            central.flags
-        );
+        let message =
+            format!("flags: directory {:#06x}, its own header {flags:#06x}", central.flags);
         return Err(disagree(message));
     }
     agree("compression method", central.method.into(), method.into())?;
@@ -127,11 +121,7 @@ pub(super) fn check_entry<'a>(
         agree("unpacked size", central.unpacked.into(), sizes.1)?;
     }
     let end = data_end
-        + if has_descriptor {
-            descriptor_size(&bytes[data_end..limit], central)?
-        } else {
-            0
-        };
+        + if has_descriptor { descriptor_size(&bytes[data_end..limit], central)? } else { 0 };
     if central.method == 0 && central.packed != central.unpacked {
         let message = format!(
             "stored without compression, yet {} bytes packed and {} unpacked",
@@ -168,28 +158,22 @@ fn check_kind(central: &Central<'_>) -> Result<(), Finding> {
         _ => Some("unknown"),
     };
     if let Some(method) = method {
-        let message = format!(
-            "expected compression store or deflate, found {method} ({})",
-            central.method
-        );
+        let message =
+            format!("expected compression store or deflate, found {method} ({})", central.method);
         return Err(
             Finding::error("zip_compression", message).hint("choose the normal zip compression")
         );
     }
     if central.flags & 0x20 != 0 {
-        return Err(
-            Finding::error("zip_compression", "expected plain data, found patched data")
-                .hint(AGAIN),
-        );
+        return Err(Finding::error("zip_compression", "expected plain data, found patched data")
+            .hint(AGAIN));
     }
     // The upper half of the attributes is st_mode where the archive was made on Unix.
     match central.attributes >> 28 {
         0 | 0o4 | 0o10 => {}
         0o12 => {
-            return Err(
-                Finding::error("link", "expected a file or folder, found a symbolic link")
-                    .hint("put the file itself there"),
-            );
+            return Err(Finding::error("link", "expected a file or folder, found a symbolic link")
+                .hint("put the file itself there"));
         }
         _ => {
             return Err(Finding::error(
@@ -203,7 +187,7 @@ fn check_kind(central: &Central<'_>) -> Result<(), Finding> {
         || extra_field(central.extra, 1).is_some();
     if has_zip64 {
         return Err(
-            Finding::error("zip64", "zip64 sizes, which no hand-in of this size needs").hint(AGAIN),
+            Finding::error("zip64", "zip64 sizes, which no hand-in of this size needs").hint(AGAIN)
         );
     }
     if central.disk != 0 {
@@ -220,9 +204,7 @@ fn agree(what: &str, central: u64, local: u64) -> Result<(), Finding> {
     if central == local {
         return Ok(());
     }
-    Err(disagree(format!(
-        "{what}: the directory says {central}, the entry's own header {local}"
-    )))
+    Err(disagree(format!("{what}: the directory says {central}, the entry's own header {local}")))
 }
 
 /// Sizes (packed, unpacked) of a local header. Writers that stream use zip64 sizes here although
@@ -257,9 +239,7 @@ fn descriptor_size(rest: &[u8], central: &Central<'_>) -> Result<usize, Finding>
             return Ok(signature.len() + 20);
         }
     }
-    Err(disagree(
-        "the descriptor after its data says something else than the directory".to_owned(),
-    ))
+    Err(disagree("the descriptor after its data says something else than the directory".to_owned()))
 }
 
 /// The name, or its UTF-8 form from Info-ZIP's extra field 0x7075, which may only replace a name
@@ -276,10 +256,8 @@ fn effective_name(name: &[u8], extra: &[u8]) -> Result<Vec<u8>, Finding> {
         return Ok(name.to_owned());
     }
     if name.is_ascii() {
-        let message = format!(
-            "a second name hides in an extra field: '{}'",
-            printable_bytes(unicode)
-        );
+        let message =
+            format!("a second name hides in an extra field: '{}'", printable_bytes(unicode));
         return Err(Finding::error("zip_name_override", message).hint(AGAIN));
     }
     Ok(unicode.to_owned())
@@ -298,19 +276,13 @@ fn extra_field(mut extra: &[u8], id: u16) -> Option<&[u8]> {
 }
 
 pub(super) fn u16_at(bytes: &[u8], at: usize) -> Option<u16> {
-    Some(u16::from_le_bytes(
-        bytes.get(at..at.checked_add(2)?)?.try_into().ok()?,
-    ))
+    Some(u16::from_le_bytes(bytes.get(at..at.checked_add(2)?)?.try_into().ok()?))
 }
 
 pub(super) fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
-    Some(u32::from_le_bytes(
-        bytes.get(at..at.checked_add(4)?)?.try_into().ok()?,
-    ))
+    Some(u32::from_le_bytes(bytes.get(at..at.checked_add(4)?)?.try_into().ok()?))
 }
 
 pub(super) fn u64_at(bytes: &[u8], at: usize) -> Option<u64> {
-    Some(u64::from_le_bytes(
-        bytes.get(at..at.checked_add(8)?)?.try_into().ok()?,
-    ))
+    Some(u64::from_le_bytes(bytes.get(at..at.checked_add(8)?)?.try_into().ok()?))
 }

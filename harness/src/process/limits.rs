@@ -71,7 +71,8 @@ fn tasks(threads: u32, counted_apart: bool) -> u64 {
         return 128 + 4 * u64::from(threads);
     }
     #[cfg(target_os = "linux")]
-    if let Ok((_, hard)) = nix::sys::resource::getrlimit(nix::sys::resource::Resource::RLIMIT_NPROC) {
+    if let Ok((_, hard)) = nix::sys::resource::getrlimit(nix::sys::resource::Resource::RLIMIT_NPROC)
+    {
         return hard;
     }
     1 << 15

@@ -92,7 +92,7 @@ pub fn run(
         (None, Some(signal)) => Exit::Signal(signal),
         (None, None) => Exit::Code(libc::WEXITSTATUS(status)),
     };
-    let in_force = match lock.sandbox.as_ref().map(|policy| in_force(policy)) {
+    let in_force = match lock.sandbox.as_ref().map(in_force) {
         // It was not locked, and nothing foreign ran: that is nobody's fault but the machine's.
         Some(Err(error)) if ended_by_us.is_none() => return Err(io::Error::other(error)),
         Some(in_force) => in_force.ok(),

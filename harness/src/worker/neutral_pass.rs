@@ -52,7 +52,9 @@ pub fn render(request: &Request, values: &mut [f32]) -> Result<(), CallError> {
             let camera = Camera::new(config, width, height)?;
             gpu.checked(&mut || pass.draw(&gpu, &camera, &target))?;
             let image = target.read_back(&gpu)?;
-            frame.copy_from_slice(image.pixels.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>().as_slice());
+            frame.copy_from_slice(
+                image.pixels.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>().as_slice(),
+            );
         }
         Ok(())
     };
@@ -90,7 +92,11 @@ struct NeutralPass {
 impl NeutralPass {
     fn new(gpu: &Gpu, scene: &Scene, [vs, diffuse, phong]: [&str; 3]) -> basecode::Result<Self> {
         let vertex = Stage { name: STAGES[0], text: vs };
-        let fragments = [Stage { name: STAGES[1], text: diffuse }, Stage { name: STAGES[2], text: phong }, EMITTER_FS];
+        let fragments = [
+            Stage { name: STAGES[1], text: diffuse },
+            Stage { name: STAGES[2], text: phong },
+            EMITTER_FS,
+        ];
         let objects = scene.shapes().iter().enumerate().map(|(index, shape)| {
             let material = scene.material_of(index);
             let scale = material.energy_scale();

@@ -112,7 +112,8 @@ impl Supervisor {
             }
             // Each worker settles one request at least, so this ends.
             pending.retain(|&index| outcomes[index].is_none());
-            let timeouts = outcomes.iter().filter(|outcome| matches!(outcome, Some(Outcome::TimedOut)));
+            let timeouts =
+                outcomes.iter().filter(|outcome| matches!(outcome, Some(Outcome::TimedOut)));
             if timeouts.count() >= MAX_TIMEOUTS {
                 for index in std::mem::take(&mut pending) {
                     outcomes[index] = Some(not_asked());

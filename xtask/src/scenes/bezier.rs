@@ -13,12 +13,7 @@ fn bernstein(t: f64) -> [f64; 4] {
 /// Their derivatives.
 fn bernstein_derivative(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
-    [
-        -3.0 * s * s,
-        3.0 * s * s - 6.0 * s * t,
-        6.0 * s * t - 3.0 * t * t,
-        3.0 * t * t,
-    ]
+    [-3.0 * s * s, 3.0 * s * s - 6.0 * s * t, 6.0 * s * t - 3.0 * t * t, 3.0 * t * t]
 }
 
 /// The sum of `points` weighted by a basis.
@@ -53,12 +48,7 @@ pub fn sweep(profiles: &[Profile], steps: usize) -> Mesh {
 /// leaves the limit normal on the axis, where the patch itself is degenerate.
 fn swept_point(profile: &Profile, turn: f64, v: f64) -> Vertex {
     let quarter = turn.floor();
-    let arc = [
-        [1.0, 0.0],
-        [1.0, QUARTER_TURN_K],
-        [QUARTER_TURN_K, 1.0],
-        [0.0, 1.0],
-    ];
+    let arc = [[1.0, 0.0], [1.0, QUARTER_TURN_K], [QUARTER_TURN_K, 1.0], [0.0, 1.0]];
     let [x, y] = blend(bernstein(turn - quarter), &arc);
     let [dx, dy] = blend(bernstein_derivative(turn - quarter), &arc);
     let [r, z] = blend(bernstein(v), profile);

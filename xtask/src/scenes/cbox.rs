@@ -15,25 +15,13 @@ pub fn cbox() -> Scene {
     let y = DVec3::Y * HEIGHT;
     let corner = |sx: f64, height: f64, sz: f64| dvec3(sx * HALF_WIDTH, height, sz * HALF_DEPTH);
     let white = || Material::diffuse([0.72, 0.7, 0.66]);
-    let camera = Camera {
-        eye: dvec3(0.0, 1.05, 4.9),
-        at: dvec3(0.0, 0.98, 0.0),
-        fov_deg: 28.5,
-    };
+    let camera = Camera { eye: dvec3(0.0, 1.05, 4.9), at: dvec3(0.0, 0.98, 0.0), fov_deg: 28.5 };
     let mut scene = Scene::new("cbox", "cbox_simple", camera, [600, 450])
         .with("floor", white(), quad(corner(-1.0, 0.0, 1.0), x, -z))
         .with("ceiling", white(), quad(corner(-1.0, HEIGHT, -1.0), x, z))
         .with("back", white(), quad(corner(-1.0, 0.0, -1.0), x, y))
-        .with(
-            "left",
-            Material::diffuse([0.6, 0.09, 0.07]),
-            quad(corner(-1.0, 0.0, 1.0), -z, y),
-        )
-        .with(
-            "right",
-            Material::diffuse([0.12, 0.42, 0.1]),
-            quad(corner(1.0, 0.0, -1.0), z, y),
-        )
+        .with("left", Material::diffuse([0.6, 0.09, 0.07]), quad(corner(-1.0, 0.0, 1.0), -z, y))
+        .with("right", Material::diffuse([0.12, 0.42, 0.1]), quad(corner(1.0, 0.0, -1.0), z, y))
         .with(
             "sphere_diffuse",
             Material::diffuse([0.3, 0.42, 0.75]),

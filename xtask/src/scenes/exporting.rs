@@ -21,16 +21,11 @@ const EMITTER_DECIMALS: usize = 7;
 pub fn scene_files(scene: &Scene) -> Result<Vec<File>> {
     let mut files = Vec::new();
     let mut push = |path: String, bytes: Vec<u8>| {
-        files.push(File {
-            path: format!("{}/{path}", scene.folder),
-            bytes,
-        })
+        files.push(File { path: format!("{}/{path}", scene.folder), bytes })
     };
-    for (variant, realtime, bonus) in [
-        ("offline", false, false),
-        ("realtime", true, false),
-        ("realtime_bonus", true, true),
-    ] {
+    for (variant, realtime, bonus) in
+        [("offline", false, false), ("realtime", true, false), ("realtime_bonus", true, true)]
+    {
         if !bonus || scene.bonus {
             push(
                 format!("tinyrender/{}_{variant}.toml", scene.name),
@@ -38,14 +33,8 @@ pub fn scene_files(scene: &Scene) -> Result<Vec<File>> {
             );
         }
     }
-    push(
-        format!("mesh/{}.obj", scene.mesh_name),
-        obj(scene).into_bytes(),
-    );
-    push(
-        format!("mesh/{}.mtl", scene.mesh_name),
-        mtl(scene).into_bytes(),
-    );
+    push(format!("mesh/{}.obj", scene.mesh_name), obj(scene).into_bytes());
+    push(format!("mesh/{}.mtl", scene.mesh_name), mtl(scene).into_bytes());
     for texture in &scene.textures {
         push(format!("mesh/{}", texture.file), texture.png()?);
     }
@@ -55,26 +44,15 @@ pub fn scene_files(scene: &Scene) -> Result<Vec<File>> {
 /// `value` rounded to `decimals` places, without trailing zeros and without a negative zero.
 pub fn decimal(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
-    let text = if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.')
-    } else {
-        &text
-    };
-    if text == "-0" {
-        "0".to_string()
-    } else {
-        text.to_string()
-    }
+    let text =
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_string() } else { text.to_string() }
 }
 
 /// A TOML float: always with a decimal point, because arrays of the original format hold one type only.
 fn float(value: f64) -> String {
     let text = decimal(value, DECIMALS);
-    if text.contains('.') {
-        text
-    } else {
-        format!("{text}.0")
-    }
+    if text.contains('.') { text } else { format!("{text}.0") }
 }
 
 fn toml(scene: &Scene, realtime: bool, bonus: bool) -> String {
@@ -112,13 +90,7 @@ fn mtl(scene: &Scene) -> String {
                 text += &format!("illum 7\nKd {}\n", rgb(kd));
                 [("map_Kd", map_kd), ("map_Ks", &None)]
             }
-            Material::Phong {
-                kd,
-                ks,
-                ns,
-                map_kd,
-                map_ks,
-            } => {
+            Material::Phong { kd, ks, ns, map_kd, map_ks } => {
                 text += &format!(
                     "illum 2\nKd {}\nKs {}\nNs {}\n",
                     rgb(kd),
@@ -166,15 +138,9 @@ fn write_mesh(text: &mut String, mesh: &Mesh, first: usize, decimals: usize) {
         }
         text.push('\n');
     };
-    mesh.vertices
-        .iter()
-        .for_each(|v| line("v", &v.position.to_array(), decimals));
-    mesh.vertices
-        .iter()
-        .for_each(|v| line("vt", &v.uv.to_array(), DECIMALS));
-    mesh.vertices
-        .iter()
-        .for_each(|v| line("vn", &v.normal.to_array(), DECIMALS));
+    mesh.vertices.iter().for_each(|v| line("v", &v.position.to_array(), decimals));
+    mesh.vertices.iter().for_each(|v| line("vt", &v.uv.to_array(), DECIMALS));
+    mesh.vertices.iter().for_each(|v| line("vn", &v.normal.to_array(), DECIMALS));
     for triangle in &mesh.triangles {
         let [a, b, c] = triangle.map(|i| i as usize + first);
         text.push_str(&format!("f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}\n"));

@@ -29,19 +29,14 @@ impl Mesh {
         let mut mesh = Self::default();
         for j in 0..=nv {
             for i in 0..=nu {
-                mesh.vertices
-                    .push(surface(i as f64 / nu as f64, j as f64 / nv as f64));
+                mesh.vertices.push(surface(i as f64 / nu as f64, j as f64 / nv as f64));
             }
         }
         let index = |i: usize, j: usize| (j * (nu + 1) + i) as u32;
         for j in 0..nv {
             for i in 0..nu {
-                let (a, b, c, d) = (
-                    index(i, j),
-                    index(i + 1, j),
-                    index(i + 1, j + 1),
-                    index(i, j + 1),
-                );
+                let (a, b, c, d) =
+                    (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
                 for triangle in [[a, b, c], [a, c, d]] {
                     if mesh.cross(triangle).length() > 1e-13 {
                         mesh.triangles.push(triangle);
@@ -52,15 +47,10 @@ impl Mesh {
         let agreement: f64 = mesh
             .triangles
             .iter()
-            .map(|t| {
-                mesh.cross(*t)
-                    .dot(t.iter().map(|i| mesh.vertices[*i as usize].normal).sum())
-            })
+            .map(|t| mesh.cross(*t).dot(t.iter().map(|i| mesh.vertices[*i as usize].normal).sum()))
             .sum();
         if agreement < 0.0 {
-            mesh.triangles
-                .iter_mut()
-                .for_each(|triangle| triangle.swap(1, 2));
+            mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         mesh
     }
@@ -75,8 +65,7 @@ impl Mesh {
     pub fn join(mut self, other: Self) -> Self {
         let first = self.vertices.len() as u32;
         self.vertices.extend(other.vertices);
-        self.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
         self
     }
 

@@ -25,12 +25,7 @@ use std::path::PathBuf;
 
 /// Every scene, the four of the assignment first.
 fn all() -> Vec<Scene> {
-    let mut scenes = vec![
-        spheres::diffuse(),
-        spheres::phong(),
-        cbox::cbox(),
-        teapot::teapot(),
-    ];
+    let mut scenes = vec![spheres::diffuse(), spheres::phong(), cbox::cbox(), teapot::teapot()];
     scenes.extend(probes::all());
     scenes
 }
@@ -66,11 +61,7 @@ pub fn write() -> Result<String> {
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
     let bytes: usize = files.iter().map(|file| file.bytes.len()).sum();
-    Ok(format!(
-        "wrote {} files, {:.1} MB, to scenes/a2",
-        files.len(),
-        bytes as f64 / 1e6
-    ))
+    Ok(format!("wrote {} files, {:.1} MB, to scenes/a2", files.len(), bytes as f64 / 1e6))
 }
 
 /// Compares the committed files with freshly made ones, byte for byte, in memory.
@@ -93,8 +84,5 @@ pub fn check() -> Result<String> {
             faults.join("\n")
         );
     }
-    Ok(format!(
-        "{} files of scenes/a2 are what xtask makes",
-        files.len()
-    ))
+    Ok(format!("{} files of scenes/a2 are what xtask makes", files.len()))
 }

@@ -17,10 +17,7 @@ pub struct Camera {
 #[derive(Clone, Debug)]
 pub enum Material {
     /// MTL `illum 7`.
-    Diffuse {
-        kd: [f64; 3],
-        map_kd: Option<&'static str>,
-    },
+    Diffuse { kd: [f64; 3], map_kd: Option<&'static str> },
     /// MTL `illum 2`, with Phong exponent `ns`.
     Phong {
         kd: [f64; 3],
@@ -39,13 +36,7 @@ impl Material {
     }
 
     pub fn phong(kd: [f64; 3], ks: [f64; 3], ns: f64) -> Self {
-        Self::Phong {
-            kd,
-            ks,
-            ns,
-            map_kd: None,
-            map_ks: None,
-        }
+        Self::Phong { kd, ks, ns, map_kd: None, map_ks: None }
     }
 }
 
@@ -96,37 +87,25 @@ impl Scene {
 
     /// The scene with one shape more.
     pub fn with(mut self, name: &'static str, material: Material, mesh: Mesh) -> Self {
-        self.shapes.push(Shape {
-            name,
-            material,
-            mesh,
-        });
+        self.shapes.push(Shape { name, material, mesh });
         self
     }
 
     /// The scene with its point light: a level quad 2e-6 wide, as in the original course.
     pub fn lit_by(self, position: DVec3, intensity: [f64; 3]) -> Self {
         let e = 1e-6;
-        let light = quad(
-            position + dvec3(-e, 0.0, -e),
-            dvec3(2.0 * e, 0.0, 0.0),
-            dvec3(0.0, 0.0, 2.0 * e),
-        );
+        let light =
+            quad(position + dvec3(-e, 0.0, -e), dvec3(2.0 * e, 0.0, 0.0), dvec3(0.0, 0.0, 2.0 * e));
         self.with("light", Material::Emitter { ke: intensity }, light)
     }
 
     /// Where the point light is: the mean of the first emitter's positions over its index list.
     pub fn light(&self) -> DVec3 {
-        let emitter = self
-            .shapes
-            .iter()
-            .find(|shape| matches!(shape.material, Material::Emitter { .. }));
+        let emitter =
+            self.shapes.iter().find(|shape| matches!(shape.material, Material::Emitter { .. }));
         let mesh = &emitter.expect("every scene has an emitter").mesh;
         let indices = mesh.triangles.as_flattened();
-        indices
-            .iter()
-            .map(|&i| mesh.vertices[i as usize].position)
-            .sum::<DVec3>()
+        indices.iter().map(|&i| mesh.vertices[i as usize].position).sum::<DVec3>()
             / indices.len() as f64
     }
 }

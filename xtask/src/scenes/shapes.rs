@@ -7,20 +7,12 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// A flat parallelogram with corner `origin`; its front is the side that `u x v` points to.
 pub fn quad(origin: DVec3, u: DVec3, v: DVec3) -> Mesh {
     let normal = u.cross(v).normalize();
-    Mesh::grid(1, 1, |s, t| Vertex {
-        position: origin + u * s + v * t,
-        normal,
-        uv: dvec2(s, t),
-    })
+    Mesh::grid(1, 1, |s, t| Vertex { position: origin + u * s + v * t, normal, uv: dvec2(s, t) })
 }
 
 /// A horizontal rectangle at height `y` that faces up, from corner (x0, z0) to corner (x1, z1).
 pub fn floor(y: f64, [x0, z0]: [f64; 2], [x1, z1]: [f64; 2]) -> Mesh {
-    quad(
-        dvec3(x0, y, z1),
-        dvec3(x1 - x0, 0.0, 0.0),
-        dvec3(0.0, 0.0, z0 - z1),
-    )
+    quad(dvec3(x0, y, z1), dvec3(x1 - x0, 0.0, 0.0), dvec3(0.0, 0.0, z0 - z1))
 }
 
 /// A closed sphere with its poles on the y axis.
@@ -37,19 +29,11 @@ pub fn ball(centre: DVec3, radius: f64) -> Mesh {
 pub fn sphere_band(centre: DVec3, radius: f64, segments: usize, rings: usize, part: f64) -> Mesh {
     Mesh::grid(segments, rings, |u, v| {
         // Exact values at the seam and at the poles keep the mesh watertight.
-        let (sin_phi, cos_phi) = if u == 1.0 {
-            (0.0, 1.0)
-        } else {
-            (TAU * u).sin_cos()
-        };
+        let (sin_phi, cos_phi) = if u == 1.0 { (0.0, 1.0) } else { (TAU * u).sin_cos() };
         let theta = PI * v * part;
         let sin_theta = if v * part == 1.0 { 0.0 } else { theta.sin() };
         let normal = dvec3(sin_theta * cos_phi, theta.cos(), -sin_theta * sin_phi);
-        Vertex {
-            position: centre + normal * radius,
-            normal,
-            uv: dvec2(u, 1.0 - v * part),
-        }
+        Vertex { position: centre + normal * radius, normal, uv: dvec2(u, 1.0 - v * part) }
     })
 }
 
@@ -61,11 +45,8 @@ pub fn backdrop(half_width: f64, z_front: f64, z_wall: f64, height: f64, radius:
     // The profile in the (z, y) plane: one step of floor, the arc, one step of wall.
     let profile = |step: usize| -> (DVec2, DVec2) {
         let angle = FRAC_PI_2 * (step.clamp(1, arc_steps + 1) - 1) as f64 / arc_steps as f64;
-        let normal = if step > arc_steps {
-            dvec2(1.0, 0.0)
-        } else {
-            dvec2(angle.sin(), angle.cos())
-        };
+        let normal =
+            if step > arc_steps { dvec2(1.0, 0.0) } else { dvec2(angle.sin(), angle.cos()) };
         let centre = dvec2(z_wall + radius, radius);
         match step {
             0 => (dvec2(z_front, 0.0), dvec2(0.0, 1.0)),
@@ -77,11 +58,7 @@ pub fn backdrop(half_width: f64, z_front: f64, z_wall: f64, height: f64, radius:
     Mesh::grid(1, steps, |u, v| {
         let (p, n) = profile((v * steps as f64).round() as usize);
         let x = half_width * (2.0 * u - 1.0);
-        Vertex {
-            position: dvec3(x, p.y, p.x),
-            normal: dvec3(0.0, n.y, n.x),
-            uv: dvec2(u, v),
-        }
+        Vertex { position: dvec3(x, p.y, p.x), normal: dvec3(0.0, n.y, n.x), uv: dvec2(u, v) }
     })
 }
 
@@ -108,34 +85,16 @@ pub fn height_field(
 pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
     let d = high - low;
     let (x, y, z) = (DVec3::X * d.x, DVec3::Y * d.y, DVec3::Z * d.z);
-    [
-        (low, y, x),
-        (low, z, y),
-        (low, x, z),
-        (high, -x, -y),
-        (high, -y, -z),
-        (high, -z, -x),
-    ]
-    .into_iter()
-    .map(|(origin, u, v)| quad(origin, u, v))
-    .fold(Mesh::default(), Mesh::join)
+    [(low, y, x), (low, z, y), (low, x, z), (high, -x, -y), (high, -y, -z), (high, -z, -x)]
+        .into_iter()
+        .map(|(origin, u, v)| quad(origin, u, v))
+        .fold(Mesh::default(), Mesh::join)
 }
 
 /// Triangles (0, i, i + 1) over a planar polygon, front towards `normal`: vertex 0 occurs in every triangle.
 pub fn fan(corners: &[DVec3], normal: DVec3) -> Mesh {
-    let vertices = corners
-        .iter()
-        .map(|&position| Vertex {
-            position,
-            normal,
-            uv: DVec2::ZERO,
-        })
-        .collect();
-    let triangles = (1..corners.len() as u32 - 1)
-        .map(|i| [0, i, i + 1])
-        .collect();
-    Mesh {
-        vertices,
-        triangles,
-    }
+    let vertices =
+        corners.iter().map(|&position| Vertex { position, normal, uv: DVec2::ZERO }).collect();
+    let triangles = (1..corners.len() as u32 - 1).map(|i| [0, i, i + 1]).collect();
+    Mesh { vertices, triangles }
 }

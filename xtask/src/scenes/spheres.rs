@@ -11,24 +11,13 @@ pub fn diffuse() -> Scene {
 
 /// A Phong sphere whose reflectivities sum to less than one: `scale` is 1 here, as in the original course.
 pub fn phong() -> Scene {
-    scene(
-        "sphere_phong",
-        Material::phong([0.16, 0.3, 0.5], [0.36, 0.36, 0.36], 30.0),
-    )
+    scene("sphere_phong", Material::phong([0.16, 0.3, 0.5], [0.36, 0.36, 0.36], 30.0))
 }
 
 fn scene(name: &'static str, material: Material) -> Scene {
-    let camera = Camera {
-        eye: dvec3(0.0, 2.0, 7.0),
-        at: dvec3(0.0, 0.95, 0.0),
-        fov_deg: 28.0,
-    };
+    let camera = Camera { eye: dvec3(0.0, 2.0, 7.0), at: dvec3(0.0, 0.95, 0.0), fov_deg: 28.0 };
     Scene::new(name, name, camera, [512, 384])
-        .with(
-            "backdrop",
-            Material::diffuse([0.6, 0.6, 0.6]),
-            backdrop(7.0, 6.0, -3.0, 7.0, 2.0),
-        )
+        .with("backdrop", Material::diffuse([0.6, 0.6, 0.6]), backdrop(7.0, 6.0, -3.0, 7.0, 2.0))
         .with("sphere", material, sphere(dvec3(0.0, 0.995, 0.0), 1.0))
         .lit_by(dvec3(-2.5, 4.0, 3.0), [45.0, 45.0, 45.0])
 }

@@ -21,10 +21,7 @@ struct Triangle {
 /// Triangles by shape name, read back from the OBJ text.
 fn parsed(scene: &Scene) -> Vec<(String, Vec<Triangle>)> {
     let files = scene_files(scene).unwrap();
-    let file = files
-        .iter()
-        .find(|file| file.path.ends_with(".obj"))
-        .unwrap();
+    let file = files.iter().find(|file| file.path.ends_with(".obj")).unwrap();
     let text = std::str::from_utf8(&file.bytes).unwrap();
     let (mut v, mut vn, mut uvs, mut shapes) = (Vec::new(), Vec::new(), 0, Vec::new());
     for line in text.lines() {
@@ -38,16 +35,10 @@ fn parsed(scene: &Scene) -> Vec<(String, Vec<Triangle>)> {
             "usemtl" => assert_eq!(words[1], shapes.last().unwrap().0),
             "f" => {
                 let corner = [1, 2, 3].map(|i| {
-                    words[i]
-                        .split('/')
-                        .map(|x| x.parse().unwrap())
-                        .collect::<Vec<usize>>()
+                    words[i].split('/').map(|x| x.parse().unwrap()).collect::<Vec<usize>>()
                 });
                 assert!(corner.iter().all(|c| c.len() == 3 && c[1] <= uvs));
-                let (p, n) = (
-                    corner.clone().map(|c| v[c[0] - 1]),
-                    corner.map(|c| vn[c[2] - 1]),
-                );
+                let (p, n) = (corner.clone().map(|c| v[c[0] - 1]), corner.map(|c| vn[c[2] - 1]));
                 shapes.last_mut().unwrap().1.push(Triangle { p, n });
             }
             _ => {}
@@ -64,19 +55,11 @@ fn open_edges(mesh: &Mesh) -> Vec<[DVec3; 2]> {
         let p = triangle.map(|i| mesh.vertices[i as usize].position);
         for (a, b) in [(p[0], p[1]), (p[1], p[2]), (p[2], p[0])] {
             let (ka, kb) = (key(a), key(b));
-            let (edge, sign) = if ka < kb {
-                ((ka, kb), 1)
-            } else {
-                ((kb, ka), -1)
-            };
+            let (edge, sign) = if ka < kb { ((ka, kb), 1) } else { ((kb, ka), -1) };
             balance.entry(edge).or_insert((0, [a, b])).0 += sign;
         }
     }
-    balance
-        .into_values()
-        .filter(|(count, _)| *count != 0)
-        .map(|(_, edge)| edge)
-        .collect()
+    balance.into_values().filter(|(count, _)| *count != 0).map(|(_, edge)| edge).collect()
 }
 
 /// How often a closed mesh winds around a point: 1 inside, 0 outside (sum of solid angles, van Oosterom and Strackee).
@@ -97,11 +80,7 @@ fn winding(mesh: &Mesh, point: DVec3) -> f64 {
 /// The enclosed volume; negative when the mesh is inside out.
 fn volume(mesh: &Mesh) -> f64 {
     let corner = |t: &[u32; 3]| t.map(|i| mesh.vertices[i as usize].position);
-    mesh.triangles
-        .iter()
-        .map(corner)
-        .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
-        .sum()
+    mesh.triangles.iter().map(corner).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
 
 /// The distance of a point from a triangle.
@@ -109,10 +88,7 @@ fn distance(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let normal = (b - a).cross(c - a).normalize();
     let foot = point - normal * (point - a).dot(normal);
     let edges = [(a, b), (b, c), (c, a)];
-    if edges
-        .iter()
-        .all(|&(p, q)| (q - p).cross(foot - p).dot(normal) >= 0.0)
-    {
+    if edges.iter().all(|&(p, q)| (q - p).cross(foot - p).dot(normal) >= 0.0) {
         return point.distance(foot);
     }
     let to_edge = |(p, q): (DVec3, DVec3)| {
@@ -141,13 +117,8 @@ fn committed_files_are_current_and_small() {
 
 #[test]
 fn decimals_are_short() {
-    let cases = [
-        (1.0, "1"),
-        (-0.000001, "0"),
-        (0.123456, "0.12346"),
-        (-2.5, "-2.5"),
-        (100.0, "100"),
-    ];
+    let cases =
+        [(1.0, "1"), (-0.000001, "0"), (0.123456, "0.12346"), (-2.5, "-2.5"), (100.0, "100")];
     for (value, text) in cases {
         assert_eq!(decimal(value, 5), text);
     }
@@ -161,21 +132,14 @@ fn triangles_have_area_and_normals_agree_with_the_winding() {
             assert!(!triangles.is_empty(), "{} {name}", scene.folder);
             for Triangle { p, n } in triangles {
                 let cross = (p[1] - p[0]).cross(p[2] - p[0]);
-                let longest = p[0]
-                    .distance(p[1])
-                    .max(p[1].distance(p[2]))
-                    .max(p[2].distance(p[0]));
+                let longest = p[0].distance(p[1]).max(p[1].distance(p[2])).max(p[2].distance(p[0]));
                 assert!(
                     cross.length() > 1e-3 * longest * longest,
                     "{} {name}: sliver {p:?}",
                     scene.folder
                 );
                 for n in n {
-                    assert!(
-                        (n.length() - 1.0).abs() < 2e-5,
-                        "{} {name}: normal {n}",
-                        scene.folder
-                    );
+                    assert!((n.length() - 1.0).abs() < 2e-5, "{} {name}: normal {n}", scene.folder);
                     assert!(
                         n.dot(cross.normalize()) > 0.3,
                         "{} {name}: {n} against {cross} at {p:?}",
@@ -190,31 +154,18 @@ fn triangles_have_area_and_normals_agree_with_the_winding() {
 #[test]
 fn one_emitter_whose_index_mean_is_the_light() {
     for scene in all() {
-        let emitters = scene
-            .shapes
-            .iter()
-            .filter(|shape| matches!(shape.material, Material::Emitter { .. }));
+        let emitters =
+            scene.shapes.iter().filter(|shape| matches!(shape.material, Material::Emitter { .. }));
         assert_eq!(emitters.count(), 1, "{}", scene.folder);
         let shapes = parsed(&scene);
         let (name, triangles) = shapes.last().unwrap();
         assert_eq!(name, "light");
         // As a loader sees it: positions are f32.
-        let positions: Vec<DVec3> = triangles
-            .iter()
-            .flat_map(|t| t.p)
-            .map(|p| p.as_vec3().as_dvec3())
-            .collect();
+        let positions: Vec<DVec3> =
+            triangles.iter().flat_map(|t| t.p).map(|p| p.as_vec3().as_dvec3()).collect();
         let mean = positions.iter().sum::<DVec3>() / positions.len() as f64;
-        assert!(
-            mean.distance(scene.light()) < 1e-6,
-            "{}: {mean}",
-            scene.folder
-        );
-        assert!(
-            triangles
-                .iter()
-                .all(|t| t.p.map(DVec3::as_vec3).windows(2).all(|w| w[0] != w[1]))
-        );
+        assert!(mean.distance(scene.light()) < 1e-6, "{}: {mean}", scene.folder);
+        assert!(triangles.iter().all(|t| t.p.map(DVec3::as_vec3).windows(2).all(|w| w[0] != w[1])));
     }
 }
 
@@ -224,10 +175,8 @@ fn surfaces_keep_clear_of_the_light() {
         let light = scene.light();
         let bound = 0.01 * light.distance(scene.camera.at);
         for (name, triangles) in parsed(&scene).iter().filter(|(name, _)| name != "light") {
-            let nearest = triangles
-                .iter()
-                .map(|t| distance(light, t.p))
-                .fold(f64::INFINITY, f64::min);
+            let nearest =
+                triangles.iter().map(|t| distance(light, t.p)).fold(f64::INFINITY, f64::min);
             assert!(
                 nearest > bound,
                 "{} {name}: {nearest} from the light, bound {bound}",
@@ -245,11 +194,7 @@ fn closed_meshes_are_watertight_and_right_side_out() {
     for mesh in [&ball, &pot, &cup, &block] {
         assert_eq!(open_edges(mesh).len(), 0);
     }
-    assert!(
-        (volume(&ball) / (4.0 / 3.0 * PI) - 1.0).abs() < 0.01,
-        "{}",
-        volume(&ball)
-    );
+    assert!((volume(&ball) / (4.0 / 3.0 * PI) - 1.0).abs() < 0.01, "{}", volume(&ball));
     assert!((volume(&block) - 6.0).abs() < 1e-12);
     // The pot is about a cylinder of radius 1.8 and height 2.4; the cup holds its tea outside the mesh.
     assert!((15.0..32.0).contains(&volume(&pot)), "{}", volume(&pot));
@@ -263,11 +208,7 @@ fn handles_and_spout_end_inside_what_they_grow_from() {
     let inside =
         |body: &Mesh, end: &[DVec3]| end.iter().all(|&p| (winding(body, p) - 1.0).abs() < 1e-6);
     let ends = |tube: &Mesh, x_split: &dyn Fn(DVec3) -> bool| -> Vec<DVec3> {
-        open_edges(tube)
-            .into_iter()
-            .map(|edge| edge[0])
-            .filter(|&p| x_split(p))
-            .collect()
+        open_edges(tube).into_iter().map(|edge| edge[0]).filter(|&p| x_split(p)).collect()
     };
     let (pot, cup) = (sweep(&TEAPOT_PROFILES, 12), sweep(&TEACUP_PROFILES, 12));
     let handle = ends(&teapot_handle(), &|_| true);
@@ -317,76 +258,42 @@ fn one_frustum_from_the_light_holds_every_caster() {
             .collect();
         assert!(ways.len() > 1000);
         let axis = ways.iter().sum::<DVec3>().normalize();
-        let widest_deg = ways
-            .iter()
-            .map(|w| w.angle_between(axis).to_degrees())
-            .fold(0.0, f64::max);
-        assert!(
-            widest_deg < 55.0,
-            "{}: {widest_deg} degrees off the axis",
-            scene.folder
-        );
+        let widest_deg =
+            ways.iter().map(|w| w.angle_between(axis).to_degrees()).fold(0.0, f64::max);
+        assert!(widest_deg < 55.0, "{}: {widest_deg} degrees off the axis", scene.folder);
     }
 }
 
 #[test]
 fn nothing_is_hidden_in_the_open() {
-    let scene = probes::all()
-        .into_iter()
-        .find(|scene| scene.name == "open")
-        .unwrap();
+    let scene = probes::all().into_iter().find(|scene| scene.name == "open").unwrap();
     let shapes = parsed(&scene);
-    let triangles = || {
-        shapes
-            .iter()
-            .filter(|(name, _)| name != "light")
-            .flat_map(|(_, triangles)| triangles)
-    };
-    for point in triangles()
-        .step_by(11)
-        .map(|t| (t.p[0] + t.p[1] + t.p[2]) / 3.0)
-    {
+    let triangles =
+        || shapes.iter().filter(|(name, _)| name != "light").flat_map(|(_, triangles)| triangles);
+    for point in triangles().step_by(11).map(|t| (t.p[0] + t.p[1] + t.p[2]) / 3.0) {
         for other in [scene.light(), scene.camera.eye] {
-            assert!(
-                !triangles().any(|t| meets(t.p, point, other)),
-                "{point} does not see {other}"
-            );
+            assert!(!triangles().any(|t| meets(t.p, point, other)), "{point} does not see {other}");
         }
     }
 }
 
 #[test]
 fn the_large_emitter_tells_its_means_apart() {
-    let scene = probes::all()
-        .into_iter()
-        .find(|scene| scene.name == "emitter")
-        .unwrap();
+    let scene = probes::all().into_iter().find(|scene| scene.name == "emitter").unwrap();
     let mesh = &scene.shapes.last().unwrap().mesh;
-    let corners: Vec<DVec2> = mesh
-        .vertices
-        .iter()
-        .map(|v| DVec2::new(v.position.x, v.position.z))
-        .collect();
+    let corners: Vec<DVec2> =
+        mesh.vertices.iter().map(|v| DVec2::new(v.position.x, v.position.z)).collect();
     let light = DVec2::new(scene.light().x, scene.light().z);
     let count = corners.len();
     let edges = || (0..count).map(|i| (corners[i], corners[(i + 1) % count]));
-    assert!(
-        edges().all(|(a, b)| (b - a).perp_dot(light - a) > 0.3),
-        "{light} is not well inside"
-    );
+    assert!(edges().all(|(a, b)| (b - a).perp_dot(light - a) > 0.3), "{light} is not well inside");
     let area: f64 = edges().map(|(a, b)| a.perp_dot(b) / 2.0).sum();
     let centroid = edges().map(|(a, b)| (a + b) * a.perp_dot(b)).sum::<DVec2>() / (6.0 * area);
     let low = corners.iter().copied().fold(DVec2::INFINITY, DVec2::min);
-    let high = corners
-        .iter()
-        .copied()
-        .fold(DVec2::NEG_INFINITY, DVec2::max);
-    for other in [
-        corners.iter().sum::<DVec2>() / count as f64,
-        centroid,
-        (low + high) / 2.0,
-        corners[0],
-    ] {
+    let high = corners.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
+    for other in
+        [corners.iter().sum::<DVec2>() / count as f64, centroid, (low + high) / 2.0, corners[0]]
+    {
         assert!(other.distance(light) > 0.2, "{light} against {other}");
     }
 }

@@ -15,10 +15,7 @@ pub struct Texture {
 impl Texture {
     /// Fills a square image of `size` texels a side with `colour(column, row)`.
     pub fn new(file: &'static str, size: u32, colour: impl Fn(u32, u32) -> [u8; 3]) -> Self {
-        Self {
-            file,
-            image: RgbImage::from_fn(size, size, |x, y| Rgb(colour(x, y))),
-        }
+        Self { file, image: RgbImage::from_fn(size, size, |x, y| Rgb(colour(x, y))) }
     }
 
     /// The bytes of the PNG file.

@@ -50,17 +50,12 @@ impl Decoder<'_> {
         let (names, targets) = self.assign_channels(&header.channels, &mut notes)?;
 
         let mut layers = vec![Image::new(width, height); names.len()];
-        let chunks = reader
-            .all_chunks(false)
-            .map_err(|e| self.error(e, "the offset table"))?;
+        let chunks = reader.all_chunks(false).map_err(|e| self.error(e, "the offset table"))?;
         let blocks = chunks.sequential_decompressor(false);
         let mut seen = HashSet::new();
         for block in blocks {
             let block = block.map_err(|e| {
-                self.error(
-                    e,
-                    &format!("pixel block {} of {}", seen.len() + 1, header.chunk_count),
-                )
+                self.error(e, &format!("pixel block {} of {}", seen.len() + 1, header.chunk_count))
             })?;
             let Vec2(left, top) = block.index.pixel_position;
             if block.index.level != Vec2(0, 0) {
@@ -86,19 +81,11 @@ impl Decoder<'_> {
     fn check_signature(&self) -> Result<(), ImageError> {
         let found = match self.bytes {
             [] => "nothing (the file is empty)".to_owned(),
-            bytes => bytes
-                .iter()
-                .take(4)
-                .map(|b| format!("{b:02x}"))
-                .collect::<Vec<_>>()
-                .join(" "),
+            bytes => bytes.iter().take(4).map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" "),
         };
         let magic = &exr::meta::magic_number::BYTES[..];
         if self.bytes.is_empty() || !self.bytes.starts_with(&magic[..self.bytes.len().min(4)]) {
-            return Err(ImageError::NotExr {
-                path: self.path.into(),
-                found,
-            });
+            return Err(ImageError::NotExr { path: self.path.into(), found });
         }
         let Some(flags) = self.bytes.get(5) else {
             return Err(self.truncated("the version field"));
@@ -162,10 +149,9 @@ impl Decoder<'_> {
             return Err(self.unsupported(&header.compression.to_string(), "none, RLE, ZIP or PIZ"));
         }
         if header.channels.list.len() > MAX_CHANNELS {
-            return Err(self.unsupported(
-                &format!("{} channels", header.channels.list.len()),
-                "R, G and B",
-            ));
+            return Err(
+                self.unsupported(&format!("{} channels", header.channels.list.len()), "R, G and B")
+            );
         }
         let pixel_bytes = width * height * header.channels.bytes_per_pixel;
         let least = 8 * header.chunk_count
@@ -196,20 +182,14 @@ impl Decoder<'_> {
         layers.retain(|layer| ["R", "G", "B"].iter().any(|c| has(layer, c)));
         if layers.is_empty() {
             return Err(match all.iter().any(|name| name == "Y") {
-                true => ImageError::LuminanceOnly {
-                    path: self.path.into(),
-                },
+                true => ImageError::LuminanceOnly { path: self.path.into() },
                 false => self.missing_channel("R", &all),
             });
         }
         for layer in &layers {
             for c in ["R", "G", "B"] {
                 if !has(layer, c) {
-                    let full = if layer.is_empty() {
-                        c.to_owned()
-                    } else {
-                        format!("{layer}.{c}")
-                    };
+                    let full = if layer.is_empty() { c.to_owned() } else { format!("{layer}.{c}") };
                     return Err(self.missing_channel(&full, &all));
                 }
             }
@@ -304,10 +284,7 @@ impl Decoder<'_> {
     }
 
     fn malformed(&self, what: String) -> ImageError {
-        ImageError::Malformed {
-            path: self.path.into(),
-            what,
-        }
+        ImageError::Malformed { path: self.path.into(), what }
     }
 
     fn missing_channel(&self, channel: &str, all: &[String]) -> ImageError {
@@ -321,12 +298,7 @@ impl Decoder<'_> {
 
 /// The `name = text` lines of a file's `comments`.
 fn provenance(header: &Header) -> BTreeMap<String, String> {
-    let comments = header
-        .own_attributes
-        .comments
-        .as_ref()
-        .map(Text::to_string)
-        .unwrap_or_default();
+    let comments = header.own_attributes.comments.as_ref().map(Text::to_string).unwrap_or_default();
     comments
         .lines()
         .filter_map(|l| l.split_once(" = "))

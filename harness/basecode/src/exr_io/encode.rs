@@ -23,13 +23,8 @@ pub(super) fn encode(
     compression: Compression,
     path: &Path,
 ) -> Result<Vec<u8>, ImageError> {
-    let unwritable = |what: String| ImageError::Unwritable {
-        path: path.into(),
-        what,
-    };
-    let &(_, first) = layers
-        .first()
-        .ok_or_else(|| unwritable("there is no image".into()))?;
+    let unwritable = |what: String| ImageError::Unwritable { path: path.into(), what };
+    let &(_, first) = layers.first().ok_or_else(|| unwritable("there is no image".into()))?;
     let (width, height) = (first.width, first.height);
     if width == 0
         || height == 0
@@ -43,16 +38,11 @@ pub(super) fn encode(
     let mut channels = Vec::new();
     for &(layer, image) in layers {
         if (image.width, image.height, image.pixels.len()) != (width, height, width * height) {
-            return Err(unwritable(format!(
-                "layer \"{layer}\" is not {width}x{height}"
-            )));
+            return Err(unwritable(format!("layer \"{layer}\" is not {width}x{height}")));
         }
         for (component, letter) in ["R", "G", "B"].into_iter().enumerate() {
-            let name = if layer.is_empty() {
-                letter.to_owned()
-            } else {
-                format!("{layer}.{letter}")
-            };
+            let name =
+                if layer.is_empty() { letter.to_owned() } else { format!("{layer}.{letter}") };
             if !name.bytes().all(|b| b.is_ascii_graphic()) {
                 return Err(unwritable(format!("\"{layer}\" is no name for a layer")));
             }
@@ -66,22 +56,11 @@ pub(super) fn encode(
         Precision::Float => SampleType::F32,
     };
     let described = channels.iter().map(|(name, ..)| {
-        ChannelDescription::new(
-            Text::new_or_none(name).unwrap_or_default(),
-            sample_type,
-            false,
-        )
+        ChannelDescription::new(Text::new_or_none(name).unwrap_or_default(), sample_type, false)
     });
-    let mut header = Header::new(
-        Text::default(),
-        (width, height),
-        described.collect::<SmallVec<[_; 5]>>(),
-    )
-    .with_encoding(
-        compression,
-        BlockDescription::ScanLines,
-        LineOrder::Increasing,
-    );
+    let mut header =
+        Header::new(Text::default(), (width, height), described.collect::<SmallVec<[_; 5]>>())
+            .with_encoding(compression, BlockDescription::ScanLines, LineOrder::Increasing);
     header.own_attributes.layer_name = None;
     header.own_attributes.software_name = Text::new_or_none("umbra");
     if !attributes.is_empty() {

@@ -119,8 +119,7 @@ fn shadows_are_judged_where_radiance_is_right() {
         checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
     };
     let (pass, fail) = (Verdict::Pass, Verdict::Fail);
-    let emitter =
-        [check("radiance.lit", "emitter", fail), check("shadow.rays", "emitter", fail)];
+    let emitter = [check("radiance.lit", "emitter", fail), check("shadow.rays", "emitter", fail)];
     // Wrong everywhere: shadows are judged all the same.
     assert_eq!(verdicts(&emitter), [fail, fail]);
     let right = [check("radiance.lit", "cbox", pass), check("shadow.rays", "cbox", fail)];

@@ -10,11 +10,7 @@ use std::f64::consts::PI;
 pub fn behind() -> Scene {
     let plate = quad(dvec3(-0.6, 2.4, -0.6), DVec3::X * 1.2, DVec3::Z * 1.2);
     probe("behind", dvec3(0.6, 4.4, 5.0), dvec3(0.0, 0.7, 0.2), 36.0)
-        .with(
-            "floor",
-            Material::diffuse([0.7, 0.7, 0.7]),
-            floor(0.0, [-7.0, -6.0], [7.0, 3.5]),
-        )
+        .with("floor", Material::diffuse([0.7, 0.7, 0.7]), floor(0.0, [-7.0, -6.0], [7.0, 3.5]))
         .with(
             "shelf",
             Material::diffuse([0.1, 0.08, 0.06]),
@@ -37,38 +33,17 @@ pub fn behind() -> Scene {
 /// A hexagon of emitter, level, fanned out from its first corner.
 pub fn emitter() -> Scene {
     // Two thin triangles pull the index mean away from the centroid.
-    let corners = [
-        [-2.0, -1.2],
-        [0.2, -1.3],
-        [0.9, -1.2],
-        [1.3, -0.9],
-        [1.6, 0.8],
-        [-0.8, 1.1],
-    ];
+    let corners = [[-2.0, -1.2], [0.2, -1.3], [0.9, -1.2], [1.3, -0.9], [1.6, 0.8], [-0.8, 1.1]];
     let corners = corners.map(|[x, z]| dvec3(x, 3.25, z));
     probe("emitter", dvec3(0.0, 2.5, 8.5), dvec3(0.0, 1.35, 0.0), 28.0)
-        .with(
-            "floor",
-            Material::diffuse([0.6, 0.6, 0.6]),
-            floor(0.0, [-8.0, -8.0], [8.0, 5.0]),
-        )
+        .with("floor", Material::diffuse([0.6, 0.6, 0.6]), floor(0.0, [-8.0, -8.0], [8.0, 5.0]))
         .with(
             "left",
             Material::phong([0.5, 0.2, 0.2], [0.3, 0.3, 0.3], 20.0),
             ball(dvec3(-1.5, 0.597, 0.5), 0.6),
         )
-        .with(
-            "right",
-            Material::diffuse([0.3, 0.5, 0.7]),
-            ball(dvec3(1.2, 0.597, 0.0), 0.6),
-        )
-        .with(
-            "light",
-            Material::Emitter {
-                ke: [20.0, 20.0, 20.0],
-            },
-            fan(&corners, DVec3::NEG_Y),
-        )
+        .with("right", Material::diffuse([0.3, 0.5, 0.7]), ball(dvec3(1.2, 0.597, 0.0), 0.6))
+        .with("light", Material::Emitter { ke: [20.0, 20.0, 20.0] }, fan(&corners, DVec3::NEG_Y))
 }
 
 /// Upright cards on either side of the light, facing to and fro, and a bowl that shows its inside.
@@ -81,42 +56,17 @@ pub fn backfaces() -> Scene {
         dvec3(0.0, 0.6, 1.6),
     );
     let phong = |kd: [f64; 3]| Material::phong(kd, [0.4, 0.4, 0.4], 9.0);
-    probe(
-        "backfaces",
-        dvec3(0.0, 3.4, 7.0),
-        dvec3(0.0, 0.45, 0.0),
-        32.0,
-    )
-    .with(
-        "floor",
-        Material::diffuse([0.5, 0.5, 0.5]),
-        floor(0.0, [-7.0, -7.0], [7.0, 4.0]),
-    )
-    .with(
-        "both",
-        phong([0.5, 0.3, 0.2]),
-        joined([toward(-1.7, -1.5), toward(0.6, -1.5)]),
-    )
-    .with("neither", phong([0.2, 0.5, 0.3]), away(-0.7, -1.5))
-    .with(
-        "neither_diffuse",
-        Material::diffuse([0.7, 0.4, 0.5]),
-        away(1.7, -1.5),
-    )
-    .with("camera_only", phong([0.3, 0.3, 0.6]), toward(-1.7, 1.4))
-    .with(
-        "light_only",
-        Material::diffuse([0.6, 0.6, 0.2]),
-        away(-0.85, 1.4),
-    )
-    .with(
-        "camera_only_diffuse",
-        Material::diffuse([0.4, 0.6, 0.6]),
-        toward(0.85, 1.4),
-    )
-    .with("light_only_phong", phong([0.5, 0.2, 0.5]), away(1.7, 1.4))
-    .with("bowl", phong([0.4, 0.4, 0.2]), bowl)
-    .lit_by(dvec3(0.25, 3.0, 0.0), [26.0, 26.0, 26.0])
+    probe("backfaces", dvec3(0.0, 3.4, 7.0), dvec3(0.0, 0.45, 0.0), 32.0)
+        .with("floor", Material::diffuse([0.5, 0.5, 0.5]), floor(0.0, [-7.0, -7.0], [7.0, 4.0]))
+        .with("both", phong([0.5, 0.3, 0.2]), joined([toward(-1.7, -1.5), toward(0.6, -1.5)]))
+        .with("neither", phong([0.2, 0.5, 0.3]), away(-0.7, -1.5))
+        .with("neither_diffuse", Material::diffuse([0.7, 0.4, 0.5]), away(1.7, -1.5))
+        .with("camera_only", phong([0.3, 0.3, 0.6]), toward(-1.7, 1.4))
+        .with("light_only", Material::diffuse([0.6, 0.6, 0.2]), away(-0.85, 1.4))
+        .with("camera_only_diffuse", Material::diffuse([0.4, 0.6, 0.6]), toward(0.85, 1.4))
+        .with("light_only_phong", phong([0.5, 0.2, 0.5]), away(1.7, 1.4))
+        .with("bowl", phong([0.4, 0.4, 0.2]), bowl)
+        .lit_by(dvec3(0.25, 3.0, 0.0), [26.0, 26.0, 26.0])
 }
 
 /// A comb 0.02 above the floor, a plate 0.2 above it, and a fin that stands on it, under a slanting light.
@@ -125,11 +75,7 @@ pub fn contact() -> Scene {
         .map(|k| -0.9 + 0.12 * f64::from(k))
         .map(|x| floor(0.02, [x, -0.42], [x + 0.05, 0.42]));
     let mut scene = probe("contact", dvec3(0.0, 2.8, 1.6), dvec3(0.0, 0.0, 0.03), 24.0)
-        .with(
-            "floor",
-            Material::diffuse([0.7, 0.68, 0.64]),
-            floor(0.0, [-2.0, -2.0], [2.0, 2.0]),
-        )
+        .with("floor", Material::diffuse([0.7, 0.68, 0.64]), floor(0.0, [-2.0, -2.0], [2.0, 2.0]))
         .with("comb", Material::diffuse([0.5, 0.2, 0.15]), joined(bars))
         .with(
             "plate",
@@ -153,21 +99,13 @@ pub fn rows() -> Scene {
     // One unit is the height of the film at the stripes: 64 pixels.
     let stripes = (0..28).map(|k| {
         let x = (-47.3 + 3.37 * f64::from(k)) / 64.0;
-        quad(
-            dvec3(x, -0.8, 0.0),
-            DVec3::X * (1.71 / 64.0),
-            DVec3::Y * 1.6,
-        )
+        quad(dvec3(x, -0.8, 0.0), DVec3::X * (1.71 / 64.0), DVec3::Y * 1.6)
     });
     // Wider than elsewhere: floats near 64 are 8e-6 apart.
     let light = quad(dvec3(-0.01, -0.01, 64.0), DVec3::X * 0.02, DVec3::Y * 0.02);
     let fov_deg = 2.0 * (0.5f64 / 20.0).atan().to_degrees();
     let mut scene = probe("rows", dvec3(0.0, 0.0, 20.0), DVec3::ZERO, fov_deg)
-        .with(
-            "stripes",
-            Material::diffuse([0.8, 0.8, 0.8]),
-            joined(stripes),
-        )
+        .with("stripes", Material::diffuse([0.8, 0.8, 0.8]), joined(stripes))
         .with("light", Material::Emitter { ke: [6000.0; 3] }, light);
     scene.film = [96, 64];
     scene

@@ -78,20 +78,12 @@ pub fn readme() -> File {
             scene.name, light.x, light.y, light.z
         );
     }
-    File {
-        path: "probes/README.md".to_string(),
-        bytes: text.into_bytes(),
-    }
+    File { path: "probes/README.md".to_string(), bytes: text.into_bytes() }
 }
 
 /// An empty probe scene.
 fn probe(name: &'static str, eye: DVec3, at: DVec3, fov_deg: f64) -> Scene {
-    Scene::new(
-        &format!("probes/{name}"),
-        name,
-        Camera { eye, at, fov_deg },
-        FILM,
-    )
+    Scene::new(&format!("probes/{name}"), name, Camera { eye, at, fov_deg }, FILM)
 }
 
 /// Several meshes as one.
