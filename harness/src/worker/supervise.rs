@@ -198,6 +198,8 @@ impl Supervisor {
         let mut command = Command::new(&self.umbra);
         command.arg("__worker").arg(&cage.job).current_dir(Folder(dir).scratch()).env_clear();
         command.env("LANG", "C").env("HOME", "/nonexistent");
+        // One renderer's compiled shaders are no other's business; Mesa would make the folder above.
+        command.env("MESA_SHADER_CACHE_DISABLE", "true").env("MESA_GLSL_CACHE_DISABLE", "true");
         command.env("LP_NUM_THREADS", limits.threads.to_string());
         command.env("RAYON_NUM_THREADS", limits.threads.to_string());
         let software = requests.iter().any(|request| {
