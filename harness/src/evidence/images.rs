@@ -225,3 +225,36 @@ fn ratio_hint(actual: &Image, expected: &Image, mask: &RegionMask) -> String {
     named.truncate(3);
     named.join("; ")
 }
+
+#[cfg(test)]
+mod tests {
+    use basecode::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn normals_that_are_not_renormalised_are_accepted_by_material() {
+        let mut mask = RegionMask::background(16, 16);
+        for exponent in [0.0, 20.0] {
+            mask.regions.push(Region { name: "ball".into(), lit: true, exponent });
+        }
+        mask.pixels = (0..256).map(|i| if i % 16 < 8 { 1 } else { 2 }).collect();
+        let image = |value: &dyn Fn(usize) -> f32| Image {
+            width: 16,
+            height: 16,
+            pixels: (0..256).map(|i| Vec3::splat(value(i))).collect(),
+        };
+        let (right, raw) = (image(&|_| 1.0), image(&|_| 0.95));
+        let judge = |actual: &Image, raw: Option<&Image>| {
+            judge_shaded("i", "s", actual, (&right, raw), &mask, &Tolerances::default()).verdict
+        };
+        assert_eq!(judge(&right, Some(&raw)), Verdict::Pass);
+        assert_eq!(judge(&raw, Some(&raw)), Verdict::Pass);
+        assert_eq!(judge(&raw, None), Verdict::Fail);
+        let diffuse_alone = image(&|i| if i % 16 < 8 { 0.95 } else { 1.0 });
+        assert_eq!(judge(&diffuse_alone, Some(&raw)), Verdict::Pass);
+        // Neither one nor the other.
+        assert_eq!(judge(&image(&|_| 0.97), Some(&raw)), Verdict::Fail);
+        assert_eq!(judge(&image(&|i| if i < 128 { 0.95 } else { 1.0 }), Some(&raw)), Verdict::Fail);
+    }
+}

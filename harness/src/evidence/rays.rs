@@ -18,6 +18,8 @@ const RELATIVE: f64 = 3e-3;
 /// So many of the rays may still differ: a student's own intersection code meets other triangles
 /// along seams that no mask knows.
 const STRAY_FRACTION: f64 = 2e-3;
+/// So many of the lit rays must not be black without shadows.
+const LEAST_KNOWN: f64 = 0.25;
 /// A visibility below this is dark, above one minus it lit; anything between is neither.
 const HALF_LIGHT: f64 = 0.02;
 
@@ -229,12 +231,19 @@ pub fn judge_shadows(
         let summary = "the scene has no ray in full light, or none in full shadow, away from edges";
         return Check::new(id, &batch.scene, Verdict::NotJudged, summary);
     }
-    let (mut lit_wrong, mut dark_wrong) = (0usize, 0usize);
+    // A renderer that ignores the switch draws shadows always: then its own shadows are what is
+    // missing without, and no fault of its shading.
+    let ignores_switch = with == without;
+    let (mut lit_wrong, mut dark_wrong, mut lit_black) = (0usize, 0usize, 0usize);
     let mut first: Option<(usize, f64)> = None;
     for index in 0..batch.rays.len() {
         let expected = batch.unshadowed(index, bsdf(&batch.points[index]));
-        let visibility = visibility(with[index], without[index], expected);
         let is_lit = index < batch.lit;
+        if is_lit && !ignores_switch && is_black(without[index], expected) {
+            lit_black += 1;
+            continue;
+        }
+        let visibility = visibility(with[index], without[index], expected);
         // What is no number is never right.
         let right = (visibility - f64::from(u8::from(is_lit))).abs() < HALF_LIGHT;
         if !right {
@@ -243,7 +252,15 @@ pub fn judge_shadows(
             first = first.or(Some((index, visibility)));
         }
     }
-    let lit_fraction = lit_wrong as f64 / batch.lit as f64;
+    // What is black with shadows and without says nothing about visibility.
+    let lit_known = batch.lit - lit_black;
+    if (lit_known as f64) < LEAST_KNOWN * batch.lit as f64 {
+        let verdict = if lit_known == 0 { Verdict::Fail } else { Verdict::NotJudged };
+        let summary =
+            format!("{lit_black} of {} lit rays are black without shadows too", batch.lit);
+        return Check::new(id, &batch.scene, verdict, summary);
+    }
+    let lit_fraction = lit_wrong as f64 / lit_known as f64;
     let dark_fraction = dark_wrong as f64 / dark as f64;
     let measures = vec![
         Measure::at_most("lit rays that are not lit (fraction)", lit_fraction, STRAY_FRACTION),
@@ -261,9 +278,8 @@ pub fn judge_shadows(
         Some((index, visibility)) => {
             let p = batch.points[index].position;
             let summary = format!(
-                "{lit_wrong} of {} lit rays are not lit and {dark_wrong} of {dark} shadowed rays are not dark; \
+                "{lit_wrong} of {lit_known} lit rays are not lit and {dark_wrong} of {dark} shadowed rays are not dark; \
                  first at ({:.3}, {:.3}, {:.3}): expected visibility {}, found {visibility:.2}",
-                batch.lit,
                 p.x,
                 p.y,
                 p.z,
@@ -278,16 +294,20 @@ pub fn judge_shadows(
     check
 }
 
+/// The least fraction of rays whose radiance is wrong where the light stands elsewhere.
+const LIGHT_ELSEWHERE: f64 = 0.9;
+
 /// Where the light stands elsewhere than it should, shadows fall elsewhere too. So on a scene whose
-/// unshadowed radiance is wrong (1.3) shadows are not judged (1.4), as long as there is another
-/// scene whose radiance is right and whose shadows are judged.
+/// unshadowed radiance is wrong nearly everywhere (1.3) shadows are not judged (1.4), as long as
+/// there is another scene whose radiance is right and whose shadows are judged.
 pub fn set_apart(checks: &mut [Check]) {
     let is = |check: &Check, id: &str, verdict| check.id == id && check.verdict == verdict;
-    let scenes = |verdict| -> Vec<String> {
-        let radiance = checks.iter().filter(|check| is(check, "radiance.lit", verdict));
-        radiance.map(|check| check.scene.clone()).collect()
-    };
-    let (right, wrong) = (scenes(Verdict::Pass), scenes(Verdict::Fail));
+    let nearly_all = |check: &&Check| check.measures.iter().any(|m| m.value > LIGHT_ELSEWHERE);
+    let named =
+        |checks: Vec<&Check>| checks.iter().map(|check| check.scene.clone()).collect::<Vec<_>>();
+    let radiance = |verdict| checks.iter().filter(move |check| is(check, "radiance.lit", verdict));
+    let right = named(radiance(Verdict::Pass).collect());
+    let wrong = named(radiance(Verdict::Fail).filter(nearly_all).collect());
     let judged = |check: &Check| {
         is(check, "shadow.rays", Verdict::Pass) || is(check, "shadow.rays", Verdict::Fail)
     };
@@ -309,8 +329,16 @@ pub fn set_apart(checks: &mut [Check]) {
 /// without (a renderer that ignores the switch), no radiance with shadows is darkness.
 fn visibility(with: [f32; 3], without: [f32; 3], expected: [f64; 3]) -> f64 {
     let sum = |v: [f32; 3]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
-    let (with, without, expected) = (sum(with), sum(without), expected.iter().sum::<f64>());
-    if without.abs() > 1e-3 * expected { with / without } else { with / expected }
+    let expected_sum = expected.iter().sum::<f64>();
+    if is_black(without, expected) { sum(with) / expected_sum } else { sum(with) / sum(without) }
+}
+
+/// Whether radiance is nothing beside what is expected.
+fn is_black(radiance: [f32; 3], expected: [f64; 3]) -> bool {
+    let sum = radiance.iter().map(|&x| f64::from(x)).sum::<f64>();
+    // Asked this way round, a NaN is black.
+    let shines = sum.abs() > 1e-3 * expected.iter().sum::<f64>();
+    !shines
 }
 
 fn shadow_hint(lit: f64, dark: f64) -> String {

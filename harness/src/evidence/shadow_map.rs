@@ -106,7 +106,7 @@ impl Shadows<'_> {
             }
             *known += 1;
             let off = if lit { (a - b).abs() } else { a.abs() };
-            // Written so that a NaN is wrong.
+            // Asked this way round, a NaN is wrong.
             let right = off.max_element() <= HALF_LIGHT * b.abs().max_element();
             if !right {
                 *wrong += 1;

@@ -91,6 +91,15 @@ fn visibility_is_judged_apart_from_radiance() {
     }
     let black = shadows(|_| 0.0, |_| 0.0);
     assert!(black.verdict == Verdict::Fail && black.error >= 1.0);
+    // Rays that are black without shadows too are no matter of shadows, unless all are.
+    let faced = |index: usize| if index.is_multiple_of(2) { 1.0 } else { 0.0 };
+    assert_eq!(shadows(|i| right(i) * faced(i), faced).verdict, Verdict::Pass);
+    assert_eq!(shadows(faced, faced).verdict, Verdict::Fail);
+    let acne = shadows(|i| right(i) * faced(i), |i| right(i) * faced(i));
+    assert_eq!(acne.verdict, Verdict::Fail);
+    let few = |index: usize| if index.is_multiple_of(10) { 1.0 } else { 0.0 };
+    assert_eq!(shadows(|i| right(i) * few(i), few).verdict, Verdict::NotJudged);
+    assert_eq!(shadows(|_| 0.0, |i| 1.0 - right(i)).verdict, Verdict::Fail);
     let some = shadows(|index| if index < 45 { 1.0 } else { 0.0 }, |_| 1.0);
     assert!((some.error - 0.25).abs() < 1e-9 && some.hint.contains("occluders"));
 }
@@ -119,7 +128,11 @@ fn shadows_are_judged_where_radiance_is_right() {
         checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
     };
     let (pass, fail) = (Verdict::Pass, Verdict::Fail);
-    let emitter = [check("radiance.lit", "emitter", fail), check("shadow.rays", "emitter", fail)];
+    let wrong = |fraction| {
+        let measures = vec![Measure::at_most("rays wrong (fraction)", fraction, STRAY_FRACTION)];
+        Check { measures, ..check("radiance.lit", "emitter", fail) }
+    };
+    let emitter = [wrong(0.99), check("shadow.rays", "emitter", fail)];
     // Wrong everywhere: shadows are judged all the same.
     assert_eq!(verdicts(&emitter), [fail, fail]);
     let right = [check("radiance.lit", "cbox", pass), check("shadow.rays", "cbox", fail)];
@@ -128,4 +141,7 @@ fn shadows_are_judged_where_radiance_is_right() {
     // A scene without shadows is no other scene to judge them on.
     let open = [emitter.as_slice(), &[check("radiance.lit", "open", pass)]].concat();
     assert_eq!(verdicts(&open), [fail, fail, pass]);
+    // Wrong on some surfaces alone: the light stands where it should.
+    let some = [&[wrong(0.3)], &emitter[1..], right.as_slice()].concat();
+    assert_eq!(verdicts(&some), [fail, fail, pass, fail]);
 }
