@@ -233,6 +233,7 @@ pub fn judge_shadows(
     }
     // A renderer that ignores the switch draws shadows always: then its own shadows are what is
     // missing without, and no fault of its shading.
+    // Asked of one scene alone: `set_apart` looks at the others.
     let ignores_switch = with == without;
     let (mut lit_wrong, mut dark_wrong, mut lit_black) = (0usize, 0usize, 0usize);
     let mut first: Option<(usize, f64)> = None;
@@ -262,7 +263,10 @@ pub fn judge_shadows(
     }
     let lit_fraction = lit_wrong as f64 / lit_known as f64;
     let dark_fraction = dark_wrong as f64 / dark as f64;
+    let changed = with.iter().zip(without).filter(|(with, without)| with != without).count();
+    let changed = changed as f64 / batch.rays.len() as f64;
     let measures = vec![
+        Measure::at_most(SWITCHED, changed, 1.0),
         Measure::at_most("lit rays that are not lit (fraction)", lit_fraction, STRAY_FRACTION),
         Measure::at_most(
             "shadowed rays that are not dark (fraction)",
@@ -294,6 +298,9 @@ pub fn judge_shadows(
     check
 }
 
+/// The measure of how much of a scene the shadows switch changes.
+const SWITCHED: &str = "rays that the shadows switch changes (fraction)";
+
 /// The least fraction of rays whose radiance is wrong where the light stands elsewhere.
 const LIGHT_ELSEWHERE: f64 = 0.9;
 
@@ -311,6 +318,19 @@ pub fn set_apart(checks: &mut [Check]) {
     let judged = |check: &Check| {
         is(check, "shadow.rays", Verdict::Pass) || is(check, "shadow.rays", Verdict::Fail)
     };
+    let switched = |check: &Check| {
+        let of = check.measures.iter().find(|measure| measure.name == SWITCHED);
+        of.map_or(0.0, |measure| measure.value)
+    };
+    // Black on lit rays, with shadows and without, by a renderer that obeys the switch elsewhere.
+    let obeys = checks.iter().any(|check| judged(check) && switched(check) > 0.0);
+    let no_dark_is_lit = |check: &Check| check.measures.last().is_some_and(|dark| dark.passed);
+    for check in checks.iter_mut().filter(|check| is(check, "shadow.rays", Verdict::Fail)) {
+        if obeys && switched(check) == 0.0 && no_dark_is_lit(check) {
+            check.verdict = Verdict::NotJudged;
+            check.summary = format!("black without shadows too: they are judged elsewhere ({})", check.summary);
+        }
+    }
     if !checks.iter().any(|check| judged(check) && right.contains(&check.scene)) {
         return;
     }

@@ -145,3 +145,19 @@ fn shadows_are_judged_where_radiance_is_right() {
     let some = [&[wrong(0.3)], &emitter[1..], right.as_slice()].concat();
     assert_eq!(verdicts(&some), [fail, fail, pass, fail]);
 }
+
+#[test]
+fn black_rays_are_no_shadows_when_the_switch_is_obeyed_elsewhere() {
+    let right = |index: usize| if index < 40 { 1.0 } else { 0.0 };
+    let half_black = |index: usize| if index < 20 { 1.0 } else { 0.0 };
+    let here = Check { scene: "here".into(), ..shadows(half_black, half_black) };
+    assert_eq!(here.verdict, Verdict::Fail);
+    let settle = |other: Check| {
+        let mut checks = vec![here.clone(), other];
+        set_apart(&mut checks);
+        checks[0].verdict
+    };
+    assert_eq!(settle(shadows(right, |_| 1.0)), Verdict::NotJudged);
+    // A renderer that ignores the switch everywhere has only its own shadows to show.
+    assert_eq!(settle(shadows(right, right)), Verdict::Fail);
+}
