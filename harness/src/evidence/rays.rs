@@ -328,7 +328,8 @@ pub fn set_apart(checks: &mut [Check]) {
     for check in checks.iter_mut().filter(|check| is(check, "shadow.rays", Verdict::Fail)) {
         if obeys && switched(check) == 0.0 && no_dark_is_lit(check) {
             check.verdict = Verdict::NotJudged;
-            check.summary = format!("black without shadows too: they are judged elsewhere ({})", check.summary);
+            check.summary =
+                format!("black without shadows too: they are judged elsewhere ({})", check.summary);
         }
     }
     if !checks.iter().any(|check| judged(check) && right.contains(&check.scene)) {
