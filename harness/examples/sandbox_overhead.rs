@@ -1,10 +1,14 @@
-//! What locking a child costs, start to exit: medians of a plain start and of a locked one, taken
-//! in turn so that the machine's mood touches both. `cargo run --release --example sandbox_overhead`.
+//! What isolation costs, start to exit: medians of a plain start, of a locked one, and of a whole
+//! worker under supervision (its files, its table, its end), taken in turn so that the machine's
+//! mood touches all. `cargo run --release --example sandbox_overhead`.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use umbra::process::Limits;
 use umbra::sandbox::{Bind, Kind, Policy, command, doctor};
+use umbra::worker::{Job, Matter, Outcome, Request, SceneRef, Supervisor};
 
 const RUNS: usize = 200;
 
@@ -32,12 +36,18 @@ fn main() -> anyhow::Result<()> {
         kinds.push((name, Some(policy)));
     }
     let mut times = vec![Vec::new(); kinds.len()];
+    let scratch = tempfile::tempdir()?;
+    let supervisor = Supervisor::new(umbra.clone(), scratch.path().to_owned());
+    let mut supervised = Vec::new();
     for _ in 0..RUNS {
         for ((_, policy), times) in kinds.iter().zip(&mut times) {
             times.push(time(&umbra, policy.as_ref())?);
         }
+        supervised.push(worker(&supervisor)?);
     }
     let plain = median(&mut times[0]);
+    kinds.push(("a supervised worker".to_owned(), None));
+    times.push(supervised);
     for ((name, _), times) in kinds.iter().zip(&mut times) {
         let median = median(times);
         let added = median.as_secs_f64() - plain.as_secs_f64();
@@ -64,6 +74,19 @@ fn time(umbra: &PathBuf, policy: Option<&Policy>) -> anyhow::Result<Duration> {
     };
     anyhow::ensure!(status.success(), "the child ended with {status}");
     Ok(begin.elapsed())
+}
+
+/// One worker that has nothing to load and refuses its one question: what is left is supervision.
+fn worker(supervisor: &Supervisor) -> anyhow::Result<Duration> {
+    let scene = SceneRef { path: "none.toml".into(), options: String::new() };
+    let requests = vec![Request::EvalBsdf { scene, queries: Vec::new() }];
+    let begin = Instant::now();
+    let (job, never) = (Job { plugin: None, requests }, AtomicBool::new(false));
+    let report = supervisor.run_job(&job, &Limits::default(), &never, &mut |_| ());
+    let time = begin.elapsed();
+    let began = matches!(&report.outcomes[..], [Outcome::NotRun { matter: Matter::Ours, .. }]);
+    anyhow::ensure!(began && report.runs.len() == 1, "no worker ran: {report:?}");
+    Ok(time)
 }
 
 fn median(times: &mut [Duration]) -> Duration {

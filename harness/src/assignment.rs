@@ -68,6 +68,9 @@ pub struct SceneEntry {
     /// Whether its expected images are kept in the repository.
     #[serde(default)]
     pub stored: bool,
+    /// Whether changed copies of it are held back from students.
+    #[serde(default)]
+    pub perturb: bool,
     /// Images that a hand-in holds of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hand_in: Option<HandInImages>,
@@ -180,6 +183,11 @@ impl Assignment {
     /// Where the expected images of a stored scene lie.
     pub fn expected_file(&self, scene: &SceneEntry) -> PathBuf {
         self.root.join("expected").join(&self.name).join(format!("{}.exr", scene.name))
+    }
+
+    /// Where a student's kit keeps the expected images that only the reference renderer can make.
+    pub fn made(&self) -> PathBuf {
+        self.root.join("expected").join(&self.name).join("made")
     }
 
     /// Where Umbra keeps what it can make again.

@@ -9,6 +9,7 @@ pub mod diagnosis;
 pub mod evidence;
 pub mod expected;
 pub mod grading;
+pub mod held_back;
 pub mod imaging;
 pub mod intake;
 pub mod plugin;

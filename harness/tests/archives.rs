@@ -1,6 +1,8 @@
 //! Hostile archives, one test each: the finding, the entry it names, nothing written outside the
 //! destination, nothing left inside it.
 
+#![allow(clippy::unwrap_used)] // its helpers are tests too
+
 mod support;
 
 use support::scratch::{assert_accepted, assert_refused};

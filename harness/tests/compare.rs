@@ -1,7 +1,8 @@
 //! The deciding comparison: known answers by hand, and a small Monte Carlo renderer whose truth is known.
 
+#![allow(clippy::unwrap_used)] // its helpers are tests too
+
 use std::f32::consts::TAU;
-use std::time::Instant;
 
 use basecode::image::Image;
 use glam::{Vec3, vec3};
@@ -494,34 +495,7 @@ fn evidence_survives_json_with_nan_in_it() {
     assert_eq!(serde_json::to_string(&back).unwrap(), text);
     assert!(back.worst.unwrap().actual[0].is_nan());
 
-    let tolerances: Tolerances = toml::from_str("z_limit = 5.0").unwrap();
+    let tolerances: Tolerances = serde_json::from_str(r#"{"z_limit": 5.0}"#).unwrap();
     assert_eq!(tolerances, Tolerances { z_limit: 5.0, ..Tolerances::default() });
-    assert!(toml::from_str::<Tolerances>("z_limt = 5.0").is_err());
-}
-
-/// Prints, asserts nothing about clocks: what one comparison at the course's film size costs.
-#[test]
-fn cost_at_768x576() {
-    let (width, height) = (768, 576);
-    let mut rng = Rng(1);
-    let mut reference = flat(width, height, Vec3::splat(0.5), 0.01);
-    let mut actual = reference.mean.clone();
-    for p in reference.mean.pixels.iter_mut().chain(&mut actual.pixels) {
-        *p += 0.02 * rng.gaussian();
-    }
-    let t = Tolerances::default();
-    let time = |what: &str, run: &dyn Fn() -> ImageEvidence| {
-        let best = (0..5)
-            .map(|_| {
-                let start = Instant::now();
-                assert!(!run().checks.is_empty());
-                start.elapsed()
-            })
-            .min();
-        println!("{what}: {:.1} ms", best.unwrap().as_secs_f64() * 1e3);
-    };
-    let (centre, mask) = (&reference.centre, &reference.mask);
-    time("offline", &|| compare_offline(&actual, &reference, 16, &t).unwrap());
-    time("realtime linear", &|| compare_realtime_linear(&actual, centre, mask, &t).unwrap());
-    time("realtime srgb8", &|| compare_srgb8(&actual, centre, mask, &t).unwrap());
+    assert!(serde_json::from_str::<Tolerances>(r#"{"z_limt": 5.0}"#).is_err());
 }

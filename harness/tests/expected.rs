@@ -1,25 +1,24 @@
-//! The stored expected images against fresh, reduced renders of the reference: the same statistics,
-//! not the same bytes.
+//! The stored expected images against fresh renders of the reference: the same statistics, not the
+//! same bytes; and how small an error costs points on them.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use basecode::Image;
 use umbra::assignment::{Assignment, SceneEntry};
-use umbra::evidence::Verdict;
 use umbra::evidence::images::{Kind, judge};
+use umbra::evidence::{Check, Evidence, Verdict};
 use umbra::expected::{Expected, Store};
 use umbra::process::Limits;
+use umbra::rubric::grade;
 use umbra::worker::{Job, Outcome, Request, SceneRef, Supervisor};
 
-/// Samples per pixel of the reduced renders.
-const SPP: u32 = 4;
 /// A seed that no stored image was made with.
 const SEED: u64 = 20_191_006;
 
 #[test]
 #[ignore = "half a minute: `./run test` asks for it"]
-fn stored_images_agree_with_a_reduced_render_of_another_seed() {
+fn stored_images_agree_with_a_render_of_another_seed_and_a_small_gain_costs_points() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let assignment = Assignment::load(root).unwrap();
     let reference = format!(
@@ -49,6 +48,7 @@ fn stored_images_agree_with_a_reduced_render_of_another_seed() {
         let expected = store.expected(&entry).unwrap();
         let scene = SceneRef { path: root.join(&entry.offline), options: String::new() };
         let (width, height) = (expected.offline.mean.width, expected.offline.mean.height);
+        let own_spp = expected.scene.config().spp as u32;
         let render = |spp| Request::RenderOffline {
             scene: scene.clone(),
             width: width as u32,
@@ -58,42 +58,53 @@ fn stored_images_agree_with_a_reduced_render_of_another_seed() {
             threads,
             shadows: true,
         };
-        let job = Job { plugin: Some(reference.clone()), requests: vec![render(SPP), render(1)] };
+        let job =
+            Job { plugin: Some(reference.clone()), requests: vec![render(own_spp), render(1)] };
         let limits = Limits { wall_s: 300.0, cpu_s: 600, ..Limits::default() };
         let report = supervisor.run_job(&job, &limits, &AtomicBool::new(false), &mut |_| ());
         let images = report.outcomes.into_iter().map(|outcome| match outcome {
             Outcome::Done(answer) => image(&answer.values, width, height),
             other => panic!("{}: the reference answers {other:?}", entry.name),
         });
-        for (spp, image) in [SPP, 1].into_iter().zip(images) {
-            let verdict = |image: &Image| verdict(&entry.name, spp, image, &expected, &assignment);
-            let (accepted, said) = verdict(&image);
-            assert_eq!(accepted, Verdict::Pass, "{} at {spp} spp: {said}", entry.name);
-            // The same render 2 % too bright would be no reference.
-            let brighter =
-                Image { pixels: image.pixels.iter().map(|&p| 1.02 * p).collect(), ..image };
-            assert_eq!(
-                verdict(&brighter).0,
-                Verdict::Fail,
-                "{} at {spp} spp, brighter",
-                entry.name
-            );
+        let judged = |kind, image: &Image| judged(&entry.name, kind, image, &expected, &assignment);
+        for (spp, image) in [own_spp, 1].into_iter().zip(images) {
+            let kind = Kind::Offline { spp };
+            for (gain, right) in [(1.0, true), (0.99, false), (1.01, false)] {
+                let (full, said) = judged(kind, &scaled(&image, gain));
+                assert_eq!(full, right, "{} at {spp} spp, gain {gain}: {said}", entry.name);
+            }
+        }
+        for (gain, right) in [(1.0, true), (0.98, false), (1.02, false)] {
+            let (full, said) = judged(Kind::Realtime, &scaled(&expected.unshadowed, gain));
+            assert_eq!(full, right, "{} realtime, gain {gain}: {said}", entry.name);
         }
     }
     assert!(stored >= 4, "only {stored} scenes are stored");
 }
 
-fn verdict(
+/// Whether a hand-in earns everything when this image is like that and all other evidence is right.
+fn judged(
     name: &str,
-    spp: u32,
+    kind: Kind,
     image: &Image,
     expected: &Expected,
     assignment: &Assignment,
-) -> (Verdict, String) {
-    let kind = Kind::Offline { spp };
-    let check =
-        judge("image.offline", name, kind, image, expected, &|_| true, &assignment.tolerances);
-    (check.verdict, check.summary)
+) -> (bool, String) {
+    let rules = &assignment.rules;
+    let id = if kind == Kind::Realtime { "image.realtime" } else { "image.offline" };
+    let check = judge(id, name, kind, image, expected, &|_| true, &assignment.tolerances);
+    let said = check.summary.clone();
+    let right = |id: &String| Check::new(id, name, Verdict::Pass, "right");
+    let mut checks: Vec<Check> =
+        rules.parts.iter().flat_map(|part| &part.evidence).map(right).collect();
+    checks.push(check);
+    let grade = grade(rules, &Evidence { checks });
+    let full: f64 = rules.parts.iter().map(|part| part.points).sum();
+    (grade.points == full && grade.points_max == full, said)
+}
+
+fn scaled(image: &Image, gain: f32) -> Image {
+    Image { pixels: image.pixels.iter().map(|&p| gain * p).collect(), ..*image }
 }
 
 fn image(values: &[f32], width: usize, height: usize) -> Image {

@@ -1,5 +1,7 @@
 //! Any bytes at all: no panic, nothing written outside the destination, limits kept.
 
+#![allow(clippy::unwrap_used)] // its helpers are tests too
+
 mod support;
 
 use proptest::prelude::*;

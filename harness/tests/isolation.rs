@@ -1,6 +1,8 @@
 //! The sandbox as workers and builds use it: what a hand-in must not reach it does not reach, and
 //! what it draws is the same as without. Each attack is run without isolation, too, and succeeds
 //! there: a test that passes without a sandbox proves nothing.
+
+#![allow(clippy::unwrap_used)] // its helpers are tests too
 #![cfg(target_os = "linux")]
 
 use std::net::TcpListener;
@@ -194,6 +196,63 @@ fn a_plugin_reaches_nothing_of_the_host() {
             assert_eq!(said, "ok", "without isolation, {attack}");
         }
     }
+}
+
+#[test]
+fn without_any_one_layer_the_others_still_hold() {
+    let house = House::new();
+    let plugin = house.plugin("attack.so", &[]);
+    let root = nix::unistd::geteuid().is_root();
+    let port = house.tcp.local_addr().unwrap().port().to_string();
+    let (own, victim) = (std::process::id().to_string(), house.victim.id().to_string());
+    let attacks = [
+        format!("read {}", workspace().join("expected/a2/cbox.exr").display()),
+        format!("read {}", reference().display()),
+        "read /etc/shadow".into(),
+        format!("read {}", house.path("other/secret")),
+        format!("list {}", house.path("scratch")),
+        format!("write {}", house.path("other/new")),
+        format!("change {}", house.path("other/secret")),
+        "exec /bin/sh".into(),
+        format!("tcp {port}"),
+        format!("unix {}", house.path("other/socket")),
+        format!("reach {own}"),
+        format!("kill {victim}"),
+    ];
+    for (name, on) in Layers::full().named() {
+        // Without root, all namespaces hang on the first.
+        if !on || (name == "user_ns" && !root) {
+            continue;
+        }
+        let mut layers = Layers::full();
+        *layers.switch(name).unwrap() = false;
+        // Another user could not reach the test's own folder then.
+        layers.drop_privileges &= layers.mount_ns || !root;
+        for attack in &attacks {
+            let report = run(&house.isolated(layers), &plugin, vec![house.offline(attack)]);
+            let answer = report.outcomes[0].answer();
+            let answer = answer.unwrap_or_else(|| panic!("no {name}, {attack}: {report:#?}"));
+            assert_eq!(answer.values, [0.0; 135]);
+            let said = word(&report);
+            assert!(said.starts_with('E'), "no {name}, {attack}: {said}");
+        }
+    }
+}
+
+/// All the other tests, where these run as root.
+#[test]
+fn an_ordinary_user_is_isolated_as_well() {
+    use std::os::unix::process::CommandExt;
+    if !nix::unistd::geteuid().is_root() {
+        return;
+    }
+    let mut tests = Command::new(std::env::current_exe().unwrap());
+    tests.args(["--test-threads=1", "--skip", "an_ordinary_user"]);
+    // Root's toolchain may be out of reach.
+    let output = tests.args(["--skip", "a_build"]).uid(65533).gid(65533).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("test result: ok. 7 passed"), "{said}");
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Workers from outside: answers that are known in closed form, and crashes that hurt nobody.
 
+#![allow(clippy::unwrap_used)] // its helpers are tests too
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
@@ -10,7 +12,7 @@ use umbra::process::{Exit, Limits};
 use umbra::sandbox::Layers;
 use umbra::worker::{
     Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, JobReport, Matter, Outcome,
-    RayQuery, Request, SceneRef, Supervisor,
+    Patience, RayQuery, Request, SceneRef, Supervisor,
 };
 
 /// A floor in y = 0 from -4 to 4, facing up, a small blocker over x > 2 at y = 1, and a light at
@@ -358,6 +360,20 @@ fn each_fault_has_its_outcome_and_the_requests_around_it_are_answered() {
 }
 
 #[test]
+fn a_request_is_blamed_only_for_what_it_does_first_in_a_worker() {
+    let house = House::new();
+    let plugin = house.compile("fault.c", &[]);
+    let requests = ["first", "first", "abort", "first"].map(|mode| house.offline(mode, 1, 1));
+    let report = house.run(&plugin, requests.to_vec());
+    for index in [0, 1, 3] {
+        assert_eq!(values(&report.outcomes[index]), [0.0; 135], "request {index}");
+    }
+    assert_eq!(report.outcomes[2], Outcome::CrashedBySignal("SIGABRT".into()));
+    let asked: Vec<&[usize]> = report.runs.iter().map(|run| run.requests.as_slice()).collect();
+    assert_eq!(asked, [&[0, 1, 2, 3][..], &[1, 2, 3], &[2, 3], &[3]]);
+}
+
+#[test]
 fn files_cut_short_by_a_plugin_are_its_own_loss() {
     let house = House::new();
     let plugin = house.compile("fault.c", &[]);
@@ -384,6 +400,52 @@ fn cpu_time_is_limited_apart_from_wall_clock_time() {
     let report = house.run(&plugin, vec![house.offline("loop", 1, 1)]);
     assert_eq!(report.outcomes, [Outcome::TimedOut]);
     assert!(begin.elapsed() < Duration::from_secs(10));
+}
+
+#[test]
+fn a_timeout_counts_when_it_is_confirmed_alone_on_the_machine() {
+    let mut house = House::new();
+    house.limits.wall_s = 1.0;
+    // What a worker did before is known to the next only without isolation.
+    house.supervisor.isolation = Layers::NONE;
+    let plugin = house.compile("fault.c", &[]);
+    let ask = |modes: &[&str], patience: &Patience| {
+        let requests = modes.iter().map(|mode| house.offline(mode, 1, 1)).collect();
+        let job = Job { plugin: Some(plugin.clone()), requests };
+        let (limits, never) = (&house.limits, AtomicBool::new(false));
+        house.supervisor.run_job_patiently(&job, limits, patience, &never, &mut |_| {})
+    };
+    // Late once, while another worker runs for two seconds: it is asked again when that one is gone.
+    let once = format!("once {}", house.dir.path().join("late").display());
+    let begin = Instant::now();
+    let report = std::thread::scope(|scope| {
+        let (told, tell) = std::sync::mpsc::channel();
+        let other = house.supervisor.clone();
+        scope.spawn(move || {
+            let _beside = other.beside_others();
+            told.send(()).unwrap();
+            std::thread::sleep(Duration::from_secs(2));
+        });
+        tell.recv().unwrap();
+        ask(&["", &once, ""], &Patience::default())
+    });
+    assert!(begin.elapsed() >= Duration::from_secs(2), "{:?}", begin.elapsed());
+    for outcome in &report.outcomes {
+        assert_eq!(values(outcome), [0.0; 135]);
+    }
+    let asked: Vec<_> = report.runs.iter().map(|run| run.requests.as_slice()).collect();
+    assert_eq!(asked, [&[0, 1, 2][..], &[1], &[2]]);
+
+    // One that hangs is confirmed once, and not again in the next job of the same path.
+    let patience = Patience::default();
+    let report = ask(&["sleep", "sleep", ""], &patience);
+    let not_asked = Outcome::NotRun {
+        reason: "not asked: the renderer ran out of time before".into(),
+        matter: Matter::Submission,
+    };
+    assert_eq!(report.outcomes, [Outcome::TimedOut, Outcome::TimedOut, not_asked.clone()]);
+    assert_eq!(report.runs.len(), 3);
+    assert_eq!(patience.is_over(), Some(not_asked));
 }
 
 #[test]

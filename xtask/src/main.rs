@@ -1,10 +1,12 @@
 //! `xtask`: the chores of this repository that are not part of grading.
 
+mod dist;
 mod samples;
 mod scenes;
 mod verdicts;
 
 use clap::{Parser, Subcommand};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// The chores of this repository.
@@ -25,16 +27,28 @@ enum Command {
     },
     /// Pack the sample hand-ins into target/umbra/samples, with the images that their code draws.
     Samples,
+    /// Make what is given out.
+    Dist(dist::Arguments),
     /// Grade the reference with known mistakes on, and without: print the matrix part x mistake.
     Verdicts(verdicts::Arguments),
+}
+
+/// The repository.
+fn root() -> &'static Path {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    own.parent().unwrap_or(own)
 }
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Scenes { check: true } => scenes::check(),
         Command::Scenes { check: false } => scenes::write(),
-        Command::Samples => samples::pack(),
-        Command::Verdicts(arguments) => verdicts::run(&arguments),
+        Command::Samples => samples::pack(root(), &|_| true).map(|samples| {
+            let paths = samples.iter().map(|sample| sample.archive.display().to_string());
+            paths.collect::<Vec<_>>().join("\n")
+        }),
+        Command::Dist(arguments) => dist::run(root(), &arguments),
+        Command::Verdicts(arguments) => verdicts::run(root(), &arguments),
     };
     match result {
         Ok(summary) => {

@@ -1,23 +1,29 @@
 //! The sample hand-ins: real archives, packed from `samples/`, with the images that their own code
 //! draws. They lie under `target/umbra/samples/`.
 
+mod archive;
+mod expect;
+
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use anyhow::{Context, Result, bail, ensure};
-use basecode::exr_io::{Precision, write_exr};
+use basecode::exr_io::{Precision, read_exr_layers, write_exr};
 use basecode::scene::SceneConfig;
 use basecode::{Image, Vec3};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
-use umbra::assignment::Assignment;
+use umbra::assignment::{Assignment, SceneEntry};
 use umbra::build::{self, BuildOutcome, Recording};
 use umbra::worker::{
     Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef, Supervisor,
 };
+
+use archive::write_archive;
+use expect::Expect;
 
 /// How one sample is made; `samples/README.md` explains the fields.
 #[derive(Clone, Debug, Deserialize)]
@@ -42,10 +48,13 @@ pub struct Recipe {
     omit: Vec<String>,
     /// Whether grading it takes longer than the others: it waits for time limits.
     #[serde(default)]
-    #[allow(dead_code)]
     slow: bool,
-    /// Whose code draws its images: `own`, `none` or `from:<sample>`.
+    /// Whose code draws its images: `own`, `none`, `from:<sample>`, or `of:<sample>` with that
+    /// student's seed.
     images: String,
+    /// Offline images that are copies of the published ones.
+    #[serde(default)]
+    published: Vec<String>,
     /// Where its bonus image lies, if it hands one in.
     bonus: Option<String>,
     /// `zip`, `tar` or `tar.gz`.
@@ -55,9 +64,20 @@ pub struct Recipe {
     /// Files and folders that lie elsewhere than they should: from, to.
     #[serde(default)]
     moves: Vec<(String, String)>,
-    /// What it is worth; read by the tests.
-    #[allow(dead_code)]
-    expect: toml::Table,
+    /// What it is worth.
+    expect: Expect,
+}
+
+/// A packed sample.
+pub struct Sample {
+    /// The name of its folder.
+    pub name: String,
+    /// Its archive.
+    pub archive: PathBuf,
+    /// What it is worth.
+    pub expect: Expect,
+    /// Whether grading it waits for time limits.
+    pub slow: bool,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -72,18 +92,31 @@ fn template() -> String {
     "template".to_owned()
 }
 
-/// Packs every sample whose archive is missing or older than its sources; answers their paths.
-pub fn pack() -> Result<String> {
-    let root =
-        Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask lies in the repository")?;
+/// Packs the samples whose names are wanted where the archive is missing or older than its sources,
+/// as many at a time as there are cores.
+///
+/// # Errors
+/// When a sample contradicts itself or cannot be drawn; names it.
+pub fn pack(root: &Path, wanted: &(dyn Fn(&str) -> bool + Sync)) -> Result<Vec<Sample>> {
     let packer = Packer::new(root)?;
-    let mut lines = Vec::new();
-    for name in packer.recipes.keys() {
-        lines.push(
-            packer.pack(name).with_context(|| format!("sample {name}"))?.display().to_string(),
-        );
-    }
-    Ok(lines.join("\n"))
+    let names: Vec<&String> = packer.recipes.keys().filter(|name| wanted(name)).collect();
+    let next = AtomicUsize::new(0);
+    let packed = Mutex::new(Vec::new());
+    let work = || {
+        while let Some(name) = names.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let sample = packer.pack(name).with_context(|| format!("sample {name}"));
+            packed.lock().map(|mut packed| packed.push(sample)).ok();
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, |n| n.get()) {
+            scope.spawn(work);
+        }
+    });
+    let mut packed =
+        packed.into_inner().unwrap_or_default().into_iter().collect::<Result<Vec<Sample>>>()?;
+    packed.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(packed)
 }
 
 struct Packer {
@@ -147,34 +180,44 @@ impl Packer {
         Ok(files)
     }
 
-    fn pack(&self, name: &str) -> Result<PathBuf> {
+    fn pack(&self, name: &str) -> Result<Sample> {
         let recipe = &self.recipes[name];
         let archive = self.out.join(format!("{name}.{}", recipe.format));
+        let (expect, slow) = (recipe.expect.clone(), recipe.slow);
+        let sample = Sample { name: name.to_owned(), archive, expect, slow };
         let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
         let source = self.source(name)?;
         for (path, bytes) in &source {
             files.insert(format!("src/{}", path.display()).replace('\\', "/"), bytes.clone());
         }
-        let artist = match recipe.images.as_str() {
-            "own" => Some(source),
-            "none" => None,
-            other => match other.strip_prefix("from:") {
-                Some(sample) => Some(self.source(sample)?),
-                None => bail!("images is \"{other}\" but must be own, none or from:<sample>"),
-            },
+        let id = &recipe.student.id;
+        let artist = match (recipe.images.as_str(), recipe.images.split_once(':')) {
+            ("own", _) => Some((source, id)),
+            ("none", _) => None,
+            (_, Some(("from", sample))) => Some((self.source(sample)?, id)),
+            (_, Some(("of", sample))) => {
+                Some((self.source(sample)?, &self.recipes[sample].student.id))
+            }
+            (other, _) => {
+                bail!("images is \"{other}\" but must be own, none, from:<sample> or of:<sample>")
+            }
         };
         let key = self.key(&files, recipe, artist.as_ref())?;
         let key_file = self.out.join(format!(".{name}.key"));
-        if archive.is_file() && fs::read_to_string(&key_file).is_ok_and(|old| old == key) {
-            return Ok(archive);
+        if sample.archive.is_file() && fs::read_to_string(&key_file).is_ok_and(|old| old == key) {
+            return Ok(sample);
         }
         eprintln!("packing sample {name}");
         let mut renders = Vec::new();
-        if let Some(source) = &artist {
-            for (path, bytes) in self.draw(source, recipe)? {
+        if let Some((source, id)) = &artist {
+            for (path, bytes) in self.draw(source, id, recipe)? {
                 renders.push(path.clone());
                 files.insert(path, bytes);
             }
+        }
+        for path in &recipe.published {
+            ensure!(files.contains_key(path), "published: {path} is not in the archive");
+            files.insert(path.clone(), self.published(path)?);
         }
         files.insert("config.json".into(), config(recipe, &renders)?);
         for (from, to) in &recipe.moves {
@@ -190,9 +233,9 @@ impl Packer {
         for path in &recipe.omit {
             ensure!(files.remove(path).is_some(), "omit: {path} is not in the archive");
         }
-        write_archive(&archive, recipe, &files)?;
+        write_archive(&sample.archive, recipe, &files)?;
         fs::write(key_file, key)?;
-        Ok(archive)
+        Ok(sample)
     }
 
     /// All that an archive depends on.
@@ -200,16 +243,19 @@ impl Packer {
         &self,
         files: &BTreeMap<String, Vec<u8>>,
         recipe: &Recipe,
-        artist: Option<&BTreeMap<PathBuf, Vec<u8>>>,
+        artist: Option<&(BTreeMap<PathBuf, Vec<u8>>, &String)>,
     ) -> Result<String> {
         let mut hash = Sha256::new();
         for (path, bytes) in files {
             hash.update(path);
             hash.update(bytes);
         }
-        for (path, bytes) in artist.into_iter().flatten() {
-            hash.update(path.to_string_lossy().as_bytes());
-            hash.update(bytes);
+        if let Some((source, id)) = artist {
+            for (path, bytes) in source {
+                hash.update(path.to_string_lossy().as_bytes());
+                hash.update(bytes);
+            }
+            hash.update(id);
         }
         hash.update(format!("{recipe:?} {}", self.recording.key));
         for (path, bytes) in read_tree(&self.root.join("scenes"))? {
@@ -219,10 +265,25 @@ impl Packer {
         Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
     }
 
-    /// Builds a source and draws the images that a hand-in must contain.
+    /// The published image of the scene whose offline image lies at `path`, as an EXR file.
+    fn published(&self, path: &str) -> Result<Vec<u8>> {
+        let own = |scene: &&SceneEntry| {
+            scene.hand_in.as_ref().is_some_and(|images| images.offline == path)
+        };
+        let scene = self.assignment.scenes.iter().find(own);
+        let scene = scene.with_context(|| format!("published: no scene's image is {path}"))?;
+        let mut layers = read_exr_layers(self.assignment.expected_file(scene))?.layers;
+        let mean = layers.remove("mean").context("the stored image has no mean")?;
+        let file = tempfile::Builder::new().suffix(".exr").tempfile()?;
+        write_exr(file.path(), &mean, Precision::Half, &[])?;
+        Ok(fs::read(file.path())?)
+    }
+
+    /// Builds a source and draws the images that a hand-in must contain, seeded by a student's `id`.
     fn draw(
         &self,
         source: &BTreeMap<PathBuf, Vec<u8>>,
+        id: &str,
         recipe: &Recipe,
     ) -> Result<Vec<(String, Vec<u8>)>> {
         let scratch = tempfile::tempdir_in(&self.supervisor.scratch)?;
@@ -245,7 +306,7 @@ impl Packer {
             }
             other => bail!("its source does not build: {other:?}"),
         };
-        let seed = recipe.student.id.parse().context("the student's id seeds the sampler")?;
+        let seed = id.parse().context("the student's id seeds the sampler")?;
         let mut asked = Vec::new();
         for scene in &self.assignment.scenes {
             let Some(images) = &scene.hand_in else { continue };
@@ -256,18 +317,19 @@ impl Packer {
                 asked.push((path.clone(), self.request(toml, seed)?));
             }
         }
+        let (paths, requests): (Vec<String>, Vec<Request>) = asked.into_iter().unzip();
+        let job = Job { plugin: Some(library), requests };
+        let report = self.supervisor.run_job(&job, &limits.run, &cancel, &mut |_| ());
         let mut images = Vec::new();
-        for (path, request) in asked {
+        for ((path, request), outcome) in paths.into_iter().zip(job.requests).zip(report.outcomes) {
             let (Request::RenderOffline { width, height, .. }
             | Request::RenderRealtime { width, height, .. }) = request
             else {
                 bail!("only images are asked for");
             };
             let is_offline = matches!(request, Request::RenderOffline { .. });
-            let job = Job { plugin: Some(library.clone()), requests: vec![request] };
-            let report = self.supervisor.run_job(&job, &limits.run, &cancel, &mut |_| ());
             // What does not draw hands in no image.
-            let Some(Outcome::Done(answer)) = report.outcomes.into_iter().next() else { continue };
+            let Outcome::Done(answer) = outcome else { continue };
             // Realtime images were clamped to [0, 1] by the original course's framebuffer.
             let pixel = |v: &[f32; 3]| {
                 let v = Vec3::from(*v);
@@ -294,7 +356,7 @@ impl Packer {
                 width,
                 height,
                 shadow_map: config.bonus,
-                adapter: Adapter { kind: AdapterKind::Any, name: String::new() },
+                adapter: Adapter { kind: AdapterKind::Software, name: String::new() },
                 stages: Vec::new(),
                 cameras: vec![CameraValue {
                     eye: camera.eye.into(),
@@ -304,14 +366,14 @@ impl Packer {
                 }],
             }
         } else {
-            let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
             Request::RenderOffline {
                 scene,
                 width,
                 height,
                 spp: config.spp as u32,
                 seed,
-                threads,
+                // The other cores pack other samples.
+                threads: 1,
                 shadows: true,
             }
         })
@@ -333,51 +395,8 @@ fn config(recipe: &Recipe, renders: &[String]) -> Result<Vec<u8>> {
     Ok(serde_json::to_vec_pretty(&config)?)
 }
 
-fn write_archive(archive: &Path, recipe: &Recipe, files: &BTreeMap<String, Vec<u8>>) -> Result<()> {
-    let inside = |path: &str| match &recipe.wrap {
-        Some(folder) => format!("{folder}/{path}"),
-        None => path.to_owned(),
-    };
-    let mut bytes = Vec::new();
-    match recipe.format.as_str() {
-        "zip" => {
-            let mut zip = zip::ZipWriter::new(std::io::Cursor::new(&mut bytes));
-            let options = zip::write::SimpleFileOptions::default();
-            for (path, content) in files {
-                zip.start_file(inside(path), options)?;
-                zip.write_all(content)?;
-            }
-            zip.finish()?;
-        }
-        "tar" => write_tar(&mut bytes, files, &inside)?,
-        "tar.gz" => {
-            let mut gz = flate2::write::GzEncoder::new(&mut bytes, flate2::Compression::fast());
-            write_tar(&mut gz, files, &inside)?;
-            gz.finish()?;
-        }
-        other => bail!("format is \"{other}\" but must be zip, tar or tar.gz"),
-    }
-    fs::write(archive, bytes).with_context(|| archive.display().to_string())
-}
-
-fn write_tar(
-    out: &mut impl Write,
-    files: &BTreeMap<String, Vec<u8>>,
-    inside: &dyn Fn(&str) -> String,
-) -> Result<()> {
-    let mut tar = tar::Builder::new(out);
-    for (path, content) in files {
-        let mut header = tar::Header::new_gnu();
-        header.set_size(content.len() as u64);
-        header.set_mode(0o644);
-        tar.append_data(&mut header, inside(path), content.as_slice())?;
-    }
-    tar.finish()?;
-    Ok(())
-}
-
 /// All files below a folder, by their relative paths; nothing when there is no such folder.
-fn read_tree(folder: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
+pub(crate) fn read_tree(folder: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
     let mut files = BTreeMap::new();
     let mut pending = vec![folder.to_owned()];
     while let Some(current) = pending.pop() {

@@ -91,6 +91,8 @@ struct OpenPass {
     pass: Box<dyn RenderPass>,
     target: Target,
     gpu: Gpu,
+    /// By what the device was opened.
+    adapter: (AdapterKind, String),
 }
 
 /// Loads a scene into a new renderer.
@@ -251,7 +253,8 @@ unsafe extern "C" fn open_realtime(
             _ => AdapterKind::Any,
         };
         // SAFETY: texts of the host's, valid during the call.
-        let mut gpu = Gpu::open(kind, unsafe { text(&settings.adapter_name)? })?;
+        let name = unsafe { text(&settings.adapter_name)? };
+        let mut gpu = Gpu::reopen(kind, name)?;
         let mut replaced = Vec::new();
         for stage in stages {
             // SAFETY: as above.
@@ -270,7 +273,8 @@ unsafe extern "C" fn open_realtime(
         let Some(opened) = opened else {
             return Err(Error::Gpu("the render pass was not made".into()));
         };
-        let opened = Box::new(OpenPass { pass: opened, target, gpu });
+        let adapter = (kind, name.to_owned());
+        let opened = Box::new(OpenPass { pass: opened, target, gpu, adapter });
         // SAFETY: the host's place for the handle.
         unsafe { *pass = Box::into_raw(opened).cast() };
         Ok(())
@@ -292,7 +296,7 @@ unsafe extern "C" fn draw_frame(
             fov_y_deg: camera.fov_y_deg,
         };
         let camera = Camera::new(config, open.target.width, open.target.height)?;
-        let OpenPass { pass, target, gpu } = open;
+        let OpenPass { pass, target, gpu, .. } = open;
         gpu.checked(&mut || pass.draw(gpu, &camera, target))
     })
 }
@@ -319,7 +323,12 @@ unsafe extern "C" fn read_frame(
 unsafe extern "C" fn close_realtime(pass: api::Pass) {
     // SAFETY: the host hands back what `open_realtime` gave, once.
     let open = unsafe { Box::from_raw(pass.cast::<OpenPass>()) };
-    let _ = catch_unwind(AssertUnwindSafe(|| drop(open)));
+    // A panic in a student's `drop` must not cross the boundary; the device goes with it.
+    let _ = catch_unwind(AssertUnwindSafe(|| {
+        let OpenPass { pass, target, gpu, adapter: (kind, name) } = *open;
+        drop((pass, target));
+        gpu.keep(kind, &name);
+    }));
 }
 
 /// A surface point of no scene, for materials given by value.

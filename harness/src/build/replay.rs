@@ -117,7 +117,9 @@ pub fn compile(
         command.env("CARGO_MANIFEST_DIR", root);
     }
     let keep = (limits.output_kib as usize) << 10;
+    let beside = supervisor.beside_others();
     let ended = process::run(command, &lock, keep, cancel, &mut || {})?;
+    drop(beside);
     let said = parse(&ended.stderr.head);
     let out_of_memory = ended.stderr.contains("memory allocation of ")
         || ended.stderr.contains("LLVM ERROR: out of memory")

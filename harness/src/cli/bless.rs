@@ -2,20 +2,32 @@
 
 use std::path::Path;
 
-use anyhow::ensure;
+use anyhow::{Context as _, bail, ensure};
 
-use super::context::Context;
+use super::context::{Context, INTERRUPTED};
+use crate::diagnosis::Catalogue;
+use crate::grading::Grading;
+use crate::worker::{Adapter, AdapterKind};
+
+/// The film of scenes that a hand-in holds images of: what mistakes do there shows on a small one.
+const SMALL_FILM: [u32; 2] = [128, 96];
 
 /// What `umbra bless` is told.
 #[derive(clap::Args)]
 pub struct BlessArguments {
     /// Names of the scenes [default: all that are stored]
     scenes: Vec<String>,
+    /// Instead, what known mistakes look like: the reference renderer makes each of them
+    #[arg(long, conflicts_with = "scenes")]
+    mistakes: bool,
 }
 
 /// Renders and replaces, printing old and new.
 pub fn run(arguments: &BlessArguments, root: Option<&Path>) -> anyhow::Result<u8> {
-    let context = Context::new(root)?;
+    let mut context = Context::new(root)?;
+    if arguments.mistakes {
+        return mistakes(&mut context);
+    }
     let stored: Vec<_> = context.assignment.scenes.iter().filter(|scene| scene.stored).collect();
     for name in &arguments.scenes {
         let known = stored.iter().any(|scene| scene.name == *name);
@@ -40,6 +52,36 @@ pub fn run(arguments: &BlessArguments, root: Option<&Path>) -> anyhow::Result<u8
         for (key, value) in &blessing.attributes {
             println!("  {key} {value}");
         }
+    }
+    Ok(super::EXIT_OK)
+}
+
+/// Looks at every known mistake anew and replaces what is stored of them.
+fn mistakes(context: &mut Context) -> anyhow::Result<u8> {
+    for scene in context.assignment.scenes.iter_mut().filter(|scene| scene.hand_in.is_some()) {
+        scene.film = Some(SMALL_FILM);
+    }
+    let context = &*context;
+    let reference = context.reference().context("there is no reference renderer here")?;
+    let catalogue = Catalogue::known()?;
+    let mistakes: Vec<_> = catalogue.mistakes.iter().filter(|m| !m.proves_a_rule()).collect();
+    let (folder, stored) = context.with_store(|store| {
+        let adapter = Adapter { kind: AdapterKind::Software, name: String::new() };
+        let grading = Grading::prepare(store, adapter, None, &INTERRUPTED)?;
+        if let Err(why) = &grading.adapter {
+            bail!("realtime cannot be drawn here: {why}");
+        }
+        let say = |message: &str| context.say(message);
+        Ok((grading.stored_folder(), grading.look_at_mistakes(&reference, &mistakes, &say)?))
+    })?;
+    stored.save(&folder)?;
+    context.line.finish_and_clear();
+    for (view, content) in &stored.views {
+        println!(
+            "{}: {} mistakes",
+            folder.join(format!("{view}.exr")).display(),
+            content.mistakes.len()
+        );
     }
     Ok(super::EXIT_OK)
 }

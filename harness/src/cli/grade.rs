@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -11,7 +12,8 @@ use anyhow::{Context as _, bail, ensure};
 use super::MachineLacks;
 use super::context::{Context, INTERRUPTED, cores};
 use super::render::AdapterChoice;
-use crate::grading::{Grading, Purpose, Record};
+use crate::grading::{Folders, Grading, Purpose, Record, judge_shared};
+use crate::held_back::secret_seed;
 use crate::report::{self, Entry, Sheet};
 use crate::rubric;
 use crate::sandbox::Isolation;
@@ -51,9 +53,31 @@ pub struct GradeArguments {
     /// and says so in the report (see `umbra doctor`)
     #[arg(long, value_enum, default_value_t = IsolationChoice::Full)]
     isolation: IsolationChoice,
+    /// Seed of the held-back scenes, to reproduce a batch; off grades on the public scenes alone
+    /// [default: a secret one, recorded in report.json]
+    #[arg(long, value_name = "SEED|off", overrides_with = "perturb")]
+    perturb: Option<Perturb>,
     /// Print what each stage cost
     #[arg(long)]
     timings: bool,
+}
+
+/// A seed of held-back scenes, or none of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Perturb(Option<u64>);
+
+impl FromStr for Perturb {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "off" {
+            return Ok(Self(None));
+        }
+        let seed = text.parse().map_err(|_| {
+            format!("expected off or a whole number from 0 to {}, found {text}", u64::MAX)
+        })?;
+        Ok(Self(Some(seed)))
+    }
 }
 
 /// How much isolation is demanded.
@@ -74,6 +98,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         jobs: 1,
         purpose: Purpose::Check,
         isolation: IsolationChoice::Reduced,
+        perturb: None,
         timings: arguments.timings,
     };
     let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
@@ -97,12 +122,19 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         jobs: arguments.jobs.unwrap_or(cores() as usize).max(1),
         purpose: Purpose::Grade,
         isolation: arguments.isolation,
+        perturb: match arguments.perturb {
+            Some(Perturb(seed)) => seed,
+            None => Some(secret_seed()?),
+        },
         timings: arguments.timings,
     };
     let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
     let (width, colours) = terminal();
     print!("{}", report::text_table(&sheet, width, colours)?);
     println!("report: {}", arguments.output.join(report::HTML_FILE).display());
+    if let Some(held_back) = &sheet.held_back {
+        println!("held-back seed {0}; --perturb {0} reproduces", held_back.seed);
+    }
     let ungraded = sheet.entries.iter().any(|entry| entry.grade.points < entry.grade.points_max);
     Ok(if ungraded { super::EXIT_MACHINE } else { super::EXIT_OK })
 }
@@ -146,7 +178,7 @@ fn collect(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
 
 /// Folder names for hand-ins: what their names allow, made unique.
 fn slugs(sources: &[PathBuf]) -> Vec<String> {
-    let mut taken = HashSet::new();
+    let mut taken = HashSet::from([report::INSTRUCTOR.to_owned()]);
     let slug = |source: &PathBuf| {
         let name = source.file_name().unwrap_or(source.as_os_str()).to_string_lossy().into_owned();
         let safe = |c: char| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '-' };
@@ -172,6 +204,7 @@ struct Batch<'a> {
     jobs: usize,
     purpose: Purpose,
     isolation: IsolationChoice,
+    perturb: Option<u64>,
     timings: bool,
 }
 
@@ -182,6 +215,15 @@ impl Batch<'_> {
             ensure!(source.exists(), "{} does not exist", source.display());
         }
         let context = Context::new(root)?;
+        if self.purpose == Purpose::Grade && context.reference().is_none() {
+            return Err(MachineLacks(
+                "grades are made with the reference renderer and with scenes that are held back, which \
+                 are not here: a student's kit has neither; hint: `umbra check DIR` judges your work \
+                 on the public scenes, as the grader does (instructors: cargo build --release --workspace)"
+                    .into(),
+            )
+            .into());
+        }
         let isolation = context.supervisor.isolation.isolation();
         if self.isolation == IsolationChoice::Full && isolation != Isolation::Full {
             return Err(MachineLacks(format!(
@@ -191,21 +233,24 @@ impl Batch<'_> {
             .into());
         }
         let result = context.with_store(|store| {
-            let grading = Grading::prepare(store, self.adapter.adapter(), &INTERRUPTED)?;
-            self.grade_all(&context, grading)
+            let adapter = self.adapter.adapter();
+            let grading = Grading::prepare(store, adapter, self.perturb, &INTERRUPTED)?;
+            let held_back = grading.held_back.clone();
+            Ok::<_, anyhow::Error>((self.grade_all(&context, grading)?, held_back))
         });
         context.line.finish_and_clear();
         if INTERRUPTED.load(Ordering::Relaxed) {
             eprintln!("umbra: interrupted");
             return Ok(None);
         }
-        let records = result?;
+        let (mut records, held_back) = result?;
+        judge_shared(&mut records);
         let rules = &context.assignment.rules;
         let entries = records.into_iter().map(|record| {
             let grade = rubric::grade(rules, &record.evidence);
             Entry { record, grade }
         });
-        let sheet = Sheet::new(&context.assignment, entries.collect());
+        let sheet = Sheet::new(&context.assignment, held_back, entries.collect());
         report::write(self.output, &sheet)?;
         if self.timings {
             print_timings(&sheet);
@@ -229,7 +274,11 @@ impl Batch<'_> {
                     let done = done.load(Ordering::Relaxed);
                     context.say(&format!("{done} of {} done; {slug}: {stage}", self.sources.len()));
                 };
-                match grading.hand_in(source, slug, &self.output.join(slug), self.purpose, &say) {
+                let out = Folders {
+                    student: self.output.join(slug),
+                    instructor: self.output.join(report::INSTRUCTOR).join(slug),
+                };
+                match grading.hand_in(source, slug, &out, self.purpose, &say) {
                     Ok(record) => {
                         done.fetch_add(1, Ordering::Relaxed);
                         if let Ok(mut records) = records.lock() {

@@ -9,6 +9,7 @@ use basecode::scene::SceneConfig;
 use basecode::{Image, Vec3};
 
 use super::context::{Context, INTERRUPTED, cores};
+use crate::intake::HandInConfig;
 use crate::process::Limits;
 use crate::worker::{Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef};
 
@@ -26,9 +27,10 @@ pub struct RenderArguments {
     /// Samples per pixel, offline [default: the scene's]
     #[arg(long)]
     spp: Option<u32>,
-    /// Seed of the samplers: your student id for a hand-in
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
+    /// Seed of the samplers [default: the student number in the config.json of the hand-in that the
+    /// image is written into, else 0]
+    #[arg(long)]
+    seed: Option<u64>,
     /// Threads to render with [default: all cores]
     #[arg(long)]
     threads: Option<u32>,
@@ -110,7 +112,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     }
     let plugin = match arguments.plugin.as_str() {
         "reference" => context.reference().context(
-            "there is no reference renderer here; hint: cargo build --release --workspace",
+            "there is no reference renderer here (a student's kit has none); hint: cargo build --release --workspace",
         )?,
         path => PathBuf::from(path),
     };
@@ -139,7 +141,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
             width,
             height,
             spp: arguments.spp.unwrap_or(config.spp as u32),
-            seed: arguments.seed,
+            seed: arguments.seed.or_else(|| own_seed(&arguments.output)).unwrap_or(0),
             threads: arguments.threads.unwrap_or_else(cores).max(1),
             shadows: arguments.shadows.is_none_or(|Switch(on)| on),
         }
@@ -185,6 +187,14 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     }
 }
 
+/// The student number of the hand-in that a file lies in, at its root or one folder deeper.
+fn own_seed(file: &Path) -> Option<u64> {
+    let file = std::path::absolute(file).ok()?;
+    let configs = file.ancestors().skip(1).take(2).map(|folder| folder.join("config.json"));
+    let mut found = configs.filter_map(|path| std::fs::read(path).ok());
+    found.find_map(|bytes| HandInConfig::parse(&bytes).0.sampler_seed())
+}
+
 /// The camera of a scene file, as workers are told.
 pub fn camera_of(config: &SceneConfig) -> CameraValue {
     let camera = &config.camera;
@@ -193,5 +203,24 @@ pub fn camera_of(config: &SceneConfig) -> CameraValue {
         at: camera.at.into(),
         up: camera.up.into(),
         fov_y_deg: camera.fov_y_deg,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hand_in_s_images_have_the_seed_of_its_student() {
+        let folder = tempfile::tempdir().unwrap();
+        let offline = folder.path().join("offline");
+        std::fs::create_dir(&offline).unwrap();
+        assert_eq!(own_seed(&offline.join("a.exr")), None);
+        let config = folder.path().join("config.json");
+        std::fs::write(&config, r#"{"studentID": "", "renders": []}"#).unwrap();
+        assert_eq!(own_seed(&offline.join("a.exr")), None);
+        std::fs::write(&config, r#"{"studentID": "260331564", "renders": []}"#).unwrap();
+        assert_eq!(own_seed(&offline.join("a.exr")), Some(260_331_564));
+        assert_eq!(own_seed(&folder.path().join("b.exr")), Some(260_331_564));
     }
 }

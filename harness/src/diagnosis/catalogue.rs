@@ -29,8 +29,18 @@ pub struct KnownMistake {
     /// The findings that it leads to although it costs nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<String>,
+    /// Other mistakes that look the same in everything that is asked: they are named together.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub alike: Vec<String>,
     /// For the student, after the words "looks like:".
     pub looks_like: String,
+}
+
+impl KnownMistake {
+    /// Whether it was made so that one rule alone sees it. No student makes it, no diagnosis names it.
+    pub fn proves_a_rule(&self) -> bool {
+        self.family == "seen by one rule"
+    }
 }
 
 /// Why a catalogue cannot be used.
@@ -45,6 +55,9 @@ pub enum CatalogueError {
     /// A mistake that nothing can show.
     #[error("catalogue of mistakes: \"{0}\" belongs to no part and leads to no finding")]
     Harmless(String),
+    /// A mistake is like one that is not like it.
+    #[error("catalogue of mistakes: \"{0}\" is like \"{1}\", which is not there or not like it")]
+    OneSided(String, String),
 }
 
 impl Catalogue {
@@ -65,6 +78,11 @@ impl Catalogue {
             }
             if mistake.parts.is_empty() && mistake.findings.is_empty() {
                 return Err(CatalogueError::Harmless(name.clone()));
+            }
+            for other in &mistake.alike {
+                if !catalogue.named(other).is_some_and(|other| other.alike.contains(name)) {
+                    return Err(CatalogueError::OneSided(name.clone(), other.clone()));
+                }
             }
         }
         Ok(catalogue)
@@ -106,10 +124,19 @@ mod tests {
         let list = |entries: &[String]| format!(r#"{{"mistakes": [{}]}}"#, entries.join(","));
         let right = entry(r#""1.1""#);
         assert!(Catalogue::parse(&list(std::slice::from_ref(&right))).is_ok());
-        let twice = Catalogue::parse(&list(&[right.clone(), right]));
+        let twice = Catalogue::parse(&list(&[right.clone(), right.clone()]));
         assert!(matches!(twice, Err(CatalogueError::Twice(name)) if name == "a"));
         let harmless = Catalogue::parse(&list(&[entry("")]));
         assert!(matches!(harmless, Err(CatalogueError::Harmless(_))));
+        let like_b = right.replace(r#""looks_like""#, r#""alike": ["b"], "looks_like""#);
+        let b = right.replace(r#""name": "a""#, r#""name": "b""#);
+        let one_sided = Catalogue::parse(&list(&[like_b.clone(), b.clone()]));
+        assert!(
+            matches!(one_sided, Err(CatalogueError::OneSided(a, b)) if (&*a, &*b) == ("a", "b"))
+        );
+        let like_a =
+            like_b.replace(r#"["b"]"#, r#"["a"]"#).replace(r#""name": "a""#, r#""name": "b""#);
+        assert!(Catalogue::parse(&list(&[like_b, like_a])).is_ok());
         assert!(Catalogue::parse("{").unwrap_err().to_string().contains("line 1"));
     }
 }

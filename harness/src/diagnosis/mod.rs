@@ -1,5 +1,16 @@
-//! What a wrong picture looks like: the catalogue of known mistakes.
+//! What a wrong picture looks like: the catalogue of known mistakes, what they answer, and which one
+//! a hand-in's answers are nearest to.
 
 mod catalogue;
+mod diagnose;
+mod loops;
+mod nearest;
+mod stored;
+mod tile;
+mod view;
 
 pub use catalogue::{Catalogue, CatalogueError, KnownMistake};
+pub use diagnose::{Diagnosis, Facts};
+pub use stored::{Material, Stored, StoredError, StoredView};
+pub use tile::{LENGTH, Tile};
+pub use view::{Kind, LoopSeen, Sightings, View};

@@ -109,13 +109,13 @@ pub fn value(material: &api::MaterialValue, scale: f64, wo: [f32; 3], wi: [f32; 
 }
 
 /// 0.99 over the largest component of Kd + Ks where that exceeds 1; 1 elsewhere and for diffuse.
-fn energy_scale(material: &api::MaterialValue) -> f64 {
+pub(super) fn energy_scale(material: &api::MaterialValue) -> f64 {
     let sums = (0..3).map(|c| f64::from(material.diffuse[c]) + f64::from(material.specular[c]));
     let largest = sums.fold(0.0, f64::max);
     if material.model == api::MATERIAL_PHONG && largest > 1.0 { 0.99 / largest } else { 1.0 }
 }
 
-fn materials(kind: BsdfKind) -> Vec<api::MaterialValue> {
+pub(super) fn materials(kind: BsdfKind) -> Vec<api::MaterialValue> {
     let material = |model, diffuse, specular, exponent| api::MaterialValue {
         model,
         diffuse,
@@ -224,9 +224,11 @@ pub fn judge(kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Check
         }
     };
     check.error = if wrong == 0 { 0.0 } else { apart / total };
+    let of_shape = probes.iter().any(|probe| probe.query.source == api::BSDF_OF_SHAPE);
+    let rule = if of_shape { "bsdf.textured" } else { "bsdf.value" };
     check.measures = vec![
-        Measure::at_most("directions answered wrongly (fraction)", fraction, 0.0),
-        Measure::at_most("values not finite (count)", not_finite as f64, 0.0),
+        Measure::at_most(rule, "directions answered wrongly (fraction)", fraction, 0.0),
+        Measure::at_most(rule, "values not finite (count)", not_finite as f64, 0.0),
     ];
     check
 }

@@ -1,5 +1,7 @@
 //! What evidence is made of: checks, each with the values that decided it.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 /// Everything that was found out about one hand-in. Plain data: the rubric needs nothing else.
@@ -50,9 +52,38 @@ pub enum Verdict {
     NotRun,
 }
 
+/// Every rule that can fail a check, by what judges: one or several of them make up a check.
+pub const RULES: [&str; 23] = [
+    "bsdf.value",
+    "bsdf.textured",
+    "rays.lit",
+    "shadow.lit",
+    "shadow.dark",
+    "loop.agreement",
+    "image.size",
+    "image.non_finite",
+    "image.negative",
+    "image.interior",
+    "image.blob",
+    "image.edge",
+    "image.bias",
+    "pass.camera_position",
+    "pass.light_position",
+    "pass.light_intensity",
+    "pass.rho_d",
+    "pass.rho_s",
+    "pass.exponent",
+    "vertex.position",
+    "vertex.normal",
+    "bonus.lit",
+    "bonus.dark",
+];
+
 /// One value against its bound.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measure {
+    /// The rule that it is judged by: one of [`super::RULES`]; empty when it only informs.
+    pub rule: String,
     /// What was measured, with its unit.
     pub name: String,
     /// The value.
@@ -68,7 +99,8 @@ pub struct Measure {
 pub struct Picture {
     /// What it shows: actual, expected, difference...
     pub title: String,
-    /// File name, relative to the folder of the hand-in's report.
+    /// File name, relative to the folder of the hand-in's report; of a held-back scene, to that of
+    /// the instructor's.
     pub file: String,
 }
 
@@ -88,6 +120,34 @@ impl Check {
         }
     }
 
+    /// What it says, as far as everybody may know it: of a held-back scene only whether it is right
+    /// and how wrong. The summary may hold places in the scene and words of the hand-in's.
+    pub fn said(&self) -> Cow<'_, str> {
+        if !self.held_back {
+            return Cow::Borrowed(&self.summary);
+        }
+        Cow::Owned(match self.verdict {
+            Verdict::Pass => "right on a held-back scene".into(),
+            Verdict::Fail => {
+                format!("wrong on a held-back scene (error {})", coarse(self.error))
+            }
+            Verdict::NotImplemented => "not implemented on a held-back scene".into(),
+            Verdict::NotJudged | Verdict::NotRun => "not judged on a held-back scene".into(),
+        })
+    }
+
+    /// The check as a student may read it: of a held-back scene only what [`Check::said`] says.
+    pub fn for_student(&self) -> Self {
+        if !self.held_back {
+            return self.clone();
+        }
+        Self {
+            held_back: true,
+            error: coarse(self.error),
+            ..Self::new(&self.id, &self.scene, self.verdict, self.said())
+        }
+    }
+
     /// The same check with a hint.
     pub fn with_hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = hint.into();
@@ -95,9 +155,14 @@ impl Check {
     }
 }
 
+/// Two digits: an error must not spell out a scene either.
+fn coarse(error: f64) -> f64 {
+    format!("{error:.1e}").parse().unwrap_or(error)
+}
+
 impl Measure {
     /// A value that passes when it is at most `bound`; NaN never passes.
-    pub fn at_most(name: impl Into<String>, value: f64, bound: f64) -> Self {
-        Self { name: name.into(), value, bound, passed: value <= bound }
+    pub fn at_most(rule: &str, name: impl Into<String>, value: f64, bound: f64) -> Self {
+        Self { rule: rule.to_owned(), name: name.into(), value, bound, passed: value <= bound }
     }
 }

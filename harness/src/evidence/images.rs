@@ -6,6 +6,7 @@ use super::{Check, Measure, Verdict};
 use crate::expected::Expected;
 use crate::imaging::compare::{compare_offline, compare_realtime_linear, compare_srgb8};
 use crate::imaging::evidence::{CompareError, ImageEvidence, Tolerances};
+use crate::imaging::origin::{same_draws, same_levels};
 use crate::imaging::ratio::region_ratios;
 use crate::imaging::reference::{Region, RegionMask};
 
@@ -73,14 +74,15 @@ pub fn judge(
     match compared {
         Ok(found) => describe(id, scene, &found, actual, reference, &mask),
         Err(error @ CompareError::Size { .. }) => {
-            Check::new(id, scene, Verdict::Fail, error.to_string())
+            let measures = vec![Measure::at_most("image.size", error.to_string(), 1.0, 0.0)];
+            Check { measures, ..Check::new(id, scene, Verdict::Fail, error.to_string()) }
         }
         Err(error) => Check::new(id, scene, Verdict::NotJudged, error.to_string()),
     }
 }
 
-/// Whether two images of one scene may come from one renderer: equal within noise offline, within
-/// a level of 8-bit sRGB realtime.
+/// Whether two images of one scene come from one renderer: equal within noise offline, within a
+/// level of 8-bit sRGB realtime.
 pub fn same_origin(
     kind: Kind,
     a: &Image,
@@ -88,24 +90,14 @@ pub fn same_origin(
     expected: &Expected,
     tolerances: &Tolerances,
 ) -> bool {
-    if (a.width, a.height) != (b.width, b.height) {
-        return false;
-    }
-    match kind {
+    let mask = match kind {
         Kind::Offline { spp } => {
-            // Both are draws at the same spp: the second takes the mean's place.
-            let reference = crate::imaging::reference::ReferenceImage {
-                mean: b.clone(),
-                n: spp,
-                ..expected.offline.clone()
-            };
-            compare_offline(a, &reference, spp, tolerances).is_ok_and(|found| found.passed())
+            return same_draws(a, b, spp, expected.offline.median_lit, tolerances);
         }
-        _ => {
-            let mask = &expected.unshadowed_mask;
-            compare_srgb8(a, b, mask, tolerances).is_ok_and(|found| found.passed())
-        }
-    }
+        Kind::Realtime | Kind::HandedInRealtime => &expected.unshadowed_mask,
+        Kind::RealtimeShadows | Kind::HandedInShadows => &expected.offline.mask,
+    };
+    same_levels(a, b, mask, tolerances)
 }
 
 /// Judges a frame drawn by code, linear floats, against the image at pixel centres.
@@ -172,6 +164,7 @@ fn describe(
     mask: &RegionMask,
 ) -> Check {
     let measures = found.checks.iter().map(|check| Measure {
+        rule: format!("image.{}", check.id.split(':').next().unwrap_or_default()),
         name: format!("{}: {}", check.id, check.detail),
         value: check.value,
         bound: check.bound,

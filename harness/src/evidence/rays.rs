@@ -30,6 +30,8 @@ pub struct RayBatch {
     pub scene: String,
     /// The rays, lit ones first.
     pub rays: Vec<Ray>,
+    /// The pixel of the small film that each goes through, row by row.
+    pub pixels: Vec<usize>,
     /// What each ray meets.
     pub points: Vec<SurfacePoint>,
     /// How many of the rays end on lit points; the others end in shadow.
@@ -42,18 +44,18 @@ impl RayBatch {
     /// Chooses the rays of a surface buffer; `mask` is that of the same film, with shadows.
     pub fn new(scene: &str, surface: &SurfaceBuffer, mask: &RegionMask, intensity: Vec3) -> Self {
         let (mut lit, mut dark) = (Vec::new(), Vec::new());
-        for ((ray, point), &value) in surface.pixels.iter().zip(&mask.pixels) {
+        for (pixel, ((ray, point), &value)) in surface.pixels.iter().zip(&mask.pixels).enumerate() {
             let Some(point) = point else { continue };
             let clear_of_edges = value & (RegionMask::EDGE | RegionMask::EMITTER) == 0;
             let above = |w| Frame::cos_theta(w) > MIN_COSINE;
             if clear_of_edges && above(point.wo) && above(point.wi) {
                 let list = if mask.region(value).lit { &mut lit } else { &mut dark };
-                list.push((*ray, *point));
+                list.push((pixel, (*ray, *point)));
             }
         }
         let count = lit.len();
-        let (rays, points) = lit.into_iter().chain(dark).unzip();
-        Self { scene: scene.to_owned(), rays, points, lit: count, intensity }
+        let (pixels, (rays, points)) = lit.into_iter().chain(dark).unzip();
+        Self { scene: scene.to_owned(), rays, pixels, points, lit: count, intensity }
     }
 
     /// Unshadowed radiance along ray `index` when the BSDF (cosine included) is `bsdf`.
@@ -85,6 +87,7 @@ pub fn judge_unshadowed(batch: &RayBatch, answers: &[Unshadowed]) -> Check {
     for answer in answers {
         let difference = Difference::of(batch, answer);
         measures.push(Measure::at_most(
+            "rays.lit",
             format!("rays wrong under the witness BSDF \"{}\" (fraction)", answer.witness),
             difference.wrong,
             STRAY_FRACTION,
@@ -218,12 +221,14 @@ fn factor_hint(ratios: &mut [f64], at: &[(f64, &SurfacePoint)]) -> String {
 /// (`without`), under the same BSDF whose value is `bsdf`.
 ///
 /// Errors on lit and on shadowed rays count apart and add up, so that an image that is all lit or
-/// all dark is worth nothing.
+/// all dark is worth nothing. `shaded` is radiance with and without shadows under the renderer's own
+/// BSDFs, right or wrong: along a lit ray the shadow query leaves what is shaded as it was.
 pub fn judge_shadows(
     batch: &RayBatch,
     bsdf: &dyn Fn(&SurfacePoint) -> [f64; 3],
     with: &[[f32; 3]],
     without: &[[f32; 3]],
+    shaded: (&[[f32; 3]], &[[f32; 3]]),
 ) -> Check {
     let id = "shadow.rays";
     let dark = batch.rays.len() - batch.lit;
@@ -247,7 +252,8 @@ pub fn judge_shadows(
         let visibility = visibility(with[index], without[index], expected);
         // What is no number is never right.
         let right = (visibility - f64::from(u8::from(is_lit))).abs() < HALF_LIGHT;
-        if !right {
+        let changed = is_lit && !same_shading(shaded.0[index], shaded.1[index]);
+        if !right || changed {
             let count = if is_lit { &mut lit_wrong } else { &mut dark_wrong };
             *count += 1;
             first = first.or(Some((index, visibility)));
@@ -266,9 +272,15 @@ pub fn judge_shadows(
     let changed = with.iter().zip(without).filter(|(with, without)| with != without).count();
     let changed = changed as f64 / batch.rays.len() as f64;
     let measures = vec![
-        Measure::at_most(SWITCHED, changed, 1.0),
-        Measure::at_most("lit rays that are not lit (fraction)", lit_fraction, STRAY_FRACTION),
+        Measure::at_most("", SWITCHED, changed, 1.0),
         Measure::at_most(
+            "shadow.lit",
+            "lit rays that are not lit (fraction)",
+            lit_fraction,
+            STRAY_FRACTION,
+        ),
+        Measure::at_most(
+            "shadow.dark",
             "shadowed rays that are not dark (fraction)",
             dark_fraction,
             STRAY_FRACTION,
@@ -296,6 +308,15 @@ pub fn judge_shadows(
     check.error = if check.verdict == Verdict::Pass { 0.0 } else { lit_fraction + dark_fraction };
     check.measures = measures;
     check
+}
+
+/// Whether radiance is the same but for rounding; what is no number in both is no matter of shadows.
+fn same_shading(with: [f32; 3], without: [f32; 3]) -> bool {
+    let same = |a: f64, b: f64| match (a.is_finite(), b.is_finite()) {
+        (true, true) => (a - b).abs() <= RELATIVE * b.abs(),
+        (a, b) => a == b,
+    };
+    with.iter().zip(without).all(|(a, b)| same(f64::from(*a), f64::from(b)))
 }
 
 /// The measure of how much of a scene the shadows switch changes.
@@ -416,7 +437,12 @@ pub fn judge_agreement(
         }
     }
     let fraction = wrong as f64 / counted.max(1) as f64;
-    let measure = Measure::at_most("pixels that differ (fraction)", fraction, STRAY_FRACTION);
+    let measure = Measure::at_most(
+        "loop.agreement",
+        "pixels that differ (fraction)",
+        fraction,
+        STRAY_FRACTION,
+    );
     let mut check = match first.filter(|_| !measure.passed) {
         None => {
             let summary =

@@ -124,8 +124,9 @@ impl Shadows<'_> {
         };
         let [dark, lit] = counts;
         let measures = vec![
-            Measure::at_most(VISIBILITY, fraction(lit), bound(lit)),
+            Measure::at_most("bonus.lit", VISIBILITY, fraction(lit), bound(lit)),
             Measure::at_most(
+                "bonus.dark",
                 "shadowed pixels that are not dark (fraction)",
                 fraction(dark),
                 bound(dark),

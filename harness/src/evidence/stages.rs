@@ -65,6 +65,18 @@ impl BoundValue {
         }
     }
 
+    /// The rule that it is judged by.
+    fn rule(self) -> &'static str {
+        match self {
+            Self::CameraPosition => "pass.camera_position",
+            Self::LightPosition => "pass.light_position",
+            Self::LightIntensity => "pass.light_intensity",
+            Self::RhoD => "pass.rho_d",
+            Self::RhoS => "pass.rho_s",
+            Self::Exponent => "pass.exponent",
+        }
+    }
+
     /// A fragment stage that writes the value; as `phong.fs` with `model` 1, as `diffuse.fs` with 0.
     /// The blue channel of scalars tells which of the two drew.
     pub fn stage(self, phong: bool) -> String {
@@ -142,6 +154,7 @@ pub fn judge_pass(
         (wrong_total, total) = (wrong_total + wrong, total + counted);
         let fraction = wrong as f64 / counted as f64;
         let measure = Measure::at_most(
+            bound.rule(),
             format!("{} wrong (fraction of pixels)", bound.name()),
             fraction,
             STRAY_FRACTION,
@@ -219,11 +232,13 @@ pub fn judge_vertex(
     let fraction = |wrong: usize| wrong as f64 / counted as f64;
     let measures = vec![
         Measure::at_most(
+            "vertex.position",
             "world positions wrong (fraction of pixels)",
             fraction(wrong_position),
             STRAY_FRACTION,
         ),
         Measure::at_most(
+            "vertex.normal",
             "world normals wrong (fraction of pixels)",
             fraction(wrong_normal),
             STRAY_FRACTION,

@@ -5,5 +5,6 @@ mod store;
 mod surface;
 
 pub use regions::regions;
+pub(crate) use store::scene_digest;
 pub use store::{Blessing, Expected, Store, load_scene};
 pub use surface::{Sight, SurfaceBuffer, SurfacePoint};

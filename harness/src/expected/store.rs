@@ -243,7 +243,23 @@ impl Store<'_> {
         Ok((take("mean")?, take("variance")?, n, take("centre")?))
     }
 
-    /// The cache file of something made from a scene; its name holds all that it depends on.
+    /// The files of what is made for a scene on a film.
+    ///
+    /// # Errors
+    /// When the scene cannot be read.
+    pub(crate) fn made_files(
+        &self,
+        offline: &Path,
+        realtime: &Path,
+        [width, height]: [u32; 2],
+    ) -> anyhow::Result<Vec<PathBuf>> {
+        let own = ["offline", "realtime", "masks"].map(|what| (offline, what));
+        let files = own.into_iter().chain([(realtime, "raw-normals")]);
+        files.map(|(toml, what)| self.cached(toml, width, height, what)).collect()
+    }
+
+    /// The file of something made from a scene, in a kit or in the cache; its name holds all that it
+    /// depends on.
     fn cached(&self, toml: &Path, width: u32, height: u32, what: &str) -> anyhow::Result<PathBuf> {
         let mut hash = Sha256::new();
         hash.update(scene_digest(toml)?);
@@ -252,7 +268,8 @@ impl Store<'_> {
             env!("CARGO_PKG_VERSION")
         ));
         let name = format!("{what}-{}.exr", &hex(&hash.finalize())[..24]);
-        Ok(self.assignment.cache().join("expected").join(name))
+        let made = self.assignment.made().join(&name);
+        Ok(if made.is_file() { made } else { self.assignment.cache().join("expected").join(name) })
     }
 
     /// Reads layers of a cache file, or makes and keeps them.
@@ -398,7 +415,7 @@ pub fn load_scene(toml: &Path) -> basecode::Result<Scene> {
 }
 
 /// SHA-256 over all that an image of a scene depends on: the TOML file and the files beside its mesh.
-fn scene_digest(toml: &Path) -> anyhow::Result<String> {
+pub(crate) fn scene_digest(toml: &Path) -> anyhow::Result<String> {
     let config = basecode::scene::SceneConfig::load(toml)?;
     let mut hash = Sha256::new();
     hash.update(std::fs::read(toml)?);

@@ -44,8 +44,13 @@ impl SurfacePoint {
 
     /// Casts one camera ray.
     pub fn cast(scene: &Scene, ray: Ray) -> Option<Self> {
+        Self::cast_under(scene, scene.first_light_position(), ray)
+    }
+
+    /// As [`SurfacePoint::cast`], with the light elsewhere.
+    pub fn cast_under(scene: &Scene, light: Vec3, ray: Ray) -> Option<Self> {
         let hit = scene.intersect(&ray)?;
-        let to_light = scene.first_light_position() - hit.p;
+        let to_light = light - hit.p;
         let distance = to_light.length();
         let direction = to_light / distance;
         Some(Self {

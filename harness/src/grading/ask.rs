@@ -2,16 +2,18 @@
 
 use std::path::Path;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use basecode::{Image, Ray, Vec3};
 use renderer_api as api;
 
+use super::control;
+use crate::diagnosis::{Sightings, Tile, View};
 use crate::evidence::{Check, Verdict};
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, BsdfQuery, BsdfSource, Job, JobReport, MAX_TIMEOUTS, Matter, Outcome, RayQuery,
-    Request, SceneRef, Supervisor, not_asked,
+    Adapter, BsdfQuery, BsdfSource, Job, JobReport, Matter, Outcome, Patience, RayQuery, Request,
+    SceneRef, Supervisor,
 };
 
 /// What it takes to run one hand-in.
@@ -28,8 +30,13 @@ pub struct Asker<'a> {
     pub options: String,
     /// CPU seconds of all workers so far.
     pub cpu_s: Mutex<f64>,
-    /// Questions of this path that ran out of time so far.
-    pub timeouts: AtomicUsize,
+    /// What is left of it for this path.
+    pub patience: Patience,
+    /// The reference renderer's library, absent in a student's kit: what it can draw, the machine
+    /// is not to blame for.
+    pub reference: Option<&'a Path>,
+    /// What was answered, for the diagnosis.
+    pub sightings: Mutex<Sightings>,
 }
 
 impl Asker<'_> {
@@ -38,18 +45,35 @@ impl Asker<'_> {
         if requests.is_empty() {
             return Vec::new();
         }
-        if self.timeouts.load(Ordering::Relaxed) >= MAX_TIMEOUTS {
-            return requests.iter().map(|_| not_asked()).collect();
-        }
         let job = Job { plugin: plugin.map(Path::to_owned), requests };
-        let JobReport { outcomes, runs, .. } =
-            self.supervisor.run_job(&job, &self.limits, self.cancel, &mut |_| ());
+        let mut outcomes = self.run(&job);
+        control::question_the_machine(self, &job, &mut outcomes);
+        outcomes
+    }
+
+    /// Runs a job while there is patience.
+    pub fn run(&self, job: &Job) -> Vec<Outcome> {
+        if let Some(rest) = self.patience.is_over() {
+            return vec![rest; job.requests.len()];
+        }
+        let JobReport { outcomes, runs, .. } = self.supervisor.run_job_patiently(
+            job,
+            &self.limits,
+            &self.patience,
+            self.cancel,
+            &mut |_| (),
+        );
         if let Ok(mut cpu_s) = self.cpu_s.lock() {
             *cpu_s += runs.iter().map(|run| run.ended.cpu_s).sum::<f64>();
         }
-        let timeouts = outcomes.iter().filter(|outcome| matches!(outcome, Outcome::TimedOut));
-        self.timeouts.fetch_add(timeouts.count(), Ordering::Relaxed);
         outcomes
+    }
+
+    /// Keeps what was answered, for the diagnosis.
+    pub fn see(&self, view: View, tile: Tile) {
+        if let Ok(mut sightings) = self.sightings.lock() {
+            sightings.see(view, tile);
+        }
     }
 
     /// A scene file for a request.
@@ -57,9 +81,14 @@ impl Asker<'_> {
         SceneRef { path: path.to_owned(), options: self.options.clone() }
     }
 
-    /// Ends a path: answers the CPU seconds of its workers, and forgets its timeouts.
+    /// Whether Ctrl-C came.
+    pub fn is_cancelled(&self) -> bool {
+        self.cancel.load(Ordering::Relaxed)
+    }
+
+    /// Ends a path: answers the CPU seconds of its workers; patience begins anew.
     pub fn end_path(&self) -> f64 {
-        self.timeouts.store(0, Ordering::Relaxed);
+        self.patience.renew();
         self.cpu_s.lock().map_or(0.0, |mut cpu_s| std::mem::take(&mut *cpu_s))
     }
 }
@@ -109,7 +138,9 @@ pub fn unanswered(id: &str, scene: &str, parts: &[&str], outcome: &Outcome) -> C
     match outcome {
         Outcome::Done(_) => check(Verdict::NotJudged, "answered".into()),
         Outcome::NotImplemented(task) => {
-            let verdict = if parts.iter().any(|part| task.starts_with(part)) {
+            // A task without a part's number is the asked one's: it cannot hide others.
+            let numbered = task.starts_with(|c: char| c.is_ascii_digit());
+            let verdict = if !numbered || parts.iter().any(|part| task.starts_with(part)) {
                 Verdict::NotImplemented
             } else {
                 Verdict::NotJudged

@@ -18,6 +18,8 @@ const SMALL_WIDTH: u32 = 96;
 pub struct Case {
     /// What the assignment says of it.
     pub entry: SceneEntry,
+    /// Whether students never see it.
+    pub held_back: bool,
     /// The offline TOML file, absolute.
     pub offline: PathBuf,
     /// The realtime TOML file, absolute.
@@ -54,6 +56,12 @@ pub struct Small {
     pub raw_normals: Option<Image>,
 }
 
+/// The small film of a film, width and height in pixels.
+fn small_film([full_width, full_height]: [u32; 2]) -> [u32; 2] {
+    let width = full_width.min(SMALL_WIDTH);
+    [width, (full_height * width / full_width).max(1)]
+}
+
 impl Case {
     /// Makes a scene ready.
     ///
@@ -64,10 +72,8 @@ impl Case {
         let (offline, realtime) = (at(&entry.offline)?, at(&entry.realtime)?);
         let config = SceneConfig::load(&offline)?;
         let expected = store.expected(entry)?;
-        let (full_width, full_height) =
-            (expected.unshadowed.width as u32, expected.unshadowed.height as u32);
-        let width = full_width.min(SMALL_WIDTH);
-        let height = (full_height * width / full_width).max(1);
+        let film = [expected.unshadowed.width as u32, expected.unshadowed.height as u32];
+        let [width, height] = small_film(film);
         let (w, h) = (width as usize, height as usize);
         let scene = &expected.scene;
         let surface = SurfaceBuffer::new(scene, w, h)?;
@@ -98,7 +104,28 @@ impl Case {
             expected,
             small,
             entry: entry.clone(),
+            held_back: false,
         })
+    }
+
+    /// The files that the reference renderer makes for a scene, on both films; some may be
+    /// stored elsewhere or not needed, and do not exist.
+    ///
+    /// # Errors
+    /// When the scene cannot be read.
+    pub fn made_files(store: &Store, entry: &SceneEntry) -> anyhow::Result<Vec<PathBuf>> {
+        let at = |path: &PathBuf| std::path::absolute(store.assignment.root.join(path));
+        let (offline, realtime) = (at(&entry.offline)?, at(&entry.realtime)?);
+        let config = SceneConfig::load(&offline)?;
+        let film = entry.film.unwrap_or([config.width as u32, config.height as u32]);
+        let mut files = store.made_files(&offline, &realtime, film)?;
+        files.extend(store.made_files(&offline, &realtime, small_film(film))?);
+        Ok(files)
+    }
+
+    /// Whether it only shows what others do not: no hand-in holds an image of it.
+    pub fn is_probe(&self) -> bool {
+        self.entry.hand_in.is_none() && self.bonus.is_none()
     }
 
     /// Width and height of the film that the scene is judged on, in pixels.

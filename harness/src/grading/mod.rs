@@ -2,15 +2,22 @@
 
 mod ask;
 mod case;
+mod control;
+mod draw;
 mod handed_in;
+mod isolate;
+mod look;
 mod offline;
 mod pictures;
 mod pipeline;
 mod realtime;
 mod record;
 mod sampler;
+mod shared;
 
 pub use case::Case;
-pub use pipeline::{Grading, Purpose, TREE};
+pub use pipeline::{Folders, Grading, Purpose, RenderPath, TREE};
 pub use realtime::Stages;
 pub use record::{Conditions, Record, StageCost, Student};
+pub use sampler::{CORRELATED, row_correlation};
+pub use shared::{ImageDigest, judge_shared};

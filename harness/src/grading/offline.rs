@@ -7,8 +7,10 @@ use renderer_api as api;
 
 use super::ask::{self, Asker};
 use super::case::Case;
+use crate::diagnosis::{self, LoopSeen, Tile, View};
 use crate::evidence::bsdf::{self, BsdfKind, BsdfProbe};
 use crate::evidence::images::{self, Kind};
+use crate::evidence::physical::Probes;
 use crate::evidence::rays::{self, Unshadowed};
 use crate::evidence::{Check, Verdict};
 use crate::expected::SurfacePoint;
@@ -37,7 +39,8 @@ pub struct Drawn {
     pub image: Image,
 }
 
-/// Probes both BSDFs, given by value and as a textured scene hands them out.
+/// Probes both BSDFs: given by value, as a textured scene hands them out, and as any held-back one
+/// does, whose materials nobody has seen.
 pub fn probe_bsdfs(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
     let Some(case) = cases.first() else { return Vec::new() };
     let request = |scene: &Path, probes: &[BsdfProbe]| Request::EvalBsdf {
@@ -46,21 +49,34 @@ pub fn probe_bsdfs(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
     };
     let mut asked = Vec::new();
     for kind in [BsdfKind::Diffuse, BsdfKind::Phong] {
-        asked.push((kind, String::new(), &case.offline, bsdf::probes(kind)));
+        if !case.held_back {
+            asked.push((kind, String::new(), &case.offline, bsdf::probes(kind)));
+        }
         for case in cases {
-            let probes = textured_probes(kind, case);
+            let probes = shape_probes(kind, case);
             if !probes.is_empty() {
                 asked.push((kind, case.entry.name.clone(), &case.offline, probes));
             }
         }
     }
-    let requests = asked.iter().map(|(_, _, scene, probes)| request(scene, probes)).collect();
+    let mut requests: Vec<Request> =
+        asked.iter().map(|(_, _, scene, probes)| request(scene, probes)).collect();
+    let physical = [BsdfKind::Diffuse, BsdfKind::Phong].map(|kind| (kind, Probes::new(kind)));
+    requests.extend(physical.iter().map(|(_, probes)| Request::EvalBsdf {
+        scene: asker.scene(&case.offline),
+        queries: probes.queries.iter().map(ask::query).collect(),
+    }));
     let outcomes = asker.ask(Some(plugin), requests);
     let judged =
         asked.iter().zip(&outcomes).map(|((kind, scene, _, probes), outcome)| match outcome {
             Outcome::Done(answer) => {
                 let mut check = bsdf::judge(*kind, probes, ask::colours(&answer.values));
                 check.scene.clone_from(scene);
+                let seen = match kind {
+                    BsdfKind::Diffuse => diagnosis::Kind::Diffuse,
+                    BsdfKind::Phong => diagnosis::Kind::Phong,
+                };
+                asker.see(View::new(seen, scene), Tile::of_list(ask::colours(&answer.values)));
                 check
             }
             other => match kind {
@@ -68,11 +84,15 @@ pub fn probe_bsdfs(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
                 BsdfKind::Phong => ask::unanswered("bsdf.phong", scene, &["1.2"], other),
             },
         });
-    judged.collect()
+    let answered = physical.iter().zip(outcomes.iter().skip(asked.len()));
+    let physical = answered.filter_map(|((kind, probes), outcome)| {
+        probes.judge(*kind, ask::colours(&outcome.answer()?.values))
+    });
+    judged.chain(physical).collect()
 }
 
-/// Directions and texture coordinates for each textured shape of a kind.
-fn textured_probes(kind: BsdfKind, case: &Case) -> Vec<BsdfProbe> {
+/// Directions and texture coordinates for each shape of a kind: of a public scene the textured ones.
+fn shape_probes(kind: BsdfKind, case: &Case) -> Vec<BsdfProbe> {
     let scene = &case.expected.scene;
     let sampler = Sampler::new(0x7E87);
     let mut probes = Vec::new();
@@ -84,7 +104,8 @@ fn textured_probes(kind: BsdfKind, case: &Case) -> Vec<BsdfProbe> {
             _ => continue,
         };
         let bitmap = |texture| matches!(texture, &basecode::Texture::Bitmap(_));
-        if material.is_emitter() || !(bitmap(&material.diffuse) || bitmap(&material.specular)) {
+        let textured = bitmap(&material.diffuse) || bitmap(&material.specular);
+        if material.is_emitter() || !(textured || case.held_back) {
             continue;
         }
         for _ in 0..200 {
@@ -168,7 +189,7 @@ pub fn judge_scene(
             case,
             &[(true_off, "the scene's own: the integrator asks for none", &own)],
         ));
-        checks.push(judge_shadows(case, &own, true_on, true_off));
+        checks.push(judge_shadows(case, &own, (true_on, true_off), (true_on, true_off)));
     } else {
         let values =
             WITNESSES.map(|(witness, _)| move |point: &SurfacePoint| witness_value(witness, point));
@@ -179,10 +200,12 @@ pub fn judge_scene(
             .collect();
         checks.push(judge_unshadowed(case, &asked));
         let flat = |point: &SurfacePoint| witness_value(FLAT, point);
-        checks.push(judge_shadows(case, &flat, flat_on, flat_off));
+        checks.push(judge_shadows(case, &flat, (flat_on, flat_off), (true_on, true_off)));
+        see_rays(asker, case, w1, (flat_on, flat_off));
     }
     checks.push(match (one_spp, at_centres) {
         (Outcome::Done(image), Outcome::Done(along)) => {
+            see_loop(asker, case, (&image.values, &along.values));
             let (image, along) = (ask::colours(&image.values), ask::colours(&along.values));
             rays::judge_agreement(name, &small.mask, image, along)
         }
@@ -201,17 +224,8 @@ pub fn judge_scene(
         Outcome::Done(answer) => {
             let image = ask::image(&answer.values, width, height);
             let kind = Kind::Offline { spp: case.spp };
-            for (id, wanted) in OFFLINE_VIEWS {
-                checks.push(images::judge(
-                    id,
-                    name,
-                    kind,
-                    &image,
-                    &case.expected,
-                    wanted,
-                    tolerances,
-                ));
-            }
+            let (id, expected) = ("image.offline", &case.expected);
+            checks.push(images::judge(id, name, kind, &image, expected, &|_| true, tolerances));
             (checks, Some(Drawn { scene: name.clone(), kind, image }))
         }
         other => {
@@ -222,14 +236,37 @@ pub fn judge_scene(
     }
 }
 
-type View = (&'static str, &'static dyn Fn(&crate::imaging::reference::Region) -> bool);
+/// Keeps for the diagnosis what witnesses say of light and visibility.
+fn see_rays(asker: &Asker, case: &Case, lit: &Outcome, (with, without): (&Outcome, &Outcome)) {
+    let (name, small) = (&case.entry.name, &case.small);
+    let size = (small.width as usize, small.height as usize);
+    if let Outcome::Done(lit) = lit {
+        let values = ask::colours(&lit.values).iter().copied();
+        let tile = Tile::of_pixels(size, small.batch.pixels.iter().copied().zip(values));
+        asker.see(View::new(diagnosis::Kind::Lit, name), tile);
+    }
+    if let (Outcome::Done(with), Outcome::Done(without)) = (with, without) {
+        let pairs = ask::colours(&with.values).iter().zip(ask::colours(&without.values));
+        let sums = pairs.map(|(a, b)| (a.iter().sum::<f32>(), b.iter().sum::<f32>()));
+        // What is black without shadows tells nothing.
+        let told = small.batch.pixels.iter().zip(sums).filter(|(_, (_, without))| *without != 0.0);
+        let visibility = told.map(|(&pixel, (with, without))| (pixel, [with / without; 3]));
+        asker.see(View::new(diagnosis::Kind::Shadow, name), Tile::of_pixels(size, visibility));
+    }
+}
 
-/// The image as a whole, and by material.
-const OFFLINE_VIEWS: [View; 3] = [
-    ("image.offline", &|_| true),
-    ("image.offline.diffuse", &|region| region.exponent == 0.0),
-    ("image.offline.phong", &|region| region.exponent > 0.0),
-];
+/// Keeps for the diagnosis what the loop makes of the radiance along the centres of all pixels.
+fn see_loop(asker: &Asker, case: &Case, (image, along): (&[f32], &[f32])) {
+    if case.held_back {
+        return;
+    }
+    let (name, small) = (&case.entry.name, &case.small);
+    let [image, rays] = [image, along].map(|values| ask::image(values, small.width, small.height));
+    asker.see(View::new(diagnosis::Kind::Offline, name), Tile::of_image(&image));
+    if let Ok(mut sightings) = asker.sightings.lock() {
+        sightings.loops.insert(name.clone(), LoopSeen { rays, image });
+    }
+}
 
 /// A question's outcome, the witness' name and its value.
 type Asked<'a> = (&'a Outcome, &'a str, &'a dyn Fn(&SurfacePoint) -> [f64; 3]);
@@ -250,17 +287,22 @@ fn judge_unshadowed(case: &Case, asked: &[Asked]) -> Check {
 fn judge_shadows(
     case: &Case,
     bsdf: &dyn Fn(&SurfacePoint) -> [f64; 3],
-    with: &Outcome,
-    without: &Outcome,
+    (with, without): (&Outcome, &Outcome),
+    shaded: (&Outcome, &Outcome),
 ) -> Check {
     let (id, name) = ("shadow.rays", &case.entry.name);
     match (with, without) {
-        (Outcome::Done(with), Outcome::Done(without)) => rays::judge_shadows(
-            &case.small.batch,
-            bsdf,
-            ask::colours(&with.values),
-            ask::colours(&without.values),
-        ),
+        (Outcome::Done(with), Outcome::Done(without)) => {
+            let (with, without) = (ask::colours(&with.values), ask::colours(&without.values));
+            // Where there is no BSDF yet, nothing is told of what it would shade.
+            let shaded = match shaded {
+                (Outcome::Done(on), Outcome::Done(off)) => {
+                    (ask::colours(&on.values), ask::colours(&off.values))
+                }
+                _ => (without, without),
+            };
+            rays::judge_shadows(&case.small.batch, bsdf, with, without, shaded)
+        }
         (Outcome::Done(_), missing) => {
             Check { verdict: Verdict::NotJudged, ..ask::unanswered(id, name, &[], missing) }
         }

@@ -7,6 +7,7 @@ use basecode::exr_io::read_exr;
 
 use super::case::Case;
 use super::offline::Drawn;
+use super::pipeline::Folders;
 use crate::evidence::images::Kind;
 use crate::evidence::{Check, Picture, Verdict};
 use crate::imaging::pictures::{signed_error, tone_mapped};
@@ -14,7 +15,7 @@ use crate::imaging::pictures::{signed_error, tone_mapped};
 /// The relative error that the difference picture shows in full colour.
 const FULL_SCALE: f32 = 0.1;
 
-/// Draws the pictures of every failed image check into `out` and notes them in the checks.
+/// Draws the pictures of every failed image check into one of the folders and notes them in the checks.
 ///
 /// # Errors
 /// When a file cannot be written.
@@ -23,7 +24,7 @@ pub fn draw(
     cases: &[Case],
     drawn: &[Drawn],
     root: &Path,
-    out: &Path,
+    out: &Folders,
 ) -> anyhow::Result<()> {
     for check in checks.iter_mut().filter(|check| check.verdict == Verdict::Fail) {
         let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
@@ -43,6 +44,7 @@ pub fn draw(
             _ => None,
         };
         if let Some(actual) = actual {
+            let out = if check.held_back { &out.instructor } else { &out.student };
             check.pictures = triple(&check.id, case, &actual, out)?;
         }
     }

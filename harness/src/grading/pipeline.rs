@@ -1,8 +1,8 @@
 //! One hand-in through all stages: intake, build, offline, realtime, images.
 
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock};
 use std::time::Instant;
 
 use anyhow::Context;
@@ -12,14 +12,16 @@ use super::case::Case;
 use super::offline::{self, Drawn};
 use super::realtime::{self, Stages};
 use super::record::{Conditions, Record, StageCost, Student};
-use super::{handed_in, pictures, sampler};
+use super::{draw, handed_in, isolate, pictures, sampler};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
+use crate::diagnosis::{Diagnosis, Stored};
 use crate::evidence::{Check, Evidence, Verdict, rays, shadow_map};
 use crate::expected::Store;
+use crate::held_back::{self, HeldBack};
 use crate::intake::{self, HandIn, HandInConfig, IntakeError, Validation};
 use crate::rubric::BUILD;
-use crate::worker::{Adapter, Supervisor};
+use crate::worker::{Adapter, Patience, Supervisor};
 
 /// The check that says whether the hand-in follows the tree.
 pub const TREE: &str = "hand_in.tree";
@@ -36,14 +38,28 @@ pub struct Grading<'a> {
     pub supervisor: &'a Supervisor,
     /// The template's compiler call.
     pub recording: Recording,
-    /// The scenes, ready.
+    /// The scenes, ready: the public ones first.
     pub cases: Vec<Case>,
+    /// What is held back, if anything.
+    pub held_back: Option<HeldBack>,
     /// What realtime is drawn with, or why nothing can be.
     pub adapter: Result<Adapter, String>,
+    /// The reference renderer's library; absent in a student's kit.
+    pub reference: Option<PathBuf>,
     /// Threads for each hand-in.
     pub threads: u32,
     /// Ctrl-C.
     pub cancel: &'a AtomicBool,
+    /// What known mistakes answer, read when it is first needed.
+    pub(super) stored: OnceLock<Stored>,
+}
+
+/// Where the pictures of one hand-in go; the folders are made when there is something to show.
+pub struct Folders {
+    /// Those of public scenes.
+    pub student: PathBuf,
+    /// Those of held-back scenes.
+    pub instructor: PathBuf,
 }
 
 /// How a hand-in is to be looked at.
@@ -55,17 +71,38 @@ pub enum Purpose {
     Check,
 }
 
+/// A way from a scene to an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RenderPath {
+    /// Rays on the CPU: parts 1.1 to 1.4.
+    Offline,
+    /// Rasterised: parts 2.1 to 2.5.
+    Realtime,
+}
+
+impl RenderPath {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Offline, Self::Realtime];
+}
+
 impl<'a> Grading<'a> {
     /// Makes the batch ready: records the compiler call, loads all scenes, tries the adapter.
+    /// `perturb` is the seed of the held-back scenes; without one there are none.
     ///
     /// # Errors
     /// When the template cannot be built or expected images cannot be had: the machine's matter.
     pub fn prepare(
         store: &Store<'a>,
         adapter: Adapter,
+        perturb: Option<u64>,
         cancel: &'a AtomicBool,
     ) -> anyhow::Result<Self> {
         let assignment = store.assignment;
+        anyhow::ensure!(
+            perturb.is_none() || store.reference.is_some(),
+            "held-back scenes cannot be made: there is no reference renderer to tell what is right on them; \
+             hint: `--perturb off` grades on the public scenes alone"
+        );
         (store.progress)("preparing the compiler");
         let recording = Recording::obtain(&assignment.root, &store.supervisor.umbra)?;
         let mut cases = Vec::new();
@@ -74,25 +111,29 @@ impl<'a> Grading<'a> {
             let case = Case::new(store, entry);
             cases.push(case.with_context(|| format!("scene \"{}\" cannot be used", entry.name))?);
         }
+        let held_back = perturb.map(|seed| hold_back(store, seed, &mut cases)).transpose()?;
         let supervisor = store.supervisor;
         let mut grading = Self {
             assignment,
             supervisor,
             recording,
             cases,
+            held_back,
             adapter: Ok(adapter),
+            reference: store.reference.clone(),
             threads: store.threads,
             cancel,
+            stored: OnceLock::new(),
         };
         if let Some(case) = grading.cases.first()
-            && let Err(why) = realtime::probe_adapter(&grading.asker(""), case)
+            && let Err(why) = draw::probe_adapter(&grading.asker(""), case)
         {
             grading.adapter = Err(why);
         }
         Ok(grading)
     }
 
-    fn asker(&self, options: &str) -> Asker<'_> {
+    pub(super) fn asker(&self, options: &str) -> Asker<'_> {
         let mut limits = self.assignment.limits.run.clone();
         limits.threads = self.threads;
         Asker {
@@ -102,12 +143,13 @@ impl<'a> Grading<'a> {
             adapter: self.adapter.clone(),
             options: options.to_owned(),
             cpu_s: Mutex::new(0.0),
-            timeouts: AtomicUsize::new(0),
+            patience: Patience::default(),
+            reference: self.reference.as_deref(),
+            sightings: Mutex::default(),
         }
     }
 
-    /// Grades one hand-in; pictures of what is wrong go to `out`, a folder that is made when there
-    /// is something to show. `say` is told each stage.
+    /// Grades one hand-in; pictures of what is wrong go to `out`. `say` is told each stage.
     ///
     /// # Errors
     /// The machine's matters and Ctrl-C; what is wrong with the hand-in is in the record.
@@ -115,7 +157,7 @@ impl<'a> Grading<'a> {
         &self,
         source: &Path,
         slug: &str,
-        out: &Path,
+        out: &Folders,
         purpose: Purpose,
         say: &dyn Fn(&str),
     ) -> anyhow::Result<Record> {
@@ -131,6 +173,8 @@ impl<'a> Grading<'a> {
             findings: Vec::new(),
             diagnostics: String::new(),
             evidence: Evidence::default(),
+            diagnoses: Vec::new(),
+            images: Vec::new(),
             stages: Vec::new(),
             conditions: self.conditions(),
         };
@@ -182,22 +226,23 @@ impl<'a> Grading<'a> {
         }
         say("comparing the images handed in");
         for case in &self.cases {
-            checks.extend(handed_in::judge(
-                &hand_in.root,
-                case,
-                &drawn,
-                &self.assignment.tolerances,
-            ));
+            let tolerances = &self.assignment.tolerances;
+            let (found, images) = handed_in::judge(&hand_in.root, tree, case, &drawn, tolerances);
+            checks.extend(found);
+            record.images.extend(images);
         }
         costs.end("images", 0.0);
         pictures::draw(&mut checks, &self.cases, &drawn, &hand_in.root, out)?;
-        record.stages = costs.end("pictures", 0.0);
+        costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
+        record.diagnoses = self.diagnose(&asker, &record.evidence, &drawn, Some(&out.student))?;
+        record.stages = costs.end("diagnosis", 0.0);
         Ok(record)
     }
 
-    /// What is found out about a library that is there already, without a hand-in around it.
-    /// `options` are told to it with every scene, `seed` to its samplers; `stages` are its texts.
+    /// What is found out on some paths about a library that is there already, without a hand-in
+    /// around it, and what it looks like. `options` are told to it with every scene, `seed` to its
+    /// samplers; `stages` are its texts.
     ///
     /// # Errors
     /// The machine's matters and Ctrl-C.
@@ -207,12 +252,19 @@ impl<'a> Grading<'a> {
         options: &str,
         seed: u64,
         stages: &Stages,
-    ) -> anyhow::Result<Evidence> {
+        paths: &[RenderPath],
+    ) -> anyhow::Result<(Evidence, Vec<Diagnosis>)> {
         let asker = self.asker(options);
         let (mut checks, mut drawn) = (Vec::new(), Vec::new());
-        self.offline(&asker, library, seed, &mut checks, &mut drawn)?;
-        self.realtime(&asker, library, stages, &mut checks, &mut drawn)?;
-        Ok(Evidence { checks })
+        if paths.contains(&RenderPath::Offline) {
+            self.offline(&asker, library, seed, &mut checks, &mut drawn)?;
+        }
+        if paths.contains(&RenderPath::Realtime) {
+            self.realtime(&asker, library, stages, &mut checks, &mut drawn)?;
+        }
+        let evidence = Evidence { checks };
+        let diagnoses = self.diagnose(&asker, &evidence, &drawn, None)?;
+        Ok((evidence, diagnoses))
     }
 
     fn build(
@@ -279,16 +331,28 @@ impl<'a> Grading<'a> {
             tolerances.bias_standard_errors *= DEPENDENT_PIXELS;
         }
         checks.extend(findings);
-        checks.extend(offline::probe_bsdfs(asker, plugin, &self.cases));
-        for case in &self.cases {
-            self.stop_if_interrupted()?;
-            let (found, image) =
-                offline::judge_scene(asker, plugin, case, seed, self.threads, &tolerances);
-            checks.extend(found);
-            drawn.extend(image);
+        for cases in self.groups() {
+            let begin = checks.len();
+            checks.extend(offline::probe_bsdfs(asker, plugin, cases));
+            for case in cases {
+                self.stop_if_interrupted()?;
+                let (found, image) =
+                    offline::judge_scene(asker, plugin, case, seed, self.threads, &tolerances);
+                checks.extend(found);
+                drawn.extend(image);
+            }
+            rays::set_apart(&mut checks[begin..]);
+            mark(&mut checks[begin..], cases);
         }
-        rays::set_apart(checks);
         Ok(())
+    }
+
+    /// The public scenes and the held-back ones. No worker is asked about both, and neither's
+    /// verdicts hang on the other's: what a renderer learns of a held-back scene must not show in
+    /// an image of a public one.
+    fn groups(&self) -> [&[Case]; 2] {
+        let public = self.cases.iter().take_while(|case| !case.held_back).count();
+        self.cases.split_at(public).into()
     }
 
     fn realtime(
@@ -300,25 +364,28 @@ impl<'a> Grading<'a> {
         drawn: &mut Vec<Drawn>,
     ) -> anyhow::Result<()> {
         let tolerances = &self.assignment.tolerances;
-        let mut wrong = Vec::new();
-        for case in &self.cases {
-            self.stop_if_interrupted()?;
-            let (found, images) = realtime::judge_images(asker, plugin, case, tolerances);
-            let proof =
-                |check: &Check| check.id == "image.realtime" && check.verdict != Verdict::Pass;
-            if found.iter().any(proof) {
-                wrong.push(case);
+        for cases in self.groups() {
+            let begin = checks.len();
+            let judged = realtime::judge_images(asker, plugin, cases, tolerances);
+            let mut wrong = Vec::new();
+            for (case, (found, images)) in cases.iter().zip(judged) {
+                let proof =
+                    |check: &Check| check.id == "image.realtime" && check.verdict != Verdict::Pass;
+                if found.iter().any(proof) {
+                    wrong.push(case);
+                }
+                checks.extend(found);
+                drawn.extend(images);
             }
-            checks.extend(found);
-            drawn.extend(images);
-        }
-        shadow_map::set_apart(checks);
-        // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
-        for case in wrong {
+            shadow_map::set_apart(&mut checks[begin..]);
             self.stop_if_interrupted()?;
-            checks.extend(realtime::isolate(asker, plugin, case, stages, tolerances));
+            // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
+            if !wrong.is_empty() {
+                checks.extend(isolate::isolate(asker, plugin, &wrong, stages, tolerances));
+            }
+            mark(&mut checks[begin..], cases);
         }
-        Ok(())
+        self.stop_if_interrupted()
     }
 
     fn stop_if_interrupted(&self) -> anyhow::Result<()> {
@@ -337,6 +404,25 @@ impl<'a> Grading<'a> {
             compiler: self.recording.key.clone(),
         }
     }
+}
+
+/// Makes the held-back scenes of a batch ready.
+fn hold_back(store: &Store, seed: u64, cases: &mut Vec<Case>) -> anyhow::Result<HeldBack> {
+    (store.progress)("making the held-back scenes");
+    let (held_back, entries) = held_back::make(store.assignment, seed)?;
+    for entry in &entries {
+        (store.progress)(&format!("preparing scene {}", entry.name));
+        let case = Case::new(store, entry);
+        let case = case.with_context(|| format!("seed {seed}: {} cannot be used", entry.name))?;
+        cases.push(Case { held_back: true, ..case });
+    }
+    Ok(held_back)
+}
+
+/// Notes in the checks on a group of scenes whether these are held back.
+fn mark(checks: &mut [Check], cases: &[Case]) {
+    let held_back = cases.iter().any(|case| case.held_back);
+    checks.iter_mut().for_each(|check| check.held_back = held_back);
 }
 
 /// What the stages cost so far.

@@ -1,4 +1,4 @@
-//! The realtime path: images drawn by a plugin, and where one is wrong, pass and stages apart.
+//! The realtime path: images drawn by a plugin, those of the bonus too.
 
 use std::path::Path;
 
@@ -6,17 +6,16 @@ use basecode::Image;
 
 use super::ask::{self, Asker};
 use super::case::Case;
+use super::draw::{Frame, STAGES, draw, draw_plain};
 use super::offline::Drawn;
 use crate::evidence::images::{self, Kind};
 use crate::evidence::shadow_map::Shadows;
-use crate::evidence::stages::{
-    BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, is_template, judge_pass, judge_vertex,
-};
+use crate::evidence::stages::{VERTEX, is_template};
 use crate::evidence::{Check, Verdict};
 use crate::expected::Expected;
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::{Region, RegionMask};
-use crate::worker::{Outcome, Request, Stage};
+use crate::worker::{Outcome, Stage};
 
 /// The stage texts of a hand-in, and of the template.
 pub struct Stages {
@@ -26,9 +25,6 @@ pub struct Stages {
     pub template: [String; 3],
 }
 
-/// The names of the stages, in order.
-const NAMES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
-
 impl Stages {
     /// Reads the stages below a hand-in's and the template's `src` folder. A file that is no text
     /// counts as absent.
@@ -36,12 +32,13 @@ impl Stages {
         let stage =
             |src: &Path, name| std::fs::read_to_string(src.join(format!("shaders/{name}.wgsl")));
         Self {
-            own: NAMES.map(|name| stage(src, name).ok()),
-            template: NAMES.map(|name| stage(template, name).unwrap_or_default()),
+            own: STAGES.map(|name| stage(src, name).ok()),
+            template: STAGES.map(|name| stage(template, name).unwrap_or_default()),
         }
     }
 
-    fn is_template(&self, index: usize) -> bool {
+    /// Whether a stage is the template's still.
+    pub fn is_template(&self, index: usize) -> bool {
         self.own[index].as_ref().is_some_and(|own| is_template(own, &self.template[index]))
     }
 }
@@ -55,65 +52,102 @@ const VIEWS: [View; 3] = [
     ("image.realtime.phong", &|region| region.exponent > 0.0),
 ];
 
-/// Draws every scene with the plugin and judges the images, those of the bonus too.
+/// Draws every scene with the plugin and judges the images, those of the bonus too; answers for
+/// each scene what was found and what was drawn.
 pub fn judge_images(
     asker: &Asker,
     plugin: &Path,
-    case: &Case,
+    cases: &[Case],
     tolerances: &Tolerances,
-) -> (Vec<Check>, Vec<Drawn>) {
-    let name = &case.entry.name;
-    let (width, height) = case.film();
-    let mut asked = vec![(Kind::Realtime, &case.realtime, "image.realtime")];
-    if let Some(bonus) = &case.bonus {
-        asked.push((Kind::RealtimeShadows, bonus, "bonus.image"));
-    }
-    let (mut checks, mut drawn) = (Vec::new(), Vec::new());
-    // One worker for each image: the bonus may crash without a trace on the other.
-    for (kind, toml, id) in asked {
-        let outcome = draw(
-            asker,
-            Some(plugin),
-            case,
-            toml,
-            (width, height),
-            kind == Kind::RealtimeShadows,
-            &[],
-        );
-        let parts = ["2.1", "2.2", "2.3", "2.4", "2.5"];
-        let Outcome::Done(answer) = &outcome else {
-            checks.push(ask::unanswered(id, name, &parts, &outcome));
-            continue;
-        };
+) -> Vec<(Vec<Check>, Vec<Drawn>)> {
+    let is_right = |case: &Case, outcome: &Outcome| {
+        let Outcome::Done(answer) = outcome else { return false };
+        let (width, height) = case.film();
         let image = ask::image(&answer.values, width, height);
-        let judge =
-            |id, wanted| images::judge(id, name, kind, &image, &case.expected, wanted, tolerances);
-        if kind == Kind::Realtime {
-            let views = VIEWS.map(|(id, wanted)| judge(id, wanted));
-            checks.extend(
-                if views[0].verdict == Verdict::Fail {
-                    plain_but_for_shadows(case, &image, tolerances)
-                } else {
-                    None
-                }
-                .unwrap_or(views.to_vec()),
-            );
-            checks.push(judge_coverage(case, &image));
-        } else {
-            let check = judge(id, &|_| true);
-            let plain = drawn
-                .iter()
-                .find(|drawn: &&Drawn| drawn.kind == Kind::Realtime)
-                .map(|drawn| &drawn.image);
-            checks.push(if check.verdict == Verdict::Fail {
-                judge_visibility(asker, plugin, case, (&image, plain), check, tolerances)
-            } else {
-                check
-            });
+        judge(case, Kind::Realtime, &image, VIEWS[0], tolerances).verdict == Verdict::Pass
+    };
+    let plain = draw_plain(asker, plugin, cases, &is_right);
+    let judged = cases.iter().zip(plain).map(|(case, plain)| {
+        let (mut checks, plain) = judge_plain(case, &plain, tolerances);
+        let mut drawn = Vec::from_iter(plain);
+        if let Some(toml) = &case.bonus {
+            // A worker of its own: the bonus may crash without a trace on the others.
+            let frame = Frame { toml, shadow_map: true, ..Frame::plain(case) };
+            let outcome = draw(asker, Some(plugin), &frame);
+            let plain = drawn.first().map(|drawn| &drawn.image);
+            let (check, bonus) = judge_bonus(asker, plugin, case, &outcome, plain, tolerances);
+            checks.push(check);
+            drawn.extend(bonus);
         }
-        drawn.push(Drawn { scene: name.clone(), kind, image });
+        (checks, drawn)
+    });
+    judged.collect()
+}
+
+fn judge(
+    case: &Case,
+    kind: Kind,
+    image: &Image,
+    (id, wanted): View,
+    tolerances: &Tolerances,
+) -> Check {
+    images::judge(id, &case.entry.name, kind, image, &case.expected, wanted, tolerances)
+}
+
+/// An outcome as an image, or else the check that says why there is none.
+fn drawn(case: &Case, kind: Kind, id: &str, outcome: &Outcome) -> Result<Drawn, Box<Check>> {
+    let parts = ["2.1", "2.2", "2.3", "2.4", "2.5"];
+    let scene = &case.entry.name;
+    let Outcome::Done(answer) = outcome else {
+        return Err(Box::new(ask::unanswered(id, scene, &parts, outcome)));
+    };
+    let (width, height) = case.film();
+    let image = ask::image(&answer.values, width, height);
+    Ok(Drawn { scene: scene.clone(), kind, image })
+}
+
+fn judge_plain(
+    case: &Case,
+    outcome: &Outcome,
+    tolerances: &Tolerances,
+) -> (Vec<Check>, Option<Drawn>) {
+    let drawn = match drawn(case, Kind::Realtime, VIEWS[0].0, outcome) {
+        Ok(drawn) => drawn,
+        Err(check) => {
+            // Where stages cannot be exchanged either, nobody but the pass is left to blame.
+            let all = Check { id: "image.realtime.all".to_owned(), ..(*check).clone() };
+            return (vec![*check, all], None);
+        }
+    };
+    let views = VIEWS.map(|view| judge(case, Kind::Realtime, &drawn.image, view, tolerances));
+    let without_shadows = match views[0].verdict {
+        Verdict::Fail => plain_but_for_shadows(case, &drawn.image, tolerances),
+        _ => None,
+    };
+    let mut checks = without_shadows.unwrap_or(views.to_vec());
+    checks.push(judge_coverage(case, &drawn.image));
+    (checks, Some(drawn))
+}
+
+/// Judges the image with shadows; `plain` is the student's own without.
+fn judge_bonus(
+    asker: &Asker,
+    plugin: &Path,
+    case: &Case,
+    outcome: &Outcome,
+    plain: Option<&Image>,
+    tolerances: &Tolerances,
+) -> (Check, Option<Drawn>) {
+    let (kind, id) = (Kind::RealtimeShadows, "bonus.image");
+    let drawn = match drawn(case, kind, id, outcome) {
+        Ok(drawn) => drawn,
+        Err(check) => return (*check, None),
+    };
+    let mut check = judge(case, kind, &drawn.image, (id, &|_| true), tolerances);
+    if check.verdict == Verdict::Fail {
+        check = judge_visibility(asker, plugin, case, (&drawn.image, plain), check, tolerances);
     }
-    (checks, drawn)
+    (check, Some(drawn))
 }
 
 /// The masks that tell where shadows fall.
@@ -165,19 +199,12 @@ fn judge_visibility(
     if let Some(own) = own.as_ref().filter(|own| own.verdict == Verdict::Pass) {
         return own.clone();
     }
-    let (width, height) = case.film();
-    let vertex = [Stage { name: NAMES[0].to_owned(), text: VERTEX.to_owned() }];
-    let drawn = |toml, shadow_map| match draw(
-        asker,
-        Some(plugin),
-        case,
-        toml,
-        (width, height),
-        shadow_map,
-        &vertex,
-    ) {
-        Outcome::Done(answer) => Some(ask::image(&answer.values, width, height)),
-        _ => None,
+    let vertex = Stage { name: STAGES[0].to_owned(), text: VERTEX.to_owned() };
+    let drawn = |toml: &Path, shadow_map| {
+        let frame = Frame { toml, shadow_map, stages: vec![vertex.clone()], ..Frame::plain(case) };
+        let outcome = draw(asker, Some(plugin), &frame);
+        let (width, height) = frame.size;
+        outcome.answer().map(|answer| ask::image(&answer.values, width, height))
     };
     let swapped = case
         .bonus
@@ -201,7 +228,8 @@ fn judge_coverage(case: &Case, image: &Image) -> Check {
             continue;
         }
         counted += 1;
-        wrong += usize::from((*pixel == basecode::Vec3::ZERO) != background);
+        let covered = *pixel != basecode::Vec3::ZERO;
+        wrong += usize::from(covered == background || !pixel.is_finite());
     }
     let (id, name) = ("image.realtime.coverage", &case.entry.name);
     let error = wrong as f64 / counted.max(1) as f64;
@@ -211,188 +239,4 @@ fn judge_coverage(case: &Case, image: &Image) -> Check {
     let summary =
         format!("{wrong} of {counted} pixels show a surface where none is, or none where one is");
     Check { error, ..Check::new(id, name, Verdict::Fail, summary) }
-}
-
-/// Judges the student's pass under stages of ours (2.1) and his stages under a pass of ours (2.2
-/// to 2.4), on one scene's small film.
-pub fn isolate(
-    asker: &Asker,
-    plugin: &Path,
-    case: &Case,
-    stages: &Stages,
-    tolerances: &Tolerances,
-) -> Vec<Check> {
-    let mut checks = vec![isolate_pass(asker, plugin, case)];
-    checks.push(match stages.is_template(0) {
-        true => untouched("stage.vertex", case, "2.2 vertex shader"),
-        false => isolate_vertex(asker, case, stages),
-    });
-    for (index, id, task, phong) in [
-        (1, "stage.diffuse", "2.3 diffuse fragment shader", false),
-        (2, "stage.phong", "2.4 Phong fragment shader", true),
-    ] {
-        checks.push(match stages.is_template(index) {
-            true => untouched(id, case, task),
-            false => isolate_fragment(asker, case, stages, (index, id, phong), tolerances),
-        });
-    }
-    checks
-}
-
-fn untouched(id: &str, case: &Case, task: &str) -> Check {
-    let summary = format!("not implemented yet: {task}: the stage is the template's");
-    Check::new(id, &case.entry.name, Verdict::NotImplemented, summary)
-}
-
-fn isolate_pass(asker: &Asker, plugin: &Path, case: &Case) -> Check {
-    let size = (case.small.width, case.small.height);
-    let mut frames = Vec::new();
-    let shown = BoundValue::ALL
-        .map(|bound| named([VERTEX.to_owned(), bound.stage(false), bound.stage(true)]));
-    let outcomes = draw_each(asker, Some(plugin), case, &case.realtime, size, false, &shown);
-    for (bound, outcome) in BoundValue::ALL.into_iter().zip(outcomes) {
-        match outcome {
-            Outcome::Done(answer) => {
-                frames.push((bound, ask::image(&answer.values, size.0, size.1)))
-            }
-            other => return swap_failed("pass.uniforms", case, &["2.1"], &other),
-        }
-    }
-    let scene = &case.expected.scene;
-    judge_pass(&case.entry.name, scene, &case.small.surface, &case.small.unshadowed_mask, &frames)
-}
-
-fn isolate_vertex(asker: &Asker, case: &Case, stages: &Stages) -> Check {
-    let id = "stage.vertex";
-    let Some(own) = &stages.own[0] else { return absent(id, case, NAMES[0]) };
-    let size = (case.small.width, case.small.height);
-    let mut images = Vec::new();
-    let shown = [SHOW_POSITION, SHOW_NORMAL]
-        .map(|show| named([own.clone(), show.to_owned(), show.to_owned()]));
-    for outcome in draw_each(asker, None, case, &case.realtime, size, false, &shown) {
-        match outcome {
-            Outcome::Done(answer) => images.push(ask::image(&answer.values, size.0, size.1)),
-            other => return swap_failed(id, case, &[], &other),
-        }
-    }
-    let mask = &case.small.unshadowed_mask;
-    judge_vertex(&case.entry.name, &case.small.surface, mask, &images[0], &images[1])
-}
-
-fn isolate_fragment(
-    asker: &Asker,
-    case: &Case,
-    stages: &Stages,
-    (index, id, phong): (usize, &str, bool),
-    tolerances: &Tolerances,
-) -> Check {
-    let Some(own) = &stages.own[index] else { return absent(id, case, NAMES[index]) };
-    let (width, height) = (case.small.width, case.small.height);
-    let mut texts = [VERTEX, BLACK, BLACK].map(str::to_owned);
-    texts[index].clone_from(own);
-    match draw(asker, None, case, &case.realtime, (width, height), false, &named(texts)) {
-        Outcome::Done(answer) => {
-            let image = ask::image(&answer.values, width, height);
-            let small = &case.small;
-            images::judge_shaded(
-                id,
-                &case.entry.name,
-                &image,
-                (&small.unshadowed, small.raw_normals.as_ref()),
-                &images::only(&small.unshadowed_mask, &|region| (region.exponent > 0.0) == phong),
-                tolerances,
-            )
-        }
-        other => swap_failed(id, case, &[], &other),
-    }
-}
-
-fn absent(id: &str, case: &Case, name: &str) -> Check {
-    let summary = format!("swap not possible: there is no src/shaders/{name}.wgsl");
-    Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
-}
-
-/// A swap that the graphics library refuses is no fault: the student may have chosen another
-/// layout. Whether a stage compiles at all shows in the student's own image.
-fn swap_failed(id: &str, case: &Case, parts: &[&str], outcome: &Outcome) -> Check {
-    match outcome {
-        Outcome::Failed(message) => {
-            let first = message.lines().next().unwrap_or_default();
-            let summary = format!("swap not possible: {first}");
-            Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
-        }
-        other => ask::unanswered(id, &case.entry.name, parts, other),
-    }
-}
-
-fn named(texts: [String; 3]) -> Vec<Stage> {
-    let named = NAMES.iter().zip(texts);
-    named.map(|(&name, text)| Stage { name: name.to_owned(), text }).collect()
-}
-
-/// Draws one frame.
-fn draw(
-    asker: &Asker,
-    plugin: Option<&Path>,
-    case: &Case,
-    toml: &Path,
-    size: (u32, u32),
-    shadow_map: bool,
-    stages: &[Stage],
-) -> Outcome {
-    let outcome = draw_each(asker, plugin, case, toml, size, shadow_map, &[stages.to_vec()]).pop();
-    outcome.unwrap_or_else(|| {
-        Outcome::NoAdapter("the worker gave no outcome: a bug of Umbra's".into())
-    })
-}
-
-/// Draws a frame under each set of stages, all in one worker.
-fn draw_each(
-    asker: &Asker,
-    plugin: Option<&Path>,
-    case: &Case,
-    toml: &Path,
-    (width, height): (u32, u32),
-    shadow_map: bool,
-    sets: &[Vec<Stage>],
-) -> Vec<Outcome> {
-    let adapter = match &asker.adapter {
-        Ok(adapter) => adapter,
-        Err(reason) => return vec![Outcome::NoAdapter(reason.clone()); sets.len()],
-    };
-    let request = |stages: &Vec<Stage>| Request::RenderRealtime {
-        scene: asker.scene(toml),
-        width,
-        height,
-        shadow_map,
-        adapter: adapter.clone(),
-        stages: stages.clone(),
-        cameras: vec![case.camera],
-    };
-    let requests: Vec<Request> = sets.iter().map(request).collect();
-    let mut outcomes = asker.ask(plugin, requests.clone());
-    if outcomes.iter().any(|outcome| matches!(outcome, Outcome::NoAdapter(_))) {
-        // The adapter was there when the batch began: believe its loss only twice.
-        outcomes = asker.ask(plugin, requests);
-    }
-    let believed = outcomes.into_iter().map(|outcome| match outcome {
-        Outcome::NoAdapter(message) => {
-            Outcome::Failed(format!("{message} (but this machine's adapter works)"))
-        }
-        outcome => outcome,
-    });
-    believed.collect()
-}
-
-/// Whether this machine can draw at all: asks Umbra's own pass for one small frame.
-///
-/// # Errors
-/// Why not, in words.
-pub fn probe_adapter(asker: &Asker, case: &Case) -> Result<(), String> {
-    let texts = [VERTEX, SHOW_NORMAL, SHOW_NORMAL].map(str::to_owned);
-    match draw(asker, None, case, &case.realtime, (16, 16), false, &named(texts)) {
-        Outcome::Done(_) => Ok(()),
-        Outcome::NoAdapter(message) | Outcome::Failed(message) => Err(message),
-        other => Err(format!("{other:?}")),
-    }
 }

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::shared::ImageDigest;
+use crate::diagnosis::Diagnosis;
 use crate::evidence::Evidence;
 use crate::intake::Finding;
 
@@ -23,6 +25,12 @@ pub struct Record {
     pub diagnostics: String,
     /// What was found out.
     pub evidence: Evidence,
+    /// What failing parts look like.
+    #[serde(default)]
+    pub diagnoses: Vec<Diagnosis>,
+    /// The images handed in whose noise tells them from anybody else's.
+    #[serde(default)]
+    pub images: Vec<ImageDigest>,
     /// What each stage cost, in order.
     pub stages: Vec<StageCost>,
     /// Under which conditions.

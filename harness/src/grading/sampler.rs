@@ -10,7 +10,7 @@ use crate::worker::{Outcome, Request};
 
 /// Rows whose noise is correlated by this much or more share their seeds: 1 when they do, 0 but for
 /// chance when they do not.
-const CORRELATED: f64 = 0.5;
+pub const CORRELATED: f64 = 0.5;
 
 /// Renders the scene of vertical stripes with one and several threads, one seed and two, and looks
 /// at what may differ and what may not.
@@ -73,7 +73,7 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
 
 /// How alike the noise of neighbouring rows is: 0 when it is independent, 1 when it is the same.
 /// The difference of two images of other seeds is noise alone.
-fn row_correlation(one: &[f32], other: &[f32], row_floats: usize) -> f64 {
+pub fn row_correlation(one: &[f32], other: &[f32], row_floats: usize) -> f64 {
     let noise: Vec<f64> = one.iter().zip(other).map(|(a, b)| f64::from(a - b)).collect();
     let rows = || noise.chunks_exact(row_floats);
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();

@@ -115,9 +115,7 @@ pub fn compare_srgb8(
     let allowed = tolerances.srgb_levels as f32 - 0.5;
     let mut walk = walk(actual, centre, mask, tolerances, |_, row| {
         for x in 0..width {
-            let levels = |p: Vec3| p.to_array().map(|c| i32::from(srgb::level(c)));
-            let (a, b) = (levels(row.actual[x]), levels(row.expected[x]));
-            let apart = (0..3).map(|c| (a[c] - b[c]).abs()).max().unwrap_or(0);
+            let apart = srgb::levels_apart(row.actual[x], row.expected[x]);
             row.excess2[x] = (apart as f32 / allowed).powi(2);
         }
     });

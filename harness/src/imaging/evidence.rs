@@ -55,7 +55,7 @@ impl Default for Tolerances {
             floor_of_median: 5e-4,
             floor_relative: 2e-3,
             bias_relative: 3e-3,
-            bias_standard_errors: 4.0,
+            bias_standard_errors: 10.0,
             min_region_pixels: 16,
             negative_limit: 1e-6,
             realtime_relative: 2e-3,

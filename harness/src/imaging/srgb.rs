@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use glam::Vec3;
+
 /// Encodes a linear value in [0, 1].
 pub fn encode(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
@@ -52,6 +54,13 @@ pub fn level(linear: f32) -> u8 {
         level += 1;
     }
     level as u8
+}
+
+/// How many levels two colours are apart, in the channel where they are furthest.
+pub fn levels_apart(a: Vec3, b: Vec3) -> u32 {
+    let levels = |p: Vec3| p.to_array().map(level);
+    let pairs = levels(a).into_iter().zip(levels(b));
+    pairs.map(|(a, b)| u32::from(a.abs_diff(b))).max().unwrap_or(0)
 }
 
 #[cfg(test)]

@@ -107,13 +107,24 @@ fn scan_at(path: &str, tokens: &[Token], at: usize, found: &mut Vec<(u32, &'stat
     }
     let Some(text) = word(tokens, at) else { return };
     let is_macro = is_sign(tokens, at + 1, '!') && !is_sign(tokens, at + 2, '=');
+    let is_renamed = word(tokens, at + 1) == Some("as");
     match text {
         "unsafe" => found.push((line, "source_unsafe", "unsafe code".to_owned())),
-        "asm" | "global_asm" | "naked_asm" if is_macro => {
+        "asm" | "global_asm" | "naked_asm" if is_macro || is_renamed => {
             found.push((line, "source_asm", format!("inline assembly: {text}!")));
         }
+        "env" | "option_env" if is_macro => {
+            found.push((line, "source_system", format!("{text}!")));
+        }
+        // Methods of paths need no `std::fs`.
+        "read_dir" | "read_link" | "canonicalize" | "metadata" | "symlink_metadata" | "exists"
+        | "try_exists"
+            if is_sign(tokens, at + 1, '(') && at > 0 && is_sign(tokens, at - 1, '.') =>
+        {
+            found.push((line, "source_system", format!("file access: .{text}()")));
+        }
         // Brought in under another name, `include_bytes as x` escapes the macro rule.
-        _ if text.starts_with("include") && (is_macro || word(tokens, at + 1) == Some("as")) => {
+        _ if text.starts_with("include") && (is_macro || is_renamed) => {
             found.push(include(path, tokens, at, text));
         }
         "extern" => match tokens.get(at + 1).map(|token| &token.kind) {
@@ -141,7 +152,7 @@ fn scan_at(path: &str, tokens: &[Token], at: usize, found: &mut Vec<(u32, &'stat
             found.push((line, "source_system", "libc".to_owned()));
         }
         "std" if is_path_separator(tokens, at + 1) => scan_std(tokens, at + 3, found),
-        "std" if word(tokens, at + 1) == Some("as") => {
+        "std" if is_renamed => {
             found.push((line, "source_system", "std under another name".to_owned()));
         }
         _ => {}
@@ -153,6 +164,9 @@ fn scan_std(tokens: &[Token], at: usize, found: &mut Vec<(u32, &'static str, Str
     let mut check = |at: usize| {
         if let Some(module @ ("process" | "fs" | "net" | "os" | "env")) = word(tokens, at) {
             found.push((tokens[at].line, "source_system", format!("std::{module}")));
+        }
+        if is_sign(tokens, at, '*') {
+            found.push((tokens[at].line, "source_system", "all of std".to_owned()));
         }
     };
     if !is_sign(tokens, at, '{') {
@@ -269,7 +283,8 @@ mod tests {
         let source = "//! unsafe std::fs\nuse std::f32::consts::PI;\nuse std::{fmt, sync::Arc};\n\
             #![forbid(unsafe_code)]\n#[derive(Clone)]\nstruct S<'a>(&'a str);\n\
             fn f(include: bool) -> bool { let s = \"std::process::exit asm!()\"; include != s.is_empty() }\n\
-            mod process { pub fn fs() {} }\nuse glam::Vec3;\nlet path = 1;";
+            mod process { pub fn fs() {} }\nuse glam::Vec3;\nlet path = 1;\n\
+            let exists = mesh.metadata + a.exists;";
         assert_eq!(codes(source), [""; 0]);
     }
 
@@ -297,6 +312,11 @@ mod tests {
             ("use std::{io, collections::{env, x}, net};", "source_system@1"),
             ("r#std::r#env::var(\"x\")", "source_system@1"),
             ("use std as s;", "source_system@1"),
+            ("use std::*;", "source_system@1"),
+            ("use std::{fmt, *};", "source_system@1"),
+            ("Path::new(\"/\")\n.read_dir()", "source_system@2"),
+            ("option_env!(\"HOME\")", "source_system@1"),
+            ("use core::arch::asm as x;", "source_asm@1"),
             ("libc::fork()", "source_system@1"),
             ("use proc_macro::TokenStream;", "source_proc_macro@1"),
             ("#![feature(asm)]", "source_feature@1"),

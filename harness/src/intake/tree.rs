@@ -1,5 +1,7 @@
 //! The tree that a hand-in must have, as data.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 
 /// The expected tree of a hand-in.
@@ -97,6 +99,13 @@ impl TreeSpec {
     /// The expected file that lies at `path`, by its own path or an alias.
     pub fn file_at(&self, path: &str) -> Option<&TreeFile> {
         self.files.iter().find(|file| file.accepts(path))
+    }
+
+    /// Where the expected file `path` lies below `root`: there, or at one of its aliases.
+    pub fn found_in<'a>(&'a self, root: &Path, path: &'a str) -> Option<&'a str> {
+        let aliases = self.file_at(path).into_iter().flat_map(|file| &file.aliases);
+        let mut names = std::iter::once(path).chain(aliases.map(String::as_str));
+        names.find(|name| root.join(name).is_file())
     }
 
     /// The open folder that holds `path`.

@@ -8,8 +8,10 @@ use serde_json::ser::{CharEscape, Formatter, PrettyFormatter};
 
 use super::number::significant;
 use super::{Entry, ReportError, Sheet, harmless};
+use crate::diagnosis::Diagnosis;
 use crate::evidence::Check;
 use crate::grading::{Conditions, StageCost, Student};
+use crate::held_back::HeldBack;
 use crate::intake::Finding;
 use crate::rubric::{PartGrade, Rules};
 
@@ -29,6 +31,8 @@ struct Report<'a> {
     assignment: About<'a>,
     /// Every set of conditions that occurs; a hand-in names its own by index.
     conditions: Vec<&'a Conditions>,
+    /// Seed and scenes; `null` when nothing was held back.
+    held_back: Option<&'a HeldBack>,
     hand_ins: Vec<HandIn<'a>>,
     /// By slug. Last, and the only thing that two runs over the same hand-ins do not share.
     timings: BTreeMap<&'a str, &'a [StageCost]>,
@@ -55,6 +59,7 @@ struct HandIn<'a> {
     out_of: f64,
     remarks: &'a [String],
     parts: &'a [PartGrade],
+    diagnoses: &'a [Diagnosis],
     findings: &'a [Finding],
     diagnostics: &'a str,
     checks: &'a [Check],
@@ -93,6 +98,7 @@ pub fn report(sheet: &Sheet) -> Result<String, ReportError> {
             rules: &sheet.rules,
         },
         conditions,
+        held_back: sheet.held_back.as_ref(),
         hand_ins,
         timings,
     };
@@ -117,6 +123,7 @@ fn hand_in<'a>(Entry { record, grade }: &'a Entry, conditions: &[&Conditions]) -
         out_of: grade.out_of,
         remarks: &grade.remarks,
         parts: &grade.parts,
+        diagnoses: &record.diagnoses,
         findings: &record.findings,
         diagnostics: &record.diagnostics,
         checks: &record.evidence.checks,

@@ -1,5 +1,9 @@
 //! What is shown: a console text, `report.json`, `grades.csv` and HTML pages.
 //!
+//! What a student gets is the folder `<slug>/` of his hand-in: of held-back scenes it tells only
+//! whether they are right and how wrong. All else is the instructor's: the files of the batch, and
+//! `instructor/<slug>/` with all that was found out.
+//!
 //! It decides nothing. Every format lets a hand-in's words through one gate, [`harmless`], and adds
 //! the escaping that the format itself needs.
 
@@ -23,12 +27,13 @@ use thiserror::Error;
 
 pub use self::csv::grades as csv_grades;
 pub use self::harmless::harmless;
-pub use self::html::{batch as html_batch, hand_in as html_hand_in};
+pub use self::html::{Reader, batch as html_batch, hand_in as html_hand_in};
 pub use self::json::{SCHEMA, VERSION, report as json_report};
 pub use self::text::{detail as text_detail, table as text_table};
 
 use crate::assignment::Assignment;
 use crate::grading::Record;
+use crate::held_back::HeldBack;
 use crate::rubric::{Grade, Rules};
 
 /// The file for programs, in the batch's folder.
@@ -37,6 +42,8 @@ pub const JSON_FILE: &str = "report.json";
 pub const CSV_FILE: &str = "grades.csv";
 /// The page for readers, in the batch's folder and in the folder of each hand-in.
 pub const HTML_FILE: &str = "report.html";
+/// The folder in the batch's folder that holds what students must not see.
+pub const INSTRUCTOR: &str = "instructor";
 
 /// One hand-in with its points.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,8 +67,26 @@ pub struct Sheet {
     pub due: String,
     /// The rules that made the points.
     pub rules: Rules,
+    /// What was held back from students, if anything.
+    pub held_back: Option<HeldBack>,
     /// The hand-ins, in the order to be shown.
     pub entries: Vec<Entry>,
+}
+
+impl Entry {
+    /// Whether there is more to know than the student may.
+    pub fn has_held_back(&self) -> bool {
+        self.record.evidence.checks.iter().any(|check| check.held_back)
+    }
+
+    /// The entry as its student may read it.
+    pub fn for_student(&self) -> Self {
+        let mut entry = self.clone();
+        for check in &mut entry.record.evidence.checks {
+            *check = check.for_student();
+        }
+        entry
+    }
 }
 
 /// Why there is no report.
@@ -102,13 +127,14 @@ pub enum ReportError {
 
 impl Sheet {
     /// A sheet for hand-ins of an assignment.
-    pub fn new(assignment: &Assignment, entries: Vec<Entry>) -> Self {
+    pub fn new(assignment: &Assignment, held_back: Option<HeldBack>, entries: Vec<Entry>) -> Self {
         Self {
             assignment: assignment.name.clone(),
             title: assignment.title.clone(),
             course: assignment.course.clone(),
             due: assignment.due.clone(),
             rules: assignment.rules.clone(),
+            held_back,
             entries,
         }
     }
@@ -124,7 +150,8 @@ impl Sheet {
                 (components.next(), components.next()),
                 (Some(Component::Normal(name)), None) if name == record.slug.as_str()
             );
-            let taken = [JSON_FILE, CSV_FILE, HTML_FILE].contains(&record.slug.as_str());
+            let taken =
+                [JSON_FILE, CSV_FILE, HTML_FILE, INSTRUCTOR].contains(&record.slug.as_str());
             if !plain || taken || !seen.insert(&record.slug) {
                 let (name, slug) = (record.name.clone(), record.slug.clone());
                 return Err(ReportError::Slug { name, slug });
@@ -135,8 +162,9 @@ impl Sheet {
 }
 
 /// Writes `report.json`, `grades.csv`, `report.html`, and `<slug>/report.html` for each hand-in,
-/// into the folder `out`, which is made when missing. The pictures are expected to lie in
-/// `<slug>/` already.
+/// into the folder `out`, which is made when missing, and `instructor/<slug>/report.html` where
+/// scenes were held back. The pictures are expected to lie in `<slug>/`, those of held-back scenes
+/// in `instructor/<slug>/` already.
 ///
 /// Each file appears whole or not at all; the pages of the hand-ins come first, so that
 /// `report.html` never leads nowhere.
@@ -146,8 +174,13 @@ impl Sheet {
 pub fn write(out: &Path, sheet: &Sheet) -> Result<(), ReportError> {
     sheet.check()?;
     for entry in &sheet.entries {
-        let page = html_hand_in(sheet, entry);
-        put(&out.join(&entry.record.slug), HTML_FILE, page.as_bytes())?;
+        let slug = &entry.record.slug;
+        let page = html_hand_in(sheet, entry, Reader::Student);
+        put(&out.join(slug), HTML_FILE, page.as_bytes())?;
+        if entry.has_held_back() {
+            let page = html_hand_in(sheet, entry, Reader::Instructor);
+            put(&out.join(INSTRUCTOR).join(slug), HTML_FILE, page.as_bytes())?;
+        }
     }
     put(out, CSV_FILE, csv_grades(sheet)?.as_bytes())?;
     put(out, JSON_FILE, json_report(sheet)?.as_bytes())?;

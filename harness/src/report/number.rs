@@ -1,5 +1,6 @@
 //! Numbers as they are shown.
 
+use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, Measure, Verdict};
 use crate::rubric::{Grade, PartGrade};
 
@@ -97,6 +98,17 @@ pub(super) fn hints<'a>(part: &PartGrade, checks: &'a [Check]) -> Vec<&'a str> {
         }
     }
     hints
+}
+
+/// What a part that lost points looks like, in words; for `""` what costs nothing does.
+pub(super) fn looks_like(part: &str, diagnoses: &[Diagnosis]) -> Vec<String> {
+    let own = diagnoses.iter().filter(|diagnosis| diagnosis.part == part);
+    let words = own.map(|diagnosis| {
+        // Rounded down: 100 % is all of it.
+        let percent = (100.0 * (1.0 - diagnosis.unexplained)).floor().max(0.0);
+        format!("{} (explains {percent} % of the difference)", diagnosis.words)
+    });
+    words.collect()
 }
 
 /// `1 hand-in`, `2 hand-ins`.

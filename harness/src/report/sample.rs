@@ -2,8 +2,10 @@
 //! whose bonus could not be judged, one that does not build.
 
 use super::{Entry, Sheet};
+use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, Evidence, Measure, Picture, Verdict};
 use crate::grading::{Conditions, Record, StageCost, Student};
+use crate::held_back::HeldBack;
 use crate::intake::Finding;
 use crate::rubric::{Grade, PartGrade, Rules};
 
@@ -15,6 +17,10 @@ pub(super) fn sheet() -> Sheet {
         course: "ECSE 446/546: Realistic/Advanced Image Synthesis".into(),
         due: "2019-10-06T23:59:00-04:00".into(),
         rules: rules(),
+        held_back: Some(HeldBack {
+            seed: 18_446_744_073_709_551_557,
+            scenes: vec![("held-back-1".into(), "cbox".into())],
+        }),
         entries: vec![perfect(), two_cosines(), does_not_build()],
     }
 }
@@ -51,6 +57,8 @@ fn entry(name: &str, slug: &str, student: [&str; 3], conditions: Conditions) -> 
         findings: Vec::new(),
         diagnostics: String::new(),
         evidence: Evidence::default(),
+        diagnoses: Vec::new(),
+        images: Vec::new(),
         stages: vec![
             StageCost { name: "intake".into(), wall_s: 0.021, cpu_s: 0.0 },
             StageCost { name: "build".into(), wall_s: 1.534, cpu_s: 1.49 },
@@ -109,7 +117,7 @@ fn check(
     measures: &[(&str, f64, f64)],
 ) -> Check {
     let measures =
-        measures.iter().map(|&(name, value, bound)| Measure::at_most(name, value, bound));
+        measures.iter().map(|&(name, value, bound)| Measure::at_most("", name, value, bound));
     Check { measures: measures.collect(), ..Check::new(id, scene, verdict, summary) }
 }
 
@@ -178,6 +186,15 @@ fn two_cosines() -> Entry {
     .with_hint("cos theta_i is multiplied twice: eval() holds it already");
     radiance.error = 0.1025;
     radiance.held_back = true;
+    entry.record.diagnoses = vec![Diagnosis {
+        part: "1.3".into(),
+        mistakes: vec![vec!["light-two-cosines".into()]],
+        factor: None,
+        words: "the cosine is multiplied twice: eval() holds it already".into(),
+        unexplained: 0.0125,
+        runner_up: 0.75,
+        pictures: Vec::new(),
+    }];
     let pictures = [
         ("actual", "actual"),
         ("expected", "expected"),

@@ -13,7 +13,7 @@ fn every_file_is_there_and_no_temporary_one() {
         write(out.path(), &sheet).unwrap();
     }
     let mut names: Vec<String> = Vec::new();
-    for folder in ["", "a2_ada", "two_cosines", "hand_in_3"] {
+    for folder in ["", "a2_ada", "two_cosines", "hand_in_3", "instructor/two_cosines"] {
         for file in fs::read_dir(out.path().join(folder)).unwrap() {
             names.push(format!("{folder}/{}", file.unwrap().file_name().display()));
         }
@@ -25,11 +25,13 @@ fn every_file_is_there_and_no_temporary_one() {
             "/a2_ada",
             "/grades.csv",
             "/hand_in_3",
+            "/instructor",
             "/report.html",
             "/report.json",
             "/two_cosines",
             "a2_ada/report.html",
             "hand_in_3/report.html",
+            "instructor/two_cosines/report.html",
             "two_cosines/report.html",
         ]
     );
@@ -48,7 +50,7 @@ fn an_empty_batch_writes_nothing() {
 #[test]
 fn a_slug_cannot_leave_the_folder_or_meet_another() {
     let out = tempfile::tempdir().unwrap();
-    for slug in ["", "..", ".", "a/b", "/etc", "a/", "two_cosines", "report.html"] {
+    for slug in ["", "..", ".", "a/b", "/etc", "a/", "two_cosines", "report.html", "instructor"] {
         let mut sheet = sample::sheet();
         sheet.entries[0].record.slug = slug.into();
         let error = write(&out.path().join("out"), &sheet).unwrap_err();

@@ -53,7 +53,49 @@ struct Worth {
 }
 
 /// Grades a hand-in. Depends on nothing but its arguments, nor on the order of the checks.
+///
+/// A part is worth the lower of what it is worth on public and on held-back scenes; checks without a
+/// scene count in both.
 pub fn grade(rules: &Rules, evidence: &Evidence) -> Grade {
+    let of = |wanted: &dyn Fn(&Check) -> bool| Evidence {
+        checks: evidence.checks.iter().filter(|check| wanted(check)).cloned().collect(),
+    };
+    let public = grade_together(rules, &of(&|check| !check.held_back));
+    if !evidence.checks.iter().any(|check| check.held_back) {
+        return public;
+    }
+    let held_back = of(&|check| check.held_back || check.scene.is_empty());
+    lower(public, grade_together(rules, &held_back))
+}
+
+/// The lower of two grades, part by part; what decided is the first's where both are equal.
+fn lower(first: Grade, second: Grade) -> Grade {
+    let parts = first.parts.into_iter().zip(second.parts).map(|(first, second)| {
+        let points = first.points.min(second.points);
+        let points_max = first.points_max.min(second.points_max);
+        let worth = |part: &PartGrade| (part.points, part.points_max);
+        let decides = if worth(&second) < worth(&first) { second } else { first };
+        PartGrade { points, points_max, ..decides }
+    });
+    let mut remarks = first.remarks;
+    remarks.extend(second.remarks);
+    remarks.dedup();
+    sum(parts.collect(), first.out_of, remarks)
+}
+
+/// The grade of parts.
+fn sum(parts: Vec<PartGrade>, out_of: f64, remarks: Vec<String>) -> Grade {
+    Grade {
+        points: round(parts.iter().map(|part| part.points).sum()),
+        points_max: round(parts.iter().map(|part| part.points_max).sum()),
+        out_of,
+        remarks,
+        parts,
+    }
+}
+
+/// Grades by all of the evidence, the worst scene counting wherever it is from.
+fn grade_together(rules: &Rules, evidence: &Evidence) -> Grade {
     let built = evidence.named(BUILD).all(|check| check.verdict == Verdict::Pass);
     let mut worths: Vec<Worth> =
         rules
@@ -83,6 +125,16 @@ pub fn grade(rules: &Rules, evidence: &Evidence) -> Grade {
             "the source does not build: graded on the images alone, an instructor confirms".into(),
         );
     }
+    let not_run = |check: &&Check| check.verdict == Verdict::NotRun;
+    if let Some(check) = evidence.checks.iter().filter(not_run).min_by_key(|check| check.name()) {
+        let count = evidence.checks.iter().filter(not_run).count();
+        remarks.push(format!(
+            "ungraded in part, by the machine's fault: {count} of the checks, the first {}: {}; grade \
+             it again",
+            check.name(),
+            check.summary
+        ));
+    }
     let parts: Vec<PartGrade> = rules
         .parts
         .iter()
@@ -98,13 +150,7 @@ pub fn grade(rules: &Rules, evidence: &Evidence) -> Grade {
             evidence: worth.evidence,
         })
         .collect();
-    Grade {
-        points: round(parts.iter().map(|part| part.points).sum()),
-        points_max: round(parts.iter().map(|part| part.points_max).sum()),
-        out_of: rules.total_points(),
-        remarks,
-        parts,
-    }
+    sum(parts, rules.total_points(), remarks)
 }
 
 /// Points are published with two digits.
@@ -160,7 +206,8 @@ fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String], any_scene: bool
     // Ties are broken by the words, so that the order of the checks does not matter.
     let order = |a: &&Check, b: &&Check| {
         let (fa, fb) = (fraction(rules, a), fraction(rules, b));
-        fa.total_cmp(&fb).then_with(|| (&b.id, &b.scene).cmp(&(&a.id, &a.scene)))
+        let words = |check: &Check| (check.name(), check.said().into_owned());
+        fa.total_cmp(&fb).then_with(|| words(b).cmp(&words(a)))
     };
     let of = |id: &String| judged.iter().copied().filter(|check| check.id == **id).collect();
     let deciding = ids.iter().filter_map(|id| {
@@ -176,13 +223,13 @@ fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String], any_scene: bool
         .collect();
     evidence.sort();
     evidence.dedup();
-    let reason = deciding.summary.clone();
+    let reason = deciding.said().into_owned();
     Some(Worth { least, most: least, reason, evidence })
 }
 
 fn unjudged(evidence: &Evidence, part: &Part) -> Worth {
     let ids = part.evidence.iter().chain(&part.fallback);
-    let silent = ids.flat_map(|id| evidence.named(id)).map(|check| check.summary.as_str()).min();
+    let silent = ids.flat_map(|id| evidence.named(id)).map(Check::said).min();
     Worth {
         least: 0.0,
         most: 1.0,
@@ -200,7 +247,7 @@ fn blame_the_unexplained(rules: &Rules, evidence: &Evidence, worths: &mut [Worth
         let failed = evidence.named(&path.proof).filter(|check| check.verdict == Verdict::Fail);
         let worst = failed.min_by(|a, b| {
             let (fa, fb) = (fraction(rules, a), fraction(rules, b));
-            fa.total_cmp(&fb).then_with(|| a.scene.cmp(&b.scene))
+            fa.total_cmp(&fb).then_with(|| (&a.scene, a.said()).cmp(&(&b.scene, b.said())))
         });
         let Some(worst) = worst else { continue };
         let own = |part: &Part| part.path == *name && !part.bonus;
@@ -216,7 +263,7 @@ fn blame_the_unexplained(rules: &Rules, evidence: &Evidence, worths: &mut [Worth
             if part.id == path.blame {
                 worth.least = fraction(rules, worst);
                 worth.most = worth.least;
-                worth.reason = format!("every part alone is right, but {}", worst.summary);
+                worth.reason = format!("every part alone is right, but {}", worst.said());
                 worth.evidence = vec![worst.name()];
             }
         }

@@ -7,11 +7,14 @@
 //! 4. Evidence that does not apply gives way to the part's fallback.
 //! 5. When the proof fails and no part's own evidence says why, the path's `blame` part pays.
 //! 6. What cannot be judged is a range from 0 to all points, with its reason.
+//! 7. Public and held-back scenes are graded apart by these rules; the lower counts, part by part.
 
 mod curve;
+mod deletion;
 mod grade;
 mod rules;
 
 pub use curve::Curve;
+pub use deletion::EvidenceRule;
 pub use grade::{BUILD, Grade, PartGrade, grade};
 pub use rules::{Gate, Part, PathRule, Rules};

@@ -28,7 +28,7 @@ pub struct Rules {
 pub struct Gate {
     /// The check that must not fail.
     pub check: String,
-    /// Fraction of the points that can be earned when it fails.
+    /// Fraction of the points that can be earned when it fails; with 1 it is only remarked on.
     pub ceiling: f64,
     /// Why, in the words of the handout.
     pub reason: String,

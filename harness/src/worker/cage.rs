@@ -141,3 +141,46 @@ fn common(a: &Path, b: &Path) -> PathBuf {
     let pairs = a.components().zip(b.components());
     pairs.take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assignment::Assignment;
+    use crate::worker::SceneRef;
+
+    /// Names and order of what a worker sees of a scene, and by what path it is told of it.
+    fn seen(dir: &Path, toml: &Path) -> (Vec<PathBuf>, Vec<PathBuf>, Vec<PathBuf>) {
+        let scene = SceneRef { path: toml.to_owned(), options: String::new() };
+        let request = Request::EvalBsdf { scene, queries: Vec::new() };
+        let job = Job { plugin: None, requests: vec![request.clone()] };
+        let cage = Cage::new(dir, &job, &[&request], Layers::full()).unwrap();
+        let scene = cage.policy.read_only.iter().filter(|bind| bind.inside.starts_with(SCENE));
+        let mut names = Vec::new();
+        for bind in scene.clone().filter(|bind| bind.host.is_dir()) {
+            for file in bind.host.read_dir().unwrap() {
+                names.push(bind.inside.join(file.unwrap().file_name()));
+            }
+        }
+        names.sort();
+        (cage.scenes, scene.map(|bind| bind.inside.clone()).collect(), names)
+    }
+
+    #[test]
+    fn a_held_back_scene_looks_like_its_original() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+        let assignment = Assignment::load(root).unwrap();
+        let (held_back, entries) = crate::held_back::make(&assignment, 5).unwrap();
+        let dir = tempfile::tempdir().unwrap();
+        for (entry, (_, original)) in entries.iter().zip(&held_back.scenes) {
+            let scene = assignment.scenes.iter().find(|scene| scene.name == *original).unwrap();
+            let tomls = |entry: &crate::assignment::SceneEntry| {
+                [Some(entry.offline.clone()), Some(entry.realtime.clone()), entry.bonus.clone()]
+            };
+            let tomls = tomls(entry).into_iter().zip(tomls(scene));
+            for (changed, public) in tomls.filter_map(|(a, b)| Some((a?, root.join(b?)))) {
+                assert!(changed.is_file() && public.is_file());
+                assert_eq!(seen(dir.path(), &changed), seen(dir.path(), &public));
+            }
+        }
+    }
+}

@@ -8,7 +8,7 @@ use renderer_api as api;
 
 use super::arena::{Input, Output, Table};
 use super::job::{Request, SceneRef};
-use super::neutral_pass;
+use super::neutral_pass::Neutral;
 use super::table::{Record, STATUS_OURS, STATUS_REJECTED};
 use super::wire::{Folder, WireJob, WireRequest, queries, rays, words};
 use crate::plugin::{
@@ -56,7 +56,7 @@ fn work(dir: &Path) -> std::io::Result<()> {
     };
     let name = plugin.as_ref().map(HostPlugin::name).unwrap_or_default();
     loading.answer(api::STATUS_OK, &name, 0.0);
-    let mut scene = None;
+    let (mut scene, mut neutral) = (None, Neutral::default());
     for (index, request) in job.requests.iter().enumerate() {
         let record = table.request(index);
         record.start();
@@ -65,7 +65,7 @@ fn work(dir: &Path) -> std::io::Result<()> {
         let bytes = input.bytes(request.input);
         let result = match &plugin {
             Some(plugin) => ask(plugin, &mut scene, request, bytes, record, output.floats()),
-            None => neutral_pass::render(&request.request, output.floats()),
+            None => neutral.render(&request.request, output.floats()),
         };
         let seconds = begin.elapsed().as_secs_f64();
         match result {

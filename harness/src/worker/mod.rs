@@ -10,9 +10,11 @@
 mod arena;
 mod cage;
 mod child;
+mod command;
 mod job;
 mod neutral_pass;
 mod outcome;
+mod patience;
 mod supervise;
 mod table;
 mod wire;
@@ -23,4 +25,5 @@ pub use job::{
     Stage,
 };
 pub use outcome::{Answer, JobReport, Matter, Outcome, WitnessUse, WorkerRun};
-pub use supervise::{MAX_TIMEOUTS, Progress, Supervisor, not_asked};
+pub use patience::{Patience, blames_the_machine};
+pub use supervise::{Progress, Supervisor};

@@ -3,69 +3,125 @@
 //! It does what the shader contract says a right pass does, so that what is wrong in its picture
 //! is the stages' fault. Of a student it sees WGSL text alone.
 
+use std::path::{Path, PathBuf};
+
 use basecode::gpu::{
     self, EMITTER_FS, FRAME_GROUP, FrameUniforms, Gpu, MATERIAL_GROUP, MaterialUniforms, Mesh,
     OBJECT_GROUP, ObjectUniforms, SHADOW_GROUP, ShadowMap, Stage, Target, Uniform,
 };
 use basecode::{Camera, CameraConfig, Error, Mat4, MaterialModel, Scene, wgpu};
 
-use super::job::{AdapterKind, Request};
+use super::job::{Adapter, AdapterKind, Request};
 use crate::expected::load_scene;
 use crate::plugin::{CallError, CallErrorKind};
 
 /// The stages that a request must bring.
 const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
 
-/// Draws a [`Request::RenderRealtime`] into `values`, frame after frame.
-///
-/// # Errors
-/// [`CallErrorKind::NoAdapter`] without an adapter, [`CallErrorKind::Failed`] for stages that the
-/// graphics library refuses, [`CallErrorKind::Ours`] for a request that is not one.
-pub fn render(request: &Request, values: &mut [f32]) -> Result<(), CallError> {
-    let Request::RenderRealtime { scene, width, height, adapter, stages, cameras, .. } = request
-    else {
-        return Err(ours("the neutral pass draws realtime images only"));
-    };
-    let mut texts = [""; 3];
-    for (text, name) in texts.iter_mut().zip(STAGES) {
-        let stage = stages.iter().find(|stage| stage.name == name);
-        *text = &stage.ok_or_else(|| ours("the neutral pass needs all three stages"))?.text;
-    }
-    let kind = match adapter.kind {
-        AdapterKind::Any => gpu::AdapterKind::Any,
-        AdapterKind::Software => gpu::AdapterKind::Software,
-        AdapterKind::Hardware => gpu::AdapterKind::Hardware,
-    };
-    let mut draw = || -> basecode::Result<()> {
-        let scene = load_scene(&scene.path)?;
-        let gpu = Gpu::open(kind, &adapter.name)?;
-        let (width, height) = (*width as usize, *height as usize);
-        let target = Target::new(&gpu, width, height)?;
-        let pass = gpu.checked(&mut || NeutralPass::new(&gpu, &scene, texts))?;
-        for (camera, frame) in cameras.iter().zip(values.chunks_mut(3 * width * height)) {
-            let config = CameraConfig {
-                eye: camera.eye.into(),
-                at: camera.at.into(),
-                up: camera.up.into(),
-                fov_y_deg: camera.fov_y_deg,
-            };
-            let camera = Camera::new(config, width, height)?;
-            gpu.checked(&mut || pass.draw(&gpu, &camera, &target))?;
-            let image = target.read_back(&gpu)?;
-            frame.copy_from_slice(
-                image.pixels.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>().as_slice(),
-            );
-        }
-        Ok(())
-    };
-    draw().map_err(|error| {
-        let kind = match error {
-            Error::NoAdapter(_) => CallErrorKind::NoAdapter,
-            Error::Gpu(_) => CallErrorKind::Failed,
-            _ => CallErrorKind::Ours,
+/// The pass, with what one request leaves for the next: most of what a small frame costs is
+/// opening the device and compiling stages.
+#[derive(Default)]
+pub struct Neutral {
+    scene: Option<(PathBuf, Scene)>,
+    open: Option<Open>,
+}
+
+/// An open device and its pipelines, by the texts of their stages.
+struct Open {
+    gpu: Gpu,
+    pipelines: Vec<([String; 2], wgpu::RenderPipeline)>,
+}
+
+impl Neutral {
+    /// Draws a [`Request::RenderRealtime`] into `values`, frame after frame.
+    ///
+    /// # Errors
+    /// [`CallErrorKind::NoAdapter`] without an adapter, [`CallErrorKind::Failed`] for stages that
+    /// the graphics library refuses, [`CallErrorKind::Ours`] for a request that is not one.
+    pub fn render(&mut self, request: &Request, values: &mut [f32]) -> Result<(), CallError> {
+        let Request::RenderRealtime { scene, width, height, adapter, stages, cameras, .. } =
+            request
+        else {
+            return Err(ours("the neutral pass draws realtime images only"));
         };
-        CallError { kind, message: error.to_string() }
-    })
+        let mut texts = [""; 3];
+        for (text, name) in texts.iter_mut().zip(STAGES) {
+            let stage = stages.iter().find(|stage| stage.name == name);
+            *text = &stage.ok_or_else(|| ours("the neutral pass needs all three stages"))?.text;
+        }
+        // A device on which something failed is not used again: here it is dropped on errors.
+        let mut open = self.open.take();
+        let mut draw = || -> basecode::Result<()> {
+            let open = match &mut open {
+                Some(open) => open,
+                closed => closed.insert(Open::new(adapter)?),
+            };
+            let scene = self.load(&scene.path)?;
+            let (width, height) = (*width as usize, *height as usize);
+            let target = Target::new(&open.gpu, width, height)?;
+            let pass = NeutralPass::new(open, scene, texts)?;
+            for (camera, frame) in cameras.iter().zip(values.chunks_mut(3 * width * height)) {
+                let config = CameraConfig {
+                    eye: camera.eye.into(),
+                    at: camera.at.into(),
+                    up: camera.up.into(),
+                    fov_y_deg: camera.fov_y_deg,
+                };
+                let camera = Camera::new(config, width, height)?;
+                open.gpu.checked(&mut || pass.draw(&open.gpu, &camera, &target))?;
+                let image = target.read_back(&open.gpu)?;
+                frame.copy_from_slice(
+                    image.pixels.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>().as_slice(),
+                );
+            }
+            Ok(())
+        };
+        let drawn = draw();
+        drawn.map(|()| self.open = open).map_err(|error| {
+            let kind = match error {
+                Error::NoAdapter(_) => CallErrorKind::NoAdapter,
+                Error::Gpu(_) => CallErrorKind::Failed,
+                _ => CallErrorKind::Ours,
+            };
+            CallError { kind, message: error.to_string() }
+        })
+    }
+
+    /// The scene of a file, kept because requests about one scene come together.
+    fn load(&mut self, path: &Path) -> basecode::Result<&Scene> {
+        if self.scene.as_ref().is_none_or(|(loaded, _)| loaded != path) {
+            self.scene = Some((path.to_owned(), load_scene(path)?));
+        }
+        match &self.scene {
+            Some((_, scene)) => Ok(scene),
+            None => Err(Error::Argument("no scene is loaded".into())),
+        }
+    }
+}
+
+impl Open {
+    fn new(adapter: &Adapter) -> basecode::Result<Self> {
+        let kind = match adapter.kind {
+            AdapterKind::Any => gpu::AdapterKind::Any,
+            AdapterKind::Software => gpu::AdapterKind::Software,
+            AdapterKind::Hardware => gpu::AdapterKind::Hardware,
+        };
+        Ok(Self { gpu: Gpu::open(kind, &adapter.name)?, pipelines: Vec::new() })
+    }
+
+    fn pipeline(
+        &mut self,
+        vertex: Stage,
+        fragment: Stage,
+    ) -> basecode::Result<wgpu::RenderPipeline> {
+        let texts = [vertex.text, fragment.text];
+        if let Some((_, made)) = self.pipelines.iter().find(|(known, _)| *known == texts) {
+            return Ok(made.clone());
+        }
+        let made = self.gpu.checked(&mut || Ok(self.gpu.pipeline(vertex, fragment)))?;
+        self.pipelines.push((texts.map(str::to_owned), made.clone()));
+        Ok(made)
+    }
 }
 
 fn ours(message: &str) -> CallError {
@@ -90,14 +146,19 @@ struct NeutralPass {
 }
 
 impl NeutralPass {
-    fn new(gpu: &Gpu, scene: &Scene, [vs, diffuse, phong]: [&str; 3]) -> basecode::Result<Self> {
+    fn new(
+        open: &mut Open,
+        scene: &Scene,
+        [vs, diffuse, phong]: [&str; 3],
+    ) -> basecode::Result<Self> {
         let vertex = Stage { name: STAGES[0], text: vs };
-        let fragments = [
-            Stage { name: STAGES[1], text: diffuse },
-            Stage { name: STAGES[2], text: phong },
-            EMITTER_FS,
+        let pipelines = [
+            open.pipeline(vertex, Stage { name: STAGES[1], text: diffuse })?,
+            open.pipeline(vertex, Stage { name: STAGES[2], text: phong })?,
+            open.pipeline(vertex, EMITTER_FS)?,
         ];
-        let objects = scene.shapes().iter().enumerate().map(|(index, shape)| {
+        let gpu = &open.gpu;
+        let object = |(index, shape)| {
             let material = scene.material_of(index);
             let scale = material.energy_scale();
             let uniforms = MaterialUniforms::new(
@@ -115,16 +176,18 @@ impl NeutralPass {
                     MaterialModel::Diffuse | MaterialModel::Mirror => 0,
                 },
             }
-        });
-        Ok(Self {
-            pipelines: fragments.map(|fragment| gpu.pipeline(vertex, fragment)),
-            frame: Uniform::frame(gpu, &FrameUniforms::new(&scene.camera(1, 1)?)),
-            objects: objects.collect(),
-            shadow: ShadowMap::off(gpu),
-            light: [
-                scene.first_light_position().extend(1.0),
-                scene.first_light_intensity().extend(0.0),
-            ],
+        };
+        gpu.checked(&mut || {
+            Ok(Self {
+                pipelines: pipelines.clone(),
+                frame: Uniform::frame(gpu, &FrameUniforms::new(&scene.camera(1, 1)?)),
+                objects: scene.shapes().iter().enumerate().map(object).collect(),
+                shadow: ShadowMap::off(gpu),
+                light: [
+                    scene.first_light_position().extend(1.0),
+                    scene.first_light_intensity().extend(0.0),
+                ],
+            })
         })
     }
 

@@ -3,15 +3,17 @@
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 use std::time::{Duration, Instant};
 
 use renderer_api as api;
 
 use super::cage::Cage;
-use super::job::{AdapterKind, Job, Request};
+use super::command::{command, software_driver};
+use super::job::{Job, Request};
 use super::outcome::{Answer, JobReport, Matter, Outcome, WitnessUse, WorkerRun};
+use super::patience::Patience;
 use super::table::{Noted, RECORD, STATUS_OURS, STATUS_REJECTED};
 use super::wire::{Folder, Place, WireJob, WireRequest, take_input};
 use crate::plugin::Witness;
@@ -32,11 +34,9 @@ pub struct Supervisor {
     pub scratch: PathBuf,
     /// What isolates workers and compilers. A layer that cannot be had is an error of the machine.
     pub isolation: Layers,
+    /// Whatever runs holds it for reading; who must have the machine for itself, for writing.
+    pub machine: Arc<RwLock<()>>,
 }
-
-/// After so many requests of a job ran out of time, the rest is not asked any more: a renderer
-/// that hangs would otherwise cost its limit for every question.
-pub const MAX_TIMEOUTS: usize = 2;
 
 /// How far a job is, by the worker's word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,12 +47,6 @@ pub struct Progress {
     pub requests: usize,
     /// Finished and total rows of the image that is being rendered; 0 of 0 otherwise.
     pub rows: (u32, u32),
-}
-
-/// The outcome of a request that is not asked any more.
-pub fn not_asked() -> Outcome {
-    let reason = "not asked: the renderer ran out of time before".to_owned();
-    Outcome::NotRun { reason, matter: Matter::Submission }
 }
 
 impl Supervisor {
@@ -66,22 +60,41 @@ impl Supervisor {
 
     /// Starts workers of the program `umbra`, with full isolation where there is a sandbox.
     pub fn new(umbra: PathBuf, scratch: PathBuf) -> Self {
-        Self { umbra, scratch, isolation: Layers::of_this_system() }
+        Self { umbra, scratch, isolation: Layers::of_this_system(), machine: Arc::default() }
     }
 
     /// The same with as much isolation as this machine gives, tried for real.
     pub fn available(umbra: PathBuf, scratch: PathBuf) -> Self {
         let isolation = sandbox::available(&umbra);
-        Self { umbra, scratch, isolation }
+        Self { isolation, ..Self::new(umbra, scratch) }
     }
 
-    /// Asks all requests of `job` in one worker. When it dies, the request it was at gets the
-    /// blame, those before keep their answers, and those after are asked in a fresh worker.
-    /// `limits` hold for each worker. A `cancel` that becomes true ends it at once.
+    /// To be held by what runs beside others; waits while someone has the machine for itself.
+    pub fn beside_others(&self) -> RwLockReadGuard<'_, ()> {
+        self.machine.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Asks all requests of `job` in one worker. When it dies, those answered keep their answers,
+    /// and the rest is asked in a fresh worker. The request that it was at gets the blame when it
+    /// was the worker's first; otherwise it is asked again as the first of the next. So `limits`,
+    /// which hold for each worker, leave no request less than it would have alone. A `cancel` that
+    /// becomes true ends it at once.
     pub fn run_job(
         &self,
         job: &Job,
         limits: &Limits,
+        cancel: &AtomicBool,
+        progress: &mut dyn FnMut(Progress),
+    ) -> JobReport {
+        self.run_job_patiently(job, limits, &Patience::none(), cancel, progress)
+    }
+
+    /// The same for one job of a hand-in's path: timeouts are confirmed as `patience` says.
+    pub fn run_job_patiently(
+        &self,
+        job: &Job,
+        limits: &Limits,
+        patience: &Patience,
         cancel: &AtomicBool,
         progress: &mut dyn FnMut(Progress),
     ) -> JobReport {
@@ -94,30 +107,56 @@ impl Supervisor {
             let mut worker_progress = |in_worker, rows| {
                 progress(Progress { answered: answered + in_worker, requests: count, rows });
             };
-            match self.run_worker(job, &pending, limits, cancel, &mut worker_progress) {
+            let beside = self.beside_others();
+            let run = self.run_worker(job, &pending, limits, cancel, &mut worker_progress);
+            drop(beside);
+            let mut late = None;
+            match run {
                 Ok(run) => {
                     for (&index, outcome) in pending.iter().zip(run.outcomes) {
                         outcomes[index] = outcome;
+                    }
+                    if run.ended.exit == Exit::TimedOut {
+                        let open = |outcome: &Option<Outcome>| {
+                            outcome.as_ref().is_none_or(|outcome| *outcome == Outcome::TimedOut)
+                        };
+                        late = pending.iter().copied().find(|&index| open(&outcomes[index]));
+                        // One that hangs while it is loaded is late for all that it is asked.
+                        for index in pending.iter().copied().filter(|&index| Some(index) != late) {
+                            outcomes[index].take_if(|outcome| *outcome == Outcome::TimedOut);
+                        }
                     }
                     report.renderer = report.renderer.or(run.renderer);
                     report.runs.push(WorkerRun { requests: pending.clone(), ended: run.ended });
                 }
                 Err(error) => {
-                    let reason = format!("cannot run a worker: {error}");
-                    for &index in &pending {
-                        let (reason, matter) = (reason.clone(), Matter::Machine);
-                        outcomes[index] = Some(Outcome::NotRun { reason, matter });
+                    pending.iter().for_each(|&index| outcomes[index] = Some(cannot_run(&error)));
+                }
+            }
+            if let Some(index) = late {
+                if patience.asks_again() {
+                    let alone = self.machine.write().unwrap_or_else(PoisonError::into_inner);
+                    let run = self.run_worker(job, &[index], limits, cancel, &mut |_, _| ());
+                    drop(alone);
+                    outcomes[index] = match run {
+                        Ok(run) => {
+                            let requests = vec![index];
+                            report.runs.push(WorkerRun { requests, ended: run.ended });
+                            run.outcomes.into_iter().next().flatten()
+                        }
+                        Err(error) => Some(cannot_run(&error)),
+                    };
+                    if outcomes[index] == Some(Outcome::TimedOut) {
+                        outcomes[index] = Some(patience.timed_out(true));
                     }
+                } else if outcomes[index].is_some() {
+                    outcomes[index] = Some(patience.timed_out(false));
                 }
             }
             // Each worker settles one request at least, so this ends.
             pending.retain(|&index| outcomes[index].is_none());
-            let timeouts =
-                outcomes.iter().filter(|outcome| matches!(outcome, Some(Outcome::TimedOut)));
-            if timeouts.count() >= MAX_TIMEOUTS {
-                for index in std::mem::take(&mut pending) {
-                    outcomes[index] = Some(not_asked());
-                }
+            if let Some(rest) = patience.is_over() {
+                pending.drain(..).for_each(|index| outcomes[index] = Some(rest.clone()));
             }
         }
         report.outcomes = outcomes.into_iter().flatten().collect();
@@ -139,7 +178,8 @@ impl Supervisor {
         let mut files = Files::prepare(private.path(), &cage, &requests)?;
         let driver = software_driver();
         let elsewhere = |driver: &PathBuf| !driver.starts_with("/usr/share/vulkan");
-        let command = self.command(private.path(), &cage, &requests, limits, driver.as_deref());
+        let command =
+            command(&self.umbra, private.path(), &cage, &requests, limits, driver.as_deref());
         let mut policy = cage.policy;
         policy.read_only.extend(driver.filter(elsewhere).map(Bind::same));
         let lock = Lock::new(limits, policy);
@@ -162,17 +202,17 @@ impl Supervisor {
             Noted::Started { .. } => run.outcomes = all(death(&run.ended, limits)),
             Noted::Answered { status: api::STATUS_OK, message, .. } => {
                 run.renderer = job.plugin.is_some().then(|| message.clone());
-                for (index, request) in requests.iter().enumerate() {
-                    let outcome = match &records[1 + index] {
-                        Noted::Answered { .. } => {
-                            files.outcome(index, request, &records[1 + index])?
-                        }
-                        _ => death(&run.ended, limits),
-                    };
-                    run.outcomes[index] = Some(outcome);
-                    if !matches!(records[1 + index], Noted::Answered { .. }) {
-                        break;
+                for (index, (request, noted)) in requests.iter().zip(&records[1..]).enumerate() {
+                    if matches!(noted, Noted::Answered { .. }) {
+                        run.outcomes[index] = Some(files.outcome(index, request, noted)?);
+                        continue;
                     }
+                    // The limits hold for all that a worker is asked, and others may have left
+                    // something behind: only who came first in it is to blame for its end.
+                    if index == 0 {
+                        run.outcomes[index] = Some(death(&run.ended, limits));
+                    }
+                    break;
                 }
             }
             Noted::Answered { message, .. } => {
@@ -186,36 +226,11 @@ impl Supervisor {
         }
         Ok(run)
     }
+}
 
-    fn command(
-        &self,
-        dir: &Path,
-        cage: &Cage,
-        requests: &[&Request],
-        limits: &Limits,
-        driver: Option<&Path>,
-    ) -> Command {
-        let mut command = Command::new(&self.umbra);
-        command.arg("__worker").arg(&cage.job).current_dir(Folder(dir).scratch()).env_clear();
-        command.env("LANG", "C").env("HOME", "/nonexistent");
-        // One renderer's compiled shaders are no other's business; Mesa would make the folder above.
-        command.env("MESA_SHADER_CACHE_DISABLE", "true").env("MESA_GLSL_CACHE_DISABLE", "true");
-        command.env("LP_NUM_THREADS", limits.threads.to_string());
-        command.env("RAYON_NUM_THREADS", limits.threads.to_string());
-        let software = requests.iter().any(|request| {
-            let Request::RenderRealtime { adapter, .. } = request else { return false };
-            adapter.kind == AdapterKind::Software
-        });
-        if software {
-            let driver = driver.unwrap_or(Path::new("/nonexistent"));
-            command.env("VK_ICD_FILENAMES", driver).env("VK_DRIVER_FILES", driver);
-        }
-        if cfg!(windows) {
-            // Without it, no library of the system can be found.
-            command.envs(std::env::var_os("SystemRoot").map(|root| ("SystemRoot", root)));
-        }
-        command
-    }
+fn cannot_run(error: &io::Error) -> Outcome {
+    let reason = format!("cannot run a worker: {error}");
+    Outcome::NotRun { reason, matter: Matter::Machine }
 }
 
 /// One worker's result: an outcome for each request up to the one that it died at.
@@ -223,17 +238,6 @@ struct Run {
     outcomes: Vec<Option<Outcome>>,
     renderer: Option<String>,
     ended: Ended,
-}
-
-/// Where Mesa's lavapipe describes itself to the Vulkan loader.
-fn software_driver() -> Option<PathBuf> {
-    let folders = ["/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
-    folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).find_map(|entries| {
-        let mut found = entries.flatten().map(|entry| entry.path()).filter(|path| {
-            path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("lvp_icd"))
-        });
-        found.next()
-    })
 }
 
 /// The files of a worker, as the parent holds them: opened before it began, read only by plain

@@ -1,9 +1,11 @@
-/* A plugin that misbehaves on purpose. What it does in render_offline is the scene's options
- * text; without options it draws zeros. FAULT_AT_LOAD makes a constructor that ends the worker.
+/* A plugin that misbehaves on purpose. What it does in each call is the scene's options text;
+ * without options it draws zeros. FAULT_AT_LOAD makes a constructor that ends the worker.
  * With ATTACKS it is linked with hostile/attack.c, and options of several words are an attack;
- * ATTACK_AT_LOAD is one for the constructor. */
+ * ATTACK_AT_LOAD is one for the constructor. With DEEDS it is linked with hostile/deeds.c, which
+ * knows more. Tables that do not fit are renderer.c's. */
 #include "umbra_renderer.h"
 
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,8 +13,10 @@
 
 #define TEXT(s) {(const uint8_t *)(s), sizeof(s) - 1}
 
+#define LONGEST 4096
+
 typedef struct {
-    char mode[512];
+    char mode[LONGEST];
 } Loaded;
 
 static int is(UmbraScene scene, const char *mode)
@@ -32,7 +36,7 @@ int attack(int argc, char **argv);
 
 static void attack_by(const char *text)
 {
-    char copy[512], *words[8], *rest = copy;
+    char copy[LONGEST], *words[8], *rest = copy;
     int count = 0;
     snprintf(copy, sizeof copy, "%s", text);
     while (count < 7 && (words[count] = strsep(&rest, " ")) != NULL)
@@ -40,6 +44,15 @@ static void attack_by(const char *text)
     words[count] = NULL;
     attack(count, words);
 }
+#endif
+
+#ifdef DEEDS
+/* Answers whether it knows the deed. */
+int deed(const char *what, float *values, size_t count, UmbraMessage *message,
+         UmbraStatus *status);
+/* Remembers a stage's text by every means, or tells what is remembered. */
+void remember(const char *where, const UmbraText *text);
+int recall(const char *where, UmbraMessage *message);
 #endif
 
 #ifdef ATTACK_AT_LOAD
@@ -55,7 +68,7 @@ static UmbraStatus load_scene(const UmbraSceneRequest *request, UmbraScene *scen
     size_t length = request->options.length;
     Loaded *loaded = calloc(1, sizeof *loaded);
     (void)message;
-    memcpy(loaded->mode, request->options.data, length < 511 ? length : 511);
+    memcpy(loaded->mode, request->options.data, length < LONGEST ? length : LONGEST - 1);
     *scene = is(loaded, "null_scene") ? NULL : (UmbraScene)loaded;
     return UMBRA_STATUS_OK;
 }
@@ -82,16 +95,22 @@ static void daemon_that_holds_the_pipe(void)
     _exit(0);
 }
 
-static UmbraStatus render_offline(UmbraScene scene, const UmbraOfflineSettings *settings,
-                                  float *pixels, size_t float_count, UmbraMessage *message)
+static UmbraStatus act(UmbraScene scene, float *pixels, size_t float_count, UmbraMessage *message)
 {
-    static int start[1];
-    (void)settings;
+    static int start[1], drawn;
     memset(pixels, 0, float_count * sizeof(float));
+#ifdef DEEDS
+    UmbraStatus status = UMBRA_STATUS_OK;
+    if (deed(((Loaded *)scene)->mode, pixels, float_count, message, &status))
+        return status;
+#endif
 #ifdef ATTACKS
     if (strchr(((Loaded *)scene)->mode, ' ') != NULL)
         attack_by(((Loaded *)scene)->mode);
 #endif
+    if (is(scene, "first") && drawn > 0)
+        abort();
+    drawn++;
     if (is(scene, "abort"))
         abort();
     if (is(scene, "segv"))
@@ -102,6 +121,10 @@ static UmbraStatus render_offline(UmbraScene scene, const UmbraOfflineSettings *
         for (volatile int i = 0;; i++)
             ;
     if (is(scene, "sleep"))
+        sleep(1000);
+    /* Hangs until the named file is there, which it makes. */
+    if (strncmp(((Loaded *)scene)->mode, "once ", 5) == 0 &&
+        open(((Loaded *)scene)->mode + 5, O_CREAT | O_EXCL | O_WRONLY, 0600) >= 0)
         sleep(1000);
     if (is(scene, "stack"))
         return recurse(start);
@@ -141,43 +164,55 @@ static UmbraStatus render_offline(UmbraScene scene, const UmbraOfflineSettings *
     return UMBRA_STATUS_OK;
 }
 
-static UmbraStatus not_there(UmbraMessage *message)
+static UmbraStatus render_offline(UmbraScene scene, const UmbraOfflineSettings *settings,
+                                  float *pixels, size_t float_count, UmbraMessage *message)
 {
-    message->length = 0;
-    return UMBRA_STATUS_NOT_IMPLEMENTED;
+    (void)settings;
+    return act(scene, pixels, float_count, message);
 }
+
 static UmbraStatus set_witness(UmbraScene s, const UmbraWitnessBsdf *w, UmbraMessage *m)
 {
-    (void)s, (void)w;
-    return not_there(m);
+    (void)s, (void)w, (void)m;
+    return UMBRA_STATUS_OK;
 }
 static UmbraStatus eval_bsdf(UmbraScene s, const UmbraBsdfQuery *q, size_t n, float *v,
                              UmbraMessage *m)
 {
-    (void)s, (void)q, (void)n, (void)v;
-    return not_there(m);
+    (void)q;
+    return act(s, v, 3 * n, m);
 }
 static UmbraStatus radiance(UmbraScene s, const UmbraRadianceSettings *t, const UmbraRayQuery *r,
                             size_t n, float *v, UmbraMessage *m)
 {
-    (void)s, (void)t, (void)r, (void)n, (void)v;
-    return not_there(m);
+    (void)t, (void)r;
+    return act(s, v, 3 * n, m);
 }
+/* A pass is its scene. */
 static UmbraStatus open_realtime(UmbraScene s, const UmbraRealtimeSettings *t, UmbraPass *p,
                                  UmbraMessage *m)
 {
-    (void)s, (void)t, (void)p;
-    return not_there(m);
+    (void)t, (void)m;
+#ifdef DEEDS
+    const char *mode = ((Loaded *)s)->mode;
+    if (strncmp(mode, "keep ", 5) == 0) {
+        if (t->stage_count > 0)
+            remember(mode + 5, &t->stages[0].source);
+        else if (recall(mode + 5, m))
+            return UMBRA_STATUS_ERROR;
+    }
+#endif
+    *p = s;
+    return UMBRA_STATUS_OK;
 }
 static UmbraStatus draw_frame(UmbraPass p, const UmbraCameraValue *c, UmbraMessage *m)
 {
-    (void)p, (void)c;
-    return not_there(m);
+    (void)p, (void)c, (void)m;
+    return UMBRA_STATUS_OK;
 }
 static UmbraStatus read_frame(UmbraPass p, float *v, size_t n, UmbraMessage *m)
 {
-    (void)p, (void)v, (void)n;
-    return not_there(m);
+    return act(p, v, n, m);
 }
 static void close_realtime(UmbraPass p)
 {

@@ -48,6 +48,9 @@ impl Bsdf for Diffuse {
         if has(M::DiffusePiTwice) {
             value *= INV_PI;
         }
+        if has(M::DiffusePiRounded) {
+            value *= 0.32 / INV_PI;
+        }
         if has(M::DiffuseChannelsSwapped) { blue_first(value) } else { value }
     }
 }

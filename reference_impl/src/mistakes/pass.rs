@@ -15,6 +15,10 @@ pub fn spoil(mistakes: &Mistakes, gpu: &Gpu, pass: &mut SimplePass) -> Result<()
         return Ok(());
     }
     let has = |mistake| mistakes.has(mistake);
+    pass.camera_unset = has(M::CameraUnset);
+    if has(M::HalfPixel) {
+        pass.viewport_shift = 0.5;
+    }
     if has(M::LightPositionUnset) {
         pass.light_position = Vec3::ZERO;
     }

@@ -19,8 +19,9 @@ pub fn render(
         let own = Sampler::new(job.seed.wrapping_add(row_seed));
         let sampler = if has(M::SharedSampler) { &shared } else { &own };
         for (x, pixel) in row.iter_mut().enumerate() {
-            let mut sum = Vec3::ZERO;
-            for _ in 0..job.spp {
+            let (mut sum, mut counted) = (Vec3::ZERO, 0);
+            let spp = if has(M::FewerSamples) { (job.spp / 4).max(1) } else { job.spp };
+            for _ in 0..spp {
                 let (jx, jy) = match job.spp {
                     1 if has(M::PixelCorner) => (0.0, 0.0),
                     1 => (0.5, 0.5),
@@ -28,9 +29,11 @@ pub fn render(
                 };
                 let shift = if has(M::JitterShifted) && job.spp > 1 { 0.5 } else { 0.0 };
                 let ray = camera.ray(x as f32 + jx - shift, y as f32 + jy - shift);
-                sum += integrator.radiance(scene, &ray, sampler);
+                let radiance = integrator.radiance(scene, &ray, sampler);
+                sum += radiance;
+                counted += u32::from(!has(M::BlackNotCounted) || radiance != Vec3::ZERO);
             }
-            *pixel = if has(M::NotAveraged) { sum } else { sum / job.spp as f32 };
+            *pixel = if has(M::NotAveraged) { sum } else { sum / counted.max(1) as f32 };
         }
     })?;
     spoil(mistakes, film);
@@ -73,5 +76,21 @@ fn spoil(mistakes: &Mistakes, film: &mut Film) {
     }
     if mistakes.has(M::Clamped) {
         pixels.iter_mut().for_each(|pixel| *pixel = pixel.clamp(Vec3::ZERO, Vec3::ONE));
+    }
+    if mistakes.has(M::LastPixelMissing)
+        && let Some(last) = pixels.last_mut()
+    {
+        *last = Vec3::NAN;
+    }
+    if mistakes.has(M::DebugMark) {
+        for index in [0, 1, width, width + 1] {
+            pixels[index] *= 1.1;
+        }
+    }
+    if mistakes.has(M::Dithered) {
+        const HALF_LEVEL: f32 = 0.5 / 65535.0;
+        for (index, pixel) in pixels.iter_mut().enumerate() {
+            *pixel += if index % 2 == 0 { HALF_LEVEL } else { -HALF_LEVEL };
+        }
     }
 }

@@ -4,7 +4,7 @@ use basecode::gpu::{
     EMITTER_FS, FRAME_GROUP, FrameUniforms, Gpu, MATERIAL_GROUP, MaterialUniforms, Mesh,
     OBJECT_GROUP, ObjectUniforms, RenderPass, SHADOW_GROUP, ShadowMap, Stage, Target, Uniform,
 };
-use basecode::{Camera, Mat4, Material, MaterialModel, Result, Scene, Vec3, wgpu};
+use basecode::{Camera, Mat4, Material, MaterialModel, Result, Scene, Vec3, Vec4, wgpu};
 
 use super::shadow;
 use crate::mistakes::{self, Mistake, Mistakes};
@@ -39,6 +39,9 @@ pub struct SimplePass {
     shadow: ShadowMap,
     pub(crate) light_position: Vec3,
     pub(crate) light_intensity: Vec3,
+    pub(crate) camera_unset: bool,
+    /// Pixels; 0 but for a mistake.
+    pub(crate) viewport_shift: f32,
 }
 
 impl SimplePass {
@@ -78,6 +81,8 @@ impl SimplePass {
             shadow,
             light_position: scene.first_light_position(),
             light_intensity: scene.first_light_intensity(),
+            camera_unset: false,
+            viewport_shift: 0.0,
         };
         mistakes::spoil_pass(mistakes, gpu, &mut pass)?;
         Ok(pass)
@@ -126,9 +131,17 @@ impl RenderPass for SimplePass {
     fn draw(&mut self, gpu: &Gpu, camera: &Camera, target: &Target) -> Result<()> {
         let mut frame = FrameUniforms::new(camera);
         self.set_light(&mut frame);
+        if self.camera_unset {
+            frame.camera_position = Vec4::ZERO;
+        }
         self.frame.write_frame(gpu, &frame);
         let mut encoder = gpu.encoder();
         let mut pass = target.begin(&mut encoder);
+        if self.viewport_shift != 0.0 {
+            let (width, height) = (target.width as f32, target.height as f32);
+            let shift = self.viewport_shift;
+            pass.set_viewport(shift, shift, width - shift, height - shift, 0.0, 1.0);
+        }
         self.draw_objects(&mut pass);
         // Ends the pass, so that the encoder can be submitted.
         drop(pass);

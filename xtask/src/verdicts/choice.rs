@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result};
 use umbra::diagnosis::Catalogue;
+use umbra::grading::RenderPath;
 
 /// Samples per pixel of right renderers; none for what the scenes ask for.
 pub const SPP: [Option<u32>; 5] = [None, Some(1), Some(4), Some(16), Some(64)];
@@ -10,9 +11,12 @@ pub const THREADS: [u32; 3] = [1, 2, 4];
 /// Seeds of right renderers: as student ids are.
 const SEEDS: [u64; 4] = [260_000_001, 260_712_345, 261_999_999, 7];
 
+/// The seed of what stands for the other path.
+pub const PLAIN_SEED: u64 = SEEDS[0];
+
 /// Pairs of mistakes that a student may well make together. Not among them: one that hides the
 /// other, such as an intensity that was never set.
-const PAIRS: [[&str; 2]; 24] = [
+const PAIRS: [[&str; 2]; 26] = [
     ["diffuse-no-pi", "phong-n-plus-1"],
     ["diffuse-no-cosine", "light-two-cosines"],
     ["diffuse-no-wi-test", "shadow-none"],
@@ -37,7 +41,12 @@ const PAIRS: [[&str; 2]; 24] = [
     ["diffuse-fs-no-falloff", "phong-fs-n-plus-1"],
     ["phong-fs-unnormalised", "shadow-map-none"],
     ["light-two-cosines", "diffuse-fs-two-cosines"],
+    [ELSEWHERE, "diffuse-fs-no-pi"],
+    [ELSEWHERE, "phong-fs-n-plus-1"],
 ];
+
+/// The stages lie in no file of the contract's: none can be exchanged, pixels by material decide.
+pub const ELSEWHERE: &str = "stages-elsewhere";
 
 /// A renderer to be graded.
 #[derive(Clone, Debug)]
@@ -54,17 +63,39 @@ pub struct Subject {
     pub parts: Vec<String>,
     /// The findings that it must lead to.
     pub findings: Vec<String>,
+    /// Whether the diagnosis must name it.
+    pub named: bool,
 }
 
 impl Subject {
     fn right(switch: Option<&str>, seed: u64, threads: u32, spp: Option<u32>) -> Self {
         let mistakes = switch.map(str::to_owned).into_iter().collect();
-        Self { mistakes, seed, threads, spp, parts: Vec::new(), findings: Vec::new() }
+        Self { mistakes, seed, threads, spp, parts: Vec::new(), findings: Vec::new(), named: false }
+    }
+
+    /// The paths that its switches can show on. Seed, threads and samples are matters of offline.
+    pub fn paths(&self) -> Vec<RenderPath> {
+        let declares = |path: &RenderPath| match path {
+            RenderPath::Offline => {
+                !self.findings.is_empty() || self.parts.iter().any(|part| part.starts_with("1."))
+            }
+            RenderPath::Realtime => self.parts.iter().any(|part| part.starts_with("2.")),
+        };
+        match (self.is_right(), self.mistakes.is_empty()) {
+            (true, true) => vec![RenderPath::Offline],
+            (true, false) => RenderPath::ALL.to_vec(),
+            (false, _) => RenderPath::ALL.into_iter().filter(declares).collect(),
+        }
+    }
+
+    /// Whether it must lose nothing.
+    fn is_right(&self) -> bool {
+        self.parts.is_empty() && self.findings.is_empty()
     }
 
     /// Its name in the matrix.
     pub fn name(&self) -> String {
-        if !self.parts.is_empty() || !self.findings.is_empty() {
+        if !self.is_right() {
             return self.mistakes.join(" + ");
         }
         let mut name =
@@ -96,6 +127,14 @@ pub fn variants(spp: Option<u32>) -> Vec<Subject> {
     each.map(|(seed, threads)| Subject::right(None, seed, threads, spp)).collect()
 }
 
+/// One of the right renderers at each number of samples, the `index`th: no two share seed and
+/// threads. What is no mistake is kept.
+pub fn few(variants: Vec<Subject>, index: usize) -> Vec<Subject> {
+    let kept = index * (SEEDS.len() + 2) % variants.len().max(1);
+    let keep = |(at, subject): &(usize, Subject)| *at == kept || !subject.mistakes.is_empty();
+    variants.into_iter().enumerate().filter(keep).map(|(_, subject)| subject).collect()
+}
+
 /// Every mistake alone.
 pub fn singles(catalogue: &Catalogue) -> Vec<Subject> {
     let single = |mistake: &umbra::diagnosis::KnownMistake| Subject {
@@ -105,6 +144,7 @@ pub fn singles(catalogue: &Catalogue) -> Vec<Subject> {
         spp: None,
         parts: mistake.parts.clone(),
         findings: mistake.findings.clone(),
+        named: !mistake.proves_a_rule(),
     };
     catalogue.mistakes.iter().map(single).collect()
 }
@@ -115,11 +155,13 @@ pub fn singles(catalogue: &Catalogue) -> Vec<Subject> {
 /// When the catalogue lacks a name.
 pub fn pairs(catalogue: &Catalogue) -> Result<Vec<Subject>> {
     let pair = |names: &[&str; 2]| {
-        let [a, b] = names.map(|name| {
-            catalogue.named(name).with_context(|| format!("there is no mistake {name}"))
-        });
-        let (a, b) = (a?, b?);
-        let mut parts = [a.parts.as_slice(), b.parts.as_slice()].concat();
+        let (mut parts, mut findings) = (Vec::new(), Vec::new());
+        for name in names.iter().filter(|name| **name != ELSEWHERE) {
+            let mistake = catalogue.named(name);
+            let mistake = mistake.with_context(|| format!("there is no mistake {name}"))?;
+            parts.extend(mistake.parts.iter().cloned());
+            findings.extend(mistake.findings.iter().cloned());
+        }
         parts.sort();
         parts.dedup();
         Ok(Subject {
@@ -128,8 +170,44 @@ pub fn pairs(catalogue: &Catalogue) -> Result<Vec<Subject>> {
             threads: THREADS[1],
             spp: None,
             parts,
-            findings: [a.findings.as_slice(), b.findings.as_slice()].concat(),
+            findings,
+            named: true,
         })
     };
     PAIRS.iter().map(pair).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn every_mistake_is_seen_on_the_paths_of_its_parts() {
+        let subjects = singles(&Catalogue::known().unwrap());
+        let count = |paths: &[RenderPath]| {
+            subjects.iter().filter(|subject| subject.paths() == paths).count()
+        };
+        let [offline, realtime] = RenderPath::ALL.map(|path| count(&[path]));
+        assert!(offline >= 40 && realtime >= 40, "{offline} {realtime}");
+        assert_eq!(offline + realtime + count(&RenderPath::ALL), subjects.len());
+        for pair in pairs(&Catalogue::known().unwrap()).unwrap() {
+            assert!(!pair.paths().is_empty(), "{}", pair.name());
+        }
+    }
+
+    #[test]
+    fn few_variants_are_unlike_each_other() {
+        let few = SPP.iter().enumerate().map(|(index, &spp)| few(variants(spp), index));
+        let few: Vec<Subject> = few.flatten().collect();
+        let plain = few.iter().filter(|subject| subject.mistakes.is_empty());
+        let kinds: BTreeSet<_> = plain.clone().map(|subject| (subject.seed, subject.spp)).collect();
+        assert_eq!((plain.count(), kinds.len()), (SPP.len() - 1, SPP.len() - 1));
+        let threads: BTreeSet<_> = few.iter().map(|subject| subject.threads).collect();
+        assert_eq!(threads, BTreeSet::from(THREADS));
+        let harmless: Vec<Subject> = variants(None);
+        assert_eq!(few.len(), harmless.len() + SPP.len() - 1);
+        assert!(harmless.iter().all(|subject| subject.paths() == RenderPath::ALL));
+    }
 }

@@ -1,40 +1,37 @@
 //! One row of the matrix: what one renderer lost, and whether that is what the catalogue says.
 
 use umbra::assignment::Assignment;
-use umbra::evidence::{Evidence, Verdict};
+use umbra::diagnosis::Diagnosis;
+use umbra::evidence::{Check, Evidence, Verdict};
 use umbra::rubric::Grade;
 
 use super::choice::Subject;
 
-/// What one renderer lost.
+/// What one renderer lost, and by which evidence.
 pub struct Row {
-    name: String,
-    grade: Grade,
-    /// The parts in which it must lose points.
-    declared: Vec<String>,
-    /// Findings that it must lead to and did not.
-    unfound: Vec<String>,
-    seconds: f64,
+    /// Which renderer, and what it must lose.
+    pub subject: Subject,
+    /// What was found out about it.
+    pub evidence: Evidence,
+    /// What it looks like.
+    pub diagnoses: Vec<Diagnosis>,
+    /// What it earned by the assignment's rules.
+    pub grade: Grade,
+    /// Wall-clock seconds that it took.
+    pub seconds: f64,
 }
 
 impl Row {
-    /// Compares a grade with what was declared.
-    pub fn new(subject: &Subject, grade: Grade, evidence: &Evidence, seconds: f64) -> Self {
-        let found = |id: &&String| evidence.named(id).any(|check| check.verdict == Verdict::Fail);
-        let unfound = subject.findings.iter().filter(|id| !found(id)).cloned().collect();
-        Self { name: subject.name(), grade, declared: subject.parts.clone(), unfound, seconds }
-    }
-
     /// Whether it lost points in every part that it declares, in no other, and all was judged.
     pub fn as_declared(&self) -> bool {
         self.complaint().is_empty()
     }
 
     /// What differs from the declaration; empty when nothing does.
-    fn complaint(&self) -> String {
+    pub fn complaint(&self) -> String {
         let mut complaints = Vec::new();
         for part in &self.grade.parts {
-            let declared = self.declared.contains(&part.id);
+            let declared = self.subject.parts.contains(&part.id);
             if part.points_max < part.out_of && !declared {
                 complaints.push(format!(
                     "{} loses {:.2} ({})",
@@ -48,8 +45,37 @@ impl Row {
                 complaints.push(format!("{} is not judged ({})", part.id, part.reason));
             }
         }
-        complaints.extend(self.unfound.iter().map(|id| format!("{id} finds nothing")));
+        let fails = |check: &Check| check.verdict == Verdict::Fail;
+        let unfound = self.subject.findings.iter().filter(|id| !self.evidence.named(id).any(fails));
+        complaints.extend(unfound.map(|id| format!("{id} finds nothing")));
         complaints.join("; ")
+    }
+
+    /// Whether the diagnosis says all there is to say: a single mistake by its name in some part, a
+    /// right renderer by silence; and nothing else.
+    pub fn well_diagnosed(&self) -> bool {
+        let names = &self.subject.mistakes;
+        let right = self.subject.parts.is_empty() && self.subject.findings.is_empty();
+        if right {
+            return self.diagnoses.is_empty();
+        }
+        let said = |found: &Diagnosis| {
+            let named = |alike: &Vec<String>| alike.iter().any(|name| names.contains(name));
+            found.factor.is_none() && found.mistakes.iter().all(named)
+        };
+        let mentioned = |name: &String| {
+            let found = self.diagnoses.iter().flat_map(|found| found.mistakes.iter().flatten());
+            found.into_iter().any(|known| known == name)
+        };
+        self.diagnoses.iter().all(said) && names.iter().all(mentioned)
+    }
+
+    /// What the diagnosis says, in one line.
+    pub fn said(&self) -> String {
+        let each = self.diagnoses.iter().map(|found| format!("{} {}", found.part, found.words));
+        let said = each.collect::<Vec<_>>().join(" | ");
+        let said = if said.is_empty() { "nothing" } else { &said };
+        format!("{} looks like: {said}", self.subject.name())
     }
 
     /// Prints it: the points of each part, `.` for all of them.
@@ -65,7 +91,7 @@ impl Row {
         let verdict = if self.as_declared() { "" } else { "  WRONG" };
         let line = format!(
             "{:<56}{}  {:4.1} s{verdict}",
-            self.name,
+            self.subject.name(),
             cells.collect::<String>(),
             self.seconds
         );
@@ -73,6 +99,13 @@ impl Row {
         if explain {
             for part in self.grade.parts.iter().filter(|part| part.points < part.out_of) {
                 println!("    {}: {} [{}]", part.id, part.reason, part.evidence.join(", "));
+            }
+            for found in &self.diagnoses {
+                let (words, left, next) = (&found.words, found.unexplained, found.runner_up);
+                println!(
+                    "    {} looks like: {words} (leaves {left:.3}, next {next:.3})",
+                    found.part
+                );
             }
         }
     }
@@ -82,10 +115,4 @@ impl Row {
 pub fn print_header(assignment: &Assignment) {
     let parts = assignment.rules.parts.iter().map(|part| format!("{:>5}", part.id));
     println!("{:<56}{}", "points left, . for all", parts.collect::<String>());
-}
-
-/// Everything that differs from the declarations, one line each.
-pub fn complaints<'a>(rows: impl Iterator<Item = &'a Row>) -> String {
-    let wrong = rows.filter(|row| !row.as_declared());
-    wrong.map(|row| format!("{}: {}", row.name, row.complaint())).collect::<Vec<_>>().join("\n")
 }

@@ -1,5 +1,6 @@
 //! The graphics device: which adapter, and what went wrong.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Layouts;
@@ -27,6 +28,8 @@ pub struct Gpu {
     /// The bind group layouts of the shader contract.
     pub layouts: Layouts,
     stages: Vec<(String, String)>,
+    /// Bodies of [`Gpu::checked`] that were begun and did not end well.
+    unfinished: AtomicUsize,
     trouble: Arc<Mutex<Trouble>>,
 }
 
@@ -38,6 +41,9 @@ struct Trouble {
     /// The first error that no scope caught.
     uncaught: Option<wgpu::Error>,
 }
+
+/// The device that was kept, and what it was opened by.
+static KEPT: Mutex<Option<((AdapterKind, String), Gpu)>> = Mutex::new(None);
 
 /// The one graphics interface to use here. Never GL: on software adapters it has no float targets.
 const BACKEND: wgpu::Backends = if cfg!(target_vendor = "apple") {
@@ -106,7 +112,36 @@ impl Gpu {
             }
         }));
         let layouts = Layouts::new(&device);
-        Ok(Self { device, queue, adapter: info, layouts, stages: Vec::new(), trouble })
+        let (stages, unfinished) = (Vec::new(), AtomicUsize::new(0));
+        Ok(Self { device, queue, adapter: info, layouts, stages, unfinished, trouble })
+    }
+
+    /// As [`Gpu::open`], but takes a device of this process that was [kept](Gpu::keep).
+    ///
+    /// # Errors
+    /// As [`Gpu::open`].
+    pub fn reopen(kind: AdapterKind, name: &str) -> Result<Self> {
+        let kept = KEPT.lock().ok().and_then(|mut kept| kept.take());
+        match kept {
+            Some((of, gpu)) if of == (kind, name.to_owned()) => Ok(gpu),
+            _ => Self::open(kind, name),
+        }
+    }
+
+    /// Keeps a device for the next [`Gpu::reopen`] of the same `kind` and `name`, for opening one
+    /// costs more than a small frame. One on which anything went wrong is closed instead: neither
+    /// its errors nor its loss may reach the next.
+    pub fn keep(mut self, kind: AdapterKind, name: &str) {
+        // What happened since the last check comes to light here.
+        let polled = self.device.poll(wgpu::PollType::Poll).is_ok();
+        let untroubled =
+            self.trouble.lock().is_ok_and(|it| it.lost.is_none() && it.uncaught.is_none());
+        if polled && untroubled && *self.unfinished.get_mut() == 0 {
+            self.stages.clear();
+            if let Ok(mut kept) = KEPT.lock() {
+                *kept = Some(((kind, name.to_owned()), self));
+            }
+        }
     }
 
     /// Replaces the text of shader stages, by stage name (`simple.vs`, `diffuse.fs`, `phong.fs`).
@@ -138,6 +173,7 @@ impl Gpu {
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
+        self.unfinished.fetch_add(1, Ordering::Relaxed);
         let answer = body();
         // An error that poll itself finds is a lost device, which the callback reports.
         let _ = self.device.poll(wgpu::PollType::Poll);
@@ -154,7 +190,10 @@ impl Gpu {
             return Err(self.lost(&why));
         }
         match memory.or(internal).or(validation).or(uncaught) {
-            None => Ok(value),
+            None => {
+                self.unfinished.fetch_sub(1, Ordering::Relaxed);
+                Ok(value)
+            }
             Some(wgpu::Error::OutOfMemory { .. }) => Err(Error::Gpu(format!(
                 "the graphics device {:?} is out of memory",
                 self.adapter.name
@@ -191,4 +230,54 @@ fn no_adapter(kind: AdapterKind, name: &str, found: &[wgpu::AdapterInfo]) -> Err
         found.iter().map(|info| format!("{:?} ({:?})", info.name, info.device_type)).collect();
     let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
     Error::NoAdapter(format!("no {wanted}{named} on this machine; found {found}; {HINT}"))
+}
+
+/// Needs a graphics adapter, as `tests/gpu.rs` does; what tells two devices apart is not public.
+#[cfg(test)]
+mod tests {
+    use super::super::{Stage, Target};
+    use super::*;
+
+    const KIND: AdapterKind = AdapterKind::Any;
+    const NONSENSE: Stage = Stage { name: "diffuse.fs", text: "no WGSL" };
+
+    fn reopen() -> Gpu {
+        Gpu::reopen(KIND, "").unwrap()
+    }
+
+    /// Gives a device back, and says whether the next one is the same.
+    fn is_kept(gpu: Gpu) -> bool {
+        let trouble = Arc::clone(&gpu.trouble);
+        gpu.keep(KIND, "");
+        Arc::ptr_eq(&trouble, &reopen().trouble)
+    }
+
+    #[test]
+    fn a_device_is_kept_only_while_nothing_is_wrong_with_it() {
+        let gpu = reopen();
+        Target::new(&gpu, 4, 4).unwrap().read_back(&gpu).unwrap();
+        assert!(is_kept(gpu), "all was well");
+        let mut gpu = reopen();
+        gpu.replace_stages(vec![("diffuse.fs".into(), "another's".into())]);
+        gpu.keep(KIND, "");
+        assert_eq!(reopen().stage("diffuse.fs", "own"), "own");
+
+        let gpu = reopen();
+        let refused = gpu.checked(&mut || {
+            drop(gpu.pipeline(NONSENSE, NONSENSE));
+            Ok(())
+        });
+        assert!(refused.is_err());
+        assert!(!is_kept(gpu), "a check found an error");
+        let gpu = reopen();
+        drop(gpu.pipeline(NONSENSE, NONSENSE));
+        assert!(!is_kept(gpu), "an error that no check saw");
+        let gpu = reopen();
+        let panics = || gpu.checked::<()>(&mut || panic!("not written"));
+        assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(panics)).is_err());
+        assert!(!is_kept(gpu), "a check did not end");
+        let gpu = reopen();
+        gpu.device.destroy();
+        assert!(!is_kept(gpu), "the device was lost");
+    }
 }

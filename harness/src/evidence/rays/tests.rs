@@ -24,6 +24,7 @@ fn batch() -> RayBatch {
     RayBatch {
         scene: "s".into(),
         rays: points.iter().map(|p| p.ray).collect(),
+        pixels: (0..60).collect(),
         points,
         lit: 40,
         intensity: Vec3::new(1.0, 2.0, 3.0),
@@ -75,7 +76,23 @@ fn shadows(with: impl Fn(usize) -> f64, without: impl Fn(usize) -> f64) -> Check
     let batch = batch();
     let with = answers(&batch, |index, _| with(index));
     let without = answers(&batch, |index, _| without(index));
-    judge_shadows(&batch, &witness, &with, &without)
+    judge_shadows(&batch, &witness, &with, &without, (&without, &without))
+}
+
+#[test]
+fn a_shadow_query_that_moves_what_is_shaded_is_seen() {
+    let batch = batch();
+    let right = answers(&batch, |index, _| if index < 40 { 1.0 } else { 0.0 });
+    let without = answers(&batch, |_, _| 1.0);
+    let judge = |on: f64, off: f64| {
+        let (on, off) = (answers(&batch, |_, _| on), answers(&batch, |_, _| off));
+        judge_shadows(&batch, &witness, &right, &without, (&on, &off)).verdict
+    };
+    assert_eq!(judge(0.0, 0.7), Verdict::Fail);
+    assert_eq!(judge(0.71, 0.7), Verdict::Fail);
+    for wrong_in_both in [0.7, 0.0, f64::NAN] {
+        assert_eq!(judge(wrong_in_both, wrong_in_both), Verdict::Pass, "{wrong_in_both}");
+    }
 }
 
 #[test]
@@ -129,7 +146,8 @@ fn shadows_are_judged_where_radiance_is_right() {
     };
     let (pass, fail) = (Verdict::Pass, Verdict::Fail);
     let wrong = |fraction| {
-        let measures = vec![Measure::at_most("rays wrong (fraction)", fraction, STRAY_FRACTION)];
+        let measures =
+            vec![Measure::at_most("rays.lit", "rays wrong (fraction)", fraction, STRAY_FRACTION)];
         Check { measures, ..check("radiance.lit", "emitter", fail) }
     };
     let emitter = [wrong(0.99), check("shadow.rays", "emitter", fail)];

@@ -1,7 +1,7 @@
 //! The page of the batch.
 
 use super::super::number::{count, due, is_range, of_part, points, range};
-use super::super::{Entry, HTML_FILE, ReportError, Sheet};
+use super::super::{Entry, HTML_FILE, INSTRUCTOR, ReportError, Sheet};
 use super::markup::Html;
 use super::{SORT, begin, class, end, part_class};
 use crate::grading::Conditions;
@@ -56,13 +56,16 @@ fn table(html: &mut Html, sheet: &Sheet) {
     html.raw("</tbody>\n</table>\n</div>\n");
 }
 
-fn row(html: &mut Html, sheet: &Sheet, Entry { record, grade }: &Entry) {
+fn row(html: &mut Html, sheet: &Sheet, entry: &Entry) {
+    let Entry { record, grade } = entry;
     let student = &record.student;
     let name = student.full_name();
     let shown = if name.is_empty() { "(no name)" } else { &name };
     let key = format!("{} {}", student.last_name, student.first_name);
     html.raw("<tr><th scope=\"row\" data-sort=\"").text(&key).raw("\"><a href=\"");
-    html.address(&format!("{}/{HTML_FILE}", record.slug)).raw("\">").text(shown);
+    // The batch's page is the instructor's, too.
+    let folder = if entry.has_held_back() { format!("{INSTRUCTOR}/") } else { String::new() };
+    html.address(&format!("{folder}{}/{HTML_FILE}", record.slug)).raw("\">").text(shown);
     html.raw("</a><small>").text(&record.name).raw("</small></th>");
     html.raw("<td class=\"number total ");
     html.raw(class(grade.points, grade.points_max, grade.out_of)).raw("\" data-sort=\"");
@@ -131,6 +134,17 @@ fn conditions(html: &mut Html, sheet: &Sheet) {
             html.raw("<p>").text(&count(*number, "hand-in")).raw(":</p>\n");
         }
         super::hand_in::conditions(html, conditions);
+    }
+    if let Some(held_back) = &sheet.held_back {
+        let original = |(name, original): &(String, String)| format!("{name} ({original})");
+        let scenes: Vec<String> = held_back.scenes.iter().map(original).collect();
+        html.raw("<p>Held-back scenes: ").text(&scenes.join(", ")).raw("; seed ");
+        html.show(held_back.seed).raw(", <code>--perturb ").show(held_back.seed);
+        html.raw(
+            "</code> reproduces them. Give students nothing but the folders of their hand-ins: ",
+        );
+        html.raw("this page, report.json, grades.csv and the folder <code>").raw(INSTRUCTOR);
+        html.raw("</code> are for the instructor.</p>\n");
     }
     html.raw("</section>\n");
 }

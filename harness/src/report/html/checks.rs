@@ -4,8 +4,9 @@ use super::super::number::{self, is_failure, value};
 use super::markup::Html;
 use crate::evidence::{Check, Measure, Picture, Verdict};
 
-/// All checks, those that cost points first.
-pub(super) fn checks(html: &mut Html, checks: &[Check]) {
+/// All checks, those that cost points first. `public_pictures` leads from the page to the folder of
+/// the pictures that are not held back: empty, or ending with a slash.
+pub(super) fn checks(html: &mut Html, checks: &[Check], public_pictures: &str) {
     // A check is linked by its place in the evidence, wherever it is shown.
     let pick = |wanted: fn(&Check) -> bool| -> Vec<(usize, &Check)> {
         checks.iter().enumerate().filter(|(_, check)| wanted(check)).collect()
@@ -14,28 +15,35 @@ pub(super) fn checks(html: &mut Html, checks: &[Check]) {
     if !failed.is_empty() {
         html.raw("<section>\n<h2>What is wrong</h2>\n");
         for (place, check) in failed {
-            article(html, place, check);
+            article(html, place, check, public_pictures);
         }
         html.raw("</section>\n");
     }
     let silent = |check: &Check| matches!(check.verdict, Verdict::NotJudged | Verdict::NotRun);
-    folded(html, "could not be judged", true, &pick(silent));
-    folded(html, "passed", false, &pick(|check| check.verdict == Verdict::Pass));
+    let passed = |check: &Check| check.verdict == Verdict::Pass;
+    folded(html, "could not be judged", true, &pick(silent), public_pictures);
+    folded(html, "passed", false, &pick(passed), public_pictures);
 }
 
-fn folded(html: &mut Html, what: &str, open: bool, checks: &[(usize, &Check)]) {
+fn folded(
+    html: &mut Html,
+    what: &str,
+    open: bool,
+    checks: &[(usize, &Check)],
+    public_pictures: &str,
+) {
     if checks.is_empty() {
         return;
     }
     html.raw(if open { "<details open>" } else { "<details>" }).raw("\n<summary>");
     html.text(&number::count(checks.len(), "check")).raw(" ").text(what).raw("</summary>\n");
     for (place, check) in checks {
-        article(html, *place, check);
+        article(html, *place, check, public_pictures);
     }
     html.raw("</details>\n");
 }
 
-fn article(html: &mut Html, place: usize, check: &Check) {
+fn article(html: &mut Html, place: usize, check: &Check, public_pictures: &str) {
     html.raw("<article id=\"check-").show(place).raw("\">\n<h3>");
     badge(html, check.verdict);
     html.raw(" <code>").text(&check.id).raw("</code>");
@@ -57,7 +65,8 @@ fn article(html: &mut Html, place: usize, check: &Check) {
         );
     }
     measures(html, &check.measures);
-    pictures(html, check);
+    let folder = if check.held_back { "" } else { public_pictures };
+    pictures(html, &check.name(), folder, &check.pictures);
     html.raw("</article>\n");
 }
 
@@ -88,14 +97,17 @@ fn measures(html: &mut Html, measures: &[Measure]) {
     html.raw("</tbody>\n</table>\n");
 }
 
-fn pictures(html: &mut Html, check: &Check) {
-    if check.pictures.is_empty() {
+/// Pictures side by side, of the thing called `name`; their files lie in `folder`, which ends in a
+/// slash or is empty.
+pub(super) fn pictures(html: &mut Html, name: &str, folder: &str, pictures: &[Picture]) {
+    if pictures.is_empty() {
         return;
     }
     html.raw("<div class=\"pictures\">\n");
-    for Picture { title, file } in &check.pictures {
-        html.raw("<figure><a href=\"").address(file).raw("\"><img loading=\"lazy\" src=\"");
-        html.address(file).raw("\" alt=\"").text(&check.name()).raw(": ").text(title);
+    for Picture { title, file } in pictures {
+        let file = format!("{folder}{file}");
+        html.raw("<figure><a href=\"").address(&file).raw("\"><img loading=\"lazy\" src=\"");
+        html.address(&file).raw("\" alt=\"").text(name).raw(": ").text(title);
         html.raw("\"></a><figcaption>").text(title).raw("</figcaption></figure>\n");
     }
     html.raw("</div>\n");

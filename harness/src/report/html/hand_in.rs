@@ -1,10 +1,10 @@
 //! The page of one hand-in.
 
 use super::super::harmless::harmless_lines;
-use super::super::number::{hints, is_range, of_part, points, range, seconds};
+use super::super::number::{hints, is_range, looks_like, of_part, points, range, seconds};
 use super::super::{Entry, HTML_FILE, Sheet};
 use super::markup::Html;
-use super::{begin, checks, class, end, part_class};
+use super::{Reader, begin, checks, class, end, part_class};
 use crate::evidence::{Check, Verdict};
 use crate::grading::{Conditions, StageCost};
 use crate::intake::{Finding, Severity};
@@ -15,12 +15,20 @@ const DIAGNOSTIC_LINES: usize = 400;
 
 /// The page of one hand-in: its parts with points and reasons, what failed with pictures, what
 /// could not be judged, what passed, findings, conditions and costs.
-pub fn hand_in(sheet: &Sheet, entry: &Entry) -> String {
+pub fn hand_in(sheet: &Sheet, entry: &Entry, reader: Reader) -> String {
+    let known;
+    let (entry, root) = match reader {
+        Reader::Instructor => (entry, "../.."),
+        Reader::Student => {
+            known = entry.for_student();
+            (&known, "..")
+        }
+    };
     let Entry { record, grade } = entry;
     let name = record.student.full_name();
     let name = if name.is_empty() { &record.name } else { &name };
     let mut html = begin(&format!("{name} - {}", sheet.title));
-    html.raw("<header class=\"top\">\n<nav><a href=\"../").raw(HTML_FILE);
+    html.raw("<header class=\"top\">\n<nav><a href=\"").raw(root).raw("/").raw(HTML_FILE);
     html.raw("\">All hand-ins</a></nav>\n<p class=\"course\">").text(&sheet.title);
     html.raw("</p>\n<h1>").text(name).raw("</h1>\n<p class=\"who\">");
     if !record.student.id.is_empty() {
@@ -43,13 +51,18 @@ pub fn hand_in(sheet: &Sheet, entry: &Entry) -> String {
     for remark in &grade.remarks {
         html.raw("<p class=\"notice\">").text(remark).raw("</p>\n");
     }
-    if record.evidence.checks.iter().any(|check| check.held_back) {
+    if reader == Reader::Instructor {
         html.raw("<p class=\"notice\">This page shows scenes that are held back: it is for the ");
-        html.raw("instructor, not for the student.</p>\n");
+        html.raw("instructor, not for the student, who gets <a href=\"");
+        html.address(&format!("{root}/{}/{HTML_FILE}", record.slug)).raw("\">another</a>.</p>\n");
     }
     html.raw("</header>\n<main>\n");
-    parts(&mut html, entry);
-    checks::checks(&mut html, &record.evidence.checks);
+    let public_pictures = match reader {
+        Reader::Student => String::new(),
+        Reader::Instructor => format!("{root}/{}/", record.slug),
+    };
+    parts(&mut html, entry, &public_pictures);
+    checks::checks(&mut html, &record.evidence.checks, &public_pictures);
     diagnostics(&mut html, &record.diagnostics);
     findings(&mut html, &record.findings);
     let marks: Vec<(f64, &str)> = grade.parts.iter().filter_map(|part| mark(part, entry)).collect();
@@ -62,25 +75,34 @@ pub fn hand_in(sheet: &Sheet, entry: &Entry) -> String {
     end(html, sheet)
 }
 
-fn parts(html: &mut Html, Entry { record, grade }: &Entry) {
+fn parts(html: &mut Html, Entry { record, grade }: &Entry, public_pictures: &str) {
     html.raw("<section>\n<h2>Parts</h2>\n<table class=\"parts\">\n<thead><tr>");
     html.raw("<th scope=\"col\">Part</th><th scope=\"col\">Points</th></tr></thead>\n<tbody>\n");
-    let checks = &record.evidence.checks;
     for part in &grade.parts {
         html.raw("<tr class=\"").raw(part_class(part)).raw("\"><td><strong><span class=\"id\">");
         html.text(&part.id).raw("</span> ").text(&part.title).raw("</strong><p>");
         html.text(&part.reason).raw("</p>");
         if part.points < part.out_of {
-            for hint in hints(part, checks) {
+            for words in looks_like(&part.id, &record.diagnoses) {
+                html.raw("<p class=\"hint\"><b>Looks like</b> ").text(&words).raw("</p>");
+            }
+            for diagnosis in record.diagnoses.iter().filter(|found| found.part == part.id) {
+                checks::pictures(html, "looks like", public_pictures, &diagnosis.pictures);
+            }
+            for hint in hints(part, &record.evidence.checks) {
                 html.raw("<p class=\"hint\"><b>Hint</b> ").text(hint).raw("</p>");
             }
-            decided_by(html, part, checks);
+            decided_by(html, part, &record.evidence.checks);
         }
         html.raw("</td><td class=\"worth\"><strong>").text(&of_part(part));
         html.raw("</strong> <span class=\"of\">of ").text(&points(part.out_of)).raw("</span>");
         html.bar(part.points, part.points_max, part.out_of).raw("</td></tr>\n");
     }
-    html.raw("</tbody>\n</table>\n</section>\n");
+    html.raw("</tbody>\n</table>\n");
+    for words in looks_like("", &record.diagnoses) {
+        html.raw("<p class=\"hint\"><b>Also looks like</b> ").text(&words).raw("</p>\n");
+    }
+    html.raw("</section>\n");
 }
 
 /// Links to the checks that decided a part.

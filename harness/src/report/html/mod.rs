@@ -23,6 +23,15 @@ const STYLE: &str = include_str!("style.css");
 /// Sorts the batch's table; the page is whole without it.
 const SORT: &str = include_str!("sort.js");
 
+/// Whom a page is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reader {
+    /// Nothing of held-back scenes but whether they are right and how wrong.
+    Student,
+    /// Everything. The page lies one folder deeper.
+    Instructor,
+}
+
 /// Everything up to the page's content.
 fn begin(title: &str) -> Html {
     let mut html = Html::default();

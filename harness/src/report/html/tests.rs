@@ -6,16 +6,18 @@ fn pages_say_what_matters() {
     let sheet = sample::sheet();
     let page = batch(&sheet).unwrap();
     for words in [
-        "<a href=\"./two_cosines/report.html\">Jörg Müller</a><small>two_cosines.tar.gz</small>",
+        "<a href=\"./instructor/two_cosines/report.html\">Jörg Müller</a><small>two_cosines.tar.gz</small>",
         "<td class=\"number total open\" data-sort=\"64.85\">64.85..84.85</td>",
         "<td class=\"number open\" data-sort=\"0\">0..20</td>",
         "3 hand-ins, 1 not wholly judged",
         "not graded under the same conditions",
         "1 warning, 1 note",
+        "<a href=\"./a2_ada/report.html\">Ada",
+        "--perturb 18446744073709551557",
     ] {
         assert!(page.contains(words), "{words:?} is not in the batch's page");
     }
-    let page = hand_in(&sheet, &sheet.entries[1]);
+    let page = hand_in(&sheet, &sheet.entries[1], Reader::Instructor);
     for words in [
         "<strong>64.85..84.85</strong> of 75 points",
         "<b>Hint</b> cos theta_i is multiplied twice: eval() holds it already",
@@ -29,9 +31,41 @@ fn pages_say_what_matters() {
     ] {
         assert!(page.contains(words), "{words:?} is not in the hand-in's page");
     }
-    let page = hand_in(&sheet, &sheet.entries[2]);
+    let page = hand_in(&sheet, &sheet.entries[2], Reader::Student);
     assert!(page.contains("expected `Vec3`, found `f32`"));
-    assert!(!hand_in(&sheet, &sheet.entries[0]).contains("What is wrong"));
+    assert!(!hand_in(&sheet, &sheet.entries[0], Reader::Student).contains("What is wrong"));
+}
+
+#[test]
+fn a_student_reads_nothing_of_held_back_scenes_but_that_they_are_wrong() {
+    let mut sheet = sample::sheet();
+    let words =
+        ["sums", "hints", "measures", "titles", "files"].map(|what| format!("SECRET-{what}"));
+    let record = &mut sheet.entries[1].record;
+    for check in record.evidence.checks.iter_mut().filter(|check| check.held_back) {
+        let [summary, hint, measure, title, file] = words.clone();
+        check.summary = summary;
+        check.hint = hint;
+        check.error = 0.123_456;
+        check.measures[0].name = measure;
+        check.pictures[0] = crate::evidence::Picture { title, file };
+    }
+    let [student, instructor] = [Reader::Student, Reader::Instructor]
+        .map(|reader| hand_in(&sheet, &sheet.entries[1], reader));
+    for word in &words {
+        assert!(instructor.contains(word), "{word:?} is not on the instructor's page");
+    }
+    let page = student.split("<h2>What is wrong</h2>").nth(1).unwrap();
+    assert!(page.contains("wrong on a held-back scene (error 0.12)"));
+    for word in ["SECRET", "0.1234", "18446744073709551557", "instructor", "<img"] {
+        assert!(!student.contains(word), "{word:?} is on the student's page");
+    }
+    // The instructor's page lies one folder deeper, beside the pictures of held-back scenes alone.
+    assert!(instructor.contains("<a href=\"../../report.html\">"));
+    assert!(instructor.contains("src=\"./SECRET-files\""));
+    sheet.entries[1].record.evidence.checks[2].held_back = false;
+    let instructor = hand_in(&sheet, &sheet.entries[1], Reader::Instructor);
+    assert!(instructor.contains("src=\"./../../two_cosines/SECRET-files\""));
 }
 
 /// Every tag that stands in a page, in order: what a browser sees of structure.
@@ -78,7 +112,9 @@ fn hostile_words_stay_words() {
     }
     let mut pages = vec![(batch(&plain).unwrap(), batch(&sheet).unwrap())];
     for (plain_entry, entry) in plain.entries.iter().zip(&sheet.entries) {
-        pages.push((hand_in(&plain, plain_entry), hand_in(&sheet, entry)));
+        for reader in [Reader::Student, Reader::Instructor] {
+            pages.push((hand_in(&plain, plain_entry, reader), hand_in(&sheet, entry, reader)));
+        }
     }
     for (plain, page) in pages {
         similar_asserts::assert_eq!(tags(&plain), tags(&page));
@@ -92,7 +128,9 @@ fn hostile_words_stay_words() {
 fn pages_load_nothing_from_elsewhere() {
     let sheet = sample::sheet();
     let mut pages = vec![batch(&sheet).unwrap()];
-    pages.extend(sheet.entries.iter().map(|entry| hand_in(&sheet, entry)));
+    for reader in [Reader::Student, Reader::Instructor] {
+        pages.extend(sheet.entries.iter().map(|entry| hand_in(&sheet, entry, reader)));
+    }
     for page in pages {
         assert!(!page.contains("http:") && !page.contains("https:") && !page.contains("url("));
         assert!(page.contains("default-src 'none'"));

@@ -1,7 +1,9 @@
 //! Every detail of one hand-in.
 
 use super::super::harmless::harmless_lines;
-use super::super::number::{self, hints, is_failure, is_range, of_part, points, seconds, total};
+use super::super::number::{
+    self, hints, is_failure, is_range, looks_like, of_part, points, seconds, total,
+};
 use super::super::{Entry, Sheet};
 use super::page::{Page, Style, columns, left, wrap};
 use crate::evidence::{Check, Measure, Verdict};
@@ -61,6 +63,10 @@ fn parts(page: &mut Page, Entry { record, grade }: &Entry) {
         if style == Style::Good {
             continue;
         }
+        for words in looks_like(&part.id, &record.diagnoses) {
+            let lead = [(Style::Plain, indent.as_str()), (Style::Heading, "looks like: ")];
+            page.wrapped(&lead, Style::Plain, &words);
+        }
         for hint in hints(part, &record.evidence.checks) {
             page.wrapped(
                 &[(Style::Plain, &indent), (Style::Heading, "hint: ")],
@@ -72,6 +78,9 @@ fn parts(page: &mut Page, Entry { record, grade }: &Entry) {
             let evidence = format!("decided by {}", part.evidence.join(", "));
             page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &evidence);
         }
+    }
+    for words in looks_like("", &record.diagnoses) {
+        page.wrapped(&[(Style::Heading, "  also looks like: ")], Style::Plain, &words);
     }
 }
 

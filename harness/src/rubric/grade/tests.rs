@@ -41,6 +41,11 @@ fn points(checks: &[Check]) -> Vec<f64> {
     grade.parts.iter().map(|part| part.points).collect()
 }
 
+/// The same check on a held-back scene.
+fn hidden(check: Check) -> Check {
+    Check { scene: "held-back-1".into(), held_back: true, ..check }
+}
+
 use Verdict::{Fail, NotImplemented, NotJudged, NotRun, Pass};
 
 #[test]
@@ -120,11 +125,85 @@ fn images_alone_earn_at_most_the_ceiling_and_a_closed_gate_everything() {
     assert_eq!(points(&checks), [0.0, 0.0, 0.0]);
 }
 
+#[test]
+fn a_part_is_worth_the_lower_of_public_and_held_back_scenes() {
+    let public = [check("image", Pass, 0.0), check("bonus", Pass, 0.0)];
+    let held_back = [
+        hidden(check("image", Fail, 0.5)),
+        hidden(check("rays", Fail, 0.1)),
+        hidden(check("bonus", Pass, 0.0)),
+        check("bsdf", Pass, 0.0),
+    ];
+    assert_eq!(points(&public), [10.0, 30.0, 20.0]);
+    let both = [&public[..], &held_back[..]].concat();
+    assert_eq!(points(&both), [10.0, 15.0, 20.0]);
+    // The other way round: what is right on held-back scenes rescues nothing.
+    let other = [
+        hidden(check("image", Pass, 0.0)),
+        hidden(check("bonus", Pass, 0.0)),
+        check("image", Fail, 0.5),
+        check("rays", Fail, 0.1),
+        check("bsdf", Pass, 0.0),
+        check("bonus", Pass, 0.0),
+    ];
+    assert_eq!(points(&other), [10.0, 15.0, 20.0]);
+}
+
+#[test]
+fn the_best_scene_counts_among_public_and_among_held_back_ones_apart() {
+    let at = |scene: &str, verdict, error| Check {
+        scene: scene.into(),
+        ..check("bonus", verdict, error)
+    };
+    let held_back =
+        |scene, verdict, error| Check { scene, ..hidden(check("bonus", verdict, error)) };
+    let mut checks = vec![at("teapot", Pass, 0.0), at("cbox", Fail, 1.0)];
+    checks.push(held_back("held-back-1".into(), Fail, 0.1));
+    checks.push(held_back("held-back-2".into(), Fail, 1.0));
+    assert_eq!(points(&checks)[2], 10.0);
+    checks.push(held_back("held-back-3".into(), Pass, 0.0));
+    assert_eq!(points(&checks)[2], 20.0);
+}
+
+#[test]
+fn reasons_tell_nothing_of_held_back_scenes() {
+    let secret = Check {
+        summary: "worst at (0.120, 1.200, -0.400)".into(),
+        ..hidden(check("rays", Fail, 0.123_456))
+    };
+    let image = |verdict| hidden(check("image", verdict, 0.5));
+    let base = vec![check("image", Pass, 0.0), check("bsdf", Pass, 0.0)];
+    let reason = |checks: &[Check]| {
+        let evidence = Evidence { checks: [base.as_slice(), checks].concat() };
+        grade(&rules(), &evidence).parts[1].reason.clone()
+    };
+    assert_eq!(reason(&[image(Fail), secret.clone()]), "wrong on a held-back scene (error 0.12)");
+    let blamed = reason(&[image(Fail), hidden(check("rays", Pass, 0.0))]);
+    assert_eq!(blamed, "every part alone is right, but wrong on a held-back scene (error 0.5)");
+    let silent = Check { verdict: NotRun, ..secret };
+    assert_eq!(
+        reason(&[image(Fail), silent]),
+        "could not be judged: not judged on a held-back scene"
+    );
+}
+
+#[test]
+fn who_dodges_the_held_back_scenes_gets_a_range() {
+    // Public evidence alone would be worth all points.
+    let public = ["image", "rays", "bsdf"]
+        .map(|id| Check { scene: "public".into(), ..check(id, Pass, 0.0) });
+    let dodged = [hidden(check("image", Fail, 1.0)), hidden(check("rays", NotJudged, 0.0))];
+    let evidence = Evidence { checks: [&public[..], &dodged[..]].concat() };
+    let part = &grade(&rules(), &evidence).parts[1];
+    assert_eq!((part.points, part.points_max), (0.0, 30.0));
+}
+
 fn any_check() -> impl Strategy<Value = Check> {
     let id = prop::sample::select(vec!["image", "bsdf", "pixels", "rays", "bonus", "tree", BUILD]);
     let verdict = prop::sample::select(vec![Pass, Fail, NotImplemented, NotJudged, NotRun]);
-    (id, verdict, 0.0..2.0f64, 0..3u8).prop_map(|(id, verdict, error, scene)| Check {
-        scene: format!("scene{scene}"),
+    (id, verdict, 0.0..2.0f64, 0..6u8).prop_map(|(id, verdict, error, scene)| Check {
+        scene: if scene == 0 { String::new() } else { format!("scene{scene}") },
+        held_back: scene > 3,
         ..check(id, verdict, error)
     })
 }
@@ -146,6 +225,29 @@ proptest! {
             turned.reverse();
         }
         prop_assert_eq!(before, grade(&rules(), &Evidence { checks: turned }));
+    }
+
+    #[test]
+    fn held_back_scenes_never_add_points(
+        checks in prop::collection::vec(any_check(), 0..16)
+    ) {
+        let all = grade(&rules(), &Evidence { checks: checks.clone() });
+        let apart = |wanted: &dyn Fn(&Check) -> bool| {
+            let checks = checks.iter().filter(|check| wanted(check)).cloned().collect();
+            grade(&rules(), &Evidence { checks })
+        };
+        let public = apart(&|check| !check.held_back);
+        // The same scenes, were they public.
+        let mut held_back: Vec<Check> =
+            checks.iter().filter(|c| c.held_back || c.scene.is_empty()).cloned().collect();
+        let any = held_back.iter().any(|check| check.held_back);
+        held_back.iter_mut().for_each(|check| check.held_back = false);
+        let held_back = grade(&rules(), &Evidence { checks: held_back });
+        for ((all, public), held_back) in all.parts.iter().zip(&public.parts).zip(&held_back.parts) {
+            let lower = |a: f64, b: f64| if any { a.min(b) } else { a };
+            prop_assert_eq!(all.points, lower(public.points, held_back.points));
+            prop_assert_eq!(all.points_max, lower(public.points_max, held_back.points_max));
+        }
     }
 
     #[test]

@@ -1,0 +1,267 @@
+//! From the parts that fail to what each looks like. Decides nothing: points are given without it.
+
+use serde::{Deserialize, Serialize};
+
+use super::catalogue::{Catalogue, KnownMistake};
+use super::loops;
+use super::nearest::{Exhibit, Guess, Nearest, nearest};
+use super::stored::{Material, Stored};
+use super::view::{Kind, Sightings, View};
+use crate::evidence::{Evidence, Picture, Verdict};
+use crate::imaging::ratio::ratio_name;
+
+/// What one failing part looks like.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// The part, such as `1.3`; empty for a finding that costs nothing.
+    pub part: String,
+    /// The known mistakes, all made together; each as the names that cannot be told apart.
+    pub mistakes: Vec<Vec<String>>,
+    /// A constant factor, if there is one.
+    pub factor: Option<f64>,
+    /// For the student, after the words "looks like:".
+    pub words: String,
+    /// The fraction of the difference from what is right that this leaves unexplained.
+    pub unexplained: f64,
+    /// The same of the next best guess; 1 is what is right.
+    pub runner_up: f64,
+    /// Small pictures: what was drawn, what is right, what the known mistake draws.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pictures: Vec<Picture>,
+}
+
+/// All that a diagnosis is made from. Nothing of it comes from scenes that are held back.
+pub struct Facts<'a> {
+    /// What was found out.
+    pub evidence: &'a Evidence,
+    /// The parts that lost points.
+    pub failing: &'a [String],
+    /// What the renderer answered.
+    pub sightings: &'a Sightings,
+    /// What known mistakes answer.
+    pub stored: &'a Stored,
+    /// What they are.
+    pub catalogue: &'a Catalogue,
+}
+
+/// The checks of a part, and the view that isolates it.
+struct Question {
+    part: &'static str,
+    checks: &'static [&'static str],
+    isolated: &'static [Kind],
+    /// The image that shows it too.
+    image: Kind,
+    /// The material that it is about, if any.
+    material: Option<Material>,
+}
+
+const QUESTIONS: [Question; 9] = {
+    const fn question(
+        part: &'static str,
+        checks: &'static [&'static str],
+        isolated: &'static [Kind],
+        image: Kind,
+        material: Option<Material>,
+    ) -> Question {
+        Question { part, checks, isolated, image, material }
+    }
+    let (diffuse, phong) = (Some(Material::Diffuse), Some(Material::Phong));
+    [
+        question("1.1", &["bsdf.diffuse"], &[Kind::Diffuse], Kind::Offline, diffuse),
+        question("1.2", &["bsdf.phong"], &[Kind::Phong], Kind::Offline, phong),
+        question("1.3", &["radiance.lit", "loop.agreement"], &[Kind::Lit], Kind::Offline, None),
+        question("1.4", &["shadow.rays"], &[Kind::Shadow], Kind::Offline, None),
+        question("2.1", &["pass.uniforms"], &[], Kind::Realtime, None),
+        question("2.2", &["stage.vertex"], &[], Kind::Realtime, None),
+        question("2.3", &["stage.diffuse"], &[Kind::Fragment], Kind::Realtime, diffuse),
+        question("2.4", &["stage.phong"], &[Kind::Fragment], Kind::Realtime, phong),
+        question("2.5", &["bonus.image"], &[Kind::Bonus], Kind::Bonus, None),
+    ]
+};
+
+impl Facts<'_> {
+    /// What every failing part looks like; nothing of those that look like nothing known.
+    pub fn diagnose(&self) -> Vec<Diagnosis> {
+        let mut found = self.by_findings();
+        for question in &QUESTIONS {
+            let known = |diagnosis: &Diagnosis| diagnosis.part == question.part;
+            if self.fails(question.part) && !self.unwritten(question) && !found.iter().any(known) {
+                found.extend(self.part(question));
+            }
+        }
+        found.sort_by(|a, b| a.part.cmp(&b.part));
+        found
+    }
+
+    fn fails(&self, part: &str) -> bool {
+        self.failing.iter().any(|failing| failing == part)
+    }
+
+    fn verdict_of(&self, check: &str, verdict: Verdict) -> bool {
+        let seen = |check: &crate::evidence::Check| !check.held_back && check.verdict == verdict;
+        self.evidence.named(check).any(seen)
+    }
+
+    fn unwritten(&self, question: &Question) -> bool {
+        question.checks.iter().any(|check| self.verdict_of(check, Verdict::NotImplemented))
+    }
+
+    /// Mistakes that a finding gives away.
+    fn by_findings(&self) -> Vec<Diagnosis> {
+        let found = |mistake: &&KnownMistake| {
+            let fails = |id: &String| self.verdict_of(id, Verdict::Fail);
+            !mistake.findings.is_empty() && mistake.findings.iter().all(fails)
+        };
+        let mistakes = self.catalogue.mistakes.iter().filter(found);
+        let named = mistakes.map(|mistake| Diagnosis {
+            part: mistake.parts.iter().find(|part| self.fails(part)).cloned().unwrap_or_default(),
+            ..self.known(&[&mistake.name], 0.0, 1.0)
+        });
+        named.collect()
+    }
+
+    fn part(&self, question: &Question) -> Option<Diagnosis> {
+        let part = question.part;
+        let own = |mistake: &KnownMistake| mistake.parts.iter().any(|own| own == part);
+        let failing = |mistake: &KnownMistake| mistake.parts.iter().any(|part| self.fails(part));
+        let [isolated, image] = [question.isolated, &[question.image]]
+            .map(|kinds| self.exhibits(kinds, question.material));
+        if part == "1.3" {
+            return self.direct_light(&isolated, &image);
+        }
+        let found = if isolated.is_empty() {
+            self.among(&image, own).or_else(|| self.among(&image, failing))
+        } else {
+            // What isolates a part may hide how it went wrong: a surface point that is overwritten
+            // under a constant witness.
+            self.among(&isolated, own).or_else(|| self.among(&image, own))
+        };
+        found.map(|diagnosis| Diagnosis { part: part.to_owned(), ..diagnosis })
+    }
+
+    /// Part 1.3 is radiance along rays, and the loop that makes an image of it.
+    fn direct_light(&self, lit: &[Exhibit], image: &[Exhibit]) -> Option<Diagnosis> {
+        let own = |mistake: &KnownMistake| mistake.parts.iter().any(|part| part == "1.3");
+        let looping =
+            |mistake: &KnownMistake| matches!(&*mistake.family, "loop" | "film" | "camera");
+        let rays_fail = self.verdict_of("radiance.lit", Verdict::Fail);
+        let loop_fails = self.verdict_of("loop.agreement", Verdict::Fail);
+        let radiance = || {
+            let seen = if lit.is_empty() { image } else { lit };
+            self.among(seen, |mistake| own(mistake) && !looping(mistake))
+        };
+        let by_loop = || {
+            // Scenes that nothing is stored of are held back.
+            let public =
+                |scene: &&String| self.stored.views.contains_key(&View::new(Kind::Offline, scene));
+            let scenes = self.sightings.loops.iter().filter(|(scene, _)| public(scene));
+            let made = loops::explain(scenes.map(|(_, seen)| seen));
+            made.map(|(name, left)| self.known(&[name], left, 1.0))
+                .or_else(|| self.among(image, |mistake| own(mistake) && looping(mistake)))
+        };
+        let film =
+            || self.among(&self.exhibits(&[Kind::Film], None), |mistake| mistake.family == "loop");
+        let found = match (rays_fail, loop_fails) {
+            (true, true) => match (radiance(), by_loop()) {
+                (Some(a), Some(b)) => Some(a.and(b)),
+                (a, b) => a.or(b),
+            },
+            (true, false) => radiance(),
+            (false, true) => by_loop(),
+            // Every ray is right, and the image at one sample per pixel too.
+            (false, false) => film(),
+        };
+        found.map(|diagnosis| Diagnosis { part: "1.3".to_owned(), ..diagnosis })
+    }
+
+    /// What the renderer answered to questions of these kinds, beside what the store knows.
+    fn exhibits(&self, kinds: &[Kind], material: Option<Material>) -> Vec<Exhibit<'_>> {
+        let seen = self.sightings.tiles.iter().filter(|(view, _)| kinds.contains(&view.kind));
+        let exhibits = seen.filter_map(|(view, tile)| {
+            let stored = self.stored.views.get(view)?;
+            let everything = material.is_none() || matches!(view.kind, Kind::Diffuse | Kind::Phong);
+            let counts = |shown: &Material| match everything {
+                true => *shown != Material::Ignored,
+                false => Some(*shown) == material,
+            };
+            Some(Exhibit {
+                seen: tile,
+                right: &stored.right,
+                mistakes: &stored.mistakes,
+                counts: stored.materials.iter().map(counts).collect(),
+            })
+        });
+        exhibits.collect()
+    }
+
+    /// What some views look like, among some of the known mistakes.
+    fn among(
+        &self,
+        exhibits: &[Exhibit],
+        wanted: impl Fn(&KnownMistake) -> bool,
+    ) -> Option<Diagnosis> {
+        let mut names: Vec<&str> = Vec::new();
+        for mistake in self.catalogue.mistakes.iter().filter(|mistake| wanted(mistake)) {
+            if !mistake.alike.iter().any(|other| names.contains(&other.as_str())) {
+                names.push(&mistake.name);
+            }
+        }
+        let Nearest { guess, distance, runner_up } = nearest(exhibits, &names)?;
+        Some(match guess {
+            Guess::One(name) => self.known(&[&name], distance, runner_up),
+            Guess::Two(a, b) => self.known(&[&a, &b], distance, runner_up),
+            Guess::Factor(factor) => self.known(&[], distance, runner_up).times(factor),
+            Guess::Scaled(name, factor) => self.known(&[&name], distance, runner_up).times(factor),
+        })
+    }
+
+    /// The words for mistakes made together.
+    fn known(&self, names: &[&str], unexplained: f64, runner_up: f64) -> Diagnosis {
+        let (mut mistakes, mut words) = (Vec::new(), Vec::new());
+        for name in names {
+            let Some(mistake) = self.catalogue.named(name) else { continue };
+            let alike: Vec<&KnownMistake> = std::iter::once(mistake)
+                .chain(mistake.alike.iter().filter_map(|other| self.catalogue.named(other)))
+                .collect();
+            mistakes.push(alike.iter().map(|mistake| mistake.name.clone()).collect());
+            let each: Vec<&str> = alike.iter().map(|mistake| mistake.looks_like.as_str()).collect();
+            words.push(each.join("; or "));
+        }
+        let words = words.join("; and ");
+        Diagnosis {
+            part: String::new(),
+            mistakes,
+            factor: None,
+            words,
+            unexplained,
+            runner_up,
+            pictures: Vec::new(),
+        }
+    }
+}
+
+impl Diagnosis {
+    /// Two things that were found apart, in one part.
+    fn and(self, other: Self) -> Self {
+        Self {
+            mistakes: [self.mistakes, other.mistakes].concat(),
+            factor: self.factor.or(other.factor),
+            words: format!("{}; and {}", self.words, other.words),
+            unexplained: self.unexplained.max(other.unexplained),
+            runner_up: self.runner_up.min(other.runner_up),
+            part: self.part,
+            pictures: Vec::new(),
+        }
+    }
+
+    /// The same with a constant factor on top.
+    fn times(mut self, factor: f32) -> Self {
+        let value = f64::from(factor);
+        let name = ratio_name(value).map(|name| format!(" ({name})")).unwrap_or_default();
+        let words = format!("off by a constant factor of {value:.4}{name}");
+        self.words =
+            if self.words.is_empty() { words } else { format!("{}; and {words}", self.words) };
+        self.factor = Some(value);
+        self
+    }
+}

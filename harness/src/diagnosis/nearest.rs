@@ -1,0 +1,218 @@
+//! The known mistake that answers are nearest to, if it is clearly nearer than any other and than
+//! what is right. Pure: tiles in, a guess out.
+
+use std::collections::BTreeMap;
+
+use basecode::Vec3;
+
+use super::tile::Tile;
+
+/// Values that differ by less than this fraction of their sum are the same: 16-bit floats in the
+/// store and f32 arithmetic in any order.
+const DEAD_ZONE: f32 = 1.5e-3;
+/// A difference counts against at least this fraction of the mean of what is right.
+const FLOOR: f32 = 1e-3;
+/// Mean difference from what is right below which there is nothing to explain.
+const NOTHING: f64 = 1e-5;
+/// A single mistake is named when it leaves less than this fraction of the difference unexplained.
+/// Measured: a mistake that the catalogue lacks leaves more, but for its own kin.
+const SINGLE: f64 = 0.2;
+/// The same for a constant factor.
+const FACTOR: f64 = 0.1;
+/// The same for two mistakes together, which fit more easily.
+const PAIR: f64 = 0.1;
+/// What is named must leave less than this fraction of what the runner-up leaves.
+const CLEARLY: f64 = 0.5;
+/// Pairs are compared on so many views at most, those that differ most.
+const PAIR_VIEWS: usize = 4;
+
+/// One view of the renderer in question, beside what the store knows of it.
+pub struct Exhibit<'a> {
+    /// What it answered.
+    pub seen: &'a Tile,
+    /// What is right.
+    pub right: &'a Tile,
+    /// What known mistakes answer; one that is not here answers what is right.
+    pub mistakes: &'a BTreeMap<String, Tile>,
+    /// Which values count.
+    pub counts: Vec<bool>,
+}
+
+/// What answers look like.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Guess {
+    /// This mistake.
+    One(String),
+    /// What is right, times a constant.
+    Factor(f32),
+    /// This mistake, and a constant factor on top.
+    Scaled(String, f32),
+    /// These two together.
+    Two(String, String),
+}
+
+/// A guess with its distance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nearest {
+    /// What it is.
+    pub guess: Guess,
+    /// Its distance, as a fraction of the distance from what is right.
+    pub distance: f64,
+    /// The distance of the next best guess of the same sort; 1 is that of what is right.
+    pub runner_up: f64,
+}
+
+/// What the answers look like, among mistakes of these names; no two of them may look the same.
+pub fn nearest(exhibits: &[Exhibit], names: &[&str]) -> Option<Nearest> {
+    if from_right(exhibits) < NOTHING {
+        return None;
+    }
+    let shown: Vec<(&Exhibit, f32)> =
+        exhibits.iter().map(|exhibit| (exhibit, scale(exhibit))).collect();
+    let distance = |shown: &[(&Exhibit, f32)], guess: &dyn Fn(&Exhibit) -> Tile| {
+        let from_right = total(shown, |exhibit| exhibit.right.clone());
+        total(shown, guess).sum / from_right.sum.max(f64::MIN_POSITIVE)
+    };
+    let single: Vec<f64> =
+        names.iter().map(|name| distance(&shown, &|exhibit| exhibit.tile(name).clone())).collect();
+    let singles = single.iter().zip(names);
+    let singles = singles.map(|(&distance, &name)| (distance, Guess::One(name.to_owned())));
+    if let Some(found) = clearest(singles.collect(), SINGLE) {
+        return Some(found);
+    }
+    let factor = common_factor(&shown, |exhibit| exhibit.right.clone());
+    let left = distance(&shown, &|exhibit| exhibit.right.map(|value| factor * value));
+    if left < FACTOR {
+        return Some(Nearest { guess: Guess::Factor(factor), distance: left, runner_up: 1.0 });
+    }
+    let mut most = shown;
+    let apart = |(exhibit, scale): &(&Exhibit, f32)| {
+        total(&[(*exhibit, *scale)], |exhibit| exhibit.right.clone()).sum
+    };
+    most.sort_by(|a, b| apart(b).total_cmp(&apart(a)));
+    most.truncate(PAIR_VIEWS);
+    let mut pairs = Vec::new();
+    for (i, first) in names.iter().enumerate() {
+        let factor = common_factor(&most, |exhibit| exhibit.tile(first).clone());
+        let left = distance(&most, &|exhibit| exhibit.tile(first).map(|value| factor * value));
+        if left < CLEARLY * single[i] {
+            pairs.push((left, Guess::Scaled((*first).to_owned(), factor)));
+        }
+        for (j, second) in names.iter().enumerate().skip(i + 1) {
+            let left = distance(&most, &|exhibit| exhibit.both(first, second));
+            // A second mistake that explains nothing more is none.
+            if left < CLEARLY * single[i].min(single[j]) {
+                pairs.push((left, Guess::Two((*first).to_owned(), (*second).to_owned())));
+            }
+        }
+    }
+    clearest(pairs, PAIR)
+}
+
+/// The mean difference of all answers from what is right: 0 is the same, 1 nothing alike.
+pub fn from_right(exhibits: &[Exhibit]) -> f64 {
+    let shown: Vec<_> = exhibits.iter().map(|exhibit| (exhibit, scale(exhibit))).collect();
+    total(&shown, |exhibit| exhibit.right.clone()).mean()
+}
+
+impl Exhibit<'_> {
+    fn tile(&self, name: &str) -> &Tile {
+        self.mistakes.get(name).unwrap_or(self.right)
+    }
+
+    /// Two mistakes together, from each alone: what either does to what is right, it does to the
+    /// other too.
+    fn both(&self, first: &str, second: &str) -> Tile {
+        let compose = |right: f32, a: f32, b: f32| if right == 0.0 { a + b } else { a * b / right };
+        self.right.combine(self.tile(first), self.tile(second), |right, a, b| {
+            Vec3::from_array(std::array::from_fn(|c| compose(right[c], a[c], b[c])))
+        })
+    }
+}
+
+/// The nearest guess, if it leaves less than `limit` and clearly less than the next one.
+fn clearest(mut guesses: Vec<(f64, Guess)>, limit: f64) -> Option<Nearest> {
+    guesses.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let runner_up = guesses.get(1).map_or(1.0, |(distance, _)| distance.min(1.0));
+    let (distance, guess) = guesses.into_iter().next()?;
+    (distance < limit && distance < CLEARLY * runner_up).then_some(Nearest {
+        guess,
+        distance,
+        runner_up,
+    })
+}
+
+/// Differences, added up.
+#[derive(Clone, Copy, Default)]
+struct Total {
+    sum: f64,
+    count: usize,
+}
+
+impl Total {
+    fn mean(self) -> f64 {
+        self.sum / self.count.max(1) as f64
+    }
+}
+
+/// How far the answers are from a guess, over all views.
+fn total(shown: &[(&Exhibit, f32)], guess: impl Fn(&Exhibit) -> Tile) -> Total {
+    let mut total = Total::default();
+    for (exhibit, scale) in shown {
+        let guess = guess(exhibit);
+        let values = exhibit.seen.values().iter().zip(guess.values()).zip(&exhibit.counts);
+        for ((a, b), _) in values.filter(|(_, counts)| **counts) {
+            if let Some(difference) = difference(*a, *b, *scale) {
+                total.sum += f64::from(difference);
+                total.count += 1;
+            }
+        }
+    }
+    total
+}
+
+/// The relative difference of an answer and a guess, from 0 to 1; nothing where nothing was asked.
+/// A guess by which there would have been nothing to ask is all wrong.
+fn difference(a: Vec3, b: Vec3, scale: f32) -> Option<f32> {
+    if a.is_nan() {
+        return None;
+    }
+    Some(match (a.is_finite(), b.is_finite()) {
+        (true, true) => {
+            let size = a.abs().element_sum() + b.abs().element_sum();
+            ((a - b).abs().element_sum() / (size + FLOOR * scale) - DEAD_ZONE).max(0.0)
+        }
+        (false, false) => 0.0,
+        _ => 1.0,
+    })
+}
+
+/// The mean of what is right.
+fn scale(exhibit: &Exhibit) -> f32 {
+    let (mut sum, mut count) = (0.0f64, 0);
+    for value in exhibit.right.values().iter().filter(|value| value.is_finite()) {
+        sum += f64::from(value.abs().element_sum());
+        count += 1;
+    }
+    (sum / f64::from(count.max(1))).max(1e-6) as f32
+}
+
+/// The median of answers over a guess, where the guess is not dark.
+fn common_factor(shown: &[(&Exhibit, f32)], guess: impl Fn(&Exhibit) -> Tile) -> f32 {
+    let mut ratios = Vec::new();
+    for (exhibit, scale) in shown {
+        let guess = guess(exhibit);
+        let values = exhibit.seen.values().iter().zip(guess.values()).zip(&exhibit.counts);
+        for ((a, b), counts) in values {
+            let (a, b) = (a.element_sum(), b.element_sum());
+            if *counts && a.is_finite() && b.is_finite() && b > 0.05 * scale {
+                ratios.push(a / b);
+            }
+        }
+    }
+    ratios.sort_by(f32::total_cmp);
+    ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,147 @@
+//! Views: the questions whose answers are compared with those of known mistakes.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use basecode::Image;
+
+use super::tile::Tile;
+
+/// What was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// The diffuse BSDF at the probes of part 1.1.
+    Diffuse,
+    /// The Phong BSDF at the probes of part 1.2.
+    Phong,
+    /// Radiance without shadows at pixel centres, under a witness BSDF.
+    Lit,
+    /// Visibility at pixel centres, under a witness BSDF.
+    Shadow,
+    /// The offline image at one sample per pixel.
+    Offline,
+    /// The offline image at the scene's own samples per pixel.
+    Film,
+    /// The realtime image.
+    Realtime,
+    /// The fragment stages alone, under a right vertex stage.
+    Fragment,
+    /// The bonus' image over the plain one.
+    Bonus,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Diffuse,
+        Self::Phong,
+        Self::Lit,
+        Self::Shadow,
+        Self::Offline,
+        Self::Film,
+        Self::Realtime,
+        Self::Fragment,
+        Self::Bonus,
+    ];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Diffuse => "diffuse",
+            Self::Phong => "phong",
+            Self::Lit => "lit",
+            Self::Shadow => "shadow",
+            Self::Offline => "offline",
+            Self::Film => "film",
+            Self::Realtime => "realtime",
+            Self::Fragment => "fragment",
+            Self::Bonus => "bonus",
+        }
+    }
+
+    /// Whether its tiles are pictures of the scene.
+    pub fn is_picture(self) -> bool {
+        matches!(self, Self::Offline | Self::Realtime)
+    }
+}
+
+/// A question on a scene.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct View {
+    /// What is asked.
+    pub kind: Kind,
+    /// Name of the scene; empty for BSDFs given by value.
+    pub scene: String,
+}
+
+impl View {
+    /// A question on a scene.
+    pub fn new(kind: Kind, scene: &str) -> Self {
+        Self { kind, scene: scene.to_owned() }
+    }
+
+    /// The view of a name that [`View`] was shown as.
+    pub fn named(name: &str) -> Option<Self> {
+        let (kind, scene) = name.split_once('-').unwrap_or((name, ""));
+        let kind = Kind::ALL.into_iter().find(|known| known.name() == kind)?;
+        Some(Self::new(kind, scene))
+    }
+}
+
+impl fmt::Display for View {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.scene.as_str() {
+            "" => write!(f, "{}", self.kind.name()),
+            scene => write!(f, "{}-{scene}", self.kind.name()),
+        }
+    }
+}
+
+/// What one renderer answered.
+#[derive(Clone, Debug, Default)]
+pub struct Sightings {
+    /// The tiles of its answers.
+    pub tiles: BTreeMap<View, Tile>,
+    /// By scene: radiance along the centres of all pixels, and the image that its own loop made of it.
+    pub loops: BTreeMap<String, LoopSeen>,
+}
+
+/// The same pixels twice: along the host's rays, and by the renderer's own loop.
+#[derive(Clone, Debug)]
+pub struct LoopSeen {
+    /// Radiance along the rays.
+    pub rays: Image,
+    /// The image at one sample per pixel.
+    pub image: Image,
+}
+
+impl Sightings {
+    /// Keeps an answer. Answers to the same question fill each other's gaps.
+    pub fn see(&mut self, view: View, tile: Tile) {
+        if tile.is_empty() {
+            return;
+        }
+        match self.tiles.get_mut(&view) {
+            Some(own) => own.fill(&tile),
+            None => {
+                self.tiles.insert(view, tile);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn views_have_names() {
+        for kind in Kind::ALL {
+            for scene in ["", "cbox", "sphere_phong", "a-b"] {
+                let view = View::new(kind, scene);
+                assert_eq!(View::named(&view.to_string()), Some(view));
+            }
+        }
+        assert_eq!(View::named("colour-cbox"), None);
+    }
+}

@@ -1,0 +1,101 @@
+//! The machine's word against a hand-in's: who blames the machine (no adapter, a lost device, a full
+//! disk, a worker that could not begin) is believed when a renderer of ours fails on the same case.
+
+use super::ask::Asker;
+use super::draw;
+use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
+use crate::process::Limits;
+use crate::worker::{
+    Adapter, AdapterKind, CameraValue, Job, Matter, Outcome, Request, blames_the_machine,
+};
+
+/// Settles the outcomes of `job` that blame the machine: what a renderer of ours does is the
+/// hand-in's own failure; otherwise they are asked again while there is patience, and stay ungraded.
+pub fn question_the_machine(asker: &Asker, job: &Job, outcomes: &mut [Outcome]) {
+    loop {
+        let blaming = |&index: &usize| blames_the_machine(&outcomes[index]);
+        let blaming: Vec<usize> = (0..outcomes.len()).filter(blaming).collect();
+        let Some(&first) = blaming.first() else { return };
+        if asker.is_cancelled() {
+            return;
+        }
+        if let Some(witness) = works_here(asker, job, &job.requests[first]) {
+            for index in blaming {
+                outcomes[index] =
+                    Outcome::Failed(format!("{} ({witness})", said(&outcomes[index])));
+            }
+            return;
+        }
+        if !asker.patience.another_try() {
+            for index in blaming {
+                let (reason, matter) = (said(&outcomes[index]).to_owned(), Matter::Machine);
+                outcomes[index] = Outcome::NotRun { reason, matter };
+            }
+            return;
+        }
+        let requests = blaming.iter().map(|&index| job.requests[index].clone()).collect();
+        let again = asker.run(&Job { plugin: job.plugin.clone(), requests });
+        for (index, outcome) in blaming.into_iter().zip(again) {
+            outcomes[index] = outcome;
+        }
+    }
+}
+
+/// What an outcome says in words.
+fn said(outcome: &Outcome) -> &str {
+    match outcome {
+        Outcome::NoAdapter(said) | Outcome::Failed(said) | Outcome::Panicked(said) => said,
+        Outcome::NotRun { reason, .. } => reason,
+        _ => "",
+    }
+}
+
+/// Asks a renderer of ours the same in a fresh worker: the reference, or Umbra's own pass for stages
+/// and where there is no reference. Says who could do it; nothing when it fails as well.
+fn works_here(asker: &Asker, job: &Job, request: &Request) -> Option<&'static str> {
+    let mut request = request.clone();
+    request.scene_mut().options.clear();
+    let reference = asker.reference.filter(|_| job.plugin.is_some());
+    if reference.is_none() {
+        request = own_pass(&request);
+    }
+    let control = Job { plugin: reference.map(Into::into), requests: vec![request] };
+    // What a hand-in may use is no measure of ours.
+    let limits = Limits { threads: asker.limits.threads, ..Limits::default() };
+    let report = asker.supervisor.run_job(&control, &limits, asker.cancel, &mut |_| ());
+    let outcome = report.outcomes.first()?;
+    let offline = !matches!(job.requests.first(), Some(Request::RenderRealtime { .. }));
+    match reference {
+        Some(_) if outcome.answer().is_some() => Some("but the reference renderer can do it here"),
+        None if outcome.answer().is_some() => Some("but Umbra's own pass draws here"),
+        // Offline needs no adapter, but a worker that begins.
+        None if offline && !matches!(outcome, Outcome::NotRun { .. }) => {
+            Some("but other workers run here")
+        }
+        _ => None,
+    }
+}
+
+/// A frame of the same scene by Umbra's own pass, under stages of ours.
+fn own_pass(request: &Request) -> Request {
+    let stages = draw::named([VERTEX, SHOW_NORMAL, SHOW_NORMAL].map(str::to_owned));
+    match request.clone() {
+        Request::RenderRealtime { scene, width, height, shadow_map, adapter, cameras, .. } => {
+            Request::RenderRealtime { scene, width, height, shadow_map, adapter, stages, cameras }
+        }
+        offline => Request::RenderRealtime {
+            scene: offline.scene().clone(),
+            width: 16,
+            height: 16,
+            shadow_map: false,
+            adapter: Adapter { kind: AdapterKind::Software, name: String::new() },
+            stages,
+            cameras: vec![CameraValue {
+                eye: [0.0, 0.0, 1.0],
+                at: [0.0; 3],
+                up: [0.0, 1.0, 0.0],
+                fov_y_deg: 40.0,
+            }],
+        },
+    }
+}

@@ -1,0 +1,140 @@
+//! Frames: one of a scene under given stages, asked of a plugin or of Umbra's neutral pass.
+
+use std::path::Path;
+
+use super::ask::Asker;
+use super::case::Case;
+use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
+use crate::worker::{Outcome, Request, Stage};
+
+/// The names of the stages, in order.
+pub const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
+
+/// A frame to be drawn.
+#[derive(Clone)]
+pub struct Frame<'a> {
+    /// The scene, whose camera looks.
+    pub case: &'a Case,
+    /// Which of its TOML files.
+    pub toml: &'a Path,
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Whether to draw shadows.
+    pub shadow_map: bool,
+    /// Stages to replace; all three where there is no plugin.
+    pub stages: Vec<Stage>,
+}
+
+impl<'a> Frame<'a> {
+    /// The realtime image of a scene, on the film that it is judged on.
+    pub fn plain(case: &'a Case) -> Self {
+        let toml = case.realtime.as_path();
+        Self { case, toml, size: case.film(), shadow_map: false, stages: Vec::new() }
+    }
+
+    /// A scene's small film under other stages.
+    pub fn small(case: &'a Case, stages: Vec<Stage>) -> Self {
+        Self { size: (case.small.width, case.small.height), stages, ..Self::plain(case) }
+    }
+}
+
+/// Texts under the names of the stages.
+pub fn named(texts: [String; 3]) -> Vec<Stage> {
+    let named = STAGES.iter().zip(texts);
+    named.map(|(&name, text)| Stage { name: name.to_owned(), text }).collect()
+}
+
+/// Draws one frame in a worker of its own.
+pub fn draw(asker: &Asker, plugin: Option<&Path>, frame: &Frame) -> Outcome {
+    draw_each(asker, plugin, std::slice::from_ref(frame)).pop().unwrap_or_else(|| {
+        Outcome::NoAdapter("the worker gave no outcome: a bug of Umbra's".into())
+    })
+}
+
+/// Draws frames, all in one worker while it lives.
+pub fn draw_each(asker: &Asker, plugin: Option<&Path>, frames: &[Frame]) -> Vec<Outcome> {
+    let adapter = match &asker.adapter {
+        Ok(adapter) => adapter,
+        Err(reason) => return vec![Outcome::NoAdapter(reason.clone()); frames.len()],
+    };
+    let request = |frame: &Frame| Request::RenderRealtime {
+        scene: asker.scene(frame.toml),
+        width: frame.size.0,
+        height: frame.size.1,
+        shadow_map: frame.shadow_map,
+        adapter: adapter.clone(),
+        stages: frame.stages.clone(),
+        cameras: vec![frame.case.camera],
+    };
+    asker.ask(plugin, frames.iter().map(request).collect())
+}
+
+/// Draws the frames of several scenes with a plugin, all in one worker while it lives, where
+/// drawing costs less. `is_right` says of a scene's outcomes, by its index, that they need no
+/// second look.
+pub fn draw_scenes(
+    asker: &Asker,
+    plugin: &Path,
+    scenes: &[Vec<Frame>],
+    is_right: &dyn Fn(usize, &[Outcome]) -> bool,
+) -> Vec<Vec<Outcome>> {
+    let mut outcomes = draw_each(asker, Some(plugin), &scenes.concat()).into_iter();
+    let of_scene = |frames: &Vec<Frame>| outcomes.by_ref().take(frames.len()).collect();
+    let mut drawn: Vec<Vec<Outcome>> = scenes.iter().map(of_scene).collect();
+    // A renderer may rely on a process of its own for each scene, as a command line gives it. So
+    // what is wrong must be wrong alone. Where that is so for the last, nothing was left behind.
+    let wrong: Vec<usize> = (0..scenes.len()).filter(|&i| !is_right(i, &drawn[i])).collect();
+    let alone = |index: usize| draw_each(asker, Some(plugin), &scenes[index]);
+    if let Some((&last, others)) = wrong.split_last().filter(|(last, _)| **last > 0) {
+        let own = alone(last);
+        if !drawn[last].iter().zip(&own).all(|(shared, own)| same(shared, own)) {
+            drawn[last] = own;
+            others.iter().for_each(|&index| drawn[index] = alone(index));
+        }
+    }
+    drawn
+}
+
+/// Draws the plain image of every scene: those that only probe share a worker.
+pub fn draw_plain(
+    asker: &Asker,
+    plugin: &Path,
+    cases: &[Case],
+    is_right: &dyn Fn(&Case, &Outcome) -> bool,
+) -> Vec<Outcome> {
+    let probes: Vec<&Case> = cases.iter().filter(|case| case.is_probe()).collect();
+    let frames: Vec<Vec<Frame>> = probes.iter().map(|case| vec![Frame::plain(case)]).collect();
+    let all_right = |index: usize, outcomes: &[Outcome]| {
+        outcomes.iter().all(|outcome| is_right(probes[index], outcome))
+    };
+    let mut shared = draw_scenes(asker, plugin, &frames, &all_right).into_iter().flatten();
+    let drawn = cases.iter().map(|case| {
+        let shared = if case.is_probe() { shared.next() } else { None };
+        shared.unwrap_or_else(|| draw(asker, Some(plugin), &Frame::plain(case)))
+    });
+    drawn.collect()
+}
+
+/// Whether two outcomes are the same, bit by bit; what is no number equals itself.
+fn same(a: &Outcome, b: &Outcome) -> bool {
+    match (a.answer(), b.answer()) {
+        (Some(a), Some(b)) => {
+            let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            bits(&a.values) == bits(&b.values)
+        }
+        _ => a == b,
+    }
+}
+
+/// Whether this machine can draw at all: asks Umbra's own pass for one small frame.
+///
+/// # Errors
+/// Why not, in words.
+pub fn probe_adapter(asker: &Asker, case: &Case) -> Result<(), String> {
+    let stages = named([VERTEX, SHOW_NORMAL, SHOW_NORMAL].map(str::to_owned));
+    match draw(asker, None, &Frame { size: (16, 16), ..Frame::small(case, stages) }) {
+        Outcome::Done(_) => Ok(()),
+        Outcome::NoAdapter(message) | Outcome::Failed(message) => Err(message),
+        other => Err(format!("{other:?}")),
+    }
+}

@@ -1,0 +1,187 @@
+//! Parts 2.1 to 2.4 apart, where an image is wrong: the student's pass under stages of ours, and
+//! his stages under a pass of ours, on small films.
+
+use std::ops::Range;
+use std::path::Path;
+
+use basecode::{Image, Vec3};
+
+use super::ask::{self, Asker};
+use super::case::Case;
+use super::draw::{Frame, STAGES, draw_each, draw_scenes, named};
+use super::realtime::Stages;
+use crate::diagnosis::{Kind, Tile, View};
+use crate::evidence::images;
+use crate::evidence::stages::{
+    BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass, judge_vertex,
+};
+use crate::evidence::{Check, Verdict};
+use crate::imaging::evidence::Tolerances;
+use crate::imaging::reference::RegionMask;
+use crate::worker::{Outcome, Stage};
+
+/// The checks of the three stages, and the tasks that they belong to.
+const CHECKS: [(&str, &str); 3] = [
+    ("stage.vertex", "2.2 vertex shader"),
+    ("stage.diffuse", "2.3 diffuse fragment shader"),
+    ("stage.phong", "2.4 Phong fragment shader"),
+];
+
+/// Judges the student's pass under stages of ours (2.1) and his stages under a pass of ours (2.2
+/// to 2.4) on scenes: one worker draws all frames of the former, another without any code of his
+/// those of the latter.
+pub fn isolate(
+    asker: &Asker,
+    plugin: &Path,
+    cases: &[&Case],
+    stages: &Stages,
+    tolerances: &Tolerances,
+) -> Vec<Check> {
+    let shown = BoundValue::ALL
+        .map(|bound| named([VERTEX.to_owned(), bound.stage(false), bound.stage(true)]));
+    let (swaps, sets) = swaps(stages);
+    let is_right =
+        |index, frames: &[Outcome]| pass_check(cases[index], frames).verdict == Verdict::Pass;
+    let passes = draw_scenes(asker, plugin, &under(cases, &shown), &is_right);
+    let mut swapped = draw_each(asker, None, &under(cases, &sets).concat()).into_iter();
+    let judged = cases.iter().zip(passes).flat_map(|(case, pass)| {
+        let swapped: Vec<Outcome> = swapped.by_ref().take(sets.len()).collect();
+        let stage = |index: usize| {
+            let (id, task) = CHECKS[index];
+            let outcomes = match &swaps[index] {
+                Swap::Untouched => {
+                    let summary =
+                        format!("not implemented yet: {task}: the stage is the template's");
+                    return Check::new(id, &case.entry.name, Verdict::NotImplemented, summary);
+                }
+                Swap::Absent => {
+                    let name = STAGES[index];
+                    let summary = format!("swap not possible: there is no src/shaders/{name}.wgsl");
+                    return Check::new(id, &case.entry.name, Verdict::NotJudged, summary);
+                }
+                Swap::Drawn(range) => &swapped[range.clone()],
+            };
+            let images = match images(case, outcomes) {
+                Ok(images) => images,
+                Err(outcome) => return swap_failed(id, case, &[], outcome),
+            };
+            match images.as_slice() {
+                [positions, normals] => vertex(case, positions, normals),
+                [image] => {
+                    see_fragment(asker, case, image, index == 2);
+                    fragment(id, case, image, index == 2, tolerances)
+                }
+                _ => {
+                    Check::new(id, &case.entry.name, Verdict::NotRun, "no frame: a bug of Umbra's")
+                }
+            }
+        };
+        let mut checks = vec![pass_check(case, &pass)];
+        checks.extend((0..STAGES.len()).map(stage));
+        checks
+    });
+    judged.collect()
+}
+
+/// The frames of each scene under all sets of stages.
+fn under<'a>(cases: &[&'a Case], sets: &[Vec<Stage>]) -> Vec<Vec<Frame<'a>>> {
+    let frames = |case: &&'a Case| sets.iter().map(|set| Frame::small(case, set.clone())).collect();
+    cases.iter().map(frames).collect()
+}
+
+/// What can be asked of a stage.
+enum Swap {
+    /// Nothing: it is the template's.
+    Untouched,
+    /// Nothing: there is no such file.
+    Absent,
+    /// These of the sets of stages show it.
+    Drawn(Range<usize>),
+}
+
+/// How each stage is looked at, and the sets of stages that it takes, the same for every scene.
+fn swaps(stages: &Stages) -> ([Swap; 3], Vec<Vec<Stage>>) {
+    let mut sets = Vec::new();
+    let swaps = [0, 1, 2].map(|index| {
+        if stages.is_template(index) {
+            return Swap::Untouched;
+        }
+        let Some(own) = &stages.own[index] else { return Swap::Absent };
+        let begin = sets.len();
+        if index == 0 {
+            let under = |show: &str| named([own.clone(), show.to_owned(), show.to_owned()]);
+            sets.extend([SHOW_POSITION, SHOW_NORMAL].map(under));
+        } else {
+            let mut texts = [VERTEX, BLACK, BLACK].map(str::to_owned);
+            texts[index].clone_from(own);
+            sets.push(named(texts));
+        }
+        Swap::Drawn(begin..sets.len())
+    });
+    (swaps, sets)
+}
+
+/// The images of a scene's frames, or the first outcome that is none.
+fn images<'a>(case: &Case, outcomes: &'a [Outcome]) -> Result<Vec<Image>, &'a Outcome> {
+    let image = |outcome: &'a Outcome| match outcome {
+        Outcome::Done(answer) => {
+            Ok(ask::image(&answer.values, case.small.width, case.small.height))
+        }
+        other => Err(other),
+    };
+    outcomes.iter().map(image).collect()
+}
+
+fn pass_check(case: &Case, outcomes: &[Outcome]) -> Check {
+    let images = match images(case, outcomes) {
+        Ok(images) => images,
+        Err(outcome) => return swap_failed("pass.uniforms", case, &["2.1"], outcome),
+    };
+    // Each frame shows another value. A pass with pipelines of its own takes no stages of ours.
+    let is_same = |image: &Image| image.pixels == images[0].pixels;
+    let shows = |image: &Image| image.pixels.iter().any(|pixel| *pixel != Vec3::ZERO);
+    if images.iter().all(is_same) && images.iter().any(shows) {
+        let summary = "swap not possible: the pass draws the same under all stages";
+        return Check::new("pass.uniforms", &case.entry.name, Verdict::NotJudged, summary);
+    }
+    let frames: Vec<_> = BoundValue::ALL.into_iter().zip(images).collect();
+    let (scene, small) = (&case.expected.scene, &case.small);
+    judge_pass(&case.entry.name, scene, &small.surface, &small.unshadowed_mask, &frames)
+}
+
+fn vertex(case: &Case, positions: &Image, normals: &Image) -> Check {
+    let small = &case.small;
+    judge_vertex(&case.entry.name, &small.surface, &small.unshadowed_mask, positions, normals)
+}
+
+fn fragment(id: &str, case: &Case, image: &Image, phong: bool, tolerances: &Tolerances) -> Check {
+    let small = &case.small;
+    let wanted = images::only(&small.unshadowed_mask, &|region| (region.exponent > 0.0) == phong);
+    let expected = (&small.unshadowed, small.raw_normals.as_ref());
+    images::judge_shaded(id, &case.entry.name, image, expected, &wanted, tolerances)
+}
+
+/// Keeps for the diagnosis what one of the two fragment stages draws.
+fn see_fragment(asker: &Asker, case: &Case, image: &Image, phong: bool) {
+    let mask = &case.small.unshadowed_mask;
+    let pixels = image.pixels.iter().zip(&mask.pixels).enumerate();
+    let own = pixels.filter(|(_, (_, value))| {
+        **value & RegionMask::INDEX != 0 && (mask.region(**value).exponent > 0.0) == phong
+    });
+    let own = own.map(|(index, (pixel, _))| (index, (*pixel).into()));
+    let tile = Tile::of_pixels((image.width, image.height), own);
+    asker.see(View::new(Kind::Fragment, &case.entry.name), tile);
+}
+
+/// A swap that the graphics library refuses is no fault: the student may have chosen another
+/// layout. Whether a stage compiles at all shows in the student's own image.
+fn swap_failed(id: &str, case: &Case, parts: &[&str], outcome: &Outcome) -> Check {
+    match outcome {
+        Outcome::Failed(message) => {
+            let first = message.lines().next().unwrap_or_default();
+            let summary = format!("swap not possible: {first}");
+            Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
+        }
+        other => ask::unanswered(id, &case.entry.name, parts, other),
+    }
+}

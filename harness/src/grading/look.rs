@@ -1,0 +1,255 @@
+//! What the diagnosis is made from: answers kept while a hand-in is judged, and those of the known
+//! mistakes, which the reference renderer gives to the same questions.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use rayon::prelude::*;
+
+use super::ask::{self, Asker};
+use super::draw::{Frame, draw_each};
+use super::offline::{self, Drawn};
+use super::pipeline::Grading;
+use super::realtime;
+use crate::diagnosis::{
+    Catalogue, Diagnosis, Facts, Kind, KnownMistake, LENGTH, Material, Sightings, Stored,
+    StoredView, Tile, View,
+};
+use crate::evidence::{self, Evidence, Picture};
+use crate::expected::scene_digest;
+use crate::imaging::pictures::tone_mapped;
+use crate::rubric;
+
+/// A tile whose mean difference from what is right is less than this is not stored.
+const VISIBLE: f64 = 1e-5;
+
+impl Grading<'_> {
+    /// Where the answers of known mistakes are stored.
+    pub fn stored_folder(&self) -> PathBuf {
+        self.assignment.root.join("expected").join(&self.assignment.name).join("mistakes")
+    }
+
+    /// What the parts that lost points look like; small pictures of it go to `out`.
+    ///
+    /// # Errors
+    /// When the stored answers or the catalogue cannot be used, or a picture cannot be written.
+    pub(super) fn diagnose(
+        &self,
+        asker: &Asker,
+        evidence: &Evidence,
+        drawn: &[Drawn],
+        out: Option<&Path>,
+    ) -> anyhow::Result<Vec<Diagnosis>> {
+        // Students read this: nothing of the held-back scenes is in it.
+        let mut evidence = evidence.clone();
+        evidence.checks.retain(|check| !check.held_back);
+        let grade = rubric::grade(&self.assignment.rules, &evidence);
+        let failing = grade.parts.iter().filter(|part| part.points_max < part.out_of);
+        let failing: Vec<String> = failing.map(|part| part.id.clone()).collect();
+        let nothing = Stored::default();
+        let stored = match self.stored.get() {
+            _ if failing.is_empty() => &nothing,
+            Some(stored) => stored,
+            None => {
+                let stored = Stored::load(&self.stored_folder())?;
+                self.check_digests(&stored)?;
+                self.stored.get_or_init(|| stored)
+            }
+        };
+        self.see_drawn(asker, drawn);
+        let sightings = match asker.sightings.lock() {
+            Ok(mut sightings) => std::mem::take(&mut *sightings),
+            Err(_) => Sightings::default(),
+        };
+        let catalogue = Catalogue::known()?;
+        let facts = Facts {
+            evidence: &evidence,
+            failing: &failing,
+            sightings: &sightings,
+            stored,
+            catalogue: &catalogue,
+        };
+        let mut diagnoses = facts.diagnose();
+        for diagnosis in &mut diagnoses {
+            if let Some(out) = out {
+                diagnosis.pictures = pictures(diagnosis, &facts, out)?;
+            }
+        }
+        Ok(diagnoses)
+    }
+
+    /// Stored answers must be those of the scenes as they are now.
+    fn check_digests(&self, stored: &Stored) -> anyhow::Result<()> {
+        for case in &self.cases {
+            let digest = scene_digest(&case.offline)?;
+            for (view, content) in &stored.views {
+                anyhow::ensure!(
+                    view.scene != case.entry.name || content.digest == digest,
+                    "{}: made from another version of the scene; hint: `umbra bless --mistakes`",
+                    self.stored_folder().join(format!("{view}.exr")).display()
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps the images that were drawn. Films of hand-ins may be large ones or small ones: what
+    /// they show is told by probes, but for the bonus.
+    fn see_drawn(&self, asker: &Asker, drawn: &[Drawn]) {
+        for case in &self.cases {
+            let name = &case.entry.name;
+            let of = |kind| {
+                let own = drawn.iter().find(|drawn| drawn.scene == *name && drawn.kind == kind);
+                own.map(|drawn| &drawn.image)
+            };
+            let plain = of(evidence::images::Kind::Realtime);
+            let shadows = of(evidence::images::Kind::RealtimeShadows);
+            if let (Some(with), Some(without)) = (shadows, plain) {
+                asker.see(View::new(Kind::Bonus, name), Tile::of_ratio(with, without));
+            }
+            if case.is_probe() {
+                // At one sample the film tells nothing that the rays do not.
+                let film = of(evidence::images::Kind::Offline { spp: case.spp });
+                let film = film.filter(|_| case.spp > 1);
+                for (kind, image) in [(Kind::Realtime, plain), (Kind::Film, film)] {
+                    if let Some(image) = image {
+                        asker.see(View::new(kind, name), Tile::of_image(image));
+                    }
+                }
+            }
+        }
+    }
+
+    /// The answers of the reference renderer, right and with each of some mistakes.
+    ///
+    /// # Errors
+    /// The machine's matters, and a reference that does not answer.
+    pub fn look_at_mistakes(
+        &self,
+        reference: &Path,
+        mistakes: &[&KnownMistake],
+        say: &(dyn Fn(&str) + Sync),
+    ) -> anyhow::Result<Stored> {
+        let right = self.look(reference, None)?;
+        let mut stored = Stored::default();
+        for (view, tile) in right.tiles {
+            let case = self.cases.iter().find(|case| case.entry.name == view.scene);
+            let materials = match (view.kind, case) {
+                (Kind::Offline, Some(case)) => Material::of_mask(&case.small.mask),
+                (Kind::Fragment, Some(case)) => Material::of_mask(&case.small.unshadowed_mask),
+                (Kind::Film, Some(case)) => Material::of_mask(&case.expected.offline.mask),
+                (Kind::Realtime, Some(case)) => Material::of_mask(&case.expected.unshadowed_mask),
+                _ => vec![Material::None; LENGTH],
+            };
+            let digest = case.map(|case| scene_digest(&case.offline)).transpose()?;
+            let digest = digest.unwrap_or_default();
+            let mistakes = std::collections::BTreeMap::new();
+            stored.views.insert(view, StoredView { right: tile, materials, mistakes, digest });
+        }
+        // One that belongs to no part is told by its findings.
+        let shown = mistakes.par_iter().filter(|mistake| !mistake.parts.is_empty());
+        let seen = shown.map(|mistake| {
+            say(&format!("looking at {}", mistake.name));
+            let seen = self.look(reference, Some(mistake)).with_context(|| mistake.name.clone())?;
+            Ok::<_, anyhow::Error>((*mistake, seen))
+        });
+        for (mistake, seen) in seen.collect::<Result<Vec<_>, _>>()? {
+            for (view, tile) in seen.tiles {
+                let Some(stored) = stored.views.get_mut(&view) else { continue };
+                if shows(view.kind, mistake) && stored.differs(&tile) > VISIBLE {
+                    stored.mistakes.insert(mistake.name.clone(), tile);
+                }
+            }
+        }
+        stored.views.retain(|_, view| !view.mistakes.is_empty());
+        Ok(stored)
+    }
+
+    /// All answers of the reference renderer, with a mistake or without.
+    fn look(&self, reference: &Path, mistake: Option<&KnownMistake>) -> anyhow::Result<Sightings> {
+        let asker = self
+            .asker(&mistake.map_or(String::new(), |mistake| format!("mistake={}", mistake.name)));
+        let tolerances = &self.assignment.tolerances;
+        let belongs = |path: &str| {
+            mistake.is_none_or(|known| known.parts.iter().any(|part| part.starts_with(path)))
+        };
+        let mut drawn = Vec::new();
+        if belongs("1.") {
+            offline::probe_bsdfs(&asker, reference, &self.cases);
+            for case in &self.cases {
+                let seed = 1;
+                let judged =
+                    offline::judge_scene(&asker, reference, case, seed, self.threads, tolerances);
+                drawn.extend(judged.1);
+            }
+        }
+        if belongs("2.") {
+            let judged = realtime::judge_images(&asker, reference, &self.cases, tolerances);
+            drawn.extend(judged.into_iter().flat_map(|(_, images)| images));
+            // Under the reference's own vertex stage, which is right where a fragment stage is not.
+            let frames: Vec<Frame> =
+                self.cases.iter().map(|case| Frame::small(case, Vec::new())).collect();
+            let outcomes = draw_each(&asker, Some(reference), &frames);
+            for (case, outcome) in self.cases.iter().zip(outcomes) {
+                if let Some(answer) = outcome.answer() {
+                    let (width, height) = (case.small.width, case.small.height);
+                    let image = ask::image(&answer.values, width, height);
+                    asker.see(View::new(Kind::Fragment, &case.entry.name), Tile::of_image(&image));
+                }
+            }
+        }
+        self.see_drawn(&asker, &drawn);
+        let sightings = asker.sightings.lock().map(|mut seen| std::mem::take(&mut *seen));
+        let sightings = sightings.unwrap_or_default();
+        anyhow::ensure!(!sightings.tiles.is_empty(), "the reference renderer answers nothing");
+        Ok(sightings)
+    }
+}
+
+/// Width and height of a tile's values in pictures, in pixels.
+const ENLARGED: usize = 5;
+
+/// Draws what was drawn, what is right and what the known mistake draws, where it shows best;
+/// nothing of several mistakes together.
+fn pictures(diagnosis: &Diagnosis, facts: &Facts, out: &Path) -> anyhow::Result<Vec<Picture>> {
+    let [alike] = diagnosis.mistakes.as_slice() else { return Ok(Vec::new()) };
+    let kind = if diagnosis.part.starts_with('1') { Kind::Offline } else { Kind::Realtime };
+    let views = facts.stored.views.iter().filter(|(view, _)| view.kind == kind);
+    let shown = views.filter_map(|(view, stored)| {
+        let known = stored.mistakes.get(alike.first()?)?;
+        Some((stored.differs(known), view, facts.sightings.tiles.get(view)?, stored, known))
+    });
+    let best = shown.max_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, view, seen, stored, known)) = best else { return Ok(Vec::new()) };
+    let mut lit: Vec<f32> = stored.right.values().iter().map(|v| v.element_sum() / 3.0).collect();
+    lit.retain(|value| *value > 0.0);
+    lit.sort_by(f32::total_cmp);
+    let median_lit = lit.get(lit.len() / 2).copied().unwrap_or(1.0);
+    std::fs::create_dir_all(out)?;
+    let mut pictures = Vec::new();
+    for (title, tile) in [("yours", seen), ("right", &stored.right), ("known mistake", known)] {
+        let file = format!("diagnosis-{}-{}.png", diagnosis.part, title.replace(' ', "-"));
+        let picture = tone_mapped(&tile.enlarged(ENLARGED), median_lit);
+        std::fs::write(out.join(&file), picture.png()?)?;
+        let (path, scene) = (view.kind.name(), &view.scene);
+        pictures
+            .push(Picture { title: format!("{title} ({path}, {scene}, every few pixels)"), file });
+    }
+    Ok(pictures)
+}
+
+/// Whether a view is one of those that a mistake is looked for in.
+fn shows(kind: Kind, mistake: &KnownMistake) -> bool {
+    let any = |parts: &[&str]| mistake.parts.iter().any(|part| parts.contains(&part.as_str()));
+    match kind {
+        Kind::Diffuse => any(&["1.1"]),
+        Kind::Phong => any(&["1.2"]),
+        Kind::Lit => any(&["1.3"]),
+        Kind::Shadow => any(&["1.4"]),
+        Kind::Offline => any(&["1.1", "1.2", "1.3", "1.4"]),
+        Kind::Film => mistake.family == "loop",
+        Kind::Realtime => any(&["2.1", "2.2", "2.3", "2.4"]),
+        Kind::Fragment => any(&["2.3", "2.4"]),
+        Kind::Bonus => any(&["2.5"]),
+    }
+}

@@ -1,0 +1,147 @@
+//! What would change without a rule: a rule whose deletion changes no verdict decides nothing.
+
+use std::collections::BTreeSet;
+use std::fmt;
+
+use super::Rules;
+use crate::evidence::{Evidence, Measure, RULES, Verdict};
+
+/// A rule that decides, to be deleted.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum EvidenceRule {
+    /// All checks of this name: evidence of a part, its fallback, a proof, a gate.
+    Check(String),
+    /// One of [`RULES`]: what judges inside checks.
+    Measure(&'static str),
+    /// What is left unexplained on this path costs its `blame` part.
+    Blame(String),
+}
+
+impl EvidenceRule {
+    /// Every rule that the rubric and the checks know.
+    pub fn all(rules: &Rules) -> BTreeSet<Self> {
+        let parts = rules.parts.iter();
+        let named = parts.flat_map(|part| [&part.evidence, &part.fallback, &part.images_only]);
+        let checks = named.flatten().chain(rules.gates.iter().map(|gate| &gate.check));
+        let checks = checks.chain(rules.paths.values().map(|path| &path.proof));
+        let blames = rules.paths.keys().map(|path| Self::Blame(path.clone()));
+        let measures = RULES.into_iter().map(Self::Measure);
+        checks.map(|id| Self::Check(id.clone())).chain(blames).chain(measures).collect()
+    }
+
+    /// Whether only a hand-in can break it: by its tree, its images, a crash.
+    pub fn is_of_hand_ins(&self) -> bool {
+        match self {
+            Self::Check(id) => {
+                let crash = id == "image.realtime.all";
+                crash || id.starts_with("handed_in.") || id.starts_with("hand_in.")
+            }
+            Self::Measure(rule) => *rule == "image.size",
+            Self::Blame(_) => false,
+        }
+    }
+
+    /// Rubric and evidence as they would be without this rule: nothing is asked anew. A check that
+    /// failed by this rule alone passes.
+    pub fn delete(&self, rules: &Rules, evidence: &Evidence) -> (Rules, Evidence) {
+        let (mut rules, mut evidence) = (rules.clone(), evidence.clone());
+        match self {
+            Self::Check(id) => evidence.checks.retain(|check| check.id != *id),
+            Self::Measure(rule) => {
+                let failed = evidence.checks.iter_mut().filter(|c| c.verdict == Verdict::Fail);
+                for check in failed {
+                    let broken = |m: &&mut Measure| !m.passed && !m.rule.is_empty();
+                    let mut broken = check.measures.iter_mut().filter(broken).peekable();
+                    if broken.peek().is_some() && broken.all(|measure| measure.rule == *rule) {
+                        (check.verdict, check.error) = (Verdict::Pass, 0.0);
+                    }
+                }
+            }
+            Self::Blame(path) => {
+                if let Some(path) = rules.paths.get_mut(path) {
+                    path.blame.clear();
+                }
+            }
+        }
+        (rules, evidence)
+    }
+}
+
+impl fmt::Display for EvidenceRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Check(id) => write!(f, "the check {id}"),
+            Self::Measure(rule) => write!(f, "the rule {rule}"),
+            Self::Blame(path) => write!(f, "the blame of the path {path}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assignment::Assignment;
+    use crate::evidence::Check;
+    use crate::rubric::{BUILD, grade};
+
+    fn rules() -> Rules {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+        Assignment::load(root).unwrap().rules
+    }
+
+    fn points(rules: &Rules, evidence: &Evidence) -> (f64, f64) {
+        let grade = grade(rules, evidence);
+        (grade.points, grade.points_max)
+    }
+
+    /// What only a hand-in can break: images without a source, a tree, an image's size, a crash.
+    #[test]
+    fn every_rule_of_hand_ins_is_needed() {
+        let rules = rules();
+        let all = EvidenceRule::all(&rules);
+        let pass = |id: &String| Check::new(id, "teapot", Verdict::Pass, "right");
+        let images = rules.parts.iter().flat_map(|part| &part.images_only).map(pass);
+        let mut right: Vec<Check> = images.collect();
+        right.push(Check::new(BUILD, "", Verdict::Fail, "does not build"));
+        let mut other_size = right.clone();
+        for check in other_size.iter_mut().filter(|check| check.id != BUILD) {
+            check.verdict = Verdict::Fail;
+            check.measures = vec![Measure::at_most("image.size", "is 2x4", 1.0, 0.0)];
+        }
+        let mut no_tree = right.clone();
+        no_tree.push(Check::new("hand_in.tree", "", Verdict::Fail, "wrong tree"));
+        let crash = ["image.realtime", "image.realtime.all"];
+        let mut crash = crash.map(|id| Check::new(id, "teapot", Verdict::Fail, "crashed")).to_vec();
+        crash.push(Check::new("pass.uniforms", "teapot", Verdict::NotJudged, "no swap"));
+        let hand_ins = [right, other_size, no_tree, crash].map(|checks| Evidence { checks });
+        let mut counted = 0;
+        for rule in all.iter().filter(|rule| rule.is_of_hand_ins()) {
+            counted += 1;
+            let changes = hand_ins.iter().any(|evidence| {
+                let (less, rest) = rule.delete(&rules, evidence);
+                points(&less, &rest) != points(&rules, evidence)
+            });
+            assert!(changes, "without {rule} nothing changes");
+        }
+        assert!(counted >= 9, "{counted}");
+    }
+
+    #[test]
+    fn a_check_that_failed_by_one_rule_alone_passes_without_it() {
+        let rules = rules();
+        let mut check = Check::new("image.offline", "cbox", Verdict::Fail, "wrong");
+        let broken = |rule| Measure::at_most(rule, "", 2.0, 1.0);
+        check.measures = vec![broken("image.blob"), Measure::at_most("image.edge", "", 0.0, 1.0)];
+        let verdict = |check: &Check, rule| {
+            let evidence = Evidence { checks: vec![check.clone()] };
+            EvidenceRule::Measure(rule).delete(&rules, &evidence).1.checks[0].verdict
+        };
+        assert_eq!(verdict(&check, "image.blob"), Verdict::Pass);
+        assert_eq!(verdict(&check, "image.edge"), Verdict::Fail);
+        check.measures.push(broken("image.bias"));
+        assert_eq!(verdict(&check, "image.blob"), Verdict::Fail);
+        // What failed without a measure (a crash) is no rule's matter.
+        check.measures.clear();
+        assert_eq!(verdict(&check, "image.blob"), Verdict::Fail);
+    }
+}

@@ -1,0 +1,54 @@
+//! How a worker is started.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use super::cage::Cage;
+use super::job::{AdapterKind, Request};
+use super::wire::Folder;
+use crate::process::Limits;
+
+/// The command that starts a worker with the private folder `dir`, an empty environment but for what
+/// drivers and thread pools are told. `umbra` is this program, `driver` the software adapter's.
+pub fn command(
+    umbra: &Path,
+    dir: &Path,
+    cage: &Cage,
+    requests: &[&Request],
+    limits: &Limits,
+    driver: Option<&Path>,
+) -> Command {
+    let mut command = Command::new(umbra);
+    command.arg("__worker").arg(&cage.job).current_dir(Folder(dir).scratch()).env_clear();
+    command.env("LANG", "C").env("HOME", "/nonexistent");
+    // Compiling shaders costs most of a small frame. What is compiled stays in the scratch of
+    // this one worker: one renderer's shaders are no other's business.
+    command.env("MESA_SHADER_CACHE_DISABLE", "false").env("MESA_SHADER_CACHE_DIR", ".");
+    command.env("LP_NUM_THREADS", limits.threads.to_string());
+    command.env("RAYON_NUM_THREADS", limits.threads.to_string());
+    let software = requests.iter().any(|request| {
+        let Request::RenderRealtime { adapter, .. } = request else { return false };
+        adapter.kind == AdapterKind::Software
+    });
+    if software {
+        let driver = driver.unwrap_or(Path::new("/nonexistent"));
+        command.env("VK_ICD_FILENAMES", driver).env("VK_DRIVER_FILES", driver);
+    }
+    if cfg!(windows) {
+        // Without it, no library of the system can be found.
+        command.envs(std::env::var_os("SystemRoot").map(|root| ("SystemRoot", root)));
+    }
+    command
+}
+
+/// Where Mesa's lavapipe describes itself to the Vulkan loader.
+pub fn software_driver() -> Option<PathBuf> {
+    let folders = ["/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
+    folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).find_map(|entries| {
+        let mut found = entries.flatten().map(|entry| entry.path()).filter(|path| {
+            path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("lvp_icd"))
+        });
+        found.next()
+    })
+}

@@ -1,0 +1,69 @@
+//! The line of figures that ends a run, and what is wrong where one is not full.
+
+use super::row::Row;
+
+/// Everything that was graded.
+pub struct Matrix {
+    /// Right renderers.
+    pub variants: Vec<Row>,
+    /// Renderers with one mistake.
+    pub singles: Vec<Row>,
+    /// Renderers with two.
+    pub pairs: Vec<Row>,
+}
+
+/// One figure of the line.
+pub struct Figure {
+    /// As it is printed: `pairs=24/24`.
+    pub text: String,
+    /// What is wrong, one line each; empty when the figure is as it must be.
+    pub complaints: Vec<String>,
+}
+
+impl Figure {
+    /// How many of `of` are right: all but one for each complaint.
+    pub fn right(name: &str, of: usize, complaints: Vec<String>) -> Self {
+        Self { text: format!("{name}={}/{of}", of.saturating_sub(complaints.len())), complaints }
+    }
+}
+
+/// The figures that follow from the matrix alone, in the order of the line.
+pub fn of_matrix(matrix: &Matrix) -> Vec<Figure> {
+    let rejected = complaints(&matrix.variants);
+    let text = format!("false_rejects={}/{}", rejected.len(), matrix.variants.len());
+    vec![
+        Figure { text, complaints: rejected },
+        Figure::right("singles", matrix.singles.len(), complaints(&matrix.singles)),
+        Figure::right("pairs", matrix.pairs.len(), complaints(&matrix.pairs)),
+        diagnosis(matrix),
+    ]
+}
+
+/// The least fraction of single mistakes that the diagnosis must name first.
+const NAMED: f64 = 0.95;
+
+/// How many single mistakes are named first. Right renderers must look like nothing.
+fn diagnosis(matrix: &Matrix) -> Figure {
+    let silent = |rows: &mut dyn Iterator<Item = &Row>| -> Vec<String> {
+        rows.filter(|row| !row.well_diagnosed()).map(Row::said).collect()
+    };
+    let singles = || matrix.singles.iter().filter(|row| row.subject.named);
+    let (mut complaints, unnamed) = (silent(&mut matrix.variants.iter()), silent(&mut singles()));
+    let of = singles().count();
+    let named = of - unnamed.len();
+    let text = format!("diagnosis={named}/{of}");
+    if (named as f64) < NAMED * of as f64 {
+        complaints.extend(unnamed);
+    } else {
+        unnamed.iter().for_each(|line| println!("not named: {line}"));
+    }
+    // Two mistakes at once are told apart where they can be: what is said is shown.
+    silent(&mut matrix.pairs.iter()).iter().for_each(|line| println!("pair: {line}"));
+    Figure { text, complaints }
+}
+
+/// Rows that are not as declared, one line each.
+fn complaints(rows: &[Row]) -> Vec<String> {
+    let wrong = rows.iter().filter(|row| !row.as_declared());
+    wrong.map(|row| format!("{}: {}", row.subject.name(), row.complaint())).collect()
+}

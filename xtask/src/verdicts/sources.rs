@@ -1,0 +1,59 @@
+//! Real hand-ins: every sample is packed as a student would, built and graded by the real binary,
+//! and worth what its recipe says.
+
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+use serde_json::Value;
+use umbra::rubric::Rules;
+
+use super::figures::Figure;
+use crate::samples;
+
+/// Seed of the held-back scenes: the same in every run.
+const PERTURB: &str = "20191006";
+
+/// Grades the samples whose names are wanted, none if there are none; those that wait for time
+/// limits only if `slow`.
+///
+/// # Errors
+/// When a sample cannot be packed, or `umbra` not be run to a good end.
+pub fn grade(
+    root: &Path,
+    umbra: &Path,
+    rules: &Rules,
+    wanted: &(dyn Fn(&str) -> bool + Sync),
+    slow: bool,
+) -> Result<Option<Figure>> {
+    let mut samples = samples::pack(root, wanted)?;
+    samples.retain(|sample| slow || !sample.slow);
+    if samples.is_empty() {
+        return Ok(None);
+    }
+    let out = root.join("target/umbra/samples-report");
+    let mut command = Command::new(umbra);
+    command.arg("grade").args(samples.iter().map(|sample| &sample.archive));
+    command.arg("--output").arg(&out).arg("--root").arg(root);
+    command.args(["--perturb", PERTURB]);
+    let output = command.output().with_context(|| umbra.display().to_string())?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "umbra grade: {}\n{said}", output.status);
+    print!("{}", String::from_utf8_lossy(&output.stdout));
+    let file = out.join("report.json");
+    let report = std::fs::read(&file).with_context(|| file.display().to_string())?;
+    let report: Value = serde_json::from_slice(&report)?;
+    ensure!(report["held_back"]["seed"] == PERTURB, "the report has another seed than {PERTURB}");
+    let hand_ins = report["hand_ins"].as_array().context("the report lists no hand-ins")?;
+    let complaint = |sample: &samples::Sample| {
+        let file = sample.archive.file_name().unwrap_or_default().to_string_lossy();
+        let own = hand_ins.iter().find(|hand_in| hand_in["name"] == *file);
+        let complaint = match own {
+            Some(hand_in) => sample.expect.complaint(hand_in, rules),
+            None => "it is not in the report".into(),
+        };
+        (!complaint.is_empty()).then(|| format!("source {}: {complaint}", sample.name))
+    };
+    let complaints = samples.iter().filter_map(complaint).collect();
+    Ok(Some(Figure::right("sources", samples.len(), complaints)))
+}

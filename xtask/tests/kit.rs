@@ -1,0 +1,198 @@
+//! The student's kit: it gives nothing away, and lacks nothing that checking one's own work needs.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+use umbra::assignment::Assignment;
+use umbra::expected::Store;
+use umbra::grading::Case;
+use umbra::worker::Supervisor;
+
+/// So many lines in a row that the reference has too, most of them not the template's, are no chance.
+const BLOCK: usize = 5;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}
+
+/// The kit, made anew in a folder of its own.
+fn make(name: &str) -> PathBuf {
+    let kit = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    if kit.exists() {
+        std::fs::remove_dir_all(&kit).unwrap();
+    }
+    let mut xtask = Command::new(env!("CARGO_BIN_EXE_xtask"));
+    run(xtask.args(["dist", "student"]).arg(&kit).current_dir(root()));
+    kit
+}
+
+fn run(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{command:?}: {}\n{said}", output.status);
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// All files below a folder that hold text, with it.
+fn texts(folder: &Path) -> Vec<(PathBuf, String)> {
+    let mut found = Vec::new();
+    let mut open = vec![folder.to_owned()];
+    while let Some(folder) = open.pop() {
+        for entry in folder.read_dir().unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                open.push(path);
+            } else if let Ok(text) = std::fs::read_to_string(&path) {
+                found.push((path, text));
+            }
+        }
+    }
+    found
+}
+
+/// The lines that say something: no comments, imports or lone brackets.
+fn lines(text: &str) -> Vec<&str> {
+    let says = |line: &&str| {
+        let letters = line.chars().filter(|c| c.is_alphanumeric()).count();
+        letters > 5 && !line.starts_with("//") && !line.starts_with("use ")
+    };
+    text.lines().map(str::trim).filter(says).collect()
+}
+
+/// Every run of [`BLOCK`] lines most of which `given` lacks.
+fn blocks(text: &str, given: &HashSet<&str>) -> Vec<String> {
+    let lines = lines(text);
+    let own =
+        |block: &&[&str]| 2 * block.iter().filter(|line| !given.contains(*line)).count() > BLOCK;
+    lines.windows(BLOCK).filter(own).map(|block| block.join("\n")).collect()
+}
+
+#[test]
+#[ignore = "some seconds, after the expected images are made: `./run test` asks for it"]
+fn the_kit_is_whole_and_holds_nothing_of_the_reference() {
+    let kit = make("kit");
+
+    // What students start from shows much of the reference: it was made from it.
+    let template = texts(&root().join("student_template"));
+    let given: HashSet<&str> = template.iter().flat_map(|(_, text)| lines(text)).collect();
+    let reference = texts(&root().join("reference_impl/src"));
+    let own: HashSet<String> =
+        reference.iter().flat_map(|(_, text)| blocks(text, &given)).collect();
+    assert!(own.len() > 300, "only {} blocks tell the reference", own.len());
+    let files = texts(&kit);
+    assert!(files.len() > 80, "only {} files", files.len());
+    for (path, text) in &files {
+        let shared = blocks(text, &given).into_iter().find(|block| own.contains(block));
+        assert!(shared.is_none(), "{}:\n{}", path.display(), shared.unwrap());
+        let name = path.strip_prefix(&kit).unwrap().display().to_string();
+        assert!(!name.contains("reference_impl") && !name.contains("xtask"), "{name}");
+    }
+
+    let umbra = std::fs::read(kit.join("umbra")).unwrap();
+    let holds = |bytes: &[u8]| umbra.windows(bytes.len()).any(|window| window == bytes);
+    assert!(holds(b"Samples per pixel, offline"), "the program's texts are not found at all");
+    assert!(!holds(b"14reference_impl"), "a symbol of the reference");
+    for (path, text) in reference.iter().filter(|(path, _)| path.extension().unwrap() == "wgsl") {
+        if lines(text).iter().any(|line| !given.contains(line)) {
+            assert!(!holds(text.trim().as_bytes()), "the shader {}", path.display());
+        }
+    }
+
+    // The lock file fits, and holds only what the repository's holds.
+    let mut tree = Command::new("cargo");
+    run(tree.args(["tree", "--locked", "--offline", "--workspace"]).current_dir(&kit));
+    let lock = |folder: &Path| {
+        let text = std::fs::read_to_string(folder.join("Cargo.lock")).unwrap();
+        let packages = text.split("[[package]]").skip(1).map(|package| {
+            let lines = package.trim().lines().take_while(|line| !line.starts_with("dependencies"));
+            lines.collect::<Vec<_>>().join("\n")
+        });
+        packages.collect::<HashSet<String>>()
+    };
+    let (ours, theirs) = (lock(root()), lock(&kit));
+    assert!(theirs.is_subset(&ours) && theirs.len() > 50, "{:?}", theirs.difference(&ours));
+    for package in ["reference_impl", "xtask"] {
+        let name = format!("name = \"{package}\"");
+        assert!(!theirs.iter().any(|other| other.contains(&name)), "{package} is locked");
+    }
+
+    // Everything that is expected is there, and is what the grader expects.
+    let scratch = tempfile::tempdir().unwrap();
+    let supervisor =
+        Supervisor::available(root().join("target/release/umbra"), scratch.path().to_owned());
+    let assignments = [&kit, root()].map(|folder| Assignment::load(folder).unwrap());
+    let [here, there] = assignments.each_ref().map(|assignment| Store {
+        assignment,
+        reference: None,
+        supervisor: &supervisor,
+        threads: 1,
+        progress: &|_| (),
+    });
+    for entry in &assignments[0].scenes {
+        let [a, b] = [&here, &there].map(|store| Case::new(store, entry).unwrap());
+        let name = &entry.name;
+        assert!(a.expected.offline.mean == b.expected.offline.mean, "{name}: mean");
+        assert!(a.expected.offline.variance == b.expected.offline.variance, "{name}: variance");
+        assert!(a.expected.offline.centre == b.expected.offline.centre, "{name}: centre");
+        assert!(a.expected.offline.mask == b.expected.offline.mask, "{name}: mask");
+        assert!(a.expected.unshadowed == b.expected.unshadowed, "{name}: unshadowed");
+        assert!(a.expected.raw_normals == b.expected.raw_normals, "{name}: raw normals");
+        assert!(a.small.unshadowed == b.small.unshadowed, "{name}: small film");
+        assert!(a.small.raw_normals == b.small.raw_normals, "{name}: small film, raw normals");
+    }
+}
+
+/// `./run kit` asks for it.
+#[cfg(unix)]
+#[test]
+#[ignore = "a minute or two: compiles the kit"]
+fn a_check_in_the_kit_says_what_the_grader_says() {
+    let kit = make("kit-built");
+    // Dependencies need not be compiled once more; all else of `target` is the kit's own.
+    let (built, release) = (root().join("target/release"), kit.join("target/release"));
+    std::fs::create_dir_all(&release).unwrap();
+    for folder in ["deps", "build", ".fingerprint"] {
+        std::os::unix::fs::symlink(built.join(folder), release.join(folder)).unwrap();
+    }
+    run(Command::new("cargo").args(["build", "--release"]).current_dir(&kit));
+    let umbra = kit.join("umbra");
+
+    let packed = run(Command::new(env!("CARGO_BIN_EXE_xtask")).arg("samples").current_dir(root()));
+    for name in ["perfect.zip", "two-cosines.zip", "no-shadows.zip", "reflect-sign.zip"] {
+        let archive = packed.lines().find(|line| line.ends_with(&format!("/{name}"))).unwrap();
+        let mut student = Command::new(&umbra);
+        let theirs =
+            report(student.args(["check", archive]).current_dir(&kit), &kit.join("report"));
+        let out = kit.join("graded");
+        let mut grader = Command::new(root().join("target/release/umbra"));
+        grader.args(["grade", archive, "--isolation", "reduced"]);
+        grader.arg("--root").arg(root());
+        let ours = report(&mut grader, &out);
+        let parts = |report: &Value| report["hand_ins"][0]["parts"].clone();
+        assert_eq!(parts(&theirs), parts(&ours), "{name}");
+        assert_eq!(verdicts(&theirs), verdicts(&ours), "{name}");
+    }
+
+    let output =
+        Command::new(&umbra).args(["grade", "student_template"]).current_dir(&kit).output();
+    let output = output.unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("student's kit") && said.contains("umbra check DIR"), "{said}");
+}
+
+/// Runs umbra and answers its `report.json`.
+fn report(umbra: &mut Command, out: &Path) -> Value {
+    let output = umbra.arg("--output").arg(out).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{umbra:?}: {said}");
+    serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap()
+}
+
+/// Which check said what of which scene, in the order they were made.
+fn verdicts(report: &Value) -> Vec<String> {
+    let checks = report["hand_ins"][0]["checks"].as_array().unwrap().iter();
+    checks.map(|check| format!("{} {} {}", check["id"], check["scene"], check["verdict"])).collect()
+}
