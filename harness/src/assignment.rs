@@ -43,6 +43,8 @@ pub struct Assignment {
 pub struct Limits {
     /// The archive.
     pub archive: intake::Limits,
+    /// Each child that decodes a file of it.
+    pub decode: process::Limits,
     /// The compiler.
     pub build: process::Limits,
     /// Each worker.

@@ -5,6 +5,7 @@
 pub mod assignment;
 pub mod build;
 pub mod cli;
+pub mod decode;
 pub mod diagnosis;
 pub mod evidence;
 pub mod expected;

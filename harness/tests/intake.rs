@@ -9,12 +9,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use similar_asserts::assert_eq;
-use support::scratch::{Scratch, assert_accepted, assert_folder_refused, listing};
+use support::scratch::{Scratch, assert_accepted, assert_folder_refused, listing, with_decoder};
 use support::tar_bytes::{self, gz, tar};
 use support::zip_bytes::{Entry, Zip, crc32, extra};
 use umbra::intake::{
     Finding, Format, HandIn, IntakeError, Limits, TreeSpec, Validation, fix, pack, scan_source,
-    unpack, unpack_bytes, validate, validate_hand_in,
+    unpack, unpack_bytes, validate_hand_in, validate_refusal,
 };
 
 const CONFIG: &str = r#"{
@@ -76,7 +76,18 @@ fn validate_bytes(bytes: &[u8], name: &str) -> Validation {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     fs::write(&path, bytes).unwrap();
-    validate(&path, &TreeSpec::default(), &Limits::default()).unwrap()
+    validate(&path).unwrap()
+}
+
+/// As `umbra validate` does.
+fn validate(source: &Path) -> Result<Validation, IntakeError> {
+    let copy = tempfile::tempdir().unwrap();
+    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    match with_decoder(|decoder| decoder.receive(source, copy.path(), &tree, &limits)) {
+        Ok(received) => Ok(received.validation),
+        Err(IntakeError::Refused(refusal)) => Ok(validate_refusal(&refusal)),
+        Err(error) => Err(error),
+    }
 }
 
 fn validate_files(files: &[(String, Vec<u8>)]) -> Validation {
@@ -277,7 +288,7 @@ fn destination_must_be_empty() {
 
 #[test]
 fn missing_source_is_an_error_of_the_machine() {
-    let result = validate(Path::new("/nowhere/a.zip"), &TreeSpec::default(), &Limits::default());
+    let result = validate(Path::new("/nowhere/a.zip"));
     let message = result.unwrap_err().to_string();
     assert!(message.starts_with("cannot read '/nowhere/a.zip': "), "{message}");
 }
@@ -520,7 +531,7 @@ fn packed_archives_conform_and_hold_only_what_is_needed() {
     want.sort();
     let names: Vec<String> = packed.files.iter().map(|(_, to)| to.clone()).collect();
     assert_eq!(names, want);
-    let validation = validate(&packed.archive, &TreeSpec::default(), &Limits::default()).unwrap();
+    let validation = validate(&packed.archive).unwrap();
     assert!(validation.conforms);
     assert_eq!(validation, packed.validation);
     // A second reader of zip sees the same.
@@ -572,6 +583,8 @@ fn fix_files(files: &[(String, Vec<u8>)]) -> Result<HandIn, IntakeError> {
     let folder = tempfile::tempdir().unwrap();
     let (source, out) = (folder.path().join("in.zip"), folder.path().join("out.zip"));
     fs::write(&source, zip_of(files)).unwrap();
+    let copy = Scratch::new();
+    let source = unpack(&source, &copy.dest, &TreeSpec::default(), &Limits::default())?;
     let result = fix(&source, &out, &TreeSpec::default(), &Limits::default());
     assert_eq!(result.is_ok(), out.exists());
     result?;

@@ -15,9 +15,6 @@ use crate::sandbox::policy::{CLOSURE, SCRATCH, SRC, TOOLCHAIN};
 use crate::sandbox::{Bind, Kind, Policy};
 use crate::worker::Supervisor;
 
-/// How much the compiler, the linker and the plugin may write in all, in MiB.
-const SCRATCH_MIB: u64 = 1024;
-
 /// What became of a compiler call.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum BuildOutcome {
@@ -64,6 +61,8 @@ pub fn default_limits() -> Limits {
         memory_mib: 4096,
         output_kib: 4096,
         file_size_mib: 256,
+        scratch_mib: 1024,
+        tasks: 160,
         open_files: 1024,
         threads: 1,
     }
@@ -94,7 +93,6 @@ pub fn compile(
     policy.read_only.push(Bind::new(&recording.closure, CLOSURE));
     policy.read_only.push(Bind::new(&src, SRC));
     policy.collect.push(Bind::new(&library, Path::new(SCRATCH).join(&file)));
-    policy.scratch.quota_mib = SCRATCH_MIB;
     policy.scratch.without_mount = Some(scratch.path().to_owned());
     policy.report = Some(report.path().to_owned());
     let lock = Lock::new(limits, policy.clone());

@@ -7,6 +7,7 @@ use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::assignment::Assignment;
+use crate::decode::Decoder;
 use crate::expected::Store;
 use crate::worker::Supervisor;
 
@@ -68,6 +69,11 @@ impl Context {
             progress: &progress,
         };
         body(&store)
+    }
+
+    /// What decodes hand-ins.
+    pub fn decoder(&self) -> Decoder<'_> {
+        Decoder::new(&self.supervisor, &self.assignment.limits.decode, &INTERRUPTED)
     }
 
     /// Shows what is being done.

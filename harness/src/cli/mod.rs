@@ -86,6 +86,7 @@ pub fn main() -> ExitCode {
         }
     }
     match (args.first().and_then(|name| name.to_str()), args.get(1)) {
+        (Some("__decode"), Some(dir)) => return crate::decode::child_main(Path::new(dir)),
         (Some("__worker"), Some(dir)) => return crate::worker::child_main(Path::new(dir)),
         (Some("__exec"), Some(program)) => return crate::process::exec_main(program, &args[2..]),
         _ => {}
@@ -101,11 +102,20 @@ pub fn main() -> ExitCode {
     match run(command, root.as_deref()) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            eprintln!("umbra: {error:#}");
+            eprintln!("umbra: {}", told_once(&error));
             let machine = error.downcast_ref::<MachineLacks>().is_some();
             ExitCode::from(if machine { EXIT_MACHINE } else { EXIT_USAGE })
         }
     }
+}
+
+/// An error and its causes, without those that it tells of already.
+fn told_once(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |told, cause| match told.as_str() {
+        "" => cause,
+        told if told.contains(&cause) => told.to_owned(),
+        told => format!("{told}: {cause}"),
+    })
 }
 
 /// An error of the machine, not of the command line.

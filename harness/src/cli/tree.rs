@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 
 use super::context::Context;
-use crate::intake;
+use crate::intake::{self, IntakeError};
 
 /// What `umbra validate` is told.
 #[derive(clap::Args)]
@@ -31,10 +31,20 @@ pub struct PackArguments {
 pub fn validate(arguments: &ValidateArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
     let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
-    let validation = intake::validate(&arguments.archive, tree, limits)?;
+    let private = tempfile::tempdir_in(&context.supervisor.scratch)?;
+    let copy = private.path().join("copy");
+    std::fs::create_dir(&copy)?;
+    let received = context.decoder().receive(&arguments.archive, &copy, tree, limits);
+    let (validation, hand_in) = match received {
+        Ok(received) => (received.validation, Ok(received.hand_in)),
+        Err(IntakeError::Refused(refusal)) => {
+            (intake::validate_refusal(&refusal), Err(IntakeError::Refused(refusal)))
+        }
+        Err(error) => bail!(error),
+    };
     print!("{}", validation.to_text());
     if let Some(out) = &arguments.fix {
-        let packed = intake::fix(&arguments.archive, out, tree, limits)?;
+        let packed = intake::fix(&hand_in?, out, tree, limits)?;
         println!("repacked as {}", packed.archive.display());
     }
     Ok(if validation.conforms { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
@@ -50,7 +60,7 @@ pub fn pack(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8
             println!("{}", packed.archive.display());
             Ok(super::EXIT_OK)
         }
-        Err(intake::IntakeError::Refused(refusal)) => {
+        Err(IntakeError::Refused(refusal)) => {
             print!("{}", intake::validate_refusal(&refusal).to_text());
             Ok(super::EXIT_NOT_IN_ORDER)
         }

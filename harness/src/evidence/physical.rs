@@ -53,16 +53,20 @@ impl Probes {
     }
 
     /// Adds the midpoint rule in polar angle and azimuth, fine enough for a lobe of exponent `n`.
+    /// At the pole the integrand f sin(theta) is as steep as the lobe is high: the first ring takes
+    /// the Euler-Maclaurin term -h^2/24 f for it.
     fn integrate(&mut self, material: &api::MaterialValue, wo: [f32; 3], n: f64) {
         let rows = (NODES * FRAC_PI_2 * n.sqrt()).ceil().max(24.0);
         let columns = (NODES * TAU * n.sqrt()).ceil().max(32.0);
         let mut solid_angles = Vec::new();
         for row in 0..rows as usize {
-            let theta = (row as f64 + 0.5) / rows * FRAC_PI_2;
+            let step = FRAC_PI_2 / rows;
+            let theta = (row as f64 + 0.5) * step;
+            let at_pole = if row == 0 { step * step / 24.0 } else { 0.0 };
             for column in 0..columns as usize {
                 let wi = direction(theta.cos(), (column as f64 + 0.5) / columns * TAU);
                 self.queries.push(query(material, wo, wi));
-                solid_angles.push(theta.sin() * FRAC_PI_2 / rows * TAU / columns);
+                solid_angles.push((theta.sin() * step - at_pole) * TAU / columns);
             }
         }
         self.integrals.push(solid_angles);

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use basecode::Image;
-use basecode::exr_io::read_exr;
 
 use super::case::Case;
+use super::handed_in::HandedIn;
 use super::offline::Drawn;
 use super::pipeline::Folders;
 use crate::evidence::images::Kind;
@@ -23,29 +23,23 @@ pub fn draw(
     checks: &mut [Check],
     cases: &[Case],
     drawn: &[Drawn],
-    root: &Path,
+    handed_in: &[HandedIn],
     out: &Folders,
 ) -> anyhow::Result<()> {
     for check in checks.iter_mut().filter(|check| check.verdict == Verdict::Fail) {
         let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
         let own = |kind: Kind| {
-            drawn.iter().find(|d| d.scene == check.scene && d.kind == kind).map(|d| d.image.clone())
-        };
-        let handed_in = |path: fn(&crate::assignment::HandInImages) -> &String| {
-            let path = path(case.entry.hand_in.as_ref()?);
-            read_exr(root.join(path)).ok()
+            drawn.iter().find(|d| d.scene == check.scene && d.kind == kind).map(|d| &d.image)
         };
         let actual = match check.id.as_str() {
             "image.offline" => own(Kind::Offline { spp: case.spp }),
             "image.realtime" => own(Kind::Realtime),
             "bonus.image" => own(Kind::RealtimeShadows),
-            "handed_in.offline" => handed_in(|images| &images.offline),
-            "handed_in.realtime.all" => handed_in(|images| &images.realtime),
-            _ => None,
+            _ => handed_in.iter().find_map(|image| image.shown_by(check)),
         };
         if let Some(actual) = actual {
             let out = if check.held_back { &out.instructor } else { &out.student };
-            check.pictures = triple(&check.id, case, &actual, out)?;
+            check.pictures = triple(&check.id, case, actual, out)?;
         }
     }
     Ok(())

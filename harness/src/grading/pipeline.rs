@@ -15,6 +15,7 @@ use super::record::{Conditions, Record, StageCost, Student};
 use super::{draw, handed_in, isolate, pictures, sampler};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
+use crate::decode::{Decoder, Received};
 use crate::diagnosis::{Diagnosis, Stored};
 use crate::evidence::{Check, Evidence, Verdict, rays, shadow_map};
 use crate::expected::Store;
@@ -162,6 +163,7 @@ impl<'a> Grading<'a> {
         say: &dyn Fn(&str),
     ) -> anyhow::Result<Record> {
         let asker = self.asker("");
+        let decoder = Decoder::new(self.supervisor, &self.assignment.limits.decode, self.cancel);
         let mut costs = Costs { since: Instant::now(), stages: Vec::new() };
         let scratch =
             tempfile::Builder::new().prefix("hand-in-").tempdir_in(&self.supervisor.scratch)?;
@@ -182,31 +184,31 @@ impl<'a> Grading<'a> {
         let copy = scratch.path().join("copy");
         std::fs::create_dir(&copy)?;
         let (tree, limits) = (&self.assignment.tree, &self.assignment.limits.archive);
-        let hand_in = match intake::unpack(source, &copy, tree, limits) {
-            Ok(hand_in) => hand_in,
-            Err(IntakeError::Refused(refusal)) => {
-                let validation = intake::validate_refusal(&refusal);
-                record.evidence.checks.push(tree_check(&validation, purpose));
-                record.evidence.checks.push(Check::new(
-                    BUILD,
-                    "",
-                    Verdict::Fail,
-                    "there is no source to build",
-                ));
-                record.findings = validation.findings;
-                record.stages = costs.end("intake", 0.0);
-                return Ok(record);
-            }
-            Err(error) => return Err(error.into()),
-        };
-        let validation = intake::validate_hand_in(&hand_in, tree)?;
+        let Received { hand_in, validation, source } =
+            match decoder.receive(source, &copy, tree, limits) {
+                Ok(received) => received,
+                Err(IntakeError::Refused(refusal)) => {
+                    let validation = intake::validate_refusal(&refusal);
+                    record.evidence.checks.push(tree_check(&validation, purpose));
+                    record.evidence.checks.push(Check::new(
+                        BUILD,
+                        "",
+                        Verdict::Fail,
+                        "there is no source to build",
+                    ));
+                    record.findings = validation.findings;
+                    record.stages = costs.end("intake", decoder.take_cpu_s());
+                    return Ok(record);
+                }
+                Err(error) => return Err(error.into()),
+            };
         record.digest.clone_from(&hand_in.digest);
         let config = validation.config.clone().unwrap_or_default();
         record.student = student(&config);
         record.findings.clone_from(&validation.findings);
-        record.findings.extend(intake::scan_source(&hand_in)?);
+        record.findings.extend(source);
         let mut checks = vec![tree_check(&validation, purpose)];
-        costs.end("intake", 0.0);
+        costs.end("intake", decoder.take_cpu_s());
 
         say("building");
         let plugin = self.build(&hand_in, scratch.path(), &mut record, &mut checks, &mut costs)?;
@@ -225,14 +227,15 @@ impl<'a> Grading<'a> {
             costs.end("realtime", asker.end_path());
         }
         say("comparing the images handed in");
-        for case in &self.cases {
+        let handed_in = handed_in::read(&decoder, &hand_in.root, tree, &self.cases)?;
+        for image in &handed_in {
             let tolerances = &self.assignment.tolerances;
-            let (found, images) = handed_in::judge(&hand_in.root, tree, case, &drawn, tolerances);
+            let (found, digest) = handed_in::judge(image, &drawn, tolerances);
             checks.extend(found);
-            record.images.extend(images);
+            record.images.extend(digest);
         }
-        costs.end("images", 0.0);
-        pictures::draw(&mut checks, &self.cases, &drawn, &hand_in.root, out)?;
+        costs.end("images", decoder.take_cpu_s());
+        pictures::draw(&mut checks, &self.cases, &drawn, &handed_in, out)?;
         costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
         record.diagnoses = self.diagnose(&asker, &record.evidence, &drawn, Some(&out.student))?;

@@ -332,6 +332,7 @@ impl<'a> PrivateCopy<'a> {
                 findings: self.findings.into_vec(),
             })));
         }
+        open_to_readers(self.dest, &self.folders, &files)?;
         let wrapped_in = wrapping_folder(&files, self.tree);
         let mut root = self.dest.to_owned();
         if let Some(folder) = &wrapped_in {
@@ -355,6 +356,29 @@ impl<'a> PrivateCopy<'a> {
             findings: self.findings.into_vec(),
         })
     }
+}
+
+/// Lets everybody read a copy, whatever the user's umask is: under root, whoever looks at it
+/// (decoders, the compiler) is another user. The folder around it keeps others out.
+fn open_to_readers(
+    dest: &Path,
+    folders: &BTreeSet<String>,
+    files: &[HandInFile],
+) -> Result<(), IntakeError> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let open = |path: &Path, mode| {
+            let mode = fs::Permissions::from_mode(mode);
+            fs::set_permissions(path, mode).map_err(|e| IntakeError::io("open", path, e))
+        };
+        open(dest, 0o755)?;
+        // A folder without a file in it was not made.
+        let mut made = folders.iter().map(|folder| dest.join(folder)).filter(|path| path.is_dir());
+        made.try_for_each(|path| open(&path, 0o755))?;
+        files.iter().try_for_each(|file| open(&dest.join(&file.path), 0o644))?;
+    }
+    Ok(())
 }
 
 /// The single folder that holds everything, unless it is one of the tree's own.

@@ -170,7 +170,7 @@ pub(super) fn printable_bytes(bytes: &[u8]) -> String {
 }
 
 /// Hostile text as harmless text of at most about 160 characters.
-pub(super) fn printable(text: &str) -> String {
+pub(crate) fn printable(text: &str) -> String {
     const SHOWN: usize = 160;
     let mut out = String::new();
     for (i, c) in text.chars().enumerate() {

@@ -6,9 +6,9 @@
 //! nearly right one  --fix-----> a conforming zip
 //! ```
 //!
-//! Everything here is library code without processes. [`unpack`] is the one function that reads
-//! hostile bytes: it reads the hand-in, writes below an empty destination folder that the caller
-//! made, and touches nothing else, so that it can run inside a locked child.
+//! Everything here is library code without processes. [`unpack_bytes`] is the one function that
+//! decodes an archive: it writes below an empty destination folder that the caller made, and touches
+//! nothing else. Hand-ins come in by [`crate::decode`], which calls it in a locked child.
 //!
 //! Conventions: paths of a hand-in are relative, UTF-8, with `/` between components and neither
 //! `.` nor `..`; sizes are bytes; hashes are lower-case hexadecimal SHA-256.
@@ -34,6 +34,7 @@ mod zip;
 mod zip_headers;
 
 pub use check_config::check_config;
+pub(crate) use finding::printable;
 pub use finding::{Finding, Severity};
 pub use hand_in_config::{Field, HandInConfig, ListedRender};
 pub use limits::Limits;
@@ -44,4 +45,5 @@ pub use tree_match::{Mark, TreeLine};
 pub use unpack::{
     Format, HandIn, HandInFile, IntakeError, Refusal, format_of_bytes, unpack, unpack_bytes,
 };
-pub use validate::{Validation, validate, validate_hand_in, validate_refusal};
+pub(crate) use unpack::{copy_unpacked, name_of, read_archive};
+pub use validate::{Validation, validate_hand_in, validate_refusal};

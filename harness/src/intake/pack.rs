@@ -15,8 +15,8 @@ use super::hand_in_config::{Field, HandInConfig};
 use super::limits::Limits;
 use super::tree::TreeSpec;
 use super::tree_match::{Mark, match_tree, tree_findings};
-use super::unpack::{HandIn, IntakeError, Refusal, copy_folder, unpack, unpack_bytes};
-use super::validate::{Validation, scratch_folder, validate_hand_in};
+use super::unpack::{HandIn, IntakeError, Refusal, copy_folder, unpack_bytes};
+use super::validate::{Validation, validate_hand_in};
 
 /// An archive that was written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,23 +57,11 @@ pub fn pack(
     };
     let scratch = scratch_folder()?;
     let hand_in = copy_folder(dir, &is_wanted, scratch.path(), tree, limits)?;
-    write_conforming(&hand_in, out, tree, limits)
+    fix(&hand_in, out, tree, limits)
 }
 
-/// Repacks a nearly right hand-in: wrong level, wrong folders, other names, junk and stray files.
-///
-/// # Errors
-/// [`IntakeError::Refused`] when the hand-in itself is refused or something is missing that moving
-/// files cannot mend; nothing is then written.
-pub fn fix(
-    source: &Path,
-    out: &Path,
-    tree: &TreeSpec,
-    limits: &Limits,
-) -> Result<Packed, IntakeError> {
-    let scratch = scratch_folder()?;
-    let hand_in = unpack(source, scratch.path(), tree, limits)?;
-    write_conforming(&hand_in, out, tree, limits)
+fn scratch_folder() -> Result<tempfile::TempDir, IntakeError> {
+    tempfile::tempdir().map_err(|e| IntakeError::io("create a folder in", &std::env::temp_dir(), e))
 }
 
 /// `a2_first_last.zip` by the credentials: lower case, other signs than letters and digits as `-`.
@@ -88,7 +76,12 @@ pub fn archive_name(config: &HandInConfig, tree: &TreeSpec) -> String {
     format!("{}_{}_{}.zip", tree.name_prefix, plain(&config.first_name), plain(&config.last_name))
 }
 
-fn write_conforming(
+/// Repacks a nearly right hand-in: wrong level, wrong folders, other names, junk and stray files.
+///
+/// # Errors
+/// [`IntakeError::Refused`] when something is missing that moving files cannot mend; nothing is
+/// then written.
+pub fn fix(
     hand_in: &HandIn,
     out: &Path,
     tree: &TreeSpec,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::copy::{Halt, Kind, PrivateCopy};
+use super::copy::{Admitted, Halt, Kind, PrivateCopy};
 use super::finding::{Finding, printable};
 use super::limits::{Limits, mib};
 use super::tree::TreeSpec;
@@ -99,7 +99,7 @@ pub enum IntakeError {
 }
 
 impl IntakeError {
-    pub(super) fn io(doing: &'static str, path: &Path, source: io::Error) -> Self {
+    pub(crate) fn io(doing: &'static str, path: &Path, source: io::Error) -> Self {
         Self::Io { doing, path: path.to_owned(), source }
     }
 }
@@ -116,25 +116,79 @@ pub fn unpack(
     tree: &TreeSpec,
     limits: &Limits,
 ) -> Result<HandIn, IntakeError> {
-    let name = name_of(source);
+    match read_archive(source, limits)? {
+        Some(bytes) => unpack_bytes(&bytes, &name_of(source), dest, tree, limits),
+        None => copy_folder(source, &|_, _| true, dest, tree, limits),
+    }
+}
+
+/// The bytes of the archive at `source`, one more than is allowed at most; none of a folder.
+///
+/// # Errors
+/// [`IntakeError::Refused`] when it is neither, and when it cannot be read.
+pub(crate) fn read_archive(source: &Path, limits: &Limits) -> Result<Option<Vec<u8>>, IntakeError> {
     // The path itself was given by whoever grades, so a link there is followed.
     let metadata = source.metadata().map_err(|e| IntakeError::io("read", source, e))?;
     if metadata.is_dir() {
-        return copy_folder(source, &|_, _| true, dest, tree, limits);
+        return Ok(None);
     }
     if !metadata.is_file() {
-        return refused(
-            &name,
-            None,
-            Finding::error("not_a_file", "expected an archive or a folder"),
-        );
+        let finding = Finding::error("not_a_file", "expected an archive or a folder");
+        return refused(&name_of(source), None, finding);
     }
     let file = File::open(source).map_err(|e| IntakeError::io("read", source, e))?;
     let mut bytes = Vec::new();
     file.take(mib(limits.max_total_mib).saturating_add(1))
         .read_to_end(&mut bytes)
         .map_err(|e| IntakeError::io("read", source, e))?;
-    unpack_bytes(&bytes, &name, dest, tree, limits)
+    Ok(Some(bytes))
+}
+
+/// Copies the files of an archive that was unpacked elsewhere: their paths and sizes, and their
+/// contents one after the other. Neither is believed.
+///
+/// # Errors
+/// As [`unpack`]; refused when paths, sizes and contents do not go together.
+pub(crate) fn copy_unpacked(
+    unpacked: &HandIn,
+    contents: &[u8],
+    dest: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<HandIn, IntakeError> {
+    let mut copy = PrivateCopy::new(dest, tree, limits)?;
+    let result = write_unpacked(unpacked, contents, &mut copy);
+    copy.finish(&unpacked.name, unpacked.format, result)
+}
+
+fn write_unpacked(
+    unpacked: &HandIn,
+    mut contents: &[u8],
+    copy: &mut PrivateCopy<'_>,
+) -> Result<(), Halt> {
+    let contradiction = |path: &str| {
+        let message = "what was unpacked contradicts itself: a bug of Umbra's";
+        Finding::error("decoder_answer", message).at(printable(path))
+    };
+    for file in &unpacked.files {
+        copy.count_entry()?;
+        // As it was in the archive.
+        let folder = unpacked.wrapped_in.iter().map(|folder| format!("{folder}/"));
+        let path = folder.collect::<String>() + &file.path;
+        let size = usize::try_from(file.bytes).unwrap_or(usize::MAX);
+        let Some((mut content, rest)) = contents.split_at_checked(size) else {
+            return Err(copy.refuse(contradiction(&path)));
+        };
+        contents = rest;
+        match copy.admit(path.as_bytes(), Kind::File) {
+            Admitted::File(admitted) if admitted == path => {
+                copy.write(&path, &mut content, None)?
+                    .map_err(|e| IntakeError::io("copy", Path::new(&path), e))?;
+            }
+            _ => return Err(copy.refuse(contradiction(&path))),
+        }
+    }
+    if contents.is_empty() { Ok(()) } else { Err(copy.refuse(contradiction(""))) }
 }
 
 /// Copies the wanted part of a folder.
@@ -151,7 +205,7 @@ pub(super) fn copy_folder(
 }
 
 /// The last component of a path, also of `.` and `..`.
-fn name_of(source: &Path) -> String {
+pub(crate) fn name_of(source: &Path) -> String {
     let whole = source.canonicalize().unwrap_or_else(|_| source.to_owned());
     let name = source.file_name().or(whole.file_name()).unwrap_or(source.as_os_str());
     name.to_string_lossy().into_owned()

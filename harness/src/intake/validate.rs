@@ -1,17 +1,15 @@
 //! Whether a hand-in conforms to the expected tree, and what to do where it does not.
 
 use std::fs;
-use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::check_config::check_config;
 use super::finding::{Finding, Findings, Severity};
 use super::hand_in_config::HandInConfig;
-use super::limits::Limits;
 use super::tree::{CONFIG_FILE, TreeSpec};
 use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
-use super::unpack::{Format, HandIn, IntakeError, Refusal, unpack};
+use super::unpack::{Format, HandIn, IntakeError, Refusal};
 
 /// What `validate` found.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,27 +30,6 @@ pub struct Validation {
 
 /// Largest `config.json` that is read [bytes].
 const MAX_CONFIG: u64 = 64 << 10;
-
-/// Validates an archive or folder by way of a private copy in the system's temporary folder.
-///
-/// # Errors
-/// Only matters of the machine; what is wrong with the hand-in is in the validation.
-pub fn validate(
-    source: &Path,
-    tree: &TreeSpec,
-    limits: &Limits,
-) -> Result<Validation, IntakeError> {
-    let scratch = scratch_folder()?;
-    match unpack(source, scratch.path(), tree, limits) {
-        Ok(hand_in) => validate_hand_in(&hand_in, tree),
-        Err(IntakeError::Refused(refusal)) => Ok(validate_refusal(&refusal)),
-        Err(error) => Err(error),
-    }
-}
-
-pub(super) fn scratch_folder() -> Result<tempfile::TempDir, IntakeError> {
-    tempfile::tempdir().map_err(|e| IntakeError::io("create a folder in", &std::env::temp_dir(), e))
-}
 
 /// Validates a private copy that was already made.
 ///

@@ -6,6 +6,7 @@ use crate::sandbox::{self, Isolation, Policy};
 
 /// What a child may use.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Limits {
     /// Wall-clock time in seconds; the parent enforces it.
     pub wall_s: f64,
@@ -17,6 +18,11 @@ pub struct Limits {
     pub output_kib: u64,
     /// Size of any file that is written, in MiB.
     pub file_size_mib: u64,
+    /// All files that are written together, in MiB. Without a mount namespace nothing bounds them.
+    pub scratch_mib: u64,
+    /// Processes and threads together: a compiler and a graphics driver have some of their own.
+    /// Without a user namespace every process of the user counts, and the session's limit holds.
+    pub tasks: u64,
     /// Open files at a time.
     pub open_files: u64,
     /// Threads that thread pools and the software adapter are told to use; a request, not a cage.
@@ -32,6 +38,8 @@ impl Default for Limits {
             memory_mib: 4096,
             output_kib: 1024,
             file_size_mib: 64,
+            scratch_mib: 64,
+            tasks: 160,
             open_files: 256,
             threads: 2,
         }
@@ -50,26 +58,23 @@ pub struct Lock {
 
 impl Lock {
     /// A lock that isolates by `policy`, or by limits alone when the policy has no layer.
-    /// The policy's limits are replaced by these.
+    /// The policy's limits and quota are replaced by these.
     pub fn new(limits: &Limits, mut policy: Policy) -> Self {
         let none = policy.layers.isolation() == Isolation::None;
+        policy.scratch.quota_mib = limits.scratch_mib;
         policy.limits = sandbox::Limits {
             cpu_s: limits.cpu_s,
             memory_mib: limits.memory_mib,
             file_size_mib: limits.file_size_mib,
             open_files: limits.open_files,
-            tasks: tasks(limits.threads, policy.layers.user_ns),
+            tasks: if policy.layers.user_ns { limits.tasks } else { tasks_of_session() },
         };
         Self { limits: limits.clone(), sandbox: (!none).then_some(policy) }
     }
 }
 
-/// How many processes and threads together: a compiler and a graphics driver have some of their own.
-/// Without a user namespace every process of the user counts, and only the session's limit fits.
-fn tasks(threads: u32, counted_apart: bool) -> u64 {
-    if counted_apart {
-        return 128 + 4 * u64::from(threads);
-    }
+/// How many processes and threads the user may have in all.
+fn tasks_of_session() -> u64 {
     #[cfg(target_os = "linux")]
     if let Ok((_, hard)) = nix::sys::resource::getrlimit(nix::sys::resource::Resource::RLIMIT_NPROC)
     {

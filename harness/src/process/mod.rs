@@ -3,7 +3,7 @@
 //!
 //! Everything of Umbra that runs foreign code (the compiler, the worker) goes through [`run`].
 //! [`start`] is the one place where a process is made; what the child does to itself first is
-//! [`crate::sandbox::lock_self`] or, without any isolation, [`lock_self`].
+//! [`lock_self`].
 
 mod capture;
 mod limits;
@@ -16,7 +16,7 @@ mod watch;
 
 pub use capture::Captured;
 pub use limits::{Limits, Lock};
-pub use start::{EXIT_NOT_LOCKED, command, exec_main, exit_now, is_plain, lock_self, start};
+pub use start::{EXIT_NOT_LOCKED, command, exec_main, exit_now, lock_self, start};
 pub use watch::run;
 
 use serde::{Deserialize, Serialize};

@@ -27,7 +27,7 @@ pub fn command(umbra: &Path, lock: &Lock, program: &Path) -> Command {
 }
 
 /// Starts `command`, which must be Umbra itself with a hidden command that calls [`lock_self`]
-/// (either module's) before anything hostile is touched. Its standard input is taken. The child must be waited for on the thread that calls this:
+/// before anything hostile is touched. Its standard input is taken. The child must be waited for on the thread that calls this:
 /// it is killed when that thread ends.
 ///
 /// # Errors
@@ -48,20 +48,22 @@ pub fn start(mut command: Command, lock: &Lock) -> io::Result<Child> {
     command.spawn()
 }
 
-/// Whether [`start`] was told of no isolation: then [`lock_self`] is this child's, otherwise
-/// the sandbox's of the same name.
-pub fn is_plain() -> bool {
-    std::env::var_os(LOCK_VARIABLE).is_some()
-}
-
-/// Locks this process by what [`start`] was given: a session and process group of its own, death
-/// with its parent, and its limits.
+/// Locks this process by what [`start`] was given: in a sandbox or, where there is no isolation at
+/// all, by a session and process group of its own, death with its parent, and its limits.
 ///
 /// Call it first thing in `main`, while there is one thread.
 ///
 /// # Errors
 /// When there is no lock, or any part of it cannot be applied: then nothing hostile may be touched.
 pub fn lock_self() -> io::Result<()> {
+    #[cfg(target_os = "linux")]
+    if std::env::var_os(LOCK_VARIABLE).is_none() {
+        return sandbox::lock_self().map(drop).map_err(io::Error::other);
+    }
+    lock_plainly()
+}
+
+fn lock_plainly() -> io::Result<()> {
     let lock = std::env::var(LOCK_VARIABLE)
         .map_err(|_| io::Error::other("this command is for Umbra's own use"))?;
     let lock: Lock = serde_json::from_str(&lock)?;
@@ -77,7 +79,7 @@ pub fn lock_self() -> io::Result<()> {
 
 /// Locks this process, then turns it into `program`: the hidden command `__exec`.
 pub fn exec_main(program: &OsStr, args: &[OsString]) -> ExitCode {
-    let failure = match lock_self() {
+    let failure = match lock_plainly() {
         Ok(()) => exec(Command::new(program).args(args)),
         Err(error) => error,
     };

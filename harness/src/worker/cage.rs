@@ -12,9 +12,6 @@ use super::wire::Folder;
 use crate::sandbox::policy::{JOB, PLUGIN, SCENE};
 use crate::sandbox::{Bind, Gpu, Kind, Layers, Policy};
 
-/// How much a worker may keep in its scratch, in MiB.
-const SCRATCH_MIB: u64 = 64;
-
 /// A policy, and the names by which the worker is told of things.
 pub struct Cage {
     /// What it sees.
@@ -35,7 +32,6 @@ impl Cage {
     pub fn new(dir: &Path, job: &Job, requests: &[&Request], layers: Layers) -> io::Result<Self> {
         let mut policy = Policy::new(Kind::Worker);
         policy.layers = layers;
-        policy.scratch.quota_mib = SCRATCH_MIB;
         policy.scratch.without_mount = Some(Folder(dir).scratch());
         policy.report = Some(dir.join("report"));
         let inside = Folder(Path::new(JOB));

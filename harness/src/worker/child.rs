@@ -19,25 +19,12 @@ use crate::process::{self, exit_now};
 
 /// Locks this process, then answers the job in `dir`. Does not return when it worked.
 pub fn child_main(dir: &Path) -> ExitCode {
-    let failure = match lock() {
-        Ok(()) => work(dir).err(),
-        Err(error) => Some(error),
-    };
-    if let Some(error) = failure {
+    if let Err(error) = process::lock_self().and_then(|()| work(dir)) {
         eprintln!("umbra: the worker cannot work: {error}");
-        return ExitCode::from(crate::process::EXIT_NOT_LOCKED);
+        return ExitCode::from(process::EXIT_NOT_LOCKED);
     }
     // The answers are in place; what a plugin wants to do at exit concerns nobody.
     exit_now(0)
-}
-
-/// The parent says which lock; one it is always.
-fn lock() -> std::io::Result<()> {
-    #[cfg(target_os = "linux")]
-    if !process::is_plain() {
-        return crate::sandbox::lock_self().map(drop).map_err(std::io::Error::other);
-    }
-    process::lock_self()
 }
 
 fn work(dir: &Path) -> std::io::Result<()> {

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use umbra::build::{BuildOutcome, BuildReport, Recording, compile};
+use umbra::build::{BuildOutcome, BuildReport, Recording, compile, default_limits};
 use umbra::process::Limits;
 use umbra::worker::Supervisor;
 
@@ -81,8 +81,7 @@ impl Source {
             memory_mib: 2048,
             output_kib: 1024,
             file_size_mib: 64,
-            open_files: 256,
-            threads: 1,
+            ..default_limits()
         };
         let never = AtomicBool::new(false);
         compile(recording, supervisor, &src, &out, &limits, &never).expect("a compiler that starts")

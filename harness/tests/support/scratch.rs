@@ -3,10 +3,14 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
+use umbra::assignment::Assignment;
+use umbra::decode::Decoder;
 use umbra::intake::{
     Finding, HandIn, IntakeError, Limits, Severity, TreeSpec, unpack, unpack_bytes,
 };
+use umbra::worker::Supervisor;
 
 /// `root/around/dest` is the destination; everything else below `root` must stay as it is.
 pub struct Scratch {
@@ -30,9 +34,47 @@ impl Scratch {
         all
     }
 
+    /// In a locked child, as hand-ins are; in this process the same must come out.
     pub fn unpack(&self, bytes: &[u8], name: &str, limits: &Limits) -> Result<HandIn, IntakeError> {
+        let tree = TreeSpec::default();
+        let apart =
+            with_decoder(|decoder| decoder.unpack_bytes(bytes, name, &self.dest, &tree, limits));
+        let here = Self::new();
+        let own = here.unpack_here(bytes, name, limits);
+        match (&apart, &own) {
+            (Ok(apart), Ok(own)) => {
+                let root = own.root.strip_prefix(&here.dest).unwrap();
+                assert_eq!(*apart, HandIn { root: self.dest.join(root), ..own.clone() });
+            }
+            (Err(IntakeError::Refused(apart)), Err(IntakeError::Refused(own))) => {
+                assert_eq!(apart, own);
+            }
+            (Err(_), _) => {}
+            (Ok(_), Err(own)) => panic!("a child unpacked what is refused here: {own}"),
+        }
+        apart
+    }
+
+    /// In this process.
+    pub fn unpack_here(
+        &self,
+        bytes: &[u8],
+        name: &str,
+        limits: &Limits,
+    ) -> Result<HandIn, IntakeError> {
         unpack_bytes(bytes, name, &self.dest, &TreeSpec::default(), limits)
     }
+}
+
+/// Calls `body` with what decodes hand-ins, and looks for what its children leave behind.
+pub fn with_decoder<T>(body: impl FnOnce(&Decoder) -> T) -> T {
+    let scratch = tempfile::tempdir().unwrap();
+    let supervisor = Supervisor::new(env!("CARGO_BIN_EXE_umbra").into(), scratch.path().into());
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let limits = Assignment::load(root).unwrap().limits.decode;
+    let result = body(&Decoder::new(&supervisor, &limits, &AtomicBool::new(false)));
+    assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0, "something was left behind");
+    result
 }
 
 /// Files and links below `folder`, with contents.

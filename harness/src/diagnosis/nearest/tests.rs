@@ -27,9 +27,12 @@ impl World {
     }
 
     fn guess(&self, seen: &Tile, names: &[&str]) -> Option<Nearest> {
+        nearest(&[self.exhibit(seen)], names)
+    }
+
+    fn exhibit<'a>(&'a self, seen: &'a Tile) -> Exhibit<'a> {
         let counts = vec![true; LENGTH];
-        let exhibit = Exhibit { seen, right: &self.right, mistakes: &self.mistakes, counts };
-        nearest(&[exhibit], names)
+        Exhibit { seen, right: &self.right, mistakes: &self.mistakes, counts }
     }
 }
 
@@ -148,16 +151,19 @@ proptest! {
         prop_assert_eq!(&found.guess, &plain.guess);
         prop_assert!(found.distance < 0.02);
 
-        let exhibit = |seen| Exhibit {
-            seen,
-            right: &world.right,
-            mistakes: &world.mistakes,
-            counts: vec![true; LENGTH],
-        };
-        let (a, b) = (&world.mistakes[name], &world.right);
-        let one = nearest(&[exhibit(a), exhibit(b)], &NAMES).unwrap();
-        let other = nearest(&[exhibit(b), exhibit(a)], &names).unwrap();
-        prop_assert_eq!(one.guess, other.guess);
-        prop_assert!((one.distance - other.distance).abs() < 1e-9);
+        // Two views of one mistake, one of them darker; and one that shows the mistake beside one
+        // that is right, which is like no mistake.
+        let (shown, darker) = (&world.mistakes[name], &scaled.mistakes[name]);
+        let both = || [world.exhibit(shown), scaled.exhibit(darker)];
+        let [one, other] = [both(), both()].map(|exhibits| nearest(&exhibits, &names));
+        let mut turned = both();
+        turned.reverse();
+        let turned = nearest(&turned, &NAMES);
+        prop_assert_eq!(&one, &other);
+        prop_assert_eq!(one.map(|found| found.guess), turned.map(|found| found.guess));
+        let mut torn = [world.exhibit(shown), world.exhibit(&world.right)];
+        prop_assert_eq!(nearest(&torn, &NAMES), None);
+        torn.reverse();
+        prop_assert_eq!(nearest(&torn, &names), None);
     }
 }

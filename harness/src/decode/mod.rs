@@ -1,0 +1,285 @@
+//! Decoding what hostile bytes may hold: archives, texts and images of a hand-in. Each question is
+//! answered by a child of its own, Umbra itself, locked before it touches a byte; what it sees is
+//! the one file or folder in question, what it may write is its answer.
+//!
+//! The parent reads an answer when the child is gone, and believes neither names nor sizes in it.
+//! A child that dies is the hand-in's matter: whatever it could not decode is refused.
+
+mod child;
+mod wire;
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+
+use basecode::exr_io::{MAX_PIXELS, MAX_SIDE};
+use basecode::{Image, Vec3};
+use serde::Serialize;
+
+pub use child::child_main;
+
+use crate::intake::{self, Finding, HandIn, IntakeError, Refusal, TreeSpec, Validation};
+use crate::process::{self, Ended, Exit, Limits, Lock, signal_name};
+use crate::sandbox::{Bind, Kind, Policy, policy::JOB};
+use crate::worker::Supervisor;
+use wire::{Answer, Folder, Question, read_answer};
+
+/// Bytes of a child's output that are kept.
+const KEEP_OUTPUT: usize = 4 << 10;
+
+/// Asks children to decode.
+pub struct Decoder<'a> {
+    /// Which program is Umbra, and what isolates its children.
+    pub supervisor: &'a Supervisor,
+    /// What each child may use.
+    pub limits: &'a Limits,
+    /// Ctrl-C.
+    pub cancel: &'a AtomicBool,
+    /// CPU seconds of all children so far.
+    cpu_s: Mutex<f64>,
+}
+
+/// A hand-in as it came: the private copy, and what is to be said about it.
+pub struct Received {
+    /// The private copy.
+    pub hand_in: HandIn,
+    /// The copy beside the expected tree, and its `config.json`.
+    pub validation: Validation,
+    /// What its source contains that an instructor should look at.
+    pub source: Vec<Finding>,
+}
+
+/// Why there is no answer.
+enum NoAnswer {
+    /// The bytes ended the child: the hand-in's matter. Says how.
+    Died(String),
+    /// The machine's matter, or Ctrl-C.
+    Machine(io::Error),
+}
+
+impl From<io::Error> for NoAnswer {
+    fn from(error: io::Error) -> Self {
+        Self::Machine(error)
+    }
+}
+
+impl<'a> Decoder<'a> {
+    /// One that starts children of `supervisor`'s kind.
+    pub fn new(supervisor: &'a Supervisor, limits: &'a Limits, cancel: &'a AtomicBool) -> Self {
+        Self { supervisor, limits, cancel, cpu_s: Mutex::new(0.0) }
+    }
+
+    /// Copies the hand-in at `source` (archive or folder) once, without following links, into the
+    /// empty folder `dest`, and looks at the copy.
+    ///
+    /// # Errors
+    /// As [`intake::unpack`]; an archive or text that ends its decoder is refused.
+    pub fn receive(
+        &self,
+        source: &Path,
+        dest: &Path,
+        tree: &TreeSpec,
+        limits: &intake::Limits,
+    ) -> Result<Received, IntakeError> {
+        let hand_in = match intake::read_archive(source, limits)? {
+            // Nothing is decoded: files are copied one by one.
+            None => intake::unpack(source, dest, tree, limits)?,
+            Some(bytes) => {
+                self.unpack_bytes(&bytes, &intake::name_of(source), dest, tree, limits)?
+            }
+        };
+        self.inspect(hand_in, tree)
+    }
+
+    /// As [`intake::unpack_bytes`], in a child.
+    ///
+    /// # Errors
+    /// As [`intake::unpack_bytes`]; an archive that ends its decoder is refused.
+    pub fn unpack_bytes(
+        &self,
+        bytes: &[u8],
+        name: &str,
+        dest: &Path,
+        tree: &TreeSpec,
+        limits: &intake::Limits,
+    ) -> Result<HandIn, IntakeError> {
+        let refused = |finding: Finding| {
+            let findings = vec![finding];
+            let name = intake::printable(name);
+            IntakeError::Refused(Box::new(Refusal { name, format: None, findings }))
+        };
+        let question =
+            Question::Unpack { name: name.to_owned(), tree: tree.clone(), limits: limits.clone() };
+        let wanted = |folder: &Folder| {
+            fs::write(folder.input(), bytes)?;
+            Ok(Bind::new(folder.input(), Folder(Path::new(JOB)).input()))
+        };
+        // The names of all files, and as much content as an archive may hold.
+        let most = limits.max_entries * (limits.max_path_bytes + 256);
+        let most = most + (limits.max_total_mib << 20) + (1 << 20);
+        match self.ask(&question, &wanted, most) {
+            Ok((Answer::Unpacked(unpacked), contents)) => {
+                let copy = intake::copy_unpacked(&unpacked, &contents, dest, tree, limits)?;
+                // What was left out and what was odd is known to whoever saw the archive.
+                Ok(HandIn { findings: unpacked.findings, ..copy })
+            }
+            Ok((Answer::Refused(refusal), _)) => Err(IntakeError::Refused(Box::new(refusal))),
+            Ok(_) => Err(refused(ended("it gave no answer"))),
+            Err(NoAnswer::Died(how)) => Err(refused(ended(&how))),
+            Err(NoAnswer::Machine(error)) => {
+                Err(IntakeError::Io { doing: "unpack", path: name.into(), source: error })
+            }
+        }
+    }
+
+    /// Validates a private copy and scans its source, in a child.
+    fn inspect(&self, hand_in: HandIn, tree: &TreeSpec) -> Result<Received, IntakeError> {
+        let inside = Folder(Path::new(JOB)).input();
+        let root = std::path::absolute(&hand_in.root)
+            .map_err(|error| IntakeError::io("find", &hand_in.root, error))?;
+        let bind = Bind::new(&root, inside);
+        let question = Question::Inspect {
+            hand_in: HandIn { root: self.seen(&bind), ..hand_in.clone() },
+            tree: tree.clone(),
+        };
+        let most = 16 << 20;
+        match self.ask(&question, &|_| Ok(bind.clone()), most) {
+            Ok((Answer::Inspected { validation, source }, _)) => {
+                Ok(Received { hand_in, validation, source })
+            }
+            Ok(_) => Err(refused_copy(&hand_in, "it gave no answer")),
+            Err(NoAnswer::Died(how)) => Err(refused_copy(&hand_in, &how)),
+            Err(NoAnswer::Machine(error)) => Err(IntakeError::io("read", &hand_in.root, error)),
+        }
+    }
+
+    /// Decodes the image in `file`, an EXR; `name` is what messages call it. The inner error says
+    /// what is wrong with the image.
+    ///
+    /// # Errors
+    /// The machine's matters and Ctrl-C.
+    pub fn image(&self, file: &Path, name: &str) -> io::Result<Result<Image, String>> {
+        let bind = Bind::new(std::path::absolute(file)?, Folder(Path::new(JOB)).input());
+        let most = 12 * MAX_PIXELS as u64 + (1 << 20);
+        let question = Question::Image { name: name.to_owned() };
+        Ok(match self.ask(&question, &|_| Ok(bind.clone()), most) {
+            Ok((Answer::Image { width, height }, content)) => image(width, height, &content)
+                .ok_or_else(|| format!("{name}: its decoder answered another size")),
+            Ok((Answer::Failed(message), _)) => Err(message),
+            Ok(_) => Err(format!("{name}: its decoder gave no answer")),
+            Err(NoAnswer::Died(how)) => Err(format!("{name}: cannot be decoded: {how}")),
+            Err(NoAnswer::Machine(error)) => return Err(error),
+        })
+    }
+
+    /// CPU seconds of all children since the last call.
+    pub fn take_cpu_s(&self) -> f64 {
+        self.cpu_s.lock().map_or(0.0, |mut cpu_s| std::mem::take(&mut *cpu_s))
+    }
+
+    /// The path under which a child sees what a bind names.
+    fn seen(&self, bind: &Bind) -> std::path::PathBuf {
+        let place = if self.supervisor.isolation.mount_ns { &bind.inside } else { &bind.host };
+        place.clone()
+    }
+
+    /// Runs one child to its end. `wanted` prepares what it looks at in its private folder; its
+    /// answer is read up to `most` bytes.
+    fn ask(
+        &self,
+        question: &Question,
+        wanted: &dyn Fn(&Folder) -> io::Result<Bind>,
+        most: u64,
+    ) -> Result<(Answer, Vec<u8>), NoAnswer> {
+        let scratch = &self.supervisor.scratch;
+        let private = tempfile::Builder::new().prefix("umbra-decode-").tempdir_in(scratch)?;
+        let folder = Folder(private.path());
+        let inside = Folder(Path::new(JOB));
+        fs::create_dir(folder.scratch())?;
+        let bind = wanted(&folder)?;
+        write_json(&folder, &(question, self.seen(&bind)))?;
+        let output = File::options().create_new(true).read(true).write(true).open(folder.output());
+        let mut output = output?;
+        #[cfg(unix)]
+        for path in [folder.question(), folder.input()].iter().filter(|path| path.exists()) {
+            use std::os::unix::fs::PermissionsExt;
+            // As root, the child is another user; the folder above lets nobody else in.
+            fs::set_permissions(path, fs::Permissions::from_mode(0o644))?;
+        }
+        let mut policy = Policy::new(Kind::Decode);
+        policy.layers = self.supervisor.isolation;
+        policy.scratch.without_mount = Some(folder.scratch());
+        // Folders count as well.
+        policy.scratch.files = 1 << 16;
+        policy.report = Some(private.path().join("report"));
+        policy.read_only.push(Bind::new(folder.question(), inside.question()));
+        policy.read_only.push(bind);
+        policy.read_write.push(Bind::new(folder.output(), inside.output()));
+        let place = if policy.layers.mount_ns { inside.0 } else { folder.0 };
+        let mut command = std::process::Command::new(&self.supervisor.umbra);
+        command.arg("__decode").arg(place).current_dir(folder.scratch()).env_clear();
+        command.env("LANG", "C").env("HOME", "/nonexistent");
+        if cfg!(windows) {
+            command.envs(std::env::var_os("SystemRoot").map(|root| ("SystemRoot", root)));
+        }
+        let lock = Lock::new(self.limits, policy);
+        let beside = self.supervisor.beside_others();
+        let ended = process::run(command, &lock, KEEP_OUTPUT, self.cancel, &mut || ())?;
+        drop(beside);
+        if let Ok(mut cpu_s) = self.cpu_s.lock() {
+            *cpu_s += ended.cpu_s;
+        }
+        if let Some(how) = death(&ended)? {
+            return Err(NoAnswer::Died(how));
+        }
+        let mut bytes = Vec::new();
+        output.by_ref().take(most + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > most {
+            return Err(NoAnswer::Died("it answered more than there can be".to_owned()));
+        }
+        read_answer(bytes).ok_or_else(|| NoAnswer::Died("its answer makes no sense".to_owned()))
+    }
+}
+
+/// How the child died, if it did.
+fn death(ended: &Ended) -> io::Result<Option<String>> {
+    Ok(Some(match ended.exit {
+        Exit::Code(0) => return Ok(None),
+        Exit::Cancelled => return Err(io::Error::from(io::ErrorKind::Interrupted)),
+        Exit::TimedOut => "its decoder ran out of time".to_owned(),
+        Exit::Flooded => "its decoder printed too much".to_owned(),
+        Exit::Code(_) | Exit::Signal(_) if ended.stderr.contains("memory allocation of ") => {
+            "its decoder ran out of memory".to_owned()
+        }
+        Exit::Code(code) => format!("its decoder ended with code {code}: {}", ended.stderr.head),
+        Exit::Signal(signal) => format!("its decoder was ended by {}", signal_name(signal)),
+    }))
+}
+
+fn ended(how: &str) -> Finding {
+    Finding::error("decoder_ended", format!("cannot be unpacked: {how}"))
+        .hint("make the archive anew; umbra pack makes the right one from your working folder")
+}
+
+fn refused_copy(hand_in: &HandIn, how: &str) -> IntakeError {
+    let finding = Finding::error("decoder_ended", format!("its texts cannot be read: {how}"));
+    let (name, format) = (hand_in.name.clone(), Some(hand_in.format));
+    IntakeError::Refused(Box::new(Refusal { name, format, findings: vec![finding] }))
+}
+
+fn image(width: usize, height: usize, content: &[u8]) -> Option<Image> {
+    let fits = width.max(height) <= MAX_SIDE && width * height <= MAX_PIXELS;
+    let (pixels, rest) = content.as_chunks::<12>();
+    if !fits || !rest.is_empty() || pixels.len() != width * height {
+        return None;
+    }
+    let float = |bytes: &[u8]| f32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+    let pixel = |p: &[u8; 12]| Vec3::new(float(&p[..4]), float(&p[4..8]), float(&p[8..]));
+    Some(Image { width, height, pixels: pixels.iter().map(pixel).collect() })
+}
+
+fn write_json(folder: &Folder, value: &impl Serialize) -> io::Result<()> {
+    fs::write(folder.question(), serde_json::to_vec(value)?)
+}
