@@ -82,8 +82,8 @@ mistakes! {
     "phong-fs-gamma": (PHONG, RETURN, GAMMA);
     "shadow-map-acne": (DIFFUSE, MOVED, "let moved = position;"), (PHONG, MOVED, "let moved = position;");
     "shadow-map-peter-panning":
-        (DIFFUSE, MOVED, "let moved = position + 0.15 * (n + wi);"),
-        (PHONG, MOVED, "let moved = position + 0.15 * (n + wi);");
+        (DIFFUSE, MOVED, "let moved = position + 0.3 * (n + wi);"),
+        (PHONG, MOVED, "let moved = position + 0.3 * (n + wi);");
     "shadow-map-inverted":
         (DIFFUSE, LOOKUP, "return 1.0 - textureSampleCompareLevel(shadow_map, shadow_sampler, uv, face, ndc.z);"),
         (PHONG, LOOKUP, "return 1.0 - textureSampleCompareLevel(shadow_map, shadow_sampler, uv, face, ndc.z);");
