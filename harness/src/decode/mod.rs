@@ -24,7 +24,9 @@ use crate::intake::{self, Finding, HandIn, IntakeError, Refusal, TreeSpec, Valid
 use crate::process::{self, Ended, Exit, Limits, Lock, signal_name};
 use crate::sandbox::{Bind, Kind, Policy, policy::JOB};
 use crate::worker::Supervisor;
-use wire::{Answer, Folder, Question, read_answer};
+// Public for its fuzz target: a child may write anything.
+pub use wire::{Answer, read_answer};
+use wire::{Folder, Question};
 
 /// Bytes of a child's output that are kept.
 const KEEP_OUTPUT: usize = 4 << 10;

@@ -27,3 +27,5 @@ pub use job::{
 pub use outcome::{Answer, JobReport, Matter, Outcome, WitnessUse, WorkerRun};
 pub use patience::{Patience, blames_the_machine};
 pub use supervise::{Progress, Supervisor};
+// What is parsed of a file that foreign code could write: public for its fuzz target.
+pub use table::{Noted, RECORD};

@@ -53,8 +53,12 @@ pub(super) fn load(path: &Path) -> Result<(Vec<Shape>, Vec<Material>)> {
     let loaded = tobj::load_obj_buf(&mut reader, &options, |name| {
         let mtl = folder.join(name.to_string_lossy().replace('\\', "/").trim());
         let line = Cell::new(0);
-        let entries = File::open(&mtl).map_err(|error| error.to_string()).and_then(|file| {
-            let mut reader = CountLines { inner: BufReader::new(file), line: &line };
+        let entries = std::fs::read(&mtl).map_err(|error| error.to_string()).and_then(|text| {
+            if let Some((at, message)) = short_colour(&text) {
+                line.set(at);
+                return Err(message);
+            }
+            let mut reader = CountLines { inner: text.as_slice(), line: &line };
             tobj::load_mtl_buf(&mut reader).map_err(|error| error.to_string())
         });
         entries
@@ -86,6 +90,19 @@ pub(super) fn load(path: &Path) -> Result<(Vec<Shape>, Vec<Material>)> {
         return Err(Error::file(path, "mesh holds no triangle"));
     }
     Ok((shapes, materials))
+}
+
+/// The first line, from 1, whose colour has fewer than three numbers, and what to say of it: tobj
+/// panics on it.
+fn short_colour(mtl: &[u8]) -> Option<(usize, String)> {
+    let text = String::from_utf8_lossy(mtl);
+    text.lines().enumerate().find_map(|(index, line)| {
+        let mut words = line.split_whitespace();
+        let name = words.next().filter(|name| ["Ka", "Kd", "Ks", "Ke"].contains(name))?;
+        let found = words.count();
+        let message = || format!("{name} has {found} numbers, expected 3: red, green, blue");
+        (found < 3).then(|| (index + 1, message()))
+    })
 }
 
 fn shape(path: &Path, model: tobj::Model) -> Result<Shape> {

@@ -102,6 +102,12 @@ fn mistakes_in_mesh_and_materials_name_file_and_line() {
         ("nomtl", OBJ.replace("s.mtl", "t.mtl"), MTL.to_owned(), "t.mtl"),
         ("kd", OBJ.to_owned(), MTL.replace("Kd 0.5", "Kd -0.5"), "\"grey\": Kd is"),
         ("kdword", OBJ.to_owned(), MTL.replace("Kd 0.5", "Kd half"), "s.mtl:2"),
+        (
+            "kdshort",
+            OBJ.to_owned(),
+            MTL.replace("0.25 0.125", "0.25"),
+            "s.mtl:2: cannot read the materials: Kd has 2 numbers",
+        ),
         ("dark", OBJ.to_owned(), MTL.replace("Ke 10 20 30", "Ke 0 0 0"), "no light"),
         ("nouse", OBJ.replace("usemtl grey\n", ""), MTL.to_owned(), "has no material"),
         (
