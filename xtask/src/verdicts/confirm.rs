@@ -1,0 +1,85 @@
+//! Thresholds were set on public scenes and on those of one seed. Here they meet scenes that nobody
+//! has looked at: what is right must lose nothing on them, and a mistake no part but its own.
+
+use std::sync::atomic::AtomicBool;
+
+use anyhow::Result;
+use umbra::diagnosis::Catalogue;
+use umbra::expected::Store;
+use umbra::grading::Grading;
+
+use super::Bench;
+use super::choice::{Subject, singles, variants};
+use super::figures::Figure;
+use super::row::Row;
+use super::software;
+
+/// What this is called in `--only`.
+pub const NAME: &str = "unseen scenes";
+
+/// The primes after a million. A seed is spent once a threshold was changed by what it showed: then
+/// all ten are replaced by the next ten.
+const UNSEEN: [u64; 10] = [
+    1_000_003, 1_000_033, 1_000_037, 1_000_039, 1_000_081, 1_000_099, 1_000_117, 1_000_121,
+    1_000_133, 1_000_151,
+];
+/// Samples per pixel of right renderers, in turn.
+const SPP: [u32; 3] = [16, 4, 64];
+
+/// Grades on the held-back scenes of every unseen seed: right renderers on each, the known mistakes
+/// dealt out among them. With `few`, one right renderer on each, and no mistakes.
+///
+/// # Errors
+/// When scenes cannot be made or graded: the machine's matters.
+pub fn figure(bench: &Bench, store: &Store, few: bool, jobs: usize) -> Result<Figure> {
+    let mut assignment = bench.assignment.clone();
+    assignment.scenes.retain(|scene| scene.perturb);
+    let store = Store { assignment: &assignment, reference: store.reference.clone(), ..*store };
+    let mistakes = if few { Vec::new() } else { singles(&Catalogue::known()?) };
+    let (mut complaints, mut confirmed) = (Vec::new(), 0);
+    for (index, seed) in UNSEEN.into_iter().enumerate() {
+        let never = AtomicBool::new(false);
+        let mut grading = Grading::prepare(&store, software(), Some(seed), &never)?;
+        grading.cases.retain(|case| case.held_back);
+        let library = bench.library.clone();
+        let plain = Vec::new();
+        let mut bench = Bench { grading, library, plain, assignment: &assignment, ..*bench };
+        println!("held-back scenes of seed {seed}");
+        let spp = SPP[index % SPP.len()];
+        let right = right(index, spp, few);
+        let own = mistakes.iter().skip(index).step_by(UNSEEN.len()).cloned().collect::<Vec<_>>();
+        let mut rows = bench.grade_all(&own, jobs)?;
+        for case in &mut bench.grading.cases {
+            case.spp = spp;
+        }
+        rows.extend(bench.grade_all(&right, jobs)?);
+        let wrong: Vec<String> = rows.iter().filter_map(|row| lost(row, seed)).collect();
+        confirmed += usize::from(wrong.is_empty());
+        complaints.extend(wrong);
+    }
+    let text = format!("confirmed={confirmed}/{}", UNSEEN.len());
+    Ok(Figure { text, complaints })
+}
+
+/// Right renderers for the `index`th seed.
+fn right(index: usize, spp: u32, few: bool) -> Vec<Subject> {
+    let mut plain = variants(Some(spp));
+    let first = index % plain.len();
+    plain.rotate_left(first);
+    plain.truncate(if few { 1 } else { 3 });
+    if !few {
+        plain.extend(variants(None));
+    }
+    plain
+}
+
+/// What a renderer lost that it should not have. That it loses what it should is the matrix' matter:
+/// three scenes do not show everything.
+fn lost(row: &Row, seed: u64) -> Option<String> {
+    let undeclared = row.grade.parts.iter().filter(|part| !row.subject.parts.contains(&part.id));
+    let lost = undeclared.filter(|part| part.points < part.out_of);
+    let lost: Vec<String> =
+        lost.map(|part| format!("{} is left {} ({})", part.id, part.points, part.reason)).collect();
+    let name = row.subject.name();
+    (!lost.is_empty()).then(|| format!("held-back seed {seed}: {name}: {}", lost.join("; ")))
+}
