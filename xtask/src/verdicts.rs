@@ -243,10 +243,6 @@ impl<'a> Bench<'a> {
             self.grading.plugin(&self.library, &options, subject.seed, &stages, &paths)?;
         let others = self.plain.iter().filter(|(path, _)| !paths.contains(path));
         evidence.checks.extend(others.flat_map(|(_, checks)| checks.clone()));
-        if self.grading.cases.iter().all(|case| case.held_back) {
-            // They stand for themselves here: no public scene is beside them.
-            evidence.checks.iter_mut().for_each(|check| check.held_back = false);
-        }
         let grade = rubric::grade(&self.assignment.rules, &evidence);
         let seconds = since.elapsed().as_secs_f64();
         Ok(Row { subject: subject.clone(), evidence, diagnoses, grade, seconds })
