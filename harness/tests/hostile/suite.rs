@@ -108,8 +108,8 @@ fn all(layers: Layers, only: &str) -> Result<bool, String> {
 
     let (next, results) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     std::thread::scope(|scope| {
-        // Many wait for a limit: one more than there are cores.
-        let threads = std::thread::available_parallelism().map_or(2, |n| n.get()) + 1;
+        // Most wait for a limit: more than there are cores.
+        let threads = std::thread::available_parallelism().map_or(2, |n| 2 * n.get()) + 1;
         for _ in 0..threads.min(8) {
             scope.spawn(|| {
                 while let Some((name, as_user)) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
