@@ -446,6 +446,34 @@ fn realtime_floats_allow_for_pow_only() {
     assert!(!judge(1.006, 0.0).check("bias: wall").unwrap().passed);
 }
 
+/// Hardware snaps vertices to 1/256 of a pixel: what it draws is that far off in both directions at most.
+#[test]
+fn realtime_floats_allow_for_the_rasterisers_grid() {
+    let mut reference = flat(48, 48, Vec3::splat(0.4), 0.0);
+    // A highlight 1.5 pixels wide on a dim wall, as a ray tracer and a shifted rasteriser see it.
+    let draw = |shift: f32| {
+        let mut image = Image::new(48, 48);
+        for (i, pixel) in image.pixels.iter_mut().enumerate() {
+            let (x, y) = ((i % 48) as f32 - 20.3 + shift, (i / 48) as f32 - 25.8 + shift);
+            *pixel = Vec3::splat(0.4 + 6.0 * (-(x * x + y * y) / 4.5).exp());
+        }
+        image
+    };
+    reference.centre = draw(0.0);
+    let judge = |shift: f32| {
+        let t = Tolerances::default();
+        compare_realtime_linear(&draw(shift), &reference.centre, &reference.mask, &t).unwrap()
+    };
+    assert!(judge(1.0 / 256.0).passed());
+    assert!(judge(-1.0 / 256.0).passed());
+    let off = judge(1.0 / 16.0);
+    assert_eq!(failed(&off)[..2], ["interior", "blob"], "a sixteenth of a pixel");
+    let without = Tolerances { realtime_snap_px: 0.0, ..Tolerances::default() };
+    let strict =
+        compare_realtime_linear(&draw(1.0 / 256.0), &reference.centre, &reference.mask, &without);
+    assert!(!strict.unwrap().passed(), "the allowance is what lets it pass");
+}
+
 #[test]
 fn levels_of_handed_in_realtime_images() {
     let width = 64;

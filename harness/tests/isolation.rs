@@ -336,12 +336,12 @@ fn the_reference_draws_the_same_bits_inside_and_outside() {
         threads: 2,
         shadows: true,
     };
-    let realtime = Request::RenderRealtime {
+    let realtime = |kind| Request::RenderRealtime {
         scene: scene("cbox_simple_realtime.toml"),
         width: 40,
         height: 30,
         shadow_map: false,
-        adapter: Adapter { kind: AdapterKind::Software, name: String::new() },
+        adapter: Adapter { kind, name: String::new() },
         stages: Vec::new(),
         cameras: vec![CameraValue {
             eye: [0.0, 1.0, 6.8],
@@ -350,23 +350,28 @@ fn the_reference_draws_the_same_bits_inside_and_outside() {
             fov_y_deg: 20.0,
         }],
     };
-    let draw = |isolation| {
-        let requests = vec![offline.clone(), realtime.clone()];
-        let report = run(&house.isolated(isolation), &reference(), requests);
-        let bits = |outcome: &Outcome| match outcome {
-            Outcome::Done(answer) => answer.values.iter().map(|value| value.to_bits()).collect(),
-            Outcome::NoAdapter(_) => vec![],
-            other => panic!("{other:?}"),
+    let requests = [
+        ("cores", offline),
+        ("a software adapter", realtime(AdapterKind::Software)),
+        ("a hardware adapter", realtime(AdapterKind::Hardware)),
+    ];
+    for (what, request) in requests {
+        let draw = |isolation| {
+            let report = run(&house.isolated(isolation), &reference(), vec![request.clone()]);
+            match &report.outcomes[0] {
+                Outcome::Done(answer) => Some(answer.values.clone()),
+                Outcome::NoAdapter(_) => None,
+                other => panic!("{what}: {other:?}"),
+            }
         };
-        report.outcomes.iter().map(bits).collect::<Vec<Vec<u32>>>()
-    };
-    let (inside, outside) = (draw(Layers::full()), draw(Layers::NONE));
-    assert!(inside == outside, "isolation changes a picture");
-    assert!(inside[0].iter().any(|bits| f32::from_bits(*bits) > 0.05), "something is lit");
-    if outside[1].is_empty() {
-        eprintln!("no software adapter here: realtime was not compared");
-    } else {
-        assert!(inside[1].iter().any(|bits| f32::from_bits(*bits) > 0.05), "something is lit");
+        let Some(outside) = draw(Layers::NONE) else {
+            eprintln!("not compared: there is not {what} here");
+            continue;
+        };
+        let inside = draw(Layers::full()).unwrap_or_else(|| panic!("{what} cannot be seen"));
+        let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        assert!(bits(&inside) == bits(&outside), "{what}: isolation changes a picture");
+        assert!(inside.iter().any(|value| *value > 0.05), "{what}: nothing is lit");
     }
 }
 

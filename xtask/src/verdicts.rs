@@ -18,12 +18,13 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use umbra::assignment::Assignment;
+use umbra::cli::AdapterChoice;
 use umbra::diagnosis::Catalogue;
 use umbra::evidence::Check;
 use umbra::expected::Store;
 use umbra::grading::{Grading, RenderPath, Stages};
 use umbra::rubric;
-use umbra::worker::{Adapter, AdapterKind, Supervisor};
+use umbra::worker::Supervisor;
 
 use choice::{Subject, pairs, singles, variants};
 use figures::{Figure, Matrix};
@@ -54,6 +55,9 @@ pub struct Arguments {
     /// Seed of held-back scenes to grade on as well [default: none are made]
     #[arg(long, value_name = "SEED")]
     perturb: Option<u64>,
+    /// Which adapter draws the realtime scenes
+    #[arg(long, value_enum, default_value_t = AdapterChoice::Software)]
+    adapter: AdapterChoice,
     /// Renderers graded at the same time [default: one for each core]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
@@ -95,7 +99,8 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         progress: &|message| eprintln!("{message}"),
     };
     let cancel = AtomicBool::new(false);
-    let grading = Grading::prepare(&store, software(), arguments.perturb, &cancel)?;
+    let grading =
+        Grading::prepare(&store, arguments.adapter.adapter(), arguments.perturb, &cancel)?;
     if let Err(why) = &grading.adapter {
         anyhow::bail!("realtime cannot be judged here: {why}");
     }
@@ -105,6 +110,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         grading,
         library,
         explain: arguments.explain,
+        all_shown: true,
         plain: Vec::new(),
     };
     let jobs = arguments.jobs.unwrap_or(cores).max(1);
@@ -149,7 +155,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         let few = arguments.quick;
         figures.push(confirm::figure(&bench, &store, few, jobs)?);
     }
-    let sources = sources::grade(root, &umbra, &assignment.rules, &named, arguments.full)?;
+    let sources = sources::grade(root, &umbra, &assignment.rules, &named, arguments)?;
     let graded = matrix.variants.len() + matrix.singles.len() + matrix.pairs.len();
     ensure!(graded > 0 || unseen || sources.is_some(), "nothing has a name like that");
     figures.extend(sources);
@@ -165,11 +171,6 @@ fn summary(figures: &[Figure]) -> Result<String> {
     Ok(line)
 }
 
-/// Every machine's adapter.
-fn software() -> Adapter {
-    Adapter { kind: AdapterKind::Software, name: String::new() }
-}
-
 /// What it takes to grade a renderer.
 struct Bench<'a> {
     root: &'a Path,
@@ -177,6 +178,8 @@ struct Bench<'a> {
     grading: Grading<'a>,
     library: PathBuf,
     explain: bool,
+    /// Whether the scenes show every mistake.
+    all_shown: bool,
     /// What was found out about the reference on each path, to stand for renderers that differ from
     /// it on the other alone; empty when every path of every renderer is to be seen.
     plain: Vec<(RenderPath, Vec<Check>)>,
@@ -245,7 +248,8 @@ impl<'a> Bench<'a> {
         evidence.checks.extend(others.flat_map(|(_, checks)| checks.clone()));
         let grade = rubric::grade(&self.assignment.rules, &evidence);
         let seconds = since.elapsed().as_secs_f64();
-        Ok(Row { subject: subject.clone(), evidence, diagnoses, grade, seconds })
+        let (subject, all_shown) = (subject.clone(), self.all_shown);
+        Ok(Row { subject, all_shown, evidence, diagnoses, grade, seconds })
     }
 
     /// The reference's stage texts with mistakes, and the template's.

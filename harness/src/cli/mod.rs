@@ -9,6 +9,8 @@ mod grade;
 mod render;
 mod tree;
 
+pub use render::AdapterChoice;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

@@ -66,7 +66,8 @@ pub fn compare_offline(
 
 /// Judges a realtime frame drawn from code, as unclamped linear floats, against the pixel-centre reference.
 ///
-/// In the interior |a - b| <= (relative + per_exponent n) b + floor, n being the region's Phong exponent.
+/// In the interior |a - b| <= (relative + per_exponent n) b + snap (dx + dy) + floor, n being the region's Phong
+/// exponent, dx and dy the larger of the differences to the two neighbours in b's row and column.
 ///
 /// # Errors
 /// When the sizes differ, or the mask does not fit the reference.
@@ -86,11 +87,19 @@ pub fn compare_realtime_linear(
         })
         .map(|r| r as f32)
         .collect();
-    let walk = walk(actual, centre, mask, tolerances, |_, row| {
+    let snap = tolerances.realtime_snap_px as f32;
+    let walk = walk(actual, centre, mask, tolerances, |y, row| {
+        let other = |y: usize| &centre.pixels[y * width..][..width];
+        let (above, below) = (other(y.saturating_sub(1)), other((y + 1).min(centre.height - 1)));
         for x in 0..width {
             let relative = relative[usize::from(row.mask[x] & RegionMask::INDEX)];
-            let excess = (row.actual[x] - row.expected[x]).abs()
-                / (relative * row.expected[x].abs() + floor);
+            let b = row.expected[x];
+            let to = |neighbour: Vec3| (neighbour - b).abs();
+            let dx =
+                to(row.expected[x.saturating_sub(1)]).max(to(row.expected[(x + 1).min(width - 1)]));
+            let dy = to(above[x]).max(to(below[x]));
+            let allowed = relative * b.abs() + snap * (dx + dy) + floor;
+            let excess = (row.actual[x] - b).abs() / allowed;
             row.excess2[x] = excess.max_element().powi(2);
         }
     });

@@ -37,6 +37,10 @@ pub struct Tolerances {
     /// More of it per unit of Phong exponent n. WGSL's pow is exp2(n log2 x) with log2 good to 2^-21, that is 3.3e-7 n,
     /// and cos(alpha) itself carries about 1e-6 from the interpolated normal; three times their sum.
     pub realtime_per_exponent: f64,
+    /// And more of it where neighbours differ: this part of a pixel's way to them. Graphics hardware snaps vertices to
+    /// 1/256 of a pixel and interpolates from there (lavapipe does not); an H100 was 0.73 of that off in a highlight
+    /// one pixel wide. Twice that, for room.
+    pub realtime_snap_px: f64,
     /// Realtime in 8-bit sRGB levels: a pixel fails when it is this many levels off. One level is rounding (2.5 to 45 %
     /// of pixels by driver).
     pub srgb_levels: u32,
@@ -60,6 +64,7 @@ impl Default for Tolerances {
             negative_limit: 1e-6,
             realtime_relative: 2e-3,
             realtime_per_exponent: 4e-6,
+            realtime_snap_px: 1.0 / 128.0,
             srgb_levels: 2,
             srgb_fraction: 2.5e-3,
         }

@@ -11,6 +11,7 @@
 //! everything inside, daemons included. It dies with the launcher, and the launcher with the thread that
 //! started it. The third is *locked*, the only one that ever runs foreign code.
 
+mod gpu;
 pub mod policy;
 
 #[cfg(target_os = "linux")]
@@ -32,10 +33,11 @@ mod privileges;
 #[cfg(target_os = "linux")]
 mod root;
 
+pub use gpu::Gpu;
 #[cfg(target_os = "linux")]
 pub use launch::{command, kill_inside, launch_main, lock_self, locked_pid, orders};
 pub use policy::{
-    Bind, Gpu, InForce, Isolation, Kind, Layers, Limits, Policy, SandboxError, Scratch, read_report,
+    Bind, InForce, Isolation, Kind, Layers, Limits, Policy, SandboxError, Scratch, read_report,
 };
 
 /// The layers that this machine gives and that work with each other, tried for real with `umbra`,

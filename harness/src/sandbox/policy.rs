@@ -88,34 +88,6 @@ pub struct Limits {
     pub tasks: u64,
 }
 
-/// What `--adapter gpu` adds.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Gpu {
-    /// Device nodes (`/dev/dri/renderD128`, `/dev/nvidia0`, ...), under their own paths.
-    pub nodes: Vec<PathBuf>,
-    /// Driver files and folders to read, under their own paths.
-    pub files: Vec<PathBuf>,
-}
-
-impl Gpu {
-    /// What this machine has of the usual drivers'; none when there is no device.
-    pub fn of_this_machine() -> Option<Self> {
-        let named = |folder: &str, starts: &[&str]| -> Vec<PathBuf> {
-            let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-            let known = |path: &PathBuf| {
-                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                starts.iter().any(|start| name.starts_with(start)) && !path.is_dir()
-            };
-            entries.map(|entry| entry.path()).filter(known).collect()
-        };
-        let mut nodes = named("/dev/dri", &["renderD"]);
-        nodes.extend(named("/dev", &["nvidia"]));
-        let files = ["/sys/dev/char", "/sys/devices", "/etc/vulkan", "/usr/share/nvidia"];
-        let files = files.iter().map(PathBuf::from).filter(|path| path.exists()).collect();
-        (!nodes.is_empty()).then_some(Self { nodes, files })
-    }
-}
-
 /// One switch per layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Layers {
@@ -264,7 +236,7 @@ pub struct Policy {
     /// What it may use.
     pub limits: Limits,
     /// Device nodes and driver files, when it draws on a GPU.
-    pub gpu: Option<Gpu>,
+    pub gpu: Option<super::Gpu>,
     /// Whether it has a `/proc` of its own process namespace. Landlock leaves `/proc/cpuinfo` and
     /// the links to be read (a program finds its own path by `/proc/self/exe`, as rustc's linker
     /// does) and no other file: `mountinfo` would name the binds' host paths.

@@ -57,10 +57,8 @@ impl Cage {
         for request in requests {
             scenes.push(scene(&request.scene().path, &mut roots, &mut policy)?);
         }
-        let hardware = requests.iter().any(|request| {
-            matches!(request, Request::RenderRealtime { adapter, .. } if adapter.kind != AdapterKind::Software)
-        });
-        if hardware {
+        let drawn_by = |request: &&Request| request.adapter();
+        if requests.iter().filter_map(drawn_by).any(|kind| kind != AdapterKind::Software) {
             policy.gpu = Gpu::of_this_machine();
         }
         let job = if layers.mount_ns { PathBuf::from(JOB) } else { dir.to_owned() };

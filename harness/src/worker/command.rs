@@ -27,13 +27,12 @@ pub fn command(
     command.env("MESA_SHADER_CACHE_DISABLE", "false").env("MESA_SHADER_CACHE_DIR", ".");
     command.env("LP_NUM_THREADS", limits.threads.to_string());
     command.env("RAYON_NUM_THREADS", limits.threads.to_string());
-    let software = requests.iter().any(|request| {
-        let Request::RenderRealtime { adapter, .. } = request else { return false };
-        adapter.kind == AdapterKind::Software
-    });
-    if software {
+    let kinds: Vec<AdapterKind> = requests.iter().filter_map(|request| request.adapter()).collect();
+    if kinds.contains(&AdapterKind::Software) {
         let driver = driver.unwrap_or(Path::new("/nonexistent"));
         command.env("VK_ICD_FILENAMES", driver).env("VK_DRIVER_FILES", driver);
+    } else if !kinds.is_empty() {
+        command.env("__GL_SHADER_DISK_CACHE", "0"); // NVIDIA's name for it
     }
     if cfg!(windows) {
         // Without it, no library of the system can be found.

@@ -199,6 +199,14 @@ impl Request {
         }
     }
 
+    /// Which adapter draws, where one does.
+    pub fn adapter(&self) -> Option<AdapterKind> {
+        match self {
+            Self::RenderRealtime { adapter, .. } => Some(adapter.kind),
+            _ => None,
+        }
+    }
+
     /// How many floats the answer holds.
     pub fn answer_floats(&self) -> usize {
         let image = |width: u32, height: u32| width as usize * height as usize;

@@ -30,7 +30,7 @@ fn without(rule: &EvidenceRule, rules: &Rules, row: &Row) -> Option<String> {
     let (rules, evidence) = rule.delete(rules, &row.evidence);
     let grade = rubric::grade(&rules, &evidence);
     let (subject, diagnoses) = (row.subject.clone(), Vec::new());
-    let again = Row { subject, evidence, diagnoses, grade, seconds: 0.0 };
+    let again = Row { subject, all_shown: row.all_shown, evidence, diagnoses, grade, seconds: 0.0 };
     let complaint = again.complaint();
     (!complaint.is_empty()).then(|| format!("{}: {complaint}", again.subject.name()))
 }

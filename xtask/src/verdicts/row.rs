@@ -11,6 +11,8 @@ use super::choice::Subject;
 pub struct Row {
     /// Which renderer, and what it must lose.
     pub subject: Subject,
+    /// Whether the scenes show every mistake.
+    pub all_shown: bool,
     /// What was found out about it.
     pub evidence: Evidence,
     /// What it looks like.
@@ -22,7 +24,8 @@ pub struct Row {
 }
 
 impl Row {
-    /// Whether it lost points in every part that it declares, in no other, and all was judged.
+    /// Whether it lost points in every part that it declares where the scenes show them all, in no
+    /// other, and all was judged.
     pub fn as_declared(&self) -> bool {
         self.complaint().is_empty()
     }
@@ -39,14 +42,15 @@ impl Row {
                     part.out_of - part.points_max,
                     part.reason
                 ));
-            } else if part.points_max == part.out_of && declared {
+            } else if part.points_max == part.out_of && declared && self.all_shown {
                 complaints.push(format!("{} loses nothing ({})", part.id, part.reason));
             } else if part.points < part.points_max {
                 complaints.push(format!("{} is not judged ({})", part.id, part.reason));
             }
         }
         let fails = |check: &Check| check.verdict == Verdict::Fail;
-        let unfound = self.subject.findings.iter().filter(|id| !self.evidence.named(id).any(fails));
+        let declared = self.subject.findings.iter().filter(|_| self.all_shown);
+        let unfound = declared.filter(|id| !self.evidence.named(id).any(fails));
         complaints.extend(unfound.map(|id| format!("{id} finds nothing")));
         complaints.join("; ")
     }

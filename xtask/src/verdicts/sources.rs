@@ -5,9 +5,11 @@ use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
+use clap::ValueEnum as _;
 use serde_json::Value;
 use umbra::rubric::Rules;
 
+use super::Arguments;
 use super::figures::Figure;
 use crate::samples;
 
@@ -15,7 +17,7 @@ use crate::samples;
 const PERTURB: &str = "20191006";
 
 /// Grades the samples whose names are wanted, none if there are none; those that wait for time
-/// limits only if `slow`.
+/// limits only with `--full`.
 ///
 /// # Errors
 /// When a sample cannot be packed, or `umbra` not be run to a good end.
@@ -24,10 +26,10 @@ pub fn grade(
     umbra: &Path,
     rules: &Rules,
     wanted: &(dyn Fn(&str) -> bool + Sync),
-    slow: bool,
+    arguments: &Arguments,
 ) -> Result<Option<Figure>> {
     let mut samples = samples::pack(root, wanted)?;
-    samples.retain(|sample| slow || !sample.slow);
+    samples.retain(|sample| arguments.full || !sample.slow);
     if samples.is_empty() {
         return Ok(None);
     }
@@ -36,6 +38,9 @@ pub fn grade(
     command.arg("grade").args(samples.iter().map(|sample| &sample.archive));
     command.arg("--output").arg(&out).arg("--root").arg(root);
     command.args(["--perturb", PERTURB]);
+    if let Some(adapter) = arguments.adapter.to_possible_value() {
+        command.args(["--adapter", adapter.get_name()]);
+    }
     let output = command.output().with_context(|| umbra.display().to_string())?;
     let said = String::from_utf8_lossy(&output.stderr);
     ensure!(output.status.success(), "umbra grade: {}\n{said}", output.status);
