@@ -1,6 +1,7 @@
 //! `xtask`: the chores of this repository that are not part of grading.
 
 mod dist;
+mod parallel;
 mod samples;
 mod scenes;
 mod verdicts;

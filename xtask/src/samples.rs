@@ -7,8 +7,7 @@ mod expect;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail, ensure};
 use basecode::exr_io::{Precision, read_exr_layers, write_exr};
@@ -24,6 +23,8 @@ use umbra::worker::{
 
 use archive::write_archive;
 use expect::Expect;
+
+use crate::parallel;
 
 /// How one sample is made; `samples/README.md` explains the fields.
 #[derive(Clone, Debug, Deserialize)]
@@ -100,23 +101,10 @@ fn template() -> String {
 pub fn pack(root: &Path, wanted: &(dyn Fn(&str) -> bool + Sync)) -> Result<Vec<Sample>> {
     let packer = Packer::new(root)?;
     let names: Vec<&String> = packer.recipes.keys().filter(|name| wanted(name)).collect();
-    let next = AtomicUsize::new(0);
-    let packed = Mutex::new(Vec::new());
-    let work = || {
-        while let Some(name) = names.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let sample = packer.pack(name).with_context(|| format!("sample {name}"));
-            packed.lock().map(|mut packed| packed.push(sample)).ok();
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, |n| n.get()) {
-            scope.spawn(work);
-        }
-    });
-    let mut packed =
-        packed.into_inner().unwrap_or_default().into_iter().collect::<Result<Vec<Sample>>>()?;
-    packed.sort_by(|a, b| a.name.cmp(&b.name));
-    Ok(packed)
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    parallel::each(&names, cores, |_, name| {
+        packer.pack(name).with_context(|| format!("sample {name}"))
+    })
 }
 
 struct Packer {

@@ -12,8 +12,7 @@ mod row;
 mod sources;
 
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
@@ -29,6 +28,8 @@ use umbra::worker::Supervisor;
 use choice::{Subject, pairs, singles, variants};
 use figures::{Figure, Matrix};
 use row::Row;
+
+use crate::parallel;
 
 /// The stages of a renderer, in the order of [`Stages`].
 const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
@@ -197,31 +198,11 @@ impl<'a> Bench<'a> {
 
     /// Grades all and prints a row for each as it is done.
     fn grade_all(&self, subjects: &[Subject], jobs: usize) -> Result<Vec<Row>> {
-        let next = AtomicUsize::new(0);
-        let rows = Mutex::new(Vec::new());
-        let failure = Mutex::new(None);
-        std::thread::scope(|scope| {
-            for _ in 0..jobs.min(subjects.len()) {
-                scope.spawn(|| {
-                    while let Some(subject) = subjects.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        match self.grade(subject) {
-                            Ok(row) => {
-                                row.print(self.explain);
-                                rows.lock().map(|mut rows| rows.push(row)).ok();
-                            }
-                            Err(error) => {
-                                failure.lock().map(|mut failure| *failure = Some(error)).ok();
-                                return;
-                            }
-                        }
-                    }
-                });
-            }
-        });
-        match failure.into_inner() {
-            Ok(Some(error)) => Err(error),
-            _ => Ok(rows.into_inner().unwrap_or_default()),
-        }
+        parallel::each(subjects, jobs, |_, subject| {
+            let row = self.grade(subject)?;
+            row.print(self.explain);
+            Ok(row)
+        })
     }
 
     /// Finds out about the reference as it is.

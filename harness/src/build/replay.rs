@@ -34,6 +34,8 @@ pub enum BuildOutcome {
     OutOfMemory,
     /// It wrote more messages than allowed.
     FloodedOutput,
+    /// Its library, or a file on the way there, grew larger than allowed.
+    FileTooLarge,
     /// A signal ended the compiler; names it.
     Crashed(String),
     /// The user asked to stop.
@@ -146,6 +148,7 @@ pub fn compile(
         Exit::Signal(signal) => BuildOutcome::Crashed(signal_name(signal)),
         Exit::TimedOut => BuildOutcome::TimedOut,
         Exit::Flooded => BuildOutcome::FloodedOutput,
+        Exit::FileTooLarge => BuildOutcome::FileTooLarge,
         Exit::Cancelled => BuildOutcome::Cancelled,
     };
     let (wall_s, cpu_s) = (ended.wall_s, ended.cpu_s);

@@ -252,6 +252,7 @@ fn death(ended: &Ended) -> io::Result<Option<String>> {
         Exit::Cancelled => return Err(io::Error::from(io::ErrorKind::Interrupted)),
         Exit::TimedOut => "its decoder ran out of time".to_owned(),
         Exit::Flooded => "its decoder printed too much".to_owned(),
+        Exit::FileTooLarge => "its decoder wrote too large a file".to_owned(),
         Exit::Code(_) | Exit::Signal(_) if ended.stderr.contains("memory allocation of ") => {
             "its decoder ran out of memory".to_owned()
         }

@@ -168,6 +168,9 @@ pub fn unanswered(id: &str, scene: &str, parts: &[&str], outcome: &Outcome) -> C
         Outcome::FloodedOutput => {
             check(Verdict::Fail, "the renderer printed more than is allowed".into())
         }
+        Outcome::FileTooLarge => {
+            check(Verdict::Fail, "the renderer wrote a larger file than is allowed".into())
+        }
         Outcome::NoAdapter(message) => check(Verdict::NotRun, format!("not run here: {message}")),
         Outcome::NotRun { reason, matter: Matter::Submission } => {
             check(Verdict::Fail, reason.clone())

@@ -308,6 +308,9 @@ impl<'a> Grading<'a> {
             BuildOutcome::FloodedOutput => {
                 (None, "the compiler said more than is allowed".to_owned())
             }
+            BuildOutcome::FileTooLarge => {
+                (None, "the compiler wrote a larger file than is allowed".to_owned())
+            }
             BuildOutcome::Crashed(signal) => (None, format!("the compiler crashed: {signal}")),
             BuildOutcome::Cancelled => anyhow::bail!("interrupted"),
         };

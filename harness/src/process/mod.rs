@@ -34,6 +34,8 @@ pub enum Exit {
     TimedOut,
     /// By Umbra, because it wrote more output than allowed.
     Flooded,
+    /// By the kernel, because it wrote a larger file than allowed.
+    FileTooLarge,
     /// By Umbra, because the user asked to stop.
     Cancelled,
 }

@@ -88,6 +88,7 @@ pub fn run(
         (Some(exit), _) => exit,
         _ if total(&pipes) > cap => Exit::Flooded,
         (None, Some(libc::SIGXCPU)) => Exit::TimedOut,
+        (None, Some(libc::SIGXFSZ)) => Exit::FileTooLarge,
         (None, Some(libc::SIGKILL)) if out_of_cpu => Exit::TimedOut,
         (None, Some(signal)) => Exit::Signal(signal),
         (None, None) => Exit::Code(libc::WEXITSTATUS(status)),

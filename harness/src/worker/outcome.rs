@@ -39,6 +39,9 @@ pub enum Outcome {
     OutOfMemory,
     /// It wrote more to standard output and error than allowed.
     FloodedOutput,
+    /// It wrote a larger file than allowed. Limits that only refuse (scratch, tasks, open files) end
+    /// nobody: the renderer is told, and answers for what it makes of that.
+    FileTooLarge,
     /// No graphics adapter fits, by the plugin's word.
     NoAdapter(String),
     /// Never asked.

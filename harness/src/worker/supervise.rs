@@ -383,6 +383,7 @@ fn death(ended: &Ended, limits: &Limits) -> Outcome {
     match ended.exit {
         Exit::TimedOut => Outcome::TimedOut,
         Exit::Flooded => Outcome::FloodedOutput,
+        Exit::FileTooLarge => Outcome::FileTooLarge,
         Exit::Cancelled => {
             Outcome::NotRun { reason: "cancelled".to_owned(), matter: Matter::Machine }
         }

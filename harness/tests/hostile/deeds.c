@@ -129,6 +129,13 @@ static UmbraStatus full_disk(UmbraMessage *message)
     return say(message, "%d MiB and no error", mib);
 }
 
+static UmbraStatus one_large_file(UmbraMessage *message)
+{
+    int fd = open("large", O_WRONLY | O_CREAT, 0600);
+    int grown = fd >= 0 && ftruncate(fd, (off_t)1 << 30) == 0;
+    return say(message, "%s", grown ? "a gigabyte, no error" : name_of(errno));
+}
+
 static UmbraStatus flood(int fd)
 {
     static char block[1 << 16];
@@ -373,6 +380,7 @@ int deed(const char *what, float *values, size_t count, UmbraMessage *message,
     DEED("memory_bomb", memory_bomb())
     DEED("many_files", many_files(message))
     DEED("full_disk", full_disk(message))
+    DEED("one_large_file", one_large_file(message))
     DEED("flood_stdout", flood(1))
     DEED("flood_stderr", flood(2))
     DEED("exit75", (_exit(75), 0))

@@ -40,6 +40,7 @@ enum Expect {
     TimedOut,
     OutOfMemory,
     Flood,
+    FileTooLarge,
     /// These and the next: the beginning of the message.
     Failed(&'static str),
     NotImplemented(&'static str),
@@ -116,6 +117,7 @@ impl Expect {
             (Self::TimedOut, Outcome::TimedOut)
             | (Self::OutOfMemory, Outcome::OutOfMemory)
             | (Self::Flood, Outcome::FloodedOutput)
+            | (Self::FileTooLarge, Outcome::FileTooLarge)
             | (Self::NoAdapter, Outcome::NoAdapter(_)) => true,
             (Self::Failed(text), Outcome::Failed(said))
             | (Self::NotImplemented(text), Outcome::NotImplemented(said))
@@ -171,6 +173,7 @@ pub fn all() -> Vec<Plugin> {
         rust("memory_bomb_in_rust", "huge", Offline, OutOfMemory),
         c("disk_bomb_of_many_files", "many_files", Failed("fewer than 20000 files, ENOSPC")),
         c("disk_bomb_of_large_files", "full_disk", Failed("at most 64 MiB, ENOSPC")),
+        c("disk_bomb_of_one_file", "one_large_file", FileTooLarge),
         c("stdout_flood", "flood_stdout", Flood),
         c("stderr_flood", "flood_stderr", Flood),
         c("exit_0_early", "exit0", Exit(0)),
