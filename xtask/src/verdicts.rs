@@ -59,7 +59,7 @@ pub struct Arguments {
     /// Which adapter draws the realtime scenes
     #[arg(long, value_enum, default_value_t = AdapterChoice::Software)]
     adapter: AdapterChoice,
-    /// Renderers graded at the same time [default: one for each core]
+    /// Renderers graded at the same time [default: one more than there are cores]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
 }
@@ -114,7 +114,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         all_shown: true,
         plain: Vec::new(),
     };
-    let jobs = arguments.jobs.unwrap_or(cores).max(1);
+    let jobs = arguments.jobs.unwrap_or(cores + 1).max(1);
     let named = |name: &str| arguments.only.as_ref().is_none_or(|only| name.contains(only));
     let chosen = |subjects: Vec<Subject>| {
         subjects.into_iter().filter(|subject| named(&subject.name())).collect::<Vec<_>>()
