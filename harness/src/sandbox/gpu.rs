@@ -103,3 +103,29 @@ fn hidden(path: &Path) -> bool {
     let seen = super::policy::Policy::new(super::Kind::Worker).read_only;
     !seen.iter().any(|bind| path.starts_with(&bind.host))
 }
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn manifests_lead_to_libraries() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().canonicalize().unwrap().join(name);
+        fs::write(at("driver.so"), "").unwrap();
+        let named = |library: &Path| {
+            let manifest = serde_json::json!({"ICD": {"library_path": library}});
+            fs::write(at("icd.json"), manifest.to_string()).unwrap();
+            places(&super::library(&at("icd.json")).unwrap())
+        };
+        assert_eq!(named(&at("driver.so")), [at("driver.so")]);
+        assert_eq!(named(&at("missing.so")), [] as [PathBuf; 0]);
+        // Every program's; the cache may know more than one architecture's.
+        let found = named(Path::new("libc.so.6"));
+        assert!(!found.is_empty() && found.iter().all(|path| path.is_file()), "{found:?}");
+        assert!(found.iter().all(|path| !hidden(path)));
+        assert!(hidden(&at("driver.so")));
+        fs::write(at("icd.json"), "{").unwrap();
+        assert_eq!(super::library(&at("icd.json")), None);
+    }
+}
