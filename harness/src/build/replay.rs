@@ -72,10 +72,26 @@ pub fn default_limits() -> Limits {
 
 /// Compiles the hand-in whose `src` folder is `src` into a plugin in `out`, an existing folder.
 /// `supervisor` says which program is Umbra and what isolates the compiler. Nothing of the hand-in besides `src` is named to the compiler.
+/// A timeout counts when it comes again, alone on the machine.
 ///
 /// # Errors
 /// When the compiler cannot be started or isolated, or `out` cannot be used.
 pub fn compile(
+    recording: &Recording,
+    supervisor: &Supervisor,
+    src: &Path,
+    out: &Path,
+    limits: &Limits,
+    cancel: &AtomicBool,
+) -> io::Result<BuildReport> {
+    let late = |report: &io::Result<BuildReport>| {
+        report.as_ref().is_ok_and(|report| report.outcome == BuildOutcome::TimedOut)
+    };
+    supervisor
+        .confirming_timeouts(|| compile_once(recording, supervisor, src, out, limits, cancel), late)
+}
+
+fn compile_once(
     recording: &Recording,
     supervisor: &Supervisor,
     src: &Path,
@@ -117,9 +133,7 @@ pub fn compile(
         command.env("CARGO_MANIFEST_DIR", root);
     }
     let keep = (limits.output_kib as usize) << 10;
-    let beside = supervisor.beside_others();
     let ended = process::run(command, &lock, keep, cancel, &mut || {})?;
-    drop(beside);
     let said = parse(&ended.stderr.head);
     let out_of_memory = ended.stderr.contains("memory allocation of ")
         || ended.stderr.contains("LLVM ERROR: out of memory")

@@ -55,8 +55,13 @@ pub struct Received {
 
 /// Why there is no answer.
 enum NoAnswer {
-    /// The bytes ended the child: the hand-in's matter. Says how.
-    Died(String),
+    /// The bytes ended the child: the hand-in's matter.
+    Died {
+        /// How.
+        how: String,
+        /// Whether it ran out of time.
+        late: bool,
+    },
     /// The machine's matter, or Ctrl-C.
     Machine(io::Error),
 }
@@ -129,7 +134,7 @@ impl<'a> Decoder<'a> {
             }
             Ok((Answer::Refused(refusal), _)) => Err(IntakeError::Refused(Box::new(refusal))),
             Ok(_) => Err(refused(ended("it gave no answer"))),
-            Err(NoAnswer::Died(how)) => Err(refused(ended(&how))),
+            Err(NoAnswer::Died { how, .. }) => Err(refused(ended(&how))),
             Err(NoAnswer::Machine(error)) => {
                 Err(IntakeError::Io { doing: "unpack", path: name.into(), source: error })
             }
@@ -152,7 +157,7 @@ impl<'a> Decoder<'a> {
                 Ok(Received { hand_in, validation, source })
             }
             Ok(_) => Err(refused_copy(&hand_in, "it gave no answer")),
-            Err(NoAnswer::Died(how)) => Err(refused_copy(&hand_in, &how)),
+            Err(NoAnswer::Died { how, .. }) => Err(refused_copy(&hand_in, &how)),
             Err(NoAnswer::Machine(error)) => Err(IntakeError::io("read", &hand_in.root, error)),
         }
     }
@@ -171,7 +176,7 @@ impl<'a> Decoder<'a> {
                 .ok_or_else(|| format!("{name}: its decoder answered another size")),
             Ok((Answer::Failed(message), _)) => Err(message),
             Ok(_) => Err(format!("{name}: its decoder gave no answer")),
-            Err(NoAnswer::Died(how)) => Err(format!("{name}: cannot be decoded: {how}")),
+            Err(NoAnswer::Died { how, .. }) => Err(format!("{name}: cannot be decoded: {how}")),
             Err(NoAnswer::Machine(error)) => return Err(error),
         })
     }
@@ -190,6 +195,18 @@ impl<'a> Decoder<'a> {
     /// Runs one child to its end. `wanted` prepares what it looks at in its private folder; its
     /// answer is read up to `most` bytes.
     fn ask(
+        &self,
+        question: &Question,
+        wanted: &dyn Fn(&Folder) -> io::Result<Bind>,
+        most: u64,
+    ) -> Result<(Answer, Vec<u8>), NoAnswer> {
+        let once = || self.ask_once(question, wanted, most);
+        let late =
+            |answer: &Result<_, NoAnswer>| matches!(answer, Err(NoAnswer::Died { late: true, .. }));
+        self.supervisor.confirming_timeouts(once, late)
+    }
+
+    fn ask_once(
         &self,
         question: &Question,
         wanted: &dyn Fn(&Folder) -> io::Result<Bind>,
@@ -227,29 +244,29 @@ impl<'a> Decoder<'a> {
             command.envs(std::env::var_os("SystemRoot").map(|root| ("SystemRoot", root)));
         }
         let lock = Lock::new(self.limits, policy);
-        let beside = self.supervisor.beside_others();
         let ended = process::run(command, &lock, KEEP_OUTPUT, self.cancel, &mut || ())?;
-        drop(beside);
         if let Ok(mut cpu_s) = self.cpu_s.lock() {
             *cpu_s += ended.cpu_s;
         }
-        if let Some(how) = death(&ended)? {
-            return Err(NoAnswer::Died(how));
-        }
+        death(&ended)?;
         let mut bytes = Vec::new();
         output.by_ref().take(most + 1).read_to_end(&mut bytes)?;
         if bytes.len() as u64 > most {
-            return Err(NoAnswer::Died("it answered more than there can be".to_owned()));
+            return Err(died("it answered more than there can be"));
         }
-        read_answer(bytes).ok_or_else(|| NoAnswer::Died("its answer makes no sense".to_owned()))
+        read_answer(bytes).ok_or_else(|| died("its answer makes no sense"))
     }
 }
 
+fn died(how: &str) -> NoAnswer {
+    NoAnswer::Died { how: how.to_owned(), late: false }
+}
+
 /// How the child died, if it did.
-fn death(ended: &Ended) -> io::Result<Option<String>> {
-    Ok(Some(match ended.exit {
-        Exit::Code(0) => return Ok(None),
-        Exit::Cancelled => return Err(io::Error::from(io::ErrorKind::Interrupted)),
+fn death(ended: &Ended) -> Result<(), NoAnswer> {
+    let how = match ended.exit {
+        Exit::Code(0) => return Ok(()),
+        Exit::Cancelled => return Err(io::Error::from(io::ErrorKind::Interrupted).into()),
         Exit::TimedOut => "its decoder ran out of time".to_owned(),
         Exit::Flooded => "its decoder printed too much".to_owned(),
         Exit::FileTooLarge => "its decoder wrote too large a file".to_owned(),
@@ -258,7 +275,8 @@ fn death(ended: &Ended) -> io::Result<Option<String>> {
         }
         Exit::Code(code) => format!("its decoder ended with code {code}: {}", ended.stderr.head),
         Exit::Signal(signal) => format!("its decoder was ended by {}", signal_name(signal)),
-    }))
+    };
+    Err(NoAnswer::Died { how, late: ended.exit == Exit::TimedOut })
 }
 
 fn ended(how: &str) -> Finding {

@@ -74,6 +74,23 @@ impl Supervisor {
         self.machine.read().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Does something beside others, and where it ran out of time once more, alone on the machine:
+    /// a busy machine is nobody's fault. For what is asked but once; jobs have a [`Patience`].
+    pub fn confirming_timeouts<T>(
+        &self,
+        once: impl Fn() -> T,
+        timed_out: impl Fn(&T) -> bool,
+    ) -> T {
+        let beside = self.beside_others();
+        let first = once();
+        drop(beside);
+        if !timed_out(&first) {
+            return first;
+        }
+        let _alone = self.machine.write().unwrap_or_else(PoisonError::into_inner);
+        once()
+    }
+
     /// Asks all requests of `job` in one worker. When it dies, those answered keep their answers,
     /// and the rest is asked in a fresh worker. The request that it was at gets the blame when it
     /// was the worker's first; otherwise it is asked again as the first of the next. So `limits`,
@@ -410,4 +427,25 @@ fn out_of_memory(ended: &Ended, limits: &Limits) -> bool {
         || ended.peak_resident_mib >= near
         || ended.stderr.contains("memory allocation of ")
         || ended.stderr.contains("std::bad_alloc")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn what_is_late_is_done_again_alone() {
+        let supervisor = Supervisor::new("umbra".into(), "scratch".into());
+        let calls = Cell::new(0);
+        // Answers whether it had company; a second reader would be let in then.
+        let once = || {
+            calls.set(calls.get() + 1);
+            supervisor.machine.try_read().is_ok()
+        };
+        assert!(!supervisor.confirming_timeouts(once, |_| true), "not alone the second time");
+        assert_eq!(calls.replace(0), 2);
+        assert!(supervisor.confirming_timeouts(once, |_| false));
+        assert_eq!(calls.get(), 1);
+    }
 }
