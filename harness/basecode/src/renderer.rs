@@ -116,6 +116,37 @@ impl RenderJob<'_> {
             rayon::ThreadPoolBuilder::new().num_threads(self.threads).build().map_err(|error| {
                 Error::Argument(format!("cannot start {} threads: {error}", self.threads))
             })?;
-        pool.install(|| film.pixels_mut().par_chunks_mut(width).enumerate().try_for_each(one))
+        // Bottom up, even where one thread gets to do all: rows that depend on their order show it.
+        pool.install(|| film.pixels_mut().par_chunks_mut(width).enumerate().rev().try_for_each(one))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    #[test]
+    fn several_threads_never_go_through_the_rows_from_the_top() {
+        for _ in 0..50 {
+            let mut pixels = [Vec3::ZERO; 16];
+            let mut film = Film::new(1, &mut pixels);
+            let begun = Mutex::new(Vec::new());
+            let job = RenderJob {
+                width: 1,
+                height: 16,
+                spp: 1,
+                seed: 0,
+                threads: 2,
+                progress: &|_, _| {},
+                cancelled: &|| false,
+            };
+            job.for_each_row(&mut film, &|y, _| begun.lock().expect("no panic").push(y))
+                .expect("not cancelled");
+            let mut rows = begun.into_inner().expect("no panic");
+            assert_ne!(rows, (0..16).collect::<Vec<_>>());
+            rows.sort_unstable();
+            assert_eq!(rows, (0..16).collect::<Vec<_>>());
+        }
     }
 }
