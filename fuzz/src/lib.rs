@@ -89,12 +89,12 @@ pub fn toml(bytes: &[u8]) {
     }
 }
 
-/// The mesh of a scene, with the materials of [`MTL`].
+/// The mesh of a scene, with the materials of `MTL`.
 pub fn obj(bytes: &[u8]) {
     scene(bytes, MTL);
 }
 
-/// The materials of a scene, with the mesh of [`OBJ`].
+/// The materials of a scene, with the mesh of `OBJ`.
 pub fn mtl(bytes: &[u8]) {
     scene(OBJ, bytes);
 }

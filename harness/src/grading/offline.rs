@@ -61,7 +61,9 @@ pub fn probe_bsdfs(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
     }
     let mut requests: Vec<Request> =
         asked.iter().map(|(_, _, scene, probes)| request(scene, probes)).collect();
-    let physical = [BsdfKind::Diffuse, BsdfKind::Phong].map(|kind| (kind, Probes::new(kind)));
+    // Asked of no scene's materials, so but once.
+    let kinds: &[_] = if case.held_back { &[] } else { &[BsdfKind::Diffuse, BsdfKind::Phong] };
+    let physical: Vec<_> = kinds.iter().map(|&kind| (kind, Probes::new(kind))).collect();
     requests.extend(physical.iter().map(|(_, probes)| Request::EvalBsdf {
         scene: asker.scene(&case.offline),
         queries: probes.queries.iter().map(ask::query).collect(),
