@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::files::Scratch;
 use crate::imaging::evidence::Tolerances;
 use crate::rubric::Rules;
 use crate::{intake, process};
@@ -32,7 +33,7 @@ pub struct Assignment {
     pub tolerances: Tolerances,
     /// What a hand-in may use.
     pub limits: Limits,
-    /// The folder that all paths are relative to; not in the file.
+    /// The folder that all paths are relative to, absolute; not in the file.
     #[serde(skip)]
     pub root: PathBuf,
 }
@@ -146,7 +147,9 @@ impl Assignment {
         if let Some(message) = assignment.problem() {
             return Err(AssignmentError::Contradiction { path, message });
         }
-        assignment.root = root.to_owned();
+        // Children are told paths from it, and have other folders than this process is in.
+        assignment.root = std::path::absolute(root)
+            .map_err(|source| AssignmentError::Read { path: path.clone(), source })?;
         Ok(assignment)
     }
 
@@ -190,6 +193,18 @@ impl Assignment {
     /// Where a student's kit keeps the expected images that only the reference renderer can make.
     pub fn made(&self) -> PathBuf {
         self.root.join("expected").join(&self.name).join("made")
+    }
+
+    /// A place for what nobody needs afterwards.
+    ///
+    /// # Errors
+    /// When it cannot be made; names the folder.
+    pub fn scratch(&self) -> std::io::Result<Scratch> {
+        let parent = self.cache().join("scratch");
+        let named = |error: std::io::Error| {
+            std::io::Error::new(error.kind(), format!("cannot use {}: {error}", parent.display()))
+        };
+        Scratch::new(&parent).map_err(named)
     }
 
     /// Where Umbra keeps what it can make again.

@@ -9,6 +9,7 @@ pub mod decode;
 pub mod diagnosis;
 pub mod evidence;
 pub mod expected;
+pub mod files;
 pub mod grading;
 pub mod held_back;
 pub mod imaging;

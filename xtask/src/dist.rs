@@ -133,9 +133,8 @@ fn add_expected(root: &Path, kit: &Path) -> Result<()> {
     let assignment = Assignment::load(root)?;
     let umbra = built(root, &format!("umbra{EXE_SUFFIX}"))?;
     let reference = built(root, &format!("{DLL_PREFIX}reference_impl{DLL_SUFFIX}"))?;
-    let scratch = assignment.cache().join("scratch");
-    fs::create_dir_all(&scratch)?;
-    let supervisor = Supervisor::available(umbra, scratch);
+    let scratch = assignment.scratch()?;
+    let supervisor = Supervisor::available(umbra, scratch.path().to_owned());
     let store = Store {
         assignment: &assignment,
         reference: Some(reference),

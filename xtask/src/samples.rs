@@ -17,6 +17,7 @@ use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use umbra::assignment::{Assignment, SceneEntry};
 use umbra::build::{self, BuildOutcome, Recording};
+use umbra::files::Scratch;
 use umbra::worker::{
     Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef, Supervisor,
 };
@@ -114,6 +115,8 @@ struct Packer {
     assignment: Assignment,
     supervisor: Supervisor,
     recording: Recording,
+    /// The supervisor's.
+    _scratch: Scratch,
 }
 
 impl Packer {
@@ -137,13 +140,13 @@ impl Packer {
         }
         ensure!(!recipes.is_empty(), "samples/ holds no recipe.toml");
         let assignment = Assignment::load(root)?;
-        let scratch = assignment.cache().join("scratch");
-        fs::create_dir_all(&scratch)?;
+        let scratch = assignment.scratch()?;
         let out = assignment.cache().join("samples");
         fs::create_dir_all(&out)?;
         let recording = Recording::obtain(root, &umbra)?;
-        let supervisor = Supervisor::available(umbra, scratch);
-        Ok(Self { root: root.to_owned(), out, recipes, assignment, supervisor, recording })
+        let supervisor = Supervisor::available(umbra, scratch.path().to_owned());
+        let root = root.to_owned();
+        Ok(Self { root, out, recipes, assignment, supervisor, recording, _scratch: scratch })
     }
 
     /// The source files of a sample, relative to `src/`, with their contents.

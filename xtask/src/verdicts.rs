@@ -88,9 +88,8 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
             file.display()
         );
     }
-    let scratch = assignment.cache().join("scratch");
-    std::fs::create_dir_all(&scratch)?;
-    let supervisor = Supervisor::available(umbra.clone(), scratch);
+    let scratch = assignment.scratch()?;
+    let supervisor = Supervisor::available(umbra.clone(), scratch.path().to_owned());
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let store = Store {
         assignment: &assignment,

@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 
 use super::TEMPLATE;
 use super::closure::{Metadata, libraries};
+use crate::files::hex;
 
 /// The manifest of this program's own package.
 const UMBRA: &str = "harness/Cargo.toml";
@@ -225,7 +226,7 @@ fn key(workspace: &Path, rustc: &Path) -> Result<String, RecordError> {
         hash.update((bytes.len() as u64).to_le_bytes());
         hash.update(bytes);
     }
-    Ok(hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect())
+    Ok(hex(&hash.finalize()[..8]))
 }
 
 fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), RecordError> {

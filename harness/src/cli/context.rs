@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::assignment::Assignment;
 use crate::decode::Decoder;
 use crate::expected::Store;
+use crate::files::Scratch;
 use crate::worker::Supervisor;
 
 /// Set by Ctrl-C; whatever runs ends soon after, and nothing half-written is left.
@@ -22,6 +23,8 @@ pub struct Context {
     pub supervisor: Supervisor,
     /// A line on standard error that tells what is being done; silent when it is no terminal.
     pub line: ProgressBar,
+    /// The supervisor's.
+    _scratch: Scratch,
 }
 
 impl Context {
@@ -37,16 +40,15 @@ impl Context {
                 })?
             }
         };
-        let scratch = assignment.cache().join("scratch");
-        std::fs::create_dir_all(&scratch)
-            .with_context(|| format!("cannot make {}", scratch.display()))?;
+        let scratch = assignment.scratch()?;
         let line = ProgressBar::new_spinner();
         line.set_style(
             ProgressStyle::with_template("{spinner} {msg}")
                 .unwrap_or_else(|_| ProgressStyle::default_spinner()),
         );
         catch_interrupts();
-        Ok(Self { assignment, supervisor: Supervisor::of_this_program(scratch)?, line })
+        let supervisor = Supervisor::of_this_program(scratch.path().to_owned())?;
+        Ok(Self { assignment, supervisor, line, _scratch: scratch })
     }
 
     /// Where the reference renderer's library should be, if it is there.

@@ -7,16 +7,19 @@ use std::str::FromStr;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, ensure};
 
 use super::MachineLacks;
 use super::context::{Context, INTERRUPTED, cores};
 use super::render::AdapterChoice;
-use crate::grading::{Folders, Grading, Purpose, Record, judge_shared};
-use crate::held_back::secret_seed;
+use crate::grading::{Folders, Grading, Kept, Purpose, Record, judge_shared};
+use crate::held_back::recorded_seed;
 use crate::report::{self, Entry, Sheet};
 use crate::rubric;
 use crate::sandbox::Isolation;
+
+/// The file with the seed of a batch's held-back scenes, in the instructor's folder.
+const SEED_FILE: &str = "held-back-seed.txt";
 
 /// What `umbra check` is told.
 #[derive(clap::Args)]
@@ -40,7 +43,9 @@ pub struct GradeArguments {
     /// Archives, hand-in folders, or folders that hold nothing but hand-ins
     #[arg(required = true)]
     hand_ins: Vec<PathBuf>,
-    /// Where to write report.html, report.json, grades.csv and each hand-in's own report
+    /// Where to write report.html, report.json, grades.csv and each hand-in's own report. What was found
+    /// out about a hand-in is kept there too: the same command goes on where it was ended, and takes
+    /// up what is new or has changed
     #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
     output: PathBuf,
     /// Which adapter draws realtime scenes; software gives every machine the same pixels
@@ -54,7 +59,7 @@ pub struct GradeArguments {
     #[arg(long, value_enum, default_value_t = IsolationChoice::Full)]
     isolation: IsolationChoice,
     /// Seed of the held-back scenes, to reproduce a batch; off grades on the public scenes alone
-    /// [default: a secret one, recorded in report.json]
+    /// [default: the batch's secret one, made when there is none in --output]
     #[arg(long, value_name = "SEED|off", overrides_with = "perturb")]
     perturb: Option<Perturb>,
     /// Print what each stage cost
@@ -98,7 +103,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         jobs: 1,
         purpose: Purpose::Check,
         isolation: IsolationChoice::Reduced,
-        perturb: None,
+        perturb: Some(Perturb(None)),
         timings: arguments.timings,
     };
     let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
@@ -122,10 +127,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         jobs: arguments.jobs.unwrap_or(cores() as usize).max(1),
         purpose: Purpose::Grade,
         isolation: arguments.isolation,
-        perturb: match arguments.perturb {
-            Some(Perturb(seed)) => seed,
-            None => Some(secret_seed()?),
-        },
+        perturb: arguments.perturb,
         timings: arguments.timings,
     };
     let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
@@ -204,7 +206,8 @@ struct Batch<'a> {
     jobs: usize,
     purpose: Purpose,
     isolation: IsolationChoice,
-    perturb: Option<u64>,
+    /// Nothing for the seed that is recorded with the batch.
+    perturb: Option<Perturb>,
     timings: bool,
 }
 
@@ -232,18 +235,45 @@ impl Batch<'_> {
             ))
             .into());
         }
+        let seed = match self.perturb {
+            Some(Perturb(seed)) => seed,
+            None => Some(recorded_seed(&self.output.join(report::INSTRUCTOR).join(SEED_FILE))?),
+        };
         let result = context.with_store(|store| {
             let adapter = self.adapter.adapter();
-            let grading = Grading::prepare(store, adapter, self.perturb, &INTERRUPTED)?;
-            let held_back = grading.held_back.clone();
-            Ok::<_, anyhow::Error>((self.grade_all(&context, grading)?, held_back))
+            let mut grading = Grading::prepare(store, adapter, seed, &INTERRUPTED)?;
+            if self.purpose == Purpose::Grade {
+                grading.kept = Some(Kept::of(&grading)?);
+            }
+            let jobs = self.jobs.min(self.sources.len()).max(1);
+            grading.threads = (cores() / jobs as u32).max(1);
+            let results = self.grade_all(&context, &grading, jobs);
+            let found = grading.kept.as_ref().map_or(0, Kept::found);
+            if found > 0 {
+                context.line.suspend(|| {
+                    eprintln!(
+                        "umbra: {found} of {} hand-ins are as they were graded before",
+                        self.sources.len()
+                    );
+                });
+            }
+            Ok::<_, anyhow::Error>((results, grading.held_back))
         });
         context.line.finish_and_clear();
         if INTERRUPTED.load(Ordering::Relaxed) {
-            eprintln!("umbra: interrupted");
+            let goes_on = match (self.purpose, &result) {
+                (Purpose::Grade, Ok((results, _))) => format!(
+                    ", {} of {} hand-ins are graded; the same command goes on from there",
+                    results.len(),
+                    self.sources.len()
+                ),
+                _ => String::new(),
+            };
+            eprintln!("umbra: interrupted{goes_on}");
             return Ok(None);
         }
-        let (mut records, held_back) = result?;
+        let (results, held_back) = result?;
+        let mut records = results.into_iter().collect::<anyhow::Result<Vec<Record>>>()?;
         judge_shared(&mut records);
         let rules = &context.assignment.rules;
         let entries = records.into_iter().map(|record| {
@@ -258,17 +288,21 @@ impl Batch<'_> {
         Ok(Some(sheet))
     }
 
-    fn grade_all(&self, context: &Context, mut grading: Grading) -> anyhow::Result<Vec<Record>> {
+    /// Takes all hand-ins through all stages, in their order; none is begun after Ctrl-C. To be graded, one
+    /// that the machine failed on has a record that says so: the others' are no worse for it.
+    fn grade_all(
+        &self,
+        context: &Context,
+        grading: &Grading,
+        jobs: usize,
+    ) -> Vec<anyhow::Result<Record>> {
         let slugs = slugs(&self.sources);
-        let jobs = self.jobs.min(self.sources.len()).max(1);
-        grading.threads = (cores() / jobs as u32).max(1);
         let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let records: Mutex<Vec<Option<Record>>> = Mutex::new(vec![None; self.sources.len()]);
-        let failure = Mutex::new(None);
+        let results = Mutex::new(Vec::new());
         let work = || {
-            while let Some(source) = self.sources.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let index = self.sources.iter().position(|other| std::ptr::eq(other, source));
-                let Some(index) = index else { return };
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                let Some(source) = self.sources.get(index) else { return };
                 let slug = &slugs[index];
                 let say = |stage: &str| {
                     let done = done.load(Ordering::Relaxed);
@@ -278,20 +312,22 @@ impl Batch<'_> {
                     student: self.output.join(slug),
                     instructor: self.output.join(report::INSTRUCTOR).join(slug),
                 };
-                match grading.hand_in(source, slug, &out, self.purpose, &say) {
-                    Ok(record) => {
-                        done.fetch_add(1, Ordering::Relaxed);
-                        if let Ok(mut records) = records.lock() {
-                            records[index] = Some(record);
-                        }
-                    }
-                    Err(error) => {
-                        if let Ok(mut failure) = failure.lock() {
-                            *failure = Some(error.context(source.display().to_string()));
-                        }
-                        return;
-                    }
+                let result = grading.hand_in(source, slug, &out, self.purpose, &say);
+                if INTERRUPTED.load(Ordering::Relaxed) && result.is_err() {
+                    return;
                 }
+                let result = match (result, self.purpose) {
+                    (Err(error), Purpose::Grade) => {
+                        context.line.suspend(|| {
+                            eprintln!("umbra: {}: {}", source.display(), super::told_once(&error));
+                        });
+                        Ok(grading.unjudged(source, slug))
+                    }
+                    (result, _) => result.with_context(|| source.display().to_string()),
+                };
+                done.fetch_add(1, Ordering::Relaxed);
+                let Ok(mut results) = results.lock() else { return };
+                results.push((index, result));
             }
         };
         std::thread::scope(|scope| {
@@ -299,19 +335,9 @@ impl Batch<'_> {
                 scope.spawn(work);
             }
         });
-        if let Ok(Some(error)) = failure.into_inner() {
-            return Err(error);
-        }
-        let records = records.into_inner().unwrap_or_default();
-        let records: Vec<Record> = records.into_iter().flatten().collect();
-        if records.len() != self.sources.len() {
-            bail!(
-                "{} of {} hand-ins have no record: a bug of Umbra's",
-                self.sources.len() - records.len(),
-                self.sources.len()
-            );
-        }
-        Ok(records)
+        let mut results = results.into_inner().unwrap_or_default();
+        results.sort_by_key(|(index, _)| *index);
+        results.into_iter().map(|(_, result)| result).collect()
     }
 }
 

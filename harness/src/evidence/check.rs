@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Everything that was found out about one hand-in. Plain data: the rubric needs nothing else.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -24,6 +24,7 @@ pub struct Check {
     pub verdict: Verdict,
     /// How wrong the answer is: 0 is right, 1 is as large as the right answer itself (a relative
     /// L1 error or a fraction of wrong answers; the summary says which).
+    #[serde(deserialize_with = "or_nan")]
     pub error: f64,
     /// One sentence: what was found, where, expected and actual.
     pub summary: String,
@@ -87,8 +88,10 @@ pub struct Measure {
     /// What was measured, with its unit.
     pub name: String,
     /// The value.
+    #[serde(deserialize_with = "or_nan")]
     pub value: f64,
     /// The largest value that passes.
+    #[serde(deserialize_with = "or_nan")]
     pub bound: f64,
     /// Whether it passed.
     pub passed: bool,
@@ -153,6 +156,11 @@ impl Check {
         self.hint = hint.into();
         self
     }
+}
+
+/// JSON has no number for what is not finite, and writes `null`.
+fn or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 /// Two digits: an error must not spell out a scene either.

@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 
 use super::regions::regions;
 use crate::assignment::{Assignment, SceneEntry};
+use crate::files::hex;
 use crate::imaging::reference::{ReferenceImage, RegionMask};
 use crate::process::Limits;
 use crate::worker::{
@@ -435,10 +436,6 @@ pub(crate) fn scene_digest(toml: &Path) -> anyhow::Result<String> {
         hash.update(std::fs::read(&file)?);
     }
     Ok(hex(&hash.finalize()))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn mean_radiance(image: &Image) -> f64 {

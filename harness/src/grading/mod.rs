@@ -6,6 +6,7 @@ mod control;
 mod draw;
 mod handed_in;
 mod isolate;
+mod kept;
 mod look;
 mod offline;
 mod pictures;
@@ -16,6 +17,7 @@ mod sampler;
 mod shared;
 
 pub use case::Case;
+pub use kept::Kept;
 pub use pipeline::{Folders, Grading, Purpose, RenderPath, TREE};
 pub use realtime::Stages;
 pub use record::{Conditions, Record, StageCost, Student};

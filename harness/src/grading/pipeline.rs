@@ -9,6 +9,7 @@ use anyhow::Context;
 
 use super::ask::Asker;
 use super::case::Case;
+use super::kept::Kept;
 use super::offline::{self, Drawn};
 use super::realtime::{self, Stages};
 use super::record::{Conditions, Record, StageCost, Student};
@@ -26,6 +27,9 @@ use crate::worker::{Adapter, Patience, Supervisor};
 
 /// The check that says whether the hand-in follows the tree.
 pub const TREE: &str = "hand_in.tree";
+
+/// The check that fails nobody: it says that the machine did.
+const JUDGED: &str = "hand_in.judged";
 
 /// By how much the standard error of a region's mean grows when its rows share their noise: the
 /// root of its height in pixels; the highlights that are judged apart are about 9 pixels high.
@@ -51,6 +55,8 @@ pub struct Grading<'a> {
     pub threads: u32,
     /// Ctrl-C.
     pub cancel: &'a AtomicBool,
+    /// Records made before and to be made, if they are kept.
+    pub kept: Option<Kept>,
     /// What known mistakes answer, read when it is first needed.
     pub(super) stored: OnceLock<Stored>,
 }
@@ -124,6 +130,7 @@ impl<'a> Grading<'a> {
             reference: store.reference.clone(),
             threads: store.threads,
             cancel,
+            kept: None,
             stored: OnceLock::new(),
         };
         if let Some(case) = grading.cases.first()
@@ -167,19 +174,7 @@ impl<'a> Grading<'a> {
         let mut costs = Costs { since: Instant::now(), stages: Vec::new() };
         let scratch =
             tempfile::Builder::new().prefix("hand-in-").tempdir_in(&self.supervisor.scratch)?;
-        let mut record = Record {
-            name: source.file_name().unwrap_or(source.as_os_str()).to_string_lossy().into_owned(),
-            slug: slug.to_owned(),
-            digest: String::new(),
-            student: Student::default(),
-            findings: Vec::new(),
-            diagnostics: String::new(),
-            evidence: Evidence::default(),
-            diagnoses: Vec::new(),
-            images: Vec::new(),
-            stages: Vec::new(),
-            conditions: self.conditions(),
-        };
+        let mut record = self.begin(source, slug);
         say("intake");
         let copy = scratch.path().join("copy");
         std::fs::create_dir(&copy)?;
@@ -208,6 +203,12 @@ impl<'a> Grading<'a> {
         record.findings.clone_from(&validation.findings);
         record.findings.extend(source);
         let mut checks = vec![tree_check(&validation, purpose)];
+        let key = self.kept.as_ref().map(|kept| kept.key(&record, &checks)).transpose()?;
+        if let (Some(kept), Some(key)) = (&self.kept, &key)
+            && let Some(found) = kept.find(key, out)
+        {
+            return Ok(found);
+        }
         costs.end("intake", decoder.take_cpu_s());
 
         say("building");
@@ -240,7 +241,33 @@ impl<'a> Grading<'a> {
         record.evidence = Evidence { checks };
         record.diagnoses = self.diagnose(&asker, &record.evidence, &drawn, Some(&out.student))?;
         record.stages = costs.end("diagnosis", 0.0);
-        Ok(record)
+        match (&self.kept, key) {
+            (Some(kept), Some(key)) => kept.keep(&key, record, out),
+            _ => Ok(record),
+        }
+    }
+
+    /// The record of a hand-in that the machine failed on: nothing is found out, no point lost.
+    pub fn unjudged(&self, source: &Path, slug: &str) -> Record {
+        let summary = "the machine failed, and nothing was found out";
+        let checks = vec![Check::new(JUDGED, "", Verdict::NotRun, summary)];
+        Record { evidence: Evidence { checks }, ..self.begin(source, slug) }
+    }
+
+    fn begin(&self, source: &Path, slug: &str) -> Record {
+        Record {
+            name: source.file_name().unwrap_or(source.as_os_str()).to_string_lossy().into_owned(),
+            slug: slug.to_owned(),
+            digest: String::new(),
+            student: Student::default(),
+            findings: Vec::new(),
+            diagnostics: String::new(),
+            evidence: Evidence::default(),
+            diagnoses: Vec::new(),
+            images: Vec::new(),
+            stages: Vec::new(),
+            conditions: self.conditions(),
+        }
     }
 
     /// What is found out on some paths about a library that is there already, without a hand-in

@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::record::Record;
 use crate::evidence::{Check, Verdict};
+use crate::files::hex;
 use crate::imaging::srgb;
 
 /// The check that this module makes.
@@ -33,7 +34,7 @@ impl ImageDigest {
         hash.update((image.height as u64).to_le_bytes());
         let channels = image.pixels.iter().flat_map(|pixel| pixel.to_array());
         hash.update(channels.map(|value| srgb::level(to_half(value))).collect::<Vec<u8>>());
-        let sha256 = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        let sha256 = hex(&hash.finalize());
         Self { scene: scene.to_owned(), path: path.to_owned(), sha256 }
     }
 }

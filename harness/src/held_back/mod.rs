@@ -11,6 +11,7 @@ mod look;
 #[cfg(test)]
 mod tests;
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -19,6 +20,7 @@ use sha2::{Digest, Sha256};
 
 use crate::assignment::{Assignment, SceneEntry};
 use crate::expected::load_scene;
+use crate::files::{hex, write_whole};
 use draw::Draw;
 use files::File;
 use look::Look;
@@ -45,6 +47,25 @@ pub fn secret_seed() -> anyhow::Result<u64> {
     let mut bytes = [0; 8];
     getrandom::fill(&mut bytes).context("the system gives no random numbers")?;
     Ok(u64::from_le_bytes(bytes))
+}
+
+/// The secret seed that is recorded in `file`, or a new one, which is recorded there.
+///
+/// # Errors
+/// When the file holds no seed or cannot be written, or [`secret_seed`] fails.
+pub fn recorded_seed(file: &Path) -> anyhow::Result<u64> {
+    match std::fs::read_to_string(file) {
+        Ok(text) => text.trim().parse().with_context(|| {
+            format!("{}: expected the seed of held-back scenes, found {text:?}", file.display())
+        }),
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            let seed = secret_seed()?;
+            let written = write_whole(file, format!("{seed}\n").as_bytes());
+            written.with_context(|| format!("cannot write {}", file.display()))?;
+            Ok(seed)
+        }
+        Err(error) => Err(error).with_context(|| format!("cannot read {}", file.display())),
+    }
 }
 
 /// Makes the held-back scenes of a batch below the assignment's cache, if they are not there yet.
@@ -108,8 +129,7 @@ fn write(parent: &Path, files: &[File]) -> anyhow::Result<PathBuf> {
         hash.update((bytes.len() as u64).to_le_bytes());
         hash.update(bytes);
     }
-    let digest: String = hash.finalize()[..12].iter().map(|byte| format!("{byte:02x}")).collect();
-    let folder = parent.join(digest);
+    let folder = parent.join(hex(&hash.finalize()[..12]));
     if folder.is_dir() {
         return Ok(folder);
     }

@@ -14,6 +14,7 @@ use super::limits::{Limits, mib};
 use super::name::safe_path;
 use super::tree::{CONFIG_FILE, TreeSpec};
 use super::unpack::{Format, HandIn, HandInFile, IntakeError, Refusal, archive_magic};
+use crate::files::hex;
 
 /// Why reading stops before the end.
 pub(super) enum Halt {
@@ -403,10 +404,6 @@ fn digest(files: &[HandInFile]) -> String {
         sha256.update(&file.sha256);
     }
     hex(&sha256.finalize())
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Removes what was written; the destination was empty before.

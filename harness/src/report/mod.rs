@@ -19,7 +19,6 @@ mod text;
 mod write_tests;
 
 use std::collections::HashSet;
-use std::io::Write as _;
 use std::path::{Component, Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -32,6 +31,7 @@ pub use self::json::{SCHEMA, VERSION, report as json_report};
 pub use self::text::{detail as text_detail, table as text_table};
 
 use crate::assignment::Assignment;
+use crate::files::write_whole;
 use crate::grading::Record;
 use crate::held_back::HeldBack;
 use crate::rubric::{Grade, Rules};
@@ -187,21 +187,8 @@ pub fn write(out: &Path, sheet: &Sheet) -> Result<(), ReportError> {
     put(out, HTML_FILE, html_batch(sheet)?.as_bytes())
 }
 
-/// Writes one file under another name and renames it.
+/// Writes one file.
 fn put(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), ReportError> {
     let path = folder.join(name);
-    let write = || {
-        std::fs::create_dir_all(folder)?;
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".report-").suffix(".partial");
-        // What the user's umask allows, as for any other file; the default would be private.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut file = builder.tempfile_in(folder)?;
-        file.write_all(bytes)?;
-        file.as_file().sync_all()?;
-        file.persist(&path).map_err(|error| error.error)?;
-        Ok(())
-    };
-    write().map_err(|source| ReportError::Write { path: path.clone(), source })
+    write_whole(&path, bytes).map_err(|source| ReportError::Write { path, source })
 }

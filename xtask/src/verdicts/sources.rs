@@ -34,6 +34,10 @@ pub fn grade(
         return Ok(None);
     }
     let out = root.join("target/umbra/samples-report");
+    if out.exists() {
+        // What an earlier run found out is not asked for: all are to be graded.
+        std::fs::remove_dir_all(&out).with_context(|| out.display().to_string())?;
+    }
     let mut command = Command::new(umbra);
     command.arg("grade").args(samples.iter().map(|sample| &sample.archive));
     command.arg("--output").arg(&out).arg("--root").arg(root);

@@ -1,0 +1,117 @@
+//! Files that are there whole or not at all, folders that do not stay, digests as text.
+
+use std::fs::File;
+use std::io::{self, Write as _};
+use std::path::Path;
+
+use tempfile::TempDir;
+
+/// What the folders of processes are called.
+const RUN: &str = "run-";
+/// The file in such a folder that its process holds locked.
+const LOCK: &str = "lock";
+
+/// A private folder of this process, for what nobody needs afterwards. It is removed when this is
+/// dropped or, when the process was killed, by the next one that makes one beside it.
+pub struct Scratch {
+    folder: TempDir,
+    /// Released by whatever ends the process.
+    _lock: File,
+}
+
+impl Scratch {
+    /// A folder in `parent`, which is made when missing. Removes those of processes that are gone.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn new(parent: &Path) -> io::Result<Self> {
+        std::fs::create_dir_all(parent)?;
+        // One at a time, so that nobody takes a folder that is not locked yet for a left one.
+        let turn = File::create(parent.join(LOCK))?;
+        turn.lock()?;
+        for entry in parent.read_dir()? {
+            let left = entry?;
+            let is_run = left.file_name().as_encoded_bytes().starts_with(RUN.as_bytes());
+            if is_run
+                && File::create(left.path().join(LOCK)).is_ok_and(|lock| lock.try_lock().is_ok())
+            {
+                // What cannot be removed now may be by the next.
+                let _ = std::fs::remove_dir_all(left.path());
+            }
+        }
+        let prefix = format!("{RUN}{}-", std::process::id());
+        let folder = tempfile::Builder::new().prefix(&prefix).tempdir_in(parent)?;
+        let lock = File::create(folder.path().join(LOCK))?;
+        lock.lock()?;
+        Ok(Self { folder, _lock: lock })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+}
+
+/// Writes a file under another name, syncs and renames it: whoever looks sees the old content or the new.
+/// Folders above it are made when missing.
+///
+/// # Errors
+/// When it cannot be written; the old content is still there then.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    std::fs::create_dir_all(folder)?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".umbra-").suffix(".partial");
+    // What the user's umask allows, as for any other file; the default would be private.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    file.persist(path)?;
+    Ok(())
+}
+
+/// Bytes as lower-case hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_next_scratch_removes_what_a_killed_process_left_and_nothing_else() {
+        let parent = tempfile::tempdir().unwrap();
+        let there = |name: &str| parent.path().join(name).is_dir();
+        for left in ["run-1-killed/deep", "run-2-killed-at-once", "of another kind"] {
+            std::fs::create_dir_all(parent.path().join(left)).unwrap();
+        }
+        std::fs::write(parent.path().join("run-1-killed/lock"), "").unwrap();
+        let first = Scratch::new(parent.path()).unwrap();
+        std::fs::write(first.path().join("mine"), "").unwrap();
+        let second = Scratch::new(parent.path()).unwrap();
+        assert!(first.path().join("mine").is_file() && second.path() != first.path());
+        assert!(
+            !there("run-1-killed") && !there("run-2-killed-at-once") && there("of another kind")
+        );
+        let gone = first.path().to_owned();
+        drop(first);
+        assert!(!gone.exists() && second.path().is_dir());
+    }
+
+    #[test]
+    fn a_file_keeps_its_content_until_the_new_one_is_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/file");
+        for content in ["one", "two"] {
+            write_whole(&path, content.as_bytes()).unwrap();
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), content);
+        }
+        assert_eq!(folder.path().join("new").read_dir().unwrap().count(), 1);
+        std::fs::create_dir(folder.path().join("taken")).unwrap();
+        write_whole(&folder.path().join("taken"), b"x").unwrap_err();
+        assert_eq!(folder.path().read_dir().unwrap().count(), 2);
+    }
+}

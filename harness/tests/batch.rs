@@ -1,0 +1,155 @@
+//! A batch is ended in every way and goes on: what was found out is kept, and is worth the same.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used)] // its helpers are tests too
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use similar_asserts::assert_eq;
+
+const WRONG: &str = "fn main() { not_rust }";
+/// Compiles until it is ended.
+const ENDLESS: &str = "#![allow(long_running_const_eval)]\n\
+    pub const N: u64 = { let mut n = 0; while n < u64::MAX { n += 1; } n };\n";
+
+/// Hand-ins and the folder that they are graded into.
+struct Batch {
+    place: tempfile::TempDir,
+}
+
+impl Batch {
+    fn new(hand_ins: &[(&str, &str)]) -> Self {
+        let batch = Self { place: tempfile::tempdir().unwrap() };
+        hand_ins.iter().for_each(|(name, lib)| batch.hand_in(name, lib));
+        // The seed that other suites use too: their scenes are there already.
+        fs::create_dir_all(batch.instructor("")).unwrap();
+        fs::write(batch.instructor("held-back-seed.txt"), "20191006\n").unwrap();
+        batch
+    }
+
+    fn hand_in(&self, name: &str, lib: &str) {
+        let src = self.place.path().join("hand-ins").join(name).join("src");
+        fs::create_dir_all(&src).unwrap();
+        fs::write(src.join("lib.rs"), lib).unwrap();
+    }
+
+    fn out(&self) -> PathBuf {
+        self.place.path().join("out")
+    }
+
+    fn instructor(&self, path: &str) -> PathBuf {
+        self.out().join("instructor").join(path)
+    }
+
+    fn start(&self) -> Child {
+        let mut umbra = Command::new(env!("CARGO_BIN_EXE_umbra"));
+        umbra.arg("grade").arg(self.place.path().join("hand-ins"));
+        umbra.args(["--isolation", "reduced", "--jobs", "1", "--output"]).arg(self.out());
+        umbra.args(["--root", "."]).current_dir(root());
+        umbra.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    }
+
+    /// Grades to the end: the exit code and what was said on standard error.
+    fn grade(&self) -> (Option<i32>, String) {
+        said(&self.start().wait_with_output().unwrap())
+    }
+
+    /// Grades until a record is kept, ends it by a signal, and answers as `grade` does. Before that its
+    /// process id, for [`scratch_of`].
+    fn grade_until(&self, record: &str, signal: Signal) -> (u32, Option<i32>, String) {
+        let mut umbra = self.start();
+        let pid = umbra.id();
+        let file = self.instructor(record).join("record.json");
+        while !file.exists() {
+            assert!(umbra.try_wait().unwrap().is_none(), "it ended before {record} was graded");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        kill(Pid::from_raw(pid as i32), signal).unwrap();
+        let (code, said) = said(&umbra.wait_with_output().unwrap());
+        (pid, code, said)
+    }
+
+    /// All of `report.json` but what it cost.
+    fn canonical(&self) -> String {
+        let report = fs::read_to_string(self.out().join("report.json")).unwrap();
+        report.split("\n  \"timings\":").next().unwrap().to_owned()
+    }
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// How many scratch folders of a process there are.
+fn scratch_of(pid: u32) -> usize {
+    let all = root().join("target/umbra/scratch").read_dir().unwrap();
+    let own = format!("run-{pid}-");
+    all.filter(|entry| entry.as_ref().unwrap().file_name().to_string_lossy().starts_with(&own))
+        .count()
+}
+
+fn said(output: &Output) -> (Option<i32>, String) {
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn what_was_graded_before_the_end_is_kept_whatever_the_end() {
+    let hand_ins = [("ada", WRONG), ("bob", ENDLESS), ("eve", "what?")];
+    let batch = Batch::new(&hand_ins);
+    let (killed, code, _) = batch.grade_until("ada", Signal::SIGKILL);
+    assert_eq!(code, None);
+    let kept = fs::read(batch.instructor("ada/record.json")).unwrap();
+    batch.hand_in("abe", WRONG);
+    let (interrupted, code, said) = batch.grade_until("abe", Signal::SIGINT);
+    assert_eq!(code, Some(130), "{said}");
+    assert_eq!((scratch_of(killed), scratch_of(interrupted)), (0, 0));
+    assert!(said.contains("of 4 hand-ins are graded; the same command goes on"), "{said}");
+    assert!(!batch.out().join("report.json").exists());
+
+    batch.hand_in("bob", WRONG);
+    let (code, said) = batch.grade();
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("2 of 4 hand-ins are as they were graded before"), "{said}");
+    assert_eq!(fs::read(batch.instructor("ada/record.json")).unwrap(), kept);
+
+    let fresh = Batch::new(&[("abe", WRONG), ("ada", WRONG), ("bob", WRONG), ("eve", "what?")]);
+    assert_eq!(fresh.grade().0, Some(0));
+    assert_eq!(batch.canonical(), fresh.canonical());
+    assert!(batch.canonical().contains("\"seed\": \"20191006\""));
+}
+
+#[test]
+fn a_hand_in_that_the_machine_fails_on_costs_the_others_nothing() {
+    let batch = Batch::new(&[("ada", WRONG), ("bob", WRONG), ("eve", WRONG)]);
+    // Bob's record cannot be written.
+    fs::create_dir_all(batch.instructor("bob/record.json")).unwrap();
+    let (code, said) = batch.grade();
+    assert_eq!(code, Some(3), "{said}");
+    assert!(said.contains("bob: cannot keep "), "{said}");
+    let csv = fs::read_to_string(batch.out().join("grades.csv")).unwrap();
+    let line = |name: &str| csv.lines().find(|line| line.contains(name)).unwrap().to_owned();
+    assert!(line("bob").contains("ungraded"), "{csv}");
+    assert!(!line("ada").contains("ungraded") && !line("eve").contains("ungraded"), "{csv}");
+
+    fs::remove_dir(batch.instructor("bob/record.json")).unwrap();
+    let (code, said) = batch.grade();
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("2 of 3 hand-ins are as they were graded before"), "{said}");
+    let csv = fs::read_to_string(batch.out().join("grades.csv")).unwrap();
+    assert!(!csv.contains("ungraded"), "{csv}");
+
+    // Another text is graded anew; the same one under other conditions too.
+    batch.hand_in("bob", "fn main() { other }");
+    let (_, said) = batch.grade();
+    assert!(said.contains("2 of 3 hand-ins are as they were graded before"), "{said}");
+    assert!(batch.canonical().contains("`other`"));
+    fs::write(batch.instructor("held-back-seed.txt"), "off").unwrap();
+    let (code, said) = batch.grade();
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("held-back-seed.txt: expected the seed of held-back scenes"), "{said}");
+}
