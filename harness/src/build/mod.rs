@@ -15,4 +15,4 @@ pub use record::{RecordError, Recording, wrapper_main};
 pub use replay::{BuildOutcome, BuildReport, compile, default_limits};
 
 /// The crate whose compiler call is recorded.
-const TEMPLATE: &str = "student_template";
+pub(crate) const TEMPLATE: &str = "student_template";

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use super::TEMPLATE;
 use super::closure::{Metadata, libraries};
-use crate::files::hex;
+use crate::files::{files_below, hex};
 
 /// The manifest of this program's own package.
 const UMBRA: &str = "harness/Cargo.toml";
@@ -215,7 +215,8 @@ fn key(workspace: &Path, rustc: &Path) -> Result<String, RecordError> {
     files.extend(Some(workspace.join(UMBRA)).filter(|file| file.is_file()));
     files.push(workspace.join(TEMPLATE).join("Cargo.toml"));
     for tree in ["harness/api/src", "harness/basecode/src"] {
-        collect(&workspace.join(tree), &mut files)?;
+        let tree = workspace.join(tree);
+        files.extend(files_below(&tree).map_err(at(&tree))?);
     }
     files.extend(
         ["harness/api/Cargo.toml", "harness/basecode/Cargo.toml"].map(|f| workspace.join(f)),
@@ -227,21 +228,6 @@ fn key(workspace: &Path, rustc: &Path) -> Result<String, RecordError> {
         hash.update(bytes);
     }
     Ok(hex(&hash.finalize()[..8]))
-}
-
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), RecordError> {
-    let mut entries = fs::read_dir(folder)
-        .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>())
-        .map_err(at(folder))?;
-    entries.sort();
-    for entry in entries {
-        if entry.is_dir() {
-            collect(&entry, files)?;
-        } else {
-            files.push(entry);
-        }
-    }
-    Ok(())
 }
 
 /// Runs a trusted program in the workspace and answers its standard output.

@@ -11,9 +11,10 @@ use sha2::{Digest, Sha256};
 
 use super::pipeline::{Folders, Grading};
 use super::record::Record;
-use crate::evidence::{Check, Verdict};
+use crate::build::TEMPLATE;
+use crate::evidence::{Check, Evidence, Picture, Verdict};
 use crate::expected::scene_digest;
-use crate::files::{hex, write_whole};
+use crate::files::{files_below, hex, write_whole};
 
 /// The record's file, beside the instructor's report on the hand-in.
 const FILE: &str = "record.json";
@@ -28,8 +29,10 @@ pub struct Kept {
 /// What is in the file.
 #[derive(Serialize, Deserialize)]
 struct File<R> {
-    /// SHA-256 over all that the record depends on.
+    /// SHA-256 over all that the record depends on, but for the rules.
     key: String,
+    /// The parts that were diagnosed, by the rules of then.
+    failing: Vec<String>,
     record: R,
 }
 
@@ -45,12 +48,18 @@ impl Kept {
             (&assignment.scenes, &assignment.tree, &assignment.tolerances, &assignment.limits),
             grading.held_back.as_ref(),
         ))?);
-        let expected = grading.cases.iter().filter(|case| case.entry.stored);
-        let files = expected.map(|case| assignment.expected_file(&case.entry));
-        let programs = grading.reference.iter().chain([&grading.supervisor.umbra]);
-        for file in files.chain(programs.cloned()) {
+        let mut files = vec![grading.supervisor.umbra.clone()];
+        files.extend(grading.reference.clone());
+        // Stored images, what known mistakes answer, and what a hand-in began from.
+        for folder in ["expected", TEMPLATE] {
+            let folder = assignment.root.join(folder);
+            let below = files_below(&folder);
+            files.extend(below.with_context(|| format!("cannot read {}", folder.display()))?);
+        }
+        for file in files {
             let bytes =
                 fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
+            hash.update(file.as_os_str().as_encoded_bytes());
             hash.update(Sha256::digest(bytes));
         }
         hash.update(scene_digest(&assignment.root.join(&assignment.sampler_scene))?);
@@ -76,29 +85,40 @@ impl Kept {
         Ok(hex(&hash.finalize()))
     }
 
-    /// The record with this key, when its pictures are still there too.
-    pub(super) fn find(&self, key: &str, out: &Folders) -> Option<Record> {
+    /// The record with this key, when its pictures are still there too, and `failing` names the
+    /// parts that were diagnosed.
+    pub(super) fn find(
+        &self,
+        key: &str,
+        failing: impl Fn(&Evidence) -> Vec<String>,
+        out: &Folders,
+    ) -> Option<Record> {
         let bytes = fs::read(out.instructor.join(FILE)).ok()?;
-        let File { record, .. } =
-            serde_json::from_slice(&bytes).ok().filter(|file: &File<Record>| file.key == key)?;
-        if !pictures(&record, out).all(|picture| picture.is_file()) {
-            return None;
-        }
-        self.found.fetch_add(1, Ordering::Relaxed);
-        Some(record)
+        let file: File<Record> = serde_json::from_slice(&bytes).ok()?;
+        let same = file.key == key
+            && file.failing == failing(&file.record.evidence)
+            && pictures(&file.record, out).all(|picture| picture.is_file());
+        self.found.fetch_add(usize::from(same), Ordering::Relaxed);
+        same.then_some(file.record)
     }
 
     /// Keeps a record, unless the machine left something of it unjudged. Answers what will be found.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub(super) fn keep(&self, key: &str, record: Record, out: &Folders) -> anyhow::Result<Record> {
+    pub(super) fn keep(
+        &self,
+        key: &str,
+        failing: Vec<String>,
+        record: Record,
+        out: &Folders,
+    ) -> anyhow::Result<Record> {
         if record.evidence.checks.iter().any(|check| check.verdict == Verdict::NotRun) {
             return Ok(record);
         }
         let path = out.instructor.join(FILE);
         let failed = || format!("cannot keep {}", path.display());
-        let bytes = serde_json::to_vec(&File { key: key.to_owned(), record })?;
+        let bytes = serde_json::to_vec(&File { key: key.to_owned(), failing, record })?;
         write_whole(&path, &bytes).with_context(failed)?;
         let file: File<Record> = serde_json::from_slice(&bytes).with_context(failed)?;
         Ok(file.record)
@@ -107,12 +127,78 @@ impl Kept {
 
 /// The files of a record's pictures.
 fn pictures<'a>(record: &'a Record, out: &'a Folders) -> impl Iterator<Item = PathBuf> + 'a {
-    let at =
-        |folder: &'a Path| move |picture: &crate::evidence::Picture| folder.join(&picture.file);
+    let at = |folder: &'a Path| move |picture: &Picture| folder.join(&picture.file);
     let of_checks = record.evidence.checks.iter().flat_map(move |check| {
         let folder = if check.held_back { &out.instructor } else { &out.student };
         check.pictures.iter().map(at(folder))
     });
     let of_diagnoses = record.diagnoses.iter().flat_map(|found| &found.pictures);
     of_checks.chain(of_diagnoses.map(at(&out.student)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn a_record_is_found_as_long_as_nothing_that_it_hangs_on_has_changed() {
+        let place = tempfile::tempdir().unwrap();
+        let at = |name: &str| place.path().join(name);
+        let out = Folders { student: at("student"), instructor: at("instructor") };
+        let kept = Kept { batch: [1; 32], found: AtomicUsize::new(0) };
+        let mut record = sample::sheet().entries.remove(1).record;
+        record.evidence.checks.retain(|check| check.verdict != Verdict::NotRun);
+        record.evidence.checks[0].error = f64::NAN;
+        record.evidence.checks[1].error = 0.1 + 0.2;
+        for picture in pictures(&record, &out) {
+            fs::create_dir_all(picture.parent().unwrap()).unwrap();
+            fs::write(picture, "").unwrap();
+        }
+        let failing = |_: &Evidence| vec!["1.3".to_owned()];
+        let found = || kept.find("key", failing, &out);
+        assert!(found().is_none());
+        let first = kept.keep("key", failing(&record.evidence), record.clone(), &out).unwrap();
+        // NaN equals nothing, itself included.
+        assert_eq!(format!("{first:?}"), format!("{record:?}"));
+        assert_eq!(format!("{:?}", found().unwrap()), format!("{record:?}"));
+        assert_eq!(kept.found(), 1);
+
+        assert!(kept.find("another key", failing, &out).is_none());
+        assert!(kept.find("key", |_| Vec::new(), &out).is_none());
+        let picture = pictures(&record, &out).next().unwrap();
+        fs::remove_file(&picture).unwrap();
+        assert!(found().is_none());
+        fs::write(&picture, "").unwrap();
+        assert!(found().is_some());
+        fs::write(out.instructor.join(FILE), "{").unwrap();
+        assert!(found().is_none());
+    }
+
+    #[test]
+    fn what_the_machine_left_open_is_not_kept() {
+        let place = tempfile::tempdir().unwrap();
+        let out = || place.path().to_owned();
+        let out = Folders { student: out(), instructor: out() };
+        let kept = Kept { batch: [1; 32], found: AtomicUsize::new(0) };
+        let mut record = sample::sheet().entries.remove(0).record;
+        let not_run = Check::new("bonus.image", "", Verdict::NotRun, "no adapter");
+        record.evidence.checks.push(not_run);
+        assert_eq!(kept.keep("key", Vec::new(), record.clone(), &out).unwrap(), record);
+        assert_eq!(place.path().read_dir().unwrap().count(), 0);
+    }
+
+    #[test]
+    fn another_hand_in_batch_or_word_of_intake_has_another_key() {
+        let record = sample::sheet().entries.remove(0).record;
+        let key = |batch: u8, record: &Record, checks: &[Check]| {
+            Kept { batch: [batch; 32], found: AtomicUsize::new(0) }.key(record, checks).unwrap()
+        };
+        let own = key(1, &record, &[]);
+        assert_eq!(own, key(1, &record.clone(), &[]));
+        let other = Record { digest: "other".into(), ..record.clone() };
+        let tree = Check::new("hand_in.tree", "", Verdict::Fail, "");
+        let others = [key(2, &record, &[]), key(1, &other, &[]), key(1, &record, &[tree])];
+        assert!(!others.contains(&own), "{others:?}");
+    }
 }

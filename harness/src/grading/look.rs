@@ -23,6 +23,11 @@ use crate::rubric;
 /// A tile whose mean difference from what is right is less than this is not stored.
 const VISIBLE: f64 = 1e-5;
 
+/// What students may read: nothing of the held-back scenes is in it.
+fn public(evidence: &Evidence) -> Evidence {
+    Evidence { checks: evidence.checks.iter().filter(|check| !check.held_back).cloned().collect() }
+}
+
 impl Grading<'_> {
     /// Where the answers of known mistakes are stored.
     pub fn stored_folder(&self) -> PathBuf {
@@ -40,12 +45,7 @@ impl Grading<'_> {
         drawn: &[Drawn],
         out: Option<&Path>,
     ) -> anyhow::Result<Vec<Diagnosis>> {
-        // Students read this: nothing of the held-back scenes is in it.
-        let mut evidence = evidence.clone();
-        evidence.checks.retain(|check| !check.held_back);
-        let grade = rubric::grade(&self.assignment.rules, &evidence);
-        let failing = grade.parts.iter().filter(|part| part.points_max < part.out_of);
-        let failing: Vec<String> = failing.map(|part| part.id.clone()).collect();
+        let (evidence, failing) = (public(evidence), self.failing(evidence));
         let nothing = Stored::default();
         let stored = match self.stored.get() {
             _ if failing.is_empty() => &nothing,
@@ -76,6 +76,13 @@ impl Grading<'_> {
             }
         }
         Ok(diagnoses)
+    }
+
+    /// The parts that are diagnosed: those that lost points on public scenes.
+    pub(super) fn failing(&self, evidence: &Evidence) -> Vec<String> {
+        let grade = rubric::grade(&self.assignment.rules, &public(evidence));
+        let failing = grade.parts.into_iter().filter(|part| part.points_max < part.out_of);
+        failing.map(|part| part.id).collect()
     }
 
     /// Stored answers must be those of the scenes as they are now.

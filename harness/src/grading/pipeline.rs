@@ -205,7 +205,7 @@ impl<'a> Grading<'a> {
         let mut checks = vec![tree_check(&validation, purpose)];
         let key = self.kept.as_ref().map(|kept| kept.key(&record, &checks)).transpose()?;
         if let (Some(kept), Some(key)) = (&self.kept, &key)
-            && let Some(found) = kept.find(key, out)
+            && let Some(found) = kept.find(key, |evidence| self.failing(evidence), out)
         {
             return Ok(found);
         }
@@ -242,7 +242,7 @@ impl<'a> Grading<'a> {
         record.diagnoses = self.diagnose(&asker, &record.evidence, &drawn, Some(&out.student))?;
         record.stages = costs.end("diagnosis", 0.0);
         match (&self.kept, key) {
-            (Some(kept), Some(key)) => kept.keep(&key, record, out),
+            (Some(kept), Some(key)) => kept.keep(&key, self.failing(&record.evidence), record, out),
             _ => Ok(record),
         }
     }

@@ -13,7 +13,7 @@ mod html;
 mod json;
 mod number;
 #[cfg(test)]
-mod sample;
+pub(crate) mod sample;
 mod text;
 #[cfg(test)]
 mod write_tests;

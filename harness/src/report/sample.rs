@@ -10,7 +10,7 @@ use crate::intake::Finding;
 use crate::rubric::{Grade, PartGrade, Rules};
 
 /// The batch.
-pub(super) fn sheet() -> Sheet {
+pub(crate) fn sheet() -> Sheet {
     Sheet {
         assignment: "a2".into(),
         title: "Assignment 2: Point Lights & Shadows".into(),
