@@ -190,6 +190,12 @@ impl Assignment {
         self.root.join("expected").join(&self.name).join(format!("{}.exr", scene.name))
     }
 
+    /// The template's `src` as it was handed out: what a stage that nobody touched equals. Nobody
+    /// works in it, while a student edits `student_template` in place.
+    pub fn template(&self) -> PathBuf {
+        self.root.join("expected").join(&self.name).join("template")
+    }
+
     /// Where a student's kit keeps the expected images that only the reference renderer can make.
     pub fn made(&self) -> PathBuf {
         self.root.join("expected").join(&self.name).join("made")

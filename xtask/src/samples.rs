@@ -155,13 +155,13 @@ impl Packer {
             self.recipes.get(name).with_context(|| format!("there is no sample {name}"))?;
         let mut files = match recipe.base.as_str() {
             "nothing" => BTreeMap::new(),
-            "template" => read_tree(&self.root.join("student_template/src"))?,
+            "template" => read_tree(&self.assignment.template())?,
             base => self.source(base)?,
         };
         for path in &recipe.remove {
             ensure!(files.remove(path).is_some(), "remove: {} is not in the base", path.display());
         }
-        let template = self.root.join("student_template/src");
+        let template = self.assignment.template();
         for path in &recipe.restore {
             let bytes = fs::read(template.join(path))
                 .with_context(|| format!("restore: {}", path.display()))?;

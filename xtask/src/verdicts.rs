@@ -235,8 +235,8 @@ impl<'a> Bench<'a> {
     /// The reference's stage texts with mistakes, and the template's.
     fn stages(&self, mistakes: &[String]) -> Result<Stages> {
         let names: Vec<&str> = switches(mistakes).collect();
-        let source = |package: &str| self.root.join(package).join("src");
-        let mut own = Stages::read(&source("reference_impl"), &source("student_template"));
+        let reference = self.root.join("reference_impl/src");
+        let mut own = Stages::read(&reference, &self.assignment.template());
         for (name, text) in STAGES.iter().zip(&mut own.own) {
             let right = text.take().with_context(|| format!("the reference has no {name}"))?;
             *text =

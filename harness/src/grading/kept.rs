@@ -11,7 +11,6 @@ use sha2::{Digest, Sha256};
 
 use super::pipeline::{Folders, Grading};
 use super::record::Record;
-use crate::build::TEMPLATE;
 use crate::evidence::{Check, Evidence, Picture, Verdict};
 use crate::expected::scene_digest;
 use crate::files::{files_below, hex, write_whole};
@@ -51,11 +50,9 @@ impl Kept {
         let mut files = vec![grading.supervisor.umbra.clone()];
         files.extend(grading.reference.clone());
         // Stored images, what known mistakes answer, and what a hand-in began from.
-        for folder in ["expected", TEMPLATE] {
-            let folder = assignment.root.join(folder);
-            let below = files_below(&folder);
-            files.extend(below.with_context(|| format!("cannot read {}", folder.display()))?);
-        }
+        let folder = assignment.root.join("expected");
+        let below = files_below(&folder);
+        files.extend(below.with_context(|| format!("cannot read {}", folder.display()))?);
         for file in files {
             let bytes =
                 fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;

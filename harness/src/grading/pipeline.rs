@@ -220,10 +220,7 @@ impl<'a> Grading<'a> {
             self.offline(&asker, plugin, seed, &mut checks, &mut drawn)?;
             costs.end("offline", asker.end_path());
             say("drawing realtime");
-            let stages = Stages::read(
-                &hand_in.root.join("src"),
-                &self.assignment.root.join("student_template/src"),
-            );
+            let stages = Stages::read(&hand_in.root.join("src"), &self.assignment.template());
             self.realtime(&asker, plugin, &stages, &mut checks, &mut drawn)?;
             costs.end("realtime", asker.end_path());
         }

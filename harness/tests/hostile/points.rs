@@ -42,7 +42,7 @@ pub fn all(ground: &Ground) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> 
     let adapter = Adapter { kind: AdapterKind::Software, name: String::new() };
     let grading = Grading::prepare(&store, adapter, None, &never)?;
     // The template's stages: what is drawn is all that there is.
-    let template = workspace().join("student_template/src");
+    let template = assignment.template();
     let stages = Stages::read(&template, &template);
     let plugins = plugins::all();
     let (next, earned) = (AtomicUsize::new(0), Mutex::new(Vec::new()));

@@ -35,6 +35,18 @@ fn the_template_has_the_files_of_the_reference() {
 }
 
 #[test]
+fn the_template_is_kept_as_it_was_handed_out() {
+    let own = source("student_template");
+    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("../expected/a2/template");
+    let hint = "hint: after a change of the template, `cp -r student_template/src/. expected/a2/template`";
+    assert_eq!(files(&own), files(&kept), "{hint}");
+    for file in files(&own) {
+        let text = |folder: &Path| std::fs::read_to_string(folder.join(&file)).unwrap();
+        assert_eq!(text(&own), text(&kept), "{}: {hint}", file.display());
+    }
+}
+
+#[test]
 fn the_previous_assignment_is_solved_alike() {
     for file in [
         "integrators/normal.rs",

@@ -1,0 +1,26 @@
+//! The diffuse reflectance model.
+
+// Quiet until the task of this file is done: then remove this line, and the compiler helps you.
+#![allow(unused)]
+
+use basecode::{Bsdf, Frame, INV_PI, Material, SurfaceInteraction, Texture, Vec3};
+
+/// Lambertian reflection.
+pub struct DiffuseBsdf {
+    albedo: Texture,
+}
+
+impl DiffuseBsdf {
+    /// Takes the material's Kd.
+    pub fn new(material: &Material) -> Self {
+        Self { albedo: material.diffuse.clone() }
+    }
+}
+
+impl Bsdf for DiffuseBsdf {
+    fn eval(&self, i: &SurfaceInteraction) -> Vec3 {
+        // TODO(A2) 1.1: black unless both `i.wo` and `i.wi` face the surface (`Frame::cos_theta`);
+        // otherwise the albedo at `i` (`self.albedo.eval`) over pi, times the cosine of `i.wi`.
+        todo!("1.1 diffuse BSDF: return albedo / pi * cos_i")
+    }
+}

@@ -1,0 +1,7 @@
+//! Reflectance models.
+
+mod diffuse;
+mod phong;
+
+pub use diffuse::DiffuseBsdf;
+pub use phong::PhongBsdf;

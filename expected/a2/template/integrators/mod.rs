@@ -1,0 +1,7 @@
+//! Light transport.
+
+mod normal;
+mod simple;
+
+pub use normal::NormalIntegrator;
+pub use simple::SimpleIntegrator;
