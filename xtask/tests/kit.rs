@@ -146,12 +146,10 @@ fn the_kit_is_whole_and_holds_nothing_of_the_reference() {
     }
 }
 
-/// `./run kit` asks for it.
+/// The kit after its first build.
 #[cfg(unix)]
-#[test]
-#[ignore = "a minute or two: compiles the kit"]
-fn a_check_in_the_kit_says_what_the_grader_says() {
-    let kit = make("kit-built");
+fn make_built(name: &str) -> PathBuf {
+    let kit = make(name);
     // Dependencies need not be compiled once more; all else of `target` is the kit's own.
     let (built, release) = (root().join("target/release"), kit.join("target/release"));
     std::fs::create_dir_all(&release).unwrap();
@@ -159,6 +157,76 @@ fn a_check_in_the_kit_says_what_the_grader_says() {
         std::os::unix::fs::symlink(built.join(folder), release.join(folder)).unwrap();
     }
     run(Command::new("cargo").args(["build", "--release"]).current_dir(&kit));
+    kit
+}
+
+/// What a student does: part after part, in place, each checked when it is done.
+#[cfg(unix)]
+#[test]
+#[ignore = "minutes: compiles the kit, and checks it ten times"]
+fn parts_that_are_solved_in_place_one_by_one_count_at_once() {
+    let kit = make_built("kit-solved");
+    let own = kit.join("student_template/src");
+    let solved = |file: &str| {
+        std::fs::read_to_string(root().join("samples/perfect/src").join(file)).unwrap()
+    };
+    let put = |file: &str, text: &str| std::fs::write(own.join(file), text).unwrap();
+    // The first task has no points: the README says what to write.
+    let readme = std::fs::read_to_string(kit.join("student_template/README.md")).unwrap();
+    let line = "let sampler = Sampler::new(job.seed + y as u64);";
+    assert!(readme.contains(line), "the README lacks `{line}`");
+    let renderer = std::fs::read_to_string(own.join("renderer.rs")).unwrap();
+    let shared = "    let sampler = Sampler::new(job.seed);\n";
+    let (rows, each) = ("film, &|y, row| {\n", format!("film, &|y, row| {{\n        {line}\n"));
+    assert!(renderer.contains(shared) && renderer.contains(rows), "{renderer}");
+    put("renderer.rs", &renderer.replace(shared, "").replace(rows, &each));
+
+    // Both halves of one file, the second not done yet.
+    let integrator = solved("integrators/simple.rs");
+    let visible =
+        integrator.find("    let to_light = scene.first_light_position() - i.p;\n    let distance");
+    let half = format!("{}    todo!(\"1.4 hard shadows\")\n}}\n", &integrator[..visible.unwrap()]);
+    let steps: [(&str, &[(&str, String)]); 10] = [
+        ("none", &[]),
+        ("1.1", &[("bsdfs/diffuse.rs", solved("bsdfs/diffuse.rs"))]),
+        ("1.2", &[("bsdfs/phong.rs", solved("bsdfs/phong.rs"))]),
+        ("1.3", &[("integrators/simple.rs", half)]),
+        ("1.4", &[("integrators/simple.rs", integrator.clone())]),
+        ("2.1", &[("renderpasses/simple.rs", solved("renderpasses/simple.rs"))]),
+        ("2.2", &[("shaders/simple.vs.wgsl", solved("shaders/simple.vs.wgsl"))]),
+        ("2.3", &[("shaders/diffuse.fs.wgsl", solved("shaders/diffuse.fs.wgsl"))]),
+        ("2.4", &[("shaders/phong.fs.wgsl", solved("shaders/phong.fs.wgsl"))]),
+        (
+            "2.5",
+            &[
+                ("renderpasses/shadow.rs", solved("renderpasses/shadow.rs")),
+                ("shaders/shadow.vs.wgsl", solved("shaders/shadow.vs.wgsl")),
+            ],
+        ),
+    ];
+    for (index, (part, files)) in steps.iter().enumerate() {
+        files.iter().for_each(|(file, text)| put(file, text));
+        let mut check = Command::new(kit.join("umbra"));
+        check.args(["check", "student_template"]).current_dir(&kit);
+        let report = report(&mut check, &kit.join("report"));
+        for own in report["hand_ins"][0]["parts"].as_array().unwrap() {
+            let id = own["id"].as_str().unwrap();
+            let done = steps[..=index].iter().any(|(part, _)| *part == id);
+            let right = if done { &own["out_of"] } else { &Value::from(0.0) };
+            let (points, most) = (own["points"].as_f64(), own["points_max"].as_f64());
+            assert!(points == right.as_f64() && most == points, "after {part}: {own:#}");
+            let says = own["reason"].as_str().unwrap();
+            assert_eq!(says.contains("not implemented yet"), !done, "after {part}: {own:#}");
+        }
+    }
+}
+
+/// `./run kit` asks for it.
+#[cfg(unix)]
+#[test]
+#[ignore = "a minute or two: compiles the kit"]
+fn a_check_in_the_kit_says_what_the_grader_says() {
+    let kit = make_built("kit-built");
     let umbra = kit.join("umbra");
 
     let packed = run(Command::new(env!("CARGO_BIN_EXE_xtask")).arg("samples").current_dir(root()));

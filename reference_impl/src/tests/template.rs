@@ -38,7 +38,8 @@ fn the_template_has_the_files_of_the_reference() {
 fn the_template_is_kept_as_it_was_handed_out() {
     let own = source("student_template");
     let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("../expected/a2/template");
-    let hint = "hint: after a change of the template, `cp -r student_template/src/. expected/a2/template`";
+    let hint =
+        "hint: after a change of the template, `cp -r student_template/src/. expected/a2/template`";
     assert_eq!(files(&own), files(&kept), "{hint}");
     for file in files(&own) {
         let text = |folder: &Path| std::fs::read_to_string(folder.join(&file)).unwrap();
