@@ -1,6 +1,8 @@
 //! What must hold of every reader of foreign bytes, whatever it is given. Each function is a fuzz
 //! target; `harness/tests/fuzz_corpus.rs` calls them with the corpus and what is near it.
 
+mod judge;
+
 use std::fs;
 use std::path::Path;
 
@@ -12,6 +14,8 @@ use umbra::intake::{
     validate_hand_in,
 };
 use umbra::worker::{Noted, RECORD};
+
+pub use judge::judge;
 
 /// Small, so that bombs are small.
 const LIMITS: Limits = Limits {

@@ -14,6 +14,7 @@ pub mod grading;
 pub mod held_back;
 pub mod imaging;
 pub mod intake;
+pub mod panics;
 pub mod plugin;
 pub mod process;
 pub mod report;

@@ -132,6 +132,11 @@ fn images() {
 }
 
 #[test]
+fn submitted_images() {
+    replay("judge", targets::judge);
+}
+
+#[test]
 fn scene_files() {
     replay("toml", targets::toml);
 }

@@ -12,7 +12,8 @@ use anyhow::{Context as _, ensure};
 use super::MachineLacks;
 use super::context::{Context, INTERRUPTED, cores};
 use super::render::AdapterChoice;
-use crate::grading::{Folders, Grading, Kept, Purpose, Record, judge_shared};
+use crate::evidence::Verdict;
+use crate::grading::{Folders, Grading, INTERNAL_ERROR, Kept, Purpose, Record, judge_shared};
 use crate::held_back::recorded_seed;
 use crate::report::{self, Entry, Sheet};
 use crate::rubric;
@@ -137,8 +138,17 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
     if let Some(held_back) = &sheet.held_back {
         println!("held-back seed {0}; --perturb {0} reproduces", held_back.seed);
     }
+    Ok(exit_code(&sheet))
+}
+
+/// What a batch ends with: a bug of ours counts more than what the machine lacks.
+fn exit_code(sheet: &Sheet) -> u8 {
+    let mut checks = sheet.entries.iter().flat_map(|entry| &entry.record.evidence.checks);
+    if checks.any(|check| check.id == INTERNAL_ERROR && check.verdict == Verdict::Fail) {
+        return super::EXIT_BUG;
+    }
     let ungraded = sheet.entries.iter().any(|entry| entry.grade.points < entry.grade.points_max);
-    Ok(if ungraded { super::EXIT_MACHINE } else { super::EXIT_OK })
+    if ungraded { super::EXIT_MACHINE } else { super::EXIT_OK }
 }
 
 /// The width of the terminal in columns, and whether it takes colours.
@@ -312,7 +322,10 @@ impl Batch<'_> {
                     student: self.output.join(slug),
                     instructor: self.output.join(report::INSTRUCTOR).join(slug),
                 };
-                let result = grading.hand_in(source, slug, &out, self.purpose, &say);
+                let result = match self.purpose {
+                    Purpose::Grade => grading.one_of_batch(source, slug, &out, &say),
+                    Purpose::Check => grading.hand_in(source, slug, &out, self.purpose, &say),
+                };
                 if INTERRUPTED.load(Ordering::Relaxed) && result.is_err() {
                     return;
                 }
@@ -354,5 +367,23 @@ fn print_timings(sheet: &Sheet) {
             "  {:<10} {wall_s:7.2} s wall {cpu_s:7.2} s cpu (of child processes)",
             "together"
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evidence::Check;
+    use crate::report::sample;
+
+    #[test]
+    fn a_bug_of_ours_counts_more_than_what_the_machine_lacks() {
+        let mut sheet = sample::sheet();
+        assert_eq!(exit_code(&sheet), super::super::EXIT_MACHINE);
+        let bug = Check::new(INTERNAL_ERROR, "", Verdict::Fail, "index out of bounds");
+        sheet.entries[0].record.evidence.checks.push(bug);
+        assert_eq!(exit_code(&sheet), super::super::EXIT_BUG);
+        sheet.entries.clear();
+        assert_eq!(exit_code(&sheet), super::super::EXIT_OK);
     }
 }

@@ -16,6 +16,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::panics;
+
 /// Everything went well, and what was asked about is in order.
 pub const EXIT_OK: u8 = 0;
 /// What was asked about is not in order: a hand-in that does not conform, images that differ.
@@ -24,7 +26,7 @@ pub const EXIT_NOT_IN_ORDER: u8 = 1;
 pub const EXIT_USAGE: u8 = 2;
 /// The machine lacks something: an adapter, disk space, full isolation.
 pub const EXIT_MACHINE: u8 = 3;
-/// A bug of Umbra's.
+/// A bug of Umbra's: of a batch, all other submissions have their reports.
 pub const EXIT_BUG: u8 = 70;
 /// Ended by Ctrl-C.
 pub const EXIT_INTERRUPTED: u8 = 130;
@@ -45,6 +47,14 @@ struct Arguments {
 const EXIT_CODES: &str = "Exit codes: 0 in order; 1 not in order (does not conform, images differ, \
 points were lost in a check); 2 the command line or an input cannot be used; 3 the machine lacks \
 something; 70 a bug of Umbra's; 130 interrupted.";
+
+/// What is said of a panic, after its own words.
+const BUG: &str = concat!(
+    "this is a bug of Umbra's, nobody else's fault. Please report it to its maintainers with the line \
+     above, the command line, the file it was about and the version, ",
+    env!("CARGO_PKG_VERSION"),
+    "; RUST_BACKTRACE=1 says more"
+);
 
 #[derive(Subcommand)]
 enum Command {
@@ -100,10 +110,15 @@ pub fn main() -> ExitCode {
         use nix::sys::signal::{SigHandler, Signal, signal};
         signal(Signal::SIGPIPE, SigHandler::SigDfl)
     };
+    panics::note();
     let Arguments { command, root } = Arguments::parse();
-    match run(command, root.as_deref()) {
-        Ok(code) => ExitCode::from(code),
-        Err(error) => {
+    match panics::contain(|| run(command, root.as_deref())) {
+        Ok(Ok(code)) => ExitCode::from(code),
+        Err(_) => {
+            eprintln!("umbra: {BUG}");
+            ExitCode::from(EXIT_BUG)
+        }
+        Ok(Err(error)) => {
             eprintln!("umbra: {}", told_once(&error));
             let machine = error.downcast_ref::<MachineLacks>().is_some();
             ExitCode::from(if machine { EXIT_MACHINE } else { EXIT_USAGE })

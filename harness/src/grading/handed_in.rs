@@ -42,7 +42,12 @@ pub struct HandedIn<'a> {
     image: Result<Image, String>,
 }
 
-impl HandedIn<'_> {
+impl<'a> HandedIn<'a> {
+    /// An image of a scene, with its path in the submission, or why there are no pixels.
+    pub fn new(case: &'a Case, path: &str, kind: Kind, image: Result<Image, String>) -> Self {
+        Self { case, path: path.to_owned(), kind, image }
+    }
+
     /// The image, when it is the one that a check of this id is about.
     pub fn shown_by(&self, check: &Check) -> Option<&Image> {
         let first = views(self.kind).first().is_some_and(|(id, _)| *id == check.id);
@@ -80,7 +85,7 @@ pub fn read<'a>(
         ] {
             if let Some(path) = tree.found_in(root, path) {
                 let image = decoder.image(&root.join(path), path)?;
-                found.push(HandedIn { case, path: path.to_owned(), kind, image });
+                found.push(HandedIn::new(case, path, kind, image));
             }
         }
     }

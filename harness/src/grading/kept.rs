@@ -14,9 +14,12 @@ use super::record::Record;
 use crate::evidence::{Check, Evidence, Picture, Verdict};
 use crate::expected::scene_digest;
 use crate::files::{files_below, hex, write_whole};
+use crate::panics::Bug;
 
 /// The record's file, beside the instructor's report on the hand-in.
 const FILE: &str = "record.json";
+/// The file of a bug of Umbra's that a submission met.
+const BUG: &str = "internal-error.json";
 
 /// Keeps records and finds them again.
 pub struct Kept {
@@ -25,7 +28,15 @@ pub struct Kept {
     found: AtomicUsize,
 }
 
-/// What is in the file.
+/// What is in the file of a bug.
+#[derive(Serialize, Deserialize)]
+struct Met {
+    /// SHA-256 over all that it depends on.
+    key: String,
+    bug: Bug,
+}
+
+/// What is in the file of a record.
 #[derive(Serialize, Deserialize)]
 struct File<R> {
     /// SHA-256 over all that the record depends on, but for the rules.
@@ -66,6 +77,44 @@ impl Kept {
             }
         }
         Ok(Self { batch: hash.finalize().into(), found: AtomicUsize::new(0) })
+    }
+
+    /// The bug that this program met with the submission at `source` before.
+    pub(super) fn bug_of(&self, source: &Path, out: &Folders) -> Option<Bug> {
+        let bytes = fs::read(out.instructor.join(BUG)).ok()?;
+        let met: Met = serde_json::from_slice(&bytes).ok()?;
+        (met.key == self.key_of_source(source)).then_some(met.bug)
+    }
+
+    /// Keeps a bug that was met with the submission at `source`.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(super) fn keep_bug(&self, bug: &Bug, source: &Path, out: &Folders) -> std::io::Result<()> {
+        let met = Met { key: self.key_of_source(source), bug: bug.clone() };
+        write_whole(&out.instructor.join(BUG), &serde_json::to_vec(&met)?)
+    }
+
+    /// The key of a submission of which nothing is known but its files' names, sizes and times: a bug
+    /// may lie in whatever looks further.
+    fn key_of_source(&self, source: &Path) -> String {
+        let mut hash = Sha256::new();
+        hash.update(self.batch);
+        let mut open = vec![source.to_owned()];
+        while let Some(path) = open.pop() {
+            hash.update(path.as_os_str().as_encoded_bytes());
+            // No link is followed.
+            let Ok(meta) = path.symlink_metadata() else { continue };
+            hash.update(meta.len().to_le_bytes());
+            hash.update(format!("{:?}", meta.modified().ok()));
+            if meta.is_dir() {
+                let entries = fs::read_dir(&path).into_iter().flatten().flatten();
+                let mut entries: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+                entries.sort();
+                open.append(&mut entries);
+            }
+        }
+        hex(&hash.finalize())
     }
 
     /// How many records were found again.
@@ -134,6 +183,14 @@ fn pictures<'a>(record: &'a Record, out: &'a Folders) -> impl Iterator<Item = Pa
 }
 
 #[cfg(test)]
+impl Kept {
+    /// For the records of a made-up batch.
+    pub(super) fn with(batch: [u8; 32]) -> Self {
+        Self { batch, found: AtomicUsize::new(0) }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::sample;
@@ -143,7 +200,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let at = |name: &str| place.path().join(name);
         let out = Folders { student: at("student"), instructor: at("instructor") };
-        let kept = Kept { batch: [1; 32], found: AtomicUsize::new(0) };
+        let kept = Kept::with([1; 32]);
         let mut record = sample::sheet().entries.remove(1).record;
         record.evidence.checks.retain(|check| check.verdict != Verdict::NotRun);
         record.evidence.checks[0].error = f64::NAN;
@@ -177,7 +234,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let out = || place.path().to_owned();
         let out = Folders { student: out(), instructor: out() };
-        let kept = Kept { batch: [1; 32], found: AtomicUsize::new(0) };
+        let kept = Kept::with([1; 32]);
         let mut record = sample::sheet().entries.remove(0).record;
         let not_run = Check::new("bonus.image", "", Verdict::NotRun, "no adapter");
         record.evidence.checks.push(not_run);
@@ -189,7 +246,7 @@ mod tests {
     fn another_hand_in_batch_or_word_of_intake_has_another_key() {
         let record = sample::sheet().entries.remove(0).record;
         let key = |batch: u8, record: &Record, checks: &[Check]| {
-            Kept { batch: [batch; 32], found: AtomicUsize::new(0) }.key(record, checks).unwrap()
+            Kept::with([batch; 32]).key(record, checks).unwrap()
         };
         let own = key(1, &record, &[]);
         assert_eq!(own, key(1, &record.clone(), &[]));

@@ -2,9 +2,10 @@
 
 mod ask;
 mod case;
+mod contain;
 mod control;
 mod draw;
-mod handed_in;
+pub mod handed_in;
 mod isolate;
 mod kept;
 mod look;
@@ -16,8 +17,10 @@ mod record;
 mod sampler;
 mod shared;
 
-pub use case::Case;
+pub use case::{Case, Small};
+pub use contain::INTERNAL_ERROR;
 pub use kept::Kept;
+pub use offline::Drawn;
 pub use pipeline::{Folders, Grading, Purpose, RenderPath, TREE};
 pub use realtime::Stages;
 pub use record::{Conditions, Record, StageCost, Student};

@@ -251,7 +251,7 @@ impl<'a> Grading<'a> {
         Record { evidence: Evidence { checks }, ..self.begin(source, slug) }
     }
 
-    fn begin(&self, source: &Path, slug: &str) -> Record {
+    pub(super) fn begin(&self, source: &Path, slug: &str) -> Record {
         Record {
             name: source.file_name().unwrap_or(source.as_os_str()).to_string_lossy().into_owned(),
             slug: slug.to_owned(),

@@ -44,9 +44,10 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
 /// The nearest 8-bit sRGB level of a linear value clamped to [0, 1]; NaN is 0.
 pub fn level(linear: f32) -> u8 {
     let table = &*TABLE;
-    let x = linear.clamp(0.0, 1.0);
+    // NaN and both zeros are 0: the bits of -0.0 are those of a large number.
+    let x = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
     let bucket = x.to_bits() >> (23 - FRACTION_BITS);
-    if x.is_nan() || bucket < FIRST {
+    if bucket < FIRST {
         return 0;
     }
     let mut level = usize::from(table.buckets[(bucket - FIRST) as usize]);
@@ -71,13 +72,18 @@ mod tests {
     fn known_levels() {
         let cases = [
             (0.0, 0),
+            (-0.0, 0),
+            (f32::from_bits(1), 0),
+            (-f32::from_bits(1), 0),
             (-3.0, 0),
             (1.0, 255),
             (39.0, 255),
             (0.5, 188),
             (0.2, 124),
             (f32::NAN, 0),
+            (-f32::NAN, 0),
             (f32::INFINITY, 255),
+            (f32::NEG_INFINITY, 0),
         ];
         for (linear, expected) in cases {
             assert_eq!(level(linear), expected, "{linear}");

@@ -1,0 +1,87 @@
+//! One submission never ends the batch: a bug of Umbra's that it meets is contained and remembered.
+
+use std::path::Path;
+
+use super::kept::Kept;
+use super::pipeline::{Folders, Grading, Purpose};
+use super::record::Record;
+use crate::evidence::{Check, Evidence, Verdict};
+use crate::panics::{self, Bug};
+
+/// The check that fails when Umbra itself did: the submission is ungraded.
+pub const INTERNAL_ERROR: &str = "submission.internal_error";
+
+impl Grading<'_> {
+    /// Grades one of a batch, as [`Grading::hand_in`] does. A panic of Umbra's makes a record that says
+    /// so, and is not met again with the same submission by the same program.
+    ///
+    /// # Errors
+    /// The machine's matters and Ctrl-C.
+    pub fn one_of_batch(
+        &self,
+        source: &Path,
+        slug: &str,
+        out: &Folders,
+        say: &dyn Fn(&str),
+    ) -> anyhow::Result<Record> {
+        let grade = || self.hand_in(source, slug, out, Purpose::Grade, say);
+        contained(self.kept.as_ref(), source, out, grade).unwrap_or_else(|bug| {
+            let check = Check::new(INTERNAL_ERROR, "", Verdict::Fail, bug.to_string());
+            Ok(Record { evidence: Evidence { checks: vec![check] }, ..self.begin(source, slug) })
+        })
+    }
+}
+
+/// Runs `grade`, unless it is known to meet a bug.
+fn contained<T>(
+    kept: Option<&Kept>,
+    source: &Path,
+    out: &Folders,
+    grade: impl FnOnce() -> T,
+) -> Result<T, Bug> {
+    if let Some(bug) = kept.and_then(|kept| kept.bug_of(source, out)) {
+        return Err(Bug { message: format!("not tried again: {}", bug.message), ..bug });
+    }
+    let result = panics::contain(grade);
+    if let (Err(bug), Some(kept)) = (&result, kept) {
+        // Where it cannot be kept, it is met again, and contained again.
+        let _ = kept.keep_bug(bug, source, out);
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    #[test]
+    fn a_bug_is_contained_and_the_same_program_does_not_meet_it_again() {
+        panics::note();
+        let place = tempfile::tempdir().unwrap();
+        let at = |name: &str| place.path().join(name);
+        let out = Folders { student: at("student"), instructor: at("instructor") };
+        let source = at("submission.zip");
+        std::fs::write(&source, "one").unwrap();
+        let calls = Cell::new(0);
+        let grade = |kept: &Kept, good: bool| {
+            contained(Some(kept), &source, &out, || {
+                calls.set(calls.get() + 1);
+                assert!(good, "a pixel of -0.0");
+                7
+            })
+        };
+        let kept = Kept::with([1; 32]);
+        let bug = grade(&kept, false).unwrap_err();
+        assert!(bug.message == "a pixel of -0.0" && bug.place.contains("contain.rs"), "{bug}");
+        let again = grade(&kept, true).unwrap_err();
+        assert_eq!(again.message, "not tried again: a pixel of -0.0");
+        assert_eq!((again.place, calls.get()), (bug.place, 1));
+        // Another program tries again, and so does this one with another submission.
+        assert_eq!(grade(&Kept::with([2; 32]), true), Ok(7));
+        std::fs::write(&source, "another").unwrap();
+        assert_eq!(grade(&kept, true), Ok(7));
+        assert_eq!(calls.get(), 3);
+    }
+}
