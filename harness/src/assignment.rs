@@ -53,7 +53,7 @@ pub struct Limits {
 }
 
 /// One scene of the assignment, with its files relative to the assignment's root.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneEntry {
     /// Name for reports and for the file of its expected images.
@@ -65,6 +65,15 @@ pub struct SceneEntry {
     /// The realtime TOML file with shadows, when the scene can be chosen for the bonus.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bonus: Option<PathBuf>,
+    /// Whether its image with shadows must be right whichever bonus scene the student chose. The best
+    /// of the others is `bonus.image`; this one is a check of its own, `bonus.probe`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub bonus_required: bool,
+    /// The largest share of a part's points, in (0, 1], that a mistake can cost which shows on this
+    /// scene alone. 1 for the assignment's scenes and for probes of what these demand too; less for
+    /// probes of what no image of the assignment shows.
+    #[serde(default = "full_weight", skip_serializing_if = "is_full_weight")]
+    pub weight: f64,
     /// Film to judge it on, width and height in pixels; the scene's own when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub film: Option<[u32; 2]>,
@@ -77,6 +86,15 @@ pub struct SceneEntry {
     /// Images that a hand-in holds of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hand_in: Option<HandInImages>,
+}
+
+fn full_weight() -> f64 {
+    1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde wants a reference
+fn is_full_weight(weight: &f64) -> bool {
+    *weight == 1.0
 }
 
 /// The images of one scene in a hand-in, as paths in its tree.
@@ -177,6 +195,18 @@ impl Assignment {
             }
             if scene.film.is_some_and(|[width, height]| width == 0 || height == 0) {
                 return Some(format!("scene \"{}\": its film is empty", scene.name));
+            }
+            if !(scene.weight > 0.0 && scene.weight <= 1.0) {
+                return Some(format!(
+                    "scene \"{}\": its weight is {} but must lie above 0 and be at most 1",
+                    scene.name, scene.weight
+                ));
+            }
+            if scene.bonus_required && scene.bonus.is_none() {
+                return Some(format!(
+                    "scene \"{}\": its bonus is required, but no bonus file is named",
+                    scene.name
+                ));
             }
         }
         if self.scenes.is_empty() {

@@ -52,7 +52,10 @@ impl Renderer for Reference {
         let mistaken = self.mistakes.integrator(shadows);
         match (kind, mistaken) {
             ("simple" | "direct", Some(mistaken)) => Ok(mistaken),
-            ("simple" | "direct", None) => Ok(Box::new(integrators::SimpleIntegrator { shadows })),
+            ("simple" | "direct", None) => Ok(Box::new(integrators::SimpleIntegrator {
+                shadows,
+                diffuse_mirrors: self.realtime_materials,
+            })),
             ("normal", _) => Ok(Box::new(integrators::NormalIntegrator)),
             _ => Err(Error::Argument(format!("there is no integrator \"{kind}\""))),
         }

@@ -36,7 +36,7 @@ pub enum BoundValue {
     LightIntensity,
     /// `material.rho_d`.
     RhoD,
-    /// `material.rho_s`, Phong materials only.
+    /// `material.rho_s`: Phong materials, and that none reaches a mirror.
     RhoS,
     /// `material.exponent`, Phong materials only.
     Exponent,
@@ -82,6 +82,8 @@ impl BoundValue {
     pub fn stage(self, phong: bool) -> String {
         let value = match self {
             Self::Exponent => format!("vec3f(material.exponent.x, 0.0, {}.0)", u8::from(phong)),
+            // As a shader that has no specular term: what is no Phong material shows none.
+            Self::RhoS if !phong => "vec3f(0.0)".to_owned(),
             _ => format!("{}.xyz", self.name()),
         };
         let contract = include_str!("shaders/contract.wgsl");
@@ -101,7 +103,8 @@ impl BoundValue {
             Self::LightPosition => Some(scene.first_light_position()),
             Self::LightIntensity => Some(scene.first_light_intensity()),
             Self::RhoD => Some(scale * material.diffuse.average()),
-            Self::RhoS => phong.then(|| scale * material.specular.average()),
+            Self::RhoS if phong => Some(scale * material.specular.average()),
+            Self::RhoS => (material.model == MaterialModel::Mirror).then_some(Vec3::ZERO),
             // Blue tells the pipeline apart: a diffuse material must be drawn by `diffuse.fs`.
             Self::Exponent if phong => Some(Vec3::new(material.exponent, 0.0, 1.0)),
             Self::Exponent => None,

@@ -84,7 +84,9 @@ impl Seen {
         let material = scene.shapes()[point.shape].material;
         let emitter = scene.materials()[material].is_emitter();
         let blocked = shadows && point.sight == Sight::Blocked;
-        let lit = point.faces_both() && !blocked && !emitter;
+        // Offline, which has shadows, a mirror is black; realtime draws it as a diffuse colour.
+        let black = shadows && scene.materials()[material].model == MaterialModel::Mirror;
+        let lit = point.faces_both() && !blocked && !emitter && !black;
         let grazes = |w: Vec3| Frame::cos_theta(w).abs() < GRAZING;
         let hangs_on_epsilon = shadows && point.sight == Sight::Unsure && point.faces_both();
         let flag = if emitter { RegionMask::EMITTER } else { 0 };

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use basecode::Image;
 use basecode::scene::SceneConfig;
+use basecode::{Image, MaterialModel, Scene};
 
 use crate::assignment::SceneEntry;
 use crate::evidence::rays::RayBatch;
@@ -62,6 +62,18 @@ fn small_film([full_width, full_height]: [u32; 2]) -> [u32; 2] {
     [width, (full_height * width / full_width).max(1)]
 }
 
+/// The mask with mirrors left out: they have no BSDF that light and shadow could be told by.
+fn without_mirrors(scene: &Scene, surface: &SurfaceBuffer, mask: &RegionMask) -> RegionMask {
+    let mut mask = mask.clone();
+    for (value, (_, point)) in mask.pixels.iter_mut().zip(&surface.pixels) {
+        let model = point.as_ref().map(|point| scene.material_of(point.shape).model);
+        if model == Some(MaterialModel::Mirror) {
+            *value |= RegionMask::EMITTER;
+        }
+    }
+    mask
+}
+
 impl Case {
     /// Makes a scene ready.
     ///
@@ -78,7 +90,8 @@ impl Case {
         let scene = &expected.scene;
         let surface = SurfaceBuffer::new(scene, w, h)?;
         let mask = regions(scene, w, h, true)?;
-        let batch = RayBatch::new(&entry.name, &surface, &mask, scene.first_light_intensity());
+        let asked = without_mirrors(scene, &surface, &mask);
+        let batch = RayBatch::new(&entry.name, &surface, &asked, scene.first_light_intensity());
         let small = Small {
             width,
             height,

@@ -34,7 +34,7 @@ pub fn draw(
         let actual = match check.id.as_str() {
             "image.offline" => own(Kind::Offline { spp: case.spp }),
             "image.realtime" => own(Kind::Realtime),
-            "bonus.image" => own(Kind::RealtimeShadows),
+            "bonus.image" | "bonus.probe" => own(Kind::RealtimeShadows),
             _ => handed_in.iter().find_map(|image| image.shown_by(check)),
         };
         if let Some(actual) = actual {
@@ -51,7 +51,7 @@ fn triple(id: &str, case: &Case, actual: &Image, out: &Path) -> anyhow::Result<V
         "image.realtime" | "handed_in.realtime.all" => {
             (&expected.unshadowed, &expected.unshadowed_mask)
         }
-        "bonus.image" => (&expected.offline.centre, &expected.offline.mask),
+        "bonus.image" | "bonus.probe" => (&expected.offline.centre, &expected.offline.mask),
         _ => (&expected.offline.mean, &expected.offline.mask),
     };
     std::fs::create_dir_all(out)?;

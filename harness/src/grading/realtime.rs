@@ -76,7 +76,8 @@ pub fn judge_images(
             let outcome = draw(asker, Some(plugin), &frame);
             let plain = drawn.first().map(|drawn| &drawn.image);
             let (check, bonus) = judge_bonus(asker, plugin, case, &outcome, plain, tolerances);
-            checks.push(check);
+            let id = if case.entry.bonus_required { "bonus.probe" } else { "bonus.image" };
+            checks.push(Check { id: id.to_owned(), ..check });
             drawn.extend(bonus);
         }
         (checks, drawn)

@@ -86,6 +86,8 @@ pub fn make(assignment: &Assignment, seed: u64) -> anyhow::Result<(HeldBack, Vec
             realtime: at(&original.realtime)?,
             bonus: original.bonus.as_ref().map(at).transpose()?,
             name: name.clone(),
+            bonus_required: false,
+            weight: original.weight,
             film: None,
             stored: false,
             perturb: false,

@@ -46,6 +46,25 @@ fn the_same_seed_gives_the_same_bytes_and_another_gives_others() {
 }
 
 #[test]
+fn the_required_bonus_takes_no_wider_frustum_than_the_scenes_to_choose_from() {
+    let assignment = assignment();
+    let look = |entry: &SceneEntry| {
+        let scene = load_scene(&assignment.root.join(&entry.offline)).unwrap();
+        Look::new(&scene, &Draw::original(&scene)).unwrap()
+    };
+    let with_bonus = assignment.scenes.iter().filter(|scene| scene.bonus.is_some());
+    let (required, free): (Vec<_>, Vec<_>) = with_bonus.partition(|scene| scene.bonus_required);
+    assert!(!required.is_empty() && free.len() >= 2);
+    for own in required.iter().map(|entry| look(entry)) {
+        for other in free.iter().map(|entry| look(entry)) {
+            assert!(own.shadow_cone <= other.shadow_cone, "{own:?} {other:?}");
+            assert!(own.facing_cone <= other.facing_cone, "{own:?} {other:?}");
+        }
+        assert!(own.shadowed > 0.03 && own.of_model.iter().all(|lit| *lit > 0.1), "{own:?}");
+    }
+}
+
+#[test]
 fn files_say_what_was_drawn() {
     let root = assignment().root;
     for (entry, scene) in originals() {

@@ -1,11 +1,15 @@
 //! Direct illumination from a point light.
 
-use basecode::{Integrator, Ray, Sampler, Scene, Vec3};
+use basecode::{Bsdf, Integrator, MaterialModel, Ray, Sampler, Scene, SurfaceInteraction, Vec3};
+
+use crate::bsdfs::DiffuseBsdf;
 
 /// L = V I / r^2 f cos, from the scene's point light.
 pub struct SimpleIntegrator {
     /// Whether occluders cast shadows.
     pub shadows: bool,
+    /// Whether mirrors, which have no BSDF, show the diffuse colour that realtime draws them in.
+    pub diffuse_mirrors: bool,
 }
 
 impl Integrator for SimpleIntegrator {
@@ -18,7 +22,7 @@ impl Integrator for SimpleIntegrator {
         let direction = to_light / distance;
         i.wi = i.frame_ns.to_local(direction);
         // Look up the BSDF first: most points in shadow by their own curvature need no shadow ray.
-        let f = scene.bsdf(&i).eval(&i);
+        let f = self.eval(scene, &i);
         if f == Vec3::ZERO {
             return Vec3::ZERO;
         }
@@ -30,5 +34,15 @@ impl Integrator for SimpleIntegrator {
             }
         }
         f * scene.first_light_intensity() / (distance * distance)
+    }
+}
+
+impl SimpleIntegrator {
+    fn eval(&self, scene: &Scene, i: &SurfaceInteraction) -> Vec3 {
+        let material = scene.material_of(i.shape);
+        if self.diffuse_mirrors && material.model == MaterialModel::Mirror {
+            return DiffuseBsdf::new(&crate::average(material)).eval(i);
+        }
+        scene.bsdf(i).eval(i)
     }
 }

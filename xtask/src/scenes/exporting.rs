@@ -99,6 +99,10 @@ fn mtl(scene: &Scene) -> String {
                 );
                 [("map_Kd", map_kd), ("map_Ks", map_ks)]
             }
+            Material::Mirror { kd, ks } => {
+                text += &format!("illum 5\nKd {}\nKs {}\n", rgb(kd), rgb(ks));
+                [("map_Kd", &None), ("map_Ks", &None)]
+            }
             Material::Emitter { ke } => {
                 text += &format!("illum 7\nKd 0 0 0\nKe {}\n", rgb(ke));
                 [("map_Kd", &None), ("map_Ks", &None)]

@@ -26,6 +26,8 @@ pub enum Material {
         map_kd: Option<&'static str>,
         map_ks: Option<&'static str>,
     },
+    /// MTL `illum 5`: black offline, a plain diffuse `kd` in realtime.
+    Mirror { kd: [f64; 3], ks: [f64; 3] },
     /// The point light: `ke` is its radiant intensity [W sr^-1].
     Emitter { ke: [f64; 3] },
 }

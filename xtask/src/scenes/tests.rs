@@ -251,7 +251,7 @@ fn one_frustum_from_the_light_holds_every_caster() {
         let casters = scene
             .shapes
             .iter()
-            .filter(|s| s.name.starts_with("sphere") || s.name.starts_with("tea"));
+            .filter(|s| ["sphere", "tea", "plate", "screen"].iter().any(|n| s.name.starts_with(n)));
         let ways: Vec<DVec3> = casters
             .flat_map(|s| &s.mesh.vertices)
             .map(|v| (v.position - light).normalize())
@@ -262,6 +262,49 @@ fn one_frustum_from_the_light_holds_every_caster() {
             ways.iter().map(|w| w.angle_between(axis).to_degrees()).fold(0.0, f64::max);
         assert!(widest_deg < 55.0, "{}: {widest_deg} degrees off the axis", scene.folder);
     }
+}
+
+#[test]
+fn the_leaves_block_the_last_tenth_alone() {
+    let scene = probes::all().into_iter().find(|scene| scene.name == "near_light").unwrap();
+    let (light, shapes) = (scene.light(), parsed(&scene));
+    let named = |name: &str| &shapes.iter().find(|(own, _)| own == name).unwrap().1;
+    // Of points all over the floor, many lie in the shadow of each leaf, and none of it is left at 0.9 r.
+    let floor = (0..40).flat_map(|i| (0..40).map(move |k| (f64::from(i), f64::from(k))));
+    let floor: Vec<DVec3> = floor.map(|(i, k)| dvec3(0.1 * i - 2.0, 0.0, 0.1 * k - 2.0)).collect();
+    for leaf in ["leaf", "far_leaf"] {
+        let shadowed = |far: f64| {
+            let hides =
+                |p: &&DVec3| named(leaf).iter().any(|t| meets(t.p, **p, **p + (light - **p) * far));
+            floor.iter().filter(hides).count()
+        };
+        assert!(shadowed(1.0) > 100, "{leaf}: {}", shadowed(1.0));
+        assert_eq!(shadowed(0.93), 0, "{leaf}");
+    }
+}
+
+#[test]
+fn the_speckled_scale_is_the_largest_texels() {
+    let scene = probes::all().into_iter().find(|scene| scene.name == "speckled").unwrap();
+    // As base code decodes them: 8-bit sRGB to linear.
+    let linear = |level: u8| {
+        let x = f64::from(level) / 255.0;
+        if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+    };
+    let each = |of: &dyn Fn(&[f64]) -> f64| -> [f64; 3] {
+        [0, 1, 2].map(|channel| {
+            let values = scene.textures.iter().map(|texture| {
+                let texels: Vec<f64> =
+                    texture.image.pixels().map(|texel| linear(texel.0[channel])).collect();
+                of(&texels)
+            });
+            values.sum()
+        })
+    };
+    let largest = each(&|texels| texels.iter().copied().fold(0.0, f64::max));
+    let average = each(&|texels| texels.iter().sum::<f64>() / texels.len() as f64);
+    assert!(largest[0] > 1.05 && largest[1] < 0.99 && largest[2] < 0.99, "{largest:?}");
+    assert!(average.iter().all(|m| *m < 0.9), "{average:?}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::{joined, probe};
 use crate::scenes::scene::{Material, Scene};
-use crate::scenes::shapes::{ball, cuboid, fan, floor, quad, sphere_band};
+use crate::scenes::shapes::{ball, cuboid, fan, floor, quad, sphere, sphere_band};
 use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::PI;
 
@@ -89,6 +89,58 @@ pub fn contact() -> Scene {
         )
         .lit_by(dvec3(-4.0, 2.0, 0.5), [52.0, 52.0, 52.0]);
     scene.film = [192, 144];
+    scene
+}
+
+/// A light 2 above a floor, two leaves so near to it that only the last tenth of a shadow ray meets them.
+///
+/// The leaves are level, so that they cut every way from the floor at the same fraction of its length.
+pub fn near_light() -> Scene {
+    let leaf = |y: f64, low: [f64; 2], high: [f64; 2]| {
+        let [low, high] = [low, high].map(|corner| corner.map(|x| x * (2.0 - y)));
+        floor(y, low, high)
+    };
+    let dim = || Material::diffuse([0.01, 0.01, 0.01]);
+    probe("near_light", dvec3(0.4, 3.6, 5.2), dvec3(0.0, 0.35, 0.1), 32.0)
+        .with("floor", Material::diffuse([0.7, 0.7, 0.7]), floor(0.0, [-4.0, -4.0], [0.0, 3.0]))
+        .with(
+            "glossy",
+            Material::phong([0.3, 0.35, 0.4], [0.3, 0.3, 0.3], 12.5),
+            floor(0.0, [0.0, -4.0], [4.0, 3.0]),
+        )
+        .with("leaf", dim(), leaf(1.88, [-0.85, -0.1], [-0.2, 0.5]))
+        .with("far_leaf", dim(), leaf(1.95, [0.15, -0.5], [0.7, 0.15]))
+        .with(
+            "ball",
+            Material::phong([0.5, 0.2, 0.2], [0.3, 0.3, 0.3], 20.0),
+            ball(dvec3(-1.75, 0.4, 0.3), 0.35),
+        )
+        .lit_by(dvec3(0.0, 2.0, 0.0), [8.0, 7.5, 7.0])
+}
+
+/// Two plates and a sphere over a floor that is diffuse on the left and Phong on the right. Nothing
+/// touches and nothing grazes, so that no bias is put to the test.
+pub fn both_shadows() -> Scene {
+    let plate = |centre: DVec3| {
+        let half = dvec3(0.42, 0.03, 0.32);
+        cuboid(centre - half, centre + half)
+    };
+    let mut scene = probe("both_shadows", dvec3(0.0, 4.6, 6.4), dvec3(0.0, 0.2, -0.1), 22.0)
+        .with("floor", Material::diffuse([0.6, 0.58, 0.55]), floor(0.0, [-1.9, -1.5], [0.0, 1.4]))
+        .with(
+            "glossy",
+            Material::phong([0.25, 0.35, 0.5], [0.3, 0.3, 0.3], 18.0),
+            floor(0.0, [0.0, -1.5], [1.9, 1.4]),
+        )
+        .with("plate", Material::diffuse([0.6, 0.3, 0.2]), plate(dvec3(-1.0, 0.8, -0.4)))
+        .with(
+            "sphere_phong",
+            Material::phong([0.6, 0.35, 0.15], [0.35, 0.35, 0.35], 25.0),
+            sphere(dvec3(0.8, 0.5, 0.3), 0.42),
+        )
+        .with("screen", Material::diffuse([0.3, 0.5, 0.3]), plate(dvec3(0.0, 1.5, 0.55)))
+        .lit_by(dvec3(-1.6, 5.6, 1.6), [42.0, 41.0, 38.0]);
+    scene.bonus = true;
     scene
 }
 

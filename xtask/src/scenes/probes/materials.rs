@@ -85,6 +85,47 @@ pub fn textured() -> Scene {
     scene
 }
 
+/// Phong surfaces of which a few texels reach Kd + Ks = 1.17 in red, while the average stays below 1 in every channel.
+pub fn speckled() -> Scene {
+    let both = || Material::Phong {
+        kd: [1.0; 3],
+        ks: [1.0; 3],
+        ns: 14.5,
+        map_kd: Some("speckles.png"),
+        map_ks: Some("sheen.png"),
+    };
+    let ground = floor(0.0, [-3.0, -2.0], [3.0, 2.5]).map_uv(dvec2(4.0, 3.0), dvec2(-0.3, -0.2));
+    let ball = ball(dvec3(0.4, 0.747, 0.1), 0.75).map_uv(dvec2(4.0, 2.0), dvec2(0.2, 0.0));
+    let mut scene = probe("speckled", dvec3(0.0, 2.6, 5.6), dvec3(0.0, 0.55, 0.0), 30.0)
+        .with("ground", both(), ground)
+        .with("ball", both(), ball)
+        .with("plain", Material::diffuse([0.4, 0.5, 0.6]), floor(0.9, [-1.6, -1.0], [-0.9, -0.3]))
+        .lit_by(dvec3(-1.2, 3.4, 3.0), [26.0, 26.0, 26.0]);
+    scene.textures = vec![
+        Texture::new("speckles.png", 16, |x, y| {
+            let speckle = (x % 8 == 3 && y % 8 < 2) || (x % 8 == 6 && y % 8 == 5);
+            if speckle { [240, 120, 60] } else { [70 + 4 * x as u8, 90, 60 + 5 * y as u8] }
+        }),
+        Texture::new("sheen.png", 8, |x, y| {
+            if (x / 2 + y / 4) % 2 == 0 { [150, 150, 150] } else { [40, 46, 52] }
+        }),
+    ];
+    scene
+}
+
+/// Two mirrors, a diffuse and a Phong sphere on a floor.
+pub fn mirror() -> Scene {
+    let at = |x: f64| ball(dvec3(x, 0.497, 0.0), 0.5);
+    let mirror = |kd: [f64; 3]| Material::Mirror { kd, ks: [0.9, 0.85, 0.8] };
+    probe("mirror", dvec3(0.0, 2.4, 6.4), dvec3(0.0, 0.4, 0.0), 28.0)
+        .with("floor", Material::diffuse([0.5, 0.5, 0.5]), floor(0.0, [-5.0, -6.0], [5.0, 3.5]))
+        .with("mirror", mirror([0.6, 0.3, 0.2]), at(-1.65))
+        .with("diffuse", Material::diffuse([0.3, 0.5, 0.3]), at(-0.55))
+        .with("mirror_too", mirror([0.2, 0.4, 0.7]), at(0.55))
+        .with("phong", Material::phong([0.3, 0.3, 0.5], [0.4, 0.4, 0.4], 30.0), at(1.65))
+        .lit_by(dvec3(-1.5, 4.0, 3.5), [34.0, 34.0, 34.0])
+}
+
 /// Three strips of a bumpy floor, so flat that neither light nor camera is ever hidden. At 1 spp, so
 /// that it shows where a pixel's only sample lies.
 pub fn open() -> Scene {

@@ -15,7 +15,7 @@ const FILM: [u32; 2] = [128, 96];
 type Probe = (fn() -> Scene, &'static str);
 
 /// Every probe in the order of the table.
-const PROBES: [Probe; 10] = [
+const PROBES: [Probe; 14] = [
     (
         materials::scale,
         "Kd + Ks over 1 in one channel or in all, beside spheres where `scale` is 1: a missing, inverted or misplaced `scale`, `scale` on a diffuse material",
@@ -53,6 +53,22 @@ const PROBES: [Probe; 10] = [
         "occluders 0.02 and 0.2 above the floor and a fin that stands on it: a shadow epsilon of 0.1, peter-panning",
     ),
     (
+        geometry::near_light,
+        "leaves at 94 % and 97.5 % of the way from the floor to the light, their shadows on diffuse and Phong surfaces: a shadow ray that ends too early",
+    ),
+    (
+        geometry::both_shadows,
+        "shadows that fall on a diffuse floor, a Phong floor and a Phong sphere, all within one frustum of 30 degrees: a shadow map that one of the two shaders does not look up",
+    ),
+    (
+        materials::speckled,
+        "map_Kd and map_Ks whose largest values sum to more than 1, whose averages to less, in one channel alone: `scale` from the average, at the point or by channel",
+    ),
+    (
+        materials::mirror,
+        "two mirrors (`illum 5`) beside diffuse and Phong spheres: black offline, a plain diffuse Kd in realtime",
+    ),
+    (
         geometry::rows,
         "vertical stripes, the same in every row but for the noise of their edges: one seed for all rows, a sampler shared by threads",
     ),
@@ -66,7 +82,8 @@ pub fn all() -> Vec<Scene> {
 /// The table of the probes.
 pub fn readme() -> File {
     let mut text = String::from(
-        "# Probe scenes\n\nMade by `xtask scenes`. Each shows faults that the four scenes of the assignment hide. One point light each, offline at 16 spp (`open`: 1) and realtime.\n\n\
+        "# Probe scenes\n\nMade by `xtask scenes`. Each shows faults that the four scenes of the assignment hide. One point light each, offline at 16 spp (`open`: 1) and realtime;\n\
+         `both_shadows` with shadows in realtime as well.\n\n\
          | scene | film | light at | what it shows |\n|---|---|---|---|\n",
     );
     for (scene, shows) in PROBES {
