@@ -88,6 +88,8 @@ static CASE: LazyLock<Case> = LazyLock::new(|| {
             offline: toml.clone(),
             realtime: toml.clone(),
             bonus: None,
+            bonus_required: false,
+            weight: 1.0,
             film: None,
             stored: false,
             perturb: false,
