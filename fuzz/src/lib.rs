@@ -87,8 +87,7 @@ pub fn exr(bytes: &[u8]) {
 
 /// The TOML file of a scene.
 pub fn toml(bytes: &[u8]) {
-    let text = String::from_utf8_lossy(bytes);
-    if let Ok(config) = SceneConfig::parse(Path::new("a.toml"), &text) {
+    if let Ok(config) = SceneConfig::parse(Path::new("a.toml"), bytes) {
         assert!(config.width > 0 && config.height > 0 && config.spp > 0);
     }
 }

@@ -342,6 +342,7 @@ const FLAT: SurfaceInteraction = SurfaceInteraction {
     wi: Vec3::ZERO,
     shape: 0,
     primitive: 0,
+    epsilon: Ray::EPSILON,
 };
 
 /// The BSDF of the last material given by value: batches hold long runs of the same one.
@@ -449,7 +450,10 @@ fn guard(message: *mut api::Message, body: impl FnOnce() -> Result<()>) -> api::
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         std::panic::set_hook(Box::new(|info| {
-            eprintln!("{info}");
+            // That one is an error of the scene, told by the answer.
+            if !panic_text(info.payload()).starts_with(crate::scene::NO_LIGHT) {
+                eprintln!("{info}");
+            }
             if let Ok(mut place) = PANIC_PLACE.lock() {
                 *place = info.location().map(|l| format!("{}:{}", l.file(), l.line()));
             }
@@ -483,17 +487,23 @@ fn status_of(error: &Error) -> api::Status {
     }
 }
 
+/// What a panic says.
+fn panic_text(payload: &(dyn Any + Send)) -> &str {
+    let text = payload.downcast_ref::<&str>().copied();
+    text.or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("a panic without a message")
+}
+
 /// `todo!()` and `unimplemented!()` are panics with a fixed beginning: not a crash, but work to do.
 fn describe_panic(payload: &(dyn Any + Send)) -> (api::Status, String) {
-    let said = payload
-        .downcast_ref::<&str>()
-        .map(|said| (*said).to_owned())
-        .or_else(|| payload.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "a panic without a message".to_owned());
+    let said = panic_text(payload).to_owned();
     let task = ["not yet implemented", "not implemented"].iter().find_map(|p| said.strip_prefix(p));
     if let Some(task) = task {
         let task = task.trim_start_matches(':').trim();
         return (api::STATUS_NOT_IMPLEMENTED, task.to_owned());
+    }
+    if said.starts_with(crate::scene::NO_LIGHT) {
+        return (api::STATUS_ERROR, said);
     }
     let place = PANIC_PLACE.lock().ok().and_then(|mut place| place.take());
     match place {

@@ -403,10 +403,10 @@ impl Store<'_> {
     }
 }
 
-/// Loads a scene for its geometry alone.
+/// Loads a scene for its geometry and its light.
 ///
 /// # Errors
-/// As [`Scene::load`].
+/// As [`Scene::load`], and when the scene has no light: there is nothing to grade in it.
 pub fn load_scene(toml: &Path) -> basecode::Result<Scene> {
     struct NoBsdf;
     impl basecode::Bsdf for NoBsdf {
@@ -414,7 +414,12 @@ pub fn load_scene(toml: &Path) -> basecode::Result<Scene> {
             Vec3::ZERO
         }
     }
-    Scene::load(toml, &|_| Box::new(NoBsdf))
+    let scene = Scene::load(toml, &|_| Box::new(NoBsdf))?;
+    if scene.light().is_none() {
+        let message = "the scene has no light: no shape has a material with a Ke above 0";
+        return Err(basecode::Error::file(&scene.config().mesh, message));
+    }
+    Ok(scene)
 }
 
 /// SHA-256 over all that an image of a scene depends on: the TOML file and the files beside its mesh.

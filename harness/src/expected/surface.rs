@@ -69,8 +69,11 @@ impl SurfacePoint {
 
 /// Shadow rays that leave a surface start somewhere between these distances from it, in scene
 /// units times the distance of the light: the original's epsilon is 1e-3, students use 1e-5 to 5e-3.
+/// Near a light, or in a large or small scene, the distance is that at which [`UNIT`] is one.
 const NEAREST_START: f32 = 1e-5;
 const FARTHEST_START: f32 = 5e-3;
+/// The unit of length over a hit's epsilon: one where a point is seen from five units away.
+const UNIT: f32 = 2e3;
 /// A triangle that the light grazes or leaves while its shading normal still faces it shadows
 /// itself or not, as a renderer's epsilons want: the faceted terminator. Cosine to the triangle.
 const TERMINATOR: f32 = 0.02;
@@ -80,8 +83,9 @@ const END_MARGIN: f32 = 5e-3;
 fn sight(scene: &Scene, hit: &SurfaceInteraction, direction: Vec3, distance: f32) -> Sight {
     let from =
         |origin, start: f32, end: f32| scene.occluded(&Ray::segment(origin, direction, start, end));
-    let near = NEAREST_START * distance.max(1.0);
-    let far = FARTHEST_START * distance.max(1.0);
+    let unit = distance.max(UNIT * hit.epsilon);
+    let near = NEAREST_START * unit;
+    let far = FARTHEST_START * unit;
     let outside = hit.ng * hit.ng.dot(hit.frame_ns.n).signum();
     if outside.dot(direction) < TERMINATOR
         && Frame::cos_theta(hit.frame_ns.to_local(direction)) > 0.0

@@ -27,8 +27,8 @@ impl Integrator for SimpleIntegrator {
             return Vec3::ZERO;
         }
         if self.shadows {
-            let far = distance * (1.0 - 1e-4) - Ray::EPSILON;
-            let shadow_ray = Ray::segment(i.p, direction, Ray::EPSILON, far);
+            let far = distance * (1.0 - 1e-4) - i.epsilon;
+            let shadow_ray = Ray::segment(i.p, direction, i.epsilon, far);
             if scene.occluded(&shadow_ray) {
                 return Vec3::ZERO;
             }

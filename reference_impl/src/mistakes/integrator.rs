@@ -103,14 +103,14 @@ impl Mistaken {
         if has(M::ShadowHitReused) {
             return reuse_hit(scene, i, direction, distance);
         }
-        let mut far = distance * (1.0 - 1e-4) - Ray::EPSILON;
+        let mut far = distance * (1.0 - 1e-4) - i.epsilon;
         if has(M::ShadowNoMaxT) {
             far = f32::INFINITY;
         }
         if has(M::ShadowMaxTSquared) {
             far = distance * distance;
         }
-        let mut near = Ray::EPSILON;
+        let mut near = i.epsilon;
         if has(M::ShadowEpsilon) {
             near = 0.1;
         }
@@ -128,10 +128,10 @@ impl Mistaken {
 
 /// The shadow query writes what it hits into the record that is shaded afterwards.
 fn reuse_hit(scene: &Scene, i: &mut SurfaceInteraction, direction: Vec3, distance: f32) -> f32 {
-    let ray = Ray::segment(i.p, direction, Ray::EPSILON, f32::INFINITY);
+    let ray = Ray::segment(i.p, direction, i.epsilon, f32::INFINITY);
     let Some(hit) = scene.intersect(&ray) else { return 1.0 };
-    if hit.t < distance * (1.0 - 1e-4) - Ray::EPSILON && !scene.material_of(hit.shape).is_emitter()
-    {
+    let far = distance * (1.0 - 1e-4) - i.epsilon;
+    if hit.t < far && !scene.material_of(hit.shape).is_emitter() {
         return 0.0;
     }
     *i = hit;

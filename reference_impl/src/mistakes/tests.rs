@@ -74,6 +74,7 @@ fn without_its_mistake_a_mistaken_bsdf_is_right() {
                     wi,
                     shape: 0,
                     primitive: 0,
+                    epsilon: basecode::Ray::EPSILON,
                 };
                 let (a, b) = (right.eval(&point), mistaken.eval(&point));
                 assert!((a - b).abs().max_element() <= 1e-5 * a.max_element(), "{a} {b}");

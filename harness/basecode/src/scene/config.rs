@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::text::decode;
 use crate::{CameraConfig, Error, Result};
 
 /// A scene file as it was written, defaults filled in.
@@ -48,7 +49,7 @@ struct File {
 
 #[derive(Deserialize)]
 struct Input {
-    objfile: PathBuf,
+    objfile: String,
 }
 
 #[derive(Deserialize)]
@@ -101,16 +102,18 @@ impl SceneConfig {
     /// When the file cannot be read, is not TOML, lacks `input.objfile`, or holds a value outside
     /// its range; names file, line and key.
     pub fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path)
+        let bytes = std::fs::read(path)
             .map_err(|error| Error::file(path, format!("cannot read the scene: {error}")))?;
-        Self::parse(path, &text)
+        Self::parse(path, &bytes)
     }
 
-    /// Reads the text of a scene file that lies at `path`.
+    /// Reads the bytes of a scene file that lies at `path`.
     ///
     /// # Errors
     /// As [`SceneConfig::load`].
-    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
+        // TOML knows no line that ends with CR alone.
+        let text = &decode(bytes).replace("\r\n", "\n").replace('\r', "\n");
         let wrong = |line, message: String| Error::File { path: path.to_owned(), line, message };
         let file: File = toml::from_str(text).map_err(|error| {
             let line = error.span().map(|span| line_at(text, span.start));
@@ -129,11 +132,23 @@ impl SceneConfig {
                 return Err(wrong(line, format!("camera.{key} is {value} but must be finite")));
             }
         }
+        let fov = camera.fov_y_deg;
+        if !(fov > 0.0 && fov < 180.0) {
+            let line = line_of_key(text, "camera", "fov");
+            let message = format!("camera.fov is {fov} but must lie between 0 and 180 degrees");
+            return Err(wrong(line, message));
+        }
         let renderer = file.renderer;
+        // Written on Windows, perhaps.
+        let mesh = file.input.objfile.trim().replace('\\', "/");
+        if mesh.is_empty() {
+            let message = "input.objfile names no file".to_owned();
+            return Err(wrong(line_of_key(text, "input", "objfile"), message));
+        }
         let default_kind = if renderer.realtime { "direct" } else { "simple" };
         Ok(Self {
             path: path.to_owned(),
-            mesh: path.parent().unwrap_or(Path::new("")).join(file.input.objfile),
+            mesh: path.parent().unwrap_or(Path::new("")).join(mesh),
             camera,
             width: in_range("film", "width", file.film.width, MAX_FILM_SIDE)?,
             height: in_range("film", "height", file.film.height, MAX_FILM_SIDE)?,
@@ -188,7 +203,7 @@ mod tests {
     use super::*;
 
     fn parse(text: &str) -> Result<SceneConfig> {
-        SceneConfig::parse(Path::new("a/tinyrender/b.toml"), text)
+        SceneConfig::parse(Path::new("a/tinyrender/b.toml"), text.as_bytes())
     }
 
     #[test]
@@ -211,9 +226,31 @@ mod tests {
             (&format!("{base}[renderer]\nspp = -1\n"), "b.toml:4: renderer.spp is -1"),
             (&format!("{base}[camera]\neye = [0, nan, 0]\n"), "b.toml:4: camera.eye"),
             (&format!("{base}[camera]\nfov = \"wide\"\n"), "b.toml:4"),
+            (&format!("{base}[camera]\nfov = 180\n"), "b.toml:4: camera.fov is 180"),
+            (&format!("{base}[camera]\nfov = nan\n"), "b.toml:4: camera.fov is NaN"),
+            ("[input]\nobjfile = \"\"\n", "b.toml:2: input.objfile names no file"),
         ] {
             let message = parse(text).unwrap_err().to_string();
             assert!(message.contains(expected), "{text:?} gave {message:?}");
+        }
+    }
+
+    #[test]
+    fn every_encoding_and_line_end_is_read() {
+        let plain = "# gr\u{fc}n\n[input]\nobjfile = '..\\mesh\\b.obj'\n[film]\nwidth = 7\n";
+        let latin: Vec<u8> = plain.chars().map(|c| c as u8).collect();
+        let utf16 = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>();
+        for bytes in [
+            plain.as_bytes().to_vec(),
+            format!("\u{feff}{plain}").into_bytes(),
+            utf16(&format!("\u{feff}{plain}")),
+            latin,
+            plain.replace('\n', "\r\n").into_bytes(),
+            plain.replace('\n', "\r").into_bytes(),
+        ] {
+            let config = SceneConfig::parse(Path::new("a/b.toml"), &bytes).unwrap();
+            let found = (config.width, config.mesh);
+            assert_eq!(found, (7, PathBuf::from("a/../mesh/b.obj")), "{bytes:?}");
         }
     }
 

@@ -1,11 +1,8 @@
 //! Materials as the MTL file describes them.
 
-use std::path::Path;
-
 use glam::Vec3;
 
 use super::Texture;
-use crate::{Error, Result};
 
 /// Which BSDF a material asks for, by MTL's `illum`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,60 +70,6 @@ impl Material {
     pub fn is_emitter(&self) -> bool {
         self.emission != Vec3::ZERO
     }
-
-    /// Makes a material of an MTL entry; textures are looked up beside the MTL file.
-    pub(super) fn from_mtl(mtl: &Path, entry: &tobj::Material) -> Result<Self> {
-        let wrong =
-            |message: String| Error::file(mtl, format!("material \"{}\": {message}", entry.name));
-        let folder = mtl.parent().unwrap_or(Path::new(""));
-        let colour = |key: &str, value: Option<[f32; 3]>, map: &Option<String>| {
-            if let Some(name) = map {
-                return Texture::load(&folder.join(texture_file(name)));
-            }
-            let value = Vec3::from(value.unwrap_or_default());
-            if value.is_finite() && value.min_element() >= 0.0 {
-                Ok(Texture::Constant(value))
-            } else {
-                Err(wrong(format!("{key} is {value} but must be finite and at least 0")))
-            }
-        };
-        let exponent = entry.shininess.unwrap_or(1.0);
-        if !(exponent.is_finite() && exponent >= 0.0) {
-            return Err(wrong(format!("Ns is {exponent} but must be finite and at least 0")));
-        }
-        let emission = Vec3::from(entry.emissive.unwrap_or_default());
-        if !emission.is_finite() {
-            return Err(wrong(format!("Ke is {emission} but must be finite")));
-        }
-        Ok(Self {
-            name: entry.name.clone(),
-            model: match entry.illumination_model {
-                Some(7) => MaterialModel::Diffuse,
-                Some(5) => MaterialModel::Mirror,
-                _ => MaterialModel::Phong,
-            },
-            diffuse: colour("Kd", entry.diffuse, &entry.diffuse_texture)?,
-            specular: colour("Ks", entry.specular, &entry.specular_texture)?,
-            exponent,
-            emission,
-        })
-    }
-}
-
-/// The file of a `map_` statement: what follows its options, with either kind of slash.
-fn texture_file(statement: &str) -> String {
-    let mut words = statement.split_whitespace().peekable();
-    while let Some(option) = words.next_if(|word| word.starts_with('-')) {
-        let arguments = match option {
-            "-o" | "-s" | "-t" => 3,
-            "-mm" => 2,
-            _ => 1,
-        };
-        for _ in 0..arguments {
-            words.next();
-        }
-    }
-    words.collect::<Vec<_>>().join(" ").replace('\\', "/")
 }
 
 #[cfg(test)]
@@ -139,11 +82,5 @@ mod tests {
         assert_eq!(phong(0.5, 0.5), 1.0);
         assert_eq!(phong(0.8, 0.7), 0.99 / 1.5);
         assert_eq!(Material::diffuse(Vec3::splat(2.0)).energy_scale(), 1.0);
-    }
-
-    #[test]
-    fn texture_statements_may_hold_options() {
-        assert_eq!(texture_file("-s 1 1 1 -clamp on tex\\wood floor.png"), "tex/wood floor.png");
-        assert_eq!(texture_file("wood.png"), "wood.png");
     }
 }

@@ -3,6 +3,10 @@
 mod config;
 mod material;
 mod mesh;
+mod mtl;
+mod obj;
+mod polygon;
+mod text;
 mod texture;
 
 use std::path::Path;
@@ -11,20 +15,24 @@ use glam::{Vec2, Vec3};
 
 pub use config::SceneConfig;
 pub use material::{Material, MaterialModel};
-pub use mesh::Shape;
+pub use mesh::{MeshFile, Shape};
 pub use texture::{Bitmap, Texture};
 
 use crate::bvh::{Bvh, Hit};
-use crate::{Bsdf, Camera, Error, Frame, Ray, Result, SurfaceInteraction};
+use crate::ray::epsilon_at;
+use crate::{Bsdf, Camera, Frame, Ray, Result, SurfaceInteraction};
 
 /// A scene, ready to be rendered.
 pub struct Scene {
     config: SceneConfig,
     shapes: Vec<Shape>,
     materials: Vec<Material>,
-    light_position: Vec3,
-    light_intensity: Vec3,
+    /// Position and intensity.
+    light: Option<(Vec3, Vec3)>,
+    remarks: Vec<String>,
     bvh: Bvh,
+    /// The largest coordinate of any vertex.
+    extent: f32,
     /// Shape and triangle of each triangle in the hierarchy.
     triangles: Vec<(u32, u32)>,
     bsdfs: Vec<Box<dyn Bsdf>>,
@@ -36,14 +44,15 @@ impl Scene {
     /// material; mirrors are black in this assignment and are not asked for.
     ///
     /// # Errors
-    /// When a file cannot be used (names file, place, expected and found) or the scene has no light.
+    /// When a file cannot be used; names file, line, expected and found.
     pub fn load(path: &Path, make_bsdf: &dyn Fn(&Material) -> Box<dyn Bsdf>) -> Result<Self> {
         let config = SceneConfig::load(path)?;
-        let (shapes, materials) = mesh::load(&config.mesh)?;
-        let Some(light) = shapes.iter().find(|shape| materials[shape.material].is_emitter()) else {
-            let message = "scene has no light: no material has a non-zero Ke";
-            return Err(Error::file(&config.mesh, message));
-        };
+        let MeshFile { shapes, materials, remarks, .. } = MeshFile::load(&config.mesh)?;
+        let emits = |shape: &&Shape| materials[shape.material].is_emitter();
+        let light = shapes.iter().find(emits);
+        let light = light.map(|light| (light.index_mean(), materials[light.material].emission));
+        let extent = shapes.iter().flat_map(|shape| &shape.positions);
+        let extent = extent.fold(Vec3::ZERO, |extent, p| extent.max(p.abs())).max_element();
         let mut triangles = Vec::new();
         let mut vertices = Vec::new();
         let mut blocks = Vec::new();
@@ -59,9 +68,10 @@ impl Scene {
             _ => make_bsdf(material),
         });
         Ok(Self {
-            light_position: light.index_mean(),
-            light_intensity: materials[light.material].emission,
+            light,
+            remarks,
             bvh: Bvh::new(&vertices, &blocks),
+            extent,
             bsdfs: bsdfs.collect(),
             config,
             shapes,
@@ -99,14 +109,37 @@ impl Scene {
         &self.materials[self.shapes[shape].material]
     }
 
+    /// What its files hold and no picture shows, with file and line; see [`MeshFile::remarks`].
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    /// Position (world space) and radiant intensity I [W sr^-1] of the point light, if there is one:
+    /// the index mean and the Ke of the first emitter.
+    pub fn light(&self) -> Option<(Vec3, Vec3)> {
+        self.light
+    }
+
     /// Position of the point light, world space: the first emitter's index mean.
+    ///
+    /// # Panics
+    /// When the scene has no light. The host reports that as an error of the scene.
     pub fn first_light_position(&self) -> Vec3 {
-        self.light_position
+        self.light.unwrap_or_else(|| self.no_light()).0
     }
 
     /// Radiant intensity I of the point light [W sr^-1]: the first emitter's Ke.
+    ///
+    /// # Panics
+    /// When the scene has no light. The host reports that as an error of the scene.
     pub fn first_light_intensity(&self) -> Vec3 {
-        self.light_intensity
+        self.light.unwrap_or_else(|| self.no_light()).1
+    }
+
+    #[cold]
+    fn no_light(&self) -> ! {
+        let mesh = self.config.mesh.display();
+        panic!("{NO_LIGHT}: no shape of {mesh} has a material with a Ke above 0");
     }
 
     /// The BSDF at a surface point.
@@ -121,14 +154,14 @@ impl Scene {
     ///
     /// The emitter is a surface like any other here.
     pub fn intersect(&self, ray: &Ray) -> Option<SurfaceInteraction> {
-        let hit = self.bvh.closest_hit(ray)?;
+        let hit = self.bvh.closest_hit(&ray.begun_off_surface(self.extent))?;
         Some(self.interaction(ray, &hit))
     }
 
     /// Whether anything lies on a ray between its `min_t` and `max_t`: a shadow query. It stops
     /// at the first hit, whichever that is. Emitters never block.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.bvh.any_hit(ray)
+        self.bvh.any_hit(&ray.begun_off_surface(self.extent))
     }
 
     /// Puts `witness` in the place of every BSDF until it is taken away with `None`.
@@ -159,6 +192,7 @@ impl Scene {
             wi: zero,
             shape,
             primitive,
+            epsilon: epsilon_at(corners[0], 0.0, &corners),
         })
     }
 
@@ -168,14 +202,16 @@ impl Scene {
         let vertices = shape.triangles[primitive as usize].map(|vertex| vertex as usize);
         let [u, v] = hit.barycentric;
         let w = 1.0 - u - v;
-        let ng = triangle_normal(shape.corners(primitive as usize));
+        let corners = shape.corners(primitive as usize);
+        let ng = triangle_normal(corners);
+        let p = ray.at(hit.t);
         let [n0, n1, n2] = vertices.map(|vertex| shape.normals[vertex]);
         let [uv0, uv1, uv2] = vertices.map(|vertex| shape.uvs[vertex]);
         let ns = (w * n0 + u * n1 + v * n2).normalize_or(ng);
         let frame_ns = Frame::from_normal(ns);
         SurfaceInteraction {
             t: hit.t,
-            p: ray.at(hit.t),
+            p,
             uv: w * uv0 + u * uv1 + v * uv2,
             ng,
             wo: frame_ns.to_local(-ray.direction),
@@ -183,9 +219,13 @@ impl Scene {
             wi: Vec3::ZERO,
             shape: shape_index as usize,
             primitive: primitive as usize,
+            epsilon: epsilon_at(p, hit.t, &corners),
         }
     }
 }
+
+/// How the panic of a renderer begins that asks a scene without a light for it.
+pub(crate) const NO_LIGHT: &str = "the scene has no light";
 
 /// The BSDF of what has none: reflects nothing.
 struct Black;

@@ -95,26 +95,96 @@ fn a_ray_respects_both_ends_and_emitters_never_block() {
 #[test]
 fn mistakes_in_mesh_and_materials_name_file_and_line() {
     for (name, obj, mtl, expected) in [
-        ("nan", OBJ.replace("v 1 1 0", "v 1 nan 0"), MTL.to_owned(), "s.obj:4"),
-        ("face", OBJ.replace("f 5 6 7", "f 5 6 99"), MTL.to_owned(), "out of bounds"),
+        ("nan", OBJ.replace("v 1 1 0", "v 1 nan 0"), MTL.to_owned(), "s.obj:4: v is not finite"),
+        (
+            "face",
+            OBJ.replace("f 5 6 7", "f 5 6 99"),
+            MTL.to_owned(),
+            "s.obj:20: f uses v number 99, the file has 8",
+        ),
+        (
+            "vt",
+            OBJ.replace("f 1/1/1", "f 1/9/1"),
+            MTL.to_owned(),
+            "s.obj:13: f uses vt number 9, the file has 4",
+        ),
+        (
+            "zero",
+            OBJ.replace("f 5 6 7", "f 0 6 7"),
+            MTL.to_owned(),
+            "s.obj:20: f has \"0\" where a corner is expected",
+        ),
+        (
+            "flor",
+            OBJ.replace("usemtl grey", "usemtl flor"),
+            MTL.to_owned(),
+            "s.obj:12: material \"flor\" is not in s.mtl (it has: grey, lamp)",
+        ),
+        (
+            "nolib",
+            OBJ.replace("mtllib s.mtl", ""),
+            MTL.to_owned(),
+            "s.obj:12: material \"grey\" is in no material file",
+        ),
+        ("w", OBJ.replace("v 1 1 0", "v 1 1 0 0"), MTL.to_owned(), "s.obj:4: v has the weight 0"),
+        ("short", OBJ.replace("v 1 1 0", "v 1 1"), MTL.to_owned(), "s.obj:4: v has 2 numbers"),
+        (
+            "nsneg",
+            OBJ.to_owned(),
+            MTL.replace("illum 7\nnew", "Ns -1\nnew"),
+            "s.mtl:3: material \"grey\": Ns is",
+        ),
+        (
+            "ksinf",
+            OBJ.to_owned(),
+            MTL.replace("illum 7\nnew", "Ks 0 inf 0\nnew"),
+            "s.mtl:3: material \"grey\": Ks is",
+        ),
+        (
+            "keneg",
+            OBJ.to_owned(),
+            MTL.replace("Ke 10", "Ke -10"),
+            "s.mtl:6: material \"lamp\": Ke is",
+        ),
+        (
+            "illum",
+            OBJ.to_owned(),
+            MTL.replace("illum 7\nnew", "illum x\nnew"),
+            "s.mtl:3: material \"grey\": illum is",
+        ),
         ("word", OBJ.replace("v 1 1 0", "v 1 one 0"), MTL.to_owned(), "s.obj:4"),
         ("empty", String::new(), MTL.to_owned(), "holds no triangle"),
-        ("nomtl", OBJ.replace("s.mtl", "t.mtl"), MTL.to_owned(), "t.mtl"),
+        (
+            "nomtl",
+            OBJ.replace("s.mtl", "t.mtl"),
+            MTL.to_owned(),
+            "s.obj:1: cannot read the material file",
+        ),
         ("kd", OBJ.to_owned(), MTL.replace("Kd 0.5", "Kd -0.5"), "\"grey\": Kd is"),
         ("kdword", OBJ.to_owned(), MTL.replace("Kd 0.5", "Kd half"), "s.mtl:2"),
         (
             "kdshort",
             OBJ.to_owned(),
             MTL.replace("0.25 0.125", "0.25"),
-            "s.mtl:2: cannot read the materials: Kd has 2 numbers",
+            "s.mtl:2: material \"grey\": Kd has 2 numbers",
         ),
-        ("dark", OBJ.to_owned(), MTL.replace("Ke 10 20 30", "Ke 0 0 0"), "no light"),
-        ("nouse", OBJ.replace("usemtl grey\n", ""), MTL.to_owned(), "has no material"),
+        (
+            "nouse",
+            OBJ.replace("usemtl grey\n", ""),
+            MTL.to_owned(),
+            "s.obj:12: face has no material; expected a usemtl statement before it",
+        ),
         (
             "map",
             OBJ.to_owned(),
             MTL.replace("illum 7\nnewmtl lamp", "map_Kd x.png\nnewmtl lamp"),
-            "x.png",
+            "s.mtl:3: material \"grey\": map_Kd: cannot read the texture",
+        ),
+        (
+            "option",
+            OBJ.to_owned(),
+            MTL.replace("illum 7\nnewmtl lamp", "map_Kd -bm 2 x.png\nnewmtl lamp"),
+            "s.mtl:3: material \"grey\": map_Kd: the option -bm is not supported",
         ),
     ] {
         let message = Folder::new(name, &obj, &mtl).error();
@@ -136,4 +206,185 @@ fn shading_normals_are_interpolated_and_missing_ones_are_flat() {
     assert_eq!(hit.ng, Vec3::Z);
     let lamp = scene.intersect(&Ray::new(vec3(0.1, 0.1, 1.0), Vec3::Z)).unwrap();
     assert_eq!(lamp.frame_ns.n, Vec3::Z);
+}
+
+/// The OBJ file of `OBJ`'s square and lamp in other words; all of them give the same scene.
+#[test]
+fn every_form_of_a_mesh_that_exporters_write_is_read() {
+    let plain = Folder::new("plain", OBJ, MTL).load().unwrap();
+    let seen = |scene: &Scene| {
+        let shapes = scene.shapes().iter();
+        let shape = |s: &Shape| {
+            (s.material, s.positions.clone(), s.uvs.clone(), s.normals.clone(), s.triangles.clone())
+        };
+        (shapes.map(shape).collect::<Vec<_>>(), scene.light())
+    };
+    let latin1 = |text: &str| text.chars().map(|c| c as u8).collect::<Vec<_>>();
+    let utf16 = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>();
+    let forms: Vec<(&str, Vec<u8>, Vec<u8>)> = [
+        ("bom", format!("\u{feff}{OBJ}"), format!("\u{feff}{MTL}")),
+        ("indent", OBJ.replace('\n', "\n \t "), MTL.replace('\n', "\n\t")),
+        ("tabs", OBJ.replace(' ', "\t"), MTL.replace(' ', "\t")),
+        ("comments", OBJ.replace('\n', " # c\n"), MTL.replace('\n', " # c\n")),
+        (
+            "close comments",
+            OBJ.replace("v 1 1 0", "v 1 1 0#c"),
+            MTL.replace("illum 7", "illum 7#c"),
+        ),
+        ("cr", OBJ.replace('\n', "\r"), MTL.replace('\n', "\r")),
+        ("crlf", OBJ.replace('\n', "\r\n"), MTL.replace('\n', "\r\n")),
+        (
+            "continued",
+            OBJ.replace("v 1 1 0", "v 1 \\\n1 \\\n 0"),
+            MTL.replace("Kd 0.5", "Kd \\\n0.5"),
+        ),
+        ("blank lines", OBJ.replace('\n', "\n\n  \n"), MTL.replace('\n', "\n\n")),
+        ("some colours", OBJ.replace("v 1 1 0", "v 1 1 0 0.5 0.5 0.5"), MTL.to_owned()),
+        ("half a colour", OBJ.replace("v 1 1 0", "v 1 1 0 0.5 0.5"), MTL.to_owned()),
+        ("weight", OBJ.replace("v 1 1 0", "v 2 2 0 2"), MTL.to_owned()),
+        (
+            "negative",
+            OBJ.replace("f 1/1/1 2/2/1 3/3/1 4/4/1", "f -4/-4/-1 -3/-3/-1 -2/-2/-1 -1/-1/-1"),
+            MTL.to_owned(),
+        ),
+        (
+            "spaces",
+            OBJ.replace("usemtl grey", "usemtl  light grey "),
+            MTL.replace("newmtl grey", "newmtl light grey"),
+        ),
+        (
+            "number sign",
+            OBJ.replace("usemtl grey", "usemtl Grey #1"),
+            MTL.replace("newmtl grey", "newmtl Grey #1"),
+        ),
+        ("quoted", OBJ.replace("mtllib s.mtl", "mtllib \"s.mtl\""), MTL.to_owned()),
+        ("umlauts", OBJ.replace("grey", "gr\u{fc}n"), MTL.replace("grey", "gr\u{fc}n")),
+        ("twice", OBJ.replace("o lamp", "mtllib ./s.mtl\no lamp"), MTL.to_owned()),
+        ("mtllib last", OBJ.replace("mtllib s.mtl\n", "") + "mtllib s.mtl", MTL.to_owned()),
+        ("unused", OBJ.to_owned() + "v nan 0 0\nvn nan 0 0\nvt nan 0\n", MTL.to_owned()),
+        ("lower case", OBJ.to_owned(), MTL.replace("Kd", "kd").replace("Ke", "KE")),
+    ]
+    .into_iter()
+    .map(|(name, obj, mtl)| (name, obj.into_bytes(), mtl.into_bytes()))
+    .chain([
+        (
+            "latin1",
+            latin1(&OBJ.replace("grey", "gr\u{fc}n")),
+            MTL.replace("grey", "gr\u{fc}n").into_bytes(),
+        ),
+        ("utf16", utf16(&format!("\u{feff}{OBJ}")), utf16(&format!("\u{feff}{MTL}"))),
+    ])
+    .collect();
+    for (name, obj, mtl) in forms {
+        let folder = Folder::new("forms", OBJ, MTL);
+        fs::write(folder.0.join("s.obj"), obj).unwrap();
+        fs::write(folder.0.join("s.mtl"), mtl).unwrap();
+        let scene = folder.load().unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(seen(&scene), seen(&plain), "{name}");
+    }
+}
+
+#[test]
+fn a_mesh_may_name_several_material_files() {
+    let (grey, lamp) = MTL.split_once("newmtl lamp").unwrap();
+    let lamp = format!("newmtl lamp{lamp}newmtl grey\nKd 1 1 1\n");
+    for (name, statement) in [
+        ("words", "a.mtl b.mtl"),
+        ("spaces", "a b.MTL lamp s.mtl # both"),
+        ("quotes", "\"a b\" \"lamp s.mtl\""),
+        ("one", "my mat.mtl"),
+        ("lines", "a.mtl\nmtllib b.mtl"),
+        ("slashes", "sub\\a.mtl b.mtl"),
+    ] {
+        let folder = Folder::new("several", &OBJ.replace("s.mtl", statement), "");
+        fs::create_dir(folder.0.join("sub")).unwrap();
+        for (file, text) in [
+            ("a.mtl", grey),
+            ("b.mtl", &lamp),
+            ("a b.MTL", grey),
+            ("a b", grey),
+            ("lamp s.mtl", &lamp),
+            ("sub/a.mtl", grey),
+            ("my mat.mtl", MTL),
+        ] {
+            fs::write(folder.0.join(file), text).unwrap();
+        }
+        let scene = folder.load().unwrap_or_else(|error| panic!("{name}: {error}"));
+        // Of two materials of one name the first file's counts.
+        let Texture::Constant(colour) = scene.material_of(0).diffuse else { panic!("{name}") };
+        assert_eq!(colour, vec3(0.5, 0.25, 0.125), "{name}");
+        assert_eq!(scene.first_light_intensity(), vec3(10.0, 20.0, 30.0), "{name}");
+    }
+    let folder = Folder::new("missing", &OBJ.replace("s.mtl", "s.mtl t.mtl"), MTL);
+    let error = folder.error();
+    assert!(
+        error.contains("s.obj:1: cannot read the material file") && error.contains("t.mtl"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_has_no_area_is_left_out_and_remarked_on() {
+    let plain = Folder::new("area", OBJ, MTL).load().unwrap();
+    let more = OBJ.replace("o lamp", "l 1 2\nl 1 2 3 4\np 1\nf 1 2\no lamp");
+    let scene = Folder::new("no-area", &more, MTL).load().unwrap();
+    let triangles =
+        |scene: &Scene| scene.shapes().iter().map(|s| s.triangles.len()).collect::<Vec<_>>();
+    assert_eq!(triangles(&scene), triangles(&plain));
+    let said = scene.remarks().join("\n");
+    for expected in [
+        "s.obj:18: 2 lines (l) have no area",
+        "s.obj:20: 1 point (p) has no area",
+        "s.obj:21: 1 face of fewer than 3 corners has no area",
+    ] {
+        assert!(said.contains(expected), "{said}");
+    }
+    let lines = OBJ.replace("f 1/1/1 2/2/1 3/3/1 4/4/1", "l 1 2 3 4").replace("f ", "l ");
+    assert!(Folder::new("lines", &lines, MTL).error().contains("holds no triangle"));
+}
+
+#[test]
+fn a_face_without_uv_or_normal_concerns_itself_alone() {
+    let tilted = OBJ.replace("vn 0 0 1", "vn 0 0.6 0.8");
+    let more = tilted.replace("o lamp", "f 1//1 2//1 3//1\nf 1/1 3/3 4/4\nf 2 3 4\no lamp");
+    let scene = Folder::new("mixed", &more, MTL).load().unwrap();
+    let shape = &scene.shapes()[0];
+    let corner = |triangle: usize, corner: usize| {
+        let vertex = shape.triangles[triangle][corner] as usize;
+        (shape.uvs[vertex], shape.normals[vertex])
+    };
+    let (normal, flat) = (vec3(0.0, 0.6, 0.8), Vec3::Z);
+    let uv = |x: f32, y: f32| glam::vec2(x, y);
+    assert_eq!(corner(0, 1), (uv(1.0, 0.0), normal));
+    assert_eq!(corner(1, 2), (uv(0.0, 1.0), normal));
+    assert_eq!(corner(2, 1), (uv(0.0, 0.0), normal));
+    assert_eq!(corner(3, 1), (uv(1.0, 1.0), flat));
+    assert_eq!(corner(4, 2), (uv(0.0, 0.0), flat));
+}
+
+#[test]
+fn concave_polygons_have_their_own_area() {
+    let arrow = OBJ
+        .replace("v 1 0 0", "v 0.5 0.9 0")
+        .replace("v 1 1 0", "v 1 0 0")
+        .replace("v 0 1 0", "v 0.5 1 0");
+    let scene = Folder::new("arrow", &arrow, MTL).load().unwrap();
+    let shape = &scene.shapes()[0];
+    let area: f32 = (0..shape.triangles.len())
+        .map(|i| shape.corners(i))
+        .map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length())
+        .sum();
+    assert!((area - 0.05).abs() < 1e-6, "{area}");
+    assert!(scene.intersect(&Ray::new(vec3(0.5, 0.5, 1.0), -Vec3::Z)).is_none());
+}
+
+#[test]
+fn a_scene_without_a_light_loads_and_only_asking_for_it_fails() {
+    let scene = Folder::new("dark", OBJ, &MTL.replace("Ke 10 20 30", "Ke 0 0 0")).load().unwrap();
+    assert_eq!(scene.light(), None);
+    assert!(scene.intersect(&Ray::new(vec3(0.5, 0.5, 2.0), -Vec3::Z)).is_some());
+    let said =
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| scene.first_light_position()));
+    let said = *said.unwrap_err().downcast::<String>().unwrap();
+    assert!(said.starts_with("the scene has no light: no shape of "), "{said}");
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use crate::{Error, Result, SurfaceInteraction};
+use crate::SurfaceInteraction;
 
 /// A colour, constant or looked up in a bitmap.
 #[derive(Clone, Debug)]
@@ -22,6 +22,22 @@ pub struct Bitmap {
     width: usize,
     height: usize,
     texels: Vec<Vec3>,
+    mapping: Mapping,
+}
+
+/// How texture coordinates become coordinates of a bitmap: scaled, then moved; beyond [0, 1] they
+/// wrap around, or stay at the border.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Mapping {
+    pub scale: Vec2,
+    pub offset: Vec2,
+    pub clamp: bool,
+}
+
+impl Default for Mapping {
+    fn default() -> Self {
+        Self { scale: Vec2::ONE, offset: Vec2::ZERO, clamp: false }
+    }
 }
 
 /// Bitmaps larger than this in either direction are refused.
@@ -63,28 +79,30 @@ impl Texture {
     }
 
     /// Loads a bitmap (PNG, JPEG, TGA or BMP). Its 8-bit values are decoded from sRGB.
-    pub(super) fn load(path: &Path) -> Result<Self> {
-        let wrong = |message: String| Error::file(path, message);
+    pub(super) fn load(path: &Path, mapping: Mapping) -> Result<Self, String> {
+        let file = path.display();
         let mut reader = image::ImageReader::open(path)
             .and_then(image::ImageReader::with_guessed_format)
-            .map_err(|error| wrong(format!("cannot read the texture: {error}")))?;
+            .map_err(|error| format!("cannot read the texture {file}: {error}"))?;
         let mut limits = image::Limits::default();
         limits.max_image_width = Some(MAX_SIDE);
         limits.max_image_height = Some(MAX_SIDE);
         reader.limits(limits);
         let picture = reader
             .decode()
-            .map_err(|error| wrong(format!("cannot decode the texture: {error}")))?
+            .map_err(|error| format!("cannot decode the texture {file}: {error}"))?
             .into_rgb8();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         if width == 0 || height == 0 {
-            return Err(wrong(format!("texture is {width}x{height} but needs at least one texel")));
+            return Err(format!(
+                "the texture {file} is {width}x{height}, expected one texel or more"
+            ));
         }
         let texels = picture
             .pixels()
             .map(|p| Vec3::from(p.0.map(|level| srgb_to_linear(f32::from(level) / 255.0))))
             .collect();
-        Ok(Self::Bitmap(Arc::new(Bitmap { width, height, texels })))
+        Ok(Self::Bitmap(Arc::new(Bitmap { width, height, texels, mapping })))
     }
 }
 
@@ -95,11 +113,15 @@ impl From<Vec3> for Texture {
 }
 
 impl Bitmap {
-    /// The nearest texel. Coordinates wrap around; v = 0 is the bottom row.
+    /// The nearest texel; v = 0 is the bottom row.
     fn lookup(&self, uv: Vec2) -> Vec3 {
+        let Mapping { scale, offset, clamp } = self.mapping;
+        let uv = uv * scale + offset;
         let wrap = |coordinate: f32, size: usize| {
+            let within =
+                if clamp { coordinate.clamp(0.0, 1.0) } else { coordinate.rem_euclid(1.0) };
             // A coordinate that is not finite has no texel; take the first rather than fail.
-            ((coordinate.rem_euclid(1.0) * size as f32) as usize).min(size - 1)
+            ((within * size as f32) as usize).min(size - 1)
         };
         let x = wrap(uv.x, self.width);
         let y = self.height - 1 - wrap(uv.y, self.height);
@@ -120,12 +142,24 @@ mod tests {
     #[test]
     fn lookups_wrap_and_v_points_up() {
         let texels = vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE]; // top row: X Y
-        let bitmap = Bitmap { width: 2, height: 2, texels };
+        let bitmap = Bitmap { width: 2, height: 2, texels, mapping: Mapping::default() };
         assert_eq!(bitmap.lookup(vec2(0.25, 0.75)), Vec3::X);
         assert_eq!(bitmap.lookup(vec2(1.75, -0.25)), Vec3::Y);
         assert_eq!(bitmap.lookup(vec2(0.0, 0.0)), Vec3::Z);
         assert_eq!(bitmap.lookup(vec2(-0.25, 0.25)), Vec3::ONE);
         bitmap.lookup(vec2(f32::NAN, f32::INFINITY));
+        let mapped = |scale, offset, clamp| Bitmap {
+            mapping: Mapping { scale, offset, clamp },
+            texels: bitmap.texels.clone(),
+            ..bitmap
+        };
+        let twice = mapped(vec2(2.0, 2.0), vec2(0.0, 0.0), false);
+        assert_eq!(twice.lookup(vec2(0.625, 0.875)), Vec3::X, "the second repetition");
+        let moved = mapped(vec2(1.0, 1.0), vec2(0.5, 0.0), false);
+        assert_eq!(moved.lookup(vec2(0.25, 0.75)), Vec3::Y);
+        let clamped = mapped(vec2(1.0, 1.0), vec2(0.0, 0.0), true);
+        assert_eq!(clamped.lookup(vec2(1.25, -7.0)), Vec3::ONE);
+        clamped.lookup(vec2(f32::NAN, f32::INFINITY));
         let texture = Texture::Bitmap(Arc::new(bitmap));
         assert_eq!(texture.average(), Vec3::splat(0.5));
         assert_eq!(texture.max(), Vec3::ONE);

@@ -1,0 +1,442 @@
+//! Materials of MTL files.
+
+use std::path::{Path, PathBuf};
+
+use glam::{Vec2, Vec3};
+
+use super::obj::Named;
+use super::text::{Statements, decode, split_keyword, unquoted, without_comment};
+use super::texture::Mapping;
+use super::{Material, MaterialModel, Texture};
+use crate::{Error, Result};
+
+/// The materials of all MTL files that a mesh names.
+#[derive(Debug, Default)]
+pub(super) struct Library {
+    /// In the order of the files.
+    pub materials: Vec<Material>,
+    /// The names of each material: as it stands, and without a comment behind it.
+    names: Vec<[String; 2]>,
+    /// The MTL files, as they are named.
+    files: Vec<PathBuf>,
+    /// The files of the textures.
+    textures: Vec<PathBuf>,
+    /// What was left out.
+    pub remarks: Vec<String>,
+}
+
+/// Names that a message lists at most.
+const LISTED: usize = 12;
+
+impl Library {
+    /// Loads the files that the `mtllib` statements of the mesh at `obj` name, each once.
+    ///
+    /// # Errors
+    /// When a file is missing or cannot be understood.
+    pub(super) fn load(obj: &Path, statements: &[Named]) -> Result<Self> {
+        let mut library = Self::default();
+        let folder = obj.parent().unwrap_or(Path::new(""));
+        for statement in statements {
+            let wrong =
+                |message| Error::File { path: obj.to_owned(), line: Some(statement.line), message };
+            let files = library_files(folder, &statement.name);
+            if files.is_empty() {
+                return Err(wrong("mtllib names no file".to_owned()));
+            }
+            for file in files {
+                if library.files.contains(&file) {
+                    continue;
+                }
+                let bytes = std::fs::read(&file).map_err(|error| {
+                    wrong(format!("cannot read the material file {}: {error}", file.display()))
+                })?;
+                library.read(&file, &decode(&bytes))?;
+                library.files.push(file);
+            }
+        }
+        Ok(library)
+    }
+
+    /// All files: of materials, then of textures.
+    pub(super) fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.files.iter().chain(&self.textures)
+    }
+
+    /// Index of the material of that name. Of several the first one counts, as the specification
+    /// has it for several files.
+    pub(super) fn find(&self, name: &str) -> Option<usize> {
+        let plain = unquoted(without_comment(name));
+        let named = |which: usize, name: &str| {
+            self.names.iter().position(|names| names[which] == name && !name.is_empty())
+        };
+        named(0, name).or_else(|| named(0, plain)).or_else(|| named(1, plain))
+    }
+
+    /// What to say of a name that is not there.
+    pub(super) fn lacks(&self) -> String {
+        let Some(first) = self.files.first() else {
+            return "in no material file: the mesh names none (expected an mtllib statement)"
+                .into();
+        };
+        let file = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
+        let mut names: Vec<&str> =
+            self.names.iter().take(LISTED).map(|[name, _]| name.as_str()).collect();
+        if self.names.len() > LISTED {
+            names.push("...");
+        }
+        let names = if names.is_empty() { "no material".into() } else { names.join(", ") };
+        match &self.files[1..] {
+            [] => format!("not in {} (it has: {names})", file(first)),
+            _ => {
+                let files: Vec<String> = self.files.iter().map(|path| file(path)).collect();
+                format!("in none of {} (they have: {names})", files.join(", "))
+            }
+        }
+    }
+
+    /// Adds the materials of one file.
+    fn read(&mut self, path: &Path, text: &str) -> Result<()> {
+        let mut current: Option<Entry> = None;
+        for (line, statement) in Statements::new(text) {
+            let (keyword, rest) = split_keyword(&statement);
+            let at = Place { path, line };
+            if keyword.eq_ignore_ascii_case("newmtl") {
+                self.add(path, current.take())?;
+                let plain = unquoted(without_comment(rest)).to_owned();
+                if plain.is_empty() {
+                    return Err(at.wrong("newmtl names no material".to_owned()));
+                }
+                current = Some(Entry::new(unquoted(rest).to_owned(), plain));
+            } else if let Some(entry) = &mut current
+                && !entry.read(&at, keyword, rest)?
+            {
+                self.remarks.push(format!("{}:{line}: {keyword} is ignored", path.display()));
+            }
+        }
+        self.add(path, current)
+    }
+
+    fn add(&mut self, path: &Path, entry: Option<Entry>) -> Result<()> {
+        if let Some(entry) = entry {
+            let names = [entry.name.clone(), entry.plain.clone()];
+            self.materials.push(entry.material(path, &mut self.textures)?);
+            self.names.push(names);
+        }
+        Ok(())
+    }
+}
+
+/// A line of a file.
+struct Place<'a> {
+    path: &'a Path,
+    line: usize,
+}
+
+impl Place<'_> {
+    fn wrong(&self, message: String) -> Error {
+        Error::File { path: self.path.to_owned(), line: Some(self.line), message }
+    }
+}
+
+/// A material as far as it is read.
+struct Entry {
+    name: String,
+    /// The name without a comment.
+    plain: String,
+    diffuse: Vec3,
+    specular: Vec3,
+    emission: Vec3,
+    exponent: f32,
+    illumination: Option<u32>,
+    /// Line and text of `map_Kd` and `map_Ks`.
+    maps: [Option<(usize, String)>; 2],
+}
+
+impl Entry {
+    fn new(name: String, plain: String) -> Self {
+        Self {
+            name,
+            plain,
+            diffuse: Vec3::ZERO,
+            specular: Vec3::ZERO,
+            emission: Vec3::ZERO,
+            exponent: 1.0,
+            illumination: None,
+            maps: [None, None],
+        }
+    }
+
+    /// Takes a statement; answers false when it is one that others would see in the picture.
+    fn read(&mut self, at: &Place, keyword: &str, rest: &str) -> Result<bool> {
+        let wrong = |message: String| at.wrong(format!("material \"{}\": {message}", self.name));
+        match keyword.to_ascii_lowercase().as_str() {
+            "kd" => self.diffuse = colour(keyword, rest).map_err(wrong)?,
+            "ks" => self.specular = colour(keyword, rest).map_err(wrong)?,
+            "ke" => self.emission = colour(keyword, rest).map_err(wrong)?,
+            "ns" => {
+                let word = words(rest).next().unwrap_or_default();
+                let value =
+                    word.parse().ok().filter(|value: &f32| value.is_finite() && *value >= 0.0);
+                self.exponent = value.ok_or_else(|| {
+                    wrong(format!("Ns is \"{word}\" but must be a finite number and at least 0"))
+                })?;
+            }
+            "illum" => {
+                let word = words(rest).next().unwrap_or_default();
+                let model = word.parse().ok().filter(|model: &u32| *model <= u32::from(u8::MAX));
+                self.illumination = Some(model.ok_or_else(|| {
+                    wrong(format!("illum is \"{word}\" but must be a whole number from 0 to 255"))
+                })?);
+            }
+            "map_kd" => self.maps[0] = Some((at.line, rest.to_owned())),
+            "map_ks" => self.maps[1] = Some((at.line, rest.to_owned())),
+            "bump" | "disp" | "decal" | "refl" | "norm" => return Ok(false),
+            other if other.starts_with("map_") => return Ok(false),
+            // Ambient light, transparency, refraction and what else has no part in the assignment.
+            _ => {}
+        }
+        Ok(true)
+    }
+
+    /// Loads the textures, which lie beside the MTL file at `path`.
+    fn material(self, path: &Path, files: &mut Vec<PathBuf>) -> Result<Material> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut texture = |map: &Option<(usize, String)>, keyword: &str, colour: Vec3| {
+            let Some((line, statement)) = map else { return Ok(Texture::Constant(colour)) };
+            let wrong = |message| {
+                Place { path, line: *line }
+                    .wrong(format!("material \"{}\": {keyword}: {message}", self.name))
+            };
+            let (mapping, file) = texture_statement(statement).map_err(wrong)?;
+            let file = existing(folder, file);
+            let texture = Texture::load(&file, mapping).map_err(wrong)?;
+            files.push(file);
+            Ok(texture)
+        };
+        Ok(Material {
+            diffuse: texture(&self.maps[0], "map_Kd", self.diffuse)?,
+            specular: texture(&self.maps[1], "map_Ks", self.specular)?,
+            model: match self.illumination {
+                Some(7) => MaterialModel::Diffuse,
+                Some(5) => MaterialModel::Mirror,
+                _ => MaterialModel::Phong,
+            },
+            exponent: self.exponent,
+            emission: self.emission,
+            name: self.name,
+        })
+    }
+}
+
+/// The words of a numeric statement, up to a comment.
+fn words(rest: &str) -> impl Iterator<Item = &str> {
+    rest.split('#').next().unwrap_or_default().split_whitespace()
+}
+
+/// Three numbers, or one that counts for all.
+fn colour(keyword: &str, rest: &str) -> std::result::Result<Vec3, String> {
+    let mut values = Vec::with_capacity(3);
+    for word in words(rest).take(3) {
+        if ["spectral", "xyz"].contains(&word) {
+            return Err(format!("{keyword} {word} is not supported, expected red, green, blue"));
+        }
+        let number = || format!("{keyword} has \"{word}\" where a number is expected");
+        values.push(word.parse::<f32>().map_err(|_| number())?);
+    }
+    let value = match values[..] {
+        [grey] => Vec3::splat(grey),
+        [r, g, b] => Vec3::new(r, g, b),
+        _ => {
+            let found = values.len();
+            return Err(format!("{keyword} has {found} numbers, expected 3: red, green, blue"));
+        }
+    };
+    if value.is_finite() && value.min_element() >= 0.0 {
+        return Ok(value);
+    }
+    Err(format!("{keyword} is {value} but must be finite and at least 0"))
+}
+
+/// Options and file of a `map_` statement. Options that would change the picture and are not
+/// supported are refused.
+fn texture_statement(statement: &str) -> std::result::Result<(Mapping, &str), String> {
+    let mut mapping = Mapping::default();
+    let mut rest = statement.trim();
+    while rest.starts_with('-') {
+        let (option, after) = split_keyword(rest);
+        let name = option.to_ascii_lowercase();
+        let unsupported =
+            || format!("the option {option} is not supported; supported are -s, -o and -clamp");
+        let numbers = match name.as_str() {
+            "-s" | "-o" | "-t" => 1..=3,
+            "-mm" => 2..=2,
+            "-bm" | "-boost" | "-texres" => 1..=1,
+            "-clamp" | "-cc" | "-blendu" | "-blendv" | "-imfchan" | "-type" => 0..=0,
+            // A file's name may begin with a dash.
+            _ if option.contains('.') => break,
+            _ => return Err(unsupported()),
+        };
+        let (values, mut behind) = leading_numbers(after, *numbers.end());
+        if values.len() < *numbers.start() {
+            return Err(format!("{option} lacks its number"));
+        }
+        let or = |index: usize, default: f32| values.get(index).copied().unwrap_or(default);
+        match name.as_str() {
+            "-s" => mapping.scale = Vec2::new(or(0, 1.0), or(1, 1.0)),
+            "-o" => mapping.offset = Vec2::new(or(0, 0.0), or(1, 0.0)),
+            // Nothing changes.
+            "-boost" => {}
+            "-t" if values.iter().all(|value| *value == 0.0) => {}
+            "-mm" if values == [0.0, 1.0] => {}
+            _ if *numbers.end() > 0 => return Err(unsupported()),
+            _ => {
+                let (word, more) = split_keyword(behind);
+                behind = more;
+                let on = match word.to_ascii_lowercase().as_str() {
+                    "on" => true,
+                    "off" => false,
+                    _ if name == "-imfchan" || name == "-type" => return Err(unsupported()),
+                    _ => return Err(format!("{option} is \"{word}\", expected on or off")),
+                };
+                match name.as_str() {
+                    "-clamp" => mapping.clamp = on,
+                    // Lookups take the nearest texel: there is no blending to switch.
+                    "-blendu" | "-blendv" => {}
+                    "-cc" if !on => {}
+                    _ => return Err(unsupported()),
+                }
+            }
+        }
+        rest = behind;
+    }
+    if unquoted(rest).is_empty() {
+        return Err("names no file".to_owned());
+    }
+    Ok((mapping, rest))
+}
+
+/// Up to `most` finite numbers that a text begins with, and the rest. The last word is a file's name.
+fn leading_numbers(text: &str, most: usize) -> (Vec<f32>, &str) {
+    let (mut values, mut rest) = (Vec::new(), text.trim());
+    while values.len() < most {
+        let (word, after) = split_keyword(rest);
+        let numeric = word.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+        match word.parse::<f32>() {
+            Ok(value) if numeric && value.is_finite() && !after.is_empty() => values.push(value),
+            _ => break,
+        }
+        rest = after;
+    }
+    (values, rest)
+}
+
+/// The file of that name in `folder`: as it stands if there is one, else without a comment behind it.
+fn existing(folder: &Path, name: &str) -> PathBuf {
+    let candidates = [name, without_comment(name)];
+    let mut paths = candidates.iter().flat_map(|name| spellings(folder, name));
+    let first = folder.join(unquoted(without_comment(name)).replace('\\', "/"));
+    paths.find(|path| path.is_file()).unwrap_or(first)
+}
+
+/// A name with either kind of slash, in UTF-8 and, where the system has bytes for names, in Latin-1.
+fn spellings(folder: &Path, name: &str) -> Vec<PathBuf> {
+    let name = unquoted(name).replace('\\', "/");
+    if name.is_empty() {
+        return Vec::new();
+    }
+    let mut paths = vec![folder.join(&name)];
+    #[cfg(unix)]
+    if !name.is_ascii()
+        && let Ok(bytes) =
+            name.chars().map(u8::try_from).collect::<std::result::Result<Vec<_>, _>>()
+    {
+        use std::os::unix::ffi::OsStrExt;
+        paths.push(folder.join(std::ffi::OsStr::from_bytes(&bytes)));
+    }
+    paths
+}
+
+/// The files of an `mtllib` statement: one whose name may hold spaces, if it is there; else several,
+/// in quotes or each with the ending `.mtl`, or else one a word.
+fn library_files(folder: &Path, statement: &str) -> Vec<PathBuf> {
+    let whole = existing(folder, statement);
+    if whole.is_file() {
+        return vec![whole];
+    }
+    let mut names: Vec<String> = Vec::new();
+    let mut rest = without_comment(statement).trim();
+    while !rest.is_empty() {
+        let quoted = rest.strip_prefix('"').and_then(|rest| rest.split_once('"'));
+        let (name, after) = match quoted {
+            Some((name, after)) => (name, after),
+            None => {
+                let lower = rest.to_ascii_lowercase();
+                let mut ends = lower.match_indices(".mtl").map(|(at, ending)| at + ending.len());
+                let is_end =
+                    |end: &usize| rest[*end..].chars().next().is_none_or(char::is_whitespace);
+                let word = rest.find(char::is_whitespace).unwrap_or(rest.len());
+                let end = ends.find(is_end).unwrap_or(word);
+                rest.split_at(end)
+            }
+        };
+        names.push(name.trim().to_owned());
+        rest = after.trim();
+    }
+    names.iter().filter(|name| !name.is_empty()).map(|name| existing(folder, name)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texture_options_are_applied_or_refused_by_name() {
+        let mapping = |scale: [f32; 2], offset: [f32; 2], clamp| Mapping {
+            scale: scale.into(),
+            offset: offset.into(),
+            clamp,
+        };
+        let plain = Mapping::default();
+        for (statement, expected, file) in [
+            ("wood.png", plain, "wood.png"),
+            ("-s 2 3 4 wood floor.png", mapping([2.0, 3.0], [0.0; 2], false), "wood floor.png"),
+            ("-s 2 t.png", mapping([2.0, 1.0], [0.0; 2], false), "t.png"),
+            ("-s 2 3 t.png", mapping([2.0, 3.0], [0.0; 2], false), "t.png"),
+            ("-S 2 2 -o .5 -clamp on t.png", mapping([2.0; 2], [0.5, 0.0], true), "t.png"),
+            ("-o -0.5 1e-1 0 \"a b.png\"", mapping([1.0; 2], [-0.5, 0.1], false), "\"a b.png\""),
+            ("-s 1 1 1 2.png", plain, "2.png"),
+            ("-blendu off -blendv on -cc off -boost 2 -mm 0 1 -t 0 0 0 t.png", plain, "t.png"),
+            ("-dash.png", plain, "-dash.png"),
+        ] {
+            assert_eq!(texture_statement(statement), Ok((expected, file)), "{statement}");
+        }
+        for (statement, expected) in [
+            ("-bm 0.5 t.png", "-bm is not supported"),
+            ("-mm 0.1 0.9 t.png", "-mm is not supported"),
+            ("-t 1 1 1 t.png", "-t is not supported"),
+            ("-imfchan r t.png", "-imfchan is not supported"),
+            ("-type sphere t.png", "-type is not supported"),
+            ("-texres 512 t.png", "-texres is not supported"),
+            ("-cc on t.png", "-cc is not supported"),
+            ("-rotate 3 t.png", "-rotate is not supported"),
+            ("-clamp t.png", "expected on or off"),
+            ("-s t.png", "-s lacks its number"),
+            ("-clamp on", "names no file"),
+            ("", "names no file"),
+        ] {
+            let found = texture_statement(statement);
+            assert!(found.as_ref().is_err_and(|found| found.contains(expected)), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn colours_are_checked() {
+        assert_eq!(colour("Kd", "0.5"), Ok(Vec3::splat(0.5)));
+        assert_eq!(colour("Kd", "1 2 3 # red"), Ok(Vec3::new(1.0, 2.0, 3.0)));
+        for wrong in
+            ["", "1 2", "-1 0 0", "nan 0 0", "0 inf 0", "1e39 0 0", "a b c", "spectral f.rfl"]
+        {
+            assert!(colour("Kd", wrong).is_err_and(|error| error.starts_with("Kd ")), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! The text of scene files, however an editor or exporter saved it.
+
+use std::borrow::Cow;
+
+/// The text of a file: UTF-8 or UTF-16 by its byte order mark, else UTF-8, else Latin-1.
+pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
+    if let Some(rest) = bytes.strip_prefix(b"\xef\xbb\xbf") {
+        return decode(rest);
+    }
+    let utf16 = |rest: &[u8], unit: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = rest.as_chunks::<2>().0.iter().map(|&pair| unit(pair)).collect();
+        Cow::Owned(String::from_utf16_lossy(&units))
+    };
+    match bytes {
+        [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes),
+        _ => match std::str::from_utf8(bytes) {
+            Ok(text) => Cow::Borrowed(text),
+            Err(_) => Cow::Owned(bytes.iter().map(|&byte| char::from(byte)).collect()),
+        },
+    }
+}
+
+/// The statements of an OBJ or MTL text: non-empty lines, each with the number (from 1) of the line
+/// it begins on. Lines end with LF, CR or CRLF; one that ends with a backslash goes on in the next.
+pub(super) struct Statements<'a> {
+    rest: &'a str,
+    line: usize,
+}
+
+impl<'a> Statements<'a> {
+    pub(super) fn new(text: &'a str) -> Self {
+        Self { rest: text, line: 0 }
+    }
+
+    /// The next line without its end.
+    fn physical_line(&mut self) -> Option<&'a str> {
+        if self.rest.is_empty() {
+            return None;
+        }
+        self.line += 1;
+        let is_end = |&byte: &u8| byte == b'\n' || byte == b'\r';
+        let bytes = self.rest.as_bytes();
+        let Some(at) = bytes.iter().position(is_end) else {
+            return Some(std::mem::take(&mut self.rest));
+        };
+        let end = if bytes[at..].starts_with(b"\r\n") { at + 2 } else { at + 1 };
+        let line = &self.rest[..at];
+        self.rest = &self.rest[end..];
+        Some(line)
+    }
+}
+
+impl<'a> Iterator for Statements<'a> {
+    type Item = (usize, Cow<'a, str>);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let mut line = Cow::Borrowed(self.physical_line()?.trim());
+            let number = self.line;
+            // A comment that happens to end with a backslash (a Windows path) does not go on.
+            while line.ends_with('\\') && without_comment(&line).ends_with('\\') {
+                let next = self.physical_line().unwrap_or_default().trim();
+                let so_far = line.trim_end_matches('\\').trim_end();
+                line = Cow::Owned(format!("{so_far} {next}").trim().to_owned());
+            }
+            if !line.is_empty() && !line.starts_with('#') {
+                return Some((number, line));
+            }
+        }
+    }
+}
+
+/// The first word of a statement and what follows it, trimmed.
+pub(super) fn split_keyword(statement: &str) -> (&str, &str) {
+    let end = statement.find(char::is_whitespace).unwrap_or(statement.len());
+    (&statement[..end], statement[end..].trim())
+}
+
+/// A text up to its comment: a `#` at its start or behind white space.
+pub(super) fn without_comment(text: &str) -> &str {
+    let mut before = ' ';
+    for (at, c) in text.char_indices() {
+        if c == '#' && before.is_whitespace() {
+            return text[..at].trim_end();
+        }
+        before = c;
+    }
+    text
+}
+
+/// A name without the quotes around it.
+pub(super) fn unquoted(name: &str) -> &str {
+    let name = name.trim();
+    name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).map_or(name, str::trim)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn statements(text: &str) -> Vec<(usize, String)> {
+        Statements::new(text).map(|(line, text)| (line, text.into_owned())).collect()
+    }
+
+    #[test]
+    fn every_line_end_counts_and_backslashes_join() {
+        let expected = vec![(1, "v 1 2 3".to_owned()), (3, "f 1 2 3".to_owned())];
+        for end in ["\n", "\r", "\r\n"] {
+            let text = "\tv 1 2 3  \n # no \\\nf 1 \\\n 2 \\\n 3\n\n".replace('\n', end);
+            assert_eq!(statements(&text), expected, "{end:?}");
+        }
+        assert_eq!(statements("a\\"), [(1, "a".to_owned())]);
+        assert_eq!(statements("\\\n\\\n"), []);
+        assert_eq!(statements("map_Kd a\\b.png # c:\\\nx")[1].0, 2);
+    }
+
+    #[test]
+    fn encodings_are_told_apart() {
+        assert_eq!(decode("\u{feff}grün".as_bytes()), "grün");
+        assert_eq!(decode(b"gr\xfcn"), "grün");
+        let little: Vec<u8> = "\u{feff}ü".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let big: Vec<u8> = "\u{feff}ü".encode_utf16().flat_map(u16::to_be_bytes).collect();
+        assert_eq!((decode(&little), decode(&big)), ("ü".into(), "ü".into()));
+    }
+
+    #[test]
+    fn comments_begin_behind_white_space() {
+        assert_eq!(without_comment("floor # below"), "floor");
+        assert_eq!(without_comment("floor#1"), "floor#1");
+        assert_eq!(without_comment("# all"), "");
+        assert_eq!(unquoted(" \"a b.png\" "), "a b.png");
+        assert_eq!(split_keyword("usemtl\t a b "), ("usemtl", "a b"));
+    }
+}
