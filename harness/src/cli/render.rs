@@ -5,13 +5,16 @@ use std::str::FromStr;
 
 use anyhow::{Context as _, bail};
 use basecode::exr_io::{Precision, write_exr};
-use basecode::scene::SceneConfig;
-use basecode::{Image, Vec3};
+use basecode::scene::{MeshFile, SceneConfig};
+use basecode::{Camera, Image, Vec3};
 
 use super::context::{Context, INTERRUPTED, cores};
+use crate::imaging::pictures::clamped;
 use crate::intake::HandInConfig;
 use crate::process::Limits;
-use crate::worker::{Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef};
+use crate::worker::{
+    Adapter, AdapterKind, CameraValue, Job, Matter, Outcome, Request, SceneRef, as_given,
+};
 
 /// What `umbra render` is told.
 #[derive(clap::Args)]
@@ -21,8 +24,9 @@ pub struct RenderArguments {
     /// Who renders: `reference`, or the path of a plugin's library
     #[arg(long, value_name = "reference|PATH")]
     plugin: String,
-    /// Where to write the image
-    #[arg(long, short, value_name = "OUT.exr")]
+    /// Where to write the image: `.exr` has linear radiance; `.png` is for looking at, clamped to
+    /// [0, 1] and encoded as sRGB
+    #[arg(long, short, value_name = "OUT.exr|OUT.png")]
     output: PathBuf,
     /// Samples per pixel, offline [default: the scene's]
     #[arg(long)]
@@ -102,21 +106,75 @@ impl FromStr for Size {
     }
 }
 
+/// What a file's name asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Exr,
+    Png,
+}
+
+impl Format {
+    /// The format of an output file, which must have a folder.
+    fn of(output: &Path) -> anyhow::Result<Self> {
+        let ending = output.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let format = match ending.as_str() {
+            "exr" => Self::Exr,
+            "png" => Self::Png,
+            _ => bail!("{}: the name of an image ends in .exr or .png", output.display()),
+        };
+        let folder = output.parent().unwrap_or(Path::new(""));
+        if !folder.as_os_str().is_empty() && !folder.is_dir() {
+            bail!("{}: there is no folder {}", output.display(), folder.display());
+        }
+        Ok(format)
+    }
+}
+
+/// Loads what a scene consists of, so that its mistakes are told in the user's own names, with what
+/// it holds that no picture shows.
+fn check_scene(toml: &Path) -> anyhow::Result<SceneConfig> {
+    let config = SceneConfig::load(toml)?;
+    for key in &config.unknown_keys {
+        eprintln!("umbra: {}: warning: unknown key {key}", toml.display());
+    }
+    Camera::new(config.camera, config.width, config.height)
+        .with_context(|| toml.display().to_string())?;
+    let mesh = MeshFile::load(&config.mesh)?;
+    for remark in &mesh.remarks {
+        eprintln!("umbra: warning: {remark}");
+    }
+    let folder = config.mesh.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    let real = |path: &Path| path.canonicalize().with_context(|| path.display().to_string());
+    let root = real(folder)?;
+    for file in &mesh.files {
+        if !real(file)?.starts_with(&root) {
+            bail!(
+                "{}: a renderer sees only the folder of the mesh, {}; hint: put the file there",
+                file.display(),
+                folder.display()
+            );
+        }
+    }
+    Ok(config)
+}
+
 /// Renders the image and writes it: float for what is drawn offline, half for realtime as the
 /// course's own files.
 pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
-    let config = SceneConfig::load(&arguments.scene)?;
-    for key in &config.unknown_keys {
-        eprintln!("umbra: {}: warning: unknown key {key}", arguments.scene.display());
-    }
+    let format = Format::of(&arguments.output)?;
+    let config = check_scene(&arguments.scene)?;
     let plugin = match arguments.plugin.as_str() {
         "reference" => context.reference().context(
             "there is no reference renderer here (a student's kit has none); hint: cargo build --release --workspace",
         )?,
         path => PathBuf::from(path),
     };
-    let plugin = plugin.canonicalize().with_context(|| format!("plugin {}", plugin.display()))?;
+    let plugin_as_given = plugin;
+    let plugin = plugin_as_given
+        .canonicalize()
+        .with_context(|| format!("plugin {}", plugin_as_given.display()))?;
     let Size(width, height) =
         arguments.size.unwrap_or(Size(config.width as u32, config.height as u32));
     let scene = SceneRef {
@@ -173,16 +231,32 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
             let pixels = answer.values.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v)).collect();
             let image = Image { width: width as usize, height: height as usize, pixels };
             let precision = if config.realtime { Precision::Half } else { Precision::Float };
-            write_exr(&arguments.output, &image, precision, &[])?;
+            match format {
+                Format::Exr => write_exr(&arguments.output, &image, precision, &[])?,
+                Format::Png => {
+                    let picture = clamped(&image);
+                    let file = arguments.output.display();
+                    std::fs::write(&arguments.output, picture.png()?)
+                        .with_context(|| file.to_string())?;
+                    eprintln!("umbra: {file}: {}; write an .exr to compare it", picture.caption);
+                }
+            }
             Ok(super::EXIT_OK)
         }
-        Some(Outcome::NoAdapter(message)) => {
-            eprintln!("umbra: not run here: {message}");
-            Ok(super::EXIT_MACHINE)
-        }
         outcome => {
-            eprint!("{printed}");
-            bail!("no image: {outcome:?}")
+            let outcome = outcome.as_ref();
+            let said = match outcome {
+                // A file's mistake speaks for itself.
+                Some(Outcome::Failed(message)) => message.clone(),
+                Some(outcome) => outcome.to_string(),
+                None => "the worker gave no answer".to_owned(),
+            };
+            let as_given = |said: &str| as_given(said, &arguments.scene, &plugin_as_given);
+            eprint!("{}", as_given(&printed));
+            if outcome.and_then(Outcome::matter) == Some(Matter::Machine) {
+                return Err(super::MachineLacks(as_given(&said)).into());
+            }
+            bail!("{}", as_given(&said))
         }
     }
 }

@@ -133,6 +133,21 @@ pub fn tone_mapped(image: &Image, median_lit: f32) -> Picture {
     }
 }
 
+/// A picture of a render without exposure or curve: linear values clamped to [0, 1] and encoded as
+/// sRGB, as the original course shows images.
+pub fn clamped(image: &Image) -> Picture {
+    let show = |p: &Vec3| match p.is_finite() {
+        true => p.to_array().map(|x| srgb::level(x.clamp(0.0, 1.0))),
+        false => MAGENTA,
+    };
+    Picture {
+        width: image.width,
+        height: image.height,
+        pixels: image.pixels.iter().map(show).collect(),
+        caption: "8-bit sRGB, linear values clamped to [0, 1]; not finite is magenta".into(),
+    }
+}
+
 /// Stops of a diverging map whose lightness falls evenly to both sides (ColorBrewer's RdBu with 5 classes).
 const DIVERGING: [[u8; 3]; 5] =
     [[5, 113, 176], [146, 197, 222], [247, 247, 247], [244, 165, 130], [202, 0, 32]];
@@ -210,6 +225,13 @@ mod tests {
         let expected = [[0; 3], [0; 3], [124, 255, 255], MAGENTA, MAGENTA];
         assert_eq!(picture.pixels, expected);
         assert_eq!(picture.caption, "exposure +1.3 stops, Reinhard curve, white at 3.200");
+    }
+
+    #[test]
+    fn clamped_values_are_srgb() {
+        let image = row(&[vec3(-1.0, 0.0, 0.5), vec3(1.0, 7.0, 0.216), Vec3::INFINITY]);
+        // 0.5 is level 187.5 of 255 (IEC 61966-2-1), 0.216 is level 128.0.
+        assert_eq!(clamped(&image).pixels, [[0, 0, 188], [255, 255, 128], MAGENTA]);
     }
 
     #[test]

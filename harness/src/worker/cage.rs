@@ -105,6 +105,50 @@ fn scene(toml: &Path, roots: &mut Vec<PathBuf>, policy: &mut Policy) -> io::Resu
     Ok(inside(&toml))
 }
 
+/// A worker's words with the user's names of a scene and a plugin in the place of those that the
+/// worker sees: `toml` and `plugin` are the paths as the user gave them.
+pub fn as_given(words: &str, toml: &Path, plugin: &Path) -> String {
+    let given = toml.parent().unwrap_or(Path::new(""));
+    let mut names = Vec::new();
+    if let Ok(folder) =
+        fs::canonicalize(if given.as_os_str().is_empty() { Path::new(".") } else { given })
+    {
+        let mesh = mesh_folder(&folder.join(toml.file_name().unwrap_or_default()));
+        let root = common(&folder, mesh.as_deref().unwrap_or(&folder));
+        let scene = Path::new(SCENE).join("0");
+        let rest = folder.strip_prefix(&root).unwrap_or(Path::new(""));
+        // Without a mount namespace workers see true names.
+        names.push((folder.clone(), given.to_owned()));
+        if !rest.as_os_str().is_empty() {
+            names.push((scene.join(rest), given.to_owned()));
+        }
+        let above = if rest.as_os_str().is_empty() { given.to_owned() } else { root };
+        names.push((scene, above));
+    }
+    let seen = Path::new(PLUGIN);
+    names.push((seen.to_owned(), plugin.parent().unwrap_or(Path::new("")).to_owned()));
+    let mut said = String::new();
+    let mut rest = words;
+    while !rest.is_empty() {
+        // A name begins where a word does: one that only contains it stays.
+        let begins = !said.ends_with(|c: char| c.is_alphanumeric() || "/._-".contains(c));
+        let name = names.iter().find_map(|(seen, given)| {
+            let inside = rest.strip_prefix(seen.to_str()?)?.strip_prefix('/')?;
+            Some((given, inside))
+        });
+        if let Some((given, inside)) = name.filter(|_| begins) {
+            // An empty folder leaves the name that follows.
+            said += &given.join("").to_string_lossy();
+            rest = inside;
+        } else {
+            let end = rest.char_indices().nth(1).map_or(rest.len(), |(at, _)| at);
+            said += &rest[..end];
+            rest = &rest[end..];
+        }
+    }
+    said
+}
+
 fn add(policy: &mut Policy, bind: Bind) {
     if !policy.read_only.contains(&bind) {
         policy.read_only.push(bind);
@@ -157,6 +201,36 @@ mod tests {
         }
         names.sort();
         (cage.scenes, scene.map(|bind| bind.inside.clone()).collect(), names)
+    }
+
+    #[test]
+    fn words_of_a_worker_name_what_the_user_named() {
+        let place = tempfile::tempdir().unwrap();
+        for folder in ["tinyrender", "mesh"] {
+            fs::create_dir(place.path().join(folder)).unwrap();
+        }
+        let split = place.path().join("tinyrender/s.toml");
+        fs::write(&split, "[input]\nobjfile = \"../mesh/s.obj\"\n").unwrap();
+        let flat = place.path().join("s.toml");
+        fs::write(&flat, "[input]\nobjfile = \"s.obj\"\n").unwrap();
+        let plugin = Path::new("target/libp.so");
+        let root = place.path().display();
+        for (toml, words, expected) in [
+            (&flat, "/scene/0/s.obj:3: x", format!("{root}/s.obj:3: x")),
+            (&flat, "a \"/scene/0/t.png\", /scene/0/u", format!("a \"{root}/t.png\", {root}/u")),
+            (&flat, "/my/scene/0/s.obj", "/my/scene/0/s.obj".to_owned()),
+            (&flat, "(/plugin/libp.so)", "(target/libp.so)".to_owned()),
+            (
+                &split,
+                "/scene/0/tinyrender/../mesh/s.obj",
+                format!("{root}/tinyrender/../mesh/s.obj"),
+            ),
+            (&split, "/scene/0/mesh/s.obj", format!("{root}/mesh/s.obj")),
+        ] {
+            assert_eq!(as_given(words, toml, plugin), expected);
+        }
+        let bare = as_given("/plugin/p.so: /scene/0/s.obj", Path::new("s.toml"), Path::new("p.so"));
+        assert_eq!(bare, "p.so: s.obj");
     }
 
     #[test]

@@ -19,6 +19,7 @@ mod supervise;
 mod table;
 mod wire;
 
+pub use cage::as_given;
 pub use child::child_main;
 pub use job::{
     Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, RayQuery, Request, SceneRef,

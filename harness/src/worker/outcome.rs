@@ -53,6 +53,29 @@ pub enum Outcome {
     },
 }
 
+impl std::fmt::Display for Outcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Done(_) => f.write_str("answered"),
+            Self::NotImplemented(task) => write!(f, "not implemented yet: {task}"),
+            Self::Failed(message) => write!(f, "the renderer reports an error: {message}"),
+            Self::Panicked(message) => write!(f, "the renderer panicked: {message}"),
+            Self::Rejected(message) => write!(f, "the plugin was rejected: {message}"),
+            Self::CrashedBySignal(signal) => write!(f, "the renderer crashed: {signal}"),
+            Self::ExitedEarly(code) => {
+                write!(f, "the renderer exited early, with code {code} and no answer")
+            }
+            Self::TimedOut => f.write_str("the renderer ran out of time"),
+            Self::OutOfMemory => f.write_str("the renderer ran out of memory"),
+            Self::FloodedOutput => f.write_str("the renderer printed more than is allowed"),
+            Self::FileTooLarge => f.write_str("the renderer wrote a larger file than is allowed"),
+            Self::NoAdapter(message) => write!(f, "not run here: {message}"),
+            Self::NotRun { reason, matter: Matter::Submission } => f.write_str(reason),
+            Self::NotRun { reason, .. } => write!(f, "not run here: {reason}"),
+        }
+    }
+}
+
 impl Outcome {
     /// Whose matter this is, unless it is an answer.
     pub fn matter(&self) -> Option<Matter> {

@@ -1,0 +1,364 @@
+//! `umbra render` on scenes as exporters, hands and other programs leave them: the right picture, or
+//! an error that names the user's own file and line. Means were made with independent readers.
+
+#![allow(clippy::unwrap_used)] // its helpers are tests too
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use basecode::Image;
+use basecode::exr_io::read_exr;
+
+/// A floor of 4x4 units, a lamp 2 units above it, and vertices of one more triangle.
+const VERTICES: &str =
+    "v -2 0 2\nv 2 0 2\nv 2 0 -2\nv -2 0 -2\nv -0.1 2 -0.1\nv 0.1 2 -0.1\nv 0 2 0.1\n";
+const LAMP: &str = "usemtl light\nf 5 6 7\n";
+const MTL: &str =
+    "newmtl floor\nillum 7\nKd 0.5 0.4 0.3\nnewmtl light\nillum 7\nKd 0 0 0\nKe 20 20 20\n";
+const TEXTURED: &str =
+    "newmtl floor\nillum 7\nKd 1 1 1\nmap_Kd t.png\nnewmtl light\nillum 7\nKd 0 0 0\nKe 20 20 20\n";
+const TOML: &str = "[input]\nobjfile = \"s.obj\"\n[camera]\neye = [0.0, 3.0, 4.0]\nat = [0.0, 0.0, 0.0]\n\
+                    up = [0.0, 1.0, 0.0]\nfov = 50.0\n[film]\nwidth = 64\nheight = 48\n[renderer]\nspp = 4\n";
+
+/// The mesh whose floor is these faces.
+fn mesh(floor: &str) -> String {
+    format!("mtllib m.mtl\n{VERTICES}usemtl floor\n{floor}{LAMP}")
+}
+
+fn plain() -> String {
+    mesh("f 1 2 3\nf 1 3 4\n")
+}
+
+/// A scene folder of its own, removed in the end.
+struct Scene(tempfile::TempDir);
+
+impl Scene {
+    fn new(obj: &str, mtl: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("s.toml"), TOML).unwrap();
+        fs::write(folder.path().join("s.obj"), obj).unwrap();
+        fs::write(folder.path().join("m.mtl"), mtl).unwrap();
+        fs::write(folder.path().join("t.png"), include_bytes!("golden/noise.png")).unwrap();
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Runs `umbra render` in the scene's folder: exit code and standard error.
+    fn run(&self, arguments: &[&str]) -> (i32, String) {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+        let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
+            .current_dir(self.0.path())
+            .args(["render", "--plugin", "reference", "--adapter", "software", "--root"])
+            .arg(root)
+            .args(arguments)
+            .output()
+            .unwrap();
+        (run.status.code().unwrap(), String::from_utf8_lossy(&run.stderr).into_owned())
+    }
+
+    fn image(&self) -> Image {
+        let (code, said) = self.run(&["s.toml", "--output", "o.exr"]);
+        assert_eq!(code, 0, "{said}");
+        read_exr(self.path("o.exr")).unwrap()
+    }
+
+    /// What is said of a scene that cannot be rendered.
+    fn error(&self) -> String {
+        let (code, said) = self.run(&["s.toml", "--output", "o.exr"]);
+        assert_eq!(code, 2, "{said}");
+        for foreign in ["/scene/", "Some(", "Failed("] {
+            assert!(!said.contains(foreign), "{said}");
+        }
+        said
+    }
+}
+
+fn mean(image: &Image) -> f64 {
+    let sum: f64 = image.pixels.iter().map(|p| f64::from(p.element_sum())).sum();
+    sum / (3 * image.pixels.len()) as f64
+}
+
+#[track_caller]
+fn assert_mean(image: &Image, right: f64) {
+    let found = mean(image);
+    assert!((found - right).abs() < 1.5e-5, "mean {found}, right is {right}");
+}
+
+/// Pixels that differ by more than a thousandth of the brightest value.
+fn differing(a: &Image, b: &Image) -> usize {
+    let brightest = b.pixels.iter().fold(0.0f32, |max, p| max.max(p.max_element()));
+    let differ = |(a, b): (&basecode::Vec3, &basecode::Vec3)| {
+        (*a - *b).abs().max_element() > 1e-3 * brightest
+    };
+    a.pixels.iter().zip(&b.pixels).filter(|pair| differ(*pair)).count()
+}
+
+#[test]
+fn lines_and_points_are_not_drawn() {
+    let right = Scene::new(&plain(), MTL).image();
+    assert_mean(&right, 0.12981);
+    let strokes = "v -1 0.5 0\nv 1 0.5 0\nv 1 1.5 0\n";
+    for more in ["l 8 9 10\n", "l 8 9\nl 8 9 10 8 9\n", "p 8 9 10\n", "f 8 9\n"] {
+        let scene = Scene::new(&plain().replace(LAMP, &format!("{strokes}{more}{LAMP}")), MTL);
+        assert_eq!(scene.image().pixels, right.pixels, "{more}");
+        let (_, said) = scene.run(&["s.toml", "--output", "o.exr"]);
+        assert!(said.contains("warning: s.obj:15: ") && said.contains("no area"), "{said}");
+    }
+}
+
+#[test]
+fn concave_polygons_cover_what_they_enclose() {
+    let arrow = |floor: &str| {
+        mesh(floor).replace("v 2 0 2\nv 2 0 -2\nv -2 0 -2", "v 0 0 -1.6\nv 2 0 2\nv 0 0 -2")
+    };
+    let right = Scene::new(&arrow("f 2 3 4\nf 2 4 1\n"), MTL).image();
+    assert_mean(&right, 0.00508);
+    for outline in ["f 1 2 3 4\n", "f 2 3 4 1\n", "f 3 4 1 2\n", "f 4 1 2 3\n"] {
+        assert_eq!(differing(&Scene::new(&arrow(outline), MTL).image(), &right), 0, "{outline}");
+    }
+}
+
+#[test]
+fn a_face_without_texture_coordinates_or_normals_concerns_itself_alone() {
+    let uvs = "v 5 0 5\nv 6 0 5\nv 6 0 4\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    let textured = |more: &str| mesh(&format!("{uvs}f 1/1 2/2/ 3/3\nf 1/1 3/3 4/4\n{more}"));
+    let right = Scene::new(&textured(""), TEXTURED).image();
+    assert_mean(&right, 0.09578);
+    assert_eq!(Scene::new(&textured("f 8 9 10\n"), TEXTURED).image().pixels, right.pixels);
+
+    // The floor's normal leans; one face outside the picture has none.
+    let lean = |more: &str| {
+        mesh(&format!("{uvs}vn 0 0.8 0.6\nf 1//1 2//1 3//1\nf 1//1 3//1 4//1\n{more}"))
+    };
+    let right = Scene::new(&lean(""), MTL).image();
+    assert!(differing(&right, &Scene::new(&plain(), MTL).image()) > 1000);
+    assert_eq!(Scene::new(&lean("f 8 9 10\n"), MTL).image().pixels, right.pixels);
+}
+
+#[test]
+fn options_of_maps_are_applied_or_refused() {
+    let uvs = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    let obj = mesh(&format!("{uvs}f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"));
+    let with = |statement: &str| Scene::new(&obj, &TEXTURED.replace("map_Kd t.png", statement));
+    let right = with("map_Kd -s 2 2 2 t.png").image();
+    assert_mean(&right, 0.09740);
+    // The same by texture coordinates.
+    let twice = Scene::new(&obj.replace("vt 1 ", "vt 2 ").replace(" 1\n", " 2\n"), TEXTURED);
+    assert!(differing(&twice.image(), &right) <= 3, "texel borders alone may round differently");
+    let once = with("map_Kd t.png").image();
+    for same in
+        ["-s 1 1 t.png", "-s 1 t.png", "-o 0 0 0 -mm 0 1 t.png", "\"t.png\"", "t.png # tiles"]
+    {
+        assert_eq!(with(&format!("map_Kd {same}")).image().pixels, once.pixels, "{same}");
+    }
+    assert!(differing(&with("map_Kd -o 0.5 0.5 t.png").image(), &once) > 500);
+    let spaces = with("map_Kd -s 2 2 my tiles.png");
+    fs::rename(spaces.path("t.png"), spaces.path("my tiles.png")).unwrap();
+    assert_eq!(spaces.image().pixels, right.pixels);
+    for (statement, expected) in [
+        (
+            "map_Kd -mm 0.2 0.8 t.png",
+            "m.mtl:4: material \"floor\": map_Kd: the option -mm is not supported",
+        ),
+        (
+            "map_Kd -bm 2 t.png",
+            "m.mtl:4: material \"floor\": map_Kd: the option -bm is not supported",
+        ),
+        (
+            "map_Kd none.png",
+            "m.mtl:4: material \"floor\": map_Kd: cannot read the texture none.png",
+        ),
+        ("Kd -1 0 0", "m.mtl:4: material \"floor\": Kd is"),
+        ("Ks 0 nan 0", "m.mtl:4: material \"floor\": Ks is"),
+        ("Ns -5", "m.mtl:4: material \"floor\": Ns is"),
+        ("Ke 0 0 -1", "m.mtl:4: material \"floor\": Ke is"),
+    ] {
+        let said = with(statement).error();
+        assert!(said.starts_with(&format!("umbra: {expected}")), "{said}");
+    }
+}
+
+#[test]
+fn errors_name_the_user_s_own_file_and_line() {
+    let flor = plain().replace("usemtl floor", "usemtl flor");
+    for (obj, expected) in [
+        (flor.clone(), "s.obj:9: material \"flor\" is not in m.mtl (it has: floor, light)"),
+        (plain().replace("m.mtl", "n.mtl"), "s.obj:1: cannot read the material file n.mtl"),
+        (plain().replace("f 1 3 4", "f 1 3 40"), "s.obj:11: f uses v number 40, the file has 7"),
+        (
+            plain().replace("v 2 0 2", "v 2 zero 2"),
+            "s.obj:3: v has \"zero\" where a number is expected",
+        ),
+    ] {
+        let said = Scene::new(&obj, MTL).error();
+        assert!(said.starts_with(&format!("umbra: {expected}")), "{said}");
+    }
+    // As it was given: absolute, or through another folder.
+    let scene = Scene::new(&flor, MTL);
+    let absolute = scene.path("s.toml");
+    let (_, said) = scene.run(&[absolute.to_str().unwrap(), "--output", "o.exr"]);
+    assert!(said.starts_with(&format!("umbra: {}:9: ", scene.path("s.obj").display())), "{said}");
+    let (_, said) = scene.run(&["./s.toml", "--output", "o.exr"]);
+    assert!(said.starts_with("umbra: ./s.obj:9: "), "{said}");
+    fs::write(scene.path("s.toml"), TOML.replace("fov = 50.0", "fov = 0")).unwrap();
+    assert!(scene.error().starts_with("umbra: s.toml:7: camera.fov is 0"));
+    fs::write(scene.path("s.toml"), TOML.replace("eye = [0.0, 3.0, 4.0]", "eye = [0, 0, 0]"))
+        .unwrap();
+    assert!(scene.error().starts_with("umbra: s.toml: camera eye"));
+    // What the renderer would not see.
+    let outside = Scene::new(&plain(), &TEXTURED.replace("t.png", "../mesh/t.png"));
+    fs::create_dir(outside.path("mesh")).unwrap();
+    fs::rename(outside.path("t.png"), outside.path("mesh/t.png")).unwrap();
+    fs::create_dir(outside.path("obj")).unwrap();
+    for file in ["s.obj", "m.mtl"] {
+        fs::rename(outside.path(file), outside.path("obj").join(file)).unwrap();
+    }
+    fs::write(outside.path("s.toml"), TOML.replace("s.obj", "obj/s.obj")).unwrap();
+    let said = outside.error();
+    assert!(
+        said.starts_with("umbra: obj/../mesh/t.png: a renderer sees only the folder"),
+        "{said}"
+    );
+    // What the renderer finds out itself.
+    let kind = TOML.replace("spp = 4", "type = \"glass\"");
+    let scene = Scene::new(&plain(), MTL);
+    fs::write(scene.path("s.toml"), kind).unwrap();
+    let said = scene.error();
+    assert!(said.contains("there is no integrator \"glass\""), "{said}");
+}
+
+#[test]
+fn forms_that_exporters_write_are_read() {
+    let right = Scene::new(&plain(), MTL).image();
+    let latin1 = [b"# gr\xfcn\n", plain().as_bytes()].concat();
+    for (name, obj) in [
+        ("bom", format!("\u{feff}{}", plain()).into_bytes()),
+        ("comment", plain().replace("v 2 0 2\n", "v 2 0 2 # corner\n").into_bytes()),
+        ("indent", plain().replace('\n', "\n  ").into_bytes()),
+        ("tab", plain().replace("mtllib ", "mtllib\t").into_bytes()),
+        ("latin1", latin1),
+        ("cr", plain().replace('\n', "\r").into_bytes()),
+        ("colours", plain().replace("v 2 0 2\n", "v 2 0 2 1 0 0\n").into_bytes()),
+    ] {
+        let scene = Scene::new("", MTL);
+        fs::write(scene.path("s.obj"), obj).unwrap();
+        assert_eq!(scene.image().pixels, right.pixels, "{name}");
+    }
+}
+
+/// The scene `scale` times as large, its light as bright.
+fn scaled(obj: &str, scale: f64) -> Scene {
+    let resized = obj.lines().map(|line| match line.strip_prefix("v ") {
+        Some(numbers) => {
+            let numbers = numbers.split(' ').map(|n| scale * n.parse::<f64>().unwrap());
+            format!("v {}\n", numbers.map(|n| n.to_string()).collect::<Vec<_>>().join(" "))
+        }
+        None => format!("{line}\n"),
+    });
+    let intensity = 20.0 * scale * scale;
+    let light = format!("Ke {intensity} {intensity} {intensity}");
+    let scene = Scene::new(&resized.collect::<String>(), &MTL.replace("Ke 20 20 20", &light));
+    let eye = format!("eye = [0.0, {}, {}]", 3.0 * scale, 4.0 * scale);
+    fs::write(scene.path("s.toml"), TOML.replace("eye = [0.0, 3.0, 4.0]", &eye)).unwrap();
+    scene
+}
+
+/// Above the floor: a table very close to it, a wall that stands on it, a roof of facets with soft
+/// normals.
+fn occluders() -> String {
+    let vertices = "v -1 0.004 0\nv -0.2 0.004 0\nv -0.6 0.004 -0.8\n\
+                    v 0.3 0 0\nv 1.2 0 -0.3\nv 1.2 0.7 -0.3\nv 0.3 0.7 0\n\
+                    v 0 0.5 1\nv 0.6 0.3 1.2\nv -0.6 0.3 1.2\nv 0 0.3 0.4\n\
+                    vn 0 1 0\nvn 0.6 0.8 0\nvn -0.6 0.8 0\nvn 0 0.8 -0.6\n";
+    let faces = "f 8 9 10\nf 11 12 13 14\nf 15//1 16//2 18//4\nf 15//1 18//4 17//3\n";
+    plain().replace(LAMP, &format!("{vertices}{faces}{LAMP}"))
+}
+
+const SCALES: [f64; 7] = [1e-3, 1e-2, 0.1, 30.0, 1e2, 3e3, 1e4];
+
+#[test]
+fn a_scene_of_any_size_gives_the_same_picture() {
+    for (obj, right) in [(plain(), Some(0.12981)), (occluders(), None)] {
+        let expected = scaled(&obj, 1.0).image();
+        right.into_iter().for_each(|right| assert_mean(&expected, right));
+        for scale in SCALES {
+            let image = scaled(&obj, scale).image();
+            let (wrong, mean) = (differing(&image, &expected), mean(&image));
+            assert!(wrong <= 3, "{scale} times as large: {wrong} pixels differ, mean {mean}");
+        }
+    }
+}
+
+#[test]
+fn the_grader_sees_the_same_lit_and_shadowed_points_at_any_size() {
+    let sights = |scale: f64| {
+        let scene =
+            umbra::expected::load_scene(&scaled(&occluders(), scale).path("s.toml")).unwrap();
+        let buffer = umbra::expected::SurfaceBuffer::new(&scene, 64, 48).unwrap();
+        let sight =
+            |(_, point): &(_, Option<umbra::expected::SurfacePoint>)| point.map(|p| p.sight);
+        buffer.pixels.iter().map(sight).collect::<Vec<_>>()
+    };
+    let expected = sights(1.0);
+    for sight in [umbra::expected::Sight::Clear, umbra::expected::Sight::Blocked] {
+        assert!(expected.iter().filter(|found| **found == Some(sight)).count() > 50, "{sight:?}");
+    }
+    for scale in SCALES {
+        let wrong = sights(scale).iter().zip(&expected).filter(|(a, b)| a != b).count();
+        assert!(wrong <= 3, "{scale} times as large: {wrong} points are seen otherwise");
+    }
+}
+
+#[test]
+fn a_scene_without_a_light_renders_with_normal_and_says_what_lacks() {
+    let dark = MTL.replace("Ke 20 20 20", "Ke 0 0 0");
+    let scene = Scene::new(&plain(), &dark);
+    let said = scene.error();
+    assert!(said.contains("the scene has no light: no shape of s.obj has"), "{said}");
+    let direct = TOML.replace("spp = 4", "realtime = true");
+    fs::write(scene.path("s.toml"), &direct).unwrap();
+    let said = scene.error();
+    assert!(said.contains("the scene has no light: no shape of s.obj has"), "{said}");
+    for renderer in ["type = \"normal\"\nspp = 1", "type = \"normal\"\nrealtime = true"] {
+        fs::write(scene.path("s.toml"), TOML.replace("spp = 4", renderer)).unwrap();
+        let middle = scene.image().pixels[24 * 64 + 32];
+        assert!((middle - basecode::vec3(0.0, 1.0, 0.0)).length() < 1e-3, "{renderer}: {middle}");
+    }
+}
+
+#[test]
+fn an_image_is_written_as_its_name_says_or_refused() {
+    let scene = Scene::new(&plain(), MTL);
+    let image = scene.image();
+    let (code, said) = scene.run(&["s.toml", "--output", "o.PNG"]);
+    assert!(code == 0 && said.contains("o.PNG: 8-bit sRGB, linear values clamped"), "{said}");
+    let picture = image::open(scene.path("o.PNG")).unwrap().into_rgb8();
+    assert_eq!(picture.dimensions(), (64, 48));
+    let level = |value: f32| {
+        let value = value.clamp(0.0, 1.0);
+        let encoded = if value <= 0.003_130_8 {
+            12.92 * value
+        } else {
+            1.055 * value.powf(1.0 / 2.4) - 0.055
+        };
+        (255.0 * encoded).round() as i32
+    };
+    for (pixel, shown) in image.pixels.iter().zip(picture.pixels()) {
+        for c in 0..3 {
+            assert!((level(pixel[c]) - i32::from(shown.0[c])).abs() <= 1);
+        }
+    }
+    for (output, expected) in [
+        ("o.jpg", "umbra: o.jpg: the name of an image ends in .exr or .png"),
+        ("o", "umbra: o: the name of an image ends in .exr or .png"),
+        ("none/o.exr", "umbra: none/o.exr: there is no folder none"),
+    ] {
+        let (code, said) = scene.run(&["s.toml", "--output", output]);
+        assert!(code == 2 && said.starts_with(expected), "{said}");
+        assert!(!scene.path(output).exists());
+    }
+}
