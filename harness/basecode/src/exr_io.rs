@@ -134,7 +134,13 @@ pub struct ExrLayers {
     pub attributes: BTreeMap<String, String>,
     /// What a reader may want to know about the file; not written.
     pub notes: Vec<String>,
+    /// The primaries that the file declares: CIE xy of red, green, blue and white. Without any, EXR
+    /// means [`REC_709`]. Not written, and values are not converted.
+    pub chromaticities: Option<[[f32; 2]; 4]>,
 }
+
+/// CIE xy of red, green, blue and white of Rec. 709, which all images here are meant in.
+pub const REC_709: [[f32; 2]; 4] = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
 
 /// Reads the R, G, B channels of an EXR file as linear radiance.
 ///

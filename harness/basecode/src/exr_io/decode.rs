@@ -72,6 +72,10 @@ impl Decoder<'_> {
         }
         Ok(ExrLayers {
             layers: names.into_iter().zip(layers).collect(),
+            chromaticities: header
+                .shared_attributes
+                .chromaticities
+                .map(|c| [c.red, c.green, c.blue, c.white].map(|Vec2(x, y)| [x, y])),
             attributes: provenance(&header),
             notes,
         })
