@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::files::Scratch;
 use crate::imaging::evidence::Tolerances;
 use crate::rubric::Rules;
+use crate::worker::Budget;
 use crate::{intake, process};
 
 /// An assignment: its scenes, its parts, what each is worth and how it is judged.
@@ -50,6 +51,8 @@ pub struct Limits {
     pub build: process::Limits,
     /// Each worker.
     pub run: process::Limits,
+    /// All workers of a submission, on each path.
+    pub budget: Budget,
 }
 
 /// One scene of the assignment, with its files relative to the assignment's root.

@@ -144,8 +144,8 @@ fn warnings_are_kept_and_umbras_own_crates_are_out_of_reach() {
 fn a_compiler_that_does_not_end_is_ended() {
     let text = "#![allow(long_running_const_eval)]\n\
                 pub const N: u64 = { let mut i = 0u64; while i < u64::MAX { i += 1; } i };\n";
-    let limits = Limits { wall_s: 1.0, ..default_limits() };
+    let limits = Limits { cpu_s: 1, ..default_limits() };
     let report = build_text(text, &limits);
     assert_eq!(report.outcome, BuildOutcome::TimedOut, "{:#?}", report.outcome);
-    assert!(report.wall_s < 2.0);
+    assert!(report.cpu_s < 3.0, "{report:#?}");
 }

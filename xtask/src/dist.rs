@@ -52,7 +52,8 @@ enum What {
         /// A new or empty folder, or a new .zip
         #[arg(default_value = "target/umbra/a2-student.zip")]
         out: PathBuf,
-        /// Programs to give out, built elsewhere for other systems [default: this system's]
+        /// Programs to give out, built elsewhere for other systems: umbra and umbra-worker of each
+        /// [default: this system's]
         #[arg(long, value_name = "PATH")]
         umbra: Vec<PathBuf>,
     },
@@ -82,7 +83,8 @@ fn student(root: &Path, kit: &Path, programs: &[PathBuf]) -> Result<()> {
         copy(&root.join(path), &to)?;
     }
     copy(&root.join(TEMPLATE), &kit.join(TEMPLATE))?;
-    let own = [built(root, &format!("umbra{EXE_SUFFIX}"))?];
+    let own = ["umbra", "umbra-worker"].map(|name| built(root, &format!("{name}{EXE_SUFFIX}")));
+    let own = own.into_iter().collect::<Result<Vec<_>>>()?;
     for program in if programs.is_empty() { &own } else { programs } {
         copy(program, &kit.join(program.file_name().context("a program's path")?))?;
     }

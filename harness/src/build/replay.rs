@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -14,6 +15,9 @@ use crate::process::{self, Exit, Limits, Lock, signal_name};
 use crate::sandbox::policy::{CLOSURE, SCRATCH, SRC, TOOLCHAIN};
 use crate::sandbox::{Bind, Kind, Policy};
 use crate::worker::Supervisor;
+
+/// So many characters of what is no message of the compiler's are shown.
+const UNREADABLE: usize = 4096;
 
 /// What became of a compiler call.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,12 +32,10 @@ pub enum BuildOutcome {
         /// At least one.
         errors: Vec<Diagnostic>,
     },
-    /// Out of wall-clock or CPU time.
+    /// Out of CPU time, or it stood still too long.
     TimedOut,
     /// The compiler ended at its memory limit.
     OutOfMemory,
-    /// It wrote more messages than allowed.
-    FloodedOutput,
     /// Its library, or a file on the way there, grew larger than allowed.
     FileTooLarge,
     /// A signal ended the compiler; names it.
@@ -84,8 +86,9 @@ pub fn compile(
     limits: &Limits,
     cancel: &AtomicBool,
 ) -> io::Result<BuildReport> {
-    let late = |report: &io::Result<BuildReport>| {
-        report.as_ref().is_ok_and(|report| report.outcome == BuildOutcome::TimedOut)
+    let late = |report: &io::Result<BuildReport>| match report {
+        Ok(report) => report.outcome == BuildOutcome::TimedOut,
+        Err(error) => error.kind() == io::ErrorKind::TimedOut,
     };
     supervisor
         .confirming_timeouts(|| compile_once(recording, supervisor, src, out, limits, cancel), late)
@@ -133,8 +136,9 @@ fn compile_once(
         command.env("CARGO_MANIFEST_DIR", root);
     }
     let keep = (limits.output_kib as usize) << 10;
-    let ended = process::run(command, &lock, keep, cancel, &mut || {})?;
-    let said = parse(&ended.stderr.head);
+    let ended = process::run(command, &lock, keep, cancel, &mut |_| ControlFlow::Continue(()))?;
+    // What lies between was cut: a source may be warned of more than is kept.
+    let said = parse(&[&*ended.stderr.head, &*ended.stderr.tail].join("\n"));
     let out_of_memory = ended.stderr.contains("memory allocation of ")
         || ended.stderr.contains("LLVM ERROR: out of memory")
         || ended.peak_address_mib >= limits.memory_mib - limits.memory_mib / 10;
@@ -148,20 +152,27 @@ fn compile_once(
         Exit::Code(code) if !sandboxed && code == i32::from(process::EXIT_NOT_LOCKED) => {
             return Err(io::Error::other(ended.stderr.head));
         }
+        // The compiler is content, and yet there is nothing: what it made could not be kept.
+        Exit::Code(0) if said.errors.is_empty() => {
+            let message =
+                format!("cannot keep what the compiler made in {}: no disk space?", out.display());
+            return Err(io::Error::new(io::ErrorKind::StorageFull, message));
+        }
         Exit::Code(_) if said.errors.is_empty() && out_of_memory => BuildOutcome::OutOfMemory,
         Exit::Code(code) => {
             let mut errors = said.errors;
             if errors.is_empty() {
                 let message = format!("the compiler ended with code {code} and no plugin");
-                let rendered = format!("{message}\n{}", ended.stderr.head);
+                let said: String = ended.stderr.head.chars().take(UNREADABLE).collect();
+                let rendered = format!("{message}\n{said}");
                 errors.push(Diagnostic { message, place: None, rendered });
             }
             BuildOutcome::CompileError { errors }
         }
         Exit::Signal(_) if out_of_memory => BuildOutcome::OutOfMemory,
         Exit::Signal(signal) => BuildOutcome::Crashed(signal_name(signal)),
-        Exit::TimedOut => BuildOutcome::TimedOut,
-        Exit::Flooded => BuildOutcome::FloodedOutput,
+        Exit::OutOfCpu | Exit::TimedOut => BuildOutcome::TimedOut,
+        Exit::Starved => return Err(process::starved("the compiler")),
         Exit::FileTooLarge => BuildOutcome::FileTooLarge,
         Exit::Cancelled => BuildOutcome::Cancelled,
     };

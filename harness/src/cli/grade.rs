@@ -13,6 +13,7 @@ use super::MachineLacks;
 use super::context::{Context, INTERRUPTED, cores};
 use super::render::AdapterChoice;
 use crate::evidence::Verdict;
+use crate::files::write_whole;
 use crate::grading::{Folders, Grading, INTERNAL_ERROR, Kept, Purpose, Record, judge_shared};
 use crate::held_back::recorded_seed;
 use crate::report::{self, Entry, Sheet};
@@ -21,6 +22,9 @@ use crate::sandbox::Isolation;
 
 /// The file with the seed of a batch's held-back scenes, in the instructor's folder.
 const SEED_FILE: &str = "held-back-seed.txt";
+
+/// The file with what the reference renderer took on this machine, where a slow submission needed it.
+const COSTS_FILE: &str = "reference-costs.json";
 
 /// What `umbra check` is told.
 #[derive(clap::Args)]
@@ -63,9 +67,22 @@ pub struct GradeArguments {
     /// [default: the batch's secret one, made when there is none in --output]
     #[arg(long, value_name = "SEED|off", overrides_with = "perturb")]
     perturb: Option<Perturb>,
+    /// The time that each submission has in all: as config.json says (ten times the reference renderer's
+    /// CPU time), or none, which grades fully what used it up before
+    #[arg(long, value_enum, default_value_t = BudgetChoice::Config)]
+    budget: BudgetChoice,
     /// Print what each stage cost
     #[arg(long)]
     timings: bool,
+}
+
+/// How much time a submission has in all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum BudgetChoice {
+    /// As config.json says
+    Config,
+    /// As much as it takes
+    None,
 }
 
 /// A seed of held-back scenes, or none of them.
@@ -105,6 +122,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         purpose: Purpose::Check,
         isolation: IsolationChoice::Reduced,
         perturb: Some(Perturb(None)),
+        budget: BudgetChoice::Config,
         timings: arguments.timings,
     };
     let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
@@ -129,6 +147,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         purpose: Purpose::Grade,
         isolation: arguments.isolation,
         perturb: arguments.perturb,
+        budget: arguments.budget,
         timings: arguments.timings,
     };
     let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
@@ -218,6 +237,7 @@ struct Batch<'a> {
     isolation: IsolationChoice,
     /// Nothing for the seed that is recorded with the batch.
     perturb: Option<Perturb>,
+    budget: BudgetChoice,
     timings: bool,
 }
 
@@ -227,6 +247,7 @@ impl Batch<'_> {
         for source in &self.sources {
             ensure!(source.exists(), "{} does not exist", source.display());
         }
+        super::writable(self.output)?;
         let context = Context::new(root)?;
         if self.purpose == Purpose::Grade && context.reference().is_none() {
             return Err(MachineLacks(
@@ -255,9 +276,18 @@ impl Batch<'_> {
             if self.purpose == Purpose::Grade {
                 grading.kept = Some(Kept::of(&grading)?);
             }
+            if self.budget == BudgetChoice::None {
+                grading.budget = None;
+            }
             let jobs = self.jobs.min(self.sources.len()).max(1);
             grading.threads = (cores() / jobs as u32).max(1);
             let results = self.grade_all(&context, &grading, jobs);
+            let costs = grading.costs_of_reference();
+            if self.purpose == Purpose::Grade && !costs.is_empty() {
+                let file = self.output.join(report::INSTRUCTOR).join(COSTS_FILE);
+                write_whole(&file, &serde_json::to_vec_pretty(&costs)?)
+                    .with_context(|| format!("cannot write {}", file.display()))?;
+            }
             let found = grading.kept.as_ref().map_or(0, Kept::found);
             if found > 0 {
                 context.line.suspend(|| {

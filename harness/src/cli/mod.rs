@@ -99,7 +99,6 @@ pub fn main() -> ExitCode {
     }
     match (args.first().and_then(|name| name.to_str()), args.get(1)) {
         (Some("__decode"), Some(dir)) => return crate::decode::child_main(Path::new(dir)),
-        (Some("__worker"), Some(dir)) => return crate::worker::child_main(Path::new(dir)),
         (Some("__exec"), Some(program)) => return crate::process::exec_main(program, &args[2..]),
         _ => {}
     }
@@ -120,8 +119,7 @@ pub fn main() -> ExitCode {
         }
         Ok(Err(error)) => {
             eprintln!("umbra: {}", told_once(&error));
-            let machine = error.downcast_ref::<MachineLacks>().is_some();
-            ExitCode::from(if machine { EXIT_MACHINE } else { EXIT_USAGE })
+            ExitCode::from(if machine_lacks(&error) { EXIT_MACHINE } else { EXIT_USAGE })
         }
     }
 }
@@ -133,6 +131,43 @@ fn told_once(error: &anyhow::Error) -> String {
         told if told.contains(&cause) => told.to_owned(),
         told => format!("{told}: {cause}"),
     })
+}
+
+/// Whether an error says that the machine lacks something, as far as can be told from it.
+fn machine_lacks(error: &anyhow::Error) -> bool {
+    use std::io::{Error, ErrorKind};
+    error.downcast_ref::<MachineLacks>().is_some()
+        || error.chain().filter_map(|cause| cause.downcast_ref::<Error>()).any(|cause| {
+            let too_many_files = [Some(23), Some(24)]; // ENFILE, EMFILE
+            too_many_files.contains(&cause.raw_os_error())
+                || matches!(
+                    cause.kind(),
+                    ErrorKind::StorageFull
+                        | ErrorKind::QuotaExceeded
+                        | ErrorKind::OutOfMemory
+                        | ErrorKind::ReadOnlyFilesystem
+                )
+        })
+}
+
+/// Makes sure that reports can be written to `output` and temporary files made, before any work.
+///
+/// # Errors
+/// When not, with the folder's name.
+fn writable(output: &Path) -> anyhow::Result<()> {
+    let lacks = |what: String| anyhow::Error::from(MachineLacks(what));
+    let temporary = std::env::temp_dir();
+    if !temporary.is_dir() {
+        let named =
+            if std::env::var_os("TMPDIR").is_some() { "TMPDIR" } else { "temporary folder" };
+        return Err(lacks(format!("{named} is {}, which is no folder", temporary.display())));
+    }
+    for folder in [output, &temporary] {
+        std::fs::create_dir_all(folder)
+            .and_then(|()| tempfile::Builder::new().prefix(".umbra-").tempfile_in(folder))
+            .map_err(|error| lacks(format!("cannot write to {}: {error}", folder.display())))?;
+    }
+    Ok(())
 }
 
 /// An error of the machine, not of the command line.
@@ -151,5 +186,37 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         #[cfg(target_os = "linux")]
         Command::Doctor => doctor::run(),
         Command::Bless(arguments) => bless::run(&arguments, root),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use super::*;
+
+    #[test]
+    fn what_the_machine_lacks_is_told_from_what_the_user_said() {
+        use anyhow::Context as _;
+        let of =
+            |error: io::Error| Err::<(), _>(error).context("cannot keep a record").unwrap_err();
+        // ENOSPC, EDQUOT, EMFILE, ENFILE, ENOMEM, EROFS.
+        for code in [28, 122, 24, 23, 12, 30] {
+            assert!(machine_lacks(&of(io::Error::from_raw_os_error(code))), "{code}");
+        }
+        for code in [2, 13] {
+            assert!(!machine_lacks(&of(io::Error::from_raw_os_error(code))), "{code}");
+        }
+        assert!(machine_lacks(&MachineLacks("an adapter".into()).into()));
+    }
+
+    #[test]
+    fn an_output_that_cannot_be_written_is_named() {
+        let place = tempfile::tempdir().unwrap();
+        writable(&place.path().join("new/folder")).unwrap();
+        std::fs::write(place.path().join("file"), "").unwrap();
+        let error = writable(&place.path().join("file/report")).unwrap_err();
+        assert!(error.to_string().contains("file/report") && machine_lacks(&error), "{error}");
+        assert_eq!(place.path().join("new/folder").read_dir().unwrap().count(), 0);
     }
 }

@@ -10,6 +10,7 @@ mod wire;
 
 use std::fs::{self, File};
 use std::io::{self, Read};
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
@@ -201,8 +202,11 @@ impl<'a> Decoder<'a> {
         most: u64,
     ) -> Result<(Answer, Vec<u8>), NoAnswer> {
         let once = || self.ask_once(question, wanted, most);
-        let late =
-            |answer: &Result<_, NoAnswer>| matches!(answer, Err(NoAnswer::Died { late: true, .. }));
+        let late = |answer: &Result<_, NoAnswer>| match answer {
+            Err(NoAnswer::Died { late, .. }) => *late,
+            Err(NoAnswer::Machine(error)) => error.kind() == io::ErrorKind::TimedOut,
+            Ok(_) => false,
+        };
         self.supervisor.confirming_timeouts(once, late)
     }
 
@@ -244,7 +248,9 @@ impl<'a> Decoder<'a> {
             command.envs(std::env::var_os("SystemRoot").map(|root| ("SystemRoot", root)));
         }
         let lock = Lock::new(self.limits, policy);
-        let ended = process::run(command, &lock, KEEP_OUTPUT, self.cancel, &mut || ())?;
+        let ended = process::run(command, &lock, KEEP_OUTPUT, self.cancel, &mut |_| {
+            ControlFlow::Continue(())
+        })?;
         if let Ok(mut cpu_s) = self.cpu_s.lock() {
             *cpu_s += ended.cpu_s;
         }
@@ -267,8 +273,12 @@ fn death(ended: &Ended) -> Result<(), NoAnswer> {
     let how = match ended.exit {
         Exit::Code(0) => return Ok(()),
         Exit::Cancelled => return Err(io::Error::from(io::ErrorKind::Interrupted).into()),
-        Exit::TimedOut => "its decoder ran out of time".to_owned(),
-        Exit::Flooded => "its decoder printed too much".to_owned(),
+        Exit::OutOfCpu | Exit::TimedOut => "its decoder ran out of time".to_owned(),
+        Exit::Starved => return Err(process::starved("a decoder").into()),
+        // By its own word it could not work: no disk space, no memory, no lock. No hostile byte says that.
+        Exit::Code(code) if code == i32::from(process::EXIT_NOT_LOCKED) => {
+            return Err(io::Error::other(ended.stderr.head.trim().to_owned()).into());
+        }
         Exit::FileTooLarge => "its decoder wrote too large a file".to_owned(),
         Exit::Code(_) | Exit::Signal(_) if ended.stderr.contains("memory allocation of ") => {
             "its decoder ran out of memory".to_owned()
@@ -276,7 +286,7 @@ fn death(ended: &Ended) -> Result<(), NoAnswer> {
         Exit::Code(code) => format!("its decoder ended with code {code}: {}", ended.stderr.head),
         Exit::Signal(signal) => format!("its decoder was ended by {}", signal_name(signal)),
     };
-    Err(NoAnswer::Died { how, late: ended.exit == Exit::TimedOut })
+    Err(NoAnswer::Died { how, late: matches!(ended.exit, Exit::OutOfCpu | Exit::TimedOut) })
 }
 
 fn ended(how: &str) -> Finding {

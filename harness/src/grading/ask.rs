@@ -16,6 +16,14 @@ use crate::worker::{
     SceneRef, Supervisor,
 };
 
+/// The check that fails when a submission used up its time on a path: the rest was not asked.
+pub const BUDGET: &str = "submission.budget";
+/// The check that fails, and costs nothing, when a renderer prints more than is kept.
+const OUTPUT: &str = "submission.output";
+
+/// The error of a question that was not asked any more: it leaves no point that could be seen.
+const NOT_ASKED: f64 = 0.9999;
+
 /// What it takes to run one hand-in.
 pub struct Asker<'a> {
     /// Starts workers.
@@ -30,8 +38,10 @@ pub struct Asker<'a> {
     pub options: String,
     /// CPU seconds of all workers so far.
     pub cpu_s: Mutex<f64>,
+    /// The most that one worker printed so far, in bytes.
+    pub printed: Mutex<u64>,
     /// What is left of it for this path.
-    pub patience: Patience,
+    pub patience: Patience<'a>,
     /// The reference renderer's library, absent in a student's kit: what it can draw, the machine
     /// is not to blame for.
     pub reference: Option<&'a Path>,
@@ -53,9 +63,6 @@ impl Asker<'_> {
 
     /// Runs a job while there is patience.
     pub fn run(&self, job: &Job) -> Vec<Outcome> {
-        if let Some(rest) = self.patience.is_over() {
-            return vec![rest; job.requests.len()];
-        }
         let JobReport { outcomes, runs, .. } = self.supervisor.run_job_patiently(
             job,
             &self.limits,
@@ -66,7 +73,29 @@ impl Asker<'_> {
         if let Ok(mut cpu_s) = self.cpu_s.lock() {
             *cpu_s += runs.iter().map(|run| run.ended.cpu_s).sum::<f64>();
         }
+        if let Ok(mut printed) = self.printed.lock() {
+            *printed = runs.iter().map(|run| run.ended.printed()).fold(*printed, u64::max);
+        }
         outcomes
+    }
+
+    /// That the submission used up its time on this path, if it did.
+    pub fn used_up(&self) -> Option<Check> {
+        let used = self.patience.used_up()?;
+        let said = format!("the submission used {used}; what was not asked earns nothing");
+        let hint = "an instructor grades it fully with --only STUDENT --budget none";
+        Some(Check::new(BUDGET, "", Verdict::Fail, said).with_hint(hint))
+    }
+
+    /// That the renderer printed more than is kept, if it did: that costs nothing.
+    pub fn printed_much(&self) -> Option<Check> {
+        let printed = self.printed.lock().map_or(0, |printed| *printed);
+        (printed > self.limits.output_kib << 10).then(|| {
+            let mib = printed as f64 / f64::from(1 << 20);
+            let said = format!("the renderer printed {mib:.1} MiB in one go; most of it was cut");
+            let hint = "it costs no points, only time: print less before handing in";
+            Check { error: 0.0, ..Check::new(OUTPUT, "", Verdict::Fail, said).with_hint(hint) }
+        })
     }
 
     /// Keeps what was answered, for the diagnosis.
@@ -163,18 +192,59 @@ pub fn unanswered(id: &str, scene: &str, parts: &[&str], outcome: &Outcome) -> C
             Verdict::Fail,
             format!("the renderer exited early, with code {code} and no answer"),
         ),
-        Outcome::TimedOut => check(Verdict::Fail, "the renderer ran out of time".into()),
-        Outcome::OutOfMemory => check(Verdict::Fail, "the renderer ran out of memory".into()),
-        Outcome::FloodedOutput => {
-            check(Verdict::Fail, "the renderer printed more than is allowed".into())
+        Outcome::TimedOut(late) => {
+            let place = match (parts, scene) {
+                ([], "") => String::new(),
+                ([], scene) => format!(" on scene \"{scene}\""),
+                (parts, "") => format!(" in {}", parts.join(", ")),
+                (parts, scene) => format!(" in {} on scene \"{scene}\"", parts.join(", ")),
+            };
+            let what = if late.computing { "endless loop" } else { "stuck" };
+            check(Verdict::Fail, format!("{what}{place}: {late}"))
         }
+        Outcome::OutOfMemory => check(Verdict::Fail, "the renderer ran out of memory".into()),
         Outcome::FileTooLarge => {
             check(Verdict::Fail, "the renderer wrote a larger file than is allowed".into())
         }
         Outcome::NoAdapter(message) => check(Verdict::NotRun, format!("not run here: {message}")),
+        // What was not asked is said only where nothing that was asked failed as badly.
         Outcome::NotRun { reason, matter: Matter::Submission } => {
-            check(Verdict::Fail, reason.clone())
+            Check { error: NOT_ASKED, ..check(Verdict::Fail, reason.clone()) }
         }
         Outcome::NotRun { reason, .. } => check(Verdict::NotRun, format!("not run here: {reason}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::worker::Late;
+
+    #[test]
+    fn an_endless_loop_is_named_with_scene_part_and_limit() {
+        let late = Late { computing: true, limit_s: 3.0, reference_s: Some(0.041) };
+        let said = |late: Late, scene: &str, parts: &[&str]| {
+            unanswered("radiance.lit", scene, parts, &Outcome::TimedOut(late)).summary
+        };
+        assert_eq!(
+            said(late, "teapot", &["1.3"]),
+            "endless loop in 1.3 on scene \"teapot\": no answer within 3 s of CPU time (the reference \
+             renderer takes 0.04 s)"
+        );
+        let idle = Late { computing: false, limit_s: 10.0, reference_s: None };
+        assert_eq!(
+            said(idle, "", &[]),
+            "stuck: no answer, and nothing done for 10 s: a deadlock or a sleep"
+        );
+    }
+
+    #[test]
+    fn what_was_not_asked_costs_the_part_and_is_not_its_first_reason() {
+        let not_asked = Outcome::NotRun { reason: "not asked".into(), matter: Matter::Submission };
+        let not_asked = unanswered("a", "s", &["1.3"], &not_asked);
+        let late = Late { computing: true, limit_s: 3.0, reference_s: None };
+        let hangs = unanswered("a", "s", &["1.3"], &Outcome::TimedOut(late));
+        assert_eq!((not_asked.verdict, hangs.verdict), (Verdict::Fail, Verdict::Fail));
+        assert!(not_asked.error < hangs.error && 25.0 * (1.0 - not_asked.error) < 0.005);
     }
 }

@@ -9,6 +9,7 @@ use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::ask::BUDGET;
 use super::pipeline::{Folders, Grading};
 use super::record::Record;
 use crate::evidence::{Check, Evidence, Picture, Verdict};
@@ -58,7 +59,7 @@ impl Kept {
             (&assignment.scenes, &assignment.tree, &assignment.tolerances, &assignment.limits),
             grading.held_back.as_ref(),
         ))?);
-        let mut files = vec![grading.supervisor.umbra.clone()];
+        let mut files = grading.supervisor.programs().to_vec();
         files.extend(grading.reference.clone());
         // Stored images, what known mistakes answer, and what a hand-in began from.
         let folder = assignment.root.join("expected");
@@ -132,17 +133,19 @@ impl Kept {
     }
 
     /// The record with this key, when its pictures are still there too, and `failing` names the
-    /// parts that were diagnosed.
+    /// parts that were diagnosed. One that used up its budget counts only where there is one (`budget`).
     pub(super) fn find(
         &self,
         key: &str,
         failing: impl Fn(&Evidence) -> Vec<String>,
+        budget: bool,
         out: &Folders,
     ) -> Option<Record> {
         let bytes = fs::read(out.instructor.join(FILE)).ok()?;
         let file: File<Record> = serde_json::from_slice(&bytes).ok()?;
         let same = file.key == key
             && file.failing == failing(&file.record.evidence)
+            && (budget || file.record.evidence.named(BUDGET).next().is_none())
             && pictures(&file.record, out).all(|picture| picture.is_file());
         self.found.fetch_add(usize::from(same), Ordering::Relaxed);
         same.then_some(file.record)
@@ -210,7 +213,7 @@ mod tests {
             fs::write(picture, "").unwrap();
         }
         let failing = |_: &Evidence| vec!["1.3".to_owned()];
-        let found = || kept.find("key", failing, &out);
+        let found = || kept.find("key", failing, true, &out);
         assert!(found().is_none());
         let first = kept.keep("key", failing(&record.evidence), record.clone(), &out).unwrap();
         // NaN equals nothing, itself included.
@@ -218,8 +221,8 @@ mod tests {
         assert_eq!(format!("{:?}", found().unwrap()), format!("{record:?}"));
         assert_eq!(kept.found(), 1);
 
-        assert!(kept.find("another key", failing, &out).is_none());
-        assert!(kept.find("key", |_| Vec::new(), &out).is_none());
+        assert!(kept.find("another key", failing, true, &out).is_none());
+        assert!(kept.find("key", |_| Vec::new(), true, &out).is_none());
         let picture = pictures(&record, &out).next().unwrap();
         fs::remove_file(&picture).unwrap();
         assert!(found().is_none());
@@ -227,6 +230,11 @@ mod tests {
         assert!(found().is_some());
         fs::write(out.instructor.join(FILE), "{").unwrap();
         assert!(found().is_none());
+
+        record.evidence.checks.push(Check::new(BUDGET, "", Verdict::Fail, ""));
+        kept.keep("key", failing(&record.evidence), record, &out).unwrap();
+        assert!(found().is_some());
+        assert!(kept.find("key", failing, false, &out).is_none(), "grades it without a budget");
     }
 
     #[test]

@@ -4,6 +4,7 @@ mod ask;
 mod case;
 mod contain;
 mod control;
+mod costs;
 mod draw;
 pub mod handed_in;
 mod isolate;
@@ -19,6 +20,7 @@ mod shared;
 
 pub use case::{Case, Small};
 pub use contain::INTERNAL_ERROR;
+pub use costs::Cost;
 pub use kept::Kept;
 pub use offline::Drawn;
 pub use pipeline::{Folders, Grading, Purpose, RenderPath, TREE};

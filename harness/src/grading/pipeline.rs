@@ -9,6 +9,7 @@ use anyhow::Context;
 
 use super::ask::Asker;
 use super::case::Case;
+use super::costs::ReferenceCosts;
 use super::kept::Kept;
 use super::offline::{self, Drawn};
 use super::realtime::{self, Stages};
@@ -23,7 +24,7 @@ use crate::expected::Store;
 use crate::held_back::{self, HeldBack};
 use crate::intake::{self, HandIn, HandInConfig, IntakeError, Validation};
 use crate::rubric::BUILD;
-use crate::worker::{Adapter, Patience, Supervisor};
+use crate::worker::{Adapter, Budget, Patience, Reference, Supervisor};
 
 /// The check that says whether the hand-in follows the tree.
 pub const TREE: &str = "hand_in.tree";
@@ -57,6 +58,10 @@ pub struct Grading<'a> {
     pub cancel: &'a AtomicBool,
     /// Records made before and to be made, if they are kept.
     pub kept: Option<Kept>,
+    /// What a submission may use on each path, if that is limited.
+    pub budget: Option<Budget>,
+    /// What the reference renderer takes, as far as it was needed.
+    pub(super) reference_costs: ReferenceCosts,
     /// What known mistakes answer, read when it is first needed.
     pub(super) stored: OnceLock<Stored>,
 }
@@ -131,6 +136,8 @@ impl<'a> Grading<'a> {
             threads: store.threads,
             cancel,
             kept: None,
+            budget: Some(assignment.limits.budget.clone()),
+            reference_costs: ReferenceCosts::default(),
             stored: OnceLock::new(),
         };
         if let Some(case) = grading.cases.first()
@@ -151,7 +158,11 @@ impl<'a> Grading<'a> {
             adapter: self.adapter.clone(),
             options: options.to_owned(),
             cpu_s: Mutex::new(0.0),
-            patience: Patience::default(),
+            printed: Mutex::new(0),
+            patience: Patience::with(
+                self.reference.is_some().then_some(self as &dyn Reference),
+                self.budget.clone(),
+            ),
             reference: self.reference.as_deref(),
             sightings: Mutex::default(),
         }
@@ -205,7 +216,8 @@ impl<'a> Grading<'a> {
         let mut checks = vec![tree_check(&validation, purpose)];
         let key = self.kept.as_ref().map(|kept| kept.key(&record, &checks)).transpose()?;
         if let (Some(kept), Some(key)) = (&self.kept, &key)
-            && let Some(found) = kept.find(key, |evidence| self.failing(evidence), out)
+            && let Some(found) =
+                kept.find(key, |evidence| self.failing(evidence), self.budget.is_some(), out)
         {
             return Ok(found);
         }
@@ -218,10 +230,13 @@ impl<'a> Grading<'a> {
         if let Some(plugin) = &plugin {
             say("rendering offline");
             self.offline(&asker, plugin, seed, &mut checks, &mut drawn)?;
+            checks.extend(asker.used_up());
             costs.end("offline", asker.end_path());
             say("drawing realtime");
             let stages = Stages::read(&hand_in.root.join("src"), &self.assignment.template());
             self.realtime(&asker, plugin, &stages, &mut checks, &mut drawn)?;
+            checks.extend(asker.used_up());
+            checks.extend(asker.printed_much());
             costs.end("realtime", asker.end_path());
         }
         say("comparing the images handed in");
@@ -285,6 +300,7 @@ impl<'a> Grading<'a> {
         let (mut checks, mut drawn) = (Vec::new(), Vec::new());
         if paths.contains(&RenderPath::Offline) {
             self.offline(&asker, library, seed, &mut checks, &mut drawn)?;
+            asker.patience.renew();
         }
         if paths.contains(&RenderPath::Realtime) {
             self.realtime(&asker, library, stages, &mut checks, &mut drawn)?;
@@ -329,9 +345,6 @@ impl<'a> Grading<'a> {
             }
             BuildOutcome::TimedOut => (None, "the compiler ran out of time".to_owned()),
             BuildOutcome::OutOfMemory => (None, "the compiler ran out of memory".to_owned()),
-            BuildOutcome::FloodedOutput => {
-                (None, "the compiler said more than is allowed".to_owned())
-            }
             BuildOutcome::FileTooLarge => {
                 (None, "the compiler wrote a larger file than is allowed".to_owned())
             }
@@ -343,7 +356,7 @@ impl<'a> Grading<'a> {
         Ok(plugin)
     }
 
-    fn offline(
+    pub(super) fn offline(
         &self,
         asker: &Asker,
         plugin: &Path,
@@ -351,6 +364,8 @@ impl<'a> Grading<'a> {
         checks: &mut Vec<Check>,
         drawn: &mut Vec<Drawn>,
     ) -> anyhow::Result<()> {
+        // Cheap questions first: what a slow submission is not asked any more is what costs most.
+        let probed = self.groups().map(|cases| offline::probe_bsdfs(asker, plugin, cases));
         let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
         let findings = sampler::judge(asker, plugin, &scene)?;
         let mut tolerances = self.assignment.tolerances.clone();
@@ -361,10 +376,10 @@ impl<'a> Grading<'a> {
             tolerances.bias_standard_errors *= DEPENDENT_PIXELS;
         }
         checks.extend(findings);
-        for cases in self.groups() {
+        for (cases, probed) in self.groups().into_iter().zip(probed) {
             let begin = checks.len();
-            checks.extend(offline::probe_bsdfs(asker, plugin, cases));
-            for case in cases {
+            checks.extend(probed);
+            for case in cheap_first(cases) {
                 self.stop_if_interrupted()?;
                 let (found, image) =
                     offline::judge_scene(asker, plugin, case, seed, self.threads, &tolerances);
@@ -385,7 +400,7 @@ impl<'a> Grading<'a> {
         self.cases.split_at(public).into()
     }
 
-    fn realtime(
+    pub(super) fn realtime(
         &self,
         asker: &Asker,
         plugin: &Path,
@@ -434,6 +449,16 @@ impl<'a> Grading<'a> {
             compiler: self.recording.key.clone(),
         }
     }
+}
+
+/// Scenes by what their images cost: where a submission uses up its time, the most expensive are not asked.
+fn cheap_first(cases: &[Case]) -> Vec<&Case> {
+    let mut order: Vec<&Case> = cases.iter().collect();
+    order.sort_by_key(|case| {
+        let (width, height) = case.film();
+        u64::from(width) * u64::from(height) * u64::from(case.spp)
+    });
+    order
 }
 
 /// Makes the held-back scenes of a batch ready.

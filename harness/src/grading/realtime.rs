@@ -18,6 +18,7 @@ use crate::imaging::reference::{Region, RegionMask};
 use crate::worker::{Outcome, Stage};
 
 /// The stage texts of a hand-in, and of the template.
+#[derive(Default)]
 pub struct Stages {
     /// `simple.vs`, `diffuse.fs`, `phong.fs` of the hand-in; absent where the file is.
     pub own: [Option<String>; 3],

@@ -8,13 +8,15 @@ use crate::sandbox::{self, Isolation, Policy};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
-    /// Wall-clock time in seconds; the parent enforces it.
+    /// So many seconds it may stand still, neither computing nor waiting for a processor or a disk: a
+    /// busy machine does not count. Where the system does not tell (it does on Linux), seconds by the
+    /// clock. The parent enforces it, and gives up on a child that got no processor for 20 times as long.
     pub wall_s: f64,
     /// CPU time of all threads together, in whole seconds.
     pub cpu_s: u64,
     /// Address space in MiB. Drawing with Mesa's lavapipe needs 768.
     pub memory_mib: u64,
-    /// Standard output and error together, in KiB; the parent enforces it.
+    /// Standard output and error together, in KiB: what is more is cut, and remarked on.
     pub output_kib: u64,
     /// Size of any file that is written, in MiB.
     pub file_size_mib: u64,

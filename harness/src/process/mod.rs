@@ -7,6 +7,8 @@
 
 mod capture;
 mod limits;
+#[cfg(unix)]
+mod standstill;
 mod start;
 #[cfg(unix)]
 mod watch;
@@ -23,6 +25,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::sandbox::InForce;
 
+/// Is told how many CPU seconds a child has had so far, and says whether it may go on: see [`run`].
+pub type Watcher<'a> = dyn FnMut(f64) -> std::ops::ControlFlow<()> + 'a;
+
 /// How a child ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Exit {
@@ -30,10 +35,12 @@ pub enum Exit {
     Code(i32),
     /// By this signal, which Umbra did not send.
     Signal(i32),
-    /// By Umbra, at the wall-clock deadline, or by the kernel, out of CPU time.
+    /// By the kernel, out of CPU time, or by Umbra, because whoever watched it found it had had enough.
+    OutOfCpu,
+    /// By Umbra, because it stood still too long: it neither computed nor waited for a processor.
     TimedOut,
-    /// By Umbra, because it wrote more output than allowed.
-    Flooded,
+    /// By Umbra, because the machine was too busy for it: nobody's fault.
+    Starved,
     /// By the kernel, because it wrote a larger file than allowed.
     FileTooLarge,
     /// By Umbra, because the user asked to stop.
@@ -55,6 +62,10 @@ pub struct Ended {
     pub wall_s: f64,
     /// User and system time of the child and its reaped children, in seconds; 0 when unknown.
     pub cpu_s: f64,
+    /// How long it stood still, in seconds: it neither computed nor waited for a processor or a disk.
+    /// Where the system does not tell, all its time counts.
+    #[serde(default)]
+    pub still_s: f64,
     /// Largest resident size in MiB; 0 when unknown.
     pub peak_resident_mib: u64,
     /// Largest address space that was seen in MiB, by sampling; 0 when unknown.
@@ -63,6 +74,19 @@ pub struct Ended {
     pub in_force: Option<InForce>,
     /// Whether some process outside the child's group still held its output open in the end.
     pub left_process: bool,
+}
+
+impl Ended {
+    /// Bytes that it printed, kept or not.
+    pub fn printed(&self) -> u64 {
+        self.stdout.bytes + self.stderr.bytes
+    }
+}
+
+/// The error for a child that was [`Exit::Starved`].
+pub fn starved(what: &str) -> std::io::Error {
+    let message = format!("{what} got no processor: this machine is too busy");
+    std::io::Error::new(std::io::ErrorKind::TimedOut, message)
 }
 
 /// The usual name of a signal.

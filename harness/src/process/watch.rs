@@ -17,16 +17,23 @@ use nix::sys::wait::{Id, WaitPidFlag, WaitStatus, waitid};
 use nix::unistd::Pid;
 
 use super::capture::Capture;
-use super::{Ended, Exit, Lock, start};
+use super::standstill::{self, Standstill};
+use super::{Ended, Exit, Lock, Watcher, start};
 use crate::sandbox::{InForce, Policy, SandboxError, read_report};
 
-/// How often the deadline, the user's wish to stop and the memory in use are looked at.
+/// How often time, the user's wish to stop and the memory in use are looked at.
 const TICK: Duration = Duration::from_millis(20);
+/// A child that is not done after so many times the seconds that it may stand still got no processor.
+const STARVED: u32 = 20;
+/// The most that is taken from an output stream at a time, so that a flood cannot keep us there.
+const MOUTHFUL: usize = 1 << 20;
 /// How long the output of a process that is gone may still be held open by another.
 const DRAIN: Duration = Duration::from_millis(200);
 
 /// Runs `command` (see [`start`]) to its end and reaps it. Of each output
-/// stream the first `keep` bytes and a short tail are kept. `tick` is called now and then.
+/// stream the first `keep` bytes and a short tail are kept, the rest is read and forgotten. `watcher`
+/// is told now and then how many CPU seconds it has had; when it breaks off, the child is
+/// [`Exit::OutOfCpu`].
 ///
 /// However it ends, its process group is killed and it is reaped before this returns.
 ///
@@ -37,7 +44,7 @@ pub fn run(
     lock: &Lock,
     keep: usize,
     cancel: &AtomicBool,
-    tick: &mut dyn FnMut(),
+    watcher: &mut Watcher,
 ) -> io::Result<Ended> {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let begin = Instant::now();
@@ -48,18 +55,15 @@ pub fn run(
     for end in [child.stdout.take().map(OwnedFd::from), child.stderr.take().map(OwnedFd::from)] {
         pipes.push(Pipe::new(end, keep)?);
     }
-    let cap = lock.limits.output_kib << 10;
-    let deadline = begin + Duration::from_secs_f64(lock.limits.wall_s);
+    let may_stand_still = Duration::from_secs_f64(lock.limits.wall_s);
     let mut peak_address_mib = 0;
     let mut running = Running { child: pid, sandboxed: lock.sandbox.is_some(), locked: None };
+    let (mut still, mut looked, mut printed) = (Standstill::new(begin), begin, false);
     let ended_by_us = loop {
-        let now = Instant::now();
-        wait_readable(&pipes, TICK.min(deadline.saturating_duration_since(now)));
-        pipes.iter_mut().for_each(Pipe::read);
-        peak_address_mib = peak_address_mib.max(running.address_space_mib());
-        tick();
-        if total(&pipes) > cap {
-            break Some(Exit::Flooded);
+        wait_readable(&pipes, TICK);
+        // Who waits for us to read does not wait by choice.
+        for pipe in &mut pipes {
+            printed |= pipe.read();
         }
         if has_exited(pid)? {
             break None;
@@ -67,8 +71,25 @@ pub fn run(
         if cancel.load(Ordering::Relaxed) {
             break Some(Exit::Cancelled);
         }
-        if Instant::now() >= deadline {
+        let now = Instant::now();
+        if now - looked < TICK {
+            continue;
+        }
+        looked = now;
+        running.find();
+        still.look(now, running.stands_still().map(|still| still && !printed));
+        printed = false;
+        peak_address_mib = peak_address_mib.max(running.address_space_mib());
+        let cpu_s = running.cpu_s();
+        if watcher(cpu_s).is_break() {
+            break Some(Exit::OutOfCpu);
+        }
+        if still.so_far() >= may_stand_still {
             break Some(Exit::TimedOut);
+        }
+        if now - begin >= STARVED * may_stand_still {
+            let computed = 2.0 * cpu_s > (now - begin).as_secs_f64();
+            break Some(if computed { Exit::OutOfCpu } else { Exit::Starved });
         }
     };
     if ended_by_us.is_some() {
@@ -79,17 +100,18 @@ pub fn run(
     let drained = Instant::now() + DRAIN;
     while pipes.iter().any(Pipe::is_open) && Instant::now() < drained {
         wait_readable(&pipes, drained.saturating_duration_since(Instant::now()));
-        pipes.iter_mut().for_each(Pipe::read);
+        pipes.iter_mut().for_each(|pipe| {
+            pipe.read();
+        });
     }
     let left_process = pipes.iter().any(Pipe::is_open);
     let cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
     let out_of_cpu = cpu_s >= lock.limits.cpu_s as f64;
     let exit = match (ended_by_us, libc::WIFSIGNALED(status).then(|| libc::WTERMSIG(status))) {
         (Some(exit), _) => exit,
-        _ if total(&pipes) > cap => Exit::Flooded,
-        (None, Some(libc::SIGXCPU)) => Exit::TimedOut,
+        (None, Some(libc::SIGXCPU)) => Exit::OutOfCpu,
         (None, Some(libc::SIGXFSZ)) => Exit::FileTooLarge,
-        (None, Some(libc::SIGKILL)) if out_of_cpu => Exit::TimedOut,
+        (None, Some(libc::SIGKILL)) if out_of_cpu => Exit::OutOfCpu,
         (None, Some(signal)) => Exit::Signal(signal),
         (None, None) => Exit::Code(libc::WEXITSTATUS(status)),
     };
@@ -107,6 +129,7 @@ pub fn run(
         stderr: captured.next().unwrap_or_default(),
         wall_s,
         cpu_s,
+        still_s: still.so_far().as_secs_f64(),
         // Kilobytes on Linux.
         peak_resident_mib: usage.ru_maxrss as u64 >> 10,
         peak_address_mib,
@@ -135,17 +158,35 @@ struct Running {
 }
 
 impl Running {
-    /// The address space of whoever runs foreign code now; 0 when it is not known.
-    fn address_space_mib(&mut self) -> u64 {
+    /// Looks who runs foreign code now, as long as that is not known.
+    fn find(&mut self) {
         if !self.sandboxed {
-            return address_space_mib(self.child);
+            self.locked = Some(self.child);
         }
         #[cfg(target_os = "linux")]
         if self.locked.is_none() {
             let locked = crate::sandbox::locked_pid(self.child.as_raw() as u32);
             self.locked = locked.map(|pid| Pid::from_raw(pid as i32));
         }
+    }
+
+    /// Its address space; 0 when it is not known.
+    fn address_space_mib(&self) -> u64 {
         self.locked.map_or(0, address_space_mib)
+    }
+
+    /// CPU seconds of its threads; 0 when it is not known.
+    fn cpu_s(&self) -> f64 {
+        self.locked.map_or(0.0, standstill::cpu_s)
+    }
+
+    /// Whether it and all that it started stand still; nothing when it is not known.
+    fn stands_still(&self) -> Option<bool> {
+        match self.locked {
+            Some(locked) => standstill::stands_still(locked),
+            // The launcher at work.
+            None => standstill::stands_still(self.child).filter(|still| !still),
+        }
     }
 
     /// Ends what is inside first, so that the launcher reaps it: its usage counts it then, and
@@ -233,22 +274,26 @@ impl Pipe {
         self.end.is_some()
     }
 
-    /// Takes what is there, at most one buffer full, so that a flood cannot keep us here.
-    fn read(&mut self) {
-        let Some(end) = &mut self.end else { return };
-        let mut buffer = [0; 64 << 10];
-        match end.read(&mut buffer) {
-            Ok(0) => self.end = None,
-            Ok(count) => self.capture.push(&buffer[..count]),
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(_) => self.end = None,
+    /// Takes what is there, at most a mouthful; whether there was anything.
+    fn read(&mut self) -> bool {
+        let Some(end) = &mut self.end else { return false };
+        let (mut buffer, mut taken) = ([0; 64 << 10], 0);
+        while taken < MOUTHFUL {
+            match end.read(&mut buffer) {
+                Ok(count @ 1..) => {
+                    self.capture.push(&buffer[..count]);
+                    taken += count;
+                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => break,
+                Ok(0) | Err(_) => {
+                    self.end = None;
+                    break;
+                }
+            }
         }
+        taken > 0
     }
-}
-
-fn total(pipes: &[Pipe]) -> u64 {
-    pipes.iter().map(|pipe| pipe.capture.bytes).sum()
 }
 
 /// Waits until a pipe can be read or `longest` has passed; less when the child closed both.

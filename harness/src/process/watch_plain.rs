@@ -1,4 +1,4 @@
-//! Watching a child where there is no Unix: a deadline and a cap, without groups or limits.
+//! Watching a child where there is no Unix: a deadline, without groups or limits.
 
 use std::io::{self, Read};
 use std::process::{Command, Stdio};
@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::capture::Capture;
-use super::{Captured, Ended, Exit, Lock, start};
+use super::{Captured, Ended, Exit, Lock, Watcher, start};
 
 /// Runs `command` to its end; see the Unix version for the contract.
 ///
@@ -18,21 +18,19 @@ pub fn run(
     lock: &Lock,
     keep: usize,
     cancel: &AtomicBool,
-    tick: &mut dyn FnMut(),
+    watcher: &mut Watcher,
 ) -> io::Result<Ended> {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let begin = Instant::now();
     let mut child = start(command, lock)?;
     let stdout = child.stdout.take().map(|pipe| collect(pipe, keep));
     let stderr = child.stderr.take().map(|pipe| collect(pipe, keep));
-    let bytes = |stream: &Option<Stream>| stream.as_ref().map_or(0, Stream::bytes);
     let exit = loop {
         if let Some(status) = child.try_wait()? {
             break Exit::Code(status.code().unwrap_or(-1));
         }
-        tick();
-        let ended = if bytes(&stdout) + bytes(&stderr) > lock.limits.output_kib << 10 {
-            Exit::Flooded
+        let ended = if watcher(0.0).is_break() {
+            Exit::OutOfCpu
         } else if cancel.load(Ordering::Relaxed) {
             Exit::Cancelled
         } else if begin.elapsed().as_secs_f64() >= lock.limits.wall_s {
@@ -55,6 +53,7 @@ pub fn run(
         stderr,
         wall_s,
         cpu_s: 0.0,
+        still_s: wall_s,
         peak_resident_mib: 0,
         peak_address_mib: 0,
         in_force: None,
@@ -82,10 +81,6 @@ fn collect(mut pipe: impl Read + Send + 'static, keep: usize) -> Stream {
 }
 
 impl Stream {
-    fn bytes(&self) -> u64 {
-        self.capture.lock().map_or(0, |capture| capture.bytes)
-    }
-
     /// What was read, and whether another process still holds the stream open.
     fn finish(self) -> (Captured, bool) {
         let deadline = Instant::now() + Duration::from_millis(200);

@@ -173,17 +173,20 @@ impl Copies {
         policy.collect.iter().map(prepare).collect()
     }
 
-    /// A missing or oversized file leaves the host's empty: the caller sees that.
+    /// A missing or oversized file leaves the host's empty, and so does a full disk: the caller sees that.
     fn make(self, limit: u64) {
         for (beneath, host) in self.files {
-            let _ = copy(&self.scratch, &beneath, host, limit);
+            let mut host = File::from(host);
+            if copy(&self.scratch, &beneath, &mut host, limit).is_err() {
+                let _ = host.set_len(0);
+            }
         }
     }
 }
 
 /// Whatever was put there, nothing but a regular file of the scratch is read: no link is followed,
 /// not even on the way, and no pipe is waited for.
-fn copy(scratch: &OwnedFd, beneath: &Path, host: OwnedFd, limit: u64) -> io::Result<()> {
+fn copy(scratch: &OwnedFd, beneath: &Path, host: &mut File, limit: u64) -> io::Result<()> {
     let resolve = ResolveFlag::RESOLVE_BENEATH
         | ResolveFlag::RESOLVE_NO_SYMLINKS
         | ResolveFlag::RESOLVE_NO_XDEV;
@@ -192,7 +195,7 @@ fn copy(scratch: &OwnedFd, beneath: &Path, host: OwnedFd, limit: u64) -> io::Res
     let file = File::from(openat2(scratch, beneath, how)?);
     let meta = file.metadata()?;
     if meta.is_file() && meta.len() <= limit {
-        io::copy(&mut file.take(limit), &mut File::from(host))?;
+        io::copy(&mut file.take(limit), host)?;
     }
     Ok(())
 }

@@ -73,6 +73,8 @@ fn allowed(kind: Kind, gpu: bool, own_pid: u64) -> Result<Rules, String> {
     rules.insert(libc::SYS_fcntl, one_of(1, FCNTL)?);
     rules.insert(libc::SYS_ioctl, if gpu { Vec::new() } else { one_of(1, IOCTL)? });
     if kind.may_execute() {
+        rules.insert(libc::SYS_flock, Vec::new());
+        rules.insert(libc::SYS_fcntl, one_of(1, &[FCNTL, LOCKS].concat())?);
         rules.extend(PROCESSES.iter().map(|&call| (call, Vec::new())));
         rules.insert(libc::SYS_clone, vec![rule(vec![argument(0, MaskedEq(NAMESPACES), 0)?])?]);
         // The standard library's `Command` hears of a failed exec through a pair of sockets.
@@ -99,6 +101,8 @@ fn refusals(kind: Kind, own_pid: u64) -> Result<Rules, String> {
         rules.insert(libc::SYS_socketpair, vec![rule(vec![other])?]);
         rules.insert(libc::SYS_kill, Vec::new());
     } else {
+        rules.insert(libc::SYS_flock, Vec::new());
+        rules.insert(libc::SYS_fcntl, one_of(1, LOCKS)?);
         let processes = PROCESSES.iter().chain(PAIR).chain(&[libc::SYS_socketpair]);
         rules.extend(processes.map(|&call| (call, Vec::new())));
         let no_thread = argument(0, MaskedEq(libc::CLONE_THREAD as u64), 0)?;
@@ -128,7 +132,7 @@ const PRCTL: &[u64] = &[
     libc::PR_SET_NO_NEW_PRIVS as u64,
 ];
 
-/// Flags, copies, locks and sizes; not the ones that send signals.
+/// Flags, copies and sizes; not the ones that send signals.
 const FCNTL: &[u64] = &[
     libc::F_DUPFD as u64,
     libc::F_DUPFD_CLOEXEC as u64,
@@ -136,13 +140,18 @@ const FCNTL: &[u64] = &[
     libc::F_SETFD as u64,
     libc::F_GETFL as u64,
     libc::F_SETFL as u64,
+    libc::F_GETPIPE_SZ as u64,
+];
+
+/// Locks of files: a compiler's alone. Others share files with whoever runs beside them, and could stop
+/// them there, or talk to them.
+const LOCKS: &[u64] = &[
     libc::F_GETLK as u64,
     libc::F_SETLK as u64,
     libc::F_SETLKW as u64,
     libc::F_OFD_GETLK as u64,
     libc::F_OFD_SETLK as u64,
     libc::F_OFD_SETLKW as u64,
-    libc::F_GETPIPE_SZ as u64,
 ];
 
 /// Whether it is a terminal, how much there is to read, flags; nothing that types.
@@ -182,7 +191,6 @@ const PLAIN: &[i64] = &[
     libc::SYS_dup,
     libc::SYS_dup3,
     libc::SYS_pipe2,
-    libc::SYS_flock,
     libc::SYS_fsync,
     libc::SYS_fdatasync,
     libc::SYS_truncate,

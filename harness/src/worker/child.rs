@@ -1,4 +1,4 @@
-//! The worker itself: the hidden command `umbra __worker DIR`.
+//! The worker itself: the program `umbra-worker DIR`.
 
 use std::path::Path;
 use std::process::ExitCode;

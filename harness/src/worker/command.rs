@@ -1,6 +1,7 @@
 //! How a worker is started.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -9,18 +10,65 @@ use super::job::{AdapterKind, Request};
 use super::wire::Folder;
 use crate::process::Limits;
 
+/// The name of the program that loads plugins; it lies beside `umbra`.
+const PROGRAM: &str = "umbra-worker";
+/// What it is told that it is called.
+const CALLED: &str = "worker";
+
+/// The program that loads plugins, beside `umbra`.
+pub fn program_beside(umbra: &Path) -> PathBuf {
+    umbra.with_file_name(format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX))
+}
+
+/// A program, opened: executed through its descriptor, it is not told where it lies.
+pub struct Program {
+    path: PathBuf,
+    /// Closed by being executed.
+    _open: Option<std::fs::File>,
+}
+
+impl Program {
+    /// The program at `path`.
+    ///
+    /// # Errors
+    /// When it cannot be opened.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        #[cfg(target_os = "linux")]
+        {
+            use std::os::fd::AsRawFd;
+            let missing = |error: io::Error| {
+                let hint = "it belongs beside umbra: cargo build --release --workspace makes both";
+                io::Error::new(error.kind(), format!("{}: {error}; hint: {hint}", path.display()))
+            };
+            let open = fs::File::open(path).map_err(missing)?;
+            let path = PathBuf::from(format!("/proc/self/fd/{}", open.as_raw_fd()));
+            Ok(Self { path, _open: Some(open) })
+        }
+        #[cfg(not(target_os = "linux"))]
+        Ok(Self { path: path.to_owned(), _open: None })
+    }
+
+    /// The command that executes it; it must be held until that is done.
+    fn command(&self) -> Command {
+        let mut command = Command::new(&self.path);
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::arg0(&mut command, CALLED);
+        command
+    }
+}
+
 /// The command that starts a worker with the private folder `dir`, an empty environment but for what
-/// drivers and thread pools are told. `umbra` is this program, `driver` the software adapter's.
+/// drivers and thread pools are told. `driver` is the software adapter's.
 pub fn command(
-    umbra: &Path,
+    program: &Program,
     dir: &Path,
     cage: &Cage,
     requests: &[&Request],
     limits: &Limits,
     driver: Option<&Path>,
 ) -> Command {
-    let mut command = Command::new(umbra);
-    command.arg("__worker").arg(&cage.job).current_dir(Folder(dir).scratch()).env_clear();
+    let mut command = program.command();
+    command.arg(&cage.job).current_dir(Folder(dir).scratch()).env_clear();
     command.env("LANG", "C").env("HOME", "/nonexistent");
     // Compiling shaders costs most of a small frame. What is compiled stays in the scratch of
     // this one worker: one renderer's shaders are no other's business.

@@ -199,6 +199,16 @@ impl Request {
         }
     }
 
+    /// What kind of question it is, in a word or two.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::EvalBsdf { .. } => "BSDF values",
+            Self::Radiance { .. } => "radiance along rays",
+            Self::RenderOffline { .. } => "offline image",
+            Self::RenderRealtime { .. } => "realtime frame",
+        }
+    }
+
     /// Which adapter draws, where one does.
     pub fn adapter(&self) -> Option<AdapterKind> {
         match self {

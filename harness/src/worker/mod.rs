@@ -1,7 +1,7 @@
 //! The worker: a child process that loads a plugin and answers requests, and its supervision.
 //!
 //! ```text
-//! Job -> Supervisor::run_job -> [umbra __worker DIR: load, call] -> JobReport
+//! Job -> Supervisor::run_job -> [umbra-worker DIR: load, call] -> JobReport
 //! ```
 //! Large inputs and all outputs travel through files that the worker maps (`arena`), progress and
 //! answers through a table of fixed-size records (`table`). The parent trusts neither: a plugin
@@ -25,8 +25,8 @@ pub use job::{
     Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, RayQuery, Request, SceneRef,
     Stage,
 };
-pub use outcome::{Answer, JobReport, Matter, Outcome, WitnessUse, WorkerRun};
-pub use patience::{Patience, blames_the_machine};
+pub use outcome::{Answer, JobReport, Late, Matter, Outcome, WitnessUse, WorkerRun};
+pub use patience::{Budget, Patience, Reference, blames_the_machine};
 pub use supervise::{Progress, Supervisor};
 // What is parsed of a file that foreign code could write: public for its fuzz target.
 pub use table::{Noted, RECORD};

@@ -1,5 +1,7 @@
 //! What became of a request, and whose matter it is.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use crate::process::Ended;
@@ -33,12 +35,10 @@ pub enum Outcome {
     CrashedBySignal(String),
     /// The worker exited by itself, with this code, before it answered.
     ExitedEarly(i32),
-    /// Out of wall-clock or CPU time.
-    TimedOut,
+    /// Out of time.
+    TimedOut(Late),
     /// It ended at its memory limit.
     OutOfMemory,
-    /// It wrote more to standard output and error than allowed.
-    FloodedOutput,
     /// It wrote a larger file than allowed. Limits that only refuse (scratch, tasks, open files) end
     /// nobody: the renderer is told, and answers for what it makes of that.
     FileTooLarge,
@@ -92,6 +92,31 @@ impl Outcome {
         match self {
             Self::Done(answer) => Some(answer),
             _ => None,
+        }
+    }
+}
+
+/// How a renderer ran out of time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Late {
+    /// Whether it computed until it was out of CPU time; otherwise it stood still.
+    pub computing: bool,
+    /// The limit in seconds, of CPU time or of standing still.
+    pub limit_s: f64,
+    /// CPU seconds that the reference renderer takes for the same, where it was measured.
+    pub reference_s: Option<f64>,
+}
+
+impl fmt::Display for Late {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let limit_s = (10.0 * self.limit_s).round() / 10.0;
+        if !self.computing {
+            return write!(f, "no answer, and nothing done for {limit_s} s: a deadlock or a sleep");
+        }
+        write!(f, "no answer within {limit_s} s of CPU time")?;
+        match self.reference_s {
+            Some(cpu_s) => write!(f, " (the reference renderer takes {cpu_s:.2} s)"),
+            None => Ok(()),
         }
     }
 }

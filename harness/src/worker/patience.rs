@@ -1,35 +1,122 @@
-//! How often a renderer is asked again because the machine may be at fault, and when enough is
-//! enough.
+//! How long a renderer is waited for, how often it is asked again because the machine may be at fault,
+//! and when enough is enough. CPU time decides, never the machine's load.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::outcome::{Matter, Outcome};
+use super::job::{Job, Request};
+use super::outcome::{Late, Matter, Outcome};
+use crate::process::{Ended, Limits};
 
-/// So many requests of one path may be asked again: each may cost its time limit.
+/// So many requests of a kind may be asked again: each may cost its time limit.
 const MAX_RETRIES: usize = 2;
-/// After so many requests of one path ran out of time, the rest is not asked any more: a renderer
-/// that hangs would otherwise cost its limit for every question.
+/// After so many requests of a kind ran out of time, the rest of that kind is not asked any more.
 const MAX_TIMEOUTS: usize = 2;
+/// CPU seconds that every question has at first; the reference takes a tenth of that for nearly all.
+const FIRST_S: f64 = 3.0;
+/// And so many more for each sample of a full render: five times what the reference took.
+const FIRST_S_PER_SAMPLE: f64 = 1.2e-6;
+/// A question that is asked again, alone, has so many times the reference's CPU time.
+const TIMES_REFERENCE: f64 = 10.0;
+/// Once a renderer is known to hang, other questions of that kind have so many times it, or a second.
+const TIMES_REFERENCE_SHORT: f64 = 3.0;
+/// And may stand still for this part of what they may otherwise.
+const SHORT: f64 = 0.2;
 
-/// Patience with one path of one hand-in, over all its jobs.
+/// How the reason begins when this process could not run a worker, for want of disk space, memory, files.
+pub(super) const CANNOT_RUN: &str = "cannot run a worker";
+
+/// What the reference renderer takes on this machine.
+pub trait Reference: Sync {
+    /// CPU seconds for one question, asked in a worker of its own; nothing where there is no reference.
+    fn question_cpu_s(&self, request: &Request) -> Option<f64>;
+    /// CPU seconds for all questions of the path that the request belongs to.
+    fn path_cpu_s(&self, request: &Request) -> Option<f64>;
+}
+
+/// What one submission may use on each path, offline and realtime.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Budget {
+    /// CPU time, as a multiple of what the reference renderer takes on this machine.
+    pub times_reference: f64,
+    /// CPU seconds that it has in any case.
+    pub cpu_s: f64,
+    /// Seconds in which its workers may stand still, neither computing nor waiting for a processor.
+    pub still_s: f64,
+}
+
+/// Patience with one path of one submission, over all its jobs.
 ///
 /// A timeout counts when the same request runs out of time once more, alone on the machine. One
-/// that is confirmed so speaks for all of the path: others count as they are. One that nobody can
-/// confirm any more counts for nothing, and what it asked stays ungraded.
-#[derive(Debug, Default)]
-pub struct Patience(Mutex<State>);
+/// that is confirmed so speaks for all of its kind: others have a short limit and count as they are. One
+/// that nobody can confirm any more counts for nothing, and what it asked stays ungraded.
+#[derive(Default)]
+pub struct Patience<'a> {
+    reference: Option<&'a dyn Reference>,
+    budget: Option<Budget>,
+    /// Whether questions have limits of their own, or only the job's.
+    own_limits: bool,
+    state: Mutex<State>,
+}
 
 #[derive(Debug, Default)]
 struct State {
+    kinds: [OfKind; 5],
+    retries: usize,
+    cpu_s: f64,
+    still_s: f64,
+    /// Why the budget is used up, when it is.
+    over: Option<String>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct OfKind {
     retries: usize,
     hangs: bool,
     timeouts: usize,
 }
 
-impl Patience {
+/// What one worker may use.
+pub(super) struct Allowed {
+    /// All its questions together.
+    pub limits: Limits,
+    /// CPU seconds of each question.
+    pub each_cpu_s: Vec<f64>,
+}
+
+/// A kind of question, as an index.
+fn kind(job: &Job, request: &Request) -> usize {
+    match request {
+        Request::EvalBsdf { .. } => 0,
+        Request::Radiance { .. } => 1,
+        Request::RenderOffline { .. } => 2,
+        Request::RenderRealtime { .. } if job.plugin.is_some() => 3,
+        Request::RenderRealtime { .. } => 4,
+    }
+}
+
+/// How much of an image is to be rendered at several samples, or nothing of it.
+fn samples(request: &Request) -> f64 {
+    match request {
+        Request::RenderOffline { width, height, spp, .. } => {
+            f64::from(*width) * f64::from(*height) * f64::from(*spp)
+        }
+        _ => 0.0,
+    }
+}
+
+impl<'a> Patience<'a> {
+    /// With a submission of a batch: each question has the time that fits it, all of a path's together
+    /// the budget, if there is one.
+    pub fn with(reference: Option<&'a dyn Reference>, budget: Option<Budget>) -> Self {
+        Self { reference, budget, own_limits: true, ..Self::default() }
+    }
+
     /// None at all: every timeout counts at once.
     pub fn none() -> Self {
-        Self(Mutex::new(State { hangs: true, ..State::default() }))
+        let patience = Self::default();
+        patience.state().kinds.iter_mut().for_each(|kind| kind.hangs = true);
+        patience
     }
 
     /// Begins anew, for another path.
@@ -45,30 +132,170 @@ impl Patience {
         left
     }
 
-    /// Whether a timeout must be confirmed, and may: takes one retry then.
-    pub(super) fn asks_again(&self) -> bool {
-        !self.state().hangs && self.another_try()
+    /// Why the budget of this path is used up, when it is.
+    pub fn used_up(&self) -> Option<String> {
+        self.state().over.clone()
     }
 
-    /// What a timeout comes to; `confirmed` when the request had the machine for itself.
-    pub(super) fn timed_out(&self, confirmed: bool) -> Outcome {
-        let mut state = self.state();
-        state.timeouts += 1;
-        state.hangs |= confirmed;
-        if state.hangs { Outcome::TimedOut } else { unconfirmed() }
+    /// What a worker may use that is asked `pending` of a job, at first or once a kind hangs.
+    pub(super) fn allowed(&self, job: &Job, pending: &[usize], limits: &Limits) -> Allowed {
+        let mut limits = limits.clone();
+        if !self.own_limits {
+            let each_cpu_s = vec![f64::INFINITY; pending.len()];
+            return Allowed { limits, each_cpu_s };
+        }
+        let requests = || pending.iter().map(|&index| &job.requests[index]);
+        let each_cpu_s: Vec<f64> = requests()
+            .map(|request| {
+                if self.state().kinds[kind(job, request)].hangs {
+                    self.short(request)
+                } else {
+                    first(request)
+                }
+            })
+            .collect();
+        if requests().all(|request| self.state().kinds[kind(job, request)].hangs) {
+            limits.wall_s = (SHORT * limits.wall_s).max(1.0);
+        }
+        limits.cpu_s = each_cpu_s.iter().sum::<f64>().ceil() as u64 + 1;
+        self.clamp(job, pending, &mut limits);
+        Allowed { limits, each_cpu_s }
     }
 
-    /// The outcome of all that is not asked any more, when patience is at its end.
-    pub fn is_over(&self) -> Option<Outcome> {
+    /// The limits under which a request that ran out of time is asked again, alone; nothing when it is
+    /// not asked again.
+    pub(super) fn again(&self, job: &Job, index: usize, limits: &Limits) -> Option<Allowed> {
+        let request = &job.requests[index];
+        {
+            let of_kind = &mut self.state().kinds[kind(job, request)];
+            if of_kind.hangs || of_kind.retries == MAX_RETRIES {
+                return None;
+            }
+            of_kind.retries += 1;
+        }
+        let mut limits = limits.clone();
+        if !self.own_limits {
+            return Some(Allowed { limits, each_cpu_s: vec![f64::INFINITY] });
+        }
+        let fair = match self.reference_cpu_s(request) {
+            Some(cpu_s) => first(request).max(TIMES_REFERENCE * cpu_s),
+            // A slow machine of a student's.
+            None => first(request).max((2.0 * first(request)).min(limits.cpu_s as f64)),
+        };
+        limits.cpu_s = fair.ceil() as u64 + 1;
+        self.clamp(job, &[index], &mut limits);
+        Some(Allowed { limits, each_cpu_s: vec![fair] })
+    }
+
+    /// What a request has once others of its kind are known to hang.
+    fn short(&self, request: &Request) -> f64 {
+        let times = self.reference_cpu_s(request).map(|cpu_s| TIMES_REFERENCE_SHORT * cpu_s);
+        times.unwrap_or(first(request) / 3.0).max(1.0)
+    }
+
+    fn reference_cpu_s(&self, request: &Request) -> Option<f64> {
+        self.reference?.question_cpu_s(request)
+    }
+
+    /// No worker of a submission may use more than is left of its budget.
+    fn clamp(&self, job: &Job, pending: &[usize], limits: &mut Limits) {
+        let (Some(budget), Some(&first)) = (&self.budget, pending.first()) else { return };
+        let (cpu_s, still_s) = {
+            let state = self.state();
+            (state.cpu_s, state.still_s)
+        };
+        if job.plugin.is_none() {
+            return;
+        }
+        limits.wall_s = limits.wall_s.min((budget.still_s - still_s).max(0.0) + 0.1);
+        // Before, it is not worth measuring the reference.
+        if cpu_s >= budget.cpu_s {
+            let left = self.cpu_budget(budget, &job.requests[first]) - cpu_s;
+            limits.cpu_s = limits.cpu_s.min(left.max(0.0).ceil() as u64 + 1);
+        }
+    }
+
+    fn cpu_budget(&self, budget: &Budget, request: &Request) -> f64 {
+        let path = self.reference.and_then(|reference| reference.path_cpu_s(request));
+        budget.cpu_s.max(path.map_or(f64::INFINITY, |cpu_s| budget.times_reference * cpu_s))
+    }
+
+    /// Counts what a worker used.
+    pub(super) fn spent(&self, job: &Job, ended: &Ended) {
+        let (Some(budget), Some(request)) = (&self.budget, job.requests.first()) else { return };
+        if job.plugin.is_none() {
+            return;
+        }
+        let (cpu_s, still_s) = {
+            let mut state = self.state();
+            state.cpu_s += ended.cpu_s;
+            state.still_s += ended.still_s;
+            (state.cpu_s, state.still_s)
+        };
+        let over = if still_s >= budget.still_s {
+            let allowed = budget.still_s;
+            Some(format!("{still_s:.0} s of doing nothing, where {allowed:.0} s are allowed"))
+        } else if cpu_s >= budget.cpu_s {
+            let allowed = self.cpu_budget(budget, request);
+            (cpu_s >= allowed).then(|| {
+                let times = budget.times_reference;
+                format!(
+                    "{cpu_s:.0} s of CPU time, where {allowed:.0} s are allowed, {times} times what the \
+                     reference renderer takes on this machine"
+                )
+            })
+        } else {
+            None
+        };
+        self.state().over = over;
+    }
+
+    /// What a timeout comes to; `confirmed` when the request had the machine for itself. A `late` that
+    /// is the machine's own never counts.
+    pub(super) fn timed_out(
+        &self,
+        job: &Job,
+        index: usize,
+        late: Option<Late>,
+        confirmed: bool,
+    ) -> Outcome {
+        let request = &job.requests[index];
+        let hangs = {
+            let of_kind = &mut self.state().kinds[kind(job, request)];
+            of_kind.timeouts += 1;
+            of_kind.hangs |= confirmed && late.is_some();
+            of_kind.hangs
+        };
+        match late.filter(|_| hangs) {
+            Some(late) if self.own_limits => {
+                Outcome::TimedOut(Late { reference_s: self.reference_cpu_s(request), ..late })
+            }
+            Some(late) => Outcome::TimedOut(late),
+            None => unconfirmed(),
+        }
+    }
+
+    /// The outcome of a request that is not asked any more, when patience is at its end.
+    pub fn is_over(&self, job: &Job, request: &Request) -> Option<Outcome> {
         let state = self.state();
-        let matter = if state.hangs { Matter::Submission } else { Matter::Machine };
+        if let (Some(over), Some(_)) = (&state.over, &job.plugin) {
+            let reason = format!("not asked: the submission used {over}");
+            return Some(Outcome::NotRun { reason, matter: Matter::Submission });
+        }
+        let of_kind = state.kinds[kind(job, request)];
+        let matter = if of_kind.hangs { Matter::Submission } else { Matter::Machine };
         let reason = "not asked: the renderer ran out of time before".to_owned();
-        (state.timeouts >= MAX_TIMEOUTS).then_some(Outcome::NotRun { reason, matter })
+        (of_kind.timeouts >= MAX_TIMEOUTS).then_some(Outcome::NotRun { reason, matter })
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// CPU seconds that a request has at first.
+fn first(request: &Request) -> f64 {
+    FIRST_S + FIRST_S_PER_SAMPLE * samples(request)
 }
 
 fn unconfirmed() -> Outcome {
@@ -82,8 +309,10 @@ pub fn blames_the_machine(outcome: &Outcome) -> bool {
     match outcome {
         Outcome::NoAdapter(_) => true,
         Outcome::NotRun { matter: Matter::Submission, .. } => false,
-        // Time is the parent's word.
-        Outcome::NotRun { .. } => *outcome != unconfirmed(),
+        // Time, and what this process itself cannot do, is our own word.
+        Outcome::NotRun { reason, .. } => {
+            *outcome != unconfirmed() && !reason.starts_with(CANNOT_RUN)
+        }
         Outcome::Failed(said) | Outcome::Panicked(said) => {
             let said = said.to_lowercase();
             (said.contains("device") && said.contains("lost"))
@@ -94,59 +323,5 @@ pub fn blames_the_machine(outcome: &Outcome) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_confirmed_timeout_speaks_for_all() {
-        let patience = Patience::default();
-        assert!(patience.asks_again());
-        assert_eq!(patience.timed_out(true), Outcome::TimedOut);
-        assert_eq!(patience.is_over(), None);
-        assert!(!patience.asks_again(), "hanging renderers do not stall a batch");
-        assert_eq!(patience.timed_out(false), Outcome::TimedOut);
-        assert_eq!(patience.is_over().and_then(|o| o.matter()), Some(Matter::Submission));
-        patience.renew();
-        assert_eq!(patience.is_over(), None);
-        assert!(patience.asks_again());
-    }
-
-    #[test]
-    fn what_nobody_confirms_costs_nothing() {
-        let patience = Patience::default();
-        for _ in 0..MAX_RETRIES {
-            // Asked again, it answered.
-            assert!(patience.asks_again());
-        }
-        assert!(!patience.asks_again());
-        assert_eq!(patience.timed_out(false).matter(), Some(Matter::Machine));
-        assert_eq!(patience.timed_out(false).matter(), Some(Matter::Machine));
-        assert_eq!(patience.is_over().and_then(|o| o.matter()), Some(Matter::Machine));
-        assert!(!blames_the_machine(&patience.timed_out(false)));
-    }
-
-    #[test]
-    fn without_patience_every_timeout_counts() {
-        let patience = Patience::none();
-        assert!(!patience.asks_again());
-        assert_eq!(patience.timed_out(false), Outcome::TimedOut);
-    }
-
-    #[test]
-    fn blame_is_recognised() {
-        let machine = |matter| Outcome::NotRun { reason: "x".into(), matter };
-        for (outcome, blames) in [
-            (Outcome::NoAdapter(String::new()), true),
-            (machine(Matter::Machine), true),
-            (machine(Matter::Ours), true),
-            (machine(Matter::Submission), false),
-            (Outcome::Failed("Parent device is lost".into()), true),
-            (Outcome::Panicked("No space left on device (os error 28)".into()), true),
-            (Outcome::Failed("lost in thought".into()), false),
-            (Outcome::ExitedEarly(75), false),
-            (Outcome::TimedOut, false),
-        ] {
-            assert_eq!(blames_the_machine(&outcome), blames, "{outcome:?}");
-        }
-    }
-}
+#[path = "patience_tests.rs"]
+mod tests;

@@ -2,6 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
@@ -10,10 +11,10 @@ use std::time::{Duration, Instant};
 use renderer_api as api;
 
 use super::cage::Cage;
-use super::command::{command, software_driver};
+use super::command::{Program, command, program_beside, software_driver};
 use super::job::{Job, Request};
-use super::outcome::{Answer, JobReport, Matter, Outcome, WitnessUse, WorkerRun};
-use super::patience::Patience;
+use super::outcome::{Answer, JobReport, Late, Matter, Outcome, WitnessUse, WorkerRun};
+use super::patience::{Allowed, CANNOT_RUN, Patience};
 use super::table::{Noted, RECORD, STATUS_OURS, STATUS_REJECTED};
 use super::wire::{Folder, Place, WireJob, WireRequest, take_input};
 use crate::plugin::Witness;
@@ -28,7 +29,7 @@ const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
 /// Starts workers.
 #[derive(Clone, Debug)]
 pub struct Supervisor {
-    /// The program with the hidden command `__worker`: Umbra itself.
+    /// Umbra itself, which starts compilers and decoders; `umbra-worker`, which loads plugins, lies beside it.
     pub umbra: PathBuf,
     /// Where each worker's private folder is made, and removed in the end.
     pub scratch: PathBuf,
@@ -67,6 +68,11 @@ impl Supervisor {
     pub fn available(umbra: PathBuf, scratch: PathBuf) -> Self {
         let isolation = sandbox::available(&umbra);
         Self { isolation, ..Self::new(umbra, scratch) }
+    }
+
+    /// Umbra and the program that loads plugins.
+    pub fn programs(&self) -> [PathBuf; 2] {
+        [self.umbra.clone(), program_beside(&self.umbra)]
     }
 
     /// To be held by what runs beside others; waits while someone has the machine for itself.
@@ -119,61 +125,83 @@ impl Supervisor {
         let mut outcomes: Vec<Option<Outcome>> = vec![None; count];
         let mut report = JobReport { outcomes: Vec::new(), renderer: None, runs: Vec::new() };
         let mut pending: Vec<usize> = (0..count).collect();
-        while !pending.is_empty() {
+        let used_up = || job.plugin.is_some() && patience.used_up().is_some();
+        loop {
+            // Each worker settles one request at least, so this ends.
+            pending.retain(|&index| outcomes[index].is_none());
+            for &index in &pending {
+                outcomes[index] = patience.is_over(job, &job.requests[index]);
+            }
+            pending.retain(|&index| outcomes[index].is_none());
+            if pending.is_empty() {
+                break;
+            }
             let answered = count - pending.len();
             let mut worker_progress = |in_worker, rows| {
                 progress(Progress { answered: answered + in_worker, requests: count, rows });
             };
+            let allowed = patience.allowed(job, &pending, limits);
             let beside = self.beside_others();
-            let run = self.run_worker(job, &pending, limits, cancel, &mut worker_progress);
+            let run = self.run_worker(job, &pending, &allowed, cancel, &mut worker_progress);
             drop(beside);
-            let mut late = None;
-            match run {
-                Ok(run) => {
-                    for (&index, outcome) in pending.iter().zip(run.outcomes) {
-                        outcomes[index] = outcome;
-                    }
-                    if run.ended.exit == Exit::TimedOut {
-                        let open = |outcome: &Option<Outcome>| {
-                            outcome.as_ref().is_none_or(|outcome| *outcome == Outcome::TimedOut)
-                        };
-                        late = pending.iter().copied().find(|&index| open(&outcomes[index]));
-                        // One that hangs while it is loaded is late for all that it is asked.
-                        for index in pending.iter().copied().filter(|&index| Some(index) != late) {
-                            outcomes[index].take_if(|outcome| *outcome == Outcome::TimedOut);
-                        }
-                    }
-                    report.renderer = report.renderer.or(run.renderer);
-                    report.runs.push(WorkerRun { requests: pending.clone(), ended: run.ended });
-                }
+            let run = match run {
+                Ok(run) => run,
                 Err(error) => {
                     pending.iter().for_each(|&index| outcomes[index] = Some(cannot_run(&error)));
+                    continue;
                 }
+            };
+            for (&index, outcome) in pending.iter().zip(run.outcomes) {
+                outcomes[index] = outcome;
             }
-            if let Some(index) = late {
-                if patience.asks_again() {
-                    let alone = self.machine.write().unwrap_or_else(PoisonError::into_inner);
-                    let run = self.run_worker(job, &[index], limits, cancel, &mut |_, _| ());
-                    drop(alone);
-                    outcomes[index] = match run {
-                        Ok(run) => {
-                            let requests = vec![index];
-                            report.runs.push(WorkerRun { requests, ended: run.ended });
-                            run.outcomes.into_iter().next().flatten()
+            patience.spent(job, &run.ended);
+            report.renderer = report.renderer.or(run.renderer);
+            let exit = run.ended.exit;
+            report.runs.push(WorkerRun { requests: pending.clone(), ended: run.ended });
+            if !out_of_time(exit) {
+                continue;
+            }
+            let open = |&index: &usize| match &outcomes[index] {
+                None | Some(Outcome::TimedOut(_)) => true,
+                outcome => exit == Exit::Starved && *outcome == Some(starved()),
+            };
+            let late: Vec<usize> = pending.iter().copied().filter(open).collect();
+            let Some((&first, others)) = late.split_first() else { continue };
+            // One that hangs while it is loaded is late for all that it is asked.
+            others.iter().for_each(|&index| outcomes[index] = None);
+            let was = outcomes[first].take();
+            if used_up() {
+                continue;
+            }
+            if let Some(allowed) = patience.again(job, first, limits) {
+                let alone = self.machine.write().unwrap_or_else(PoisonError::into_inner);
+                let run = self.run_worker(job, &[first], &allowed, cancel, &mut |_, _| ());
+                drop(alone);
+                outcomes[first] = match run {
+                    Ok(run) => {
+                        patience.spent(job, &run.ended);
+                        let late = out_of_time(run.ended.exit);
+                        report.runs.push(WorkerRun { requests: vec![first], ended: run.ended });
+                        let outcome = run.outcomes.into_iter().next().flatten();
+                        match (late, outcome) {
+                            (true, _) if used_up() => None,
+                            (true, Some(Outcome::TimedOut(late))) => {
+                                Some(patience.timed_out(job, first, Some(late), true))
+                            }
+                            (true, None | Some(Outcome::NotRun { .. })) => {
+                                Some(patience.timed_out(job, first, None, true))
+                            }
+                            (_, outcome) => outcome,
                         }
-                        Err(error) => Some(cannot_run(&error)),
-                    };
-                    if outcomes[index] == Some(Outcome::TimedOut) {
-                        outcomes[index] = Some(patience.timed_out(true));
                     }
-                } else if outcomes[index].is_some() {
-                    outcomes[index] = Some(patience.timed_out(false));
-                }
-            }
-            // Each worker settles one request at least, so this ends.
-            pending.retain(|&index| outcomes[index].is_none());
-            if let Some(rest) = patience.is_over() {
-                pending.drain(..).for_each(|index| outcomes[index] = Some(rest.clone()));
+                    Err(error) => Some(cannot_run(&error)),
+                };
+            } else if let Some(was) = was {
+                let late = match was {
+                    Outcome::TimedOut(late) => Some(late),
+                    _ => None,
+                };
+                outcomes[first] = Some(patience.timed_out(job, first, late, false));
             }
         }
         report.outcomes = outcomes.into_iter().flatten().collect();
@@ -184,30 +212,44 @@ impl Supervisor {
         &self,
         job: &Job,
         pending: &[usize],
-        limits: &Limits,
+        allowed: &Allowed,
         cancel: &AtomicBool,
         progress: &mut dyn FnMut(usize, (u32, u32)),
     ) -> io::Result<Run> {
+        let limits = &allowed.limits;
         let private = tempfile::Builder::new().prefix("umbra-worker-").tempdir_in(&self.scratch)?;
         let requests: Vec<_> = pending.iter().map(|&index| &job.requests[index]).collect();
         fs::create_dir(Folder(private.path()).scratch())?;
         let cage = Cage::new(private.path(), job, &requests, self.isolation)?;
         let mut files = Files::prepare(private.path(), &cage, &requests)?;
+        let program = Program::open(&program_beside(&self.umbra))?;
         let driver = software_driver();
         let elsewhere = |driver: &PathBuf| !driver.starts_with("/usr/share/vulkan");
         let command =
-            command(&self.umbra, private.path(), &cage, &requests, limits, driver.as_deref());
+            command(&program, private.path(), &cage, &requests, limits, driver.as_deref());
         let mut policy = cage.policy;
         policy.read_only.extend(driver.filter(elsewhere).map(Bind::same));
         let lock = Lock::new(limits, policy);
         let mut last = Instant::now();
-        let ended = process::run(command, &lock, KEEP_OUTPUT, cancel, &mut || {
+        // The question that is being worked at, and the CPU time at its beginning. Both are the worker's
+        // word; the kernel limits them all together.
+        let (mut current, mut since_cpu_s) = (0, 0.0);
+        let ended = process::run(command, &lock, KEEP_OUTPUT, cancel, &mut |cpu_s| {
             if last.elapsed() >= PROGRESS_INTERVAL {
                 last = Instant::now();
                 if let Ok(records) = files.records() {
                     let (answered, rows) = how_far(&records);
                     progress(answered, rows);
+                    if answered != current {
+                        (current, since_cpu_s) = (answered, cpu_s);
+                    }
                 }
+            }
+            let own = allowed.each_cpu_s.get(current).copied().unwrap_or(f64::INFINITY);
+            if cpu_s - since_cpu_s > own {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
             }
         })?;
         // From here on the worker is gone, and what lies in the files stays as it is.
@@ -216,7 +258,7 @@ impl Supervisor {
         let all = |outcome: Outcome| vec![Some(outcome); requests.len()];
         match &records[0] {
             Noted::NotStarted => run.outcomes = all(not_started(&run.ended)),
-            Noted::Started { .. } => run.outcomes = all(death(&run.ended, limits)),
+            Noted::Started { .. } => run.outcomes = all(death(&run.ended, allowed, current)),
             Noted::Answered { status: api::STATUS_OK, message, .. } => {
                 run.renderer = job.plugin.is_some().then(|| message.clone());
                 for (index, (request, noted)) in requests.iter().zip(&records[1..]).enumerate() {
@@ -227,7 +269,7 @@ impl Supervisor {
                     // The limits hold for all that a worker is asked, and others may have left
                     // something behind: only who came first in it is to blame for its end.
                     if index == 0 {
-                        run.outcomes[index] = Some(death(&run.ended, limits));
+                        run.outcomes[index] = Some(death(&run.ended, allowed, current));
                     }
                     break;
                 }
@@ -238,7 +280,7 @@ impl Supervisor {
         }
         if run.ended.exit == Exit::Cancelled {
             run.outcomes.iter_mut().for_each(|outcome| {
-                outcome.get_or_insert_with(|| death(&run.ended, limits));
+                outcome.get_or_insert_with(|| death(&run.ended, allowed, current));
             });
         }
         Ok(run)
@@ -246,7 +288,7 @@ impl Supervisor {
 }
 
 fn cannot_run(error: &io::Error) -> Outcome {
-    let reason = format!("cannot run a worker: {error}");
+    let reason = format!("{CANNOT_RUN}: {error}");
     Outcome::NotRun { reason, matter: Matter::Machine }
 }
 
@@ -387,7 +429,9 @@ fn how_far(records: &[Noted]) -> (usize, (u32, u32)) {
 fn not_started(ended: &Ended) -> Outcome {
     let (reason, matter) = match ended.exit {
         Exit::Cancelled => ("cancelled".to_owned(), Matter::Machine),
-        Exit::TimedOut => ("the worker had no time to begin".to_owned(), Matter::Machine),
+        Exit::OutOfCpu | Exit::TimedOut | Exit::Starved => {
+            ("the worker had no time to begin".to_owned(), Matter::Machine)
+        }
         exit => {
             (format!("the worker did not begin ({exit:?}): {}", ended.stderr.head), Matter::Ours)
         }
@@ -395,11 +439,28 @@ fn not_started(ended: &Ended) -> Outcome {
     Outcome::NotRun { reason, matter }
 }
 
-/// The outcome of the request at which a worker ended.
-fn death(ended: &Ended, limits: &Limits) -> Outcome {
+/// Whether a worker ended because its time was over, its own or the machine's.
+fn out_of_time(exit: Exit) -> bool {
+    matches!(exit, Exit::OutOfCpu | Exit::TimedOut | Exit::Starved)
+}
+
+fn starved() -> Outcome {
+    let reason = process::starved("the worker").to_string();
+    Outcome::NotRun { reason, matter: Matter::Machine }
+}
+
+/// The outcome of the request at which a worker ended, the one with this index among its own.
+fn death(ended: &Ended, allowed: &Allowed, index: usize) -> Outcome {
+    let limits = &allowed.limits;
+    let late =
+        |computing, limit_s| Outcome::TimedOut(Late { computing, limit_s, reference_s: None });
     match ended.exit {
-        Exit::TimedOut => Outcome::TimedOut,
-        Exit::Flooded => Outcome::FloodedOutput,
+        Exit::OutOfCpu => {
+            let own = allowed.each_cpu_s.get(index).copied().unwrap_or(f64::INFINITY);
+            late(true, own.min(limits.cpu_s as f64))
+        }
+        Exit::TimedOut => late(false, limits.wall_s),
+        Exit::Starved => starved(),
         Exit::FileTooLarge => Outcome::FileTooLarge,
         Exit::Cancelled => {
             Outcome::NotRun { reason: "cancelled".to_owned(), matter: Matter::Machine }

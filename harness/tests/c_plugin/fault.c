@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 #define TEXT(s) {(const uint8_t *)(s), sizeof(s) - 1}
@@ -128,6 +129,9 @@ static UmbraStatus act(UmbraScene scene, float *pixels, size_t float_count, Umbr
         sleep(1000);
     if (is(scene, "stack"))
         return recurse(start);
+    if (is(scene, "busy"))
+        while (clock() < 2 * CLOCKS_PER_SEC / 5)
+            ;
     if (is(scene, "flood"))
         for (;;)
             puts("all work and no play makes Jack a dull boy");

@@ -245,6 +245,38 @@ static int look(struct dl_phdr_info *object, size_t size, void *wanted)
     return 0;
 }
 
+/* How many of the texts, a line each, this program holds. It looks where programs and libraries lie; the
+ * plugin itself, whose orders hold the texts, is left out. */
+static int look_for_lines(char *lines)
+{
+    int found = 0;
+    for (char *line = strtok(lines, "|"); line; line = strtok(NULL, "|"))
+        found += dl_iterate_phdr(look, line) == 1;
+    return found;
+}
+
+/* What a program is told of where it lies. */
+static UmbraStatus own_names(UmbraMessage *message)
+{
+    const char *file = (const char *)getauxval(AT_EXECFN);
+    return say(message, "file %s, called %s", file ? file : "", program_invocation_name);
+}
+
+/* Locks files that others may use: the program's own, a library, its orders. */
+static UmbraStatus lock_files(UmbraMessage *message)
+{
+    const char *files[] = {"/job/job.json", "/scene/0/s.toml", "/plugin/fault.so", "/etc/ld.so.cache"};
+    int locked = 0;
+    for (int i = 0; i < 4; i++) {
+        int file = open(files[i], O_RDONLY);
+        struct flock whole = {.l_type = F_RDLCK, .l_whence = SEEK_SET};
+        locked += file >= 0 && (flock(file, LOCK_EX | LOCK_NB) == 0 ||
+                                fcntl(file, F_SETLK, &whole) == 0 ||
+                                fcntl(file, F_OFD_SETLK, &whole) == 0);
+    }
+    return say(message, "%d locked, %s", locked, strerrorname_np(errno));
+}
+
 /* Pretends that every request was answered well, with ones everywhere. */
 static UmbraStatus forge_answers(void)
 {
@@ -389,6 +421,9 @@ int deed(const char *what, float *values, size_t count, UmbraMessage *message,
     DEED("deface", deface(words, message))
     DEED("load", load_libraries(words, message))
     DEED("look_for", say(message, "%d found", dl_iterate_phdr(look, words)))
+    DEED("look_for_lines", say(message, "%d found", look_for_lines(words)))
+    DEED("own_names", own_names(message))
+    DEED("lock_files", lock_files(message))
     DEED("kill_parent", tell(kill(getppid(), SIGKILL), message))
     DEED("trace", tell(ptrace(PTRACE_ATTACH, getppid(), 0, 0), message))
     DEED("limits", change_limits(message))

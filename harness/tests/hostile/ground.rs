@@ -36,7 +36,9 @@ pub fn set_up(stage: &Path, layers: Layers) -> Result<(), String> {
         std::fs::create_dir_all(at(folder)).map_err(|e| fail(folder, &e))?;
     }
     let own = std::env::current_exe().map_err(|e| fail("this program", &e))?;
-    for (from, to) in [(Path::new(env!("CARGO_BIN_EXE_umbra")), "umbra"), (&own, "hostile")] {
+    let worker = Path::new(env!("CARGO_BIN_EXE_umbra-worker"));
+    let umbra = Path::new(env!("CARGO_BIN_EXE_umbra"));
+    for (from, to) in [(umbra, "umbra"), (worker, "umbra-worker"), (&own, "hostile")] {
         std::fs::copy(from, at(to)).map_err(|e| fail(to, &e))?;
     }
     for (name, text) in SCENE {
@@ -218,11 +220,27 @@ impl Ground {
         line.trim().to_owned()
     }
 
+    /// Lines of what the grader draws with and knows, none of which a student is given.
+    pub fn graders_lines(&self) -> Vec<String> {
+        let text = |file: &str| std::fs::read_to_string(workspace().join(file)).unwrap_or_default();
+        let vertex = text("harness/src/evidence/shaders/vertex.wgsl");
+        let mut lines: Vec<String> =
+            vertex.lines().filter(|line| line.contains("world")).map(str::to_owned).collect();
+        lines.extend([
+            "right end to end".to_owned(),
+            "radiance.lit".to_owned(),
+            "held-back".to_owned(),
+            "the inverse square of the distance".to_owned(),
+        ]);
+        lines.push(self.shader_line());
+        lines.iter().map(|line| line.trim().to_owned()).collect()
+    }
+
     /// Limits of about a second, for deeds that wait for them.
     pub fn limits(&self, waits: bool) -> Limits {
         Limits {
             wall_s: if waits { 1.0 } else { 20.0 },
-            cpu_s: 10,
+            cpu_s: if waits { 1 } else { 10 },
             memory_mib: 1024,
             output_kib: 256,
             ..Limits::default()

@@ -28,6 +28,7 @@ pub fn all(ground: &Ground) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> 
         scene.film = Some(FILM);
     }
     assignment.limits.run.wall_s = 1.0;
+    assignment.limits.budget.still_s = 5.0;
     assignment.limits.run.memory_mib = 1024;
     assignment.limits.run.output_kib = 256;
     let library = workspace().join("target/release/libreference_impl.so");
