@@ -61,7 +61,7 @@ pub struct Patience<'a> {
 
 #[derive(Debug, Default)]
 struct State {
-    kinds: [OfKind; 5],
+    kinds: [OfKind; 8],
     retries: usize,
     cpu_s: f64,
     still_s: f64,
@@ -84,14 +84,16 @@ pub(super) struct Allowed {
     pub each_cpu_s: Vec<f64>,
 }
 
-/// A kind of question, as an index.
+/// A kind of question, as an index. Shadows are a matter of their own: who hangs in them is right without.
 fn kind(job: &Job, request: &Request) -> usize {
     match request {
         Request::EvalBsdf { .. } => 0,
-        Request::Radiance { .. } => 1,
-        Request::RenderOffline { .. } => 2,
-        Request::RenderRealtime { .. } if job.plugin.is_some() => 3,
-        Request::RenderRealtime { .. } => 4,
+        Request::Radiance { shadows, .. } => 1 + usize::from(*shadows),
+        Request::RenderOffline { shadows, .. } => 3 + usize::from(*shadows),
+        Request::RenderRealtime { shadow_map, .. } if job.plugin.is_some() => {
+            5 + usize::from(*shadow_map)
+        }
+        Request::RenderRealtime { .. } => 7,
     }
 }
 

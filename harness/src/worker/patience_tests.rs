@@ -69,8 +69,13 @@ fn one_confirmed_timeout_speaks_for_all_of_its_kind() {
     assert!(patience.again(&job, 0, &limits()).is_none(), "hanging renderers do not stall a batch");
     assert!(matches!(patience.timed_out(&job, 0, LATE, false), Outcome::TimedOut(_)));
     assert_eq!(over(0).and_then(|o| o.matter()), Some(Matter::Submission));
-    // Another kind of question is another matter.
+    // Another kind of question is another matter, and so are images without shadows.
     assert_eq!(over(1), None);
+    let mut plain = job.clone();
+    if let Request::RenderOffline { shadows, .. } = &mut plain.requests[0] {
+        *shadows = false;
+    }
+    assert_eq!(patience.is_over(&plain, &plain.requests[0]), None);
     assert!(patience.again(&job, 1, &limits()).is_some());
     patience.renew();
     assert_eq!(over(0), None);

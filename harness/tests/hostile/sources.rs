@@ -77,7 +77,7 @@ impl Source {
         }
         let limits = Limits {
             wall_s: if matches!(self.expect, Expect::TimedOut) { 1.5 } else { 30.0 },
-            cpu_s: if matches!(self.expect, Expect::TimedOut) { 2 } else { 30 },
+            cpu_s: if matches!(self.expect, Expect::TimedOut) { 1 } else { 30 },
             memory_mib: 2048,
             output_kib: 1024,
             file_size_mib: 64,
