@@ -53,8 +53,8 @@ pub enum Outcome {
     },
 }
 
-impl std::fmt::Display for Outcome {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Done(_) => f.write_str("answered"),
             Self::NotImplemented(task) => write!(f, "not implemented yet: {task}"),
@@ -65,9 +65,8 @@ impl std::fmt::Display for Outcome {
             Self::ExitedEarly(code) => {
                 write!(f, "the renderer exited early, with code {code} and no answer")
             }
-            Self::TimedOut => f.write_str("the renderer ran out of time"),
+            Self::TimedOut(late) => write!(f, "{late}"),
             Self::OutOfMemory => f.write_str("the renderer ran out of memory"),
-            Self::FloodedOutput => f.write_str("the renderer printed more than is allowed"),
             Self::FileTooLarge => f.write_str("the renderer wrote a larger file than is allowed"),
             Self::NoAdapter(message) => write!(f, "not run here: {message}"),
             Self::NotRun { reason, matter: Matter::Submission } => f.write_str(reason),
