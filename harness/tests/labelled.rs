@@ -6,7 +6,12 @@
 #[path = "labelled/answers.rs"]
 mod answers;
 
-use answers::{Answers, Labelled, labelled};
+use answers::{Answers, Labelled, Probe, labelled};
+use basecode::{Camera, CameraConfig, Vec3};
+use umbra::diagnosis::fit::{
+    Accuracy, Bound, Deviation, Fitted, Reflector, Sample, ShadowRay, Subject, Value, VertexSeen,
+    explain, explain_pass, explain_shadows, explain_vertex,
+};
 use umbra::diagnosis::{Stored, Tile, View};
 
 /// The least difference of two answers that counts, relatively.
@@ -77,4 +82,117 @@ fn none_is_a_catalogue_entry() {
         })
         .collect();
     assert!(known.is_empty(), "{known:?}");
+}
+
+/// A point that was shaded, as the fit takes it.
+fn sample(probe: &Probe, found: [f64; 3]) -> Sample {
+    let reflector = match probe.witness {
+        Some(witness) => Reflector::Witness(witness),
+        None => Reflector::Surface {
+            phong: probe.phong,
+            diffuse: probe.kd,
+            specular: probe.ks,
+            exponent: probe.n,
+            unscaled: probe.scales,
+        },
+    };
+    let Probe { wo, wi, r: distance, intensity, .. } = *probe;
+    // Answers are f32.
+    Sample { reflector, wo, wi, distance, intensity, found: found.map(|v| f64::from(v as f32)) }
+}
+
+/// What is said of a mistake's answers.
+fn said(mistake: &Labelled) -> Option<Fitted> {
+    match mistake.answers() {
+        Answers::Shading(all) => {
+            let samples: Vec<Sample> =
+                all.iter().map(|(probe, found)| sample(probe, *found)).collect();
+            let (subject, accuracy) = match mistake.part.as_str() {
+                "1.1" | "1.2" => (Subject::Bsdf, Accuracy { relative: 1e-3, stray: 2e-3 }),
+                "1.3" => (Subject::Radiance, Accuracy { relative: 5e-3, stray: 5e-3 }),
+                _ => (Subject::Color, Accuracy { relative: 1e-2, stray: 2e-2 }),
+            };
+            explain(&samples, subject, accuracy)
+        }
+        Answers::Shadows(all) => {
+            let ray = |(ray, found): &(answers::ShadowRay, f64)| ShadowRay {
+                distance: ray.r,
+                occluders: ray.occluders.clone(),
+                found: *found,
+            };
+            explain_shadows(&all.iter().map(ray).collect::<Vec<_>>())
+        }
+        Answers::Pass(all) => {
+            let bound = |(bound, found): &(answers::Bound, Vec3)| {
+                let answers::Bound { uniform, scene, object, expected, scale } = *bound;
+                let scene = scene.to_string();
+                Bound { uniform, scene, object, expected, found: *found, scale }
+            };
+            explain_pass(&all.iter().map(bound).collect::<Vec<_>>())
+        }
+        Answers::Vertex(all) => {
+            let config = CameraConfig {
+                eye: Vec3::new(1.0, 2.0, 5.0),
+                at: Vec3::ZERO,
+                up: Vec3::Y,
+                fov_y_deg: 40.0,
+            };
+            let camera = Camera::new(config, 40, 30).unwrap();
+            let seen = |(pixel, position, normal, at): &(answers::Pixel, Vec3, Vec3, [f64; 2])| {
+                VertexSeen {
+                    position: pixel.position,
+                    normal: pixel.normal,
+                    found_position: *position,
+                    found_normal: *normal,
+                    at: *at,
+                    belongs: pixel.ndc,
+                    view: camera.view(),
+                    projection: camera.projection(),
+                }
+            };
+            explain_vertex(&all.iter().map(seen).collect::<Vec<_>>())
+        }
+    }
+}
+
+/// Whether what is said is the label.
+fn is_label(mistake: &Labelled, deviations: &[Deviation]) -> bool {
+    let near = |a: f64, b: f64| (a - b).abs() <= 0.01 * (1.0 + b.abs());
+    let same = |deviation: &Deviation| {
+        mistake.changes.iter().any(|change| {
+            let value = match (&deviation.value, &change.value) {
+                (Value::Number(found), _) => change.value.as_f64().is_some_and(|v| near(*found, v)),
+                (Value::Three(found), _) => {
+                    let list = change.value.as_array();
+                    list.is_some_and(|list| {
+                        found.iter().zip(list).all(|(a, b)| near(*a, b.as_f64().unwrap()))
+                    })
+                }
+                (Value::Form(found), _) => change.value.as_str() == Some(found),
+            };
+            value && deviation.of.name() == change.term && deviation.quantity == change.quantity
+        })
+    };
+    mistake.label && deviations.len() == mistake.changes.len() && deviations.iter().all(same)
+}
+
+#[test]
+fn most_labels_are_found_and_no_other_is_said() {
+    let (mut right, mut silent, mut wrong) = (0, Vec::new(), Vec::new());
+    for mistake in labelled() {
+        let begin = std::time::Instant::now();
+        match said(&mistake) {
+            None if mistake.label => silent.push(mistake.name),
+            None => {}
+            Some(fitted) if is_label(&mistake, &fitted.deviations) => {
+                right += 1;
+                let words: Vec<&str> = fitted.deviations.iter().map(|d| &*d.words).collect();
+                println!("{}: {} ({:?})", mistake.name, words.join("; and "), begin.elapsed());
+            }
+            Some(fitted) => wrong.push(format!("{}: {fitted:?}", mistake.name)),
+        }
+    }
+    println!("{right} of 100 get their label, {} another\nsilent: {silent:#?}", wrong.len());
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert!(right >= 60, "{right}");
 }

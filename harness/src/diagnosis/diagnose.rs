@@ -3,8 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::catalogue::{Catalogue, KnownMistake};
+use super::fit::{
+    Accuracy, Fitted, Subject, explain, explain_pass, explain_shadows, explain_vertex,
+};
 use super::loops;
-use super::nearest::{Exhibit, Guess, Nearest, nearest};
+use super::nearest::{Exhibit, Guess, Nearest, is_black, nearest};
 use super::stored::{Material, Stored};
 use super::view::{Kind, Sightings, View};
 use crate::evidence::{Evidence, Picture, Verdict};
@@ -29,6 +32,9 @@ pub struct Diagnosis {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pictures: Vec<Picture>,
 }
+
+/// A known mistake that leaves less than this fraction of the difference is as good as exact.
+const EXACT: f64 = 0.05;
 
 /// All that a diagnosis is made from. Nothing of it comes from scenes that are held back.
 pub struct Facts<'a> {
@@ -123,20 +129,56 @@ impl Facts<'_> {
     fn part(&self, question: &Question) -> Option<Diagnosis> {
         let part = question.part;
         let own = |mistake: &KnownMistake| mistake.parts.iter().any(|own| own == part);
-        let failing = |mistake: &KnownMistake| mistake.parts.iter().any(|part| self.fails(part));
         let [isolated, image] = [question.isolated, &[question.image]]
             .map(|kinds| self.exhibits(kinds, question.material));
+        // Shadows where none should be: images of the bonus tell nothing of how it draws them.
+        if part == "2.5" && self.verdict_of("bonus.default", Verdict::Fail) {
+            return None;
+        }
         if part == "1.3" {
             return self.direct_light(&isolated, &image);
         }
-        let found = if isolated.is_empty() {
-            self.among(&image, own).or_else(|| self.among(&image, failing))
-        } else {
+        // An image that several parts spoil tells nothing of one of them.
+        let alone = || !self.failing.iter().any(|other| other != part && other.starts_with("2."));
+        let known = if !question.isolated.is_empty() {
             // What isolates a part may hide how it went wrong: a surface point that is overwritten
             // under a constant witness.
             self.among(&isolated, own).or_else(|| self.among(&image, own))
+        } else if question.image == Kind::Bonus || alone() {
+            self.among(&image, own)
+        } else {
+            None
         };
+        let found = self.better(self.fitted(part), known);
         found.map(|diagnosis| Diagnosis { part: part.to_owned(), ..diagnosis })
+    }
+
+    /// What the answers of a part say by themselves.
+    fn fitted(&self, part: &str) -> Option<Diagnosis> {
+        let (seen, bsdf) = (self.sightings, Accuracy { relative: 1e-3, stray: 2e-3 });
+        let shaded = |subject, accuracy| explain(seen.shaded.get(part)?, subject, accuracy);
+        let Fitted { deviations, unexplained } = match part {
+            "1.1" | "1.2" => shaded(Subject::Bsdf, bsdf),
+            "1.3" => shaded(Subject::Radiance, Accuracy { relative: 5e-3, stray: 5e-3 }),
+            "1.4" => explain_shadows(&seen.shadow_rays),
+            "2.1" => explain_pass(&seen.bound),
+            "2.2" => explain_vertex(&seen.vertices),
+            "2.3" | "2.4" => shaded(Subject::Color, Accuracy { relative: 1e-2, stray: 2e-2 }),
+            _ => None,
+        }?;
+        let words: Vec<&str> = deviations.iter().map(|deviation| &*deviation.words).collect();
+        Some(Diagnosis { words: words.join("; and "), ..self.known(&[], unexplained, 1.0) })
+    }
+
+    /// A known mistake that is as good as exact has the better words; what is fitted is exact.
+    fn better(&self, fitted: Option<Diagnosis>, known: Option<Diagnosis>) -> Option<Diagnosis> {
+        let exact = |known: &Diagnosis| {
+            known.mistakes.len() == 1 && known.factor.is_none() && known.unexplained < EXACT
+        };
+        match (fitted, known) {
+            (Some(_), Some(known)) if exact(&known) => Some(known),
+            (fitted, known) => fitted.or(known),
+        }
     }
 
     /// Part 1.3 is radiance along rays, and the loop that makes an image of it.
@@ -148,7 +190,8 @@ impl Facts<'_> {
         let loop_fails = self.verdict_of("loop.agreement", Verdict::Fail);
         let radiance = || {
             let seen = if lit.is_empty() { image } else { lit };
-            self.among(seen, |mistake| own(mistake) && !looping(mistake))
+            let known = self.among(seen, |mistake| own(mistake) && !looping(mistake));
+            self.better(self.fitted("1.3"), known)
         };
         let by_loop = || {
             // Scenes that nothing is stored of are held back.
@@ -191,7 +234,13 @@ impl Facts<'_> {
                 counts: stored.materials.iter().map(counts).collect(),
             })
         });
-        exhibits.collect()
+        let exhibits: Vec<Exhibit> = exhibits.collect();
+        // Darkness is an answer to whether a point is lit, and elsewhere has any reason.
+        let lightless = |kind: &Kind| matches!(kind, Kind::Shadow | Kind::Bonus);
+        if !kinds.iter().all(lightless) && is_black(&exhibits) {
+            return Vec::new();
+        }
+        exhibits
     }
 
     /// What some views look like, among some of the known mistakes.
@@ -207,7 +256,10 @@ impl Facts<'_> {
             }
         }
         let Nearest { guess, distance, runner_up } = nearest(exhibits, &names)?;
+        let family = |name: &str| self.catalogue.named(name).map(|known| &known.family);
         Some(match guess {
+            // What two of a kind explain together is rather a third.
+            Guess::Two(a, b) if family(&a) == family(&b) => return None,
             Guess::One(name) => self.known(&[&name], distance, runner_up),
             Guess::Two(a, b) => self.known(&[&a, &b], distance, runner_up),
             Guess::Factor(factor) => self.known(&[], distance, runner_up).times(factor),

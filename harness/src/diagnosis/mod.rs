@@ -3,6 +3,7 @@
 
 mod catalogue;
 mod diagnose;
+pub mod fit;
 mod loops;
 mod nearest;
 mod stored;

@@ -15,12 +15,14 @@ const FLOOR: f32 = 1e-3;
 /// Mean difference from what is right below which there is nothing to explain.
 const NOTHING: f64 = 1e-5;
 /// A single mistake is named when it leaves less than this fraction of the difference unexplained.
-/// Measured: a mistake that the catalogue lacks leaves more, but for its own kin.
-const SINGLE: f64 = 0.2;
+/// Measured: a mistake that the catalogue lacks leaves more.
+const SINGLE: f64 = 0.05;
 /// The same for a constant factor.
-const FACTOR: f64 = 0.1;
+const FACTOR: f64 = 0.03;
+/// A factor that is nearer to 1 is none.
+const NO_FACTOR: f32 = 5e-3;
 /// The same for two mistakes together, which fit more easily.
-const PAIR: f64 = 0.1;
+const PAIR: f64 = 0.02;
 /// What is named must leave less than this fraction of what the runner-up leaves.
 const CLEARLY: f64 = 0.5;
 /// Pairs are compared on so many views at most, those that differ most.
@@ -82,7 +84,7 @@ pub fn nearest(exhibits: &[Exhibit], names: &[&str]) -> Option<Nearest> {
     }
     let factor = common_factor(&shown, |exhibit| exhibit.right.clone());
     let left = distance(&shown, &|exhibit| exhibit.right.map(|value| factor * value));
-    if left < FACTOR {
+    if left < FACTOR && (factor - 1.0).abs() > NO_FACTOR {
         return Some(Nearest { guess: Guess::Factor(factor), distance: left, runner_up: 1.0 });
     }
     let mut most = shown;
@@ -95,7 +97,7 @@ pub fn nearest(exhibits: &[Exhibit], names: &[&str]) -> Option<Nearest> {
     for (i, first) in names.iter().enumerate() {
         let factor = common_factor(&most, |exhibit| exhibit.tile(first).clone());
         let left = distance(&most, &|exhibit| exhibit.tile(first).map(|value| factor * value));
-        if left < CLEARLY * single[i] {
+        if left < CLEARLY * single[i] && (factor - 1.0).abs() > NO_FACTOR {
             pairs.push((left, Guess::Scaled((*first).to_owned(), factor)));
         }
         for (j, second) in names.iter().enumerate().skip(i + 1) {
@@ -113,6 +115,24 @@ pub fn nearest(exhibits: &[Exhibit], names: &[&str]) -> Option<Nearest> {
 pub fn from_right(exhibits: &[Exhibit]) -> f64 {
     let shown: Vec<_> = exhibits.iter().map(|exhibit| (exhibit, scale(exhibit))).collect();
     total(&shown, |exhibit| exhibit.right.clone()).mean()
+}
+
+/// So much of what shines must be dark for answers to be black.
+const BLACK: f64 = 0.98;
+
+/// Whether nearly everything is black that should shine: it may be so for any reason.
+pub fn is_black(exhibits: &[Exhibit]) -> bool {
+    let (mut shining, mut dark) = (0usize, 0usize);
+    for exhibit in exhibits {
+        let values = exhibit.seen.values().iter().zip(exhibit.right.values());
+        for ((seen, right), _) in values.zip(&exhibit.counts).filter(|(_, counts)| **counts) {
+            if right.element_sum() > 0.0 && !seen.is_nan() {
+                shining += 1;
+                dark += usize::from(seen.abs().element_sum() <= 1e-6);
+            }
+        }
+    }
+    shining > 0 && dark as f64 >= BLACK * shining as f64
 }
 
 impl Exhibit<'_> {

@@ -5,6 +5,7 @@ use std::fmt;
 
 use basecode::Image;
 
+use super::fit::{Bound, Sample, ShadowRay, VertexSeen};
 use super::tile::Tile;
 
 /// What was asked.
@@ -104,6 +105,14 @@ pub struct Sightings {
     pub tiles: BTreeMap<View, Tile>,
     /// By scene: radiance along the centres of all pixels, and the image that its own loop made of it.
     pub loops: BTreeMap<String, LoopSeen>,
+    /// By part: points that were shaded, and the answers.
+    pub shaded: BTreeMap<&'static str, Vec<Sample>>,
+    /// Shadow rays with their occluders, where shadows are wrong.
+    pub shadow_rays: Vec<ShadowRay>,
+    /// What the render pass bound.
+    pub bound: Vec<Bound>,
+    /// What the vertex stage forwards.
+    pub vertices: Vec<VertexSeen>,
 }
 
 /// The same pixels twice: along the host's rays, and by the renderer's own loop.

@@ -287,11 +287,12 @@ fn hint(mut ratios: Vec<f64>, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Stri
     }
     ratios.sort_by(f64::total_cmp);
     let at = |fraction: f64| ratios[((ratios.len() - 1) as f64 * fraction) as usize];
-    let (low, median, high) = (at(0.1), at(0.5), at(0.9));
+    let (low, median, high) = (at(0.005), at(0.5), at(0.995));
     if median.abs() < 1e-6 && high.abs() < 1e-6 {
         return "the BSDF is black".into();
     }
-    if (high - low).abs() < 0.002 * median.abs() {
+    let factor = (median - 1.0).abs() > 0.005;
+    if factor && (high - low).abs() < 0.002 * median.abs() {
         return match ratio_name(median) {
             Some(factor) => format!("off by a constant factor: {factor}"),
             None => format!("off by a constant factor of {median:.4}"),

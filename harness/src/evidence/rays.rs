@@ -126,7 +126,6 @@ impl Difference {
         let (mut wrong, mut apart, mut total) = (0usize, 0.0, 0.0);
         let mut worst = (0.0, 0, [0.0; 3]);
         let mut ratios = Vec::new();
-        let mut by_distance = Vec::new();
         for (index, value) in answer.values[..batch.lit].iter().enumerate() {
             let point = &batch.points[index];
             let expected = batch.unshadowed(index, (answer.bsdf)(point));
@@ -139,7 +138,6 @@ impl Difference {
                 total += b;
                 if b > 0.0 && a.is_finite() {
                     ratios.push(a / b);
-                    by_distance.push((a / b, point));
                 }
             }
             wrong += usize::from(excess > 1.0);
@@ -168,53 +166,30 @@ impl Difference {
                 found[1],
                 found[2]
             ),
-            hint: factor_hint(&mut ratios, &by_distance),
+            hint: factor_hint(&mut ratios),
         }
     }
 }
 
-/// Names the factor between actual and expected, when it is constant or a power of something known.
-fn factor_hint(ratios: &mut [f64], at: &[(f64, &SurfacePoint)]) -> String {
+/// Names the factor between actual and expected, when it is constant. What else may be wrong is told
+/// from all scenes together, by the diagnosis.
+fn factor_hint(ratios: &mut [f64]) -> String {
     if ratios.is_empty() {
         return "radiance is not a number".into();
     }
-    let spread = |values: &mut [f64]| {
-        values.sort_by(f64::total_cmp);
-        let percentile = |f: f64| values[((values.len() - 1) as f64 * f) as usize];
-        (percentile(0.5), percentile(0.95) - percentile(0.05))
-    };
-    let (median, width) = spread(ratios);
+    ratios.sort_by(f64::total_cmp);
+    let at = |fraction: f64| ratios[((ratios.len() - 1) as f64 * fraction) as usize];
+    let (median, width) = (at(0.5), at(0.99) - at(0.01));
     if median.abs() < 1e-6 && width < 1e-6 {
         return "radiance is 0 where the light is in sight".into();
     }
-    if width < 4e-3 * median.abs() {
-        return match ratio_name(median) {
-            Some(factor) => format!("off by a constant factor: {factor}"),
-            None => format!("off by a constant factor of {median:.4}"),
-        };
+    if width > 4e-3 * median.abs() || (median - 1.0).abs() < 4e-3 {
+        return String::new();
     }
-    type Factor = (&'static str, fn(&SurfacePoint) -> f64);
-    let factors: [Factor; 6] = [
-        ("cos theta_i is multiplied twice: eval() holds it already", |p| f64::from(p.wi.z)),
-        ("divided by cos theta_i", |p| 1.0 / f64::from(p.wi.z)),
-        ("the inverse square of the distance is missing", |p| f64::from(p.distance).powi(2)),
-        ("divided by r instead of r^2", |p| f64::from(p.distance)),
-        ("divided by r^3 or more", |p| 1.0 / f64::from(p.distance)),
-        ("divided by r^4: the square of the distance is taken twice", |p| {
-            f64::from(p.distance).powi(-2)
-        }),
-    ];
-    for (name, factor) in factors {
-        let mut rest: Vec<f64> = at.iter().map(|(ratio, point)| ratio / factor(point)).collect();
-        let (median, width) = spread(&mut rest);
-        if width < 4e-3 * median.abs() {
-            return match ratio_name(median) {
-                Some(also) => format!("{name}, and a factor {also}"),
-                None => name.to_owned(),
-            };
-        }
+    match ratio_name(median) {
+        Some(factor) => format!("off by a constant factor: {factor}"),
+        None => format!("off by a constant factor of {median:.4}"),
     }
-    String::new()
 }
 
 /// Part 1.4: judges visibility, from the radiance along all rays with shadows (`with`) and without
@@ -242,6 +217,7 @@ pub fn judge_shadows(
     let ignores_switch = with == without;
     let (mut lit_wrong, mut dark_wrong, mut lit_black) = (0usize, 0usize, 0usize);
     let mut first: Option<(usize, f64)> = None;
+    let (mut lit_seen, mut dark_seen) = (Vec::new(), Vec::new());
     for index in 0..batch.rays.len() {
         let expected = batch.unshadowed(index, bsdf(&batch.points[index]));
         let is_lit = index < batch.lit;
@@ -250,6 +226,7 @@ pub fn judge_shadows(
             continue;
         }
         let visibility = visibility(with[index], without[index], expected);
+        if is_lit { &mut lit_seen } else { &mut dark_seen }.push(visibility);
         // What is no number is never right.
         let right = (visibility - f64::from(u8::from(is_lit))).abs() < HALF_LIGHT;
         let changed = is_lit && !same_shading(shaded.0[index], shaded.1[index]);
@@ -302,7 +279,7 @@ pub fn judge_shadows(
                 u8::from(index < batch.lit),
             );
             let check = Check::new(id, &batch.scene, Verdict::Fail, summary);
-            check.with_hint(shadow_hint(lit_fraction, dark_fraction))
+            check.with_hint(shadow_hint(&mut lit_seen, &mut dark_seen))
         }
     };
     check.error = if check.verdict == Verdict::Pass { 0.0 } else { lit_fraction + dark_fraction };
@@ -383,15 +360,42 @@ fn is_black(radiance: [f32; 3], expected: [f64; 3]) -> bool {
     !shines
 }
 
-fn shadow_hint(lit: f64, dark: f64) -> String {
-    match (lit > STRAY_FRACTION, dark > STRAY_FRACTION) {
-        (false, true) if dark > 0.99 => "no point is in shadow: is visibility tested at all?".into(),
-        (true, false) if lit > 0.99 => "nothing is lit when shadows are on".into(),
-        (false, true) => "some occluders are missed: look at the shadow ray's min_t and max_t".into(),
-        (true, false) => {
-            "lit points are in shadow: does the shadow ray end at the light, and start off the surface?".into()
-        }
-        _ => "the shadow ray does not lead from the surface to the light".into(),
+/// What the visibilities of lit and of shadowed rays say.
+fn shadow_hint(lit: &mut [f64], dark: &mut [f64]) -> String {
+    let wrong = |values: &[f64], right: f64| {
+        let off = values.iter().filter(|v| (*v - right).abs() >= HALF_LIGHT).count();
+        off as f64 > STRAY_FRACTION * values.len() as f64
+    };
+    // The one value that nearly all have.
+    let level = |values: &mut [f64]| {
+        values.sort_by(f64::total_cmp);
+        let at = |fraction: f64| values[((values.len() - 1) as f64 * fraction) as usize];
+        (!values.is_empty() && at(0.99) - at(0.01) < HALF_LIGHT).then(|| at(0.5))
+    };
+    let bright = |values: &[f64]| values.iter().all(|v| v.min((1.0 - v).abs()) < HALF_LIGHT);
+    let percent = |v: f64| 100.0 * v;
+    match (wrong(lit, 1.0), wrong(dark, 0.0)) {
+        (false, true) => match level(dark) {
+            Some(left) if left > 1.0 - HALF_LIGHT => {
+                "no point is in shadow: is visibility tested at all?".into()
+            }
+            Some(left) => format!("shadows leave {:.0} % of the light", percent(left)),
+            None if bright(dark) => {
+                "some occluders are missed: look at the shadow ray's min_t and max_t".into()
+            }
+            None => String::new(),
+        },
+        (true, false) => match level(lit) {
+            Some(left) if left < HALF_LIGHT => "nothing is lit when shadows are on".into(),
+            Some(left) => {
+                format!("with shadows on, lit points keep {:.0} % of their light", percent(left))
+            }
+            None if bright(lit) => {
+                "lit points are in shadow: does the shadow ray end at the light, and start off the surface?".into()
+            }
+            None => String::new(),
+        },
+        _ => String::new(),
     }
 }
 

@@ -94,7 +94,7 @@ impl BoundValue {
     }
 
     /// What a right pass binds for a shape; nothing where the contract leaves it open.
-    fn expected(self, scene: &Scene, camera: &Camera, shape: usize) -> Option<Vec3> {
+    pub fn expected(self, scene: &Scene, camera: &Camera, shape: usize) -> Option<Vec3> {
         let material = scene.material_of(shape);
         let phong = material.model == MaterialModel::Phong;
         let scale = material.energy_scale();

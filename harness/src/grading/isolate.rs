@@ -10,6 +10,7 @@ use super::ask::{self, Asker};
 use super::case::Case;
 use super::draw::{Frame, STAGES, draw_each, draw_scenes, named};
 use super::realtime::Stages;
+use super::seen;
 use crate::diagnosis::{Kind, Tile, View};
 use crate::evidence::images;
 use crate::evidence::stages::{
@@ -66,9 +67,13 @@ pub fn isolate(
                 Err(outcome) => return swap_failed(id, case, &[], outcome),
             };
             match images.as_slice() {
-                [positions, normals] => vertex(case, positions, normals),
+                [positions, normals] => {
+                    seen::vertex(asker, case, positions, normals);
+                    vertex(case, positions, normals)
+                }
                 [image] => {
                     see_fragment(asker, case, image, index == 2);
+                    seen::fragment(asker, case, image, index == 2);
                     fragment(id, case, image, index == 2, tolerances)
                 }
                 _ => {
@@ -76,7 +81,14 @@ pub fn isolate(
                 }
             }
         };
-        let mut checks = vec![pass_check(case, &pass)];
+        let pass = match bound_values(case, &pass) {
+            Ok(frames) => {
+                seen::pass(asker, case, &frames);
+                judge_bound(case, &frames)
+            }
+            Err(check) => *check,
+        };
+        let mut checks = vec![pass];
         checks.extend((0..STAGES.len()).map(stage));
         checks
     });
@@ -133,20 +145,34 @@ fn images<'a>(case: &Case, outcomes: &'a [Outcome]) -> Result<Vec<Image>, &'a Ou
 }
 
 fn pass_check(case: &Case, outcomes: &[Outcome]) -> Check {
+    match bound_values(case, outcomes) {
+        Ok(frames) => judge_bound(case, &frames),
+        Err(check) => *check,
+    }
+}
+
+/// Each bound value with the frame that shows it, or else the check that says why there is none.
+fn bound_values(case: &Case, outcomes: &[Outcome]) -> Result<Vec<(BoundValue, Image)>, Box<Check>> {
     let images = match images(case, outcomes) {
         Ok(images) => images,
-        Err(outcome) => return swap_failed("pass.uniforms", case, &["2.1"], outcome),
+        Err(outcome) => {
+            return Err(Box::new(swap_failed("pass.uniforms", case, &["2.1"], outcome)));
+        }
     };
     // Each frame shows another value. A pass with pipelines of its own takes no stages of ours.
     let is_same = |image: &Image| image.pixels == images[0].pixels;
     let shows = |image: &Image| image.pixels.iter().any(|pixel| *pixel != Vec3::ZERO);
     if images.iter().all(is_same) && images.iter().any(shows) {
         let summary = "swap not possible: the pass draws the same under all stages";
-        return Check::new("pass.uniforms", &case.entry.name, Verdict::NotJudged, summary);
+        let check = Check::new("pass.uniforms", &case.entry.name, Verdict::NotJudged, summary);
+        return Err(Box::new(check));
     }
-    let frames: Vec<_> = BoundValue::ALL.into_iter().zip(images).collect();
+    Ok(BoundValue::ALL.into_iter().zip(images).collect())
+}
+
+fn judge_bound(case: &Case, frames: &[(BoundValue, Image)]) -> Check {
     let (scene, small) = (&case.expected.scene, &case.small);
-    judge_pass(&case.entry.name, scene, &small.surface, &small.unshadowed_mask, &frames)
+    judge_pass(&case.entry.name, scene, &small.surface, &small.unshadowed_mask, frames)
 }
 
 fn vertex(case: &Case, positions: &Image, normals: &Image) -> Check {

@@ -16,6 +16,7 @@ mod pipeline;
 mod realtime;
 mod record;
 mod sampler;
+mod seen;
 mod shared;
 
 pub use case::{Case, Small};

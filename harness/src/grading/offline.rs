@@ -7,6 +7,7 @@ use renderer_api as api;
 
 use super::ask::{self, Asker};
 use super::case::Case;
+use super::seen;
 use crate::diagnosis::{self, LoopSeen, Tile, View};
 use crate::evidence::bsdf::{self, BsdfKind, BsdfProbe};
 use crate::evidence::images::{self, Kind};
@@ -74,11 +75,14 @@ pub fn probe_bsdfs(asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
             Outcome::Done(answer) => {
                 let mut check = bsdf::judge(*kind, probes, ask::colours(&answer.values));
                 check.scene.clone_from(scene);
-                let seen = match kind {
+                let view = match kind {
                     BsdfKind::Diffuse => diagnosis::Kind::Diffuse,
                     BsdfKind::Phong => diagnosis::Kind::Phong,
                 };
-                asker.see(View::new(seen, scene), Tile::of_list(ask::colours(&answer.values)));
+                asker.see(View::new(view, scene), Tile::of_list(ask::colours(&answer.values)));
+                if scene.is_empty() {
+                    seen::bsdf(asker, *kind, probes, ask::colours(&answer.values));
+                }
                 check
             }
             other => match kind {
@@ -202,7 +206,17 @@ pub fn judge_scene(
             .collect();
         checks.push(judge_unshadowed(case, &asked));
         let flat = |point: &SurfacePoint| witness_value(FLAT, point);
-        checks.push(judge_shadows(case, &flat, (flat_on, flat_off), (true_on, true_off)));
+        let shadows = judge_shadows(case, &flat, (flat_on, flat_off), (true_on, true_off));
+        for ((witness, _), outcome) in WITNESSES.iter().zip(witnessed) {
+            if let Some(values) = seen::colours(outcome) {
+                seen::radiance(asker, case, *witness, values);
+            }
+        }
+        let both = seen::colours(flat_on).zip(seen::colours(flat_off));
+        if let (Verdict::Fail, Some((with, without))) = (shadows.verdict, both) {
+            seen::shadows(asker, case, with, without);
+        }
+        checks.push(shadows);
         see_rays(asker, case, w1, (flat_on, flat_off));
     }
     checks.push(match (one_spp, at_centres) {

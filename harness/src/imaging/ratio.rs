@@ -19,18 +19,20 @@ pub struct RegionRatio {
     pub pixels: usize,
     /// Median of actual over expected (mean of the channels).
     pub median: f64,
-    /// Half of the distance between the 16th and 84th percentile, over the median: small if the factor is constant.
+    /// Half of the distance between the 2nd and 98th percentile, over the median: small if the factor is constant.
     pub spread: f64,
 }
 
 impl RegionRatio {
-    /// The factor's name, if it is constant over the region and has one.
+    /// The factor's name, if it is constant over the region and has one. A factor near 1 must be the
+    /// more constant: whatever varies a little looks like 0.99 somewhere.
     pub fn name(&self) -> Option<&'static str> {
-        (self.spread < 0.05).then(|| ratio_name(self.median)).flatten()
+        let apart = self.median.abs().max(f64::MIN_POSITIVE).ln().abs();
+        (self.spread < 0.05 * apart.min(1.0)).then(|| ratio_name(self.median)).flatten()
     }
 }
 
-/// The name of a factor that a known mistake produces, within 0.4 %; 1 has none.
+/// The name of a factor that a known mistake produces, within 0.4 %, those near 1 the closer; 1 has none.
 pub fn ratio_name(ratio: f64) -> Option<&'static str> {
     let named = [
         (PI, "pi"),
@@ -52,7 +54,11 @@ pub fn ratio_name(ratio: f64) -> Option<&'static str> {
         (0.99, "0.99"),
         (1.0 / 0.99, "1/0.99"),
     ];
-    named.into_iter().find(|(factor, _)| (ratio / factor - 1.0).abs() < 4e-3).map(|(_, name)| name)
+    let margin = |factor: f64| 4e-3f64.min(0.1 * factor.ln().abs());
+    named
+        .into_iter()
+        .find(|(factor, _)| (ratio / factor - 1.0).abs() < margin(*factor))
+        .map(|(_, name)| name)
 }
 
 /// The ratio actual / expected of every lit region, over interior pixels brighter than a hundredth of the brightest.
@@ -84,7 +90,7 @@ pub fn region_ratios(actual: &Image, expected: &Image, mask: &RegionMask) -> Vec
             f64::from(values[(fraction * (values.len() - 1) as f64).round() as usize])
         };
         let median = at(0.5);
-        let spread = if median > 0.0 { 0.5 * (at(0.84) - at(0.16)) / median } else { f64::MAX };
+        let spread = if median > 0.0 { 0.5 * (at(0.98) - at(0.02)) / median } else { f64::MAX };
         found.push(RegionRatio {
             region: mask.regions[i / 2].name.clone(),
             highlight: i % 2 == 1,
@@ -108,7 +114,8 @@ mod tests {
         assert_eq!(ratio_name(0.3175), Some("1/pi"));
         assert_eq!(ratio_name(12.57), Some("4 pi"));
         assert_eq!(ratio_name(0.5), Some("1/2"));
-        for nothing in [1.0, 0.0, f64::NAN, f64::INFINITY, 1.02, 3.2, -2.0] {
+        assert_eq!((ratio_name(0.9902), ratio_name(1.0101)), (Some("0.99"), Some("1/0.99")));
+        for nothing in [1.0, 0.987, 1.013, 0.0, f64::NAN, f64::INFINITY, 1.02, 3.2, -2.0] {
             assert_eq!(ratio_name(nothing), None, "{nothing}");
         }
     }

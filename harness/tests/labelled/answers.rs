@@ -66,6 +66,8 @@ pub struct ShadowRay {
 #[derive(Clone, Debug)]
 pub struct Bound {
     pub uniform: &'static str,
+    pub scene: usize,
+    pub object: usize,
     pub expected: Vec3,
     pub scale: f64,
 }
@@ -325,7 +327,7 @@ impl Labelled {
                     ("material.exponent", Vec3::new(n, 0.0, 1.0)),
                 ] {
                     let scale = f64::from(scale);
-                    all.push((Bound { uniform, expected, scale }, camera));
+                    all.push((Bound { uniform, scene, object, expected, scale }, camera));
                 }
             }
         }

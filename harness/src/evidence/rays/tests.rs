@@ -66,8 +66,10 @@ fn unshadowed_radiance_is_judged_on_lit_rays_only() {
 
 #[test]
 fn known_factors_are_named() {
-    assert!(unshadowed(|_, p| f64::from(p.wi.z)).hint.contains("twice"));
-    assert!(unshadowed(|_, p| f64::from(p.distance).powi(2)).hint.contains("inverse square"));
+    for varying in [|p: &SurfacePoint| p.wi.z, |p: &SurfacePoint| p.distance.powi(2).min(1.3)] {
+        assert_eq!(unshadowed(|_, p| f64::from(varying(p))).hint, "");
+    }
+    assert_eq!(unshadowed(|index, _| if index < 3 { 0.9 } else { 1.0 }).hint, "");
     assert!(unshadowed(|_, _| 4.0 * std::f64::consts::PI).hint.contains("4 pi"));
     assert!(unshadowed(|_, _| 0.0).hint.contains("is 0"));
 }
@@ -119,6 +121,12 @@ fn visibility_is_judged_apart_from_radiance() {
     assert_eq!(shadows(|_| 0.0, |i| 1.0 - right(i)).verdict, Verdict::Fail);
     let some = shadows(|index| if index < 45 { 1.0 } else { 0.0 }, |_| 1.0);
     assert!((some.error - 0.25).abs() < 1e-9 && some.hint.contains("occluders"));
+    let hint = |with: &dyn Fn(usize) -> f64| shadows(with, |_| 1.0).hint;
+    assert!(hint(&|_| 1.0).contains("visibility tested"));
+    assert!(hint(&|_| 0.0).contains("nothing is lit"));
+    assert_eq!(hint(&|i| right(i).max(0.1)), "shadows leave 10 % of the light");
+    assert_eq!(hint(&|i| 0.8 * right(i)), "with shadows on, lit points keep 80 % of their light");
+    assert_eq!(hint(&|i| right(i).max(0.02 * (i % 30) as f64)), "");
 }
 
 #[test]

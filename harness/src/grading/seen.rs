@@ -1,0 +1,224 @@
+//! Keeps answers together with the geometry that they depend on, for what is fitted to them. Only
+//! of public scenes: what is said of them is read by students.
+
+use basecode::{Image, MaterialModel, Ray, Scene, Vec3};
+
+use super::ask::{self, Asker};
+use super::case::Case;
+use crate::diagnosis::fit::{Bound, Reflector, Sample, ShadowRay, VertexSeen};
+use crate::evidence::bsdf::{BsdfKind, BsdfProbe};
+use crate::evidence::stages::BoundValue;
+use crate::expected::SurfacePoint;
+use crate::imaging::reference::RegionMask;
+use crate::plugin::Witness;
+
+/// So many answers of each kind are kept of a scene.
+const KEPT: usize = 300;
+/// So far behind the light, in distances to it, occluders are looked for.
+const REACH: f32 = 4.0;
+/// So many occluders of one ray are looked for.
+const MOST_OCCLUDERS: usize = 16;
+/// Shadow rays leave the surface so far from it, relatively to the light's distance: nearer hits
+/// are the surface itself.
+const START: f32 = 1e-4;
+/// So many of a shape's pixels must show the same value.
+const SAME: f64 = 0.9;
+
+/// Answers to the probes of a BSDF given by value.
+pub fn bsdf(asker: &Asker, kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) {
+    let samples = probes.iter().zip(values).map(|(probe, value)| {
+        let material = &probe.query.material;
+        Sample {
+            reflector: Reflector::Surface {
+                phong: kind == BsdfKind::Phong,
+                diffuse: material.diffuse.map(f64::from),
+                specular: material.specular.map(f64::from),
+                exponent: f64::from(material.exponent),
+                unscaled: true,
+            },
+            wo: probe.query.wo.map(f64::from),
+            wi: probe.query.wi.map(f64::from),
+            distance: 1.0,
+            intensity: [1.0; 3],
+            found: value.map(f64::from),
+        }
+    });
+    keep(asker, if kind == BsdfKind::Phong { "1.2" } else { "1.1" }, samples);
+}
+
+/// Unshadowed radiance along lit rays under a witness.
+pub fn radiance(asker: &Asker, case: &Case, witness: Witness, values: &[[f32; 3]]) {
+    let batch = &case.small.batch;
+    let lit = batch.points[..batch.lit].iter().zip(values);
+    let samples = few(lit, batch.lit).map(|(point, value)| {
+        sample(Reflector::Witness(witness), point, batch.intensity, value.map(f64::from))
+    });
+    if !case.held_back {
+        keep(asker, "1.3", samples);
+    }
+}
+
+/// Radiance with and without shadows under a witness.
+pub fn shadows(asker: &Asker, case: &Case, with: &[[f32; 3]], without: &[[f32; 3]]) {
+    let (batch, scene) = (&case.small.batch, &case.expected.scene);
+    if case.held_back {
+        return;
+    }
+    let sum = |value: &[f32; 3]| value.iter().map(|&v| f64::from(v)).sum::<f64>();
+    let pairs = batch.points.iter().zip(with.iter().zip(without));
+    let rays = few(pairs, batch.points.len()).filter_map(|(point, (with, without))| {
+        let found = sum(with) / sum(without);
+        found.is_finite().then(|| ShadowRay {
+            distance: f64::from(point.distance),
+            occluders: occluders(scene, point),
+            found,
+        })
+    });
+    if let Ok(mut sightings) = asker.sightings.lock() {
+        sightings.shadow_rays.extend(rays);
+    }
+}
+
+/// How far off everything is that blocks light, from a point toward the light and beyond.
+fn occluders(scene: &Scene, point: &SurfacePoint) -> Vec<f64> {
+    let direction = (scene.first_light_position() - point.position) / point.distance;
+    let step = START * point.distance.max(1.0);
+    let (mut from, mut found) = (step, Vec::new());
+    while found.len() < MOST_OCCLUDERS {
+        let ray = Ray::segment(point.position, direction, from, REACH * point.distance);
+        let Some(hit) = scene.intersect(&ray) else { break };
+        let t = (hit.p - point.position).length();
+        if !scene.material_of(hit.shape).is_emitter() {
+            found.push(f64::from(t));
+        }
+        from = t.max(from) + step;
+    }
+    found
+}
+
+/// What one of the two fragment stages draws under a pass and a vertex stage of ours.
+pub fn fragment(asker: &Asker, case: &Case, image: &Image, phong: bool) {
+    let (small, scene) = (&case.small, &case.expected.scene);
+    if case.held_back {
+        return;
+    }
+    let own: Vec<(&SurfacePoint, &Vec3)> = interior(case)
+        .filter(|(_, point)| {
+            let model = scene.material_of(point.shape).model;
+            model != MaterialModel::Mirror && (model == MaterialModel::Phong) == phong
+        })
+        .filter_map(|(index, point)| Some((point, image.pixels.get(index)?)))
+        .collect();
+    let count = own.len();
+    let samples = few(own.into_iter(), count).map(|(point, pixel)| {
+        let material = scene.material_of(point.shape);
+        let colour = |colour: Vec3| (material.energy_scale() * colour).to_array().map(f64::from);
+        let reflector = Reflector::Surface {
+            phong,
+            diffuse: colour(material.diffuse.average()),
+            specular: colour(material.specular.average()),
+            exponent: f64::from(material.exponent),
+            unscaled: false,
+        };
+        sample(reflector, point, small.batch.intensity, pixel.to_array().map(f64::from))
+    });
+    keep(asker, if phong { "2.4" } else { "2.3" }, samples);
+}
+
+/// The values that a student's pass bound, each shown by a frame.
+pub fn pass(asker: &Asker, case: &Case, frames: &[(BoundValue, Image)]) {
+    let (small, scene) = (&case.small, &case.expected.scene);
+    let Ok(camera) = scene.camera(small.surface.width, small.surface.height) else { return };
+    let mut seen = Vec::new();
+    for (bound, image) in frames {
+        for (object, _) in scene.shapes().iter().enumerate() {
+            let Some(expected) = bound.expected(scene, &camera, object) else { continue };
+            let own = interior(case).filter(|(_, point)| point.shape == object);
+            let values: Vec<Vec3> =
+                own.filter_map(|(index, _)| image.pixels.get(index).copied()).collect();
+            let Some(&first) = values.get(values.len() / 2) else { continue };
+            let alike = values.iter().filter(|value| value.abs_diff_eq(first, 1e-4)).count();
+            // Several values on one object are explained by none.
+            let found = if alike as f64 >= SAME * values.len() as f64 { first } else { Vec3::NAN };
+            seen.push(Bound {
+                uniform: bound.name(),
+                scene: case.entry.name.clone(),
+                object,
+                expected,
+                found,
+                scale: f64::from(scene.material_of(object).energy_scale()),
+            });
+        }
+    }
+    if let (Ok(mut sightings), false) = (asker.sightings.lock(), case.held_back) {
+        sightings.bound.extend(seen);
+    }
+}
+
+/// What a student's vertex stage forwards.
+pub fn vertex(asker: &Asker, case: &Case, positions: &Image, normals: &Image) {
+    let surface = &case.small.surface;
+    let (width, height) = (surface.width, surface.height);
+    let Ok(camera) = case.expected.scene.camera(width, height) else { return };
+    let (view, projection) = (camera.view(), camera.projection());
+    let pixels = surface.pixels.iter().zip(&case.small.unshadowed_mask.pixels).enumerate();
+    let seen = pixels.filter_map(|(index, ((_, point), value))| {
+        if value & (RegionMask::EDGE | RegionMask::EMITTER) != 0 {
+            return None;
+        }
+        let (found_position, found_normal) = (positions.pixels[index], normals.pixels[index]);
+        let ndc = |i: usize, of: usize| (2 * i + 1) as f64 / of as f64 - 1.0;
+        let clip = projection * view * found_position.extend(1.0);
+        Some(VertexSeen {
+            position: point.as_ref().map_or(Vec3::NAN, |point| point.position),
+            normal: point.as_ref().map_or(Vec3::NAN, |point| point.normal),
+            found_position,
+            found_normal,
+            at: [ndc(index % width, width), -ndc(index / width, height)],
+            belongs: [clip.x / clip.w, clip.y / clip.w].map(f64::from),
+            view,
+            projection,
+        })
+    });
+    if let (Ok(mut sightings), false) = (asker.sightings.lock(), case.held_back) {
+        sightings.vertices.extend(seen);
+    }
+}
+
+/// Pixels of the small film away from edges and emitters, with what they show.
+fn interior(case: &Case) -> impl Iterator<Item = (usize, &SurfacePoint)> {
+    let small = &case.small;
+    let pixels = small.surface.pixels.iter().zip(&small.unshadowed_mask.pixels).enumerate();
+    pixels.filter_map(|(index, ((_, point), value))| {
+        let clear = value & (RegionMask::EDGE | RegionMask::EMITTER) == 0;
+        point.as_ref().filter(|_| clear).map(|point| (index, point))
+    })
+}
+
+fn sample(reflector: Reflector, point: &SurfacePoint, light: Vec3, found: [f64; 3]) -> Sample {
+    let three = |v: Vec3| v.to_array().map(f64::from);
+    Sample {
+        reflector,
+        wo: three(point.wo),
+        wi: three(point.wi),
+        distance: f64::from(point.distance),
+        intensity: three(light),
+        found,
+    }
+}
+
+/// Every n-th of `count`, so that about [`KEPT`] are left.
+fn few<T>(all: impl Iterator<Item = T>, count: usize) -> impl Iterator<Item = T> {
+    all.step_by(count.div_ceil(KEPT).max(1))
+}
+
+fn keep(asker: &Asker, part: &'static str, samples: impl Iterator<Item = Sample>) {
+    if let Ok(mut sightings) = asker.sightings.lock() {
+        sightings.shaded.entry(part).or_default().extend(samples);
+    }
+}
+
+/// Answers under a witness as colours, where there are any.
+pub fn colours(outcome: &crate::worker::Outcome) -> Option<&[[f32; 3]]> {
+    outcome.answer().map(|answer| ask::colours(&answer.values))
+}
