@@ -196,3 +196,38 @@ fn most_labels_are_found_and_no_other_is_said() {
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert!(right >= 60, "{right}");
 }
+
+#[test]
+fn of_two_at_once_nothing_else_is_said() {
+    let all = labelled();
+    let (mut both, mut silent, mut wrong) = (0, 0, Vec::new());
+    for part in ["1.1", "1.2", "1.3", "2.3", "2.4"] {
+        let own: Vec<&Labelled> =
+            all.iter().filter(|m| m.part == part && m.changes.len() == 1).collect();
+        // Some of all pairs, always the same.
+        let pairs =
+            own.iter().enumerate().flat_map(|(i, a)| own[..i].iter().map(move |b| (*a, *b)));
+        for (a, b) in pairs.step_by(7) {
+            let (one, other) = (&a.changes[0], &b.changes[0]);
+            // Two of a kind are one: n + 2 in exponent and normalisation, a factor and 1/pi.
+            let kind = |quantity: &str| match quantity {
+                "pi" | "factor" | "channels" => "constant".to_owned(),
+                other => other.split('_').next().unwrap().replace("normalisation", "exponent"),
+            };
+            if kind(&one.quantity) == kind(&other.quantity) {
+                continue;
+            }
+            let changes = vec![one.clone(), other.clone()];
+            let name = format!("{} + {}", a.name, b.name);
+            let mistake = Labelled { name, changes, label: a.label && b.label, ..a.clone() };
+            match said(&mistake) {
+                None => silent += 1,
+                Some(fitted) if is_label(&mistake, &fitted.deviations) => both += 1,
+                Some(fitted) => wrong.push(format!("{}: {fitted:?}", mistake.name)),
+            }
+        }
+    }
+    println!("{both} pairs are told, {silent} are not, {} are told another", wrong.len());
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert!(both >= silent / 4, "{both} of {}", both + silent);
+}

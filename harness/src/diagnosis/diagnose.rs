@@ -139,7 +139,10 @@ impl Facts<'_> {
             return self.direct_light(&isolated, &image);
         }
         // An image that several parts spoil tells nothing of one of them.
-        let alone = || !self.failing.iter().any(|other| other != part && other.starts_with("2."));
+        let spoils = |other: &String| {
+            other != part && ["2.1", "2.2", "2.3", "2.4"].contains(&other.as_str())
+        };
+        let alone = || !self.failing.iter().any(spoils);
         let known = if !question.isolated.is_empty() {
             // What isolates a part may hide how it went wrong: a surface point that is overwritten
             // under a constant witness.

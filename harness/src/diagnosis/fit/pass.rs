@@ -138,7 +138,8 @@ fn of_uniform(bound: &[Bound], name: &'static str) -> Option<Deviation> {
             all.push(say("power", Value::Number(f64::from(power)), words));
         }
     }
-    let forms: [(&'static str, &str, fn(f32) -> f32); 3] = [
+    type Form = (&'static str, &'static str, fn(f32) -> f32);
+    let forms: [Form; 3] = [
         ("truncated", "is truncated to an integer", f32::trunc),
         ("rounded", "is rounded to an integer", f32::round),
         ("ceiled", "is rounded up to an integer", f32::ceil),

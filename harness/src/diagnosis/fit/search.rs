@@ -126,13 +126,14 @@ impl<'a> Search<'a> {
         if kept.iter().filter(above).all(|sample| sample.found == [0.0; 3]) {
             return None;
         }
-        // A prime stride: probes come in regular order.
+        // An odd stride: probes come in regular order.
         let stride = (lit.div_ceil(FITTED)).max(2) | 1;
         let (mut fitted, mut verifying, mut index) = (Vec::new(), Vec::new(), 0);
         for sample in &kept {
             let is_lit = above(&sample);
             index += usize::from(is_lit);
-            let list = if is_lit && index % stride == 0 { &mut fitted } else { &mut verifying };
+            let list =
+                if is_lit && index.is_multiple_of(stride) { &mut fitted } else { &mut verifying };
             list.push(*sample);
         }
         let right = |sample: &&Sample| Formula::RIGHT.value(sample).iter().sum::<f64>() / 3.0;

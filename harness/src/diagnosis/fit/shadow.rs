@@ -112,6 +112,9 @@ impl Limit {
     }
 }
 
+/// A name for a place on a ray, and what it is for an occluder at a distance.
+type Along = (&'static str, fn(&ShadowRay, f64) -> f64);
+
 /// Where rays end or begin, when visibility is all or nothing.
 fn limits(rays: &[ShadowRay]) -> Option<Vec<Deviation>> {
     let between = |ray: &&ShadowRay| ray.found > SAME && ray.found < 1.0 - SAME;
@@ -123,7 +126,7 @@ fn limits(rays: &[ShadowRay]) -> Option<Vec<Deviation>> {
     let wrong = rays.iter().filter(|ray| right(ray) != is_dark(ray)).count();
     // A limit must explain nearly all that is wrong.
     let limit = |asked| limit(asked, OTHERWISE * wrong as f64);
-    let ends: [(&str, fn(&ShadowRay, f64) -> f64); 3] = [
+    let ends: [Along; 3] = [
         ("end_fraction", |ray, t| t / ray.distance),
         ("end_absolute", |_, t| t),
         ("end_minus", |ray, t| t - ray.distance),
@@ -136,8 +139,7 @@ fn limits(rays: &[ShadowRay]) -> Option<Vec<Deviation>> {
     });
     let ends: Vec<(&str, Limit)> = fits.filter(|_| lit_where_nothing_is(rays)).collect();
     // ... and when the farthest one before the light lies behind its start.
-    let starts: [(&str, fn(&ShadowRay, f64) -> f64); 2] =
-        [("start", |_, t| -t), ("start_fraction", |ray, t| -t / ray.distance)];
+    let starts: [Along; 2] = [("start", |_, t| -t), ("start_fraction", |ray, t| -t / ray.distance)];
     let fits = starts.into_iter().filter_map(|(quantity, of)| {
         let asked = rays.iter().filter_map(|ray| {
             let last = ray.occluders.iter().rev().find(|t| **t < ray.distance)?;

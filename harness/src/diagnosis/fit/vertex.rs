@@ -76,7 +76,6 @@ fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
 
 /// What is forwarded as position or normal: nothing wrong, or the one thing that it is; no answer
 /// when it is neither.
-#[expect(clippy::option_option, reason = "three answers: unknown, right, wrong in this way")]
 fn forwarded(pixels: &[&VertexSeen], of: Of) -> Option<Option<Deviation>> {
     let is_position = of == Of::Position;
     let found = |p: &VertexSeen| if is_position { p.found_position } else { p.found_normal };
