@@ -7,7 +7,7 @@ use crate::expected::Expected;
 use crate::imaging::compare::{compare_offline, compare_realtime_linear, compare_srgb8};
 use crate::imaging::evidence::{CompareError, ImageEvidence, Tolerances};
 use crate::imaging::origin::{same_draws, same_levels};
-use crate::imaging::ratio::region_ratios;
+use crate::imaging::ratio::{RegionRatio, region_ratios};
 use crate::imaging::reference::{Region, RegionMask};
 
 /// How an image came about, which decides how it is compared.
@@ -207,13 +207,18 @@ fn relative_error(actual: &Image, expected: &Image, mask: &RegionMask) -> f64 {
     (apart + broken as f64 * brightest) / total.max(f64::MIN_POSITIVE)
 }
 
-/// Names a factor that whole regions share.
+/// Names the factors that whole regions are off by; nothing where a region is off by anything else,
+/// since then a constant factor is not what is wrong.
 fn ratio_hint(actual: &Image, expected: &Image, mask: &RegionMask) -> String {
-    let named = region_ratios(actual, expected, mask).into_iter().filter_map(|ratio| {
-        let name = ratio.name()?;
-        Some(format!("{} is off by a constant factor: {name}", ratio.region))
-    });
-    let mut named: Vec<String> = named.collect();
+    let off = |ratio: &RegionRatio| (ratio.median - 1.0).abs() > 4e-3 || ratio.spread > 0.01;
+    let off = region_ratios(actual, expected, mask).into_iter().filter(off);
+    let named: Option<Vec<String>> = off
+        .map(|ratio| {
+            let name = ratio.name()?;
+            Some(format!("{} is off by a constant factor: {name}", ratio.region))
+        })
+        .collect();
+    let mut named = named.unwrap_or_default();
     named.dedup();
     named.truncate(3);
     named.join("; ")

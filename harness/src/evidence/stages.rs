@@ -257,10 +257,13 @@ pub fn judge_vertex(
              another world normal than expected"
         );
         let error = fraction(wrong_position.max(wrong_normal));
-        let hint = match (missing * 2 > counted, wrong_position > wrong_normal) {
-            (true, _) => "nothing is drawn where it should be: look at the clip-space position",
-            (false, true) => "look at the model matrix and at what is forwarded as position",
-            (false, false) => "look at the normal matrix and at what is forwarded as normal",
+        // Elsewhere it may be either, or the clip-space position: what the diagnosis tells.
+        let most = |wrong: usize| wrong * 2 > counted;
+        let hint = match (most(missing), most(wrong_position), most(wrong_normal)) {
+            (true, ..) => "nothing is drawn where it should be: look at the clip-space position",
+            (_, true, false) => "look at the model matrix and at what is forwarded as position",
+            (_, false, true) => "look at the normal matrix and at what is forwarded as normal",
+            _ => "",
         };
         Check { error, ..Check::new(id, scene_name, Verdict::Fail, summary) }.with_hint(hint)
     };
