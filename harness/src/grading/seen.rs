@@ -65,8 +65,11 @@ pub fn shadows(asker: &Asker, case: &Case, with: &[[f32; 3]], without: &[[f32; 3
         return;
     }
     let sum = |value: &[f32; 3]| value.iter().map(|&v| f64::from(v)).sum::<f64>();
-    let pairs = batch.points.iter().zip(with.iter().zip(without));
-    let rays = few(pairs, batch.points.len()).filter_map(|(point, (with, without))| {
+    let asked: Vec<_> = batch.points.iter().zip(with.iter().zip(without)).collect();
+    // Of a large lit floor and a small shadow, as many of either.
+    let (lit, dark) = asked.split_at(batch.lit.min(asked.len()));
+    let chosen = few(lit.iter(), lit.len()).chain(few(dark.iter(), dark.len()));
+    let rays = chosen.filter_map(|&(point, (with, without))| {
         let found = sum(with) / sum(without);
         found.is_finite().then(|| ShadowRay {
             distance: f64::from(point.distance),
