@@ -2,14 +2,19 @@
 //! commas. They prove the grader and feed the diagnosis; without one the plain renderer runs.
 //!
 //! The plain renderer stays plain: what can go wrong in a BSDF, the integrator or the render loop
-//! is written down once more here, with a switch at every place where students slip. A mistake of
-//! a shader is another text in one of its lines. `harness/data/mistakes.json` says of every name
-//! what it looks like and which parts it belongs to.
+//! is written down once more here, with a switch at every place where students slip, and at some
+//! where they do otherwise and are right. A mistake of a shader is another text in one of its lines.
+//! `harness/data/mistakes.json` says of every name what it looks like and which parts it belongs to.
 
 mod bsdfs;
+mod film;
 mod integrator;
+mod names;
 mod pass;
+mod phong;
 mod render;
+mod samples;
+mod shadow;
 mod stages;
 
 use std::borrow::Cow;
@@ -17,7 +22,8 @@ use std::borrow::Cow;
 use basecode::gpu::Stage;
 use basecode::{Bsdf, Error, Film, Integrator, Material, MaterialModel, RenderJob, Result, Scene};
 
-pub use pass::spoil as spoil_pass;
+pub use names::Mistake;
+pub use pass::{spoil as spoil_pass, spoil_frame};
 
 /// What was asked for: nothing, nearly always.
 #[derive(Clone, Debug, Default)]
@@ -26,115 +32,14 @@ pub struct Mistakes {
     stages: Vec<&'static str>,
 }
 
-macro_rules! mistakes {
-    ($($variant:ident = $name:literal,)*) => {
-        /// One mistake outside the shaders.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[allow(missing_docs)] // `harness/data/mistakes.json` describes them.
-        pub enum Mistake { $($variant,)* }
-
-        impl Mistake {
-            /// All of them, with their names.
-            const ALL: &'static [(Self, &'static str)] = &[$((Self::$variant, $name),)*];
-        }
-    };
-}
-
-mistakes! {
-    DiffuseNoPi = "diffuse-no-pi",
-    DiffusePiTwice = "diffuse-pi-twice",
-    DiffusePiRounded = "diffuse-pi-rounded",
-    DiffuseNoCosine = "diffuse-no-cosine",
-    DiffuseAbsCosine = "diffuse-abs-cosine",
-    DiffuseNoWoTest = "diffuse-no-wo-test",
-    DiffuseNoWiTest = "diffuse-no-wi-test",
-    DiffuseScaled = "diffuse-scaled",
-    DiffuseTextureIgnored = "diffuse-texture-ignored",
-    DiffuseChannelsSwapped = "diffuse-channels-swapped",
-    PhongNoPi = "phong-no-pi",
-    PhongNoCosine = "phong-no-cosine",
-    PhongAbsCosine = "phong-abs-cosine",
-    PhongNoWoTest = "phong-no-wo-test",
-    PhongNoWiTest = "phong-no-wi-test",
-    PhongBlinn = "phong-blinn",
-    PhongReflectSign = "phong-reflect-sign",
-    PhongReflectForgotten = "phong-reflect-forgotten",
-    PhongUnnormalised = "phong-unnormalised",
-    PhongNPlusOne = "phong-n-plus-1",
-    PhongNOverTwoPi = "phong-n-over-2pi",
-    PhongExponentPlusOne = "phong-exponent-plus-1",
-    PhongPowBeforeClamp = "phong-pow-before-clamp",
-    PhongNoClamp = "phong-no-clamp",
-    PhongNoScale = "phong-no-scale",
-    PhongScaleDiffuseOnly = "phong-scale-diffuse-only",
-    PhongScaleSpecularOnly = "phong-scale-specular-only",
-    PhongSpecularWithoutCosine = "phong-specular-without-cosine",
-    PhongKdKsSwapped = "phong-kd-ks-swapped",
-    PhongTextureIgnored = "phong-texture-ignored",
-    PhongChannelsSwapped = "phong-channels-swapped",
-    WorldWi = "frame-world-wi",
-    GeometricNormal = "frame-geometric-normal",
-    WiNotNormalised = "frame-wi-not-normalised",
-    WiReversed = "frame-wi-reversed",
-    TwoCosines = "light-two-cosines",
-    NoFalloff = "light-no-falloff",
-    OverR = "light-over-r",
-    OverRCubed = "light-over-r-cubed",
-    TimesFourPi = "light-times-4pi",
-    OverFourPi = "light-over-4pi",
-    FirstVertex = "light-first-vertex",
-    Centroid = "light-vertex-mean",
-    GreyIntensity = "light-grey",
-    NoShadows = "shadow-none",
-    ShadowInverted = "shadow-inverted",
-    ShadowNoMaxT = "shadow-no-max-t",
-    ShadowMaxTSquared = "shadow-max-t-r2",
-    ShadowEpsilon = "shadow-epsilon",
-    ShadowAcne = "shadow-acne",
-    ShadowReversed = "shadow-reversed",
-    ShadowHalf = "shadow-half",
-    ShadowHitReused = "shadow-hit-reused",
-    SameSeed = "sampler-same-seed",
-    SharedSampler = "sampler-shared",
-    PixelCorner = "loop-pixel-corner",
-    JitterShifted = "loop-jitter-shifted",
-    NotAveraged = "loop-not-averaged",
-    FewerSamples = "loop-fewer-samples",
-    BlackNotCounted = "loop-black-not-counted",
-    FlippedRows = "film-flipped-rows",
-    MirroredColumns = "film-mirrored-columns",
-    Transposed = "film-transposed",
-    Gamma = "film-gamma",
-    Clamped = "film-clamped",
-    LastPixelMissing = "film-last-pixel-missing",
-    DebugMark = "film-debug-mark",
-    Dithered = "film-dithered",
-    HorizontalFov = "camera-horizontal-fov",
-    CameraUnset = "pass-camera-unset",
-    HalfPixel = "pass-half-pixel",
-    LightPositionUnset = "pass-light-position-unset",
-    LightIntensityUnset = "pass-light-intensity-unset",
-    RhoDUnset = "pass-rho-d-unset",
-    RhoSUnset = "pass-rho-s-unset",
-    ExponentUnset = "pass-exponent-unset",
-    FirstMaterialForAll = "pass-first-material-for-all",
-    AlwaysDiffuse = "pass-always-diffuse",
-    LastObjectMissing = "pass-last-object-missing",
-    RhoNotScaled = "pass-rho-not-scaled",
-    ShadowMapNone = "shadow-map-none",
-    ShadowMapAlways = "shadow-map-always",
-    ShadowMapHalf = "shadow-map-half",
-}
-
 impl Mistakes {
     /// Adds a mistake by its name.
     ///
     /// # Errors
     /// When there is none of this name.
     pub fn add(&mut self, name: &str) -> Result<()> {
-        let code = Mistake::ALL.iter().find(|(_, known)| *known == name);
-        let mut stages = stages::ALL.iter().chain(stages::HARMLESS);
-        let stage = stages.find(|mistake| mistake.name == name);
+        let code = Mistake::WRONG.iter().chain(Mistake::RIGHT).find(|(_, known)| *known == name);
+        let stage = stages::all().find(|mistake| mistake.name == name);
         self.made.extend(code.map(|(mistake, _)| *mistake));
         self.stages.extend(stage.map(|mistake| mistake.name));
         if code.is_none() && stage.is_none() {
@@ -168,7 +73,7 @@ impl Mistakes {
         }
         Some(match material.model {
             MaterialModel::Diffuse => Box::new(bsdfs::Diffuse::new(self, material)),
-            _ => Box::new(bsdfs::Phong::new(self, material)),
+            _ => Box::new(phong::Phong::new(self, material)),
         })
     }
 

@@ -1,16 +1,19 @@
 //! The proof of the grader: right renderers lose nothing, known mistakes cost the parts that they
 //! belong to and no other. The renderer is the reference with a switch on.
 
-#[path = "../../reference_impl/src/mistakes/stages.rs"]
+#[path = "../../reference_impl/src/mistakes/stages/mod.rs"]
 mod stages;
 
 mod choice;
 mod confirm;
 mod deletion;
 mod figures;
+mod price;
 mod row;
 mod sources;
+mod together;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -46,10 +49,14 @@ pub struct Arguments {
     /// Scenes on their own films; without it the large ones are drawn at 128x96
     #[arg(long)]
     full: bool,
-    /// What CI runs. Left out: pairs; right variants, but one for each number of samples and what
-    /// is no mistake; of each mistake the path, offline or realtime, that it cannot show on
+    /// What CI runs: of right renderers one for each number of samples and each other way to be
+    /// right, a third of the mistakes, 60 pairs and 20 triples of these; and of each the path,
+    /// offline or realtime, that it can show on
     #[arg(long, conflicts_with = "full")]
     quick: bool,
+    /// Grade every mistake alone and write what it costs to this file, nothing else
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["quick", "only"])]
+    table: Option<PathBuf>,
     /// Print the evidence behind every point lost
     #[arg(long)]
     explain: bool,
@@ -120,12 +127,18 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
     };
 
     row::print_header(&assignment);
-    if arguments.quick {
+    if arguments.quick || arguments.table.is_some() {
         bench.grade_plain()?;
+    }
+    if let Some(file) = &arguments.table {
+        let singles = bench.grade_all(&singles(&catalogue), jobs)?;
+        std::fs::write(file, price::table(&catalogue, &singles))
+            .with_context(|| file.display().to_string())?;
+        return summary(&[figures::singles(&singles)]);
     }
     let mut right = Vec::new();
     for (index, spp) in choice::SPP.into_iter().enumerate() {
-        let all = variants(spp);
+        let all = variants(&catalogue, spp);
         let chosen = chosen(if arguments.quick { choice::few(all, index) } else { all });
         for case in &mut bench.grading.cases {
             case.spp = spp.unwrap_or(case.spp);
@@ -138,13 +151,20 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         }
     }
     bench.reset(&store)?;
+    let mut single = singles(&catalogue);
+    if arguments.quick {
+        single = single.into_iter().step_by(choice::QUICK_STEP).collect();
+    }
+    let together = Together::new(&bench, &catalogue, &single, arguments.quick, &chosen);
     let pairs = if arguments.quick { Vec::new() } else { pairs(&catalogue)? };
     let matrix = Matrix {
         variants: right,
-        singles: bench.grade_all(&chosen(singles(&catalogue)), jobs)?,
+        singles: bench.grade_all(&chosen(single), jobs)?,
         pairs: bench.grade_all(&chosen(pairs), jobs)?,
     };
     let mut figures = figures::of_matrix(&matrix);
+    let combined = together.pairs.len() + together.triples.len();
+    figures.extend(together.figures(&bench, &catalogue, &matrix.singles, jobs)?);
     let rules = deletion::figure(&matrix, &assignment.rules);
     // Some rules show in pairs alone, some in right variants.
     if arguments.only.is_none() && !arguments.quick {
@@ -156,10 +176,64 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         figures.push(confirm::figure(&bench, &store, few, jobs)?);
     }
     let sources = sources::grade(root, &umbra, &assignment.rules, &named, arguments)?;
-    let graded = matrix.variants.len() + matrix.singles.len() + matrix.pairs.len();
+    let graded = matrix.variants.len() + matrix.singles.len() + matrix.pairs.len() + combined;
     ensure!(graded > 0 || unseen || sources.is_some(), "nothing has a name like that");
     figures.extend(sources);
     summary(&figures)
+}
+
+/// Mistakes that are made together, to see that no part gains by it.
+struct Together {
+    pairs: Vec<Subject>,
+    triples: Vec<Subject>,
+}
+
+impl Together {
+    fn new(
+        bench: &Bench,
+        catalogue: &Catalogue,
+        single: &[Subject],
+        quick: bool,
+        chosen: &dyn Fn(Vec<Subject>) -> Vec<Subject>,
+    ) -> Self {
+        let fits = |names: &[String]| bench.stages(names).is_ok();
+        let names: Vec<&str> =
+            single.iter().flat_map(|s| &s.mistakes).map(String::as_str).collect();
+        let drawn = |size, count| together::drawn(catalogue, &names, size, count, &fits);
+        let (pairs, triples) = if quick {
+            (drawn(2, choice::QUICK_PAIRS), drawn(3, choice::QUICK_TRIPLES))
+        } else {
+            (together::pairs(catalogue, &fits), drawn(3, choice::TRIPLES))
+        };
+        Self { pairs: chosen(pairs), triples: chosen(triples) }
+    }
+
+    /// Grades them, and each of their mistakes alone that is not among `known`.
+    fn figures(
+        &self,
+        bench: &Bench,
+        catalogue: &Catalogue,
+        known: &[Row],
+        jobs: usize,
+    ) -> Result<Vec<Figure>> {
+        let wanted = |single: &Subject| {
+            let name = &single.mistakes[0];
+            let own = self.pairs.iter().chain(&self.triples).any(|s| s.mistakes.contains(name));
+            own && !known.iter().any(|row| row.subject.mistakes == single.mistakes)
+        };
+        let missing: Vec<Subject> = singles(catalogue).into_iter().filter(wanted).collect();
+        let missing = bench.grade_all(&missing, jobs)?;
+        let singles: BTreeMap<&str, &Row> = known
+            .iter()
+            .chain(&missing)
+            .map(|row| (row.subject.mistakes[0].as_str(), row))
+            .collect();
+        let of = |name, subjects: &[Subject]| {
+            let rows = bench.grade_all(subjects, jobs)?;
+            Ok::<_, anyhow::Error>(together::figure(name, &rows, &singles))
+        };
+        Ok(vec![of("monotone_pairs", &self.pairs)?, of("monotone_triples", &self.triples)?])
+    }
 }
 
 /// The line of figures; an error with all complaints before it when a figure is not full.

@@ -64,7 +64,7 @@ fn mistakes(context: &mut Context) -> anyhow::Result<u8> {
     let context = &*context;
     let reference = context.reference().context("there is no reference renderer here")?;
     let catalogue = Catalogue::known()?;
-    let mistakes: Vec<_> = catalogue.mistakes.iter().filter(|m| !m.proves_a_rule()).collect();
+    let mistakes: Vec<_> = catalogue.mistakes.iter().filter(|m| m.is_stored()).collect();
     let (folder, stored) = context.with_store(|store| {
         let adapter = Adapter { kind: AdapterKind::Software, name: String::new() };
         let grading = Grading::prepare(store, adapter, None, &INTERRUPTED)?;

@@ -14,6 +14,38 @@ const TEXT: &str = include_str!("../../data/mistakes.json");
 pub struct Catalogue {
     /// The mistakes, by family.
     pub mistakes: Vec<KnownMistake>,
+    /// What students do otherwise and right: it must cost nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub right: Vec<RightVariant>,
+}
+
+/// Another way to be right.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RightVariant {
+    /// The reference's switch.
+    pub name: String,
+    /// The path that it is about: `offline` or `realtime`.
+    pub path: String,
+    /// What it does.
+    pub does: String,
+}
+
+/// How much a fair teacher would take off for a mistake, decided from the handout before anything
+/// was measured. `xtask verdicts` has the range of each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Class {
+    /// One constant, sign, power, index or division is wrong.
+    Slip,
+    /// Something that the handout asks for is missing.
+    Concept,
+    /// What the part is about is not there at all.
+    Nothing,
+    /// No image of the assignment shows it, probes do.
+    Hidden,
+    /// Worth a remark, no points.
+    Finding,
 }
 
 /// One thing that students get wrong.
@@ -26,20 +58,35 @@ pub struct KnownMistake {
     pub family: String,
     /// The parts that it belongs to, such as `1.3`: what it must cost, and all that it may.
     pub parts: Vec<String>,
+    /// How much it should cost.
+    pub class: Class,
     /// The findings that it leads to although it costs nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<String>,
     /// Other mistakes that look the same in everything that is asked: they are named together.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alike: Vec<String>,
+    /// Whether the reference's answers with it are stored, for the diagnosis to compare with. The
+    /// others prove the grader only.
+    #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
+    pub stored: bool,
     /// For the student, after the words "looks like:".
     pub looks_like: String,
+}
+
+fn yes() -> bool {
+    true
 }
 
 impl KnownMistake {
     /// Whether it was made so that one rule alone sees it. No student makes it, no diagnosis names it.
     pub fn proves_a_rule(&self) -> bool {
         self.family == "seen by one rule"
+    }
+
+    /// Whether the diagnosis can name it.
+    pub fn is_stored(&self) -> bool {
+        self.stored && !self.proves_a_rule()
     }
 }
 
@@ -101,7 +148,7 @@ mod tests {
     #[test]
     fn the_catalogue_is_whole() {
         let catalogue = Catalogue::known().unwrap();
-        assert!(catalogue.mistakes.len() >= 40, "{}", catalogue.mistakes.len());
+        assert!(catalogue.mistakes.len() >= 200, "{}", catalogue.mistakes.len());
         let families: std::collections::BTreeSet<_> =
             catalogue.mistakes.iter().map(|mistake| mistake.family.as_str()).collect();
         assert!(families.len() >= 10, "{families:?}");
@@ -113,13 +160,17 @@ mod tests {
         }
         for mistake in &catalogue.mistakes {
             assert!(mistake.parts.iter().all(|part| parts.contains(&part.as_str())), "{mistake:?}");
+            let free = mistake.class == Class::Finding;
+            assert_eq!(free, mistake.parts.is_empty(), "{mistake:?}");
         }
     }
 
     #[test]
     fn contradictions_are_refused() {
         let entry = |parts: &str| {
-            format!(r#"{{"name": "a", "family": "f", "parts": [{parts}], "looks_like": "x"}}"#)
+            format!(
+                r#"{{"name": "a", "family": "f", "parts": [{parts}], "class": "slip", "looks_like": "x"}}"#
+            )
         };
         let list = |entries: &[String]| format!(r#"{{"mistakes": [{}]}}"#, entries.join(","));
         let right = entry(r#""1.1""#);

@@ -10,7 +10,7 @@ mod stored;
 mod tile;
 mod view;
 
-pub use catalogue::{Catalogue, CatalogueError, KnownMistake};
+pub use catalogue::{Catalogue, CatalogueError, Class, KnownMistake, RightVariant};
 pub use diagnose::{Diagnosis, Facts};
 pub use stored::{Material, Stored, StoredError, StoredView};
 pub use tile::{LENGTH, Tile};

@@ -1,7 +1,10 @@
 //! Mistakes in direct illumination: the steps of `crate::integrators::simple`, with switches.
 
-use basecode::{Frame, Integrator, Ray, Sampler, Scene, Shape, SurfaceInteraction, Vec3};
+use std::f32::consts::PI;
 
+use basecode::{Frame, INV_PI, Integrator, Ray, Sampler, Scene, Shape, SurfaceInteraction, Vec3};
+
+use super::shadow::visibility;
 use super::{Mistake as M, Mistakes};
 
 pub struct Mistaken {
@@ -13,50 +16,110 @@ impl Integrator for Mistaken {
     fn radiance(&self, scene: &Scene, ray: &Ray, _sampler: &Sampler) -> Vec3 {
         let has = |mistake| self.mistakes.has(mistake);
         let Some(mut i) = scene.intersect(ray) else {
-            return Vec3::ZERO;
+            return match () {
+                () if has(M::BackgroundGrey) => Vec3::splat(0.1),
+                () if has(M::BackgroundWhite) => Vec3::ONE,
+                () => Vec3::ZERO,
+            };
         };
-        let to_light = self.light_position(scene) - i.p;
-        let distance = to_light.length();
+        let to_light = self.to_light(scene, ray, &i);
+        let distance = if has(M::ShadingInF64) {
+            to_light.as_dvec3().length() as f32
+        } else {
+            to_light.length()
+        };
         let direction = to_light / distance;
+        self.turn(&mut i, ray, to_light);
+        let cos_i = Frame::cos_theta(i.wi);
+        let cos_o = Frame::cos_theta(i.wo);
+        let mut visible = 1.0;
+        if self.shadows && !has(M::NoShadows) {
+            visible = visibility(&self.mistakes, scene, ray, &mut i, (direction, distance));
+        }
+        if visible == 0.0 || has(M::IntegratorBlack) {
+            return Vec3::ZERO;
+        }
+        if has(M::TestsInIntegrator) && (cos_i <= 0.0 || cos_o <= 0.0) {
+            return Vec3::ZERO;
+        }
+        let incident = self.incident(scene, if has(M::RayDistance) { i.t } else { distance });
+        let mut radiance = visible * self.reflected(scene, &i) * incident;
+        if has(M::TwoCosines) {
+            radiance *= cos_i;
+        }
+        if has(M::LightCosO) {
+            radiance *= cos_o;
+        }
+        if has(M::CosineInIntegrator) {
+            // Where wi is as long as the way to the light, so is its cosine.
+            radiance *= direction.dot(i.frame_ns.n).max(0.0);
+        }
+        if has(M::PiInIntegrator) {
+            radiance *= INV_PI;
+        }
+        radiance
+    }
+}
+
+impl Mistaken {
+    fn to_light(&self, scene: &Scene, ray: &Ray, i: &SurfaceInteraction) -> Vec3 {
+        let light = self.light_position(scene);
+        match () {
+            () if self.mistakes.has(M::FromOrigin) => light,
+            () if self.mistakes.has(M::FromCamera) => light - ray.origin,
+            () => light - i.p,
+        }
+    }
+
+    /// Sets the frame and the directions in it.
+    fn turn(&self, i: &mut SurfaceInteraction, ray: &Ray, to_light: Vec3) {
+        let has = |mistake| self.mistakes.has(mistake);
+        let direction = to_light.normalize();
         if has(M::GeometricNormal) {
             i.frame_ns = Frame::from_normal(i.ng);
-            i.wo = i.frame_ns.to_local(-ray.direction);
         }
+        if has(M::NormalNegated) {
+            i.frame_ns = Frame::from_normal(-i.frame_ns.n);
+        }
+        if has(M::OtherTangents) {
+            let Frame { s, t, n } = i.frame_ns;
+            i.frame_ns = Frame { s: 0.6 * s + 0.8 * t, t: 0.6 * t - 0.8 * s, n };
+        }
+        i.wo = i.frame_ns.to_local(-ray.direction);
         i.wi = i.frame_ns.to_local(direction);
+        if has(M::WoWorld) {
+            i.wo = -ray.direction;
+        }
         if has(M::WorldWi) {
             i.wi = direction;
         }
-        if has(M::WiNotNormalised) {
+        if has(M::WiNotNormalised) || has(M::WiUnnormalised) {
             i.wi = i.frame_ns.to_local(to_light);
         }
         if has(M::WiReversed) {
             i.wi = -i.wi;
         }
-        let cos_i = Frame::cos_theta(i.wi);
-        let mut visibility = 1.0;
-        if self.shadows && !has(M::NoShadows) {
-            visibility = self.visibility(scene, &mut i, direction, distance);
-        }
-        if visibility == 0.0 {
-            return Vec3::ZERO;
-        }
-        let mut radiance = visibility * scene.bsdf(&i).eval(&i) * self.light_intensity(scene);
-        if has(M::TwoCosines) {
-            radiance *= cos_i;
-        }
-        if has(M::NoFalloff) {
-            radiance
-        } else if has(M::OverR) {
-            radiance / distance
-        } else if has(M::OverRCubed) {
-            radiance / distance.powi(3)
-        } else {
-            radiance / (distance * distance)
+        if has(M::WiIsWo) {
+            i.wi = i.wo;
         }
     }
-}
 
-impl Mistaken {
+    /// What the surface makes of the light.
+    fn reflected(&self, scene: &Scene, i: &SurfaceInteraction) -> Vec3 {
+        let has = |mistake| self.mistakes.has(mistake);
+        if has(M::NoBsdf) {
+            return Vec3::ONE;
+        }
+        let mut asked = *i;
+        if has(M::FirstMaterial) {
+            asked.shape = 0;
+        }
+        if has(M::NextMaterial) {
+            asked.shape = (i.shape + 1) % scene.shapes().len();
+        }
+        scene.bsdf(&asked).eval(i)
+    }
+
     fn light_position(&self, scene: &Scene) -> Vec3 {
         let mut shapes = scene.shapes().iter().enumerate();
         let emits = |(index, _): &(usize, &Shape)| scene.material_of(*index).is_emitter();
@@ -77,64 +140,33 @@ impl Mistaken {
         }
     }
 
-    fn light_intensity(&self, scene: &Scene) -> Vec3 {
-        const FOUR_PI: f32 = 4.0 * std::f32::consts::PI;
-        let intensity = scene.first_light_intensity();
-        if self.mistakes.has(M::TimesFourPi) {
-            return FOUR_PI * intensity;
-        }
-        if self.mistakes.has(M::OverFourPi) {
-            return intensity / FOUR_PI;
-        }
-        if self.mistakes.has(M::GreyIntensity) {
-            return Vec3::splat(intensity.x);
-        }
-        intensity
-    }
-
-    fn visibility(
-        &self,
-        scene: &Scene,
-        i: &mut SurfaceInteraction,
-        direction: Vec3,
-        distance: f32,
-    ) -> f32 {
+    /// The light that arrives from a distance.
+    fn incident(&self, scene: &Scene, distance: f32) -> Vec3 {
         let has = |mistake| self.mistakes.has(mistake);
-        if has(M::ShadowHitReused) {
-            return reuse_hit(scene, i, direction, distance);
-        }
-        let mut far = distance * (1.0 - 1e-4) - i.epsilon;
-        if has(M::ShadowNoMaxT) {
-            far = f32::INFINITY;
-        }
-        if has(M::ShadowMaxTSquared) {
-            far = distance * distance;
-        }
-        let mut near = i.epsilon;
-        if has(M::ShadowEpsilon) {
-            near = 0.1;
-        }
-        if has(M::ShadowAcne) {
-            near = 0.0;
-        }
-        let toward = if has(M::ShadowReversed) { -direction } else { direction };
-        let blocked = scene.occluded(&Ray::segment(i.p, toward, near, far));
-        if blocked == has(M::ShadowInverted) {
-            return 1.0;
-        }
-        if has(M::ShadowHalf) { 0.5 } else { 0.0 }
+        let squared = distance * distance;
+        let falloff = match () {
+            () if has(M::NoFalloff) => 1.0,
+            () if has(M::OverR) => distance,
+            () if has(M::OverRCubed) => distance * squared,
+            () if has(M::OverRFourth) => squared * squared,
+            () if has(M::Softened) => 1.0 + squared,
+            () => squared,
+        };
+        let incident = self.light_intensity(scene) / falloff;
+        if has(M::IncidentClamped) { incident.min(Vec3::ONE) } else { incident }
     }
-}
 
-/// The shadow query writes what it hits into the record that is shaded afterwards.
-fn reuse_hit(scene: &Scene, i: &mut SurfaceInteraction, direction: Vec3, distance: f32) -> f32 {
-    let ray = Ray::segment(i.p, direction, i.epsilon, f32::INFINITY);
-    let Some(hit) = scene.intersect(&ray) else { return 1.0 };
-    let far = distance * (1.0 - 1e-4) - i.epsilon;
-    if hit.t < far && !scene.material_of(hit.shape).is_emitter() {
-        return 0.0;
+    fn light_intensity(&self, scene: &Scene) -> Vec3 {
+        let has = |mistake| self.mistakes.has(mistake);
+        let intensity = scene.first_light_intensity();
+        match () {
+            () if has(M::TimesFourPi) => 4.0 * PI * intensity,
+            () if has(M::OverFourPi) => intensity / (4.0 * PI),
+            () if has(M::TimesPi) => PI * intensity,
+            () if has(M::GreyIntensity) => Vec3::splat(intensity.x),
+            () if has(M::RedOnly) => Vec3::X * intensity.x,
+            () if has(M::IntensitySwapped) => super::bsdfs::blue_first(intensity),
+            () => intensity,
+        }
     }
-    *i = hit;
-    i.wi = i.frame_ns.to_local(direction);
-    1.0
 }

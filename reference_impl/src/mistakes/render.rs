@@ -1,8 +1,14 @@
-//! Mistakes of sampler, loop, camera and film: the loop of `crate::renderer`, with switches.
+//! Mistakes of sampler, loop and camera, and other right orders of work: the loop of
+//! `crate::renderer`, with switches.
 
-use basecode::{Camera, CameraConfig, Film, Integrator, RenderJob, Result, Sampler, Scene, Vec3};
+use std::sync::Mutex;
 
-use super::{Mistake as M, Mistakes};
+use basecode::{
+    Camera, CameraConfig, Film, Integrator, Ray, RenderJob, Result, Sampler, Scene, Vec3,
+};
+
+use super::samples::Samples;
+use super::{Mistake as M, Mistakes, film};
 
 pub fn render(
     mistakes: &Mistakes,
@@ -12,85 +18,161 @@ pub fn render(
     film: &mut Film,
 ) -> Result<()> {
     let has = |mistake| mistakes.has(mistake);
-    let camera = camera(mistakes, scene, job)?;
-    let shared = Sampler::new(job.seed);
-    job.for_each_row(film, &|y, row| {
+    let eye = Eye::new(mistakes, scene, job)?;
+    let seed = if has(M::SeedIgnored) { 0 } else { job.seed };
+    let shared = Sampler::new(seed);
+    let work = Work { mistakes, scene, integrator, job, eye, seed };
+    let row = |y: usize, row: &mut [Vec3]| {
         let row_seed = if has(M::SameSeed) { 0 } else { y as u64 };
-        let own = Sampler::new(job.seed.wrapping_add(row_seed));
+        let own = Sampler::new(seed.wrapping_add(row_seed));
         let sampler = if has(M::SharedSampler) { &shared } else { &own };
         for (x, pixel) in row.iter_mut().enumerate() {
-            let (mut sum, mut counted) = (Vec3::ZERO, 0);
-            let spp = if has(M::FewerSamples) { (job.spp / 4).max(1) } else { job.spp };
-            for _ in 0..spp {
-                let (jx, jy) = match job.spp {
-                    1 if has(M::PixelCorner) => (0.0, 0.0),
-                    1 => (0.5, 0.5),
-                    _ => sampler.next_2d(),
-                };
-                let shift = if has(M::JitterShifted) && job.spp > 1 { 0.5 } else { 0.0 };
-                let ray = camera.ray(x as f32 + jx - shift, y as f32 + jy - shift);
-                let radiance = integrator.radiance(scene, &ray, sampler);
-                sum += radiance;
-                counted += u32::from(!has(M::BlackNotCounted) || radiance != Vec3::ZERO);
-            }
-            *pixel = if has(M::NotAveraged) { sum } else { sum / counted.max(1) as f32 };
+            *pixel = work.pixel(x, y, sampler);
         }
-    })?;
-    spoil(mistakes, film);
+    };
+    if has(M::OwnThreads) {
+        by_own_threads(job, film, &row);
+    } else if has(M::Tiles) || has(M::ColumnOrder) {
+        in_other_order(&work, film);
+    } else {
+        job.for_each_row(film, &row)?;
+    }
+    film::spoil(mistakes, film);
     Ok(())
 }
 
-fn camera(mistakes: &Mistakes, scene: &Scene, job: &RenderJob) -> Result<Camera> {
-    let right = scene.camera(job.width, job.height)?;
-    if !mistakes.has(M::HorizontalFov) {
-        return Ok(right);
-    }
-    // The angle is taken across the film's width.
-    let config = right.config();
-    let tangent = (0.5 * config.fov_y_deg.to_radians()).tan();
-    let fov_y_deg = 2.0 * (tangent * job.height as f32 / job.width as f32).atan().to_degrees();
-    Camera::new(CameraConfig { fov_y_deg, ..*config }, job.width, job.height)
+/// Every thread takes a band of rows; none waits for another.
+fn by_own_threads(job: &RenderJob, film: &mut Film, row: &(dyn Fn(usize, &mut [Vec3]) + Sync)) {
+    let (width, height) = (film.width(), film.height());
+    let band = height.div_ceil(job.threads.max(1));
+    std::thread::scope(|scope| {
+        for (index, rows) in film.pixels_mut().chunks_mut(width * band).enumerate() {
+            scope.spawn(move || {
+                for (y, pixels) in rows.chunks_mut(width).enumerate() {
+                    row(index * band + y, pixels);
+                }
+            });
+        }
+    });
 }
 
-/// What goes wrong between the pixels and the image.
-fn spoil(mistakes: &Mistakes, film: &mut Film) {
+/// Pixel by pixel in tiles or columns, each pixel with a sampler of its own.
+fn in_other_order(work: &Work, film: &mut Film) {
     let (width, height) = (film.width(), film.height());
-    let pixels = film.pixels_mut();
-    if mistakes.has(M::FlippedRows) {
-        let original = pixels.to_vec();
-        for (row, from) in pixels.chunks_mut(width).zip(original.chunks(width).rev()) {
-            row.copy_from_slice(from);
+    let side = if work.mistakes.has(M::Tiles) { 16 } else { 1 };
+    let tall = if work.mistakes.has(M::Tiles) { 16 } else { height };
+    let columns = (0..width).step_by(side);
+    let tiles: Vec<(usize, usize)> =
+        columns.flat_map(|x| (0..height).step_by(tall).map(move |y| (x, y))).collect();
+    let film = Mutex::new(film);
+    let next = std::sync::atomic::AtomicUsize::new(0);
+    let take = || {
+        while let Some((left, top)) =
+            tiles.get(next.fetch_add(1, std::sync::atomic::Ordering::Relaxed))
+        {
+            for y in *top..(top + tall).min(height) {
+                for x in *left..(left + side).min(width) {
+                    let sampler = Sampler::new(work.pixel_seed(x, y));
+                    let value = work.pixel(x, y, &sampler);
+                    if let Ok(mut film) = film.lock() {
+                        film.set(x, y, value);
+                    }
+                }
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..work.job.threads.max(1) {
+            scope.spawn(take);
+        }
+    });
+}
+
+/// What it takes to render a pixel.
+struct Work<'a> {
+    mistakes: &'a Mistakes,
+    scene: &'a Scene,
+    integrator: &'a dyn Integrator,
+    job: &'a RenderJob<'a>,
+    eye: Eye,
+    seed: u64,
+}
+
+impl Work<'_> {
+    fn pixel_seed(&self, x: usize, y: usize) -> u64 {
+        self.seed.wrapping_add(((y as u64) << 32) + x as u64)
+    }
+
+    fn pixel(&self, x: usize, y: usize, sampler: &Sampler) -> Vec3 {
+        let has = |mistake| self.mistakes.has(mistake);
+        let own = has(M::SeedPerPixel).then(|| Sampler::new(self.pixel_seed(x, y)));
+        let sampler = own.as_ref().unwrap_or(sampler);
+        let (mut sum, mut counted, mut last) = (Vec3::ZERO, 0, Vec3::ZERO);
+        let (mut wide, mut mean) = (Vec3::ZERO.as_dvec3(), Vec3::ZERO);
+        let asked = self.job.spp;
+        let spp = match () {
+            () if has(M::FewerSamples) => (asked / 4).max(1),
+            () if has(M::OneSample) => 1,
+            () => asked,
+        };
+        let samples = Samples::new(self.mistakes, sampler, asked);
+        let late = (usize::from(has(M::ColumnLate)), usize::from(has(M::RowLate)));
+        for index in 0..spp {
+            let (jx, jy) = samples.get(index);
+            let ray = self.eye.ray((x + late.0) as f32 + jx, (y + late.1) as f32 + jy);
+            let mut radiance = self.integrator.radiance(self.scene, &ray, sampler);
+            if has(M::SamplesClamped) {
+                radiance = radiance.min(Vec3::ONE);
+            }
+            sum += radiance;
+            wide += radiance.as_dvec3();
+            mean += (radiance - mean) / (index + 1) as f32;
+            last = radiance;
+            counted += u32::from(!has(M::BlackNotCounted) || radiance != Vec3::ZERO);
+        }
+        match () {
+            () if has(M::NotAveraged) => sum,
+            () if has(M::SppPlusOne) => sum / (counted + 1) as f32,
+            () if has(M::LastOverSpp) => last / counted as f32,
+            () if has(M::SumInF64) => (wide / f64::from(counted)).as_vec3(),
+            () if has(M::RunningMean) => mean,
+            () => sum / counted.max(1) as f32,
         }
     }
-    if mistakes.has(M::MirroredColumns) {
-        pixels.chunks_mut(width).for_each(<[Vec3]>::reverse);
-    }
-    if mistakes.has(M::Transposed) {
-        let original = pixels.to_vec();
-        for (index, pixel) in original.into_iter().enumerate() {
-            pixels[(index % width) * height + index / width] = pixel;
+}
+
+/// The camera, with what is wrong about it.
+struct Eye {
+    camera: Camera,
+    /// What a column counts: 1 but for a camera of another film.
+    column: f32,
+}
+
+impl Eye {
+    fn new(mistakes: &Mistakes, scene: &Scene, job: &RenderJob) -> Result<Self> {
+        let right = scene.camera(job.width, job.height)?;
+        let config = *right.config();
+        let of_tangent =
+            |tangent: f32| CameraConfig { fov_y_deg: 2.0 * tangent.atan().to_degrees(), ..config };
+        let tangent = (0.5 * config.fov_y_deg.to_radians()).tan();
+        if mistakes.has(M::SquareAspect) {
+            // The film is taken for a square one.
+            let camera = Camera::new(config, job.height, job.height)?;
+            return Ok(Self { camera, column: job.height as f32 / job.width as f32 });
         }
+        let config = match () {
+            // The angle is taken across the film's width.
+            () if mistakes.has(M::HorizontalFov) => {
+                of_tangent(tangent * job.height as f32 / job.width as f32)
+            }
+            // The angle is taken for half of it.
+            () if mistakes.has(M::FovHalf) => of_tangent(config.fov_y_deg.to_radians().tan()),
+            () => return Ok(Self { camera: right, column: 1.0 }),
+        };
+        Ok(Self { camera: Camera::new(config, job.width, job.height)?, column: 1.0 })
     }
-    if mistakes.has(M::Gamma) {
-        pixels.iter_mut().for_each(|pixel| *pixel = pixel.powf(1.0 / 2.2));
-    }
-    if mistakes.has(M::Clamped) {
-        pixels.iter_mut().for_each(|pixel| *pixel = pixel.clamp(Vec3::ZERO, Vec3::ONE));
-    }
-    if mistakes.has(M::LastPixelMissing)
-        && let Some(last) = pixels.last_mut()
-    {
-        *last = Vec3::NAN;
-    }
-    if mistakes.has(M::DebugMark) {
-        for index in [0, 1, width, width + 1] {
-            pixels[index] *= 1.1;
-        }
-    }
-    if mistakes.has(M::Dithered) {
-        const HALF_LEVEL: f32 = 0.5 / 65535.0;
-        for (index, pixel) in pixels.iter_mut().enumerate() {
-            *pixel += if index % 2 == 0 { HALF_LEVEL } else { -HALF_LEVEL };
-        }
+
+    fn ray(&self, x: f32, y: f32) -> Ray {
+        self.camera.ray(self.column * x, y)
     }
 }

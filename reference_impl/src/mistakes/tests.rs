@@ -10,16 +10,17 @@ use crate::renderpasses::{DIFFUSE_FS, PHONG_FS, SIMPLE_VS};
 fn the_catalogue_and_the_switches_have_the_same_names() {
     let catalogue: serde_json::Value =
         serde_json::from_str(include_str!("../../../harness/data/mistakes.json")).unwrap();
-    let listed: BTreeSet<&str> = catalogue["mistakes"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|m| m["name"].as_str().unwrap())
-        .collect();
-    let code = Mistake::ALL.iter().map(|(_, name)| *name);
-    let known: BTreeSet<&str> = code.chain(stages::ALL.iter().map(|m| m.name)).collect();
-    assert_eq!(listed, known);
-    assert_eq!(known.len(), Mistake::ALL.len() + stages::ALL.len(), "a name is there twice");
+    let listed = |list: &str| -> BTreeSet<&str> {
+        catalogue[list].as_array().unwrap().iter().map(|m| m["name"].as_str().unwrap()).collect()
+    };
+    let same = |list: &str, code: &[(Mistake, &'static str)], stages: Vec<&'static str>| {
+        let count = code.len() + stages.len();
+        let known: BTreeSet<&str> = code.iter().map(|(_, name)| *name).chain(stages).collect();
+        assert_eq!(listed(list), known);
+        assert_eq!(known.len(), count, "a name is there twice");
+    };
+    same("mistakes", Mistake::WRONG, stages::wrong().map(|m| m.name).collect());
+    same("right", Mistake::RIGHT, stages::HARMLESS.iter().map(|m| m.name).collect());
 }
 
 #[test]
@@ -33,7 +34,7 @@ fn options_name_mistakes() {
 
 #[test]
 fn every_mistake_of_a_shader_fits_its_text() {
-    for mistake in stages::ALL {
+    for mistake in stages::all() {
         let mut mistakes = Mistakes::default();
         mistakes.add(mistake.name).unwrap();
         let own = [SIMPLE_VS, DIFFUSE_FS, PHONG_FS];

@@ -5,7 +5,5 @@ mod shadow;
 mod simple;
 
 pub use normal::NormalPass;
-#[cfg(test)]
-pub(crate) use simple::PHONG_FS;
 pub use simple::SimplePass;
-pub(crate) use simple::{DIFFUSE_FS, Object, SIMPLE_VS};
+pub(crate) use simple::{DIFFUSE_FS, Object, PHONG_FS, SIMPLE_VS};

@@ -48,16 +48,32 @@ const FACES: [(Vec3, Vec3); 6] = [
 
 /// Draws what blocks the scene's light.
 pub fn draw_shadow_map(gpu: &Gpu, scene: &Scene, mistakes: &Mistakes) -> Result<ShadowMap> {
-    let light = scene.first_light_position();
-    let mut projection = face_projection(scene);
-    if mistakes.has(Mistake::ShadowMapHalf) {
+    let has = |mistake| mistakes.has(mistake);
+    let mut light = scene.first_light_position();
+    if has(Mistake::ShadowMapFromCamera) {
+        light = scene.camera(1, 1)?.eye();
+    }
+    let mut projection = face_projection(scene, has(Mistake::ShadowMapFarHalf));
+    if has(Mistake::ShadowMapHalf) {
         (projection.x_axis, projection.y_axis) = (2.0 * projection.x_axis, 2.0 * projection.y_axis);
     }
+    let resolution = match () {
+        () if has(Mistake::ShadowMapCoarse) => 32,
+        () if has(Mistake::ShadowMapSmall) => 1024,
+        () if has(Mistake::ShadowMapLarge) => 4096,
+        () => RESOLUTION,
+    };
     let views = FACES.map(|(direction, up)| face_view(light, direction, up));
-    let map = ShadowMap::new(gpu, RESOLUTION, &views.map(|v| projection * v), NORMAL_OFFSET)?;
+    let map = ShadowMap::new(gpu, resolution, &views.map(|v| projection * v), NORMAL_OFFSET)?;
     let pipeline = gpu.depth_pipeline(SHADOW_VS);
     let placement = Uniform::object(gpu, &ObjectUniforms::new(Mat4::IDENTITY));
-    let meshes: Vec<Mesh> = blockers(scene).map(|shape| Mesh::new(gpu, shape)).collect();
+    let mut meshes: Vec<Mesh> = blockers(scene).map(|shape| Mesh::new(gpu, shape)).collect();
+    meshes.truncate(match () {
+        () if has(Mistake::ShadowMapEmpty) => 0,
+        () if has(Mistake::ShadowMapFirstOnly) => 1,
+        () if has(Mistake::ShadowMapLastMissing) => meshes.len() - 1,
+        () => meshes.len(),
+    });
     let mut encoder = gpu.encoder();
     for (layer, view) in views.into_iter().enumerate() {
         // The light takes the camera's place.
@@ -97,7 +113,7 @@ fn face_view(light: Vec3, direction: Vec3, up: Vec3) -> Mat4 {
 }
 
 /// A face sees 90 degrees in both directions, from the nearest blocker to the farthest.
-fn face_projection(scene: &Scene) -> Mat4 {
+fn face_projection(scene: &Scene, half_as_far: bool) -> Mat4 {
     let light = scene.first_light_position();
     let (mut nearest, mut farthest) = (f32::INFINITY, 0.0f32);
     for shape in blockers(scene) {
@@ -111,7 +127,10 @@ fn face_projection(scene: &Scene) -> Mat4 {
             farthest = farthest.max((low - light).abs().max((high - light).abs()).max_element());
         }
     }
-    let far = 1.01 * farthest.max(f32::MIN_POSITIVE);
+    let mut far = 1.01 * farthest.max(f32::MIN_POSITIVE);
+    if half_as_far {
+        far *= 0.5;
+    }
     let near = (0.99 * nearest).clamp(LEAST_NEAR * far, 0.5 * far);
     let depth = far / (near - far);
     Mat4::from_cols(

@@ -4,7 +4,7 @@ use basecode::gpu::{
     EMITTER_FS, FRAME_GROUP, FrameUniforms, Gpu, MATERIAL_GROUP, MaterialUniforms, Mesh,
     OBJECT_GROUP, ObjectUniforms, RenderPass, SHADOW_GROUP, ShadowMap, Stage, Target, Uniform,
 };
-use basecode::{Camera, Mat4, Material, MaterialModel, Result, Scene, Vec3, Vec4, wgpu};
+use basecode::{Camera, Mat4, Material, MaterialModel, Result, Scene, Vec3, wgpu};
 
 use super::shadow;
 use crate::mistakes::{self, Mistake, Mistakes};
@@ -18,7 +18,7 @@ pub(crate) const PHONG_FS: Stage =
 
 /// A pipeline for each way to shade.
 pub(crate) struct Pipelines {
-    diffuse: wgpu::RenderPipeline,
+    pub(crate) diffuse: wgpu::RenderPipeline,
     pub(crate) phong: wgpu::RenderPipeline,
     emitter: wgpu::RenderPipeline,
 }
@@ -39,9 +39,11 @@ pub struct SimplePass {
     shadow: ShadowMap,
     pub(crate) light_position: Vec3,
     pub(crate) light_intensity: Vec3,
-    pub(crate) camera_unset: bool,
+    mistakes: Mistakes,
     /// Pixels; 0 but for a mistake.
     pub(crate) viewport_shift: f32,
+    /// What a mistake draws with a frame too late.
+    pub(crate) last_frame: Option<FrameUniforms>,
 }
 
 impl SimplePass {
@@ -81,10 +83,11 @@ impl SimplePass {
             shadow,
             light_position: scene.first_light_position(),
             light_intensity: scene.first_light_intensity(),
-            camera_unset: false,
+            mistakes: mistakes.clone(),
             viewport_shift: 0.0,
+            last_frame: None,
         };
-        mistakes::spoil_pass(mistakes, gpu, &mut pass)?;
+        mistakes::spoil_pass(mistakes, gpu, scene, &mut pass)?;
         Ok(pass)
     }
 
@@ -130,10 +133,11 @@ fn material_uniforms(material: &Material) -> MaterialUniforms {
 impl RenderPass for SimplePass {
     fn draw(&mut self, gpu: &Gpu, camera: &Camera, target: &Target) -> Result<()> {
         let mut frame = FrameUniforms::new(camera);
-        self.set_light(&mut frame);
-        if self.camera_unset {
-            frame.camera_position = Vec4::ZERO;
+        if let Some(last) = &mut self.last_frame {
+            std::mem::swap(last, &mut frame);
         }
+        self.set_light(&mut frame);
+        mistakes::spoil_frame(&self.mistakes, &mut frame);
         self.frame.write_frame(gpu, &frame);
         let mut encoder = gpu.encoder();
         let mut pass = target.begin(&mut encoder);

@@ -1,7 +1,7 @@
 //! Which renderers are graded: right ones, with one mistake, with two.
 
 use anyhow::{Context, Result};
-use umbra::diagnosis::Catalogue;
+use umbra::diagnosis::{Catalogue, Class, RightVariant};
 use umbra::grading::RenderPath;
 
 /// Samples per pixel of right renderers; none for what the scenes ask for.
@@ -10,6 +10,13 @@ pub const SPP: [Option<u32>; 5] = [None, Some(1), Some(4), Some(16), Some(64)];
 pub const THREADS: [u32; 3] = [1, 2, 4];
 /// Seeds of right renderers: as student ids are.
 const SEEDS: [u64; 4] = [260_000_001, 260_712_345, 261_999_999, 7];
+
+/// Of the mistakes, `--quick` takes each so manieth; and so many pairs and triples of these.
+pub const QUICK_STEP: usize = 3;
+pub const QUICK_PAIRS: usize = 60;
+pub const QUICK_TRIPLES: usize = 20;
+/// So many triples otherwise.
+pub const TRIPLES: usize = 500;
 
 /// The seed of what stands for the other path.
 pub const PLAIN_SEED: u64 = SEEDS[0];
@@ -65,12 +72,32 @@ pub struct Subject {
     pub findings: Vec<String>,
     /// Whether the diagnosis must name it.
     pub named: bool,
+    /// What the first part's loss must be like, where that is known.
+    pub class: Option<Class>,
+    /// Where a right variant shows; none for both.
+    pub path: Option<RenderPath>,
 }
 
 impl Subject {
     fn right(switch: Option<&str>, seed: u64, threads: u32, spp: Option<u32>) -> Self {
         let mistakes = switch.map(str::to_owned).into_iter().collect();
-        Self { mistakes, seed, threads, spp, parts: Vec::new(), findings: Vec::new(), named: false }
+        Self { seed, threads, spp, ..Self::together(mistakes, Vec::new()) }
+    }
+
+    /// Several mistakes at once.
+    pub fn together(mistakes: Vec<String>, parts: Vec<String>) -> Self {
+        Self {
+            mistakes,
+            // As of single mistakes, so that chance makes no difference between them.
+            seed: PLAIN_SEED,
+            threads: THREADS[1],
+            spp: None,
+            parts,
+            findings: Vec::new(),
+            named: false,
+            class: None,
+            path: None,
+        }
     }
 
     /// The paths that its switches can show on. Seed, threads and samples are matters of offline.
@@ -83,7 +110,7 @@ impl Subject {
         };
         match (self.is_right(), self.mistakes.is_empty()) {
             (true, true) => vec![RenderPath::Offline],
-            (true, false) => RenderPath::ALL.to_vec(),
+            (true, false) => self.path.map_or(RenderPath::ALL.to_vec(), |path| vec![path]),
             (false, _) => RenderPath::ALL.into_iter().filter(declares).collect(),
         }
     }
@@ -91,6 +118,11 @@ impl Subject {
     /// Whether it must lose nothing.
     fn is_right(&self) -> bool {
         self.parts.is_empty() && self.findings.is_empty()
+    }
+
+    /// Whether it must lose what it declares; of others only that they gain nothing is asked.
+    pub fn judged_alone(&self) -> bool {
+        self.mistakes.len() < 2 || self.named
     }
 
     /// Its name in the matrix.
@@ -108,13 +140,17 @@ impl Subject {
 }
 
 /// Right renderers at one number of samples.
-pub fn variants(spp: Option<u32>) -> Vec<Subject> {
+pub fn variants(catalogue: &Catalogue, spp: Option<u32>) -> Vec<Subject> {
     if spp.is_none() {
-        // What is no mistake, once each.
-        let harmless = super::stages::HARMLESS.iter();
-        return harmless
-            .map(|switch| Subject::right(Some(switch.name), 1, THREADS[0], None))
-            .collect();
+        // What is done otherwise and right, once each.
+        let variant = |(index, right): (usize, &RightVariant)| Subject {
+            path: Some(match right.path.as_str() {
+                "realtime" => RenderPath::Realtime,
+                _ => RenderPath::Offline,
+            }),
+            ..Subject::right(Some(&right.name), 1, THREADS[index % THREADS.len()], None)
+        };
+        return catalogue.right.iter().enumerate().map(variant).collect();
     }
     let each = THREADS.iter().flat_map(|&threads| {
         // One thread draws with one seed more than the others: 5 + 5 + 5 of each.
@@ -138,13 +174,10 @@ pub fn few(variants: Vec<Subject>, index: usize) -> Vec<Subject> {
 /// Every mistake alone.
 pub fn singles(catalogue: &Catalogue) -> Vec<Subject> {
     let single = |mistake: &umbra::diagnosis::KnownMistake| Subject {
-        mistakes: vec![mistake.name.clone()],
-        seed: SEEDS[0],
-        threads: THREADS[1],
-        spp: None,
-        parts: mistake.parts.clone(),
         findings: mistake.findings.clone(),
-        named: !mistake.proves_a_rule(),
+        named: mistake.is_stored(),
+        class: Some(mistake.class),
+        ..Subject::together(vec![mistake.name.clone()], mistake.parts.clone())
     };
     catalogue.mistakes.iter().map(single).collect()
 }
@@ -164,15 +197,8 @@ pub fn pairs(catalogue: &Catalogue) -> Result<Vec<Subject>> {
         }
         parts.sort();
         parts.dedup();
-        Ok(Subject {
-            mistakes: names.map(str::to_owned).to_vec(),
-            seed: SEEDS[1],
-            threads: THREADS[1],
-            spp: None,
-            parts,
-            findings,
-            named: true,
-        })
+        let names = names.map(str::to_owned).to_vec();
+        Ok(Subject { findings, named: true, seed: SEEDS[1], ..Subject::together(names, parts) })
     };
     PAIRS.iter().map(pair).collect()
 }
@@ -199,15 +225,19 @@ mod tests {
 
     #[test]
     fn few_variants_are_unlike_each_other() {
-        let few = SPP.iter().enumerate().map(|(index, &spp)| few(variants(spp), index));
+        let catalogue = Catalogue::known().unwrap();
+        let few = SPP.iter().enumerate();
+        let few = few.map(|(index, &spp)| super::few(variants(&catalogue, spp), index));
         let few: Vec<Subject> = few.flatten().collect();
         let plain = few.iter().filter(|subject| subject.mistakes.is_empty());
         let kinds: BTreeSet<_> = plain.clone().map(|subject| (subject.seed, subject.spp)).collect();
         assert_eq!((plain.count(), kinds.len()), (SPP.len() - 1, SPP.len() - 1));
         let threads: BTreeSet<_> = few.iter().map(|subject| subject.threads).collect();
         assert_eq!(threads, BTreeSet::from(THREADS));
-        let harmless: Vec<Subject> = variants(None);
+        let harmless: Vec<Subject> = variants(&catalogue, None);
         assert_eq!(few.len(), harmless.len() + SPP.len() - 1);
-        assert!(harmless.iter().all(|subject| subject.paths() == RenderPath::ALL));
+        assert!(harmless.iter().all(|subject| subject.paths().len() == 1));
+        let all = SPP.iter().map(|&spp| variants(&catalogue, spp).len()).sum::<usize>();
+        assert!(all >= 100, "{all}");
     }
 }

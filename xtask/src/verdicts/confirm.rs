@@ -34,7 +34,8 @@ const SPP: [u32; 3] = [16, 4, 64];
 pub fn figure(bench: &Bench, store: &Store, few: bool, jobs: usize) -> Result<Figure> {
     let mut assignment = bench.assignment.clone();
     assignment.scenes.retain(|scene| scene.perturb);
-    let mistakes = if few { Vec::new() } else { singles(&Catalogue::known()?) };
+    let catalogue = Catalogue::known()?;
+    let mistakes = if few { Vec::new() } else { singles(&catalogue) };
     let adapter = bench.grading.adapter.clone().map_err(anyhow::Error::msg)?;
     let complaints = parallel::each(&UNSEEN, jobs, |index, seed| {
         let reference = store.reference.clone();
@@ -51,7 +52,7 @@ pub fn figure(bench: &Bench, store: &Store, few: bool, jobs: usize) -> Result<Fi
             Bench { grading, library, plain, assignment: &assignment, all_shown: false, ..*bench };
         println!("held-back scenes of seed {seed}");
         let spp = SPP[index % SPP.len()];
-        let right = right(index, spp, few);
+        let right = right(&catalogue, index, spp, few);
         let own = mistakes.iter().skip(index).step_by(UNSEEN.len()).cloned().collect::<Vec<_>>();
         let mut rows = bench.grade_all(&own, 1)?;
         for case in &mut bench.grading.cases {
@@ -71,13 +72,15 @@ pub fn figure(bench: &Bench, store: &Store, few: bool, jobs: usize) -> Result<Fi
 }
 
 /// Right renderers for the `index`th seed.
-fn right(index: usize, spp: u32, few: bool) -> Vec<Subject> {
-    let mut plain = variants(Some(spp));
+fn right(catalogue: &Catalogue, index: usize, spp: u32, few: bool) -> Vec<Subject> {
+    let mut plain = variants(catalogue, Some(spp));
     let first = index % plain.len();
     plain.rotate_left(first);
     plain.truncate(if few { 1 } else { 3 });
     if !few {
-        plain.extend(variants(None));
+        // What is done otherwise is dealt out among the seeds.
+        let others = variants(catalogue, None).into_iter();
+        plain.extend(others.skip(index).step_by(UNSEEN.len()));
     }
     plain
 }

@@ -33,10 +33,15 @@ pub fn of_matrix(matrix: &Matrix) -> Vec<Figure> {
     let text = format!("false_rejects={}/{}", rejected.len(), matrix.variants.len());
     vec![
         Figure { text, complaints: rejected },
-        Figure::right("singles", matrix.singles.len(), complaints(&matrix.singles)),
+        singles(&matrix.singles),
         Figure::right("pairs", matrix.pairs.len(), complaints(&matrix.pairs)),
         diagnosis(matrix),
     ]
+}
+
+/// How many single mistakes cost what their class says, in the part that they belong to.
+pub fn singles(rows: &[Row]) -> Figure {
+    Figure::right("singles", rows.len(), complaints(rows))
 }
 
 /// The least fraction of single mistakes that the diagnosis must name first.

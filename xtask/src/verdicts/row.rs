@@ -6,6 +6,7 @@ use umbra::evidence::{Check, Evidence, Verdict};
 use umbra::rubric::Grade;
 
 use super::choice::Subject;
+use super::price;
 
 /// What one renderer lost, and by which evidence.
 pub struct Row {
@@ -48,11 +49,22 @@ impl Row {
                 complaints.push(format!("{} is not judged ({})", part.id, part.reason));
             }
         }
+        complaints.extend(self.price());
         let fails = |check: &Check| check.verdict == Verdict::Fail;
         let declared = self.subject.findings.iter().filter(|_| self.all_shown);
         let unfound = declared.filter(|id| !self.evidence.named(id).any(fails));
         complaints.extend(unfound.map(|id| format!("{id} finds nothing")));
         complaints.join("; ")
+    }
+
+    /// What is wrong with what the first part lost, where the scenes show all of it.
+    fn price(&self) -> Option<String> {
+        let (class, part) = (self.subject.class?, self.subject.parts.first()?);
+        let part = self.grade.parts.iter().find(|own| own.id == *part)?;
+        // That it loses nothing is another complaint.
+        let lost = part.points < part.out_of && self.all_shown;
+        let fraction = (part.out_of - part.points) / part.out_of;
+        price::complaint(class, fraction).filter(|_| lost).map(|said| format!("{} {said}", part.id))
     }
 
     /// Whether the diagnosis says all there is to say: a single mistake by its name in some part, a
@@ -92,7 +104,8 @@ impl Row {
             };
             format!("{cell:>5}")
         });
-        let verdict = if self.as_declared() { "" } else { "  WRONG" };
+        let verdict =
+            if self.subject.judged_alone() && !self.as_declared() { "  WRONG" } else { "" };
         let line = format!(
             "{:<56}{}  {:4.1} s{verdict}",
             self.subject.name(),

@@ -1,0 +1,94 @@
+//! What mistakes cost: the range of each class, and the table that a teacher looks at.
+
+use std::fmt::Write;
+
+use umbra::diagnosis::{Catalogue, Class};
+
+use super::row::Row;
+
+/// The least and the most of its part that a mistake of a class costs.
+const RANGES: [(Class, &str, [f64; 2]); 5] = [
+    (Class::Slip, "slip: one constant, sign, power, index or division", [0.10, 0.25]),
+    (Class::Concept, "concept: something that the handout asks for is missing", [0.40, 0.80]),
+    (Class::Nothing, "nothing: what the part is about is not there", [1.0, 1.0]),
+    (Class::Hidden, "hidden: only probes show it", [1e-6, 0.25]),
+    (Class::Finding, "finding: a remark", [0.0, 0.0]),
+];
+
+/// Half of the last published digit, as a fraction of the smallest part, 5 points.
+const ROUNDING: f64 = 0.005 / 5.0 + 1e-9;
+
+/// What is wrong with a price: the fraction of its part that a mistake of `class` cost.
+pub fn complaint(class: Class, fraction: f64) -> Option<String> {
+    let (_, _, [least, most]) = RANGES.iter().find(|(own, ..)| *own == class)?;
+    let right = fraction >= least - ROUNDING && fraction <= most + ROUNDING;
+    (!right).then(|| {
+        let range = format!("{:.0} to {:.0} %", 100.0 * least, 100.0 * most);
+        format!("costs {:.0} % of its part, a {class:?} {range}", 100.0 * fraction).to_lowercase()
+    })
+}
+
+/// The table mistake, part, points lost, as Markdown.
+pub fn table(catalogue: &Catalogue, singles: &[Row]) -> String {
+    let mut text = String::from(
+        "# What mistakes cost\n\nMade by `xtask verdicts --table docs/points.md`: each known mistake, made by the reference renderer alone,\n\
+         on the public scenes. Classes were given before anything was measured (`harness/data/mistakes.json`):\n\n\
+         | class | of its part |\n|---|---|\n",
+    );
+    for (_, words, [least, most]) in RANGES {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "| {words} | {:.0} to {:.0} % |", 100.0 * least, 100.0 * most);
+    }
+    let mut family = "";
+    for mistake in &catalogue.mistakes {
+        let row = singles.iter().find(|row| row.subject.mistakes == [mistake.name.as_str()]);
+        let Some(row) = row else { continue };
+        if mistake.family != family {
+            family = &mistake.family;
+            let _ = write!(
+                text,
+                "\n## {family}\n\n| mistake | what | class | points lost |\n|---|---|---|---|\n"
+            );
+        }
+        let lost = row.grade.parts.iter().filter(|part| part.points < part.out_of);
+        let lost: Vec<String> = lost
+            .map(|part| format!("{}: {:.2} of {}", part.id, part.out_of - part.points, part.out_of))
+            .collect();
+        let lost = if lost.is_empty() { "none".to_owned() } else { lost.join(", ") };
+        let class = format!("{:?}", mistake.class).to_lowercase();
+        let _ = writeln!(
+            text,
+            "| `{}` | {} | {class} | {lost} |",
+            mistake.name,
+            mistake.looks_like.replace('|', "\\|")
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prices_outside_their_range_are_told() {
+        assert_eq!(complaint(Class::Slip, 0.1), None);
+        assert_eq!(complaint(Class::Slip, 0.2505), None);
+        assert!(complaint(Class::Slip, 0.3).is_some_and(|said| said.contains("30 %")));
+        assert!(complaint(Class::Slip, 0.05).is_some());
+        assert!(complaint(Class::Hidden, 0.0).is_none_or(|said| said.contains("0 %")));
+        assert_eq!(complaint(Class::Nothing, 1.0), None);
+        assert!(complaint(Class::Nothing, 0.99).is_some());
+    }
+
+    /// The published table is one of the mistakes that are known.
+    #[test]
+    fn the_published_table_names_every_mistake() {
+        let Ok(text) = std::fs::read_to_string(crate::root().join("docs/points.md")) else {
+            return;
+        };
+        for mistake in Catalogue::known().unwrap().mistakes {
+            assert!(text.contains(&format!("| `{}` |", mistake.name)), "{}", mistake.name);
+        }
+    }
+}
