@@ -66,12 +66,13 @@ static CASE: LazyLock<Case> = LazyLock::new(|| {
     let small = Small {
         width: WIDTH as u32,
         height: HEIGHT as u32,
-        batch: RayBatch::new("a", &surface, &shadowed, Vec3::ONE),
+        batch: RayBatch::new("a", &scene, &surface, &shadowed),
         surface,
         mask: shadowed,
         unshadowed_mask: unshadowed_mask.clone(),
         unshadowed: unshadowed.clone(),
         raw_normals: None,
+        sampled: None,
     };
     let expected = Expected {
         scene,
@@ -135,7 +136,8 @@ pub fn judge(bytes: &[u8]) {
         check(&[images::judge("image", "a", kind, &image, expected, &|_| true, &tolerances)]);
     }
     let Small { surface, mask, .. } = &case.small;
-    check(&[stages::judge_vertex("a", surface, mask, &image, &image)]);
+    let camera = case.expected.scene.camera(WIDTH, HEIGHT).expect("a camera");
+    check(&[stages::judge_vertex("a", &camera, surface, mask, &image, &image)]);
     ImageDigest::new("a", "a.exr", &image);
     let (reference, mask) = (&case.expected.offline.mean, &case.expected.offline.mask);
     let scale = case.expected.offline.median_lit;

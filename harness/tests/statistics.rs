@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use basecode::Image;
 use umbra::assignment::{Assignment, SceneEntry};
-use umbra::evidence::rays::judge_agreement;
+use umbra::evidence::loops::judge_agreement;
 use umbra::expected::{Expected, Store, SurfaceBuffer};
 use umbra::grading::{CORRELATED, row_correlation};
 use umbra::imaging::compare::compare_offline;

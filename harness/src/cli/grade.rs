@@ -316,7 +316,8 @@ impl Batch<'_> {
         let mut records = results.into_iter().collect::<anyhow::Result<Vec<Record>>>()?;
         judge_shared(&mut records);
         let rules = &context.assignment.rules;
-        let entries = records.into_iter().map(|record| {
+        let entries = records.into_iter().map(|mut record| {
+            record.evidence = rubric::settle(rules, &record.evidence);
             let grade = rubric::grade(rules, &record.evidence);
             Entry { record, grade }
         });

@@ -3,6 +3,9 @@
 use basecode::Vec3;
 use renderer_api as api;
 
+use super::convention::Convention;
+use super::price::{self, Answers};
+use super::shading::{ShadedPoint, Shading, energy_scale};
 use super::{Check, Measure, Verdict};
 use crate::imaging::ratio::ratio_name;
 
@@ -26,6 +29,10 @@ pub struct BsdfProbe {
     pub tolerance: [f64; 3],
     /// The largest value of this material at any direction: the scale of a difference.
     pub peak: f64,
+    /// What is asked about, `wi` with length 1.
+    point: ShadedPoint,
+    /// The length of `wi` in the question.
+    length: f64,
 }
 
 /// Directions closer to the surface than this cosine are left out: a right answer may round
@@ -48,18 +55,32 @@ pub fn probes(kind: BsdfKind) -> Vec<BsdfProbe> {
                 wo: wo.into(),
                 wi: wi.into(),
             };
-            probes.push(BsdfProbe::new(query, &material));
+            probes.push(BsdfProbe::new(query, energy_scale(&material)));
         }
     }
     probes
 }
 
+/// Probes with a `wi` that is not of unit length: some integrators leave that to the BSDF. No
+/// renderer must answer them rightly; see [`Convention`].
+pub fn long_probes(kind: BsdfKind) -> Vec<BsdfProbe> {
+    let lengths = [0.5f32, 2.0, 5.0];
+    let some = probes(kind).into_iter().step_by(7).enumerate();
+    some.map(|(index, mut probe)| {
+        let length = lengths[index % lengths.len()];
+        probe.length = f64::from(length);
+        probe.query.wi = probe.query.wi.map(|w| length * w);
+        probe
+    })
+    .collect()
+}
+
 /// A probe of the BSDF that a scene hands out for a textured shape; `material` holds the colours
-/// that its textures have at `uv`, already multiplied by the shape's energy scale.
+/// that its textures have at `uv`, `scale` is the shape's energy scale.
 pub fn textured_probe(
     (shape, primitive, uv): (u32, u32, [f32; 2]),
     (wo, wi): (Vec3, Vec3),
-    material: &api::MaterialValue,
+    (material, scale): (&api::MaterialValue, f64),
 ) -> BsdfProbe {
     let query = api::BsdfQuery {
         source: api::BSDF_OF_SHAPE,
@@ -70,49 +91,42 @@ pub fn textured_probe(
         wo: wo.into(),
         wi: wi.into(),
     };
-    BsdfProbe::new(query, material)
+    BsdfProbe::new(query, scale)
 }
 
 impl BsdfProbe {
-    fn new(query: api::BsdfQuery, material: &api::MaterialValue) -> Self {
-        // A shape's colours come scaled; a value's do not.
-        let scale = if query.source == api::BSDF_OF_VALUE { energy_scale(material) } else { 1.0 };
-        let expected = value(material, scale, query.wo, query.wi);
+    fn new(query: api::BsdfQuery, scale: f64) -> Self {
+        let point = ShadedPoint::of_bsdf(&query.material, scale, query.wo, query.wi);
         let up = [0.0, 0.0, 1.0];
-        let peak = value(material, scale, up, up).into_iter().fold(0.0, f64::max);
+        let above = ShadedPoint { wo: up, wi: up, ..point };
+        let peak = Shading::default().radiance(&above).into_iter().fold(0.0, f64::max);
+        let expected = Shading::default().radiance(&point);
+        let probe = Self { query, expected, tolerance: [0.0; 3], peak, point, length: 1.0 };
+        Self { tolerance: probe.tolerance(expected), ..probe }
+    }
+
+    /// The right answer under a convention; nothing when the question is none under it.
+    fn expected(&self, convention: &Convention) -> Option<[f64; 3]> {
+        if self.length != 1.0 && convention.long_wi.is_none() {
+            return None;
+        }
+        let growth = convention.growth(self.length);
+        Some(convention.bsdf().radiance(&self.point).map(|value| growth * value))
+    }
+
+    /// The largest difference from a right answer: 1e-4 for f32 arithmetic in any order, 1e-6 n for
+    /// what a power makes of its base's error.
+    fn tolerance(&self, expected: [f64; 3]) -> [f64; 3] {
+        let material = &self.query.material;
         let n =
             if material.model == api::MATERIAL_PHONG { f64::from(material.exponent) } else { 0.0 };
-        // 1e-4 for f32 arithmetic in any order, 1e-6 n for what a power makes of its base's error.
-        let tolerance = expected.map(|b| (1e-4 + 1e-6 * n) * b.abs() + 1e-6 * peak);
-        Self { query, expected, tolerance, peak }
+        expected.map(|b| (1e-4 + 1e-6 * n) * b.abs() + 1e-6 * self.peak)
     }
 }
 
-/// The normalised BSDF of the handout, equation (1), times cos theta_i, in f64.
+/// The BSDF of the handout, equation (1), times cos theta_i [sr^-1].
 pub fn value(material: &api::MaterialValue, scale: f64, wo: [f32; 3], wi: [f32; 3]) -> [f64; 3] {
-    let [wo, wi] = [wo, wi].map(|w| w.map(f64::from));
-    if wo[2] <= 0.0 || wi[2] <= 0.0 {
-        return [0.0; 3];
-    }
-    let n = f64::from(material.exponent);
-    // The mirror image of wo about the normal is (-x, -y, z).
-    let cos_alpha = (wi[2] * wo[2] - wi[0] * wo[0] - wi[1] * wo[1]).max(0.0);
-    let lobe = (n + 2.0) / std::f64::consts::TAU * cos_alpha.powf(n);
-    std::array::from_fn(|c| {
-        let diffuse = f64::from(material.diffuse[c]) / std::f64::consts::PI;
-        let specular = match material.model {
-            api::MATERIAL_PHONG => f64::from(material.specular[c]) * lobe,
-            _ => 0.0,
-        };
-        scale * (diffuse + specular) * wi[2]
-    })
-}
-
-/// 0.99 over the largest component of Kd + Ks where that exceeds 1; 1 elsewhere and for diffuse.
-pub(super) fn energy_scale(material: &api::MaterialValue) -> f64 {
-    let sums = (0..3).map(|c| f64::from(material.diffuse[c]) + f64::from(material.specular[c]));
-    let largest = sums.fold(0.0, f64::max);
-    if material.model == api::MATERIAL_PHONG && largest > 1.0 { 0.99 / largest } else { 1.0 }
+    Shading::default().radiance(&ShadedPoint::of_bsdf(material, scale, wo, wi))
 }
 
 pub(super) fn materials(kind: BsdfKind) -> Vec<api::MaterialValue> {
@@ -176,8 +190,23 @@ fn directions(exponent: f32) -> Vec<(Vec3, Vec3)> {
     pairs
 }
 
-/// Judges the answers to `probes`, three floats each.
-pub fn judge(kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Check {
+/// Whether all answers to `probes` are right under a convention.
+pub fn passes(probes: &[BsdfProbe], values: &[[f32; 3]], convention: &Convention) -> bool {
+    probes.len() == values.len()
+        && probes.iter().zip(values).all(|(probe, value)| {
+            let Some(expected) = probe.expected(convention) else { return true };
+            let tolerance = probe.tolerance(expected);
+            (0..3).all(|c| (f64::from(value[c]) - expected[c]).abs() <= tolerance[c])
+        })
+}
+
+/// Judges the answers to `probes`, three floats each, under a convention.
+pub fn judge(
+    kind: BsdfKind,
+    probes: &[BsdfProbe],
+    values: &[[f32; 3]],
+    convention: &Convention,
+) -> Check {
     let (id, name) = match kind {
         BsdfKind::Diffuse => ("bsdf.diffuse", "diffuse"),
         BsdfKind::Phong => ("bsdf.phong", "Phong"),
@@ -186,19 +215,26 @@ pub fn judge(kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Check
         let summary = format!("{} answers to {} BSDF queries", values.len(), probes.len());
         return Check::new(id, "", Verdict::Fail, summary);
     }
-    let (mut wrong, mut not_finite, mut apart, mut total) = (0usize, 0usize, 0.0, 0.0);
+    let asked = probes.iter().zip(values);
+    let asked: Vec<(BsdfProbe, [f32; 3])> = asked
+        .filter_map(|(probe, value)| {
+            let expected = probe.expected(convention)?;
+            Some((BsdfProbe { expected, tolerance: probe.tolerance(expected), ..*probe }, *value))
+        })
+        .collect();
+    let (probes, values): (Vec<BsdfProbe>, Vec<[f32; 3]>) = asked.into_iter().unzip();
+    let (probes, values) = (&probes[..], &values[..]);
+    let (mut wrong, mut not_finite) = (0usize, 0usize);
     let mut worst: Option<(f64, usize)> = None;
     let mut ratios = Vec::new();
     for (index, (probe, value)) in probes.iter().zip(values).enumerate() {
         let mut excess = 0.0f64;
         for (c, &answer) in value.iter().enumerate() {
             let (a, b) = (f64::from(answer), probe.expected[c]);
-            // What is no number is as far off as the largest value.
-            let difference = if a.is_finite() { (a - b).abs() } else { probe.peak };
+            // What is no number is never right.
+            let difference = if a.is_finite() { (a - b).abs() } else { f64::INFINITY };
             not_finite += usize::from(!a.is_finite());
             excess = excess.max(difference / probe.tolerance[c].max(f64::MIN_POSITIVE));
-            apart += difference / probe.peak;
-            total += b / probe.peak;
             if b > 0.01 * probe.peak && a.is_finite() {
                 ratios.push(a / b);
             }
@@ -223,13 +259,56 @@ pub fn judge(kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Check
             Check::new(id, "", Verdict::Fail, summary).with_hint(hint(ratios, probes, values))
         }
     };
-    check.error = if wrong == 0 { 0.0 } else { apart / total };
+    let price = (wrong > 0).then(|| {
+        // By material, or by shape where a scene hands them out.
+        let fields = |m: &api::MaterialValue| (m.model, m.diffuse, m.specular, m.exponent);
+        let mut known: Vec<(u32, api::MaterialValue)> = Vec::new();
+        let groups: Vec<usize> = probes
+            .iter()
+            .map(|BsdfProbe { query, .. }| {
+                let of_shape = query.source == api::BSDF_OF_SHAPE;
+                let same = |(shape, material): &(u32, api::MaterialValue)| {
+                    *shape == query.shape
+                        && (of_shape || fields(material) == fields(&query.material))
+                };
+                known.iter().position(same).unwrap_or_else(|| {
+                    known.push((query.shape, query.material));
+                    known.len() - 1
+                })
+            })
+            .collect();
+        // A change is made to what is right under the convention.
+        let under = convention.bsdf();
+        let of = |index: usize, shading: &Shading| {
+            let probe: &BsdfProbe = &probes[index];
+            let shading = shading.over(&under);
+            let growth = convention.growth(probe.length);
+            shading.radiance(&probe.point).map(|value| growth * value)
+        };
+        let changes = match kind {
+            BsdfKind::Diffuse => price::diffuse_changes(),
+            BsdfKind::Phong => price::phong_changes(),
+        };
+        let unit = |index: usize| probes[index].peak;
+        let group = |index: usize| groups[index];
+        let answers = Answers {
+            found: values,
+            of: &of,
+            unit: &unit,
+            group: &group,
+            relative: 2e-4,
+            changes: &changes,
+        };
+        answers.price(None)
+    });
+    check.error = price.map_or(0.0, |price| price.error);
     let of_shape = probes.iter().any(|probe| probe.query.source == api::BSDF_OF_SHAPE);
     let rule = if of_shape { "bsdf.textured" } else { "bsdf.value" };
     check.measures = vec![
         Measure::at_most(rule, "directions answered wrongly (fraction)", fraction, 0.0),
         Measure::at_most(rule, "values not finite (count)", not_finite as f64, 0.0),
     ];
+    check.measures.extend(price.and_then(|price| price.measure()));
     check
 }
 
@@ -305,6 +384,10 @@ fn hint(mut ratios: Vec<f64>, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Stri
 mod tests {
     use super::*;
 
+    fn judge_plain(kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Check {
+        judge(kind, probes, values, &Convention::default())
+    }
+
     fn answers(probes: &[BsdfProbe], change: impl Fn(&BsdfProbe) -> [f64; 3]) -> Vec<[f32; 3]> {
         probes.iter().map(|probe| change(probe).map(|v| v as f32)).collect()
     }
@@ -327,27 +410,68 @@ mod tests {
         for kind in [BsdfKind::Diffuse, BsdfKind::Phong] {
             let probes = probes(kind);
             assert!(probes.len() > 1000);
-            let right = judge(kind, &probes, &answers(&probes, |p| p.expected));
+            let right = judge_plain(kind, &probes, &answers(&probes, |p| p.expected));
             assert_eq!((right.verdict, right.error), (Verdict::Pass, 0.0), "{right:?}");
-            let black = judge(kind, &probes, &answers(&probes, |_| [0.0; 3]));
+            let black = judge_plain(kind, &probes, &answers(&probes, |_| [0.0; 3]));
             assert_eq!(black.verdict, Verdict::Fail);
             assert!((black.error - 1.0).abs() < 1e-6, "{}", black.error);
-            let gain = judge(kind, &probes, &answers(&probes, |p| p.expected.map(|v| 1.01 * v)));
+            let gain =
+                judge_plain(kind, &probes, &answers(&probes, |p| p.expected.map(|v| 1.01 * v)));
             assert_eq!(gain.verdict, Verdict::Fail);
             assert!((gain.error - 0.01).abs() < 1e-4, "{}", gain.error);
-            let pi = judge(
+            for factor in [0.5, 3.0, std::f64::consts::PI] {
+                let gain = answers(&probes, |p| p.expected.map(|v| factor * v));
+                let gain = judge_plain(kind, &probes, &gain);
+                assert!((gain.error - 0.02).abs() < 1e-3, "one slip: {}", gain.error);
+            }
+            let pi = judge_plain(
                 kind,
                 &probes,
                 &answers(&probes, |p| p.expected.map(|v| v * std::f64::consts::PI)),
             );
             assert!(pi.hint.contains("pi"), "{}", pi.hint);
-            let nan = judge(kind, &probes, &answers(&probes, |_| [f64::NAN; 3]));
+            let nan = judge_plain(kind, &probes, &answers(&probes, |_| [f64::NAN; 3]));
             assert!(nan.verdict == Verdict::Fail && nan.error >= 1.0, "{}", nan.error);
             let cosine = answers(&probes, |p| p.expected.map(|v| v * f64::from(p.query.wi[2])));
-            assert_eq!(judge(kind, &probes, &cosine).verdict, Verdict::Fail);
-            let few = judge(kind, &probes, &[[0.0; 3]]);
+            assert_eq!(judge_plain(kind, &probes, &cosine).verdict, Verdict::Fail);
+            let few = judge_plain(kind, &probes, &[[0.0; 3]]);
             assert_eq!(few.verdict, Verdict::Fail);
         }
+    }
+
+    #[test]
+    fn a_convention_is_right_under_itself_alone() {
+        let mut probes = probes(BsdfKind::Phong);
+        probes.extend(long_probes(BsdfKind::Phong));
+        let kept = Convention { cos_i: 1, pi: -1, long_wi: Some(0) };
+        let values: Vec<[f32; 3]> =
+            probes.iter().map(|p| p.expected(&kept).unwrap().map(|v| v as f32)).collect();
+        for convention in Convention::all() {
+            // Of unit length, wi tells nothing of what eval() would make of another.
+            let same = (convention.cos_i, convention.pi) == (1, -1)
+                && convention.long_wi.is_none_or(|growth| growth == 0);
+            assert_eq!(passes(&probes, &values, &convention), same, "{convention:?}");
+            let judged = judge(BsdfKind::Phong, &probes, &values, &convention).verdict;
+            assert_eq!(judged == Verdict::Pass, same, "{convention:?}");
+        }
+    }
+
+    #[test]
+    fn a_second_mistake_never_costs_less() {
+        let probes = probes(BsdfKind::Phong);
+        let right = Shading::default();
+        let no_scale = Shading { scaled: [false; 2], ..right };
+        let n_plus_1 = Shading { normalization: |n| (n + 1.0) / std::f64::consts::TAU, ..right };
+        let both = Shading { scaled: [false; 2], ..n_plus_1 };
+        let error = |shading: Shading| {
+            let values = answers(&probes, |p| shading.radiance(&p.point));
+            judge_plain(BsdfKind::Phong, &probes, &values).error
+        };
+        let (a, b, both) = (error(no_scale), error(n_plus_1), error(both));
+        assert!((a - 0.02).abs() < 1e-3 && b <= 0.02 && both > a && both > b, "{a} {b} {both}");
+        // All of the lobe is missing: that is no slip.
+        let diffuse = error(Shading { factor: [1.0, 0.0], ..right });
+        assert!((0.1..0.35).contains(&diffuse), "{diffuse}");
     }
 
     #[test]
@@ -357,10 +481,10 @@ mod tests {
             let cos = f64::from(p.query.wi[2]);
             p.query.material.diffuse.map(|kd| f64::from(kd) / std::f64::consts::PI * cos)
         };
-        let no_wi = judge(BsdfKind::Diffuse, &probes, &answers(&probes, unguarded));
+        let no_wi = judge_plain(BsdfKind::Diffuse, &probes, &answers(&probes, unguarded));
         assert!(no_wi.hint.contains("wi"), "{}", no_wi.hint);
         let no_wo = answers(&probes, |p| unguarded(p).map(|v| v.max(0.0)));
-        let no_wo = judge(BsdfKind::Diffuse, &probes, &no_wo);
+        let no_wo = judge_plain(BsdfKind::Diffuse, &probes, &no_wo);
         assert!(no_wo.hint.contains("wo"), "{}", no_wo.hint);
     }
 }

@@ -20,10 +20,17 @@ pub struct Check {
     pub scene: String,
     /// Whether that scene is held back from the student.
     pub held_back: bool,
+    /// The convention that it was judged under (`evidence::convention`); empty for the handout's.
+    #[serde(default)]
+    pub convention: String,
+    /// The share of a part's points that it can cost, in (0, 1]: the scene's weight.
+    #[serde(default = "whole")]
+    pub weight: f64,
     /// The answer in a word.
     pub verdict: Verdict,
-    /// How wrong the answer is: 0 is right, 1 is as large as the right answer itself (a relative
-    /// L1 error or a fraction of wrong answers; the summary says which).
+    /// How wrong the answer is, in [0, 1]: 0 is right, 1 is as large as the right answer itself. A
+    /// relative L1 error or a fraction of wrong answers, or what the single mistake costs that
+    /// explains it (`evidence::price`), if that is less.
     #[serde(deserialize_with = "or_nan")]
     pub error: f64,
     /// One sentence: what was found, where, expected and actual.
@@ -54,13 +61,17 @@ pub enum Verdict {
 }
 
 /// Every rule that can fail a check, by what judges: one or several of them make up a check.
-pub const RULES: [&str; 23] = [
+pub const RULES: [&str; 28] = [
     "bsdf.value",
     "bsdf.textured",
     "rays.lit",
+    "rays.black",
     "shadow.lit",
     "shadow.dark",
     "loop.agreement",
+    "loop.pixels",
+    "loop.edges",
+    "loop.edge_bias",
     "image.size",
     "image.non_finite",
     "image.negative",
@@ -76,6 +87,7 @@ pub const RULES: [&str; 23] = [
     "pass.exponent",
     "vertex.position",
     "vertex.normal",
+    "vertex.clip",
     "bonus.lit",
     "bonus.dark",
 ];
@@ -114,6 +126,8 @@ impl Check {
             id: id.to_owned(),
             scene: scene.to_owned(),
             held_back: false,
+            convention: String::new(),
+            weight: 1.0,
             verdict,
             error: if verdict == Verdict::Pass { 0.0 } else { 1.0 },
             summary: summary.into(),
@@ -146,6 +160,8 @@ impl Check {
         }
         Self {
             held_back: true,
+            convention: self.convention.clone(),
+            weight: self.weight,
             error: coarse(self.error),
             ..Self::new(&self.id, &self.scene, self.verdict, self.said())
         }
@@ -156,6 +172,11 @@ impl Check {
         self.hint = hint.into();
         self
     }
+}
+
+/// The weight of a check that may cost all of a part.
+fn whole() -> f64 {
+    1.0
 }
 
 /// JSON has no number for what is not finite, and writes `null`.

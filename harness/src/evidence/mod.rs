@@ -4,10 +4,15 @@
 
 pub mod bsdf;
 mod check;
+pub mod convention;
 pub mod handed_in;
 pub mod images;
+pub mod loops;
 pub mod physical;
+pub mod pixels;
+pub mod price;
 pub mod rays;
+pub mod shading;
 pub mod shadow_map;
 pub mod stages;
 

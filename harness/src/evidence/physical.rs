@@ -135,7 +135,8 @@ fn query(material: &api::MaterialValue, wo: [f32; 3], wi: [f32; 3]) -> api::Bsdf
 
 #[cfg(test)]
 mod tests {
-    use super::super::bsdf::{energy_scale, value};
+    use super::super::bsdf::value;
+    use super::super::shading::energy_scale;
     use super::*;
 
     fn judge(kind: BsdfKind, change: impl Fn(&api::BsdfQuery, f64) -> f64) -> Check {

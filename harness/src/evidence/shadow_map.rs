@@ -13,8 +13,9 @@ const HALF_LIGHT: f32 = 0.02;
 const DIM: f32 = 1e-5;
 /// So much of the lit and of the shadowed surface must tell something.
 const LEAST_KNOWN: f64 = 0.25;
-/// An image has shadows when so much of what lies in shadow is black.
-const MOSTLY: f64 = 0.95;
+/// An image may have shadows when so much of what lies in shadow is black: not all of it where
+/// mirrors are, which are drawn plain.
+const MOSTLY: f64 = 0.02;
 
 /// The measure of a check that was judged by visibility.
 const VISIBILITY: &str = "lit pixels that are not lit (fraction)";
@@ -22,15 +23,16 @@ const VISIBILITY: &str = "lit pixels that are not lit (fraction)";
 /// An image that is wrong and so dark that it tells nothing of its shadows leaves the verdict to
 /// another scene that does, if there is one.
 pub fn set_apart(checks: &mut [Check]) {
+    let is_bonus = |check: &Check| check.id == "bonus.image" || check.id == "bonus.probe";
     let tells = |check: &Check| {
         let visibility = check.measures.iter().any(|measure| measure.name == VISIBILITY);
-        check.id == "bonus.image" && (check.verdict == Verdict::Pass || visibility)
+        is_bonus(check) && (check.verdict == Verdict::Pass || visibility)
     };
     if !checks.iter().any(tells) {
         return;
     }
     for check in checks.iter_mut() {
-        if check.id == "bonus.image" && check.verdict == Verdict::Fail && !tells(check) {
+        if is_bonus(check) && check.verdict == Verdict::Fail && !tells(check) {
             check.verdict = Verdict::NotJudged;
             check.summary = format!(
                 "too dark to tell where shadows fall; another scene does ({})",

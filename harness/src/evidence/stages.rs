@@ -3,8 +3,11 @@
 //!
 //! No reference shader is needed: ours write positions, normals and uniforms, not radiance.
 
+use std::collections::BTreeMap;
+
 use basecode::{Camera, Image, MaterialModel, Scene, Vec3};
 
+use super::price::{Class, Price};
 use super::{Check, Measure, Verdict};
 use crate::expected::SurfaceBuffer;
 use crate::imaging::reference::RegionMask;
@@ -119,6 +122,8 @@ const STRAY_FRACTION: f64 = 5e-3;
 /// The tolerance of a position, relative to its distance from the camera: rasterised attributes
 /// against a ray's hit.
 const POSITION_RELATIVE: f32 = 2e-3;
+/// How far surfaces may lie from their place on the film [pixels]: hardware snaps vertices to 1/256.
+const OFFSET_PX: f64 = 0.04;
 /// The tolerance of a unit normal.
 const NORMAL_ABSOLUTE: f32 = 1e-2;
 
@@ -192,18 +197,99 @@ pub fn judge_pass(
             } else {
                 ""
             };
-            let error = wrong_total as f64 / total as f64;
-            Check { error, ..Check::new(id, scene_name, Verdict::Fail, summary) }.with_hint(hint)
+            let price = Price::of_raw(wrong_total as f64 / total as f64);
+            let price = match measures.iter().filter(|measure| !measure.passed).count() {
+                1 => price.or("one value is wrong", Class::Slip, 0.0),
+                2 => price.or("two values are wrong", Class::Concept, 0.0),
+                _ => price,
+            };
+            let price = wrong_shapes(scene, &camera, surface, mask, frames).price(price);
+            measures.extend(price.measure());
+            Check { error: price.error, ..Check::new(id, scene_name, Verdict::Fail, summary) }
+                .with_hint(hint)
         }
     };
     check.measures = measures;
     check
 }
 
+/// What is wrong with the shapes of a pass whose values are wrong.
+struct WrongShapes {
+    /// Shapes in view.
+    shapes: usize,
+    /// Those that show a wrong value.
+    wrong: usize,
+    /// Whether each of those shows what belongs to one other shape, or to none.
+    exchanged: bool,
+    /// Whether each shows its albedos without the energy scale.
+    unscaled: bool,
+}
+
+impl WrongShapes {
+    fn price(&self, price: Price) -> Price {
+        let mut price = price;
+        if self.exchanged {
+            price = price.or("a shape has another's material", Class::Slip, 0.0);
+        }
+        if self.unscaled {
+            price = price.or("albedos without the energy scale", Class::Slip, 0.0);
+        }
+        if self.wrong == 1 && self.shapes > 1 {
+            price = price.or("one shape is wrong or missing", Class::Slip, 0.0);
+        }
+        price
+    }
+}
+
+fn wrong_shapes(
+    scene: &Scene,
+    camera: &Camera,
+    surface: &SurfaceBuffer,
+    mask: &RegionMask,
+    frames: &[(BoundValue, Image)],
+) -> WrongShapes {
+    let close = |found: Vec3, expected: Vec3| {
+        (found - expected).abs().max_element()
+            <= BOUND_RELATIVE * expected.abs().max_element().max(1e-3)
+    };
+    // What each shape shows, at its pixel in the middle of the list.
+    let mut pixels: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (index, shape) in interior(surface, mask) {
+        pixels.entry(shape).or_default().push(index);
+    }
+    let shapes = scene.shapes().len();
+    let mut seen = WrongShapes { shapes: pixels.len(), wrong: 0, exchanged: true, unscaled: true };
+    for (shape, pixels) in &pixels {
+        let shows = |expected: &dyn Fn(BoundValue) -> Option<Vec3>| {
+            frames.iter().all(|(bound, frame)| {
+                let right = |index: &&usize| {
+                    expected(*bound).is_none_or(|expected| close(frame.pixels[**index], expected))
+                };
+                let strays = pixels.len() - pixels.iter().filter(right).count();
+                strays as f64 <= STRAY_FRACTION * pixels.len() as f64
+            })
+        };
+        let of = |shape: usize| move |bound: BoundValue| bound.expected(scene, camera, shape);
+        if shows(&of(*shape)) {
+            continue;
+        }
+        seen.wrong += 1;
+        seen.exchanged &= (0..shapes).any(|other| other != *shape && shows(&of(other)));
+        let scale = scene.material_of(*shape).energy_scale();
+        seen.unscaled &= shows(&|bound| {
+            let expected = bound.expected(scene, camera, *shape)?;
+            let scaled = matches!(bound, BoundValue::RhoD | BoundValue::RhoS);
+            Some(if scaled { expected / scale } else { expected })
+        });
+    }
+    seen
+}
+
 /// Part 2.2: judges the world positions and normals that a student's vertex stage forwards, and
 /// where on the film they land.
 pub fn judge_vertex(
     scene_name: &str,
+    camera: &Camera,
     surface: &SurfaceBuffer,
     mask: &RegionMask,
     positions: &Image,
@@ -212,6 +298,8 @@ pub fn judge_vertex(
     let id = "stage.vertex";
     let (mut counted, mut wrong_position, mut wrong_normal, mut missing) =
         (0usize, 0usize, 0usize, 0usize);
+    let (mut not_negated, mut not_flipped) = (0usize, 0usize);
+    let mut offsets = Vec::new();
     for (index, _) in interior(surface, mask) {
         let (ray, Some(point)) = &surface.pixels[index] else { continue };
         counted += 1;
@@ -223,6 +311,15 @@ pub fn judge_vertex(
         let right_normal = (n - point.normal).length() <= NORMAL_ABSOLUTE;
         wrong_position += usize::from(!right_position);
         wrong_normal += usize::from(!right_normal);
+        if right_position {
+            offsets.push(offset_px(camera, surface, index, p));
+        }
+        let negated = (n + point.normal).length() <= NORMAL_ABSOLUTE;
+        not_negated += usize::from(!negated);
+        let (x, y) = (index % surface.width, index / surface.width);
+        let flipped = positions.pixels[(surface.height - 1 - y) * surface.width + x];
+        let upside_down = (flipped - point.position).length() <= 4.0 * reach;
+        not_flipped += usize::from(!upside_down);
     }
     if counted == 0 {
         return Check::new(
@@ -233,7 +330,7 @@ pub fn judge_vertex(
         );
     }
     let fraction = |wrong: usize| wrong as f64 / counted as f64;
-    let measures = vec![
+    let mut measures = vec![
         Measure::at_most(
             "vertex.position",
             "world positions wrong (fraction of pixels)",
@@ -247,28 +344,71 @@ pub fn judge_vertex(
             STRAY_FRACTION,
         ),
     ];
+    let offset_px = median_length(&mut offsets);
+    let name = "surfaces off their place on the film (pixels, median)";
+    measures.push(Measure::at_most("vertex.clip", name, offset_px, OFFSET_PX));
     let passed = measures.iter().all(|measure| measure.passed);
     let mut check = if passed {
         let summary = "positions and normals reach the fragment stage in world space";
         Check::new(id, scene_name, Verdict::Pass, summary)
     } else {
-        let summary = format!(
+        let mut summary = format!(
             "of {counted} pixels, {missing} show nothing, {wrong_position} another world position and {wrong_normal} \
              another world normal than expected"
         );
-        let error = fraction(wrong_position.max(wrong_normal));
+        if offset_px > OFFSET_PX {
+            summary += &format!("; surfaces lie {offset_px:.2} pixels beside their place");
+        }
+        let price = Price::of_raw(fraction(wrong_position.max(wrong_normal)));
+        let strays = |wrong: usize| fraction(wrong) <= STRAY_FRACTION;
+        let price = match (strays(wrong_position), strays(wrong_normal)) {
+            (true, false) => price.or("the normal alone is wrong", Class::Concept, 0.0).or(
+                "the normal is negated",
+                Class::Slip,
+                fraction(not_negated),
+            ),
+            (false, true) => price.or("the position alone is wrong", Class::Concept, 0.0),
+            (true, true) => {
+                Price::of_raw(1.0).or("surfaces lie beside their place", Class::Slip, 0.0)
+            }
+            (false, false) => price,
+        };
+        let price = price.or("the image is upside down", Class::Slip, fraction(not_flipped));
+        measures.extend(price.measure());
         // Elsewhere it may be either, or the clip-space position: what the diagnosis tells.
         let most = |wrong: usize| wrong * 2 > counted;
         let hint = match (most(missing), most(wrong_position), most(wrong_normal)) {
+            _ if strays(wrong_position) && strays(wrong_normal) => {
+                "the image is shifted: look at the clip-space position"
+            }
             (true, ..) => "nothing is drawn where it should be: look at the clip-space position",
             (_, true, false) => "look at the model matrix and at what is forwarded as position",
             (_, false, true) => "look at the normal matrix and at what is forwarded as normal",
             _ => "",
         };
-        Check { error, ..Check::new(id, scene_name, Verdict::Fail, summary) }.with_hint(hint)
+        let check = Check::new(id, scene_name, Verdict::Fail, summary);
+        Check { error: price.error, ..check }.with_hint(hint)
     };
     check.measures = measures;
     check
+}
+
+/// How far a world position lies from the centre of the pixel that shows it [pixels, x and y].
+fn offset_px(camera: &Camera, film: &SurfaceBuffer, index: usize, position: Vec3) -> [f32; 2] {
+    let (x, y) = (index % film.width, index / film.width);
+    let ndc = (camera.projection() * camera.view()).project_point3(position);
+    let (width, height) = (film.width as f32, film.height as f32);
+    let at = [(0.5 + 0.5 * ndc.x) * width, (0.5 - 0.5 * ndc.y) * height];
+    [at[0] - x as f32 - 0.5, at[1] - y as f32 - 0.5]
+}
+
+/// The length of the median offset; 0 when there is none.
+fn median_length(offsets: &mut [[f32; 2]]) -> f64 {
+    let mut median = |axis: usize| {
+        offsets.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
+        offsets.get(offsets.len() / 2).map_or(0.0, |offset| f64::from(offset[axis]))
+    };
+    median(0).hypot(median(1))
 }
 
 /// Pixels away from edges and emitters, with the shape that they show.

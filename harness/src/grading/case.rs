@@ -6,10 +6,11 @@ use basecode::scene::SceneConfig;
 use basecode::{Image, MaterialModel, Scene};
 
 use crate::assignment::SceneEntry;
+use crate::evidence::loops::{RAYS, SAMPLED_WIDTH, SampledFilm};
 use crate::evidence::rays::RayBatch;
 use crate::expected::{Expected, Store, SurfaceBuffer, regions};
 use crate::imaging::reference::RegionMask;
-use crate::worker::CameraValue;
+use crate::worker::{CameraValue, RayQuery};
 
 /// The widest film on which rays and stages are judged: enough to show every surface.
 const SMALL_WIDTH: u32 = 96;
@@ -50,10 +51,34 @@ pub struct Small {
     pub unshadowed_mask: RegionMask,
     /// The rays that hang on nothing.
     pub batch: RayBatch,
+    /// What several samples a pixel are judged on; of scenes with stored images alone.
+    pub sampled: Option<Sampled>,
     /// What a stage that shades is compared with: centres, without shadows.
     pub unshadowed: Image,
     /// The same without renormalised normals; see [`Expected::raw_normals`].
     pub raw_normals: Option<Image>,
+}
+
+/// A film on which a render of several samples per pixel is judged.
+pub struct Sampled {
+    /// Its size, and where in their pixels its rays go through.
+    pub film: SampledFilm,
+    /// The rays, pixel by pixel.
+    pub rays: Vec<RayQuery>,
+}
+
+impl Sampled {
+    fn new(scene: &Scene, [full_width, full_height]: [u32; 2]) -> anyhow::Result<Self> {
+        let width = full_width.min(SAMPLED_WIDTH);
+        let film = SampledFilm::new(width, (full_height * width / full_width).max(1));
+        let camera = scene.camera(film.width as usize, film.height as usize)?;
+        let rays = film.offsets.iter().enumerate().map(|(index, [jx, jy])| {
+            let pixel = index as u32 / RAYS;
+            let (x, y) = ((pixel % film.width) as f32, (pixel / film.width) as f32);
+            super::ask::ray(&camera.ray(x + jx, y + jy))
+        });
+        Ok(Self { rays: rays.collect(), film })
+    }
 }
 
 /// The small film of a film, width and height in pixels.
@@ -91,13 +116,15 @@ impl Case {
         let surface = SurfaceBuffer::new(scene, w, h)?;
         let mask = regions(scene, w, h, true)?;
         let asked = without_mirrors(scene, &surface, &mask);
-        let batch = RayBatch::new(&entry.name, &surface, &asked, scene.first_light_intensity());
+        let batch = RayBatch::new(&entry.name, scene, &surface, &asked);
         let small = Small {
             width,
             height,
             unshadowed_mask: regions(scene, w, h, false)?,
             unshadowed: store.unshadowed(&offline, width, height)?,
             raw_normals: store.raw_normals(&realtime, width, height)?,
+            // The loop is the same on every scene: those that have most to show are enough.
+            sampled: entry.stored.then(|| Sampled::new(scene, film)).transpose()?,
             surface,
             mask,
             batch,

@@ -12,13 +12,13 @@ use super::draw::{Frame, STAGES, draw_each, draw_scenes, named};
 use super::realtime::Stages;
 use super::seen;
 use crate::diagnosis::{Kind, Tile, View};
-use crate::evidence::images;
 use crate::evidence::stages::{
     BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass, judge_vertex,
 };
 use crate::evidence::{Check, Verdict};
+use crate::evidence::{images, pixels};
 use crate::imaging::evidence::Tolerances;
-use crate::imaging::reference::RegionMask;
+use crate::imaging::reference::{Region, RegionMask};
 use crate::worker::{Outcome, Stage};
 
 /// The checks of the three stages, and the tasks that they belong to.
@@ -176,15 +176,25 @@ fn judge_bound(case: &Case, frames: &[(BoundValue, Image)]) -> Check {
 }
 
 fn vertex(case: &Case, positions: &Image, normals: &Image) -> Check {
-    let small = &case.small;
-    judge_vertex(&case.entry.name, &small.surface, &small.unshadowed_mask, positions, normals)
+    let (name, small) = (&case.entry.name, &case.small);
+    let camera = case.expected.scene.camera(small.surface.width, small.surface.height);
+    match camera {
+        Ok(camera) => {
+            let mask = &small.unshadowed_mask;
+            judge_vertex(name, &camera, &small.surface, mask, positions, normals)
+        }
+        Err(error) => Check::new("stage.vertex", name, Verdict::NotRun, error.to_string()),
+    }
 }
 
 fn fragment(id: &str, case: &Case, image: &Image, phong: bool, tolerances: &Tolerances) -> Check {
     let small = &case.small;
-    let wanted = images::only(&small.unshadowed_mask, &|region| (region.exponent > 0.0) == phong);
+    let own = |region: &Region| (region.exponent > 0.0) == phong;
+    let wanted = images::only(&small.unshadowed_mask, &own);
     let expected = (&small.unshadowed, small.raw_normals.as_ref());
-    images::judge_shaded(id, &case.entry.name, image, expected, &wanted, tolerances)
+    let check = images::judge_shaded(id, &case.entry.name, image, expected, &wanted, tolerances);
+    let scene = &case.expected.scene;
+    check.priced(|raw| pixels::price(scene, image, &small.unshadowed_mask, &own, raw))
 }
 
 /// Keeps for the diagnosis what one of the two fragment stages draws.

@@ -7,6 +7,7 @@ use anyhow::Context;
 use rayon::prelude::*;
 
 use super::ask::{self, Asker};
+use super::conventions::Answers;
 use super::draw::{Frame, draw_each};
 use super::offline::{self, Drawn};
 use super::pipeline::Grading;
@@ -182,11 +183,12 @@ impl Grading<'_> {
         };
         let mut drawn = Vec::new();
         if belongs("1.") {
-            offline::probe_bsdfs(&asker, reference, &self.cases);
+            let mut answers = Answers::default();
+            answers.probe_bsdfs(&asker, reference, &self.cases);
             for case in &self.cases {
-                let seed = 1;
+                let run = (1, self.threads);
                 let judged =
-                    offline::judge_scene(&asker, reference, case, seed, self.threads, tolerances);
+                    offline::judge_scene(&asker, reference, case, run, tolerances, &mut answers);
                 drawn.extend(judged.1);
             }
         }

@@ -4,6 +4,7 @@ mod ask;
 mod case;
 mod contain;
 mod control;
+mod conventions;
 mod costs;
 mod draw;
 pub mod handed_in;

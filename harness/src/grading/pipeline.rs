@@ -9,6 +9,7 @@ use anyhow::Context;
 
 use super::ask::Asker;
 use super::case::Case;
+use super::conventions::Answers;
 use super::costs::ReferenceCosts;
 use super::kept::Kept;
 use super::offline::{self, Drawn};
@@ -365,7 +366,11 @@ impl<'a> Grading<'a> {
         drawn: &mut Vec<Drawn>,
     ) -> anyhow::Result<()> {
         // Cheap questions first: what a slow submission is not asked any more is what costs most.
-        let probed = self.groups().map(|cases| offline::probe_bsdfs(asker, plugin, cases));
+        let probed = self.groups().map(|cases| {
+            let mut answers = Answers::default();
+            let checks = answers.probe_bsdfs(asker, plugin, cases);
+            (answers, checks)
+        });
         let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
         let findings = sampler::judge(asker, plugin, &scene)?;
         let mut tolerances = self.assignment.tolerances.clone();
@@ -376,16 +381,18 @@ impl<'a> Grading<'a> {
             tolerances.bias_standard_errors *= DEPENDENT_PIXELS;
         }
         checks.extend(findings);
-        for (cases, probed) in self.groups().into_iter().zip(probed) {
+        for (cases, (mut answers, probed)) in self.groups().into_iter().zip(probed) {
             let begin = checks.len();
             checks.extend(probed);
             for case in cheap_first(cases) {
                 self.stop_if_interrupted()?;
+                let run = (seed, self.threads);
                 let (found, image) =
-                    offline::judge_scene(asker, plugin, case, seed, self.threads, &tolerances);
+                    offline::judge_scene(asker, plugin, case, run, &tolerances, &mut answers);
                 checks.extend(found);
                 drawn.extend(image);
             }
+            checks.extend(answers.judge());
             rays::set_apart(&mut checks[begin..]);
             mark(&mut checks[begin..], cases);
         }
@@ -474,10 +481,16 @@ fn hold_back(store: &Store, seed: u64, cases: &mut Vec<Case>) -> anyhow::Result<
     Ok(held_back)
 }
 
-/// Notes in the checks on a group of scenes whether these are held back.
+/// Notes in the checks on a group of scenes whether these are held back, and what they can cost.
 fn mark(checks: &mut [Check], cases: &[Case]) {
     let held_back = cases.iter().any(|case| case.held_back);
-    checks.iter_mut().for_each(|check| check.held_back = held_back);
+    for check in checks {
+        check.held_back = held_back;
+        let case = cases.iter().find(|case| case.entry.name == check.scene);
+        // Shadows where none belong are no matter of the scene.
+        let own = case.filter(|_| check.id != "bonus.default");
+        check.weight = own.map_or(1.0, |case| case.entry.weight);
+    }
 }
 
 /// What the stages cost so far.

@@ -9,6 +9,7 @@ use super::case::Case;
 use super::draw::{Frame, STAGES, draw, draw_plain};
 use super::offline::Drawn;
 use crate::evidence::images::{self, Kind};
+use crate::evidence::pixels;
 use crate::evidence::shadow_map::Shadows;
 use crate::evidence::stages::{VERTEX, is_template};
 use crate::evidence::{Check, Verdict};
@@ -121,7 +122,15 @@ fn judge_plain(
             return (vec![*check, all], None);
         }
     };
-    let views = VIEWS.map(|view| judge(case, Kind::Realtime, &drawn.image, view, tolerances));
+    let Expected { scene, unshadowed_mask: mask, .. } = &case.expected;
+    let views = VIEWS.map(|view| {
+        let check = judge(case, Kind::Realtime, &drawn.image, view, tolerances);
+        // The whole image tells of no one part.
+        if view.0 == VIEWS[0].0 {
+            return check;
+        }
+        check.priced(|raw| pixels::price(scene, &drawn.image, mask, view.1, raw))
+    });
     let without_shadows = match views[0].verdict {
         Verdict::Fail => plain_but_for_shadows(case, &drawn.image, tolerances),
         _ => None,

@@ -91,7 +91,8 @@ mod tests {
 
     /// What a hand-in is worth, and what an instructor is told.
     fn worth(rules: &Rules, evidence: &Evidence) -> (f64, f64, Vec<String>) {
-        let grade = grade(rules, evidence);
+        let mut grade = grade(rules, evidence);
+        grade.remarks.extend(grade.parts.into_iter().map(|part| part.reason));
         (grade.points, grade.points_max, grade.remarks)
     }
 

@@ -1,5 +1,7 @@
 //! The pure function from evidence to points.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
 use super::rules::{Part, Rules};
@@ -52,11 +54,67 @@ struct Worth {
     evidence: Vec<String>,
 }
 
-/// Grades a hand-in. Depends on nothing but its arguments, nor on the order of the checks.
+/// Grades a submission. Depends on nothing but its arguments, nor on the order of the checks.
 ///
 /// A part is worth the lower of what it is worth on public and on held-back scenes; checks without a
 /// scene count in both.
 pub fn grade(rules: &Rules, evidence: &Evidence) -> Grade {
+    grade_settled(rules, &settle(rules, evidence))
+}
+
+/// The evidence under the conventions that are worth most: for each path one, the handout's where
+/// another is worth no more. What was judged under others is left out.
+pub fn settle(rules: &Rules, evidence: &Evidence) -> Evidence {
+    let mut settled = evidence.clone();
+    for path in rules.paths.keys() {
+        let own = |part: &&Part| part.path == *path;
+        let ids: BTreeSet<&String> =
+            rules.parts.iter().filter(own).flat_map(|part| &part.evidence).collect();
+        let is_own = |check: &&Check| ids.contains(&check.id);
+        let conventions: BTreeSet<&str> =
+            evidence.checks.iter().filter(is_own).map(|check| check.convention.as_str()).collect();
+        if conventions.iter().all(|convention| convention.is_empty()) {
+            continue;
+        }
+        let under = |convention: &str| {
+            // A check under this convention stands for the same one under the handout's.
+            let stands: BTreeSet<_> = settled
+                .checks
+                .iter()
+                .filter(|check| check.convention == convention)
+                .map(|check| (&check.id, &check.scene, check.held_back))
+                .collect();
+            let keep = |check: &&Check| {
+                !ids.contains(&check.id)
+                    || check.convention == convention
+                    || (check.convention.is_empty()
+                        && !stands.contains(&(&check.id, &check.scene, check.held_back)))
+            };
+            Evidence { checks: settled.checks.iter().filter(keep).cloned().collect() }
+        };
+        let worth = |evidence: &Evidence| {
+            let grade = grade_settled(rules, evidence);
+            let parts = grade.parts.iter().zip(&rules.parts);
+            let own = parts.filter(|(_, part)| own(part));
+            own.map(|(graded, _)| graded.points_max).sum::<f64>()
+        };
+        let mut best: Option<(f64, Evidence)> = None;
+        for convention in conventions {
+            let candidate = under(convention);
+            let worth = worth(&candidate);
+            if best.as_ref().is_none_or(|(most, _)| worth > *most) {
+                best = Some((worth, candidate));
+            }
+        }
+        if let Some((_, evidence)) = best {
+            settled = evidence;
+        }
+    }
+    settled
+}
+
+/// Grades by evidence of one convention for each path.
+fn grade_settled(rules: &Rules, evidence: &Evidence) -> Grade {
     let of = |wanted: &dyn Fn(&Check) -> bool| Evidence {
         checks: evidence.checks.iter().filter(|check| wanted(check)).cloned().collect(),
     };
@@ -229,10 +287,13 @@ fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String], any_scene: bool
 
 fn unjudged(evidence: &Evidence, part: &Part) -> Worth {
     let ids = part.evidence.iter().chain(&part.fallback);
-    let silent = ids.flat_map(|id| evidence.named(id)).map(Check::said).min();
+    let checks: Vec<&Check> = ids.flat_map(|id| evidence.named(id)).collect();
+    let silent = checks.iter().map(|check| check.said()).min();
+    // Only what the machine could not ask is a range: the rest is the submission's own.
+    let open = checks.is_empty() || checks.iter().any(|check| check.verdict == Verdict::NotRun);
     Worth {
         least: 0.0,
-        most: 1.0,
+        most: if open { 1.0 } else { 0.0 },
         reason: match silent {
             Some(why) => format!("could not be judged: {why}"),
             None => "could not be judged: no evidence was collected".into(),
@@ -274,7 +335,7 @@ fn blame_the_unexplained(rules: &Rules, evidence: &Evidence, worths: &mut [Worth
 fn fraction(rules: &Rules, check: &Check) -> f64 {
     match check.verdict {
         Verdict::Pass => 1.0,
-        Verdict::Fail => rules.curve.fraction(check.error),
+        Verdict::Fail => 1.0 - check.weight * (1.0 - rules.curve.fraction(check.error)),
         _ => 0.0,
     }
 }

@@ -5,9 +5,12 @@
 //! 2. A *path* (offline or realtime) whose proof passes on every scene earns all its parts in full.
 //! 3. Otherwise each part is worth what its own evidence says, the worst scene counting.
 //! 4. Evidence that does not apply gives way to the part's fallback.
-//! 5. When the proof fails and no part's own evidence says why, the path's `blame` part pays.
-//! 6. What cannot be judged is a range from 0 to all points, with its reason.
-//! 7. Public and held-back scenes are graded apart by these rules; the lower counts, part by part.
+//! 5. A check that fails costs its scene's weight times what the curve takes for its error; a part
+//!    loses the largest of them, never a sum or a mean.
+//! 6. When the proof fails and no part's own evidence says why, the path's `blame` part pays.
+//! 7. What the machine could not ask is a range from 0 to all points, with its reason.
+//! 8. Public and held-back scenes are graded apart by these rules; the lower counts, part by part.
+//! 9. Of the conventions that a path was judged under, the one that is worth most counts.
 
 mod curve;
 mod deletion;
@@ -16,5 +19,5 @@ mod rules;
 
 pub use curve::Curve;
 pub use deletion::EvidenceRule;
-pub use grade::{BUILD, Grade, PartGrade, grade};
+pub use grade::{BUILD, Grade, PartGrade, grade, settle};
 pub use rules::{Gate, Part, PathRule, Rules};

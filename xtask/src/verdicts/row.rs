@@ -116,6 +116,13 @@ impl Row {
         if explain {
             for part in self.grade.parts.iter().filter(|part| part.points < part.out_of) {
                 println!("    {}: {} [{}]", part.id, part.reason, part.evidence.join(", "));
+                let checks = self.evidence.checks.iter();
+                for check in checks.filter(|check| part.evidence.contains(&check.name())) {
+                    let values = check.measures.iter().filter(|m| !m.passed || m.rule.is_empty());
+                    let values = values.map(|m| format!("{} {:.4} ({})", m.rule, m.value, m.name));
+                    let values = values.collect::<Vec<_>>().join("; ");
+                    println!("        {} error {:.4}: {values}", check.name(), check.error);
+                }
             }
             for found in &self.diagnoses {
                 let (words, left, next) = (&found.words, found.unexplained, found.runner_up);

@@ -188,14 +188,14 @@ fn reasons_tell_nothing_of_held_back_scenes() {
 }
 
 #[test]
-fn who_dodges_the_held_back_scenes_gets_a_range() {
+fn who_dodges_the_held_back_scenes_gets_nothing() {
     // Public evidence alone would be worth all points.
     let public = ["image", "rays", "bsdf"]
         .map(|id| Check { scene: "public".into(), ..check(id, Pass, 0.0) });
     let dodged = [hidden(check("image", Fail, 1.0)), hidden(check("rays", NotJudged, 0.0))];
     let evidence = Evidence { checks: [&public[..], &dodged[..]].concat() };
     let part = &grade(&rules(), &evidence).parts[1];
-    assert_eq!((part.points, part.points_max), (0.0, 30.0));
+    assert_eq!((part.points, part.points_max), (0.0, 0.0));
 }
 
 fn any_check() -> impl Strategy<Value = Check> {
@@ -208,7 +208,64 @@ fn any_check() -> impl Strategy<Value = Check> {
     })
 }
 
+/// The checks of a path under two conventions.
+fn under(convention: &str, bsdf: f64, rays: f64) -> Vec<Check> {
+    let of = |id: &str, error: f64| Check {
+        convention: convention.into(),
+        ..check(id, if error == 0.0 { Pass } else { Fail }, error)
+    };
+    vec![of("bsdf", bsdf), of("rays", rays)]
+}
+
+#[test]
+fn the_convention_that_is_worth_most_holds_for_all_parts_of_a_path() {
+    let wrong = check("image", Fail, 0.5);
+    let own = under("", 0.1, 0.1);
+    let other = under("the integrator multiplies by pi", 0.0, 0.1);
+    let both = [vec![wrong.clone()], own.clone(), other.clone()].concat();
+    assert_eq!(points(&both)[..2], [10.0, 15.0]);
+    // Worth no more: the handout's own.
+    let worse = under("another", 0.1, 0.1);
+    let settled = settle(&rules(), &Evidence { checks: [own.clone(), worse].concat() });
+    assert_eq!(settled.checks, own);
+    // What it does not judge anew stands.
+    let bsdf_alone = vec![other[0].clone()];
+    let some = [vec![wrong], own.clone(), bsdf_alone].concat();
+    assert_eq!(points(&some)[..2], [10.0, 15.0]);
+}
+
+#[test]
+fn a_scene_costs_no_more_than_its_weight() {
+    let hidden = |weight| Check { weight, scene: "backfaces".into(), ..check("bsdf", Fail, 1.0) };
+    let checks = |weight| [check("image", Fail, 0.5), check("rays", Pass, 0.0), hidden(weight)];
+    assert_eq!(points(&checks(0.2))[0], 8.0);
+    assert_eq!(points(&checks(1.0))[0], 0.0);
+    // The largest loss counts, not their sum.
+    let two = [&checks(0.2)[..], &[check("bsdf", Fail, 0.05)]].concat();
+    assert_eq!(points(&two)[0], 7.0);
+}
+
+/// Under two conventions, whatever is made wrong in addition.
+fn mistakes() -> impl Strategy<Value = [f64; 4]> {
+    let error = || prop_oneof![Just(0.0), 0.001..1.0f64];
+    [error(), error(), error(), error()]
+}
+
 proptest! {
+    #[test]
+    fn a_second_mistake_never_adds_points(first in mistakes(), second in mistakes()) {
+        let total = |errors: [f64; 4]| {
+            let [a, b, c, d] = errors;
+            // Nothing is right end to end, and every part says why.
+            let image = check("image", Fail, 1.0);
+            points(&[vec![image], under("", a, b.max(0.001)), under("pi", c, d.max(0.001))].concat())
+        };
+        let both = std::array::from_fn(|i| first[i].max(second[i]));
+        let (one, other, both) = (total(first), total(second), total(both));
+        let sum = |points: &[f64]| points.iter().sum::<f64>();
+        prop_assert!(sum(&both) <= sum(&one).min(sum(&other)) + 1e-9);
+    }
+
     #[test]
     fn points_are_bounded_and_independent_of_the_order(
         checks in prop::collection::vec(any_check(), 0..12), turn in 0..12usize

@@ -1,0 +1,179 @@
+//! Conventions: what one part of the offline path may leave to another.
+//!
+//! A renderer whose integrator multiplies by the cosine, and whose BSDFs therefore leave it out, is
+//! right. So each part is judged under each convention that at least two of diffuse BSDF, Phong
+//! BSDF and integrator keep; one convention holds for all of them, and the rubric takes the one that
+//! is worth most.
+
+use std::collections::BTreeSet;
+
+use super::shading::Shading;
+use super::{Check, Verdict};
+
+/// What the integrator does in place of the BSDFs: it multiplies by
+/// `cos(theta_i)^cos_i pi^pi r^-length`, and the BSDFs divide by it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Convention {
+    /// The power of cos theta_i.
+    pub cos_i: i8,
+    /// The power of pi.
+    pub pi: i8,
+    /// Nothing when wi reaches the BSDFs with length 1. Otherwise it has the light's distance r as
+    /// its length, and the values of the BSDFs grow by this power of it.
+    pub long_wi: Option<i8>,
+}
+
+impl Convention {
+    /// All of them, the handout's first.
+    pub fn all() -> Vec<Self> {
+        let mut all = Vec::new();
+        for long_wi in [None, Some(0), Some(1), Some(-1)] {
+            for cos_i in [0, 1, -1] {
+                for pi in [0, 1, -1] {
+                    all.push(Self { cos_i, pi, long_wi });
+                }
+            }
+        }
+        all
+    }
+
+    /// A short name for reports; empty for the handout's.
+    pub fn name(&self) -> String {
+        let power = |what: &str, power: i8| match power {
+            0 => None,
+            1 => Some(format!("the integrator multiplies by {what}, eval() does not")),
+            -1 => Some(format!("the integrator divides by {what}, eval() multiplies by it")),
+            other => Some(format!("the integrator multiplies by {what}^{other}")),
+        };
+        let long = self.long_wi.map(|length| match length {
+            0 => "eval() normalizes wi".to_owned(),
+            _ => format!("wi has length r, and eval() grows by r^{length}"),
+        });
+        let parts = [power("cos theta_i", self.cos_i), power("pi", self.pi), long];
+        parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
+    }
+
+    /// What a right BSDF answers under this convention; of `wi`'s length, see [`Self::growth`].
+    pub fn bsdf(&self) -> Shading {
+        let factor = std::f64::consts::PI.powi(-i32::from(self.pi));
+        let cos_i = 1.0 - f64::from(self.cos_i);
+        Shading { factor: [factor; 2], cos_i: [cos_i; 2], ..Shading::default() }
+    }
+
+    /// What a right BSDF's value is multiplied by when wi has this length.
+    pub fn growth(&self, length: f64) -> f64 {
+        length.powi(i32::from(self.long_wi.unwrap_or_default()))
+    }
+
+    /// What a right integrator makes of a BSDF's value under this convention.
+    pub fn integrator(&self) -> Shading {
+        Shading {
+            factor: [std::f64::consts::PI.powi(i32::from(self.pi)); 2],
+            cos_i: [1.0 + f64::from(self.cos_i); 2],
+            falloff: 2.0 + f64::from(self.long_wi.unwrap_or_default()),
+            long_wi: self.long_wi.is_some(),
+            ..Shading::default()
+        }
+    }
+}
+
+/// Who keeps a convention.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Party {
+    /// Part 1.1.
+    Diffuse,
+    /// Part 1.2.
+    Phong,
+    /// Part 1.3.
+    Integrator,
+}
+
+/// A question whose right answer hangs on the convention.
+pub struct Conventional<'a> {
+    /// Whose answer it is.
+    pub party: Party,
+    /// Whether the answer is right.
+    pub passes: Box<dyn Fn(&Convention) -> bool + 'a>,
+    /// The check.
+    pub judge: Box<dyn Fn(&Convention) -> Check + 'a>,
+}
+
+/// So many parties must keep a convention: one alone has made a mistake.
+const PARTIES: usize = 2;
+
+/// The checks under the handout's convention, and under each other that enough parties keep.
+pub fn judge(questions: &[Conventional]) -> Vec<Check> {
+    let mut checks: Vec<Check> =
+        questions.iter().map(|question| (question.judge)(&Convention::default())).collect();
+    if checks.iter().all(|check| check.verdict != Verdict::Fail) {
+        return checks;
+    }
+    let parties: BTreeSet<Party> = questions.iter().map(|question| question.party).collect();
+    for convention in Convention::all().into_iter().skip(1) {
+        let keeps = |party: &&Party| {
+            let mut own = questions.iter().filter(|question| question.party == **party);
+            own.all(|question| (question.passes)(&convention))
+        };
+        if parties.iter().filter(keeps).count() >= PARTIES {
+            let name = convention.name();
+            checks.extend(questions.iter().map(|question| {
+                let check = (question.judge)(&convention);
+                let summary = format!("{} (judged so: {name})", check.summary);
+                Check { convention: name.clone(), summary, ..check }
+            }));
+        }
+    }
+    checks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn question(party: Party, kept: Convention) -> Conventional<'static> {
+        Conventional {
+            party,
+            passes: Box::new(move |convention| *convention == kept),
+            judge: Box::new(move |convention| {
+                let right = if *convention == kept { Verdict::Pass } else { Verdict::Fail };
+                Check::new("radiance.lit", "s", right, "")
+            }),
+        }
+    }
+
+    #[test]
+    fn a_convention_counts_when_two_parties_keep_it() {
+        let cosine = Convention { cos_i: 1, ..Convention::default() };
+        let own = Convention::default();
+        let names = |kept: [Convention; 3]| {
+            let parties = [Party::Diffuse, Party::Phong, Party::Integrator];
+            let questions: Vec<_> =
+                parties.into_iter().zip(kept).map(|(party, kept)| question(party, kept)).collect();
+            judge(&questions).into_iter().map(|check| check.convention).collect::<Vec<_>>()
+        };
+        assert_eq!(names([own; 3]), [""; 3]);
+        let name = cosine.name();
+        assert_eq!(names([cosine, own, cosine]), ["", "", "", &name, &name, &name]);
+        assert_eq!(names([cosine, own, own]), [""; 3]);
+    }
+
+    #[test]
+    fn names_tell_conventions_apart_and_only_the_handouts_is_empty() {
+        let names: BTreeSet<String> = Convention::all().iter().map(Convention::name).collect();
+        assert_eq!(names.len(), Convention::all().len());
+        assert_eq!(Convention::all()[0].name(), "");
+    }
+
+    #[test]
+    fn what_one_leaves_out_the_other_supplies() {
+        for convention in Convention::all() {
+            let (cos_i, r) = (0.3f64, 2.5);
+            let bsdf = convention.bsdf();
+            let value = bsdf.factor[0] * cos_i.powf(bsdf.cos_i[0]) * convention.growth(r);
+            let light = convention.integrator();
+            let factor = light.factor[0] * cos_i.powf(light.cos_i[0] - 1.0);
+            let both = value * factor * r.powf(-light.falloff);
+            assert!((both - cos_i / (r * r)).abs() < 1e-12, "{convention:?}: {both}");
+        }
+    }
+}

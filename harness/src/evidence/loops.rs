@@ -1,0 +1,432 @@
+//! Part 1.3: the render loop, apart from what it shades. A render must be what the renderer's own
+//! integrator answers along rays of the host's choice, right or wrong.
+
+use super::price::{Class, Price};
+use super::rays::{RELATIVE, STRAY_FRACTION};
+use super::{Check, Measure, Verdict};
+use crate::imaging::reference::RegionMask;
+
+/// Part 1.3: whether the full render agrees with the renderer's own radiance along the same pixel
+/// centres; what differs is the loop's, the film's or the camera's fault.
+///
+/// `image` is a render at 1 spp, `rays` the renderer's radiance along the pixels' centre rays, both
+/// row by row; `mask` tells where an edge forgives.
+pub fn judge_agreement(
+    scene: &str,
+    mask: &RegionMask,
+    image: &[[f32; 3]],
+    rays: &[[f32; 3]],
+) -> Check {
+    let id = "loop.agreement";
+    let largest = rays.iter().flatten().filter(|v| v.is_finite()).fold(0.0f32, |m, &v| m.max(v));
+    if largest == 0.0 {
+        let summary = "radiance along rays is black: there is nothing to agree with";
+        return Check::new(id, scene, Verdict::NotJudged, summary);
+    }
+    let (mut wrong, mut counted, mut apart, mut total) = (0usize, 0usize, 0.0, 0.0);
+    let mut first = None;
+    for (index, ((a, b), &value)) in image.iter().zip(rays).zip(&mask.pixels).enumerate() {
+        if value & RegionMask::EDGE != 0 {
+            continue;
+        }
+        counted += 1;
+        let mut differs = false;
+        for c in 0..3 {
+            let (a, b) = (f64::from(a[c]), f64::from(b[c]));
+            let difference = match (a.is_finite(), b.is_finite()) {
+                (true, true) => (a - b).abs(),
+                (false, false) => 0.0,
+                _ => f64::from(largest),
+            };
+            differs |= difference > RELATIVE * b.abs() + 1e-5 * f64::from(largest);
+            apart += difference;
+            total += if b.is_finite() { b.abs() } else { 0.0 };
+        }
+        if differs {
+            wrong += 1;
+            first = first.or(Some(index));
+        }
+    }
+    let fraction = wrong as f64 / counted.max(1) as f64;
+    let measure = Measure::at_most(
+        "loop.agreement",
+        "pixels that differ (fraction)",
+        fraction,
+        STRAY_FRACTION,
+    );
+    let failed = !measure.passed;
+    let mut measures = vec![measure];
+    let mut check = match first.filter(|_| failed) {
+        None => {
+            let summary =
+                format!("the image is what the integrator answers at {counted} pixel centres");
+            Check::new(id, scene, Verdict::Pass, summary)
+        }
+        Some(index) => {
+            let summary = format!(
+                "{wrong} of {counted} pixels of a 1 spp render are not what the integrator answers along their \
+                 centre rays; first at ({}, {})",
+                index % mask.width,
+                index / mask.width
+            );
+            let hint = "look at the render loop, the film and the camera ray, not at the shading";
+            let size = (mask.width, mask.height);
+            let inside = |index: usize| mask.pixels[index] & RegionMask::EDGE == 0;
+            let room = |index: usize| inside(index).then_some(0.0);
+            let price = film_price(size, image, rays, &room, apart / total);
+            measures.extend(price.measure());
+            Check { error: price.error, ..Check::new(id, scene, Verdict::Fail, summary) }
+                .with_hint(hint)
+        }
+    };
+    check.measures = measures;
+    check
+}
+
+/// One slip in how an image is written: its name, how it scales noise, what it makes of right pixels.
+type Change<'a> = (&'static str, f32, Box<dyn Fn(usize) -> [f32; 3] + 'a>);
+
+/// The slips that are looked for; `right` is what each pixel should be.
+fn changes<'a>(
+    (width, height): (usize, usize),
+    right: &'a [[f32; 3]],
+    factor: f32,
+) -> Vec<Change<'a>> {
+    let at = move |x: usize, y: usize| right[y.min(height - 1) * width + x.min(width - 1)];
+    let turned = |name, from: fn(usize, usize, usize, usize) -> (usize, usize)| -> Change<'a> {
+        let value = move |index: usize| {
+            let (x, y) = from(index % width, index / width, width, height);
+            at(x, y)
+        };
+        (name, 1.0, Box::new(value))
+    };
+    let each = |name, change: fn(f32) -> f32| -> Change<'a> {
+        (name, 1.0, Box::new(move |index: usize| right[index].map(change)))
+    };
+    // Half a pixel beside, toward each corner: the mean of four pixels.
+    let beside = |name, dx: usize, dy: usize| -> Change<'a> {
+        let value = move |index: usize| {
+            let (x, y) = (index % width + dx, index / width + dy);
+            let four = [(x, y), (x.saturating_sub(1), y), (x, y.saturating_sub(1))];
+            let last = (x.saturating_sub(1), y.saturating_sub(1));
+            let four = [four[0], four[1], four[2], last].map(|(x, y)| at(x, y));
+            std::array::from_fn(|c| four.iter().map(|value| value[c]).sum::<f32>() / 4.0)
+        };
+        (name, 1.0, Box::new(value))
+    };
+    let mut changes = vec![
+        turned("rows from bottom to top", |x, y, _, height| (x, height - 1 - y)),
+        turned("columns from right to left", |x, y, width, _| (width - 1 - x, y)),
+        turned("turned by half", |x, y, width, height| (width - 1 - x, height - 1 - y)),
+        // Written as rows of the other length.
+        turned("rows and columns exchanged", |x, y, width, height| {
+            let index = y * width + x;
+            (index / height, index % height)
+        }),
+        each("clamped to 1", |v| v.clamp(0.0, 1.0)),
+        each("gamma baked in", |v| v.max(0.0).powf(1.0 / 2.2)),
+        each("magnitude", f32::abs),
+        beside("half a pixel beside", 0, 0),
+        beside("half a pixel beside", 1, 0),
+        beside("half a pixel beside", 0, 1),
+        beside("half a pixel beside", 1, 1),
+    ];
+    let value = move |index: usize| right[index].map(|v| factor * v);
+    changes.push(("a constant factor", factor.abs().max(1.0), Box::new(value)));
+    changes
+}
+
+/// What an image costs that is not what it should be: a slip in how it is written explains it, or
+/// nothing. `room` is how far a pixel may be off, where it tells anything.
+fn film_price(
+    size: (usize, usize),
+    image: &[[f32; 3]],
+    right: &[[f32; 3]],
+    room: &dyn Fn(usize) -> Option<f32>,
+    raw: f64,
+) -> Price {
+    // Nothing is drawn: no slip explains that.
+    let Some(factor) = factor(image, right) else { return Price::of_raw(raw) };
+    let changes = changes(size, right, factor);
+    changes.iter().fold(Price::of_raw(raw), |price, (name, noise, value)| {
+        let (mut apart, mut total) = (0.0, 0.0);
+        for (index, a) in image.iter().enumerate() {
+            let Some(room) = room(index) else { continue };
+            for (a, b) in a.iter().zip(value(index)) {
+                let difference = (a - b).abs();
+                total += if b.is_finite() { f64::from(b.abs()) } else { 0.0 };
+                if a.is_finite()
+                    && b.is_finite()
+                    && difference > noise * room + RELATIVE as f32 * b.abs()
+                {
+                    apart += f64::from(difference);
+                }
+            }
+        }
+        price.or(name, Class::Slip, apart / total.max(f64::MIN_POSITIVE))
+    })
+}
+
+/// The factor that most values share.
+fn factor(image: &[[f32; 3]], expected: &[[f32; 3]]) -> Option<f32> {
+    let pairs = image.iter().flatten().zip(expected.iter().flatten());
+    let mut ratios: Vec<f32> = pairs
+        .filter(|(_, b)| **b > 0.0)
+        .map(|(a, b)| a / b)
+        .filter(|ratio| ratio.is_finite() && *ratio > 1e-3)
+        .collect();
+    ratios.sort_by(f32::total_cmp);
+    ratios.get(ratios.len() / 2).copied()
+}
+
+/// Width of the film on which several samples a pixel are judged.
+pub const SAMPLED_WIDTH: u32 = 64;
+/// Samples per pixel that the renderer takes there: a square.
+pub const SAMPLES: u32 = 16;
+/// Rays per pixel that it is asked: one set to find edges by, one to judge by. Found and judged by
+/// the same rays, an edge would be one where they happen to be off.
+pub const RAYS: u32 = 2 * SAMPLES;
+
+/// A film small enough to ask for every pixel's radiance along many rays.
+#[derive(Clone, Debug, Default)]
+pub struct SampledFilm {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Where in its pixel each ray goes through, [0, 1) from left and top; [`RAYS`] a pixel.
+    pub offsets: Vec<[f32; 2]>,
+}
+
+impl SampledFilm {
+    /// Offsets in strata, from a fixed seed.
+    pub fn new(width: u32, height: u32) -> Self {
+        let sampler = basecode::Sampler::new(0x5A3D);
+        let side = SAMPLES.isqrt();
+        let mut offsets = Vec::new();
+        for _ in 0..width * height {
+            for cell in (0..RAYS).map(|ray| ray % SAMPLES) {
+                let at = |cell: u32, random: f32| (cell as f32 + random) / side as f32;
+                offsets
+                    .push([at(cell % side, sampler.next_1d()), at(cell / side, sampler.next_1d())]);
+            }
+        }
+        Self { width, height, offsets }
+    }
+}
+
+/// One pixel of a sampled film, as its own rays have it.
+#[derive(Clone, Copy, Default)]
+struct Pixel {
+    /// Mean of the rays that judge, summed over channels.
+    mean: f64,
+    /// Variance of one ray.
+    variance: f64,
+    /// Largest less smallest value where an edge runs through the pixel, at least a tenth of it on
+    /// either side; elsewhere 0.
+    range: f64,
+    /// Slope across the pixel, in x and in y.
+    slope: [f64; 2],
+}
+
+impl Pixel {
+    /// Nothing where a ray is no number.
+    fn of(values: &[[f32; 3]], offsets: &[[f32; 2]]) -> Option<Self> {
+        let sum = |value: &[f32; 3]| value.iter().map(|&v| f64::from(v)).sum::<f64>();
+        let sums: Vec<f64> = values.iter().map(sum).collect();
+        let (sums, judging) = sums.split_at(SAMPLES as usize);
+        let n = f64::from(SAMPLES);
+        let (mean, judged) = (sums.iter().sum::<f64>() / n, judging.iter().sum::<f64>() / n);
+        let variance = sums.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0);
+        let largest = sums.iter().copied().fold(f64::MIN, f64::max);
+        let smallest = sums.iter().copied().fold(f64::MAX, f64::min);
+        let slope = [0, 1].map(|axis| {
+            let pairs = sums.iter().zip(offsets);
+            pairs.map(|(v, offset)| (v - mean) * (f64::from(offset[axis]) - 0.5)).sum::<f64>()
+        });
+        // The larger of both sets': a small one makes much of little.
+        let other = judging.iter().map(|v| (v - judged) * (v - judged)).sum::<f64>() / (n - 1.0);
+        let found = variance > EDGE_VARIANCE * (largest - smallest).powi(2);
+        let range = if found { largest - smallest } else { 0.0 };
+        let pixel = Self { mean: judged, variance: variance.max(other), range, slope };
+        (mean + judged).is_finite().then_some(pixel)
+    }
+
+    fn is_edge(&self, typical: f64) -> bool {
+        self.range > 0.2 * typical
+    }
+
+    /// In which of four directions an edge's brightness rises most: along x, along y, along the
+    /// diagonal on which x and y grow together, along the other.
+    fn direction(&self) -> usize {
+        let [x, y] = self.slope;
+        let (long, short) = (x.abs().max(y.abs()), x.abs().min(y.abs()));
+        // tan 22.5 degrees.
+        match short > 0.4142 * long {
+            true if x * y > 0.0 => 2,
+            true => 3,
+            false => usize::from(y.abs() > x.abs()),
+        }
+    }
+}
+
+/// Variance over squared range, at least, where an edge leaves a tenth of the pixel on either side.
+const EDGE_VARIANCE: f64 = 0.1;
+/// A pixel is off from this many standard errors on.
+const Z_LIMIT: f64 = 4.0;
+/// So many pixels may be off: a variance from 16 rays is not well known.
+const OFF_FRACTION: f64 = 0.01;
+/// And so many more, on any film.
+const SPARE_PIXELS: f64 = 4.0;
+/// Mean square of z, by the largest variance around, on edges of one direction: 0.4 for independent samples and rays in strata, less
+/// where the samples are spread better; 4 where all samples of a pixel are the same.
+const EDGE_RATIO: f64 = 1.1;
+/// Sum of z on all edges over its standard deviation: under 4 for a right renderer, for points of a
+/// Sobol sequence too, whose mean is half a stratum off; 17 where black samples are not counted.
+const EDGE_BIAS: f64 = 8.0;
+/// Edges of fewer pixels tell nothing.
+const LEAST_EDGES: usize = 40;
+
+/// Judges a render of `film` at [`SAMPLES`] samples per pixel against the radiance that the renderer
+/// answers along the film's rays: average, count and spread of the samples, and what lies behind all
+/// surfaces. Random, stratified, Sobol, lattice and grid samples are all right.
+pub fn judge_samples(
+    scene: &str,
+    film: &SampledFilm,
+    image: &[[f32; 3]],
+    rays: &[[f32; 3]],
+) -> Check {
+    let id = "loop.samples";
+    let per = RAYS as usize;
+    let (width, height) = (film.width as usize, film.height as usize);
+    let own: Vec<Option<Pixel>> = rays
+        .chunks(per)
+        .zip(film.offsets.chunks(per))
+        .map(|(values, offsets)| Pixel::of(values, offsets))
+        .collect();
+    let mut means: Vec<f64> = own.iter().flatten().map(|p| p.mean).filter(|m| *m > 0.0).collect();
+    means.sort_by(f64::total_cmp);
+    let Some(&typical) = means.get(means.len() / 2) else {
+        let summary = "radiance along rays is black: there is nothing to agree with";
+        return Check::new(id, scene, Verdict::NotJudged, summary);
+    };
+    // Both the image's samples and the rays scatter.
+    let both = 2.0 / f64::from(SAMPLES);
+    let sum = |value: &[f32; 3]| value.iter().map(|&v| f64::from(v)).sum::<f64>();
+    let near = |index: usize| {
+        let (x, y) = (index % width, index / width);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        rows.flat_map(move |y| {
+            (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| y * width + x)
+        })
+    };
+    let around =
+        |index: usize| near(index).filter_map(|i| own[i]).map(|p| p.variance).fold(0.0, f64::max);
+    let (mut counted, mut off, mut inside) = (0usize, 0usize, 0usize);
+    let (mut apart, mut total) = (0.0, 0.0);
+    let mut first = None;
+    let mut edges = [(0usize, 0.0); 4];
+    let (mut bias, mut edge_count) = (0.0, 0usize);
+    for (index, pixel) in own.iter().enumerate() {
+        let Some(pixel) = pixel else { continue };
+        let found = sum(&image[index]);
+        counted += 1;
+        let difference = if found.is_finite() { found - pixel.mean } else { typical };
+        let room =
+            Z_LIMIT * (around(index) * both).sqrt() + RELATIVE * pixel.mean.abs() + 1e-3 * typical;
+        apart += difference.abs();
+        total += pixel.mean.abs();
+        if !found.is_finite() || difference.abs() > room {
+            off += 1;
+            inside += usize::from(!near(index).any(|i| own[i].is_some_and(|p| p.is_edge(typical))));
+            first = first.or(Some((index, found, pixel.mean)));
+        }
+        if pixel.is_edge(typical) {
+            let z = difference / (around(index) * both).sqrt();
+            let (count, squares) = &mut edges[pixel.direction()];
+            (*count, *squares) = (*count + 1, *squares + z * z);
+            (bias, edge_count) = (bias + z, edge_count + 1);
+        }
+    }
+    let off_fraction = off as f64 / counted as f64;
+    let ratio = |(count, squares): &(usize, f64)| squares / *count as f64;
+    let told = edges.iter().filter(|(count, _)| *count >= LEAST_EDGES);
+    let all = edges.iter().fold((0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+    let told = told.chain([&all].into_iter().filter(|all| all.0 >= LEAST_EDGES));
+    let worst = told.map(ratio).fold(0.0, f64::max);
+    let bias = if edge_count < LEAST_EDGES { 0.0 } else { bias.abs() / (edge_count as f64).sqrt() };
+    let mut measures = vec![
+        Measure::at_most(
+            "loop.pixels",
+            "pixels that are not the average of the integrator's answers (fraction)",
+            off_fraction,
+            OFF_FRACTION + SPARE_PIXELS / counted as f64,
+        ),
+        Measure::at_most(
+            "loop.edges",
+            "mean square error on edges over that of independent samples",
+            worst,
+            EDGE_RATIO,
+        ),
+        Measure::at_most(
+            "loop.edge_bias",
+            "mean error on edges, in standard deviations",
+            bias,
+            EDGE_BIAS,
+        ),
+    ];
+    let [pixels, spread, _] = [0, 1, 2].map(|i| measures[i].passed);
+    if measures.iter().all(|measure| measure.passed) {
+        let summary = format!(
+            "{SAMPLES} samples a pixel average what the integrator answers at {counted} pixels"
+        );
+        return Check { measures, ..Check::new(id, scene, Verdict::Pass, summary) };
+    }
+    let summary = match first.filter(|_| !pixels) {
+        Some((index, found, mean)) => format!(
+            "{off} of {counted} pixels of a render at {SAMPLES} samples a pixel are not the average of what the \
+             integrator answers in them; first at ({}, {}): expected {:.4}, found {:.4}",
+            index % width,
+            index / width,
+            mean / 3.0,
+            found / 3.0
+        ),
+        None if !spread => format!(
+            "edges are {worst:.1} times as far off as {SAMPLES} independent samples a pixel would leave them"
+        ),
+        None => format!("edges are off in one direction, by {bias:.0} standard deviations"),
+    };
+    let hint = match (pixels, spread) {
+        (false, _) => {
+            "look at the sum over samples, what it is divided by, and the pixel it is written to"
+        }
+        (true, false) => {
+            "look at how many samples are taken, and whether they spread over the pixel on both axes"
+        }
+        (true, true) => "look at which samples are counted",
+    };
+    let raw = apart / f64::max(total, f64::MIN_POSITIVE);
+    let mut price = Price::of_raw(raw);
+    if inside as f64 <= OFF_FRACTION * counted as f64 + SPARE_PIXELS {
+        // All but edges is right.
+        price = price.or("samples that do not cover their pixels", Class::Slip, 0.0);
+    } else {
+        let mean = |values: &[[f32; 3]]| {
+            let judging = &values[SAMPLES as usize..];
+            std::array::from_fn(|c| judging.iter().map(|v| v[c]).sum::<f32>() / SAMPLES as f32)
+        };
+        let means: Vec<[f32; 3]> = rays.chunks(per).map(mean).collect();
+        // Where edges are, a slip that moves the image leaves more than noise.
+        let room = |index: usize| {
+            let noise = Z_LIMIT * (around(index) * both).sqrt() + 1e-3 * typical;
+            Some(noise as f32)
+        };
+        price = film_price((width, height), image, &means, &room, raw);
+    }
+    measures.extend(price.measure());
+    Check { error: price.error, measures, ..Check::new(id, scene, Verdict::Fail, summary) }
+        .with_hint(hint)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,409 @@
+//! What a wrong answer costs: the smaller of how far off it is and what the one mistake costs that
+//! explains it, plus what that leaves unexplained.
+//!
+//! A constant factor of pi is off by 214 %, and one slip all the same: a teacher takes little for
+//! it. So answers are compared with those of known single mistakes, each of a class that has a
+//! price; `rules.curve` makes points of the error.
+
+use std::collections::BTreeMap;
+
+use super::shading::{Angle, Clamp, Shading};
+use super::{Check, Measure, Verdict};
+
+/// What a mistake is to a teacher.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// One constant, sign, power, index or division: 10 to 25 % of a part.
+    Slip,
+    /// Something that the part is about is missing: 40 to 80 %.
+    Concept,
+}
+
+impl Class {
+    /// The error that a mistake of this class counts as, in [0, 1].
+    pub fn price(self) -> f64 {
+        match self {
+            Self::Slip => 0.02,
+            Self::Concept => 0.2,
+        }
+    }
+}
+
+/// Answers beside what is right.
+pub struct Answers<'a> {
+    /// What was answered.
+    pub found: &'a [[f32; 3]],
+    /// The answer of a renderer that shades so, to a question.
+    pub of: &'a dyn Fn(usize, &Shading) -> [f64; 3],
+    /// The scale of a question's differences: its material's peak, or 1.
+    pub unit: &'a dyn Fn(usize) -> f64,
+    /// The group that a question belongs to, such as its material: the worst group counts.
+    pub group: &'a dyn Fn(usize) -> usize,
+    /// The largest relative difference that is none.
+    pub relative: f64,
+    /// The changes that are looked for.
+    pub changes: &'a [Change],
+}
+
+/// One thing changed, and what it is worth.
+#[derive(Clone, Copy, Debug)]
+pub struct Change {
+    /// What the mistake is, for reports.
+    pub name: &'static str,
+    /// Its class.
+    pub class: Class,
+    /// What is shaded then; nothing where a factor is fitted.
+    shading: Option<Shading>,
+    /// Which factor is fitted.
+    fitted: Option<Fitted>,
+}
+
+/// A factor that is taken from the answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fitted {
+    /// One of all values.
+    All,
+    /// One of each channel.
+    Channels,
+    /// One of each group of questions: a wrong scale of the material's.
+    Groups,
+    /// One of the diffuse term.
+    Diffuse,
+    /// One of the specular term.
+    Specular,
+}
+
+/// What answers cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Price {
+    /// The error that counts, in [0, 1].
+    pub error: f64,
+    /// How far off the answers are: sum of differences over sum of right values, at most 1.
+    pub raw: f64,
+    /// The single mistake that explains them best, when that made the error smaller.
+    pub mistake: Option<&'static str>,
+}
+
+impl Price {
+    /// The price of answers that are `raw` off.
+    pub fn of_raw(raw: f64) -> Self {
+        // What is no number is as wrong as can be.
+        let raw = if raw <= 1.0 { raw } else { 1.0 };
+        Self { error: raw, raw, mistake: None }
+    }
+
+    /// Says what the error is, when a single mistake made it smaller.
+    pub fn measure(&self) -> Option<Measure> {
+        let mistake = self.mistake?;
+        let name = format!(
+            "difference from what is right; counts {:.3} as one mistake: {mistake}",
+            self.error
+        );
+        Some(Measure { passed: true, ..Measure::at_most("", name, self.raw, 1.0) })
+    }
+
+    /// The same, when a mistake of this class leaves `residual` unexplained.
+    pub fn or(self, name: &'static str, class: Class, residual: f64) -> Self {
+        let error = class.price() + residual;
+        if error < self.error { Self { error, mistake: Some(name), ..self } } else { self }
+    }
+}
+
+impl Check {
+    /// The same check, when it failed by an error that a single mistake may explain.
+    pub fn priced(mut self, price: impl FnOnce(f64) -> Price) -> Self {
+        if self.verdict == Verdict::Fail && self.error > 0.0 {
+            let price = price(self.error);
+            self.error = price.error;
+            self.measures.extend(price.measure());
+        }
+        self
+    }
+}
+
+/// What the values of a changed renderer are multiplied by, channel by channel.
+struct Factors {
+    all: [f64; 3],
+    /// In place of `all`, for the questions of a group.
+    by_group: BTreeMap<usize, [f64; 3]>,
+}
+
+impl Factors {
+    fn of(all: [f64; 3]) -> Self {
+        Self { all, by_group: BTreeMap::new() }
+    }
+}
+
+impl Default for Factors {
+    fn default() -> Self {
+        Self::of([1.0; 3])
+    }
+}
+
+/// At most this many questions are looked at: a price is no finer than a percent.
+const QUESTIONS: usize = 4000;
+/// A factor below this leaves nothing of a term.
+const NOTHING: f64 = 1e-3;
+
+impl Answers<'_> {
+    /// What the answers cost; `raw` is how far off they are, where that is known better.
+    pub fn price(&self, raw: Option<f64>) -> Price {
+        let step = self.found.len().div_ceil(QUESTIONS).max(1);
+        let questions: Vec<usize> = (0..self.found.len()).step_by(step).collect();
+        let right = Shading::default();
+        let price = Price::of_raw(
+            raw.unwrap_or_else(|| self.residual(&questions, &right, &Factors::default())),
+        );
+        self.changes.iter().fold(price, |price, change| {
+            let (shading, factors, class) = match (change.shading, change.fitted) {
+                (Some(shading), _) => (shading, Factors::default(), change.class),
+                (None, Some(fitted)) => match self.fit(&questions, fitted) {
+                    Some(fit) => fit,
+                    None => return price,
+                },
+                (None, None) => return price,
+            };
+            price.or(change.name, class, self.residual(&questions, &shading, &factors))
+        })
+    }
+
+    /// Sum of differences from what `shading` answers over the sum of that, in the worst group.
+    fn residual(&self, questions: &[usize], shading: &Shading, factors: &Factors) -> f64 {
+        let mut groups: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+        for &index in questions {
+            let unit = (self.unit)(index);
+            let changed = (self.of)(index, shading);
+            let group = (self.group)(index);
+            let factors = factors.by_group.get(&group).unwrap_or(&factors.all);
+            let (apart, total) = groups.entry(group).or_default();
+            for c in 0..3 {
+                let (a, b) = (f64::from(self.found[index][c]), factors[c] * changed[c]);
+                let difference = match (a.is_finite(), b.is_finite()) {
+                    (true, true) => (a - b).abs(),
+                    (false, false) => 0.0,
+                    // What is no number is as far off as can be.
+                    _ if b.is_finite() => unit.max(b.abs()),
+                    _ => unit,
+                };
+                let room = self.relative * b.abs() + 1e-6 * unit;
+                *apart += if difference <= room { 0.0 } else { difference / unit };
+                *total += if b.is_finite() { b.abs() / unit } else { 1.0 };
+            }
+        }
+        let errors = groups.values().map(|(apart, total)| apart / total.max(f64::MIN_POSITIVE));
+        errors.fold(0.0, f64::max)
+    }
+
+    /// A factor, as the answers have it. Nothing when it cannot be told, or leaves nothing.
+    fn fit(&self, questions: &[usize], fitted: Fitted) -> Option<(Shading, Factors, Class)> {
+        let right = Shading::default();
+        let (diffuse, specular) =
+            (Shading { factor: [1.0, 0.0], ..right }, Shading { factor: [0.0, 1.0], ..right });
+        let ratios =
+            |questions: &[usize], wanted: &[usize], own: &Shading, other: Option<&Shading>| {
+                let mut ratios = Vec::new();
+                for &index in questions {
+                    let own = (self.of)(index, own);
+                    let other = other.map_or([0.0; 3], |other| (self.of)(index, other));
+                    for &c in wanted {
+                        let tells = own[c] > 0.01 * (self.unit)(index) && own[c] > 0.2 * other[c];
+                        let found = f64::from(self.found[index][c]);
+                        if tells && found.is_finite() {
+                            ratios.push((found - other[c]) / own[c]);
+                        }
+                    }
+                }
+                ratios.sort_by(f64::total_cmp);
+                ratios.get(ratios.len() / 2).copied()
+            };
+        let all = [0, 1, 2];
+        let class = |factor: f64| if factor.abs() < NOTHING { Class::Concept } else { Class::Slip };
+        match fitted {
+            Fitted::All => {
+                let factor = ratios(questions, &all, &right, None)?;
+                (factor.abs() >= NOTHING).then_some((right, Factors::of([factor; 3]), Class::Slip))
+            }
+            Fitted::Channels => {
+                let factors = all.map(|c| ratios(questions, &[c], &right, None));
+                let factors = [factors[0]?, factors[1]?, factors[2]?];
+                let some = factors.iter().any(|factor| factor.abs() >= NOTHING);
+                some.then_some((right, Factors::of(factors), Class::Slip))
+            }
+            Fitted::Groups => {
+                let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+                for &index in questions {
+                    groups.entry((self.group)(index)).or_default().push(index);
+                }
+                let mut factors = Factors::default();
+                for (group, own) in groups {
+                    let factor = ratios(&own, &all, &right, None)?;
+                    if factor.abs() < NOTHING {
+                        return None;
+                    }
+                    factors.by_group.insert(group, [factor; 3]);
+                }
+                Some((right, factors, Class::Slip))
+            }
+            Fitted::Diffuse => {
+                let factor = ratios(questions, &all, &diffuse, Some(&specular))?;
+                let shading = Shading { factor: [factor, 1.0], ..right };
+                Some((shading, Factors::default(), class(factor)))
+            }
+            Fitted::Specular => {
+                let factor = ratios(questions, &all, &specular, Some(&diffuse))?;
+                let shading = Shading { factor: [1.0, factor], ..right };
+                Some((shading, Factors::default(), class(factor)))
+            }
+        }
+    }
+}
+
+/// What can be wrong in a diffuse BSDF.
+pub fn diffuse_changes() -> Vec<Change> {
+    let right = Shading::default();
+    let mut changes = vec![
+        fit("a constant factor", Fitted::All),
+        fit("a factor by channel", Fitted::Channels),
+        fit("a factor by material", Fitted::Groups),
+    ];
+    let slip =
+        |name, shading| Change { name, class: Class::Slip, shading: Some(shading), fitted: None };
+    changes.extend([
+        slip("cos theta_i is missing", Shading { cos_i: [0.0; 2], ..right }),
+        slip("cos theta_i is there twice", Shading { cos_i: [2.0; 2], ..right }),
+        slip("cos theta_i is there three times", Shading { cos_i: [3.0; 2], ..right }),
+        slip(
+            "cos theta_o in place of cos theta_i",
+            Shading { cos_i: [0.0; 2], cos_o: [1.0; 2], ..right },
+        ),
+        slip("cos theta_o beside cos theta_i", Shading { cos_o: [1.0; 2], ..right }),
+        slip("divided by cos theta_o", Shading { cos_o: [-1.0; 2], ..right }),
+        slip("wo is not tested", Shading { tests_wo: false, ..right }),
+        slip("wi is not tested", Shading { tests_wi: false, ..right }),
+        slip("neither wo nor wi is tested", Shading { tests_wo: false, tests_wi: false, ..right }),
+        slip("abs() around cos theta_i", Shading { absolute: true, ..right }),
+        slip("abs() around both cosines", Shading { absolute: true, tests_wo: false, ..right }),
+        slip("red and blue exchanged", Shading { channels: [2, 1, 0], ..right }),
+        slip("channels turned", Shading { channels: [1, 2, 0], ..right }),
+        slip("channels turned the other way", Shading { channels: [2, 0, 1], ..right }),
+        slip("the first channel stands for all", Shading { channels: [0; 3], ..right }),
+    ]);
+    changes
+}
+
+/// What can be wrong in a Phong BSDF: all that can in a diffuse one, the lobe and the energy scale.
+pub fn phong_changes() -> Vec<Change> {
+    let right = Shading::default();
+    let of =
+        |class| move |name, shading| Change { name, class, shading: Some(shading), fitted: None };
+    let (slip, concept) = (of(Class::Slip), of(Class::Concept));
+    let lobe = |normalization| Shading { normalization, ..right };
+    let exponent = |a, b| Shading { exponent: [a, b], ..right };
+    let mut changes = diffuse_changes();
+    changes.extend([
+        fit("a factor of the diffuse term", Fitted::Diffuse),
+        fit("a factor of the specular term", Fitted::Specular),
+        slip("the energy scale is missing", Shading { scaled: [false; 2], ..right }),
+        slip(
+            "the energy scale is missing from the specular term",
+            Shading { scaled: [true, false], ..right },
+        ),
+        slip(
+            "the energy scale is missing from the diffuse term",
+            Shading { scaled: [false, true], ..right },
+        ),
+        slip("n + 1 for n + 2", lobe(|n| (n + 1.0) / std::f64::consts::TAU)),
+        slip("n for n + 2", lobe(|n| n / std::f64::consts::TAU)),
+        slip("n + 3 for n + 2", lobe(|n| (n + 3.0) / std::f64::consts::TAU)),
+        slip("n + 8 over 8 pi", lobe(|n| (n + 8.0) / (8.0 * std::f64::consts::PI))),
+        slip("n + 2 without 2 pi", lobe(|n| n + 2.0)),
+        concept("the lobe is not normalized", lobe(|_| 1.0)),
+        concept("the lobe is divided by pi alone", lobe(|_| std::f64::consts::FRAC_1_PI)),
+        concept("the lobe is divided by 2 pi alone", lobe(|_| 1.0 / std::f64::consts::TAU)),
+        slip("exponent n + 1", exponent(1.0, 1.0)),
+        slip("exponent n - 1", exponent(1.0, -1.0)),
+        slip("exponent n + 2", exponent(1.0, 2.0)),
+        slip("exponent 2 n", exponent(2.0, 0.0)),
+        slip("exponent n / 2", exponent(0.5, 0.0)),
+        slip("exponent 4 n", exponent(4.0, 0.0)),
+        slip("exponent truncated", Shading { round: f64::trunc, ..right }),
+        slip("exponent rounded", Shading { round: f64::round, ..right }),
+        slip("exponent rounded up", Shading { round: f64::ceil, ..right }),
+        slip("cos alpha is not clamped", Shading { clamp: Clamp::Nothing, ..right }),
+        slip("cos alpha is raised before it is clamped", Shading { clamp: Clamp::Power, ..right }),
+        slip("the mirror direction is negated", Shading { angle: Angle::Reversed, ..right }),
+        slip("wo is not mirrored", Shading { angle: Angle::Unmirrored, ..right }),
+        concept(
+            "the half vector in place of the mirror direction",
+            Shading { angle: Angle::Half, ..right },
+        ),
+        slip("the specular term lacks cos theta_i", Shading { cos_i: [1.0, 0.0], ..right }),
+        slip("the specular term has cos theta_i twice", Shading { cos_i: [1.0, 2.0], ..right }),
+        slip("the diffuse term lacks cos theta_i", Shading { cos_i: [0.0, 1.0], ..right }),
+        slip("the diffuse term has cos theta_i twice", Shading { cos_i: [2.0, 1.0], ..right }),
+        slip("Kd and Ks are exchanged", Shading { exchanged: true, ..right }),
+    ]);
+    changes
+}
+
+/// What can be wrong in the light that reaches a surface.
+pub fn light_changes() -> Vec<Change> {
+    let right = Shading::default();
+    let of =
+        |class| move |name, shading| Change { name, class, shading: Some(shading), fitted: None };
+    let (slip, concept) = (of(Class::Slip), of(Class::Concept));
+    vec![
+        fit("a constant factor", Fitted::All),
+        fit("a factor by channel", Fitted::Channels),
+        concept("the light does not fall off with the distance", Shading { falloff: 0.0, ..right }),
+        slip("r in place of r^2", Shading { falloff: 1.0, ..right }),
+        slip("r^3 in place of r^2", Shading { falloff: 3.0, ..right }),
+        slip("r^4 in place of r^2", Shading { falloff: 4.0, ..right }),
+        slip("wi is not of unit length", Shading { long_wi: true, ..right }),
+    ]
+}
+
+/// What can be wrong in an integrator that asks the scene for its BSDFs.
+pub fn integrator_changes() -> Vec<Change> {
+    let right = Shading::default();
+    let of =
+        |class| move |name, shading| Change { name, class, shading: Some(shading), fitted: None };
+    let (slip, concept) = (of(Class::Slip), of(Class::Concept));
+    let cosines =
+        |cos_i: f64, cos_o: f64| Shading { cos_i: [cos_i; 2], cos_o: [cos_o; 2], ..right };
+    let mut changes = light_changes();
+    changes.extend([
+        slip("cos theta_i is multiplied once more", cosines(2.0, 0.0)),
+        slip("cos theta_i is multiplied twice more", cosines(3.0, 0.0)),
+        slip("divided by cos theta_i", cosines(0.0, 0.0)),
+        slip("cos theta_o is multiplied", cosines(1.0, 1.0)),
+        slip("divided by cos theta_o", cosines(1.0, -1.0)),
+        concept("wi reaches the BSDF in world space", Shading { world_wi: true, ..right }),
+    ]);
+    changes
+}
+
+/// What can be wrong in a shader: its BSDF or its light.
+pub fn shader_changes(phong: bool) -> Vec<Change> {
+    let mut bsdf = if phong { phong_changes() } else { diffuse_changes() };
+    let output = |name, output| Change {
+        name,
+        class: Class::Slip,
+        shading: Some(Shading { output, ..Shading::default() }),
+        fitted: None,
+    };
+    bsdf.extend([
+        output("gamma baked into radiance", |v| v.max(0.0).powf(1.0 / 2.2)),
+        output("sRGB baked into radiance", |v| {
+            let v = v.max(0.0);
+            if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
+        }),
+        output("radiance clamped to 1", |v| v.clamp(0.0, 1.0)),
+    ]);
+    let fitted = |change: &Change| change.fitted.is_none();
+    bsdf.into_iter().chain(light_changes().into_iter().filter(fitted)).collect()
+}
+
+fn fit(name: &'static str, fitted: Fitted) -> Change {
+    Change { name, class: Class::Slip, shading: None, fitted: Some(fitted) }
+}

@@ -1,0 +1,348 @@
+//! Part 1.4: visibility along shadow rays.
+
+use basecode::Ray;
+
+use super::{RELATIVE, RayBatch, STRAY_FRACTION};
+use crate::evidence::price::{Class, Price};
+use crate::evidence::{Check, Measure, Verdict};
+use crate::expected::SurfacePoint;
+
+/// Nothing is in shadow, or nothing lit, where more of the rays than this are wrong.
+const NEARLY_ALL: f64 = 0.99;
+/// The mistake of shadows that are not black.
+const LEAVES_LIGHT: &str = "shadows leave some light";
+/// So many of the lit rays must not be black without shadows.
+const LEAST_KNOWN: f64 = 0.25;
+/// A visibility below this is dark, above one minus it lit; anything between is neither.
+const HALF_LIGHT: f64 = 0.02;
+
+/// Part 1.4: judges visibility, from the radiance along all rays with shadows (`with`) and without
+/// (`without`), under the same BSDF whose value is `bsdf`.
+///
+/// Errors on lit and on shadowed rays count apart and add up, so that an image that is all lit or
+/// all dark is worth nothing. `blocked` says whether the scene blocks a ray. `shaded` is radiance with and without shadows under the renderer's own
+/// BSDFs, right or wrong: along a lit ray the shadow query leaves what is shaded as it was.
+pub fn judge_shadows(
+    batch: &RayBatch,
+    bsdf: &dyn Fn(&SurfacePoint) -> [f64; 3],
+    (with, without): (&[[f32; 3]], &[[f32; 3]]),
+    shaded: (&[[f32; 3]], &[[f32; 3]]),
+    blocked: &dyn Fn(&Ray) -> bool,
+) -> Check {
+    let id = "shadow.rays";
+    let dark = batch.points.len() - batch.lit;
+    if dark == 0 || batch.lit == 0 {
+        let summary = "the scene has no ray in full light, or none in full shadow, away from edges";
+        return Check::new(id, &batch.scene, Verdict::NotJudged, summary);
+    }
+    // A renderer that ignores the switch draws shadows always: then its own shadows are what is
+    // missing without, and no fault of its shading.
+    // Asked of one scene alone: `set_apart` looks at the others.
+    let ignores_switch = with == without;
+    let (mut lit_wrong, mut dark_wrong, mut lit_black) = (0usize, 0usize, 0usize);
+    let mut first: Option<(usize, f64)> = None;
+    let (mut lit_seen, mut dark_seen) = (Vec::new(), Vec::new());
+    // What is known of visibility: the ray, and what was found.
+    let mut known = Vec::new();
+    for index in 0..batch.points.len() {
+        let expected = batch.unshadowed(index, bsdf(&batch.points[index]));
+        let is_lit = index < batch.lit;
+        if is_lit && !ignores_switch && is_black(without[index], expected) {
+            lit_black += 1;
+            continue;
+        }
+        let visibility = visibility(with[index], without[index], expected);
+        if is_lit { &mut lit_seen } else { &mut dark_seen }.push(visibility);
+        // What is no number is never right.
+        let right = (visibility - f64::from(u8::from(is_lit))).abs() < HALF_LIGHT;
+        let changed = is_lit && !same_shading(shaded.0[index], shaded.1[index]);
+        // No shadow ray explains a query that lets light through and changes what is shaded.
+        known.push((index, if changed && right { f64::NAN } else { visibility }));
+        if !right || changed {
+            let count = if is_lit { &mut lit_wrong } else { &mut dark_wrong };
+            *count += 1;
+            first = first.or(Some((index, visibility)));
+        }
+    }
+    // What is black with shadows and without says nothing about visibility.
+    let lit_known = batch.lit - lit_black;
+    if (lit_known as f64) < LEAST_KNOWN * batch.lit as f64 {
+        let verdict = if lit_known == 0 { Verdict::Fail } else { Verdict::NotJudged };
+        let summary =
+            format!("{lit_black} of {} lit rays are black without shadows too", batch.lit);
+        return Check::new(id, &batch.scene, verdict, summary);
+    }
+    let lit_fraction = lit_wrong as f64 / lit_known as f64;
+    let dark_fraction = dark_wrong as f64 / dark as f64;
+    let changed = with.iter().zip(without).filter(|(with, without)| with != without).count();
+    let changed = changed as f64 / batch.points.len() as f64;
+    let measures = vec![
+        Measure::at_most("", SWITCHED, changed, 1.0),
+        Measure::at_most(
+            "shadow.lit",
+            "lit rays that are not lit (fraction)",
+            lit_fraction,
+            STRAY_FRACTION,
+        ),
+        Measure::at_most(
+            "shadow.dark",
+            "shadowed rays that are not dark (fraction)",
+            dark_fraction,
+            STRAY_FRACTION,
+        ),
+    ];
+    let mut check = match first.filter(|_| measures.iter().any(|measure| !measure.passed)) {
+        None => {
+            let summary = format!("visibility is right along {} rays", batch.points.len());
+            Check::new(id, &batch.scene, Verdict::Pass, summary)
+        }
+        Some((index, visibility)) => {
+            let p = batch.points[index].position;
+            let summary = format!(
+                "{lit_wrong} of {lit_known} lit rays are not lit and {dark_wrong} of {dark} shadowed rays are not dark; \
+                 first at ({:.3}, {:.3}, {:.3}): expected visibility {}, found {visibility:.2}",
+                p.x,
+                p.y,
+                p.z,
+                u8::from(index < batch.lit),
+            );
+            let check = Check::new(id, &batch.scene, Verdict::Fail, summary);
+            check.with_hint(shadow_hint(&mut lit_seen, &mut dark_seen))
+        }
+    };
+    check.measures = measures;
+    if check.verdict == Verdict::Fail {
+        let price = price(batch, &known, lit_fraction + dark_fraction, blocked);
+        check.error = price.error;
+        check.measures.extend(price.measure());
+    }
+    check
+}
+
+/// A shadow ray with one thing wrong.
+enum Change {
+    /// It begins at this distance from the surface and ends at this one; both of the light's.
+    Ends(&'static str, fn(f32) -> (f32, f32)),
+    /// It leads away from the light.
+    Reversed,
+    /// What is lit is dark, and what is dark is lit.
+    Inverted,
+}
+
+/// Mistakes with shadow rays, each a slip.
+const CHANGES: [Change; 16] = [
+    Change::Reversed,
+    Change::Inverted,
+    Change::Ends("the shadow ray does not end", |_| (Ray::EPSILON, f32::INFINITY)),
+    Change::Ends("the shadow ray ends at r^2", |r| (Ray::EPSILON, r * r)),
+    Change::Ends("the shadow ray ends at 2 r", |r| (Ray::EPSILON, 2.0 * r)),
+    Change::Ends("the shadow ray ends at 1.5 r", |r| (Ray::EPSILON, 1.5 * r)),
+    Change::Ends("the shadow ray ends at 1.1 r", |r| (Ray::EPSILON, 1.1 * r)),
+    Change::Ends("the shadow ray ends at .98 r", |r| (Ray::EPSILON, 0.98 * r)),
+    Change::Ends("the shadow ray ends at .95 r", |r| (Ray::EPSILON, 0.95 * r)),
+    Change::Ends("the shadow ray ends at .9 r", |r| (Ray::EPSILON, 0.9 * r)),
+    Change::Ends("the shadow ray ends at .8 r", |r| (Ray::EPSILON, 0.8 * r)),
+    Change::Ends("the shadow ray ends at .75 r", |r| (Ray::EPSILON, 0.75 * r)),
+    Change::Ends("the shadow ray starts .01 off", |r| (0.01, 0.999 * r)),
+    Change::Ends("the shadow ray starts .02 off", |r| (0.02, 0.999 * r)),
+    Change::Ends("the shadow ray starts .05 off", |r| (0.05, 0.999 * r)),
+    Change::Ends("the shadow ray starts .1 off", |r| (0.1, 0.999 * r)),
+];
+
+impl Change {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Ends(name, _) => name,
+            Self::Reversed => "the shadow ray leads away from the light",
+            Self::Inverted => "lit and dark are exchanged",
+        }
+    }
+
+    /// Whether a point is lit by a renderer with this mistake.
+    fn lights(&self, batch: &RayBatch, index: usize, blocked: &dyn Fn(&Ray) -> bool) -> bool {
+        let point = &batch.points[index];
+        let (r, toward) = (point.distance, batch.to_light(index));
+        let ray = |toward, start, end| Ray::segment(point.position, toward, start, end);
+        match self {
+            Self::Ends(_, ends) => {
+                let (start, end) = ends(r);
+                !(start < end && blocked(&ray(toward, start, end)))
+            }
+            Self::Reversed => !blocked(&ray(-toward, Ray::EPSILON, 0.999 * r)),
+            Self::Inverted => index >= batch.lit,
+        }
+    }
+}
+
+/// What wrong visibility costs. Errors of lit and of dark rays count apart and add up.
+fn price(
+    batch: &RayBatch,
+    known: &[(usize, f64)],
+    raw: f64,
+    blocked: &dyn Fn(&Ray) -> bool,
+) -> Price {
+    let of = |wanted: bool| known.iter().filter(move |(index, _)| (*index < batch.lit) == wanted);
+    let counts = [of(true).count().max(1), of(false).count().max(1)].map(|n| n as f64);
+    // The fraction of lit rays whose visibility is not `light`, and that of dark ones.
+    let residual = |light: &dyn Fn(usize) -> f64| {
+        let wrong = |wanted| {
+            let wrong = of(wanted).filter(|(index, visibility)| {
+                // Asked this way round, a NaN is wrong.
+                let right = (visibility - light(*index)).abs() < HALF_LIGHT;
+                !right
+            });
+            wrong.count() as f64
+        };
+        wrong(true) / counts[0] + wrong(false) / counts[1]
+    };
+    let price = CHANGES.iter().fold(Price::of_raw(raw), |price, change| {
+        let light = |index: usize| f64::from(u8::from(change.lights(batch, index, blocked)));
+        price.or(change.name(), Class::Slip, residual(&light))
+    });
+    // Shadows that leave some light: the more, the worse.
+    let mut dark: Vec<f64> = of(false).map(|(_, visibility)| *visibility).collect();
+    dark.retain(|visibility| visibility.is_finite());
+    dark.sort_by(f64::total_cmp);
+    let left = dark.get(dark.len() / 2).copied().unwrap_or_default();
+    if !(left > 0.0 && left < 1.0) {
+        return price;
+    }
+    let light = |index: usize| if index < batch.lit { 1.0 } else { left };
+    price.or(LEAVES_LIGHT, Class::Slip, left * left + residual(&light))
+}
+
+/// Whether radiance is the same but for rounding; what is no number in both is no matter of shadows.
+fn same_shading(with: [f32; 3], without: [f32; 3]) -> bool {
+    let same = |a: f64, b: f64| match (a.is_finite(), b.is_finite()) {
+        (true, true) => (a - b).abs() <= RELATIVE * b.abs(),
+        (a, b) => a == b,
+    };
+    with.iter().zip(without).all(|(a, b)| same(f64::from(*a), f64::from(b)))
+}
+
+/// The measure of how much of a scene the shadows switch changes.
+const SWITCHED: &str = "rays that the shadows switch changes (fraction)";
+
+/// The least fraction of rays whose radiance is wrong where the light stands elsewhere.
+const LIGHT_ELSEWHERE: f64 = 0.9;
+
+/// Where the light stands elsewhere than it should, shadows fall elsewhere too. So on a scene whose
+/// unshadowed radiance is wrong nearly everywhere (1.3) shadows are not judged (1.4), as long as
+/// there is another scene whose radiance is right and whose shadows are judged.
+pub fn set_apart(checks: &mut [Check]) {
+    charge_what_is_never_tested(checks);
+    let is = |check: &Check, id: &str, verdict| check.id == id && check.verdict == verdict;
+    let nearly_all = |check: &&Check| check.measures.iter().any(|m| m.value > LIGHT_ELSEWHERE);
+    let named =
+        |checks: Vec<&Check>| checks.iter().map(|check| check.scene.clone()).collect::<Vec<_>>();
+    let radiance = |verdict| checks.iter().filter(move |check| is(check, "radiance.lit", verdict));
+    let right = named(radiance(Verdict::Pass).collect());
+    let mut wrong = named(radiance(Verdict::Fail).filter(nearly_all).collect());
+    // Right under a convention is right.
+    wrong.retain(|scene| !right.contains(scene));
+    let judged = |check: &Check| {
+        is(check, "shadow.rays", Verdict::Pass) || is(check, "shadow.rays", Verdict::Fail)
+    };
+    let switched = |check: &Check| {
+        let of = check.measures.iter().find(|measure| measure.name == SWITCHED);
+        of.map_or(0.0, |measure| measure.value)
+    };
+    // Black on lit rays, with shadows and without, by a renderer that obeys the switch elsewhere.
+    let obeys = checks.iter().any(|check| judged(check) && switched(check) > 0.0);
+    let no_dark_is_lit = |check: &Check| check.measures.last().is_some_and(|dark| dark.passed);
+    for check in checks.iter_mut().filter(|check| is(check, "shadow.rays", Verdict::Fail)) {
+        if obeys && switched(check) == 0.0 && no_dark_is_lit(check) {
+            check.verdict = Verdict::NotJudged;
+            check.summary =
+                format!("black without shadows too: they are judged elsewhere ({})", check.summary);
+        }
+    }
+    if !checks.iter().any(|check| judged(check) && right.contains(&check.scene)) {
+        return;
+    }
+    for check in checks.iter_mut().filter(|check| is(check, "shadow.rays", Verdict::Fail)) {
+        if wrong.contains(&check.scene) {
+            check.verdict = Verdict::NotJudged;
+            check.summary = format!(
+                "unshadowed radiance is wrong here and right elsewhere: shadows are judged there ({})",
+                check.summary
+            );
+        }
+    }
+}
+
+/// On one scene alone a shadow ray that misses its occluders looks like none at all. So where nothing
+/// is in shadow on any scene, or nothing lit, no slip explains it.
+fn charge_what_is_never_tested(checks: &mut [Check]) {
+    let fractions = |check: &Check| {
+        let of = |rule: &str| check.measures.iter().find(|measure| measure.rule == rule);
+        (check.id == "shadow.rays").then_some((of("shadow.lit")?.value, of("shadow.dark")?.value))
+    };
+    let all: Vec<(f64, f64)> = checks.iter().filter_map(fractions).collect();
+    let all_lit = all.iter().all(|(lit, dark)| *dark > NEARLY_ALL && *lit <= NEARLY_ALL);
+    let all_dark = all.iter().all(|(lit, dark)| *lit > NEARLY_ALL && *dark <= NEARLY_ALL);
+    if !(all_lit || all_dark) {
+        return;
+    }
+    for check in checks.iter_mut().filter(|check| check.verdict == Verdict::Fail) {
+        let left = check.measures.iter().any(|measure| measure.name.ends_with(LEAVES_LIGHT));
+        if let Some((lit, dark)) = fractions(check).filter(|_| !left) {
+            check.error = Price::of_raw(lit + dark).error;
+        }
+    }
+}
+
+/// Visibility as the renderer has it: radiance with over without shadows. Where there is none
+/// without (a renderer that ignores the switch), no radiance with shadows is darkness.
+fn visibility(with: [f32; 3], without: [f32; 3], expected: [f64; 3]) -> f64 {
+    let sum = |v: [f32; 3]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
+    let expected_sum = expected.iter().sum::<f64>();
+    if is_black(without, expected) { sum(with) / expected_sum } else { sum(with) / sum(without) }
+}
+
+/// Whether radiance is nothing beside what is expected.
+fn is_black(radiance: [f32; 3], expected: [f64; 3]) -> bool {
+    let sum = radiance.iter().map(|&x| f64::from(x)).sum::<f64>();
+    // Asked this way round, a NaN is black.
+    let shines = sum.abs() > 1e-3 * expected.iter().sum::<f64>();
+    !shines
+}
+
+/// What the visibilities of lit and of shadowed rays say.
+fn shadow_hint(lit: &mut [f64], dark: &mut [f64]) -> String {
+    let wrong = |values: &[f64], right: f64| {
+        let off = values.iter().filter(|v| (*v - right).abs() >= HALF_LIGHT).count();
+        off as f64 > STRAY_FRACTION * values.len() as f64
+    };
+    // The one value that nearly all have.
+    let level = |values: &mut [f64]| {
+        values.sort_by(f64::total_cmp);
+        let at = |fraction: f64| values[((values.len() - 1) as f64 * fraction) as usize];
+        (!values.is_empty() && at(0.99) - at(0.01) < HALF_LIGHT).then(|| at(0.5))
+    };
+    let bright = |values: &[f64]| values.iter().all(|v| v.min((1.0 - v).abs()) < HALF_LIGHT);
+    let percent = |v: f64| 100.0 * v;
+    match (wrong(lit, 1.0), wrong(dark, 0.0)) {
+        (false, true) => match level(dark) {
+            Some(left) if left > 1.0 - HALF_LIGHT => {
+                "no point is in shadow: is visibility tested at all?".into()
+            }
+            Some(left) => format!("shadows leave {:.0} % of the light", percent(left)),
+            None if bright(dark) => {
+                "some occluders are missed: look at the shadow ray's min_t and max_t".into()
+            }
+            None => String::new(),
+        },
+        (true, false) => match level(lit) {
+            Some(left) if left < HALF_LIGHT => "nothing is lit when shadows are on".into(),
+            Some(left) => {
+                format!("with shadows on, lit points keep {:.0} % of their light", percent(left))
+            }
+            None if bright(lit) => {
+                "lit points are in shadow: does the shadow ray end at the light, and start off the surface?".into()
+            }
+            None => String::new(),
+        },
+        _ => String::new(),
+    }
+}

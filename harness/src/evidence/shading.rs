@@ -1,0 +1,254 @@
+//! The handout's shading in closed form, in f64, and the same with one thing changed.
+//!
+//! What is right is `Shading::default()`. A changed one is the answer of a renderer with one known
+//! mistake; [`super::price`] asks whether an answer is that of a single mistake.
+
+use renderer_api as api;
+
+/// The radiance that a surface reflects of a point light:
+/// `I r^-falloff times scale (Kd/pi + Ks (n + 2)/(2 pi) max(0, cos alpha)^n) cos theta_i`,
+/// the handout's equation (1) and the equation of its section 1.3. Each field is one thing that a
+/// student may get wrong; pairs hold the diffuse term's value, then the specular term's.
+#[derive(Clone, Copy, Debug)]
+pub struct Shading {
+    /// A factor of each term.
+    pub factor: [f64; 2],
+    /// Whether each term is multiplied by the material's energy scale.
+    pub scaled: [bool; 2],
+    /// The power of cos theta_i in each term.
+    pub cos_i: [f64; 2],
+    /// The power of cos theta_o in each term.
+    pub cos_o: [f64; 2],
+    /// The lobe's exponent is `exponent[0] n + exponent[1]`, then rounded by `round`.
+    pub exponent: [f64; 2],
+    /// How the exponent is rounded.
+    pub round: fn(f64) -> f64,
+    /// What the lobe is multiplied by, a function of n.
+    pub normalization: fn(f64) -> f64,
+    /// Which angle the lobe depends on.
+    pub angle: Angle,
+    /// Where cos alpha is clamped to 0.
+    pub clamp: Clamp,
+    /// Whether a surface seen from behind is black.
+    pub tests_wo: bool,
+    /// Whether a surface lit from behind is black.
+    pub tests_wi: bool,
+    /// Whether cos theta_i is replaced by its magnitude.
+    pub absolute: bool,
+    /// Which of red, green and blue each channel takes.
+    pub channels: [usize; 3],
+    /// Whether Kd and Ks are exchanged.
+    pub exchanged: bool,
+    /// The power of 1/r.
+    pub falloff: f64,
+    /// Whether wi reaches the BSDF with the length r.
+    pub long_wi: bool,
+    /// Whether wi reaches the BSDF in world space.
+    pub world_wi: bool,
+    /// What is made of radiance before it is written.
+    pub output: fn(f64) -> f64,
+}
+
+/// What is clamped to 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clamp {
+    /// cos alpha, before it is raised: right.
+    Base,
+    /// The power of cos alpha: even exponents shine backward.
+    Power,
+    /// Nothing: fractional powers are no numbers.
+    Nothing,
+}
+
+/// The angle that a lobe depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Angle {
+    /// Between wi and the mirror direction of wo: right.
+    Mirror,
+    /// Between wi and the negated mirror direction of wo.
+    Reversed,
+    /// Between wi and wo.
+    Unmirrored,
+    /// Between the normal and the half vector (Blinn).
+    Half,
+}
+
+impl Default for Shading {
+    fn default() -> Self {
+        Self {
+            factor: [1.0; 2],
+            scaled: [true; 2],
+            cos_i: [1.0; 2],
+            cos_o: [0.0; 2],
+            exponent: [1.0, 0.0],
+            round: |n| n,
+            normalization: |n| (n + 2.0) / std::f64::consts::TAU,
+            angle: Angle::Mirror,
+            clamp: Clamp::Base,
+            tests_wo: true,
+            tests_wi: true,
+            absolute: false,
+            channels: [0, 1, 2],
+            exchanged: false,
+            falloff: 2.0,
+            long_wi: false,
+            world_wi: false,
+            output: |radiance| radiance,
+        }
+    }
+}
+
+/// One point of a surface, as its BSDF sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadedPoint {
+    /// The material, its colours not multiplied by `scale`.
+    pub material: api::MaterialValue,
+    /// The material's energy scale.
+    pub scale: f64,
+    /// Unit direction toward the viewer, local frame.
+    pub wo: [f64; 3],
+    /// Unit direction toward the light, local frame.
+    pub wi: [f64; 3],
+    /// Radiant intensity of the light [W sr^-1].
+    pub intensity: [f64; 3],
+    /// Distance to the light, scene units.
+    pub distance: f64,
+}
+
+impl ShadedPoint {
+    /// A BSDF query: a light of intensity 1 at distance 1.
+    pub fn of_bsdf(material: &api::MaterialValue, scale: f64, wo: [f32; 3], wi: [f32; 3]) -> Self {
+        let [wo, wi] = [wo, wi].map(|w| w.map(f64::from));
+        Self { material: *material, scale, wo, wi, intensity: [1.0; 3], distance: 1.0 }
+    }
+}
+
+impl Shading {
+    /// Radiance toward the viewer [W m^-2 sr^-1]; for a BSDF query its value times cos theta_i.
+    pub fn radiance(&self, point: &ShadedPoint) -> [f64; 3] {
+        let ShadedPoint { material, scale, wo, wi, intensity, distance } = point;
+        let cos_o = wo[2];
+        let length = if self.long_wi { *distance } else { 1.0 };
+        let cos_i = length * if self.absolute { wi[2].abs() } else { wi[2] };
+        if (self.tests_wo && cos_o <= 0.0) || (self.tests_wi && cos_i <= 0.0) {
+            return [0.0; 3];
+        }
+        let phong = material.model == api::MATERIAL_PHONG;
+        let lobe = if phong && self.factor[1] != 0.0 { self.lobe(point, length) } else { 0.0 };
+        let [diffuse, specular] = [0, 1].map(|term| {
+            let scale = if self.scaled[term] { *scale } else { 1.0 };
+            self.factor[term]
+                * scale
+                * power(cos_i, self.cos_i[term])
+                * power(cos_o, self.cos_o[term])
+        });
+        let diffuse = diffuse / std::f64::consts::PI;
+        let incident = distance.powf(-self.falloff);
+        let (kd, ks) = match self.exchanged && phong {
+            true => (material.specular, material.diffuse),
+            false => (material.diffuse, material.specular),
+        };
+        let value =
+            [0, 1, 2].map(|c| diffuse * f64::from(kd[c]) + specular * lobe * f64::from(ks[c]));
+        std::array::from_fn(|c| (self.output)(intensity[c] * incident * value[self.channels[c]]))
+    }
+
+    /// This change, made to another shading instead of the right one: of what conventions change
+    /// too, both count.
+    pub fn over(&self, other: &Self) -> Self {
+        Self {
+            factor: [0, 1].map(|term| self.factor[term] * other.factor[term]),
+            cos_i: [0, 1].map(|term| self.cos_i[term] + other.cos_i[term] - 1.0),
+            falloff: self.falloff + other.falloff - 2.0,
+            long_wi: self.long_wi != other.long_wi,
+            ..*self
+        }
+    }
+
+    /// The lobe with its normalization, Ks left out.
+    fn lobe(&self, point: &ShadedPoint, length: f64) -> f64 {
+        let ShadedPoint { material, wo, wi, .. } = point;
+        let n = f64::from(material.exponent);
+        // The mirror image of wo about the normal is (-x, -y, z).
+        let mirror = wi[2] * wo[2] - wi[0] * wo[0] - wi[1] * wo[1];
+        let cos_alpha = length
+            * match self.angle {
+                Angle::Mirror => mirror,
+                Angle::Reversed => -mirror,
+                Angle::Unmirrored => wi[0] * wo[0] + wi[1] * wo[1] + wi[2] * wo[2],
+                Angle::Half => {
+                    let h: [f64; 3] = std::array::from_fn(|i| wi[i] + wo[i]);
+                    h[2] / (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt().max(f64::MIN_POSITIVE)
+                }
+            };
+        let base = if self.clamp == Clamp::Base { cos_alpha.max(0.0) } else { cos_alpha };
+        let power = base.powf((self.round)(self.exponent[0] * n + self.exponent[1]));
+        let power = if self.clamp == Clamp::Power { power.max(0.0) } else { power };
+        (self.normalization)(n) * power
+    }
+}
+
+/// `base` to `exponent`, with the sign of the base.
+pub fn power(base: f64, exponent: f64) -> f64 {
+    match exponent {
+        0.0 => 1.0,
+        1.0 => base,
+        _ => base.signum() * base.abs().powf(exponent),
+    }
+}
+
+/// 0.99 over the largest component of Kd + Ks where that exceeds 1; 1 elsewhere and for diffuse.
+pub fn energy_scale(material: &api::MaterialValue) -> f64 {
+    let sums = (0..3).map(|c| f64::from(material.diffuse[c]) + f64::from(material.specular[c]));
+    let largest = sums.fold(0.0, f64::max);
+    if material.model == api::MATERIAL_PHONG && largest > 1.0 { 0.99 / largest } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UP: [f64; 3] = [0.0, 0.0, 1.0];
+
+    fn point() -> ShadedPoint {
+        let material = api::MaterialValue {
+            model: api::MATERIAL_PHONG,
+            diffuse: [0.5, 0.25, 0.1],
+            specular: [0.2, 0.3, 0.4],
+            exponent: 4.0,
+        };
+        let intensity = [2.0, 4.0, 8.0];
+        ShadedPoint { material, scale: 1.0, wo: UP, wi: UP, intensity, distance: 2.0 }
+    }
+
+    #[test]
+    fn the_formula_has_its_closed_forms() {
+        let expected = 2.0 / 4.0 * (0.5 / std::f64::consts::PI + 0.2 * 6.0 / std::f64::consts::TAU);
+        assert!((Shading::default().radiance(&point())[0] - expected).abs() < 1e-8);
+        let below = ShadedPoint { wi: [0.0, 0.0, -1.0], ..point() };
+        assert_eq!(Shading::default().radiance(&below), [0.0; 3]);
+        let behind = ShadedPoint { wo: [0.0, 0.0, -1.0], ..point() };
+        assert_eq!(Shading::default().radiance(&behind), [0.0; 3]);
+    }
+
+    #[test]
+    fn each_change_changes_its_own_term() {
+        let right = Shading::default();
+        let diffuse = Shading { factor: [1.0, 0.0], ..right };
+        let specular = Shading { factor: [0.0, 1.0], ..right };
+        let sum = diffuse.radiance(&point())[1] + specular.radiance(&point())[1];
+        assert!((sum - right.radiance(&point())[1]).abs() < 1e-12);
+        let near = Shading { falloff: 1.0, ..right };
+        assert!((near.radiance(&point())[2] / right.radiance(&point())[2] - 2.0).abs() < 1e-12);
+        let slanted = ShadedPoint { wi: [0.6, 0.0, 0.8], ..point() };
+        let twice = Shading { cos_i: [2.0; 2], ..right };
+        assert!((twice.radiance(&slanted)[0] / right.radiance(&slanted)[0] - 0.8).abs() < 1e-12);
+        let unclamped = Shading { clamp: Clamp::Nothing, tests_wi: false, ..right };
+        let odd = ShadedPoint {
+            material: api::MaterialValue { exponent: 2.5, ..point().material },
+            wi: [0.0, 0.0, -1.0],
+            ..point()
+        };
+        assert!(unclamped.radiance(&odd)[0].is_nan());
+    }
+}

@@ -1,0 +1,316 @@
+//! The answers of a plugin's BSDFs and integrator whose verdicts hang on a convention: asked once,
+//! judged under each.
+
+use std::path::Path;
+
+use basecode::{MaterialModel, Sampler, Vec2, Vec3};
+use renderer_api as api;
+
+use super::ask::{self, Asker};
+use super::case::Case;
+use super::seen;
+use crate::diagnosis::{self, Tile, View};
+use crate::evidence::Check;
+use crate::evidence::bsdf::{self, BsdfKind, BsdfProbe};
+use crate::evidence::convention::{self, Convention, Conventional, Party};
+use crate::evidence::physical::Probes;
+use crate::evidence::price;
+use crate::evidence::rays::{self, Unshadowed};
+use crate::evidence::shading::{ShadedPoint, Shading};
+use crate::expected::SurfacePoint;
+use crate::plugin::{Witness, WitnessQuery};
+use crate::worker::{Outcome, Request};
+
+/// What was answered on a group of scenes.
+#[derive(Default)]
+pub struct Answers<'a> {
+    bsdfs: Vec<BsdfAnswer>,
+    lights: Vec<LightAnswer<'a>>,
+}
+
+/// A BSDF's values at probes, or the check that says why there are none.
+struct BsdfAnswer {
+    kind: BsdfKind,
+    scene: String,
+    probes: Vec<BsdfProbe>,
+    values: Result<Vec<[f32; 3]>, Check>,
+}
+
+/// Radiance along a scene's rays without shadows, or the check that says why there is none.
+struct LightAnswer<'a> {
+    case: &'a Case,
+    values: Result<Vec<WitnessAnswer>, Box<Check>>,
+    /// What the lit points look like to an integrator that asks the scene for no BSDF; empty for
+    /// one that does.
+    own: Vec<ShadedPoint>,
+}
+
+/// Radiance under one witness.
+struct WitnessAnswer {
+    witness: Witness,
+    name: &'static str,
+    values: Vec<[f32; 3]>,
+}
+
+impl<'a> Answers<'a> {
+    /// Probes both BSDFs: given by value, as a textured scene hands them out, and as any held-back
+    /// one does, whose materials nobody has seen. Answers what hangs on no convention.
+    pub fn probe_bsdfs(&mut self, asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
+        let Some(case) = cases.first() else { return Vec::new() };
+        let request = |scene: &Path, queries: &mut dyn Iterator<Item = &api::BsdfQuery>| {
+            let queries = queries.map(ask::query).collect();
+            Request::EvalBsdf { scene: asker.scene(scene), queries }
+        };
+        let kinds = [BsdfKind::Diffuse, BsdfKind::Phong];
+        let mut asked = Vec::new();
+        for kind in kinds {
+            if !case.held_back {
+                asked.push((kind, String::new(), &case.offline, bsdf::probes(kind)));
+            }
+            for case in cases {
+                let probes = shape_probes(kind, case);
+                if !probes.is_empty() {
+                    asked.push((kind, case.entry.name.clone(), &case.offline, probes));
+                }
+            }
+        }
+        let mut requests: Vec<Request> = asked
+            .iter()
+            .map(|(_, _, scene, probes)| request(scene, &mut probes.iter().map(|p| &p.query)))
+            .collect();
+        // Asked of no scene's materials, so but once.
+        let kinds: &[_] = if case.held_back { &[] } else { &kinds };
+        let physical: Vec<_> = kinds.iter().map(|&kind| (kind, Probes::new(kind))).collect();
+        let long: Vec<_> = kinds.iter().map(|&kind| (kind, bsdf::long_probes(kind))).collect();
+        requests.extend(
+            physical.iter().map(|(_, probes)| request(&case.offline, &mut probes.queries.iter())),
+        );
+        requests.extend(long.iter().map(|(_, probes)| {
+            request(&case.offline, &mut probes.iter().map(|probe| &probe.query))
+        }));
+        let outcomes = asker.ask(Some(plugin), requests);
+        let (own, rest) = outcomes.split_at(asked.len().min(outcomes.len()));
+        let (of_physical, of_long) = rest.split_at(physical.len().min(rest.len()));
+        for ((kind, scene, _, probes), outcome) in asked.into_iter().zip(own) {
+            self.push_bsdf(asker, kind, scene, probes, outcome);
+        }
+        for ((kind, probes), outcome) in long.into_iter().zip(of_long) {
+            let by_value =
+                |answer: &&mut BsdfAnswer| answer.kind == kind && answer.scene.is_empty();
+            let known = self.bsdfs.iter_mut().find(by_value);
+            // Whoever does not answer them leaves no such convention.
+            let (Some(known), Some(answer)) = (known, outcome.answer()) else { continue };
+            if let Ok(values) = &mut known.values {
+                values.extend(ask::colours(&answer.values));
+                known.probes.extend(probes);
+            }
+        }
+        let physical = physical.iter().zip(of_physical);
+        let judge = |((kind, probes), outcome): (&(BsdfKind, Probes), &Outcome)| {
+            probes.judge(*kind, ask::colours(&outcome.answer()?.values))
+        };
+        physical.filter_map(judge).collect()
+    }
+
+    fn push_bsdf(
+        &mut self,
+        asker: &Asker,
+        kind: BsdfKind,
+        scene: String,
+        probes: Vec<BsdfProbe>,
+        outcome: &Outcome,
+    ) {
+        let (id, part, view) = match kind {
+            BsdfKind::Diffuse => ("bsdf.diffuse", "1.1", diagnosis::Kind::Diffuse),
+            BsdfKind::Phong => ("bsdf.phong", "1.2", diagnosis::Kind::Phong),
+        };
+        let values = match outcome {
+            Outcome::Done(answer) => {
+                let values = ask::colours(&answer.values);
+                asker.see(View::new(view, &scene), Tile::of_list(values));
+                if scene.is_empty() {
+                    seen::bsdf(asker, kind, &probes, values);
+                }
+                Ok(values.to_vec())
+            }
+            other => Err(ask::unanswered(id, &scene, &[part], other)),
+        };
+        self.bsdfs.push(BsdfAnswer { kind, scene, probes, values });
+    }
+
+    /// Keeps the radiance of an integrator along a scene's rays, under each witness.
+    pub fn push_light(&mut self, case: &'a Case, asked: &[(&Outcome, Witness, &'static str)]) {
+        let own = asked.iter().any(|(_, witness, _)| *witness == Witness::True);
+        let points = case.small.batch.points.iter().take(case.small.batch.lit);
+        let own =
+            if own { points.map(|point| shaded_point(case, point)).collect() } else { Vec::new() };
+        let values = asked.iter().map(|(outcome, witness, name)| match outcome {
+            Outcome::Done(answer) => {
+                let values = ask::colours(&answer.values).to_vec();
+                Ok(WitnessAnswer { witness: *witness, name, values })
+            }
+            other => {
+                let unanswered = ask::unanswered("radiance.lit", &case.entry.name, &["1.3"], other);
+                Err(Box::new(unanswered))
+            }
+        });
+        let values = values.collect();
+        self.lights.push(LightAnswer { case, values, own });
+    }
+
+    /// The checks under the handout's convention, and under others that the plugin keeps.
+    pub fn judge(&self) -> Vec<Check> {
+        let bsdfs = self.bsdfs.iter().map(BsdfAnswer::question);
+        let lights = self.lights.iter().map(LightAnswer::question);
+        convention::judge(&bsdfs.chain(lights).collect::<Vec<_>>())
+    }
+}
+
+impl BsdfAnswer {
+    fn question(&self) -> Conventional<'_> {
+        let party = match self.kind {
+            BsdfKind::Diffuse => Party::Diffuse,
+            BsdfKind::Phong => Party::Phong,
+        };
+        Conventional {
+            party,
+            passes: Box::new(|convention: &Convention| {
+                let values = self.values.as_ref();
+                values.is_ok_and(|values| bsdf::passes(&self.probes, values, convention))
+            }),
+            judge: Box::new(|convention: &Convention| match &self.values {
+                Ok(values) => Check {
+                    scene: self.scene.clone(),
+                    ..bsdf::judge(self.kind, &self.probes, values, convention)
+                },
+                Err(unanswered) => unanswered.clone(),
+            }),
+        }
+    }
+}
+
+impl LightAnswer<'_> {
+    /// Radiance along lit ray `index` of an integrator that lights so.
+    fn of(&self, witness: Witness, index: usize, shading: &Shading) -> [f64; 3] {
+        match self.own.get(index) {
+            Some(point) => shading.radiance(point),
+            None => {
+                self.case.small.batch.witnessed(index, shading, &|wi, wo| value(witness, wi, wo))
+            }
+        }
+    }
+
+    fn under<R>(&self, answers: &[WitnessAnswer], then: impl FnOnce(&[Unshadowed]) -> R) -> R {
+        let of: Vec<_> = answers
+            .iter()
+            .map(|answer| {
+                move |index: usize, shading: &Shading| self.of(answer.witness, index, shading)
+            })
+            .collect();
+        let answers: Vec<Unshadowed> = answers
+            .iter()
+            .zip(&of)
+            .map(|(answer, of)| Unshadowed { witness: answer.name, of, values: &answer.values })
+            .collect();
+        then(&answers)
+    }
+
+    fn question(&self) -> Conventional<'_> {
+        let batch = &self.case.small.batch;
+        Conventional {
+            party: Party::Integrator,
+            passes: Box::new(move |convention: &Convention| {
+                // Without BSDFs to leave anything to, an integrator keeps no convention.
+                self.own.is_empty()
+                    && self.values.as_ref().is_ok_and(|values| {
+                        self.under(values, |answers| {
+                            rays::passes_unshadowed(batch, answers, convention)
+                        })
+                    })
+            }),
+            judge: Box::new(move |convention: &Convention| match &self.values {
+                Ok(values) => self.under(values, |answers| {
+                    if self.own.is_empty() {
+                        let changes = price::integrator_changes();
+                        return rays::judge_unshadowed(batch, answers, convention, &changes);
+                    }
+                    let (handout, changes) = (Convention::default(), price::shader_changes(true));
+                    rays::judge_unshadowed(batch, answers, &handout, &changes)
+                }),
+                Err(unanswered) => (**unanswered).clone(),
+            }),
+        }
+    }
+}
+
+/// The value of a witness.
+pub fn value(witness: Witness, wi: Vec3, wo: Vec3) -> [f64; 3] {
+    let query = WitnessQuery { wi: wi.into(), wo: wo.into() };
+    witness.value(&query).unwrap_or_default().map(f64::from)
+}
+
+/// A lit point as its right BSDF sees it. A mirror is black.
+pub fn shaded_point(case: &Case, point: &SurfacePoint) -> ShadedPoint {
+    let scene = &case.expected.scene;
+    let material = scene.material_of(point.shape);
+    let uv = scene.intersect(&point.ray).map_or(Vec2::ZERO, |hit| hit.uv);
+    let (model, colours) = match material.model {
+        MaterialModel::Diffuse => (api::MATERIAL_DIFFUSE, 1.0),
+        MaterialModel::Phong => (api::MATERIAL_PHONG, 1.0),
+        MaterialModel::Mirror => (api::MATERIAL_DIFFUSE, 0.0),
+    };
+    ShadedPoint {
+        material: api::MaterialValue {
+            model,
+            diffuse: (colours * material.diffuse.lookup(uv)).into(),
+            specular: (colours * material.specular.lookup(uv)).into(),
+            exponent: material.exponent,
+        },
+        scale: f64::from(material.energy_scale()),
+        wo: point.wo.to_array().map(f64::from),
+        wi: point.wi.to_array().map(f64::from),
+        intensity: case.small.batch.intensity.to_array().map(f64::from),
+        distance: f64::from(point.distance),
+    }
+}
+
+/// Directions and texture coordinates for each shape of a kind: of a public scene the textured ones.
+fn shape_probes(kind: BsdfKind, case: &Case) -> Vec<BsdfProbe> {
+    let scene = &case.expected.scene;
+    let sampler = Sampler::new(0x7E87);
+    let mut probes = Vec::new();
+    for (index, shape) in scene.shapes().iter().enumerate() {
+        let material = scene.material_of(index);
+        let model = match (kind, material.model) {
+            (BsdfKind::Diffuse, MaterialModel::Diffuse) => api::MATERIAL_DIFFUSE,
+            (BsdfKind::Phong, MaterialModel::Phong) => api::MATERIAL_PHONG,
+            _ => continue,
+        };
+        let bitmap = |texture| matches!(texture, &basecode::Texture::Bitmap(_));
+        let textured = bitmap(&material.diffuse) || bitmap(&material.specular);
+        if material.is_emitter() || !(textured || case.held_back) {
+            continue;
+        }
+        for _ in 0..200 {
+            let uv = [sampler.next_1d() * 3.0 - 1.0, sampler.next_1d() * 3.0 - 1.0];
+            let primitive = (sampler.next_1d() * shape.triangles.len() as f32) as usize;
+            let direction = || {
+                let z = 0.05 + 0.95 * sampler.next_1d();
+                let (sin, cos) = (std::f32::consts::TAU * sampler.next_1d()).sin_cos();
+                let r = (1.0 - z * z).sqrt();
+                Vec3::new(r * cos, r * sin, z)
+            };
+            let pair = (direction(), direction());
+            let value = api::MaterialValue {
+                model,
+                diffuse: material.diffuse.lookup(uv.into()).into(),
+                specular: material.specular.lookup(uv.into()).into(),
+                exponent: material.exponent,
+            };
+            let scale = f64::from(material.energy_scale());
+            let at = (index as u32, primitive as u32, uv);
+            probes.push(bsdf::textured_probe(at, pair, (&value, scale)));
+        }
+    }
+    probes
+}
