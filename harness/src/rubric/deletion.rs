@@ -90,9 +90,9 @@ mod tests {
     }
 
     /// What a hand-in is worth, and what an instructor is told.
-    fn worth(rules: &Rules, evidence: &Evidence) -> (f64, f64, Vec<String>) {
+    fn worth(rules: &Rules, evidence: &Evidence) -> (f64, f64, f64, Vec<String>) {
         let grade = grade(rules, evidence);
-        (grade.points, grade.points_max, grade.remarks)
+        (grade.points, grade.points_max, grade.unconfirmed, grade.remarks)
     }
 
     /// What only a hand-in can break: images without a source, a tree, an image's size, a crash.

@@ -7,7 +7,9 @@
 //! 4. Evidence that does not apply gives way to the part's fallback.
 //! 5. When the proof fails and no part's own evidence says why, the path's `blame` part pays.
 //! 6. What cannot be judged is a range from 0 to all points, with its reason.
-//! 7. Public and held-back scenes are graded apart by these rules; the lower counts, part by part.
+//! 7. Without code, a part earns nothing until the instructor confirms what its images show
+//!    ([`PartGrade::unconfirmed`]).
+//! 8. Public and held-back scenes are graded apart by these rules; the lower counts, part by part.
 
 mod curve;
 mod deletion;
@@ -17,4 +19,4 @@ mod rules;
 pub use curve::Curve;
 pub use deletion::EvidenceRule;
 pub use grade::{BUILD, Grade, PartGrade, grade};
-pub use rules::{Gate, Part, PathRule, Rules};
+pub use rules::{Gate, Part, PathRule, Rules, Trust};
