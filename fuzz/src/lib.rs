@@ -70,7 +70,7 @@ pub fn archive(bytes: &[u8]) {
 
 /// The `config.json` of a hand-in.
 pub fn config(bytes: &[u8]) {
-    let (config, findings) = HandInConfig::parse(bytes);
+    let (config, findings, _) = HandInConfig::parse(bytes);
     check_findings(&findings, bytes);
     let _ = config.sampler_seed();
 }

@@ -68,11 +68,35 @@ fn zip_parent_in_an_ignored_place() {
 
 #[test]
 fn zip_backslash_parent() {
-    zip_refused(
-        [Entry::stored("..\\..\\canary.txt", b"x")],
-        "name_backslash",
-        "..\\..\\canary.txt",
-    );
+    zip_refused([Entry::stored("..\\..\\canary.txt", b"x")], "path_escape", "../../canary.txt");
+}
+
+#[test]
+fn zip_backslash_drive() {
+    zip_refused([Entry::stored("C:\\Windows\\x", b"x")], "path_drive", "C:/Windows/x");
+}
+
+#[test]
+fn zip_backslash_absolute() {
+    zip_refused([Entry::stored("\\etc\\cron.d\\x", b"x")], "path_absolute", "/etc/cron.d/x");
+}
+
+#[test]
+fn zip_backslash_beside_slashes() {
+    let entries = [Entry::stored("src/lib.rs", b"x"), Entry::stored("src\\lib.rs", b"y")];
+    zip_refused(entries, "name_backslash", "src\\lib.rs");
+}
+
+#[test]
+fn zip_backslash_duplicate() {
+    let entries = [Entry::stored("src\\lib.rs", b"x"), Entry::stored("src\\\\lib.rs", b"y")];
+    zip_refused(entries, "duplicate_entry", "src/lib.rs");
+}
+
+#[test]
+fn zip_backslash_file_and_folder() {
+    let entries = [Entry::stored("src", b"x"), Entry::stored("src\\lib.rs", b"y")];
+    zip_refused(entries, "file_and_folder", "src/lib.rs");
 }
 
 #[test]
@@ -324,6 +348,36 @@ fn zip_descriptor_disagrees() {
 }
 
 #[test]
+fn zip_descriptor_lies_where_nothing_was_deferred() {
+    let mut entry = Entry::deflated("a", b"xxxx").streamed();
+    let central = entry.central.clone();
+    (entry.local.crc32, entry.local.packed, entry.local.unpacked) =
+        (central.crc32, central.packed, central.unpacked);
+    entry.descriptor[12] ^= 1;
+    zip_refused([entry], "zip_headers_disagree", "a");
+}
+
+#[test]
+fn zip_deferred_fields_of_an_entry_without_a_descriptor() {
+    for field in 0..3 {
+        let mut entry = Entry::deflated("a", b"xxxx");
+        match field {
+            0 => entry.local.crc32 = 0,
+            1 => entry.local.packed = 0,
+            _ => entry.local.unpacked = 0,
+        }
+        zip_refused([entry], "zip_headers_disagree", "a");
+    }
+}
+
+#[test]
+fn zip_one_deferred_field_and_another_that_lies() {
+    let mut entry = Entry::deflated("a", b"xxxx").streamed();
+    entry.local.unpacked = 3;
+    zip_refused([entry], "zip_headers_disagree", "a");
+}
+
+#[test]
 fn zip_descriptor_missing() {
     let mut entry = Entry::deflated("a", b"xxxx").streamed();
     entry.descriptor.clear();
@@ -369,23 +423,68 @@ fn zip_data_after_deflate_stream() {
 
 // --- the archive as a whole ---
 
-#[test]
-fn zip_data_before() {
-    let zip = Zip { prefix: b"#!/bin/sh\n".to_vec(), entries: vec![good()], ..Zip::default() };
-    assert_refused(&zip.bytes(), "a.zip", "zip_data_before", "config.json");
+/// Where a second reader could find another archive.
+fn hidden() -> Vec<u8> {
+    Zip::of([Entry::stored("src/lib.rs", b"hidden")]).bytes()
 }
 
 #[test]
-fn zip_data_before_with_offsets_of_its_own() {
-    let mut bytes = b"MZ self-extracting".to_vec();
-    bytes.extend(Zip::of([good()]).bytes());
-    assert_refused(&bytes, "a.zip", "zip_data_before", "");
+fn zip_after_another_zip() {
+    let bytes = [hidden(), Zip::of([good()]).bytes()].concat();
+    assert_refused(&bytes, "a.zip", "zip_two_directories", "");
+    let zip = Zip { prefix: hidden(), entries: vec![good()], ..Zip::default() };
+    assert_refused(&zip.bytes(), "a.zip", "zip_two_directories", "");
 }
 
 #[test]
-fn zip_data_after() {
-    let zip = Zip { entries: vec![good()], suffix: b"tail".to_vec(), ..Zip::default() };
-    assert_refused(&zip.bytes(), "a.zip", "zip_data_after", "");
+fn zip_hidden_entry_before() {
+    let local = hidden()[..40].to_vec();
+    let zip = Zip { prefix: local, entries: vec![good()], ..Zip::default() };
+    assert_refused(&zip.bytes(), "a.zip", "zip_two_directories", "");
+}
+
+#[test]
+fn zip_hidden_entry_between() {
+    let local = hidden()[..40].to_vec();
+    let zip = Zip { entries: vec![good()], gap: local, ..Zip::default() };
+    assert_refused(&zip.bytes(), "a.zip", "zip_two_directories", "");
+}
+
+#[test]
+fn zip_hidden_entry_in_the_comment() {
+    let local = hidden()[..40].to_vec();
+    let zip = Zip { entries: vec![good()], comment: local, ..Zip::default() };
+    assert_refused(&zip.bytes(), "a.zip", "zip_two_directories", "");
+}
+
+#[test]
+fn zip_hidden_entry_after() {
+    let local = hidden()[..40].to_vec();
+    let zip = Zip { entries: vec![good()], suffix: local, ..Zip::default() };
+    assert_refused(&zip.bytes(), "a.zip", "zip_two_directories", "");
+}
+
+#[test]
+fn zip_before_another_zip() {
+    let zip = Zip { entries: vec![good()], suffix: hidden(), ..Zip::default() };
+    assert_refused(&zip.bytes(), "a.zip", "zip_two_directories", "");
+}
+
+#[test]
+fn zip_whose_offset_leads_to_another_directory() {
+    // Counted from the file's first byte, the directory is one in the data of an entry.
+    let inner = hidden();
+    let at = inner.len() - 22 - (46 + 10);
+    let mut outer = Zip::of([Entry::stored("a", &inner)]);
+    outer.directory_offset = Some((30 + 1 + at) as u32);
+    assert_refused(&outer.bytes(), "a.zip", "zip_two_directories", "");
+}
+
+#[test]
+fn zip_end_record_cut_off_in_a_nested_zip() {
+    let zip = Zip::of([Entry::stored("inner.zip", &hidden())]).bytes();
+    let cut = &zip[..zip.len() - 40];
+    assert_refused(cut, "a.zip", "zip_two_directories", "");
 }
 
 #[test]
@@ -426,13 +525,109 @@ fn zip_data_reach_into_the_directory() {
     zip_refused([entry], "zip_data_outside", "a");
 }
 
+/// The zip64 field of these numbers.
+fn zip64_field(numbers: &[u64]) -> Vec<u8> {
+    extra(1, &numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>())
+}
+
 #[test]
-fn zip64_sizes() {
+fn zip64_sizes_disagree() {
+    let mut entry = Entry::stored("a", b"x");
+    for (header, size) in [(&mut entry.local, 2), (&mut entry.central, 1)] {
+        (header.packed, header.unpacked) = (u32::MAX, u32::MAX);
+        header.extra = zip64_field(&[size, 1]);
+    }
+    zip_refused([entry], "zip_headers_disagree", "a");
+}
+
+#[test]
+fn zip64_sizes_missing() {
+    let entry = Entry::stored("a", b"x").both(|h| (h.packed, h.unpacked) = (u32::MAX, u32::MAX));
+    zip_refused([entry], "zip64", "a");
+}
+
+#[test]
+fn zip64_too_few_and_too_many_sizes() {
+    for numbers in [&[1][..], &[1, 1, 0, 0]] {
+        let entry = Entry::stored("a", b"x").both(|h| {
+            (h.packed, h.unpacked) = (u32::MAX, u32::MAX);
+            h.extra = zip64_field(numbers);
+        });
+        zip_refused([entry], "zip64", "a");
+    }
+}
+
+#[test]
+fn zip64_sizes_of_exabytes() {
     let entry = Entry::stored("a", b"x").both(|h| {
         (h.packed, h.unpacked) = (u32::MAX, u32::MAX);
-        h.extra = extra(1, &[1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0]);
+        h.extra = zip64_field(&[u64::MAX, u64::MAX]);
     });
-    zip_refused([entry], "zip64", "a");
+    zip_refused([entry], "zip_data_outside", "a");
+}
+
+#[test]
+fn zip64_place_outside() {
+    for place in [u64::MAX, 1 << 40] {
+        let mut entry = Entry::stored("a", b"x");
+        entry.offset = Some(u32::MAX);
+        entry.central.extra = zip64_field(&[place]);
+        zip_refused([entry], "zip_local_missing", "a");
+    }
+}
+
+/// A zip whose end is a zip64 record, its locator and an end record that holds nothing; `change` lies.
+fn zip64_end(change: impl Fn(&mut [u8])) -> Vec<u8> {
+    let mut bytes = Zip::of([good(), Entry::stored("a", b"x")]).bytes();
+    let end = bytes.split_off(bytes.len() - 22);
+    let field = |at: usize| u64::from(u32::from_le_bytes(end[at..at + 4].try_into().unwrap()));
+    let (size, offset) = (field(12), field(16));
+    let start = bytes.len();
+    bytes.extend(b"PK\x06\x06");
+    bytes.extend(44u64.to_le_bytes());
+    bytes.extend([45, 3, 45, 0]);
+    bytes.extend([0; 8]);
+    for number in [2, 2, size, offset] {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes.extend(b"PK\x06\x07\0\0\0\0");
+    bytes.extend((offset + size).to_le_bytes());
+    bytes.extend(1u32.to_le_bytes());
+    bytes.extend(b"PK\x05\x06\0\0\0\0");
+    bytes.extend([0xff; 12]);
+    bytes.extend([0; 2]);
+    change(&mut bytes[start..]);
+    bytes
+}
+
+#[test]
+fn zip64_end_records_disagree() {
+    assert_accepted(&zip64_end(|_| ()), "a.zip", "");
+    let lie = |at: usize, code: &str| {
+        let bytes = zip64_end(|end| end[at] ^= 1);
+        assert_refused(&bytes, "a.zip", code, "");
+    };
+    // Its own length, its disk, its counts, size and offset of the directory.
+    lie(4, "zip64");
+    lie(16, "zip64");
+    lie(24, "zip_multi_disk");
+    lie(40, "zip64");
+    lie(48, "zip64");
+    // The locator's place and number of disks.
+    lie(56 + 8, "zip64");
+    lie(56 + 4, "zip_multi_disk");
+    // What the plain record holds although it need not.
+    for at in [8, 12, 16] {
+        lie(76 + at, "zip64");
+    }
+}
+
+#[test]
+fn zip64_count_lies() {
+    let bytes = zip64_end(|end| (end[24], end[32]) = (3, 3));
+    assert_refused(&bytes, "a.zip", "zip_directory", "");
+    let bytes = zip64_end(|end| end[24..40].fill(0xff));
+    assert_refused(&bytes, "a.zip", "limit_entries", "");
 }
 
 #[test]
@@ -694,9 +889,41 @@ fn gz_data_after() {
 }
 
 #[test]
-fn gz_second_member() {
+fn gz_second_member_is_a_second_tar() {
     let mut bytes = gz(&tar(&[Tar::file("config.json", b"{}")]));
     bytes.extend(gz(&tar(&[Tar::file("hidden", b"x")])));
+    assert_refused(&bytes, "a.tar.gz", "tar_data_after", "");
+}
+
+#[test]
+fn gz_second_member_truncated() {
+    let whole = tar(&[Tar::file("config.json", b"{}"), Tar::file("a", &noise(4000, 1))]);
+    let (first, second) = whole.split_at(1000);
+    let second = gz(second);
+    let bytes = [gz(first), second[..second.len() - 9].to_vec()].concat();
+    assert_refused(&bytes, "a.tar.gz", "gz_corrupt", "");
+}
+
+#[test]
+fn gz_bomb_of_members() {
+    // Each is no bomb, together they are.
+    let piece = gz(&vec![0; 200 * 1024]);
+    let mut bytes = gz(&tar_bytes::open(&[Tar::file("bomb", &vec![0; 1536 * 1024])])[..512]);
+    for _ in 0..12 {
+        bytes.extend(&piece);
+    }
+    assert_refused(&bytes, "a.tar.gz", "limit_ratio", "bomb");
+}
+
+#[test]
+fn gz_endless_members() {
+    let bytes = [gz(b"").repeat(20_000), gz(&tar(&[Tar::file("config.json", b"{}")]))].concat();
+    assert_refused(&bytes, "a.tar.gz", "limit_members", "");
+}
+
+#[test]
+fn gz_data_after_zeros() {
+    let bytes = [gz(&tar(&[Tar::file("config.json", b"{}")])), vec![0; 600], vec![1]].concat();
     assert_refused(&bytes, "a.tar.gz", "gz_data_after", "");
 }
 
@@ -788,6 +1015,41 @@ fn names_that_are_not_utf8_are_kept_readable() {
 fn gap_between_entries_is_reported() {
     let zip = Zip { entries: vec![good()], gap: vec![0; 10], ..Zip::default() };
     assert_accepted(&zip.bytes(), "a.zip", "zip_gap");
+}
+
+#[test]
+fn bytes_around_a_zip_are_reported() {
+    let zip = Zip { prefix: b"#!/bin/sh\n".to_vec(), entries: vec![good()], ..Zip::default() };
+    assert_accepted(&zip.bytes(), "a.zip", "zip_data_before");
+    let mut bytes = b"MZ self-extracting".to_vec();
+    bytes.extend(Zip::of([good()]).bytes());
+    assert_accepted(&bytes, "a.zip", "zip_data_before");
+    let zip = |suffix: &[u8]| {
+        Zip { entries: vec![good()], suffix: suffix.to_vec(), ..Zip::default() }.bytes()
+    };
+    assert_accepted(&zip(b"tail"), "a.zip", "zip_data_after");
+    assert_accepted(&zip(&[0; 9000]), "a.zip", "zip_padding");
+    assert_accepted(&zip(&vec![b'x'; 100_000]), "a.zip", "zip_data_after");
+    let cut = Zip { entries: vec![good()], comment_length: Some(9), ..Zip::default() };
+    assert_accepted(&cut.bytes(), "a.zip", "zip_comment_cut");
+}
+
+#[test]
+fn zeros_after_gzip_are_reported() {
+    let bytes = [gz(&tar(&[Tar::file("config.json", b"{}")])), vec![0; 600]].concat();
+    assert_accepted(&bytes, "a.tar.gz", "gz_padding");
+}
+
+#[test]
+fn links_where_all_is_ignored_are_no_matter() {
+    let entries = [
+        Tar::file("config.json", b"{}"),
+        Tar::link("target/release/libx.so", b'1', "target/release/deps/libx.so"),
+        Tar::link("__MACOSX", b'2', "/etc"),
+        Tar::file("__MACOSX/passwd", b"x"),
+    ];
+    let (hand_in, _scratch) = assert_accepted(&tar(&entries), "a.tar", "ignored");
+    assert_eq!(hand_in.files.len(), 1);
 }
 
 #[test]

@@ -5,7 +5,9 @@
 
 use basecode::Image;
 use glam::{Vec3, vec3};
-use umbra::evidence::handed_in::{has_own_noise, judge_copied, judge_noise, judge_scene};
+use umbra::evidence::handed_in::{
+    has_own_noise, judge_copied, judge_noise, judge_scene, judge_seed,
+};
 use umbra::evidence::{Check, Verdict};
 use umbra::grading::ImageDigest;
 use umbra::imaging::evidence::Tolerances;
@@ -307,5 +309,32 @@ fn wrong_images_show_the_scene_and_other_pictures_do_not() {
     });
     for image in [&noise, &other, &Image::new(WIDTH, HEIGHT), &map(&right, |_| Vec3::NAN)] {
         assert_eq!(scene.shows(image), Verdict::Fail);
+    }
+}
+
+#[test]
+fn noise_is_known_again_and_that_of_other_seeds_is_not() {
+    let scene = Scene::new();
+    let noisy = scene.noisy();
+    let own = scene.render(SPP, 1_000_000);
+    let mut alike = 0.0f64;
+    for seed in 0..400 {
+        let other = scene.render(SPP, seed);
+        alike = alike.max(noisy.correlation(&own, &other).unwrap().abs());
+    }
+    assert!(alike < 0.3, "another seed's noise looks like it by {alike}");
+    // A gain and a wrong shadow leave the noise what it is; rounding does too.
+    let gain = map(&own, |p| p * 1.01);
+    for image in [half(&own), eight_bits(&own), gain] {
+        let found = noisy.correlation(&image, &own).unwrap();
+        assert!(found > 0.9, "{found}");
+        assert_eq!(judge_seed("scene", "a.exr", Some(found)).verdict, Verdict::Pass);
+    }
+    let other = noisy.correlation(&scene.render(SPP, 7), &own);
+    let check = judge_seed("scene", "a.exr", other);
+    assert_eq!(check.verdict, Verdict::NotJudged, "{}", check.summary);
+    for image in [Image::new(9, 9), map(&own, |_| Vec3::NAN), scene.reference.mean.clone()] {
+        let found = noisy.correlation(&image, &own);
+        assert_eq!(judge_seed("scene", "a.exr", found).verdict, Verdict::NotJudged, "{found:?}");
     }
 }

@@ -404,7 +404,7 @@ a2_ada_lovelace.zip: does not conform (3 errors, 3 warnings)
 error: teapot_simple_offline.exr: expected at 'offline/teapot_simple_offline.exr'
   hint: move it there, or let umbra validate --fix do it
 
-error: offline/cbox_simple_offline.exr: expected in the hand-in, found nothing like it
+error: offline/cbox_simple_offline.exr: expected in the submission, found nothing like it
   hint: add it, then pack again
 
 error: Realtime/cbox_simple_realtime.exr: expected at 'realtime/cbox_simple_realtime.exr'
@@ -420,8 +420,6 @@ warning: config.json:1: 'renders/teapot_bonus.exr' is handed in, but not listed
   hint: add { \"scene\": ..., \"render\": \"renders/teapot_bonus.exr\" } to \"renders\"
 
 note: 1 ignored: .DS_Store
-
-note: renders/teapot_bonus.exr: accepted for 'realtime/teapot_bonus.exr'
 "
     );
 }
@@ -436,10 +434,10 @@ fn text_of_a_broken_config() {
     assert_eq!(
         said,
         "
-error: config.json:9: a comma before ']'
+warning: config.json:9: a comma before ']'
   hint: remove the comma
 
-error: config.json:2: \"firstName\" is empty
+warning: config.json:2: \"firstName\" is empty
   hint: write your name: \"firstName\": \"Ada\"
 "
     );
@@ -590,7 +588,7 @@ fn fix_files(files: &[(String, Vec<u8>)]) -> Result<HandIn, IntakeError> {
     result?;
     let scratch = Scratch::new();
     let hand_in = unpack(&out, &scratch.dest, &TreeSpec::default(), &Limits::default())?;
-    assert!(validate_hand_in(&hand_in, &TreeSpec::default())?.conforms);
+    assert!(validate_hand_in(&hand_in, &TreeSpec::default())?.follows_tree());
     Ok(hand_in)
 }
 
@@ -639,9 +637,88 @@ fn fix_refuses_what_moving_cannot_mend() {
     };
     let no_source = moved(|path| (!path.starts_with("src/")).then(|| path.to_owned()));
     assert_eq!(codes_of(&no_source), ["tree_missing src/lib.rs"]);
-    let mut no_name = perfect();
-    no_name[0].1 = CONFIG.replace("Ada", "").into_bytes();
-    assert_eq!(codes_of(&no_name), ["config_credentials config.json"]);
+    // Somebody else's words are not for us to mend, but the tree is.
+    let mut nobody = moved(|path| Some(format!("a/b/{path}")));
+    nobody[0].1 = CONFIG.replace("260123456", "not yet").into_bytes();
+    assert_eq!(fix_files(&nobody).unwrap().digest.len(), 64);
+}
+
+#[test]
+fn what_fixing_would_do_is_said_in_words() {
+    let said = |files: &[(String, Vec<u8>)]| {
+        let (hand_in, _scratch) = accepted(files);
+        umbra::intake::mends(&hand_in, &TreeSpec::default())
+    };
+    assert_eq!(said(&perfect()), None);
+    let elsewhere = moved(|path| Some(path.replace("src/", "code/")));
+    assert_eq!(
+        said(&elsewhere).unwrap(),
+        "moves code/bsdfs/phong.rs to src/bsdfs/phong.rs, and 2 more"
+    );
+    let one = moved(|path| Some(path.replace("offline/cbox", "cbox")));
+    let one = said(&one).unwrap();
+    assert_eq!(one, "moves cbox_simple_offline.exr to offline/cbox_simple_offline.exr");
+    let lost = moved(|path| (!path.starts_with("src/")).then(|| path.to_owned()));
+    assert_eq!(said(&lost), None);
+}
+
+/// A copy, whatever is to be said of it.
+fn accepted(files: &[(String, Vec<u8>)]) -> (HandIn, Scratch) {
+    let scratch = Scratch::new();
+    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    (unpack_bytes(&zip_of(files), "a.zip", &scratch.dest, &tree, &limits).unwrap(), scratch)
+}
+
+#[test]
+fn a_slip_in_the_config_is_a_warning_and_the_tree_is_as_it_is() {
+    let bom = format!("\u{feff}{CONFIG}");
+    let utf16: Vec<u8> = bom.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let swapped = |from: &str, to: &str| CONFIG.replace(from, to).into_bytes();
+    let mut names = Vec::new();
+    for (what, config) in [
+        ("bom", bom.clone().into_bytes()),
+        ("UTF-16", utf16),
+        ("Latin-1", [b"{ // \xe9t\xe9\n".as_slice(), &CONFIG.as_bytes()[1..]].concat()),
+        ("comma at the end", swapped("exr\" }\n  ]", "exr\" },\n  ],")),
+        ("no comma", swapped("\"Lovelace\",", "\"Lovelace\"")),
+        ("single quotes", swapped("\"", "'")),
+        ("curly quotes", swapped("\"Ada\"", "\u{201c}Ada\u{201d}")),
+        ("comment", swapped("\"Ada\",", "\"Ada\", // my name")),
+        ("spaces in the number", swapped("260123456", "260 123 456")),
+        ("a number", swapped("\"260123456\"", "260 123 456")),
+        ("slips of the pen", swapped("firstName", "fristName")),
+        ("a missing brace", swapped("]\n}", "]")),
+        ("no name", swapped("\"Ada\"", "\"\"")),
+        ("the template's name", swapped("\"Ada\"", "\"First\"")),
+        ("an image that is not there", swapped("teapot_simple_offline.exr\"", "teapot.exr\"")),
+        ("a backslash", swapped("offline/cbox", "offline\\\\cbox")),
+        ("no list", swapped("\"renders\"", "\"x\"")),
+    ] {
+        let mut files = perfect();
+        files[0].1 = config;
+        let validation = validate_files(&files);
+        let text = validation.to_text();
+        assert!(validation.conforms && validation.follows_tree(), "{what}: {text}");
+        assert!(
+            text.contains("0 errors") && text.contains("warning: config.json:"),
+            "{what}: {text}"
+        );
+        let config = validation.config.unwrap();
+        assert_eq!(config.sampler_seed(), Some(260_123_456), "{what}");
+        names.push(config.last_name.map(|field| field.text));
+    }
+    assert!(names.iter().all(|name| name.as_deref() == Some("Lovelace")), "{names:?}");
+    // Without a number nobody knows whose it is; the tree is right all the same.
+    for config in ["", "nothing of the kind", "{}", "\0\0\0", "{\"studentID\": \"260000000\"}"] {
+        let mut files = perfect();
+        files[0].1 = config.as_bytes().to_vec();
+        let validation = validate_files(&files);
+        assert!(
+            !validation.conforms && validation.follows_tree(),
+            "{config}: {}",
+            validation.to_text()
+        );
+    }
 }
 
 // --- the rest ---

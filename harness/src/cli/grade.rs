@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context as _, ensure};
 
 use super::MachineLacks;
+use super::collect::{Collected, Source, collect};
 use super::context::{Context, INTERRUPTED, cores};
 use super::render::AdapterChoice;
 use crate::evidence::Verdict;
@@ -45,7 +46,7 @@ pub struct CheckArguments {
 /// What `umbra grade` is told.
 #[derive(clap::Args)]
 pub struct GradeArguments {
-    /// Archives, hand-in folders, or folders that hold nothing but hand-ins
+    /// Archives, submission folders, or folders that hold them at any depth, as a learning platform lays them out
     #[arg(required = true)]
     hand_ins: Vec<PathBuf>,
     /// Where to write report.html, report.json, grades.csv and each hand-in's own report. What was found
@@ -115,7 +116,7 @@ pub enum IsolationChoice {
 /// Checks one working folder and prints everything about it; exit 1 when points are missing.
 pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let batch = Batch {
-        sources: vec![arguments.hand_in.clone()],
+        paths: vec![arguments.hand_in.clone()],
         output: &arguments.output,
         adapter: arguments.adapter,
         jobs: 1,
@@ -125,9 +126,9 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         budget: BudgetChoice::Config,
         timings: arguments.timings,
     };
-    let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    let Some((sheet, _)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
     let (width, colours) = terminal();
-    let entry = &sheet.entries[0];
+    let entry = &sheet.entries[0].for_student(&sheet.rules);
     print!("{}", report::text_detail(&sheet, entry, width, colours));
     println!(
         "report: {}",
@@ -140,7 +141,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
 /// Grades hand-ins and prints the table; exit 0 when all could be graded, whatever their points.
 pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let batch = Batch {
-        sources: collect(&arguments.hand_ins)?,
+        paths: arguments.hand_ins.clone(),
         output: &arguments.output,
         adapter: arguments.adapter,
         jobs: arguments.jobs.unwrap_or(cores() as usize).max(1),
@@ -150,9 +151,12 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         budget: arguments.budget,
         timings: arguments.timings,
     };
-    let Some(sheet) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    let Some((sheet, skipped)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
     let (width, colours) = terminal();
     print!("{}", report::text_table(&sheet, width, colours)?);
+    if let Some(skipped) = skipped {
+        println!("skipped, no submissions: {skipped}");
+    }
     println!("report: {}", arguments.output.join(report::HTML_FILE).display());
     if let Some(held_back) = &sheet.held_back {
         println!("held-back seed {0}; --perturb {0} reproduces", held_back.seed);
@@ -178,40 +182,10 @@ fn terminal() -> (usize, bool) {
     (width.unwrap_or(if colours { 110 } else { 160 }), colours)
 }
 
-/// Archives and folders as they are; a folder that is no hand-in stands for what it holds.
-fn collect(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
-    let mut sources = Vec::new();
-    for path in paths {
-        let is_hand_in =
-            path.is_file() || path.join("src").exists() || path.join("config.json").exists();
-        if is_hand_in {
-            sources.push(path.clone());
-            continue;
-        }
-        let entries = path.read_dir().with_context(|| format!("cannot read {}", path.display()))?;
-        let mut inside = Vec::new();
-        for entry in entries {
-            let entry = entry?;
-            if !entry.file_name().to_string_lossy().starts_with('.') {
-                inside.push(entry.path());
-            }
-        }
-        ensure!(
-            !inside.is_empty(),
-            "{} is empty: expected archives or hand-in folders",
-            path.display()
-        );
-        inside.sort();
-        sources.append(&mut inside);
-    }
-    Ok(sources)
-}
-
 /// Folder names for hand-ins: what their names allow, made unique.
-fn slugs(sources: &[PathBuf]) -> Vec<String> {
+fn slugs(sources: &[Source]) -> Vec<String> {
     let mut taken = HashSet::from([report::INSTRUCTOR.to_owned()]);
-    let slug = |source: &PathBuf| {
-        let name = source.file_name().unwrap_or(source.as_os_str()).to_string_lossy().into_owned();
+    let slug = |Source { name, .. }: &Source| {
         let safe = |c: char| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '-' };
         let stem = name.trim_end_matches(".gz").trim_end_matches(".tar").trim_end_matches(".zip");
         let stem: String = stem.chars().map(safe).take(80).collect();
@@ -229,7 +203,7 @@ fn slugs(sources: &[PathBuf]) -> Vec<String> {
 
 /// Hand-ins to be taken through all stages.
 struct Batch<'a> {
-    sources: Vec<PathBuf>,
+    paths: Vec<PathBuf>,
     output: &'a Path,
     adapter: AdapterChoice,
     jobs: usize,
@@ -242,13 +216,21 @@ struct Batch<'a> {
 }
 
 impl Batch<'_> {
-    /// Grades all and writes the reports; nothing when Ctrl-C came in between.
-    fn run(&self, root: Option<&Path>) -> anyhow::Result<Option<Sheet>> {
-        for source in &self.sources {
-            ensure!(source.exists(), "{} does not exist", source.display());
+    /// Grades all and writes the reports; nothing when Ctrl-C came in between. Answers what was skipped, too.
+    fn run(&self, root: Option<&Path>) -> anyhow::Result<Option<(Sheet, Option<String>)>> {
+        for path in &self.paths {
+            ensure!(path.exists(), "{} does not exist", path.display());
         }
-        super::writable(self.output)?;
         let context = Context::new(root)?;
+        let collected = match self.purpose {
+            Purpose::Grade => collect(&self.paths, self.output, &context.assignment.tree)?,
+            Purpose::Check => {
+                let sources = self.paths.iter().map(|path| Source::given(path)).collect();
+                Collected { sources, ..Collected::default() }
+            }
+        };
+        let sources = &collected.sources;
+        super::writable(self.output)?;
         if self.purpose == Purpose::Grade && context.reference().is_none() {
             return Err(MachineLacks(
                 "grades are made with the reference renderer and with scenes that are held back, which \
@@ -279,9 +261,9 @@ impl Batch<'_> {
             if self.budget == BudgetChoice::None {
                 grading.budget = None;
             }
-            let jobs = self.jobs.min(self.sources.len()).max(1);
+            let jobs = self.jobs.min(sources.len()).max(1);
             grading.threads = (cores() / jobs as u32).max(1);
-            let results = self.grade_all(&context, &grading, jobs);
+            let results = self.grade_all(&context, &grading, sources, jobs);
             let costs = grading.costs_of_reference();
             if self.purpose == Purpose::Grade && !costs.is_empty() {
                 let file = self.output.join(report::INSTRUCTOR).join(COSTS_FILE);
@@ -293,7 +275,7 @@ impl Batch<'_> {
                 context.line.suspend(|| {
                     eprintln!(
                         "umbra: {found} of {} hand-ins are as they were graded before",
-                        self.sources.len()
+                        sources.len()
                     );
                 });
             }
@@ -305,7 +287,7 @@ impl Batch<'_> {
                 (Purpose::Grade, Ok((results, _))) => format!(
                     ", {} of {} hand-ins are graded; the same command goes on from there",
                     results.len(),
-                    self.sources.len()
+                    sources.len()
                 ),
                 _ => String::new(),
             };
@@ -326,7 +308,7 @@ impl Batch<'_> {
         if self.timings {
             print_timings(&sheet);
         }
-        Ok(Some(sheet))
+        Ok(Some((sheet, collected.skipped())))
     }
 
     /// Takes all hand-ins through all stages, in their order; none is begun after Ctrl-C. To be graded, one
@@ -335,19 +317,20 @@ impl Batch<'_> {
         &self,
         context: &Context,
         grading: &Grading,
+        sources: &[Source],
         jobs: usize,
     ) -> Vec<anyhow::Result<Record>> {
-        let slugs = slugs(&self.sources);
+        let slugs = slugs(sources);
         let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let results = Mutex::new(Vec::new());
         let work = || {
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(source) = self.sources.get(index) else { return };
+                let Some(Source { path: source, name }) = sources.get(index) else { return };
                 let slug = &slugs[index];
                 let say = |stage: &str| {
                     let done = done.load(Ordering::Relaxed);
-                    context.say(&format!("{done} of {} done; {slug}: {stage}", self.sources.len()));
+                    context.say(&format!("{done} of {} done; {slug}: {stage}", sources.len()));
                 };
                 let out = Folders {
                     student: self.output.join(slug),
@@ -369,6 +352,7 @@ impl Batch<'_> {
                     }
                     (result, _) => result.with_context(|| source.display().to_string()),
                 };
+                let result = result.map(|record| Record { name: name.clone(), ..record });
                 done.fetch_add(1, Ordering::Relaxed);
                 let Ok(mut results) = results.lock() else { return };
                 results.push((index, result));

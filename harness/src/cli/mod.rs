@@ -1,6 +1,7 @@
 //! The command line: parses, calls, prints. Each command is one file.
 
 mod bless;
+mod collect;
 mod compare;
 mod context;
 #[cfg(target_os = "linux")]

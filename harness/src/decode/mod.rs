@@ -182,6 +182,21 @@ impl<'a> Decoder<'a> {
         })
     }
 
+    /// What is to be said of the images of the tree in a private copy before anything is graded: those that
+    /// are empty or cannot be decoded.
+    ///
+    /// # Errors
+    /// The machine's matters and Ctrl-C.
+    pub fn image_findings(&self, hand_in: &HandIn, tree: &TreeSpec) -> io::Result<Vec<Finding>> {
+        let mut findings = Vec::new();
+        let images = tree.files.iter().filter(|file| is_image(&file.path));
+        for path in images.filter_map(|file| tree.found_in(&hand_in.root, &file.path)) {
+            let image = self.image(&hand_in.root.join(path), path)?;
+            findings.extend(image_finding(&hand_in.root, path, &image));
+        }
+        Ok(findings)
+    }
+
     /// CPU seconds of all children since the last call.
     pub fn take_cpu_s(&self) -> f64 {
         self.cpu_s.lock().map_or(0.0, |mut cpu_s| std::mem::take(&mut *cpu_s))
@@ -262,6 +277,27 @@ impl<'a> Decoder<'a> {
         }
         read_answer(bytes).ok_or_else(|| died("its answer makes no sense"))
     }
+}
+
+fn is_image(path: &str) -> bool {
+    path.ends_with(".exr")
+}
+
+/// What is to be said of an image in a private copy, if it was not decoded.
+pub fn image_finding(root: &Path, path: &str, image: &Result<Image, String>) -> Option<Finding> {
+    let error = image.as_ref().err()?;
+    let is_empty = root.join(path).metadata().is_ok_and(|found| found.len() == 0);
+    Some(if is_empty {
+        Finding::warning("image_empty", "the image is empty (0 bytes)")
+            .at(path)
+            .hint("render it again; a full disk leaves such files")
+    } else {
+        // The message begins with the path.
+        let error =
+            error.strip_prefix(path).map_or(error.as_str(), |rest| rest.trim_start_matches(": "));
+        let message = format!("the image cannot be read: {}", intake::printable(error));
+        Finding::warning("image_unreadable", message).at(path).hint("render it again, as EXR")
+    })
 }
 
 fn died(how: &str) -> NoAnswer {

@@ -37,6 +37,9 @@ pub struct Check {
     pub summary: String,
     /// What may be the cause, in a few words; empty when there is nothing to say.
     pub hint: String,
+    /// What only the instructor may read, such as the names of other submissions; empty for most checks.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub private: String,
     /// The values that decided, passed ones too.
     pub measures: Vec<Measure>,
     /// Pictures that show it, as file names beside the report.
@@ -132,6 +135,7 @@ impl Check {
             error: if verdict == Verdict::Pass { 0.0 } else { 1.0 },
             summary: summary.into(),
             hint: String::new(),
+            private: String::new(),
             measures: Vec::new(),
             pictures: Vec::new(),
         }
@@ -153,10 +157,11 @@ impl Check {
         })
     }
 
-    /// The check as a student may read it: of a held-back scene only what [`Check::said`] says.
+    /// The check as a student may read it: of a held-back scene only what [`Check::said`] says, and nothing
+    /// private.
     pub fn for_student(&self) -> Self {
         if !self.held_back {
-            return self.clone();
+            return Self { private: String::new(), ..self.clone() };
         }
         Self {
             held_back: true,

@@ -21,6 +21,9 @@ const RIGHT: f64 = 5e-4;
 /// draw one sample in the middle of each pixel alike, and what is rounded to an edge's nearer side
 /// has half of the variance of chance, so that it looks like two.
 const OWN_NOISE: f64 = 3.0;
+/// From this correlation on two images have one noise. Other seeds stay below 0.3 on a film a tenth as large
+/// as the assignment's; rounding to 8 bits leaves more than 0.9.
+const SAME_NOISE: f64 = 0.5;
 /// A picture below both likenesses shows something else: images of another scene reach 0.16 and
 /// 0.06 (240 wrong ones: 0.4 and 0.19), wrong images of the scene itself lie above one of them nearly always.
 const UNLIKE: Likeness = Likeness { brightness: 0.25, edges: 0.1 };
@@ -62,6 +65,27 @@ pub fn judge_noise(scene: &str, path: &str, noise: Option<Noise>, spp: u32) -> C
         Check { error: 0.0, ..check(Verdict::Fail, said).with_hint(hint) }
     } else {
         check(Verdict::NotJudged, format!("{path} is wrong: its noise cannot be told from that"))
+    };
+    Check { measures, ..found }
+}
+
+/// Whether an image has the noise that the student's number predicts; `alike` is its correlation with
+/// what a right renderer draws with that seed, in the order of the base code. Seeding by row is only advice
+/// and a sampler may be used in any order, so that another noise is no fault.
+pub fn judge_seed(scene: &str, path: &str, alike: Option<f64>) -> Check {
+    let check = |verdict, summary: String| Check::new("handed_in.seed", scene, verdict, summary);
+    let Some(alike) = alike else {
+        let why = "too few of its noisy pixels are right to compare its noise";
+        return check(Verdict::NotJudged, format!("{path}: {why}"));
+    };
+    let name = "1 - correlation with the noise that the student's number predicts";
+    let measures = vec![Measure::at_most("", name, 1.0 - alike, 1.0 - SAME_NOISE)];
+    let found = if alike >= SAME_NOISE {
+        let said = "has the noise that the base code draws with the student's number";
+        check(Verdict::Pass, format!("{path} {said}"))
+    } else {
+        let said = "has another noise than the base code draws with the student's number, which costs nothing";
+        check(Verdict::NotJudged, format!("{path} {said}"))
     };
     Check { measures, ..found }
 }

@@ -5,17 +5,21 @@ use std::path::Path;
 
 use basecode::Image;
 
+use super::ask::{self, Asker};
 use super::case::Case;
 use super::offline::Drawn;
 use super::shared::ImageDigest;
-use crate::decode::Decoder;
-use crate::evidence::handed_in::{has_own_noise, judge_copied, judge_noise, judge_scene};
+use crate::decode::{Decoder, image_finding};
+use crate::evidence::handed_in::{
+    has_own_noise, judge_copied, judge_noise, judge_scene, judge_seed,
+};
 use crate::evidence::images::{self, Kind};
 use crate::evidence::{Check, Verdict};
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::noise::NoisyPixels;
 use crate::imaging::reference::Region;
-use crate::intake::TreeSpec;
+use crate::intake::{Finding, TreeSpec};
+use crate::worker::Request;
 
 type View = (&'static str, fn(&Region) -> bool);
 
@@ -46,6 +50,11 @@ impl<'a> HandedIn<'a> {
     /// An image of a scene, with its path in the submission, or why there are no pixels.
     pub fn new(case: &'a Case, path: &str, kind: Kind, image: Result<Image, String>) -> Self {
         Self { case, path: path.to_owned(), kind, image }
+    }
+
+    /// What is to be said of it when it was not decoded.
+    pub fn finding(&self, root: &Path) -> Option<Finding> {
+        image_finding(root, &self.path, &self.image)
     }
 
     /// The image, when it is the one that a check of this id is about.
@@ -147,6 +156,39 @@ pub fn judge(
     checks.push(judge_copied(name, path, image, noisy.as_ref(), &published));
     checks.push(judge_noise(name, path, noise, case.spp));
     (checks, has_own_noise(noise).then(|| ImageDigest::new(name, path, image)))
+}
+
+/// Whether offline images have the noise that the student's number predicts: what the reference draws with
+/// that seed, in the order of the base code. Asked only where images are all there is.
+pub fn judge_seeds(
+    asker: &Asker,
+    reference: &Path,
+    handed_in: &[HandedIn],
+    seed: u64,
+) -> Vec<Check> {
+    let mut checks = Vec::new();
+    for HandedIn { case, path, kind, image } in handed_in {
+        let (Kind::Offline { spp }, Ok(image)) = (kind, image) else { continue };
+        let noisy = NoisyPixels::new(&case.expected.offline);
+        let noise = noisy.as_ref().and_then(|noisy| noisy.measure(image));
+        let (Some(noisy), true) = (noisy, has_own_noise(noise)) else { continue };
+        let (width, height) = case.film();
+        let request = Request::RenderOffline {
+            scene: asker.scene(&case.offline),
+            width,
+            height,
+            spp: *spp,
+            seed,
+            threads: asker.limits.threads,
+            shadows: true,
+        };
+        let outcomes = asker.ask(Some(reference), vec![request]);
+        let drawn = outcomes.first().and_then(|outcome| outcome.answer());
+        let drawn = drawn.map(|answer| ask::image(&answer.values, width, height));
+        let alike = drawn.and_then(|drawn| noisy.correlation(image, &drawn));
+        checks.push(judge_seed(&case.entry.name, path, alike));
+    }
+    checks
 }
 
 /// Whether an image that was handed in is what the code draws. A finding: it costs nothing.

@@ -23,12 +23,15 @@ use crate::diagnosis::{Diagnosis, Stored};
 use crate::evidence::{Check, Evidence, Verdict, rays, shadow_map};
 use crate::expected::Store;
 use crate::held_back::{self, HeldBack};
-use crate::intake::{self, HandIn, HandInConfig, IntakeError, Validation};
+use crate::intake::{self, HandIn, HandInConfig, IntakeError, TreeSpec, Validation};
 use crate::rubric::BUILD;
 use crate::worker::{Adapter, Budget, Patience, Reference, Supervisor};
 
 /// The check that says whether the hand-in follows the tree.
 pub const TREE: &str = "hand_in.tree";
+
+/// The check that says whether `config.json` is as it should be; it costs nothing.
+const CONFIG: &str = "hand_in.config";
 
 /// The check that fails nobody: it says that the machine did.
 const JUDGED: &str = "hand_in.judged";
@@ -196,13 +199,7 @@ impl<'a> Grading<'a> {
                 Ok(received) => received,
                 Err(IntakeError::Refused(refusal)) => {
                     let validation = intake::validate_refusal(&refusal);
-                    record.evidence.checks.push(tree_check(&validation, purpose));
-                    record.evidence.checks.push(Check::new(
-                        BUILD,
-                        "",
-                        Verdict::Fail,
-                        "there is no source to build",
-                    ));
+                    record.evidence.checks = refused_checks(&validation);
                     record.findings = validation.findings;
                     record.stages = costs.end("intake", decoder.take_cpu_s());
                     return Ok(record);
@@ -214,7 +211,8 @@ impl<'a> Grading<'a> {
         record.student = student(&config);
         record.findings.clone_from(&validation.findings);
         record.findings.extend(source);
-        let mut checks = vec![tree_check(&validation, purpose)];
+        let mut checks = vec![tree_check(&validation, &hand_in, tree, purpose)];
+        checks.extend(config_check(&validation));
         let key = self.kept.as_ref().map(|kept| kept.key(&record, &checks)).transpose()?;
         if let (Some(kept), Some(key)) = (&self.kept, &key)
             && let Some(found) =
@@ -242,13 +240,20 @@ impl<'a> Grading<'a> {
         }
         say("comparing the images handed in");
         let handed_in = handed_in::read(&decoder, &hand_in.root, tree, &self.cases)?;
+        record.findings.extend(handed_in.iter().filter_map(|image| image.finding(&hand_in.root)));
+        record.findings.sort_by_key(|finding| finding.severity);
         for image in &handed_in {
             let tolerances = &self.assignment.tolerances;
             let (found, digest) = handed_in::judge(image, &drawn, tolerances);
             checks.extend(found);
             record.images.extend(digest);
         }
-        costs.end("images", decoder.take_cpu_s());
+        if let (None, Some(reference), Some(seed)) =
+            (&plugin, &self.reference, config.sampler_seed())
+        {
+            checks.extend(handed_in::judge_seeds(&asker, reference, &handed_in, seed));
+        }
+        costs.end("images", decoder.take_cpu_s() + asker.end_path());
         pictures::draw(&mut checks, &self.cases, &drawn, &handed_in, out)?;
         costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
@@ -321,7 +326,7 @@ impl<'a> Grading<'a> {
     ) -> anyhow::Result<Option<PathBuf>> {
         let src = hand_in.root.join("src");
         if !src.join("lib.rs").is_file() {
-            checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no src/lib.rs to build"));
+            checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no src/lib.rs"));
             return Ok(None);
         }
         let out = scratch.join("out");
@@ -330,6 +335,7 @@ impl<'a> Grading<'a> {
         let report =
             build::compile(&self.recording, self.supervisor, &src, &out, limits, self.cancel)?;
         costs.end("build", report.cpu_s);
+        let mut hint = String::new();
         let (plugin, summary) = match report.outcome {
             BuildOutcome::Built { library } => (Some(library), "the source builds".to_owned()),
             BuildOutcome::CompileError { errors } => {
@@ -342,7 +348,8 @@ impl<'a> Grading<'a> {
                     Some(place) => format!("{}:{}: {}", place.file, place.line, error.message),
                     None => error.message.clone(),
                 });
-                (None, format!("the source does not build: {}", first.unwrap_or_default()))
+                hint = first.unwrap_or_default();
+                (None, "the source does not build".to_owned())
             }
             BuildOutcome::TimedOut => (None, "the compiler ran out of time".to_owned()),
             BuildOutcome::OutOfMemory => (None, "the compiler ran out of memory".to_owned()),
@@ -353,7 +360,7 @@ impl<'a> Grading<'a> {
             BuildOutcome::Cancelled => anyhow::bail!("interrupted"),
         };
         let verdict = if plugin.is_some() { Verdict::Pass } else { Verdict::Fail };
-        checks.push(Check::new(BUILD, "", verdict, summary));
+        checks.push(Check::new(BUILD, "", verdict, summary).with_hint(hint));
         Ok(plugin)
     }
 
@@ -519,21 +526,56 @@ fn student(config: &HandInConfig) -> Student {
     }
 }
 
-fn tree_check(validation: &Validation, purpose: Purpose) -> Check {
+/// What there is to say of a submission that was not unpacked: neither its tree nor its source was seen.
+fn refused_checks(validation: &Validation) -> Vec<Check> {
     let error = validation.findings.iter().find(|f| f.severity == intake::Severity::Error);
-    let (verdict, summary) = match (validation.conforms, purpose) {
-        (true, _) => (Verdict::Pass, "the hand-in follows the tree of the handout".to_owned()),
-        (false, Purpose::Grade) => {
-            (Verdict::Fail, error.map(ToString::to_string).unwrap_or_default())
+    let why = error.map(|finding| match &finding.path {
+        Some(path) => format!("{path}: {}", finding.message),
+        None => finding.message.clone(),
+    });
+    let summary = format!("it was not unpacked: {}", why.unwrap_or_default());
+    let hint = error.and_then(|finding| finding.hint.clone()).unwrap_or_default();
+    vec![
+        Check::new(TREE, "", Verdict::NotJudged, summary.clone()),
+        Check::new(BUILD, "", Verdict::Fail, summary).with_hint(hint),
+    ]
+}
+
+fn tree_check(
+    validation: &Validation,
+    hand_in: &HandIn,
+    tree: &TreeSpec,
+    purpose: Purpose,
+) -> Check {
+    if validation.follows_tree() {
+        let summary = "the submission follows the tree of the handout";
+        return Check::new(TREE, "", Verdict::Pass, summary);
+    }
+    let error = validation.findings.iter().find(|f| f.severity == intake::Severity::Error);
+    let error = error.map(ToString::to_string).unwrap_or_default();
+    match purpose {
+        Purpose::Check => {
+            let summary = format!("not ready to hand in: {error}");
+            Check::new(TREE, "", Verdict::NotJudged, summary)
+                .with_hint("umbra validate shows the whole tree")
         }
-        (false, Purpose::Check) => (
-            Verdict::NotJudged,
-            format!("not ready to hand in: {}", error.map(ToString::to_string).unwrap_or_default()),
-        ),
+        Purpose::Grade => {
+            let hint = match intake::mends(hand_in, tree) {
+                Some(mends) => format!("umbra validate --fix mends it: {mends}"),
+                None => format!("umbra validate shows the whole tree; {error}"),
+            };
+            Check::new(TREE, "", Verdict::Fail, error).with_hint(hint)
+        }
+    }
+}
+
+/// The first thing that is wrong with `config.json`, if anything: it costs nothing.
+fn config_check(validation: &Validation) -> Option<Check> {
+    let own = |f: &&intake::Finding| {
+        f.path.as_deref() == Some(intake::CONFIG_FILE) && f.severity != intake::Severity::Note
     };
-    Check::new(TREE, "", verdict, summary).with_hint(if validation.conforms {
-        ""
-    } else {
-        "umbra validate shows the whole tree"
-    })
+    let slip = validation.findings.iter().find(|finding| own(finding) && finding.line.is_some())?;
+    let line = slip.line.unwrap_or(1);
+    let words = format!("{}:{line}: {}", intake::CONFIG_FILE, slip.message);
+    Some(Check::new(CONFIG, "", Verdict::Fail, words.clone()).with_hint(words))
 }

@@ -1,4 +1,4 @@
-//! Images that two persons of a batch handed in alike.
+//! What two submissions of a batch have in common that they should not: images, or a student number.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,8 +11,10 @@ use crate::evidence::{Check, Verdict};
 use crate::files::hex;
 use crate::imaging::srgb;
 
-/// The check that this module makes.
-const ID: &str = "handed_in.shared";
+/// The check of images.
+const SHARED: &str = "handed_in.shared";
+/// The check of student numbers.
+const NUMBER: &str = "hand_in.number";
 
 /// What is kept of an image that was handed in, to find it again in another hand-in.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,50 +51,80 @@ fn to_half(value: f32) -> f32 {
     f32::from_bits((bits + 0x0fff + ((bits >> 13) & 1)) & !0x1fff)
 }
 
-/// Adds to every record which of its images another person of the batch handed in too. Depends on
-/// nothing but the set of the records; doing it again changes nothing.
+/// Adds to every record which of its images another person of the batch handed in too, and whether its
+/// student number is another person's. Depends on nothing but the set of the records; doing it again
+/// changes nothing. Names of other submissions are private.
 ///
 /// Only images with noise have digests, and every student's noise has the seed of the student's own
 /// number: two persons' images are equal when one is a copy of the other, or when neither
-/// was drawn with that seed.
+/// was drawn with that seed. A number with two names may be a slip, or somebody who hides a copy.
 pub fn judge_shared(records: &mut [Record]) {
     let mut owners: BTreeMap<String, BTreeSet<(String, String)>> = BTreeMap::new();
+    let mut names: BTreeMap<String, BTreeSet<(String, String)>> = BTreeMap::new();
     for record in records.iter() {
         for image in &record.images {
             let owner = (person(record), record.slug.clone());
             owners.entry(image.sha256.clone()).or_default().insert(owner);
         }
+        if let (Some(number), Some(name)) = (number(record), plain_name(record)) {
+            names.entry(number).or_default().insert((name, record.slug.clone()));
+        }
     }
     for record in records {
         let person = person(record);
-        let checks = &mut record.evidence.checks;
-        checks.retain(|check| check.id != ID);
+        record.evidence.checks.retain(|check| ![SHARED, NUMBER].contains(&check.id.as_str()));
+        let mut found = Vec::new();
         for ImageDigest { scene, path, sha256 } in &record.images {
-            let others: Vec<&str> = owners[sha256]
-                .iter()
-                .filter(|(owner, _)| *owner != person)
-                .map(|(_, slug)| slug.as_str())
-                .collect();
-            checks.push(if others.is_empty() {
+            let others = others(&owners[sha256], &person);
+            found.push(if others.is_empty() {
                 let summary = format!("nobody else of this batch handed in {path}");
-                Check::new(ID, scene, Verdict::Pass, summary)
+                Check::new(SHARED, scene, Verdict::Pass, summary)
             } else {
-                let summary = format!("{path} is the same image as in {}", others.join(", "));
-                Check::new(ID, scene, Verdict::Fail, summary).with_hint(
-                    "a copy, unless both were drawn with one seed instead of the student numbers: \
-                     an instructor decides",
-                )
+                let summary = format!("{path} is the same image as another submission's");
+                let hint =
+                    "a copy, unless both were drawn with one seed instead of the student numbers";
+                let check = Check::new(SHARED, scene, Verdict::Fail, summary).with_hint(hint);
+                Check { private: format!("the same image is in {others}"), ..check }
             });
         }
+        if let (Some(number), Some(name)) = (number(record), plain_name(record)) {
+            let others = others(&names[&number], &name);
+            if !others.is_empty() {
+                let summary = format!("the student number {number} stands under two names");
+                let check = Check::new(NUMBER, "", Verdict::Fail, summary);
+                let private = format!("the same number, under another name, is in {others}");
+                found.push(Check { private, ..check });
+            }
+        }
+        record.evidence.checks.extend(found);
     }
 }
 
-/// Whose a hand-in is: the student number as it is written, or what else there is.
+/// The submissions of others than `own`.
+fn others(all: &BTreeSet<(String, String)>, own: &str) -> String {
+    let others = all.iter().filter(|(owner, _)| owner != own).map(|(_, slug)| slug.as_str());
+    others.collect::<Vec<_>>().join(", ")
+}
+
+/// The student number, its digits alone.
+fn number(record: &Record) -> Option<String> {
+    let digits: String = record.student.id.chars().filter(char::is_ascii_digit).collect();
+    (!digits.is_empty()).then_some(digits)
+}
+
+/// The words of a name in one order and one case.
+fn plain_name(record: &Record) -> Option<String> {
+    let name = record.student.full_name().to_lowercase();
+    let mut words: Vec<&str> =
+        name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+    words.sort_unstable();
+    (!words.is_empty()).then(|| words.join(" "))
+}
+
+/// Whose a submission is: the student number, or what else there is.
 fn person(record: &Record) -> String {
-    let student = &record.student;
-    let known = [student.id.trim().to_owned(), student.full_name()];
-    let known = known.into_iter().find(|name| !name.is_empty());
-    known.unwrap_or_else(|| format!("the hand-in {}", record.slug))
+    let known = number(record).or_else(|| plain_name(record));
+    known.unwrap_or_else(|| format!("the submission {}", record.slug))
 }
 
 #[cfg(test)]
@@ -123,14 +155,48 @@ mod tests {
         }
     }
 
-    /// Who shares with whom.
-    fn shared(records: &[Record]) -> BTreeMap<&str, String> {
+    /// What is said for the instructor of each that failed a check; to the student no other is named.
+    fn failed<'a>(records: &'a [Record], id: &str) -> BTreeMap<&'a str, String> {
         let said = |record: &Record| {
-            let own = record.evidence.checks.iter().filter(|check| check.id == ID);
+            let own = record.evidence.checks.iter().filter(|check| check.id == id);
             let failed = own.filter(|check| check.verdict == Verdict::Fail);
-            failed.map(|check| check.summary.clone()).collect::<String>()
+            let public = failed.clone().map(Check::for_student);
+            let public = public.map(|check| format!("{check:?}")).collect::<String>();
+            let others = records.iter().filter(|other| other.slug != record.slug);
+            for name in others.map(|other| &other.slug) {
+                assert!(!public.contains(&format!("in {name}")), "{public}");
+            }
+            failed.map(|check| check.private.clone()).collect::<String>()
         };
         records.iter().map(|record| (record.slug.as_str(), said(record))).collect()
+    }
+
+    fn shared(records: &[Record]) -> BTreeMap<&str, String> {
+        failed(records, SHARED)
+    }
+
+    #[test]
+    fn one_number_with_two_names_is_said_of_both_and_of_nobody_else() {
+        let named = |slug: &str, id: &str, first: &str, last: &str| {
+            let mut record = record(slug, id, slug);
+            (record.student.first_name, record.student.last_name) = (first.into(), last.into());
+            record
+        };
+        let mut batch = vec![
+            named("ada", "260 123-456", "Ada", "Lovelace"),
+            named("ada-again", "260123456", "LOVELACE,", "ada"),
+            named("eve", "260123456", "Eve", ""),
+            named("bob", "260123457", "Eve", ""),
+            named("nameless", "260123456", "", ""),
+        ];
+        judge_shared(&mut batch);
+        let found = failed(&batch, NUMBER);
+        assert!(found["ada"].ends_with("in eve") && found["ada-again"].ends_with("in eve"));
+        assert!(found["eve"].ends_with("in ada, ada-again"), "{found:?}");
+        assert_eq!((found["bob"].as_str(), found["nameless"].as_str()), ("", ""));
+        let again = batch.clone();
+        judge_shared(&mut batch);
+        assert_eq!(again, batch);
     }
 
     #[test]

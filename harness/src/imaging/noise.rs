@@ -107,6 +107,33 @@ impl<'a> NoisyPixels<'a> {
         })
     }
 
+    /// How alike the noise of two images is, where the first one is right: the correlation of what is left
+    /// when the reference is taken off, in [-1, 1]. Two draws of one scene have about 0, whatever their
+    /// sizes; one and the same has 1. Nothing as for [`NoisyPixels::measure`].
+    pub fn correlation(&self, image: &Image, other: &Image) -> Option<f64> {
+        let mean = &self.reference.mean;
+        let size = (mean.width, mean.height);
+        if (image.width, image.height) != size || (other.width, other.height) != size {
+            return None;
+        }
+        let wrong: Vec<bool> = (0..mean.pixels.len()).map(|i| self.is_wrong(image, i)).collect();
+        let (mut both, mut first, mut second, mut pixels) = (0.0, 0.0, 0.0, 0);
+        for &(index, weight) in &self.pixels {
+            let [a, b] = [image, other].map(|image| image.pixels[index]);
+            let near_wrong = around(index, size.0, size.1, NEAR).any(|i| wrong[i]);
+            if !a.is_finite() || !b.is_finite() || near_wrong {
+                continue;
+            }
+            let [a, b] = [a, b].map(|pixel| (pixel - mean.pixels[index]).as_dvec3());
+            both += weight * a.dot(b);
+            first += weight * a.length_squared();
+            second += weight * b.length_squared();
+            pixels += 1;
+        }
+        let scale = (first * second).sqrt();
+        (pixels >= FEWEST && scale > 0.0).then_some(both / scale)
+    }
+
     /// Whether two images hold one and the same draw, whatever rounding to half precision or to
     /// 8-bit levels did to either.
     pub fn same_draw(&self, a: &Image, b: &Image) -> bool {

@@ -9,27 +9,38 @@ use super::name::safe_path;
 use super::tree::{CONFIG_FILE, TreeSpec};
 
 /// Checks what `config.json` says against the hand-in. Every finding has a line and a hint; what is
-/// missing altogether is put on line 1.
+/// missing altogether is put on line 1. A slip is a warning; only a student number that cannot be read is an
+/// error.
 ///
 /// `present` are the paths that are there once misplaced files are moved, `missing` those of the
-/// tree whose absence is reported already. The findings are in the order of lines.
+/// tree whose absence is reported already. `is_whole` is false where reading stopped: then nothing is said of
+/// what is absent, but the number. The findings are in the order of lines.
 pub fn check_config(
     config: &HandInConfig,
+    is_whole: bool,
     present: &[&str],
     missing: &[&str],
     tree: &TreeSpec,
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
-    check_name(&config.first_name, "firstName", &mut findings);
-    check_name(&config.last_name, "lastName", &mut findings);
+    if is_whole || config.first_name.is_some() {
+        check_name(&config.first_name, "firstName", &mut findings);
+        check_name(&config.last_name, "lastName", &mut findings);
+    }
     check_id(&config.student_id, &mut findings);
-    check_renders(config, present, missing, tree, &mut findings);
+    if is_whole {
+        check_renders(config, present, missing, tree, &mut findings);
+    }
     findings.sort_by_key(|finding| finding.line);
     findings
 }
 
 fn error(code: &str, line: u32, message: String, hint: impl Into<String>) -> Finding {
     Finding::error(code, message).at(CONFIG_FILE).on_line(line).hint(hint)
+}
+
+fn warning(code: &str, line: u32, message: String, hint: impl Into<String>) -> Finding {
+    Finding::warning(code, message).at(CONFIG_FILE).on_line(line).hint(hint)
 }
 
 /// Whether a value is one that templates ship with.
@@ -60,10 +71,10 @@ fn check_name(field: &Option<Field>, key: &str, findings: &mut Vec<Finding>) {
     let hint = format!("write your name: \"{key}\": \"Ada\"");
     match field {
         None => {
-            findings.push(error("config_credentials", 1, format!("\"{key}\" is missing"), hint))
+            findings.push(warning("config_credentials", 1, format!("\"{key}\" is missing"), hint))
         }
         Some(field) if field.text.is_empty() => {
-            findings.push(error(
+            findings.push(warning(
                 "config_credentials",
                 field.line,
                 format!("\"{key}\" is empty"),
@@ -72,7 +83,7 @@ fn check_name(field: &Option<Field>, key: &str, findings: &mut Vec<Finding>) {
         }
         Some(field) if is_template_value(&field.text) => {
             let message = format!("\"{key}\" is still the template's: {}", printable(&field.text));
-            findings.push(error("config_credentials", field.line, message, hint));
+            findings.push(warning("config_credentials", field.line, message, hint));
         }
         Some(_) => {}
     }
@@ -129,7 +140,7 @@ fn check_renders(
     findings: &mut Vec<Finding>,
 ) {
     if !config.has_renders {
-        findings.push(error(
+        findings.push(warning(
             "config_renders",
             1,
             "the list \"renders\" is missing".to_owned(),
@@ -151,7 +162,7 @@ fn check_renders(
         let name = canonical(&path, tree);
         if let Some(line) = listed.get(&name) {
             let message = format!("'{written}' is listed twice, first on line {line}");
-            findings.push(error(
+            findings.push(warning(
                 "config_listed_twice",
                 render.line,
                 message,
@@ -191,20 +202,23 @@ fn not_found(written: &str, name: &str, paths: &[&str], tree: &TreeSpec) -> Find
     let same_path = paths.iter().find(|found| canonical(found, tree).to_lowercase() == lower);
     let same_name = || paths.iter().find(|found| base(found) == base(name));
     if let Some(found) = same_path {
-        Finding::error(
+        Finding::warning(
             "config_wrong_case",
             format!("'{written}' is listed, but its name is '{found}'"),
         )
         .hint(format!("write \"{found}\": upper and lower case count"))
     } else if let Some(found) = same_name() {
-        Finding::error(
+        Finding::warning(
             "config_wrong_place",
             format!("'{written}' is listed, but its place is '{found}'"),
         )
         .hint(format!("write \"{found}\""))
     } else {
-        Finding::error("config_render_missing", format!("'{written}' is listed, but not handed in"))
-            .hint("add the image or remove the entry")
+        Finding::warning(
+            "config_render_missing",
+            format!("'{written}' is listed, but not handed in"),
+        )
+        .hint("add the image or remove the entry")
     }
 }
 
@@ -216,16 +230,16 @@ fn canonical(path: &str, tree: &TreeSpec) -> String {
 /// A listed path as a plain relative path.
 fn resolve(written: &str) -> Result<String, Finding> {
     if written.trim().is_empty() {
-        return Err(Finding::error("config_render_missing", "a render with an empty path")
+        return Err(Finding::warning("config_render_missing", "a render with an empty path")
             .hint("write the image's path from the root of the hand-in"));
     }
     match safe_path(written.trim().as_bytes(), &Limits::default()) {
         Ok(safe) => Ok(safe.path),
         Err(finding) if finding.code == "name_backslash" => {
-            Err(Finding::error("config_backslash", format!("'{}' holds a backslash", printable(written)))
+            Err(Finding::warning("config_backslash", format!("'{}' holds a backslash", printable(written)))
                 .hint(format!("write \"{}\"", printable(&written.replace('\\', "/")))))
         }
-        Err(_) => Err(Finding::error("config_path_escape", format!("'{}' leaves the hand-in", printable(written)))
+        Err(_) => Err(Finding::warning("config_path_escape", format!("'{}' leaves the hand-in", printable(written)))
             .hint("write the image's path from the root of the hand-in, such as offline/cbox_simple_offline.exr")),
     }
 }
@@ -243,10 +257,13 @@ mod tests {
     }
 
     fn codes(text: &str, paths: &[&str]) -> Vec<String> {
-        let (config, mut findings) = HandInConfig::parse(text.as_bytes());
-        findings.extend(check_config(&config, paths, &[], &TreeSpec::default()));
+        let (config, mut findings, is_whole) = HandInConfig::parse(text.as_bytes());
+        findings.extend(check_config(&config, is_whole, paths, &[], &TreeSpec::default()));
         for finding in &findings {
             assert!(finding.hint.is_some() && finding.line.is_some(), "{finding}");
+            // Only a number that cannot be read is an error.
+            let is_number = finding.message.contains("studentID");
+            assert_eq!(finding.severity == crate::intake::Severity::Error, is_number, "{finding}");
         }
         findings.iter().map(|f| format!("{}@{}", f.code, f.line.unwrap_or(0))).collect()
     }

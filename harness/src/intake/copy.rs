@@ -113,6 +113,14 @@ impl<'a> PrivateCopy<'a> {
         Ok(())
     }
 
+    /// Whether an entry that is neither a file nor a folder lies where all is ignored; counts it then.
+    pub(super) fn is_ignored(&mut self, raw: &[u8]) -> bool {
+        let Ok(safe) = safe_path(raw, self.limits) else { return false };
+        let Some(pattern) = self.tree.ignored_by(&safe.path) else { return false };
+        *self.ignored.entry(printable(pattern)).or_default() += 1;
+        true
+    }
+
     /// Checks the name of an entry that was counted, and its place beside the others.
     pub(super) fn admit(&mut self, raw: &[u8], kind: Kind) -> Admitted {
         let safe = match safe_path(raw, self.limits) {

@@ -1,12 +1,30 @@
-//! A folder as a hand-in: walked without following links.
+//! A folder as a submission. It may change while it is read, so that no path is looked up twice: each folder
+//! and file is opened by its name in the open folder above it, no link is followed, and what is read is what
+//! was opened.
 
-use std::fs::{File, Metadata, OpenOptions};
+#[cfg_attr(unix, path = "folder/unix.rs")]
+#[cfg_attr(not(unix), path = "folder/other.rs")]
+mod open;
+
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::copy::{Admitted, Halt, Kind, PrivateCopy};
 use super::finding::{Finding, printable_bytes};
 use super::unpack::IntakeError;
+use open::Folder;
+
+/// What lies under a name, not followed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Look {
+    Folder(Id),
+    File(Id),
+    Link,
+    Special,
+}
+
+/// By what a file or folder is known again: device and inode.
+type Id = (u64, u64);
 
 /// Copies what lies below `source` and is wanted, in the order of names. `is_wanted` gets the path
 /// from `source`, and for a folder whether anything in it may be wanted.
@@ -15,94 +33,112 @@ pub(super) fn read(
     is_wanted: &dyn Fn(&str, Kind) -> bool,
     copy: &mut PrivateCopy<'_>,
 ) -> Result<(), Halt> {
-    // Folders still to be listed, with their path in the hand-in.
-    let mut open: Vec<(PathBuf, Vec<u8>)> = vec![(source.to_owned(), Vec::new())];
-    while let Some((folder, relative)) = open.pop() {
-        let mut names = Vec::new();
-        for entry in folder.read_dir().map_err(|e| IntakeError::io("list", &folder, e))? {
-            copy.count_entry()?;
-            names.push(entry.map_err(|e| IntakeError::io("list", &folder, e))?.file_name());
+    let folder = match Folder::open(source) {
+        Ok(folder) => folder,
+        Err(error) if is_gone(&error) => return Err(copy.refuse(changed(b"."))),
+        Err(error) => return Err(IntakeError::io("list", source, error).into()),
+    };
+    Walk { source, is_wanted, copy }.folder(folder, &[])
+}
+
+/// Opens a file that is no link, without waiting for one that is a fifo.
+pub(super) fn open_file(path: &Path) -> io::Result<std::fs::File> {
+    open::file(path)
+}
+
+struct Walk<'a, 'b> {
+    source: &'a Path,
+    is_wanted: &'a dyn Fn(&str, Kind) -> bool,
+    copy: &'a mut PrivateCopy<'b>,
+}
+
+impl Walk<'_, '_> {
+    /// Copies from an open folder, whose path ends with a slash. Folders that are deeper than allowed are not
+    /// admitted, so that neither the stack nor open folders pile up.
+    fn folder(&mut self, mut folder: Folder, path: &[u8]) -> Result<(), Halt> {
+        let most = usize::try_from(self.copy.limits.max_entries).unwrap_or(usize::MAX);
+        let names = folder.names(most.saturating_add(1));
+        let mut names = self.known("list", path, names)?;
+        for _ in &names {
+            self.copy.count_entry()?;
         }
         names.sort();
         for name in names {
-            let path = folder.join(&name);
-            let mut raw = relative.clone();
-            raw.extend_from_slice(name.as_encoded_bytes());
-            let metadata =
-                path.symlink_metadata().map_err(|e| IntakeError::io("read", &path, e))?;
-            let kind = if metadata.is_dir() { Kind::Folder } else { Kind::File };
-            if !is_wanted(&String::from_utf8_lossy(&raw), kind) {
+            let raw = [path, name.as_encoded_bytes()].concat();
+            let look = self.known("read", &raw, folder.look(&name))?;
+            let kind = if matches!(look, Look::Folder(_)) { Kind::Folder } else { Kind::File };
+            if !(self.is_wanted)(&String::from_utf8_lossy(&raw), kind) {
                 continue;
             }
-            if metadata.is_dir() {
-                if copy.admit(&raw, Kind::Folder) == Admitted::Folder {
-                    raw.push(b'/');
-                    open.push((path, raw));
+            match look {
+                Look::Folder(id) => {
+                    if self.copy.admit(&raw, Kind::Folder) == Admitted::Folder {
+                        let inner = self.known("list", &raw, folder.folder(&name))?;
+                        self.is_same(&raw, inner.id(), id)?;
+                        self.folder(inner, &[raw.as_slice(), b"/"].concat())?;
+                    }
                 }
-            } else if metadata.is_file() {
-                if let Admitted::File(admitted) = copy.admit(&raw, Kind::File) {
-                    copy_file(&path, &metadata, &raw, &admitted, copy)?;
+                Look::File(id) => {
+                    if let Admitted::File(admitted) = self.copy.admit(&raw, Kind::File) {
+                        let opened = self.known("read", &raw, folder.file(&name))?;
+                        let Some((mut file, opened)) = opened else {
+                            return Err(self.copy.refuse(changed(&raw)));
+                        };
+                        self.is_same(&raw, Ok(opened), id)?;
+                        let written = self.copy.write(&admitted, &mut file, None)?;
+                        self.known("read", &raw, written)?;
+                    }
                 }
-            } else {
-                copy.findings.push(special(&metadata, &raw));
+                Look::Link | Look::Special if self.copy.is_ignored(&raw) => {}
+                Look::Link | Look::Special => {
+                    let finding = special(look).at(printable_bytes(&raw));
+                    self.copy.findings.push(finding);
+                }
             }
         }
+        Ok(())
     }
-    Ok(())
-}
 
-fn copy_file(
-    path: &Path,
-    listed: &Metadata,
-    raw: &[u8],
-    admitted: &str,
-    copy: &mut PrivateCopy<'_>,
-) -> Result<(), Halt> {
-    let mut file = open_unfollowed(path).map_err(|e| IntakeError::io("read", path, e))?;
-    // What was opened must be what was looked at: a folder can change under our feet.
-    let opened = file.metadata().map_err(|e| IntakeError::io("read", path, e))?;
-    if !opened.is_file() || !same_file(listed, &opened) {
-        let finding =
-            Finding::error("changed_while_read", "the file was exchanged while it was read");
-        return Err(copy.refuse(finding.at(printable_bytes(raw))));
+    /// The answer; refused where what was there a moment ago is gone.
+    fn known<T>(
+        &mut self,
+        doing: &'static str,
+        raw: &[u8],
+        answer: io::Result<T>,
+    ) -> Result<T, Halt> {
+        answer.map_err(|error| {
+            if is_gone(&error) {
+                return self.copy.refuse(changed(raw));
+            }
+            let path = self.source.join(String::from_utf8_lossy(raw).as_ref());
+            IntakeError::io(doing, &path, error).into()
+        })
     }
-    copy.write(admitted, &mut file, None)?.map_err(|e| IntakeError::io("read", path, e))?;
-    Ok(())
+
+    /// What was opened must be what was looked at.
+    fn is_same(&mut self, raw: &[u8], opened: io::Result<Id>, looked_at: Id) -> Result<(), Halt> {
+        let opened = self.known("read", raw, opened)?;
+        if opened == looked_at { Ok(()) } else { Err(self.copy.refuse(changed(raw))) }
+    }
 }
 
-#[cfg(unix)]
-fn open_unfollowed(path: &Path) -> io::Result<File> {
-    use std::os::unix::fs::OpenOptionsExt;
-    // Non-blocking, so that a fifo put in its place cannot hold us.
-    OpenOptions::new()
-        .read(true)
-        .custom_flags(nix::libc::O_NOFOLLOW | nix::libc::O_NONBLOCK)
-        .open(path)
+/// Errors of something that is no longer there, or no longer what it was.
+fn is_gone(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
+        || open::is_link(error)
 }
 
-#[cfg(not(unix))]
-fn open_unfollowed(path: &Path) -> io::Result<File> {
-    OpenOptions::new().read(true).open(path)
+fn changed(raw: &[u8]) -> Finding {
+    Finding::error("changed_while_read", "it was exchanged or removed while it was read")
+        .at(printable_bytes(raw))
 }
 
-#[cfg(unix)]
-fn same_file(a: &Metadata, b: &Metadata) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    (a.dev(), a.ino()) == (b.dev(), b.ino())
-}
-
-#[cfg(not(unix))]
-fn same_file(_: &Metadata, _: &Metadata) -> bool {
-    true
-}
-
-fn special(metadata: &Metadata, raw: &[u8]) -> Finding {
-    let finding = if metadata.is_symlink() {
+fn special(look: Look) -> Finding {
+    if look == Look::Link {
         Finding::error("link", "expected a file or folder, found a symbolic link")
             .hint("put the file itself there")
     } else {
         Finding::error("special_file", "expected a file or folder, found a device, fifo or socket")
             .hint("remove it")
-    };
-    finding.at(printable_bytes(raw))
+    }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::finding::{Finding, printable};
-use super::json_lines::{Node, Value, parse};
+use super::json_lines::{Node, Read, Value, parse};
 use super::tree::CONFIG_FILE;
 
 /// What the hand-in's `config.json` says; absent where it does not say it.
@@ -44,26 +44,39 @@ pub struct ListedRender {
 }
 
 impl HandInConfig {
-    /// Reads a `config.json`. The findings name `config.json`, line and hint.
-    pub fn parse(bytes: &[u8]) -> (Self, Vec<Finding>) {
-        let (node, mut findings) = parse(bytes);
+    /// Reads a `config.json`, whatever it is: what can be made out of it counts. The findings are warnings and
+    /// name `config.json`, line and hint. The last answer is whether all was read: what is
+    /// absent may else be in the rest.
+    pub fn parse(bytes: &[u8]) -> (Self, Vec<Finding>, bool) {
+        let Read { node, stopped, text, mut findings } = parse(bytes);
         let mut config = Self::default();
-        if let Some(node) = node {
-            if matches!(node.value, Value::Object(_)) {
-                config.take_members(&node, true, &mut findings);
-            } else {
+        match node {
+            Some(Node { value: Value::Object(members), .. }) => {
+                config.take_members(&members, true, &mut findings);
+            }
+            Some(node) => {
                 let message = format!("expected an object {{ ... }}, found {}", node.value.kind());
                 findings.push(
-                    Finding::error("config_shape", message)
+                    Finding::warning("config_shape", message)
                         .on_line(node.line)
                         .hint("start from the template's config.json"),
                 );
+                if let Value::List(items) = &node.value
+                    && let Some(Value::Object(members)) = items.first().map(|item| &item.value)
+                {
+                    config.take_members(members, true, &mut findings);
+                }
             }
+            None => {}
         }
+        if config.student_id.is_none() || (stopped && config.first_name.is_none()) {
+            config.salvage(&text);
+        }
+        config.tidy_number(&mut findings);
         for finding in &mut findings {
             finding.path = Some(CONFIG_FILE.to_owned());
         }
-        (config, findings)
+        (config, findings, !stopped)
     }
 
     /// The seed of every sampler that draws the hand-in's own images.
@@ -71,48 +84,112 @@ impl HandInConfig {
         self.student_id.as_ref()?.text.parse().ok()
     }
 
-    fn take_members(&mut self, object: &Node, is_top: bool, findings: &mut Vec<Finding>) {
-        let Value::Object(members) = &object.value else {
-            return;
-        };
+    fn take_members(
+        &mut self,
+        members: &[(String, u32, Node)],
+        is_top: bool,
+        findings: &mut Vec<Finding>,
+    ) {
         for (key, line, node) in members {
-            // `studentID`, `student_id` and `Student-Id` are one key.
-            let plain: String =
-                key.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
-            match plain.as_str() {
-                "firstname" | "first" | "givenname" => {
-                    take(&mut self.first_name, key, *line, node, findings)
-                }
-                "lastname" | "last" | "surname" | "familyname" => {
-                    take(&mut self.last_name, key, *line, node, findings)
-                }
-                "studentid" | "id" | "studentnumber" | "mcgillid" => {
-                    take(&mut self.student_id, key, *line, node, findings)
-                }
-                "email" | "mail" => take(&mut self.email, key, *line, node, findings),
-                "name" | "fullname" => self.take_full_name(key, *line, node, findings),
-                "student" | "credentials" | "author" if is_top => match &node.value {
-                    Value::Object(_) => self.take_members(node, false, findings),
+            let Some((known, is_slip)) = known_key(key) else { continue };
+            if is_slip {
+                let message = format!("'{}' is taken for \"{}\"", printable(key), known.written());
+                let hint = format!("write \"{}\"", known.written());
+                let finding = Finding::warning("config_key", message).on_line(*line);
+                findings.push(finding.hint(hint));
+            }
+            match known {
+                Key::First => take(&mut self.first_name, key, *line, node, findings),
+                Key::Last => take(&mut self.last_name, key, *line, node, findings),
+                Key::Id => take(&mut self.student_id, key, *line, node, findings),
+                Key::Email => take(&mut self.email, key, *line, node, findings),
+                Key::Full => match &node.value {
+                    Value::Object(members) if is_top => {
+                        self.take_members(members, false, findings);
+                    }
                     _ => self.take_full_name(key, *line, node, findings),
                 },
-                "renders" | "render" | "images" if is_top => {
+                Key::Renders if is_top => {
                     self.has_renders = true;
                     self.take_renders(node, findings);
                 }
-                _ => {}
+                Key::Renders => {}
             }
         }
     }
 
-    /// `"name": "Ada King Lovelace"`: the last word is the last name.
+    /// What lines say that no reader of JSON could make out: a known key, a sign and a value.
+    fn salvage(&mut self, text: &str) {
+        for (index, line) in text.lines().enumerate() {
+            for pair in line.split([',', ';', '{', '}']) {
+                let Some((key, value)) = pair.split_once([':', '=', '\t']) else { continue };
+                let plain = |text: &str| {
+                    let sign = |c: char| !c.is_alphanumeric();
+                    text.trim_matches(sign).to_owned()
+                };
+                let (key, value) = (plain(key), plain(value));
+                let slot = match known_key(&key) {
+                    Some((Key::First, _)) => &mut self.first_name,
+                    Some((Key::Last, _)) => &mut self.last_name,
+                    Some((Key::Id, _)) => &mut self.student_id,
+                    Some((Key::Full, _)) if self.first_name.is_none() => {
+                        let line = index as u32 + 1;
+                        self.set_full_name(&Field { text: value, line });
+                        continue;
+                    }
+                    _ => continue,
+                };
+                if slot.is_none() && !value.is_empty() {
+                    *slot = Some(Field { text: value, line: index as u32 + 1 });
+                }
+            }
+        }
+    }
+
+    /// A student number in groups, such as `260 123-456`, without what is between them.
+    fn tidy_number(&mut self, findings: &mut Vec<Finding>) {
+        let Some(field) = &mut self.student_id else { return };
+        let between = |c: char| {
+            c.is_whitespace()
+                || "-_,'".contains(c)
+                || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2060}' | '\u{feff}')
+        };
+        let text =
+            field.text.trim_start_matches('#').trim_matches(|c: char| between(c) && c != '-');
+        let digits: String = text.chars().filter(|c| !between(*c)).collect();
+        let is_number = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
+        if !is_number || digits == field.text || text.starts_with('-') {
+            return;
+        }
+        let message = format!(
+            "\"studentID\": expected digits only, found '{}': read as {digits}",
+            printable(&field.text)
+        );
+        findings.push(
+            Finding::warning("config_student_id", message)
+                .on_line(field.line)
+                .hint(format!("write \"studentID\": \"{digits}\"")),
+        );
+        field.text = digits;
+    }
+
     fn take_full_name(&mut self, key: &str, line: u32, node: &Node, findings: &mut Vec<Finding>) {
         let mut full = None;
         take(&mut full, key, line, node, findings);
-        let Some(Field { text, line }) = full else {
-            return;
+        if let Some(full) = full {
+            self.set_full_name(&full);
+        }
+    }
+
+    /// `Ada King Lovelace`: the last word is the last name; `Lovelace, Ada` says so itself. `ada_lovelace` is
+    /// how archives are named.
+    fn set_full_name(&mut self, Field { text, line }: &Field) {
+        let sign = |c: char| c.is_whitespace() || (c == '_' && !text.contains(char::is_whitespace));
+        let (first, last) = match text.split_once(',') {
+            Some((last, first)) => (first, last),
+            None => text.rsplit_once(sign).unwrap_or((text.as_str(), "")),
         };
-        let (first, last) = text.rsplit_once(char::is_whitespace).unwrap_or((&text, ""));
-        let field = |text: &str| Field { text: text.trim().to_owned(), line };
+        let field = |text: &str| Field { text: text.trim().to_owned(), line: *line };
         self.first_name.get_or_insert(field(first));
         if !last.is_empty() {
             self.last_name.get_or_insert(field(last));
@@ -124,14 +201,14 @@ impl HandInConfig {
             let message =
                 format!("expected a list of renders [ ... ], found {}", list.value.kind());
             findings.push(
-                Finding::error("config_renders", message).on_line(list.line).hint(RENDER_HINT),
+                Finding::warning("config_renders", message).on_line(list.line).hint(RENDER_HINT),
             );
             return;
         };
         if items.len() > MAX_RENDERS {
             let message = format!("expected a few renders, found {}", items.len());
             findings.push(
-                Finding::error("config_renders", message)
+                Finding::warning("config_renders", message)
                     .on_line(list.line)
                     .hint("list each image once"),
             );
@@ -157,13 +234,100 @@ impl HandInConfig {
             match render {
                 Some((render, line)) => self.renders.push(ListedRender { scene, render, line }),
                 None => findings.push(
-                    Finding::error("config_renders", "a render without a path")
+                    Finding::warning("config_renders", "a render without a path")
                         .on_line(item.line)
                         .hint(RENDER_HINT),
                 ),
             }
         }
     }
+}
+
+/// A key that means something here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Key {
+    First,
+    Last,
+    Full,
+    Id,
+    Email,
+    Renders,
+}
+
+impl Key {
+    /// As the template writes it.
+    fn written(self) -> &'static str {
+        match self {
+            Self::First => "firstName",
+            Self::Last => "lastName",
+            Self::Full => "firstlast",
+            Self::Id => "studentID",
+            Self::Email => "email",
+            Self::Renders => "renders",
+        }
+    }
+}
+
+/// What keys are called, in lower case without signs: the template's names, those of other years (`firstlast`)
+/// and what students write.
+const KEYS: [(Key, &[&str]); 6] = [
+    (Key::First, &["firstname", "first", "givenname", "forename", "fname", "prenom"]),
+    (Key::Last, &["lastname", "last", "surname", "familyname", "lname", "nom"]),
+    (
+        Key::Full,
+        &[
+            "firstlast",
+            "name",
+            "fullname",
+            "studentname",
+            "yourname",
+            "firstlastname",
+            "student",
+            "credentials",
+            "author",
+            "user",
+        ],
+    ),
+    (
+        Key::Id,
+        &[
+            "studentid",
+            "id",
+            "studentnumber",
+            "mcgillid",
+            "studentno",
+            "studentnr",
+            "number",
+            "sid",
+            "idnumber",
+            "studentidnumber",
+            "matricule",
+        ],
+    ),
+    (Key::Email, &["email", "mail", "emailaddress"]),
+    (Key::Renders, &["renders", "render", "images"]),
+];
+
+/// What a key means, and whether it is a slip of the pen: `studentID`, `student_id` and `Student-Id` are one
+/// key, `studnetID` is one that nearly is.
+fn known_key(key: &str) -> Option<(Key, bool)> {
+    /// Shorter names are too near to each other.
+    const LONG: usize = 7;
+    let plain: String =
+        key.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
+    let names = || KEYS.iter().flat_map(|(key, names)| names.iter().map(move |name| (*key, *name)));
+    if let Some((key, _)) = names().find(|(_, name)| *name == plain) {
+        return Some((key, false));
+    }
+    // Distances of endless keys are endless work.
+    if !(LONG - 1..=24).contains(&plain.len()) {
+        return None;
+    }
+    let long = names().filter(|(_, name)| name.len() >= LONG);
+    let near = long.map(|(key, name)| (strsim::osa_distance(&plain, name), key));
+    let (distance, key) = near.min_by_key(|(distance, _)| *distance)?;
+    // `username` is two letters from `surname`.
+    (distance <= 1 || distance == 2 && plain.len() > LONG + 1).then_some((key, true))
 }
 
 /// Renders that are read; an assignment has under ten.
@@ -180,7 +344,7 @@ fn take(slot: &mut Option<Field>, key: &str, line: u32, node: &Node, findings: &
         other => {
             let message = format!("'{}': expected text, found {}", printable(key), other.kind());
             findings.push(
-                Finding::error("config_type", message)
+                Finding::warning("config_type", message)
                     .on_line(node.line)
                     .hint("write it in double quotes"),
             );
@@ -192,7 +356,7 @@ fn take(slot: &mut Option<Field>, key: &str, line: u32, node: &Node, findings: &
     {
         let message = format!("'{}' says something else than line {}", printable(key), first.line);
         findings
-            .push(Finding::error("config_twice", message).on_line(line).hint("keep one of them"));
+            .push(Finding::warning("config_twice", message).on_line(line).hint("keep one of them"));
         return;
     }
     *slot = Some(Field { text, line });
@@ -203,10 +367,17 @@ mod tests {
     use super::*;
 
     fn names(text: &str) -> (String, String, Option<u64>) {
-        let (config, findings) = HandInConfig::parse(text.as_bytes());
-        assert_eq!(findings, [], "{text}");
+        let (config, findings, _) = HandInConfig::parse(text.as_bytes());
+        for finding in findings {
+            assert_eq!(finding.severity, crate::intake::Severity::Warning, "{finding}");
+        }
         let text = |f: &Option<Field>| f.as_ref().map(|f| f.text.clone()).unwrap_or_default();
         (text(&config.first_name), text(&config.last_name), config.sampler_seed())
+    }
+
+    fn codes(text: &str) -> Vec<String> {
+        let code = |f: &Finding| format!("{}@{}", f.code, f.line.unwrap_or(0));
+        HandInConfig::parse(text.as_bytes()).1.iter().map(code).collect()
     }
 
     #[test]
@@ -216,17 +387,72 @@ mod tests {
             r#"{"firstName": "Ada", "lastName": "Lovelace", "studentID": "260123456"}"#,
             r#"{"first_name": " Ada ", "last_name": "Lovelace", "student_id": 260123456}"#,
             r#"{"name": "Ada Lovelace", "id": 260123456, "email": "a@b.c"}"#,
+            r#"{"firstlast": "Ada Lovelace", "studentID": 260123456}"#,
+            r#"{"firstlast": "Ada_Lovelace", "studentID": 260123456}"#,
+            r#"{"fullName": "Lovelace, Ada", "Student Number": "260123456"}"#,
             r#"{"student": {"firstName": "Ada", "lastName": "Lovelace", "id": "260123456"}, "renders": []}"#,
         ] {
             assert_eq!(names(text), ada, "{text}");
+            assert_eq!(codes(text), [""; 0], "{text}");
         }
         assert_eq!(names(r#"{"id": "18446744073709551615"}"#).2, Some(u64::MAX));
         assert_eq!(names(r#"{"id": "18446744073709551616"}"#).2, None);
     }
 
     #[test]
+    fn slips_are_warnings_and_who_it_is_is_known() {
+        let ada = ("Ada".to_owned(), "Lovelace".to_owned(), Some(260_123_456));
+        let config = |id: &str| {
+            format!(
+                "{{\n\"firstName\": \"Ada\",\n\"lastName\": \"Lovelace\",\n\"studentID\": {id}\n}}"
+            )
+        };
+        for id in [
+            "\"260 123 456\"",
+            "\"260-123-456\"",
+            "\" 260\u{a0}123\u{a0}456\"",
+            "260 123 456",
+            "260-123-456",
+            "\"#260123456\"",
+            "\"260,123,456\"",
+            "\"260_123_456 \"",
+        ] {
+            assert_eq!(names(&config(id)), ada, "{id}");
+            assert!(codes(&config(id)).contains(&"config_student_id@4".to_owned()), "{id}");
+        }
+        for (text, code) in [
+            (
+                r#"{"fristName": "Ada", "lastNmae": "Lovelace", "studnetID": 260123456}"#,
+                "config_key@1",
+            ),
+            (
+                r#"[{"firstName": "Ada", "lastName": "Lovelace", "id": 260123456}]"#,
+                "config_shape@1",
+            ),
+            ("firstName: Ada\nlastName: Lovelace\nstudentID: 260123456\n", "json_syntax@1"),
+            (
+                "firstName = \"Ada\"\nlastName = \"Lovelace\"\nstudentID = 260123456\n",
+                "json_syntax@1",
+            ),
+            (
+                "{\"firstName\": \"Ada\", \"lastName\": \"Lovelace\"\n*\"studentID\": \"260123456\"",
+                "json_syntax@2",
+            ),
+            ("{\"firstlast\": \"Ada Lovelace\",\n* \"studentID\": \"260123456\"}", "json_syntax@2"),
+        ] {
+            assert_eq!(names(text), ada, "{text}");
+            assert!(codes(text).contains(&code.to_owned()), "{text}: {:?}", codes(text));
+        }
+        // Other keys are nobody's name.
+        assert_eq!(
+            codes(r#"{"scenes": 1, "comment": "x", "username": 2, "lastImage": 3}"#),
+            [""; 0]
+        );
+    }
+
+    #[test]
     fn reads_renders_with_lines() {
-        let (config, findings) = HandInConfig::parse(
+        let (config, findings, _) = HandInConfig::parse(
             b"{\"renders\": [\n{\"scene\": \"T\", \"render\": \"a.exr\"},\n\"b.exr\",\n{\"scene\": \"x\"}\n]}",
         );
         let listed: Vec<_> = config.renders.iter().map(|r| (r.render.as_str(), r.line)).collect();
@@ -238,13 +464,13 @@ mod tests {
     #[test]
     fn endless_lists_are_cut() {
         let text = format!("{{\"renders\": [{}\"a\"]}}", "\"a\",".repeat(5000));
-        let (config, findings) = HandInConfig::parse(text.as_bytes());
+        let (config, findings, _) = HandInConfig::parse(text.as_bytes());
         assert_eq!((config.renders.len(), findings.len()), (100, 1));
     }
 
     #[test]
     fn two_answers_are_not_one() {
-        let (_, findings) = HandInConfig::parse(b"{\"id\": 1,\n\"studentID\": 2}");
+        let (_, findings, _) = HandInConfig::parse(b"{\"id\": 1,\n\"studentID\": 2}");
         assert_eq!((findings[0].code.as_str(), findings[0].line), ("config_twice", Some(2)));
     }
 }

@@ -1,6 +1,6 @@
-//! A small JSON reader that knows lines and goes on after the usual mistakes (byte order mark,
-//! comments, trailing or missing commas, single quotes), recording each as a finding. Strict
-//! parsers stop at the first mistake and name none of them as a student would.
+//! A small JSON reader that knows lines and goes on after the usual mistakes (other encodings, comments,
+//! trailing or missing commas, other quotes), recording each as a warning. Strict parsers stop at the first
+//! mistake and name none of them as a student would. Where it cannot go on, what was read so far counts.
 
 use super::finding::{Finding, printable};
 
@@ -39,50 +39,94 @@ impl Value {
 
 const MAX_DEPTH: u32 = 32;
 
-/// Reads `bytes`. Errors in the findings mean that the file is not JSON, even where a value could
-/// be made out of it.
-pub(super) fn parse(bytes: &[u8]) -> (Option<Node>, Vec<Finding>) {
-    let mut findings = Vec::new();
-    let mut text = bytes;
-    if let Some(rest) = bytes.strip_prefix(b"\xef\xbb\xbf") {
-        text = rest;
-        findings.push(
-            Finding::error("json_bom", "expected plain UTF-8, found a byte order mark")
-                .on_line(1)
-                .hint("save as UTF-8 without BOM"),
-        );
+/// What was read of a file.
+pub(super) struct Read {
+    /// The value; none when nothing could be made out.
+    pub(super) node: Option<Node>,
+    /// Whether reading stopped before the end.
+    pub(super) stopped: bool,
+    /// The file as text.
+    pub(super) text: String,
+    /// Warnings; where there is none, the file is JSON.
+    pub(super) findings: Vec<Finding>,
+}
+
+/// Reads `bytes`, whatever they are.
+pub(super) fn parse(bytes: &[u8]) -> Read {
+    let (text, encoding) = decode(bytes);
+    let findings = encoding.into_iter().collect();
+    let mut reader =
+        Reader { chars: text.chars().collect(), at: 0, line: 1, stopped: false, findings };
+    let node = reader.document();
+    Read { node, stopped: reader.stopped, text, findings: reader.findings }
+}
+
+/// The text in these bytes, and what is to be said of its encoding: UTF-8, UTF-16 as some editors save it, or
+/// else the code page of western Windows, in which every byte is a character.
+fn decode(bytes: &[u8]) -> (String, Option<Finding>) {
+    let other = |line: u32, code: &str, message: &str| {
+        Some(Finding::warning(code, message).on_line(line).hint("save as UTF-8 without BOM"))
+    };
+    let wide = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
+        let units = bytes.as_chunks::<2>().0.iter().map(|pair| unit(*pair));
+        let text = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
+        (text.collect::<String>(), other(1, "json_encoding", "expected UTF-8, found UTF-16"))
+    };
+    match bytes {
+        [0xff, 0xfe, rest @ ..] => return wide(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => return wide(rest, u16::from_be_bytes),
+        // A text begins with a character of ASCII here.
+        [1..=255, 0, 1..=255, 0, ..] => return wide(bytes, u16::from_le_bytes),
+        [0, 1..=255, 0, 1..=255, ..] => return wide(bytes, u16::from_be_bytes),
+        _ => {}
     }
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        findings.push(
-            Finding::error("json_encoding", "expected UTF-8, found UTF-16")
-                .on_line(1)
-                .hint("save as UTF-8"),
-        );
-        return (None, findings);
-    }
-    if text.contains(&0) {
-        findings.push(
-            Finding::error("json_encoding", "expected text, found NUL bytes")
-                .on_line(1)
-                .hint("save as plain UTF-8 text"),
-        );
-        return (None, findings);
-    }
-    let text = match std::str::from_utf8(text) {
-        Ok(text) => text.to_owned(),
+    let (text, bom) = match bytes.strip_prefix(b"\xef\xbb\xbf") {
+        Some(rest) => (rest, other(1, "json_bom", "expected plain UTF-8, found a byte order mark")),
+        None => (bytes, None),
+    };
+    match std::str::from_utf8(text) {
+        Ok(text) => (text.to_owned(), bom),
         Err(e) => {
             let line = 1 + text[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count() as u32;
-            findings.push(
-                Finding::error("json_encoding", "expected UTF-8, found another encoding")
-                    .on_line(line)
-                    .hint("save as UTF-8"),
-            );
-            String::from_utf8_lossy(text).into_owned()
+            let message = "expected UTF-8, found another encoding: read as Windows-1252";
+            (
+                text.iter().map(|byte| western(*byte)).collect(),
+                other(line, "json_encoding", message),
+            )
         }
-    };
-    let mut reader = Reader { chars: text.chars().collect(), at: 0, line: 1, findings };
-    let node = reader.document();
-    (node, reader.findings)
+    }
+}
+
+/// A character of Windows-1252: Latin-1 with quotes and the like where that has control characters.
+fn western(byte: u8) -> char {
+    const UPPER: [char; 32] = [
+        '\u{20ac}', '\u{81}', '\u{201a}', '\u{192}', '\u{201e}', '\u{2026}', '\u{2020}',
+        '\u{2021}', '\u{2c6}', '\u{2030}', '\u{160}', '\u{2039}', '\u{152}', '\u{8d}', '\u{17d}',
+        '\u{8f}', '\u{90}', '\u{2018}', '\u{2019}', '\u{201c}', '\u{201d}', '\u{2022}', '\u{2013}',
+        '\u{2014}', '\u{2dc}', '\u{2122}', '\u{161}', '\u{203a}', '\u{153}', '\u{9d}', '\u{17e}',
+        '\u{178}',
+    ];
+    match byte {
+        0x80..=0x9f => UPPER[usize::from(byte - 0x80)],
+        _ => char::from(byte),
+    }
+}
+
+/// Quotes that editors and keyboards put in the place of `"`, also doubled single ones as they open and close.
+fn is_quote(c: char) -> bool {
+    matches!(
+        c,
+        '"' | '\'' | '`' | '\u{b4}' | '\u{2018}'..='\u{201f}' | '\u{ab}' | '\u{bb}' | '\u{ff02}'
+    )
+}
+
+/// Whether a quote closes what another opened: curly ones and plain ones each by their own kind.
+fn closes(open: char, c: char) -> bool {
+    let single = |c: char| matches!(c, '\'' | '`' | '\u{b4}' | '\u{2018}'..='\u{201b}');
+    match open {
+        '"' | '\'' => c == open,
+        _ => is_quote(c) && (single(c) == single(open) || c == '"'),
+    }
 }
 
 /// Parsing cannot go on; the finding is recorded.
@@ -92,15 +136,18 @@ struct Reader {
     chars: Vec<char>,
     at: usize,
     line: u32,
+    stopped: bool,
     findings: Vec<Finding>,
 }
 
 impl Reader {
     fn document(&mut self) -> Option<Node> {
-        let node = self.value(0).ok()?;
+        let node = self.value(0);
+        self.stopped |= node.is_err();
+        let node = node.ok()?;
         self.skip_space();
-        if let Some(c) = self.peek() {
-            self.error(
+        if let Some(c) = self.peek().filter(|_| !self.stopped) {
+            self.warn(
                 "json_syntax",
                 &format!("expected the end of the file, found '{}'", printable(&c.to_string())),
                 "remove what follows the last '}'",
@@ -122,15 +169,15 @@ impl Reader {
         Some(c)
     }
 
-    fn error_on(&mut self, line: u32, code: &str, message: &str, hint: &str) {
+    fn warn_on(&mut self, line: u32, code: &str, message: &str, hint: &str) {
         // One mistake may follow from another: a few are enough.
         if self.findings.len() < 8 {
-            self.findings.push(Finding::error(code, message).on_line(line).hint(hint));
+            self.findings.push(Finding::warning(code, message).on_line(line).hint(hint));
         }
     }
 
-    fn error(&mut self, code: &str, message: &str, hint: &str) {
-        self.error_on(self.line, code, message, hint);
+    fn warn(&mut self, code: &str, message: &str, hint: &str) {
+        self.warn_on(self.line, code, message, hint);
     }
 
     fn stop<T>(&mut self, expected: &str) -> Result<T, Stop> {
@@ -138,7 +185,7 @@ impl Reader {
             None => "the end of the file".to_owned(),
             Some(c) => format!("'{}'", printable(&c.to_string())),
         };
-        self.error(
+        self.warn(
             "json_syntax",
             &format!("expected {expected}, found {found}"),
             "compare with the template's config.json",
@@ -152,12 +199,12 @@ impl Reader {
             if c.is_whitespace() {
                 self.next();
             } else if c == '#' || (c == '/' && following == Some('/')) {
-                self.error("json_comment", "JSON has no comments", "remove the comment");
-                while self.peek().is_some_and(|c| c != '\n') {
+                self.warn("json_comment", "JSON has no comments", "remove the comment");
+                while self.peek().is_some_and(|c| !['\n', '\r'].contains(&c)) {
                     self.next();
                 }
             } else if c == '/' && following == Some('*') {
-                self.error("json_comment", "JSON has no comments", "remove the comment");
+                self.warn("json_comment", "JSON has no comments", "remove the comment");
                 self.next();
                 self.next();
                 while self.peek().is_some() {
@@ -175,7 +222,7 @@ impl Reader {
     fn value(&mut self, depth: u32) -> Result<Node, Stop> {
         self.skip_space();
         if depth > MAX_DEPTH {
-            self.error(
+            self.warn(
                 "json_depth",
                 "lists and objects nested too deeply",
                 "compare with the template's config.json",
@@ -186,8 +233,8 @@ impl Reader {
         let value = match self.peek() {
             Some('{') => self.object(depth)?,
             Some('[') => self.list(depth)?,
-            Some('"' | '\'' | '\u{201c}' | '\u{201d}') => Value::Text(self.text()?),
-            Some(c) if c == '-' || c.is_ascii_digit() => Value::Number(self.word()),
+            Some(c) if is_quote(c) => Value::Text(self.text()),
+            Some(c) if c == '-' || c.is_ascii_digit() => Value::Number(self.number()),
             Some(c) if c.is_alphabetic() => {
                 let word = self.word();
                 match word.as_str() {
@@ -195,7 +242,7 @@ impl Reader {
                     "true" => Value::Bool(true),
                     "false" => Value::Bool(false),
                     _ => {
-                        self.error(
+                        self.warn(
                             "json_quotes",
                             &format!("text needs double quotes: {}", printable(&word)),
                             "write \"...\" around it",
@@ -203,6 +250,10 @@ impl Reader {
                         Value::Text(word)
                     }
                 }
+            }
+            Some(',' | '}' | ']') => {
+                self.warn("json_value", "expected a value, found none", "write it after the ':'");
+                Value::Null
             }
             _ => return self.stop("a value"),
         };
@@ -219,28 +270,50 @@ impl Reader {
         word
     }
 
-    fn text(&mut self) -> Result<String, Stop> {
+    /// A number, also one in groups: `260 123 456`.
+    fn number(&mut self) -> String {
+        let mut number = self.word();
+        loop {
+            let space = |c: &&char| c.is_whitespace() && !['\n', '\r'].contains(*c);
+            let rest = &self.chars[self.at..];
+            let gap = rest.iter().take_while(space).count();
+            if gap == 0 || !rest.get(gap).is_some_and(char::is_ascii_digit) {
+                return number;
+            }
+            self.warn(
+                "json_number",
+                "a number with spaces in it",
+                "write its digits without spaces",
+            );
+            for _ in 0..gap {
+                self.next();
+            }
+            number.push(' ');
+            number.push_str(&self.word());
+        }
+    }
+
+    /// A text in quotes; one that is not closed ends with its line.
+    fn text(&mut self) -> String {
         let line = self.line;
-        let open = self.next();
-        let is_plain = open == Some('"');
-        if !is_plain {
-            self.error("json_quotes", "text needs plain double quotes", "write \"...\" around it");
+        let open = self.next().unwrap_or('"');
+        if open != '"' {
+            self.warn("json_quotes", "text needs plain double quotes", "write \"...\" around it");
         }
         let mut text = String::new();
         loop {
             match self.peek() {
-                None | Some('\n') => {
-                    self.error_on(
+                None | Some('\n' | '\r') => {
+                    self.warn_on(
                         line,
-                        "json_syntax",
+                        "json_open_text",
                         "the text has no closing quote on its line",
                         "close it with \"",
                     );
-                    return Err(Stop);
+                    let end = |c: char| c.is_whitespace() || is_quote(c) || ",}]".contains(c);
+                    return text.trim_end_matches(end).to_owned();
                 }
-                Some('"') if is_plain => break,
-                Some('\'') if open == Some('\'') => break,
-                Some('\u{201c}' | '\u{201d}' | '"') if !is_plain && open != Some('\'') => break,
+                Some(c) if closes(open, c) => break,
                 Some('\\') => {
                     self.next();
                     self.escape(&mut text);
@@ -252,7 +325,7 @@ impl Reader {
             }
         }
         self.next();
-        Ok(text)
+        text
     }
 
     fn escape(&mut self, text: &mut String) {
@@ -275,7 +348,7 @@ impl Reader {
                     text.push(char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER));
                     return;
                 }
-                self.error(
+                self.warn(
                     "json_escape",
                     "'\\u' needs four hexadecimal digits",
                     "use '/' between folders",
@@ -284,7 +357,7 @@ impl Reader {
                 return;
             }
             _ => {
-                self.error(
+                self.warn(
                     "json_escape",
                     "a backslash that starts no escape",
                     "use '/' between folders",
@@ -305,12 +378,25 @@ impl Reader {
                 self.next();
                 Ok(false)
             }
-            Some(',') => {
+            Some(sign @ (',' | ';')) => {
                 let line = self.line;
                 self.next();
                 self.skip_space();
+                if sign == ';' {
+                    self.warn_on(
+                        line,
+                        "json_separator",
+                        "expected a comma, found ';'",
+                        "write ','",
+                    );
+                }
+                while self.peek() == Some(',') {
+                    self.warn("json_trailing_comma", "two commas", "remove one of them");
+                    self.next();
+                    self.skip_space();
+                }
                 if self.peek() == Some(close) {
-                    self.error_on(
+                    self.warn_on(
                         line,
                         "json_trailing_comma",
                         &format!("a comma before '{close}'"),
@@ -321,8 +407,8 @@ impl Reader {
                 }
                 Ok(true)
             }
-            Some('"' | '{') => {
-                self.error(
+            Some(c) if is_quote(c) || "{[".contains(c) || c.is_alphanumeric() => {
+                self.warn(
                     "json_missing_comma",
                     "expected a comma before this",
                     "put a comma at the end of the line above",
@@ -342,11 +428,25 @@ impl Reader {
             return Ok(Value::List(items));
         }
         loop {
-            items.push(self.value(depth + 1)?);
-            if !self.separator(']')? {
+            match self.value(depth + 1) {
+                Ok(item) => items.push(item),
+                Err(Stop) => self.stopped = true,
+            }
+            if self.is_over(']') {
                 return Ok(Value::List(items));
             }
         }
+    }
+
+    /// Whether a list or an object ends here, by its end or because nothing more can be read.
+    fn is_over(&mut self, close: char) -> bool {
+        if !self.stopped {
+            match self.separator(close) {
+                Ok(more) => return !more,
+                Err(Stop) => self.stopped = true,
+            }
+        }
+        true
     }
 
     fn object(&mut self, depth: u32) -> Result<Value, Stop> {
@@ -358,31 +458,55 @@ impl Reader {
             return Ok(Value::Object(members));
         }
         loop {
-            self.skip_space();
-            let line = self.line;
-            let key = match self.peek() {
-                Some('"' | '\'' | '\u{201c}' | '\u{201d}') => self.text()?,
-                Some(c) if c.is_alphabetic() => {
-                    let word = self.word();
-                    self.error(
-                        "json_quotes",
-                        &format!("keys need double quotes: {}", printable(&word)),
-                        "write \"...\" around it",
-                    );
-                    word
-                }
-                _ => return self.stop("a key in double quotes"),
-            };
-            self.skip_space();
-            if self.peek() != Some(':') {
-                return self.stop("':' after the key");
+            match self.member(depth) {
+                Ok(member) => members.push(member),
+                Err(Stop) => self.stopped = true,
             }
-            self.next();
-            members.push((key, line, self.value(depth + 1)?));
-            if !self.separator('}')? {
+            if self.is_over('}') {
                 return Ok(Value::Object(members));
             }
         }
+    }
+
+    /// A key and its value.
+    fn member(&mut self, depth: u32) -> Result<(String, u32, Node), Stop> {
+        self.skip_space();
+        let line = self.line;
+        let key = match self.peek() {
+            Some(c) if is_quote(c) => self.text(),
+            Some(c) if c.is_alphabetic() => {
+                let word = self.word();
+                self.warn(
+                    "json_quotes",
+                    &format!("keys need double quotes: {}", printable(&word)),
+                    "write \"...\" around it",
+                );
+                // Only the first of two may be missing.
+                if self.peek().is_some_and(is_quote) {
+                    self.next();
+                }
+                word
+            }
+            _ => return self.stop("a key in double quotes"),
+        };
+        self.skip_space();
+        match self.peek() {
+            Some(':') => {
+                self.next();
+            }
+            Some('=') => {
+                self.warn("json_colon", "expected ':' after the key, found '='", "write ':'");
+                self.next();
+                if self.peek() == Some('>') {
+                    self.next();
+                }
+            }
+            Some(c) if self.line == line && (is_quote(c) || c.is_ascii_digit()) => {
+                self.warn("json_colon", "expected ':' after the key", "write ':' before the value");
+            }
+            _ => return self.stop("':' after the key"),
+        }
+        Ok((key, line, self.value(depth + 1)?))
     }
 }
 
@@ -391,16 +515,77 @@ mod tests {
     use super::*;
 
     fn codes(text: &str) -> Vec<String> {
-        parse(text.as_bytes())
-            .1
-            .iter()
-            .map(|f| format!("{}@{}", f.code, f.line.unwrap_or(0)))
-            .collect()
+        let warning = |f: &Finding| {
+            assert_eq!(f.severity, crate::intake::Severity::Warning, "{f}");
+            format!("{}@{}", f.code, f.line.unwrap_or(0))
+        };
+        parse(text.as_bytes()).findings.iter().map(warning).collect()
+    }
+
+    /// The members of an object that are texts or numbers.
+    fn members(bytes: &[u8]) -> Vec<(String, String)> {
+        let Some(Node { value: Value::Object(members), .. }) = parse(bytes).node else {
+            panic!("an object in {bytes:?}")
+        };
+        let text = |(key, _, node): &(String, u32, Node)| match &node.value {
+            Value::Text(text) | Value::Number(text) => Some((key.clone(), text.clone())),
+            _ => None,
+        };
+        members.iter().filter_map(text).collect()
+    }
+
+    fn pairs(expected: &[(&str, &str)]) -> Vec<(String, String)> {
+        expected.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect()
+    }
+
+    #[test]
+    fn what_is_slightly_wrong_is_read_all_the_same() {
+        let expected = pairs(&[("a", "x"), ("b", "26")]);
+        for text in [
+            "{'a': 'x', 'b': 26}",
+            "{\u{201c}a\u{201d}: \u{201c}x\u{201d}, \u{201e}b\u{201c}: 26}",
+            "{\u{2018}a\u{2019}: \u{ab}x\u{bb}, `b`: 26}",
+            "{a: x, b: 26}",
+            "{a\": \"x\", \"b\": 26}",
+            "{\"a\" = \"x\"; \"b\" => 26}",
+            "{\"a\" \"x\",, \"b\" 26,}",
+            "{\"a\": \"x\" \"b\": 26",
+            "{\"a\": \"x,\n\"b\": 26}",
+            "{\"a\": \"x\", \"b\": 26,\n*** }",
+            "{\"a\": \"x\", \"b\": 26} trailing",
+            "{\"a\": \"x\", // one\n\"b\": 26 /* two */}",
+            "// old Mac\r{\"a\": \"x\",\r\"b\": 26}",
+        ] {
+            assert_eq!(members(text.as_bytes()), expected, "{text}");
+            assert!(!codes(text).is_empty(), "{text}");
+        }
+        assert_eq!(members(b"{\"b\": 260 123 456}"), pairs(&[("b", "260 123 456")]));
+    }
+
+    #[test]
+    fn other_encodings_are_read() {
+        let text = "{\n\"a\": \"\u{e9}\"}";
+        let wide =
+            |unit: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(unit).collect::<Vec<u8>>();
+        let [little, big] = [wide(u16::to_le_bytes), wide(u16::to_be_bytes)];
+        let bom = |bom: &[u8], rest: &[u8]| [bom, rest].concat();
+        for bytes in [
+            bom(b"\xef\xbb\xbf", text.as_bytes()),
+            bom(b"\xff\xfe", &little),
+            bom(b"\xfe\xff", &big),
+            little,
+            big,
+            b"{\n\"a\": \"\xe9\"}".to_vec(),
+            b"{\n\x93a\x94: \x93\xe9\x94}".to_vec(),
+        ] {
+            assert_eq!(members(&bytes), pairs(&[("a", "\u{e9}")]), "{bytes:?}");
+            assert!(!parse(&bytes).findings.is_empty());
+        }
     }
 
     #[test]
     fn good_json_has_no_findings_and_lines() {
-        let (node, findings) =
+        let Read { node, findings, .. } =
             parse(b"{\n \"a\": [1, -2.5e3, true, null],\n \"b\": \"x\\n\\u00e9\"\n}\n");
         assert_eq!(findings, []);
         let Some(Node { value: Value::Object(members), line: 1 }) = node else {
@@ -420,12 +605,12 @@ mod tests {
         assert_eq!(codes("{\"a\": 1\n\"b\": 2}"), ["json_missing_comma@2"]);
         assert_eq!(codes("{'a': 1}"), ["json_quotes@1"]);
         assert_eq!(codes("{a: b}"), ["json_quotes@1", "json_quotes@1"]);
-        assert_eq!(codes("{\n\"a\": \"b\n}"), ["json_syntax@2"]);
+        assert_eq!(codes("{\n\"a\": \"b\n}"), ["json_open_text@2"]);
         assert_eq!(codes("{\"a\": 1} x"), ["json_syntax@1"]);
         assert_eq!(codes("{\"a\": \"r\\teapot\\x\"}"), ["json_escape@1"]);
         assert_eq!(codes(""), ["json_syntax@1"]);
         assert_eq!(codes(&"[".repeat(100_000)), ["json_depth@1"]);
-        assert_eq!(parse(b"\xff\xfe{\0}\0").1[0].code, "json_encoding");
-        assert_eq!(parse(b"{\n\"a\": \"\xe9\"}").1[0].line, Some(2));
+        assert_eq!(parse(b"\xff\xfe{\0}\0").findings[0].code, "json_encoding");
+        assert_eq!(parse(b"{\n\"a\": \"\xe9\"}").findings[0].line, Some(2));
     }
 }

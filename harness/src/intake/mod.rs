@@ -38,8 +38,9 @@ pub(crate) use finding::printable;
 pub use finding::{Finding, Severity};
 pub use hand_in_config::{Field, HandInConfig, ListedRender};
 pub use limits::Limits;
-pub use pack::{Packed, archive_name, fix, pack};
+pub use pack::{Packed, archive_name, fix, mends, pack};
 pub use source_rules::{scan_source, scan_text};
+pub(crate) use tree::CONFIG_FILE;
 pub use tree::{TreeFile, TreeSpec};
 pub use tree_match::{Mark, TreeLine};
 pub use unpack::{

@@ -14,7 +14,7 @@ use super::finding::Finding;
 use super::hand_in_config::{Field, HandInConfig};
 use super::limits::Limits;
 use super::tree::TreeSpec;
-use super::tree_match::{Mark, match_tree, tree_findings};
+use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
 use super::unpack::{HandIn, IntakeError, Refusal, copy_folder, unpack_bytes};
 use super::validate::{Validation, validate_hand_in};
 
@@ -25,7 +25,7 @@ pub struct Packed {
     pub archive: PathBuf,
     /// Path in the source and path in the archive, sorted by the latter.
     pub files: Vec<(String, String)>,
-    /// The archive's own validation; conforms.
+    /// The archive's own validation; its tree is the handout's.
     pub validation: Validation,
 }
 
@@ -57,7 +57,7 @@ pub fn pack(
     };
     let scratch = scratch_folder()?;
     let hand_in = copy_folder(dir, &is_wanted, scratch.path(), tree, limits)?;
-    fix(&hand_in, out, tree, limits)
+    write(&hand_in, out, tree, limits, |validation| validation.conforms)
 }
 
 fn scratch_folder() -> Result<tempfile::TempDir, IntakeError> {
@@ -76,7 +76,8 @@ pub fn archive_name(config: &HandInConfig, tree: &TreeSpec) -> String {
     format!("{}_{}_{}.zip", tree.name_prefix, plain(&config.first_name), plain(&config.last_name))
 }
 
-/// Repacks a nearly right hand-in: wrong level, wrong folders, other names, junk and stray files.
+/// Repacks a nearly right submission: wrong level, wrong folders, other names, junk and stray files, an archive
+/// made in an odd way. What `config.json` says is the student's to mend.
 ///
 /// # Errors
 /// [`IntakeError::Refused`] when something is missing that moving files cannot mend; nothing is
@@ -87,13 +88,38 @@ pub fn fix(
     tree: &TreeSpec,
     limits: &Limits,
 ) -> Result<Packed, IntakeError> {
+    write(hand_in, out, tree, limits, Validation::follows_tree)
+}
+
+/// What [`fix`] would do to the tree, in words; nothing where it cannot mend it, or need not.
+pub fn mends(hand_in: &HandIn, tree: &TreeSpec) -> Option<String> {
+    let places = places(hand_in, tree).ok()?;
+    let moved: Vec<_> = places
+        .iter()
+        .filter(|(to, from)| to != from && !tree.file_at(to).is_some_and(|file| file.accepts(from)))
+        .collect();
+    let (to, from) = moved.first()?;
+    Some(match moved.len() - 1 {
+        0 => format!("moves {from} to {to}"),
+        more => format!("moves {from} to {to}, and {more} more"),
+    })
+}
+
+/// Writes an archive of what belongs to the tree, where its validation is good enough.
+fn write(
+    hand_in: &HandIn,
+    out: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+    is_good: impl Fn(&Validation) -> bool,
+) -> Result<Packed, IntakeError> {
     let places = places(hand_in, tree)?;
     let bytes = zip_bytes(hand_in, &places)?;
     let scratch = scratch_folder()?;
     // The archive as whoever grades it will see it.
     let copy = unpack_bytes(&bytes, "packed.zip", scratch.path(), tree, limits)?;
     let mut validation = validate_hand_in(&copy, tree)?;
-    if !validation.conforms {
+    if !is_good(&validation) {
         return Err(refused(hand_in, validation.findings));
     }
     let archive = match &validation.config {
@@ -126,8 +152,9 @@ fn places(hand_in: &HandIn, tree: &TreeSpec) -> Result<BTreeMap<String, String>,
     let paths: Vec<&str> = hand_in.files.iter().map(|file| file.path.as_str()).collect();
     let lines = match_tree(&paths, tree);
     if lines.iter().any(|line| line.mark == Mark::Missing) {
-        let errors = tree_findings(&lines).into_iter().filter(|f| f.code == "tree_missing");
-        return Err(refused(hand_in, errors.collect()));
+        let missing = |line: &TreeLine| line.mark == Mark::Missing;
+        let missing: Vec<TreeLine> = lines.into_iter().filter(missing).collect();
+        return Err(refused(hand_in, tree_findings(&missing, &paths)));
     }
     let mut moves: Vec<(String, String)> = Vec::new();
     for line in lines {

@@ -17,6 +17,8 @@ const BLOCK: usize = 512;
 const MAX_EXTENDED: u64 = 1 << 20;
 /// Zero blocks after the end; GNU tar pads to 10 KiB [bytes].
 const MAX_PADDING: u64 = 1 << 20;
+/// Members of gzip data; programs that pack in pieces take 64 KiB or more for each.
+const MAX_MEMBERS: u64 = 1 << 14;
 const AGAIN: &str =
     "make the archive again with 'tar czf a2_first_last.tar.gz FOLDER', or with umbra pack";
 
@@ -40,20 +42,35 @@ fn is_header(block: &[u8]) -> bool {
 
 /// Reads a gzipped tar.
 pub(super) fn read_gz(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Halt> {
-    let mut gz =
-        Gz { packed: bytes.len(), inner: GzDecoder::new(bytes), unpacked: 0, limits: copy.limits };
+    let mut gz = Gz {
+        packed: bytes.len(),
+        member: GzDecoder::new(bytes),
+        members: 1,
+        rest: None,
+        unpacked: 0,
+        limits: copy.limits,
+    };
     read(&mut gz, copy)?;
-    let rest = gz.inner.get_ref().len();
-    if rest > 0 {
-        let message = format!("{rest} bytes follow the gzip data");
-        return Err(copy.refuse(Finding::error("gz_data_after", message).hint(AGAIN)));
+    match gz.rest {
+        None => Ok(()),
+        Some(rest) if rest.iter().all(|byte| *byte == 0) => {
+            let message = format!("{} zeros after the gzip data", rest.len());
+            copy.findings.push(Finding::note("gz_padding", message));
+            Ok(())
+        }
+        Some(rest) => {
+            let message = format!("{} bytes follow the gzip data", rest.len());
+            Err(copy.refuse(Finding::error("gz_data_after", message).hint(AGAIN)))
+        }
     }
-    Ok(())
 }
 
-/// Gzip data under the limits.
+/// Gzip data under the limits: a series of members (RFC 1952, 2.2), one after the other.
 struct Gz<'a> {
-    inner: GzDecoder<&'a [u8]>,
+    member: GzDecoder<&'a [u8]>,
+    members: u64,
+    /// What follows the last member, if anything.
+    rest: Option<&'a [u8]>,
     packed: usize,
     unpacked: u64,
     limits: &'a Limits,
@@ -61,9 +78,28 @@ struct Gz<'a> {
 
 impl Read for Gz<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let n = self.inner.read(buffer)?;
+        if buffer.is_empty() || self.rest.is_some() {
+            return Ok(0);
+        }
+        let n = loop {
+            let n = self.member.read(buffer)?;
+            let rest = *self.member.get_ref();
+            if n > 0 || rest.is_empty() {
+                break n;
+            }
+            if !rest.starts_with(b"\x1f\x8b") {
+                self.rest = Some(rest);
+                break 0;
+            }
+            self.members += 1;
+            // Each costs more than it weighs.
+            if self.members > MAX_MEMBERS {
+                return Err(io::Error::other(GzLimit::Members));
+            }
+            self.member = GzDecoder::new(rest);
+        };
         self.unpacked += n as u64;
-        let consumed = self.packed - self.inner.get_ref().len();
+        let consumed = self.packed - self.member.get_ref().len();
         if self.limits.ratio_exceeded(self.unpacked, consumed as u64) {
             return Err(io::Error::other(GzLimit::Ratio));
         }
@@ -83,6 +119,8 @@ enum GzLimit {
     Ratio,
     #[error("total limit")]
     Total,
+    #[error("members limit")]
+    Members,
 }
 
 /// What a reading error means.
@@ -97,6 +135,10 @@ fn unreadable(error: &io::Error, limits: &Limits) -> Finding {
         Some(GzLimit::Total) => {
             let message = format!("unpacks to more than the limit of {} MiB", limits.max_total_mib);
             Finding::error("limit_total", message).hint(HINT)
+        }
+        Some(GzLimit::Members) => {
+            let message = format!("more than {MAX_MEMBERS} pieces of gzip data");
+            Finding::error("limit_members", message).hint(AGAIN)
         }
         None => {
             let message =
@@ -328,6 +370,8 @@ fn read_entry(
         EntryType::Directory => Kind::Folder,
         EntryType::Regular | EntryType::Continuous if name.ends_with(b"/") => Kind::Folder,
         EntryType::Regular | EntryType::Continuous => Kind::File,
+        // Nothing of it is copied, and nothing lies behind it.
+        _ if copy.is_ignored(&name) => return skip(reader, padded(size), &name, copy),
         other => {
             copy.findings.push(special(other).at(printable_bytes(&name)));
             return skip(reader, padded(size), &name, copy);

@@ -33,7 +33,7 @@ pub struct TreeFile {
 }
 
 /// The configuration file of a hand-in.
-pub(super) const CONFIG_FILE: &str = "config.json";
+pub(crate) const CONFIG_FILE: &str = "config.json";
 
 /// The tree of the handout *Point Lights & Shadows*. The aliases of the bonus images are the three
 /// paths that the handout and the course's own template name.
@@ -117,7 +117,7 @@ impl TreeSpec {
     }
 
     /// Whether a folder of this name may stand at the root, so that it is no wrapping folder.
-    pub(super) fn is_top_folder(&self, name: &str) -> bool {
+    pub(crate) fn is_top_folder(&self, name: &str) -> bool {
         let starts = |path: &str| {
             path.split_once('/').is_some_and(|(top, _)| top.eq_ignore_ascii_case(name))
         };

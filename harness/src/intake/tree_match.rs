@@ -147,27 +147,17 @@ fn source_place(path: &str, lines: &[TreeLine], tree: &TreeSpec) -> Option<Strin
     })
 }
 
-/// What the comparison means for the verdict.
-pub(super) fn tree_findings(lines: &[TreeLine]) -> Vec<Finding> {
+/// What the comparison means for the verdict; `paths` are all that was found.
+pub(super) fn tree_findings(lines: &[TreeLine], paths: &[&str]) -> Vec<Finding> {
     lines
         .iter()
         .filter_map(|line| {
             let expected = line.expected.clone().unwrap_or_default();
             let found = line.found.clone().unwrap_or_default();
             match line.mark {
-                Mark::Ok if !line.advice.starts_with("accepted") => None,
-                Mark::Absent => None,
-                Mark::Ok => {
-                    Some(Finding::note("alias", format!("accepted for '{expected}'")).at(found))
-                }
-                Mark::Missing => Some(
-                    Finding::error(
-                        "tree_missing",
-                        "expected in the hand-in, found nothing like it",
-                    )
-                    .at(expected)
-                    .hint("add it, then pack again"),
-                ),
+                // An alias is as good as the name; the tree beside it shows both.
+                Mark::Ok | Mark::Absent => None,
+                Mark::Missing => Some(missing(expected, paths)),
                 Mark::WrongPlace => Some(
                     Finding::error("tree_wrong_place", format!("expected at '{expected}'"))
                         .at(found)
@@ -181,4 +171,34 @@ pub(super) fn tree_findings(lines: &[TreeLine]) -> Vec<Finding> {
             }
         })
         .collect()
+}
+
+/// Other languages than Rust, by the ends of file names.
+const LANGUAGES: [(&str, &[&str]); 7] = [
+    ("C++", &["cpp", "cc", "cxx", "hpp", "hh", "hxx", "h", "inl"]),
+    ("C", &["c"]),
+    ("C#", &["cs"]),
+    ("Python", &["py", "ipynb"]),
+    ("Java", &["java"]),
+    ("JavaScript", &["js", "ts"]),
+    ("Go", &["go"]),
+];
+
+/// What is to be said of a file that is missing; of a source file, whether it is written in another language.
+fn missing(expected: String, paths: &[&str]) -> Finding {
+    let end = |path: &str| path.rsplit_once('.').map(|(_, end)| end.to_lowercase());
+    let ends: Vec<String> = paths.iter().filter_map(|path| end(path)).collect();
+    let own = end(&expected).filter(|end| end == "rs" && !ends.contains(end));
+    let count = |own: &[&str]| ends.iter().filter(|end| own.contains(&end.as_str())).count();
+    let other = LANGUAGES.iter().map(|(name, ends)| (count(ends), name)).max_by_key(|(n, _)| *n);
+    match other.filter(|(count, _)| own.is_some() && *count > 0) {
+        Some((count, name)) => Finding::error(
+            "tree_language",
+            format!("expected a renderer in Rust, found none; {count} files look like {name}"),
+        )
+        .hint("the renderer must be written in Rust: start from the template"),
+        None => Finding::error("tree_missing", "expected in the submission, found nothing like it")
+            .hint("add it, then pack again"),
+    }
+    .at(expected)
 }

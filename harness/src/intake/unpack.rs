@@ -1,6 +1,5 @@
 //! The entry of intake: decides the format by content and makes the private copy.
 
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -125,18 +124,28 @@ pub fn unpack(
 /// The bytes of the archive at `source`, one more than is allowed at most; none of a folder.
 ///
 /// # Errors
-/// [`IntakeError::Refused`] when it is neither, and when it cannot be read.
+/// [`IntakeError::Refused`] when it is neither, a link among them: whoever hands in may choose where it leads.
+/// And when it cannot be read.
 pub(crate) fn read_archive(source: &Path, limits: &Limits) -> Result<Option<Vec<u8>>, IntakeError> {
-    // The path itself was given by whoever grades, so a link there is followed.
-    let metadata = source.metadata().map_err(|e| IntakeError::io("read", source, e))?;
+    // Without a slash at the end, which would follow a link.
+    let path = source.components().as_path();
+    let refuse = |finding| refused(&name_of(source), None, finding);
+    let metadata = path.symlink_metadata().map_err(|e| IntakeError::io("read", source, e))?;
     if metadata.is_dir() {
         return Ok(None);
     }
-    if !metadata.is_file() {
-        let finding = Finding::error("not_a_file", "expected an archive or a folder");
-        return refused(&name_of(source), None, finding);
+    if metadata.is_symlink() {
+        let message = "expected an archive or a folder, found a symbolic link";
+        return refuse(Finding::error("link", message).hint("name what it leads to"));
     }
-    let file = File::open(source).map_err(|e| IntakeError::io("read", source, e))?;
+    if !metadata.is_file() {
+        return refuse(Finding::error("not_a_file", "expected an archive or a folder"));
+    }
+    let file = folder::open_file(path).map_err(|e| IntakeError::io("read", source, e))?;
+    if !file.metadata().is_ok_and(|opened| opened.is_file()) {
+        let message = "it was exchanged while it was read";
+        return refuse(Finding::error("changed_while_read", message));
+    }
     let mut bytes = Vec::new();
     file.take(mib(limits.max_total_mib).saturating_add(1))
         .read_to_end(&mut bytes)
@@ -200,7 +209,7 @@ pub(super) fn copy_folder(
     limits: &Limits,
 ) -> Result<HandIn, IntakeError> {
     let mut copy = PrivateCopy::new(dest, tree, limits)?;
-    let result = folder::read(source, is_wanted, &mut copy);
+    let result = folder::read(source.components().as_path(), is_wanted, &mut copy);
     copy.finish(&name_of(source), Format::Folder, result)
 }
 

@@ -18,7 +18,7 @@ pub struct Validation {
     pub name: String,
     /// What it is.
     pub format: Option<Format>,
-    /// Whether there is no error among the findings.
+    /// Whether there is no error among the findings: neither the tree nor the student number.
     pub conforms: bool,
     /// The expected tree beside the found one; empty for a hand-in that was refused.
     pub tree: Vec<TreeLine>,
@@ -39,7 +39,7 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
     let paths: Vec<&str> = hand_in.files.iter().map(|file| file.path.as_str()).collect();
     let lines = match_tree(&paths, tree);
     let mut findings = hand_in.findings.clone();
-    findings.extend(tree_findings(&lines));
+    findings.extend(tree_findings(&lines, &paths));
     let mut config = None;
     if let Some(file) = hand_in.file(CONFIG_FILE) {
         if file.bytes > MAX_CONFIG {
@@ -55,19 +55,10 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
         } else {
             let path = hand_in.root.join(CONFIG_FILE);
             let bytes = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
-            let (parsed, said) = HandInConfig::parse(&bytes);
-            // What could not be read would be reported as missing once more.
-            let is_readable = !said.iter().any(|f| {
-                matches!(
-                    f.code.as_str(),
-                    "json_syntax" | "json_encoding" | "json_depth" | "config_shape"
-                )
-            });
+            let (parsed, said, is_whole) = HandInConfig::parse(&bytes);
             findings.extend(said);
-            if is_readable {
-                let (present, missing) = places(&lines);
-                findings.extend(check_config(&parsed, &present, &missing, tree));
-            }
+            let (present, missing) = places(&lines);
+            findings.extend(check_config(&parsed, is_whole, &present, &missing, tree));
             config = Some(parsed);
         }
     }
@@ -85,6 +76,23 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
         config,
         findings,
     })
+}
+
+impl Validation {
+    /// With more findings, worst first.
+    #[must_use]
+    pub fn with(mut self, more: Vec<Finding>) -> Self {
+        self.findings.extend(more);
+        self.findings.sort_by_key(|finding| finding.severity);
+        self.conforms = self.findings.iter().all(|f| f.severity != Severity::Error);
+        self
+    }
+
+    /// Whether the tree is the handout's, whatever `config.json` says. Of a refused one nothing is known.
+    pub fn follows_tree(&self) -> bool {
+        let fits = |line: &TreeLine| !matches!(line.mark, Mark::Missing | Mark::WrongPlace);
+        !self.tree.is_empty() && self.tree.iter().all(fits)
+    }
 }
 
 /// Paths that are there once misplaced files are moved, and paths that are missing.

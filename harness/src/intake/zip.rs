@@ -2,43 +2,54 @@
 //! data is inflated from exactly the bytes that both agree on: one reading of the archive, so
 //! that no second parser can see another tree in it.
 //!
+//! Bytes before, between and after the parts are passed over, with a warning, as long as nobody could take
+//! them for parts: a self-extracting program, an archiver's zeros, a line that a mailer added.
+//!
 //! Field offsets are those of PKWARE's APPNOTE 6.3 (4.3.7 local header, 4.3.9 data descriptor,
-//! 4.3.12 central directory, 4.3.16 end record).
+//! 4.3.12 central directory, 4.3.14 zip64 end record and 4.3.15 its locator, 4.3.16 end record, 4.5.3
+//! zip64 sizes).
 
 use std::io::Read;
+use std::ops::Range;
 
 use flate2::read::DeflateDecoder;
 
 use super::copy::{Admitted, Halt, Kind, PrivateCopy};
 use super::finding::{Finding, printable_bytes};
-use super::zip_headers::{CENTRAL, Central, Entry, ZIP64, check_entry, u16_at, u32_at};
+use super::zip_headers::{
+    CENTRAL, Central, Entry, LOCAL, ZIP64, check_entry, u16_at, u32_at, u64_at,
+};
 
 const END: &[u8] = b"PK\x05\x06";
+const ZIP64_END: &[u8] = b"PK\x06\x06";
 const ZIP64_LOCATOR: &[u8] = b"PK\x06\x07";
-const END_SIZE: usize = 22;
+
 pub(super) const AGAIN: &str =
     "make the archive again with your system's own zip program, or with umbra pack";
+const END_SIZE: usize = 22;
+const ZIP64_END_SIZE: usize = 56;
+const ZIP64_LOCATOR_SIZE: usize = 20;
 
-/// Whether an end record stands near the end.
+/// Whether an end record stands anywhere.
 pub(super) fn has_end_record(bytes: &[u8]) -> bool {
-    end_records(bytes).next().is_some()
+    last_end_record(bytes).is_some()
 }
 
-/// Places of end records' signatures, last first, as far back as a comment can reach.
-fn end_records(bytes: &[u8]) -> impl Iterator<Item = usize> {
-    let first = bytes.len().saturating_sub(END_SIZE + usize::from(u16::MAX));
-    let last = bytes.len().saturating_sub(END_SIZE);
-    (first..=last).rev().filter(|&i| bytes[i..].starts_with(END) && i + END_SIZE <= bytes.len())
+/// The last end record. None can stand in a comment or in bytes after it: those must hold no record.
+fn last_end_record(bytes: &[u8]) -> Option<usize> {
+    let last = bytes.len().checked_sub(END_SIZE)?;
+    (0..=last).rev().find(|&at| bytes[at..].starts_with(END))
 }
 
 /// Reads a zip archive into the copy. Nothing is written before all headers are checked.
 pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Halt> {
     let directory = find_directory(bytes, copy.limits.max_entries).map_err(|f| copy.refuse(f))?;
-    let entries = read_directory(bytes, &directory, copy)?;
-    check_ranges(&entries, directory.start, copy);
+    let mut entries = read_directory(bytes, &directory, copy)?;
+    check_ranges(bytes, &entries, &directory, copy);
+    slashes(&mut entries, copy);
     let mut files = Vec::new();
     for entry in &entries {
-        let kind = if entry.name.ends_with(b"/") { Kind::Folder } else { Kind::File };
+        let kind = if entry.is_folder() { Kind::Folder } else { Kind::File };
         match copy.admit(&entry.name, kind) {
             Admitted::File(path) => files.push((entry, path)),
             Admitted::Folder if entry.unpacked_bytes > 0 => {
@@ -57,16 +68,44 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Halt>
     Ok(())
 }
 
+/// Some Windows programs write a backslash between folders. Where no name holds a slash, nothing else can
+/// be meant.
+fn slashes(entries: &mut [Entry<'_>], copy: &mut PrivateCopy<'_>) {
+    let holds = |sign: u8| entries.iter().any(|entry| entry.name.contains(&sign));
+    if !holds(b'\\') || holds(b'/') {
+        return;
+    }
+    for sign in entries.iter_mut().flat_map(|entry| &mut entry.name) {
+        if *sign == b'\\' {
+            *sign = b'/';
+        }
+    }
+    let message = "names with a backslash between folders: read as '/'";
+    copy.findings.push(Finding::warning("zip_backslash", message).hint(AGAIN));
+}
+
 /// Where the central directory lies and how many entries it announces.
 struct Directory {
+    /// Bytes before the place that the archive's own offsets count from.
+    base: usize,
     start: usize,
     end: usize,
-    count: usize,
+    count: u64,
+    /// Where the end record ends; a comment of so many bytes follows.
+    records_end: usize,
+    comment: usize,
+}
+
+/// What the end record says, or the zip64 one before it.
+struct End {
+    disks: [u32; 2],
+    counts: [u64; 2],
+    size: u64,
+    offset: u64,
 }
 
 fn find_directory(bytes: &[u8], max_entries: u64) -> Result<Directory, Finding> {
-    let mut records = end_records(bytes);
-    let Some(at) = records.next() else {
+    let Some(at) = last_end_record(bytes) else {
         return Err(Finding::error(
             "zip_truncated",
             "expected a zip directory at the end, found none",
@@ -74,55 +113,91 @@ fn find_directory(bytes: &[u8], max_entries: u64) -> Result<Directory, Finding> 
         .hint("the upload may have been cut off; hand in again"));
     };
     let comment = usize::from(u16_at(bytes, at + 20).unwrap_or(0));
-    let after = bytes.len() - at - END_SIZE;
-    if let Some(other) = records.find(|&other| {
-        other + END_SIZE + usize::from(u16_at(bytes, other + 20).unwrap_or(0)) == bytes.len()
-    }) {
-        let message = format!("two directories end this zip, at byte {other} and at byte {at}");
-        return Err(Finding::error("zip_two_directories", message).hint(AGAIN));
-    }
-    if comment != after {
-        let message = format!("expected {comment} bytes after the zip's directory, found {after}");
-        return Err(Finding::error("zip_data_after", message).hint(AGAIN));
-    }
-    let field16 = |offset| u16_at(bytes, at + offset).unwrap_or(0);
-    let field32 = |offset| u32_at(bytes, at + offset).unwrap_or(0);
-    let (disk, directory_disk) = (field16(4), field16(6));
-    let (count_here, count) = (field16(8), field16(10));
-    let (size, offset) = (field32(12), field32(16));
-    let has_locator = at >= 20 && bytes[at - 20..].starts_with(ZIP64_LOCATOR);
-    if has_locator || count == u16::MAX || size == ZIP64 || offset == ZIP64 {
-        return Err(Finding::error("zip64", "zip64 records, which no hand-in of this size needs")
-            .hint(AGAIN));
-    }
-    if disk != 0 || directory_disk != 0 || count_here != count {
+    let (end, records) = end_record(bytes, at)?;
+    if end.disks != [0, 0] || end.counts[0] != end.counts[1] {
         return Err(
             Finding::error("zip_multi_disk", "one part of a zip over several disks").hint(AGAIN)
         );
     }
-    if u64::from(count) > max_entries {
+    let count = end.counts[1];
+    if count > max_entries {
         let message = format!("{count} entries, over the limit of {max_entries}");
         return Err(Finding::error("limit_entries", message)
             .hint("hand in only the files of the tree, no build folder"));
     }
-    let (size, offset) = (size as usize, offset as usize);
-    if size > at || offset + size > at {
+    let start = usize::try_from(end.size).ok().and_then(|size| records.checked_sub(size));
+    let offset = usize::try_from(end.offset).ok();
+    let base = start.zip(offset).and_then(|(start, offset)| start.checked_sub(offset));
+    let (Some(start), Some(offset), Some(base)) = (start, offset, base) else {
         let message = format!(
-            "the directory (at {offset}, {size} bytes) reaches past its end record at byte {at}"
+            "the directory (at {}, {} bytes) reaches past its end record at byte {records}",
+            end.offset, end.size
         );
         return Err(Finding::error("zip_directory", message).hint(AGAIN));
+    };
+    if start < records && !bytes[start..].starts_with(CENTRAL) {
+        let message = format!("expected the directory at byte {start}, found something else");
+        return Err(Finding::error("zip_directory", message).hint(AGAIN));
     }
-    if offset + size < at {
-        let extra = at - offset - size;
-        let code = if bytes[at - size..].starts_with(CENTRAL) {
-            "zip_data_before"
-        } else {
-            "zip_directory"
-        };
-        let message = format!("{extra} bytes before or inside the zip belong to no part of it");
-        return Err(Finding::error(code, message).hint(AGAIN));
+    if base > 0 && bytes[offset..].starts_with(CENTRAL) {
+        let message = format!("two directories end this zip, at byte {offset} and at byte {start}");
+        return Err(Finding::error("zip_two_directories", message).hint(AGAIN));
     }
-    Ok(Directory { start: offset, end: at, count: usize::from(count) })
+    Ok(Directory { base, start, end: records, count, records_end: at + END_SIZE, comment })
+}
+
+/// What the end record at `at` says, and where the directory ends: at it, or at a zip64 record before it.
+/// Both must say the same.
+fn end_record(bytes: &[u8], at: usize) -> Result<(End, usize), Finding> {
+    let field16 = |offset| u16_at(bytes, at + offset).unwrap_or(0);
+    let field32 = |offset| u32_at(bytes, at + offset).unwrap_or(0);
+    let end = End {
+        disks: [field16(4).into(), field16(6).into()],
+        counts: [field16(8).into(), field16(10).into()],
+        size: field32(12).into(),
+        offset: field32(16).into(),
+    };
+    let locator = at.checked_sub(ZIP64_LOCATOR_SIZE);
+    let locator = locator.filter(|&at| bytes[at..].starts_with(ZIP64_LOCATOR));
+    let full = |value: u64, max: u32| value == u64::from(max);
+    let wide = [end.size, end.offset].iter().any(|value| full(*value, ZIP64))
+        || full(end.counts[1], u16::MAX.into());
+    let refuse = |message: &str| Err(Finding::error("zip64", message).hint(AGAIN));
+    let Some(locator) = locator else {
+        return if wide { refuse("the zip64 records are missing") } else { Ok((end, at)) };
+    };
+    let record = locator.checked_sub(ZIP64_END_SIZE);
+    let record = record.filter(|&at| bytes[at..].starts_with(ZIP64_END));
+    let Some(record) = record.filter(|&at| u64_at(bytes, at + 4) == Some(44)) else {
+        return refuse("expected a zip64 record before its locator, found something else");
+    };
+    let field32 = |offset| u32_at(bytes, record + offset).unwrap_or(u32::MAX);
+    let field64 = |offset| u64_at(bytes, record + offset).unwrap_or(u64::MAX);
+    let wide = End {
+        disks: [field32(16), field32(20)],
+        counts: [field64(24), field64(32)],
+        size: field64(40),
+        offset: field64(48),
+    };
+    // A field of the plain record is full where the zip64 one counts.
+    let same = |plain: u64, full: u64, wide: u64| plain == full || plain == wide;
+    let (full16, full32) = (u64::from(u16::MAX), u64::from(ZIP64));
+    let agree = same(end.size, full32, wide.size)
+        && same(end.offset, full32, wide.offset)
+        && (0..2).all(|i| same(end.counts[i], full16, wide.counts[i]))
+        && (0..2).all(|i| same(end.disks[i].into(), full16, wide.disks[i].into()));
+    // The locator's place, counted as all offsets are.
+    let place = u64_at(bytes, locator + 8);
+    let expected = wide.offset.checked_add(wide.size);
+    if !agree || place.is_none() || place != expected {
+        return refuse("the zip64 records say something else than the end record");
+    }
+    if u32_at(bytes, locator + 4) != Some(0) || u32_at(bytes, locator + 16) > Some(1) {
+        return Err(
+            Finding::error("zip_multi_disk", "one part of a zip over several disks").hint(AGAIN)
+        );
+    }
+    Ok((wide, record))
 }
 
 fn read_directory<'a>(
@@ -141,7 +216,7 @@ fn read_directory<'a>(
         at = header.end;
         count += 1;
         copy.count_entry()?;
-        match check_entry(bytes, &header, directory.start) {
+        match check_entry(bytes, &header, directory.base, directory.start) {
             Ok(entry) => entries.push(entry),
             Err(finding) => copy.findings.push(finding.at(printable_bytes(header.name))),
         }
@@ -156,31 +231,72 @@ fn read_directory<'a>(
     Ok(entries)
 }
 
-/// Entries must follow each other without overlap from the first byte on.
-fn check_ranges(entries: &[Entry<'_>], directory: usize, copy: &mut PrivateCopy<'_>) {
+/// Entries must not overlap, and bytes that belong to no entry must hold no record: another reader could
+/// find another archive in them.
+fn check_ranges(
+    bytes: &[u8],
+    entries: &[Entry<'_>],
+    directory: &Directory,
+    copy: &mut PrivateCopy<'_>,
+) {
     let mut order: Vec<&Entry<'_>> = entries.iter().collect();
     order.sort_by_key(|entry| (entry.start, entry.end));
+    let mut free = Vec::new();
     let mut end = 0;
-    let mut gap = 0;
     for (i, entry) in order.iter().enumerate() {
         if entry.start < end {
             let message =
                 format!("overlaps '{}' in the archive's bytes", order[i.saturating_sub(1)].shown());
             copy.findings
                 .push(Finding::error("zip_overlap", message).at(entry.shown()).hint(AGAIN));
-        } else if i == 0 && entry.start > 0 && !copy.findings.has_errors() {
-            let message = format!("{} bytes stand before the first entry", entry.start);
-            copy.findings
-                .push(Finding::error("zip_data_before", message).at(entry.shown()).hint(AGAIN));
-        } else {
-            gap += entry.start - end;
         }
+        free.push(end..entry.start.max(end));
         end = end.max(entry.end);
     }
-    gap += directory.saturating_sub(end);
-    if gap > 0 && !copy.findings.has_errors() {
-        let message = format!("{gap} bytes between the entries belong to none of them");
-        copy.findings.push(Finding::warning("zip_gap", message));
+    free.push(end..directory.start.max(end));
+    free.push(directory.records_end..bytes.len());
+    if copy.findings.has_errors() {
+        return;
+    }
+    let holds_record = |range: &Range<usize>| {
+        let free = bytes[range.clone()].windows(4);
+        free.filter(|bytes| bytes.starts_with(b"PK")).any(|b| [LOCAL, CENTRAL, END].contains(&b))
+    };
+    if let Some(range) = free.iter().find(|range| holds_record(range)) {
+        let message = format!(
+            "bytes {} to {} belong to no entry, but hold records of another zip: this one can be read in two \
+             ways",
+            range.start, range.end
+        );
+        copy.findings.push(Finding::error("zip_two_directories", message).hint(AGAIN));
+        return;
+    }
+    let mut lengths = free.iter().map(Range::len);
+    let before = lengths.next().unwrap_or_default();
+    let after = lengths.next_back().unwrap_or_default();
+    // Without an entry, what stands before the directory is before and between.
+    let between: usize = lengths.sum();
+    let mut warn =
+        |code: &str, message: String| copy.findings.push(Finding::warning(code, message));
+    if before > 0 {
+        warn("zip_data_before", format!("{before} bytes before the zip belong to no part of it"));
+    }
+    if between > 0 {
+        warn("zip_gap", format!("{between} bytes between the entries belong to none of them"));
+    }
+    if after < directory.comment {
+        let message = format!("expected a comment of {} bytes, found {after}", directory.comment);
+        warn("zip_comment_cut", message);
+    }
+    let tail = &bytes[bytes.len() - after.saturating_sub(directory.comment)..];
+    if tail.iter().any(|byte| *byte != 0) {
+        warn(
+            "zip_data_after",
+            format!("{} bytes after the zip belong to no part of it", tail.len()),
+        );
+    } else if !tail.is_empty() {
+        let message = format!("{} zeros after the zip", tail.len());
+        copy.findings.push(Finding::note("zip_padding", message));
     }
 }
 

@@ -5,12 +5,15 @@ use flate2::Crc;
 use super::finding::{Finding, printable_bytes};
 use super::zip::AGAIN;
 
-const LOCAL: &[u8] = b"PK\x03\x04";
+pub(super) const LOCAL: &[u8] = b"PK\x03\x04";
 pub(super) const CENTRAL: &[u8] = b"PK\x01\x02";
 const DESCRIPTOR: &[u8] = b"PK\x07\x08";
 const CENTRAL_SIZE: usize = 46;
 const LOCAL_SIZE: usize = 30;
+/// What a field holds when a zip64 record or field holds its value.
 pub(super) const ZIP64: u32 = u32::MAX;
+/// The attribute of folders of MS-DOS and Windows.
+const DOS_FOLDER: u32 = 0x10;
 
 /// One entry whose two headers agree.
 pub(super) struct Entry<'a> {
@@ -19,12 +22,19 @@ pub(super) struct Entry<'a> {
     pub(super) unpacked_bytes: u64,
     pub(super) crc32: u32,
     pub(super) data: &'a [u8],
+    /// Whether the file system that it comes from says that it is a folder.
+    pub(super) marked_folder: bool,
     /// Bytes of the archive that it takes: local header, data, descriptor.
     pub(super) start: usize,
     pub(super) end: usize,
 }
 
 impl Entry<'_> {
+    /// A folder's name ends with a slash, but some programs only mark it.
+    pub(super) fn is_folder(&self) -> bool {
+        self.name.ends_with(b"/") || self.marked_folder && self.unpacked_bytes == 0
+    }
+
     pub(super) fn shown(&self) -> String {
         printable_bytes(&self.name)
     }
@@ -35,11 +45,12 @@ pub(super) struct Central<'a> {
     pub(super) flags: u16,
     pub(super) method: u16,
     pub(super) crc32: u32,
+    /// Plain fields; [`ZIP64`] where a zip64 field counts.
     pub(super) packed: u32,
     pub(super) unpacked: u32,
     pub(super) disk: u16,
     pub(super) attributes: u32,
-    pub(super) local: usize,
+    pub(super) local: u32,
     pub(super) name: &'a [u8],
     pub(super) extra: &'a [u8],
     pub(super) end: usize,
@@ -62,7 +73,7 @@ impl<'a> Central<'a> {
             unpacked: u32_at(bytes, at + 24)?,
             disk: u16_at(bytes, at + 34)?,
             attributes: u32_at(bytes, at + 38)?,
-            local: u32_at(bytes, at + 42)? as usize,
+            local: u32_at(bytes, at + 42)?,
             name: &bytes[at + CENTRAL_SIZE..name_end],
             extra: &bytes[name_end..extra_end],
             end,
@@ -70,32 +81,34 @@ impl<'a> Central<'a> {
     }
 }
 
-/// Checks one entry: what it is, and that its local header says the same as the directory.
+/// Checks one entry: what it is, and that its local header says the same as the directory. `base` is what
+/// the archive's offsets count from, `limit` where the directory begins.
 pub(super) fn check_entry<'a>(
     bytes: &'a [u8],
     central: &Central<'_>,
+    base: usize,
     limit: usize,
 ) -> Result<Entry<'a>, Finding> {
     check_kind(central)?;
-    let at = central.local;
-    let header = bytes[..limit].get(at..).and_then(|rest| rest.get(..LOCAL_SIZE));
-    let Some(header) = header.filter(|header| header.starts_with(LOCAL)) else {
-        let message = format!("expected the entry's own header at byte {at}, found something else");
+    let plain = [central.unpacked, central.packed, central.local];
+    let [unpacked, packed, local] = wide(plain, central.disk == u16::MAX, central.extra)?;
+    let at = usize::try_from(local).ok().and_then(|local| local.checked_add(base));
+    let header = at.and_then(|at| bytes[..limit].get(at..)?.get(..LOCAL_SIZE));
+    let (Some(at), Some(header)) = (at, header.filter(|header| header.starts_with(LOCAL))) else {
+        let message =
+            format!("expected the entry's own header at byte {local}, found something else");
         return Err(Finding::error("zip_local_missing", message).hint(AGAIN));
     };
     let field16 = |offset| u16_at(header, offset).unwrap_or(0);
     let field32 = |offset| u32_at(header, offset).unwrap_or(0);
-    let (flags, method) = (field16(6), field16(8));
-    let (crc32, packed, unpacked) = (field32(14), field32(18), field32(22));
     let name_end = at + LOCAL_SIZE + usize::from(field16(26));
     let data_start = name_end + usize::from(field16(28));
-    let data_end = data_start + central.packed as usize;
-    if data_end > limit {
-        let message = format!(
-            "its data would end at byte {data_end}, inside or after the directory at {limit}"
-        );
+    let data_end = usize::try_from(packed).ok().and_then(|packed| data_start.checked_add(packed));
+    let Some(data_end) = data_end.filter(|&end| end <= limit) else {
+        let message =
+            format!("its {packed} bytes of data would reach into the directory at {limit}");
         return Err(Finding::error("zip_data_outside", message).hint(AGAIN));
-    }
+    };
     let name = &bytes[at + LOCAL_SIZE..name_end];
     let extra = &bytes[name_end..data_start];
     if name != central.name {
@@ -103,40 +116,56 @@ pub(super) fn check_entry<'a>(
             format!("the directory names it so, its own header '{}'", printable_bytes(name));
         return Err(disagree(message));
     }
-    // Flags that change the meaning of the data or of the header: encryption and descriptor.
-    const MEANING: u16 = 1 | 8 | 0x20 | 0x40 | 0x2000;
-    let same_flags = flags & MEANING == central.flags & MEANING;
-    if !same_flags {
+    // Flags that change the meaning of the data: encryption, patches. Whether a descriptor follows the data is
+    // the local header's to say.
+    const MEANING: u16 = 1 | 0x20 | 0x40 | 0x2000;
+    let flags = field16(6);
+    if flags & MEANING != central.flags & MEANING {
         let message =
             format!("flags: directory {:#06x}, its own header {flags:#06x}", central.flags);
         return Err(disagree(message));
     }
-    agree("compression method", central.method.into(), method.into())?;
-    let sizes = local_sizes(packed, unpacked, extra)?;
+    agree("compression method", central.method.into(), field16(8).into())?;
     let has_descriptor = flags & 8 != 0;
-    let is_deferred = has_descriptor && (crc32, sizes) == (0, (0, 0));
-    if !is_deferred {
-        agree("crc32", central.crc32.into(), crc32.into())?;
-        agree("packed size", central.packed.into(), sizes.0)?;
-        agree("unpacked size", central.unpacked.into(), sizes.1)?;
+    let [local_unpacked, local_packed] = wide([field32(22), field32(18)], false, extra)?;
+    // A writer that streams leaves zeros for what it does not know yet, one by one.
+    let mut is_deferred = false;
+    for (what, central, local) in [
+        ("crc32", u64::from(central.crc32), u64::from(field32(14))),
+        ("packed size", packed, local_packed),
+        ("unpacked size", unpacked, local_unpacked),
+    ] {
+        if has_descriptor && local == 0 {
+            is_deferred |= central != 0;
+        } else {
+            agree(what, central, local)?;
+        }
     }
-    let end = data_end
-        + if has_descriptor { descriptor_size(&bytes[data_end..limit], central)? } else { 0 };
-    if central.method == 0 && central.packed != central.unpacked {
+    let rest = &bytes[data_end..limit];
+    let descriptor = match descriptor_size(rest, central.crc32, packed, unpacked) {
+        Some(size) if has_descriptor => size,
+        // A descriptor may be promised and left out where nothing was deferred, as of folders.
+        _ if has_descriptor && (is_deferred || rest.starts_with(DESCRIPTOR)) => {
+            let message = "the descriptor after its data says something else than the directory";
+            return Err(disagree(message.to_owned()));
+        }
+        _ => 0,
+    };
+    if central.method == 0 && packed != unpacked {
         let message = format!(
-            "stored without compression, yet {} bytes packed and {} unpacked",
-            central.packed, central.unpacked
+            "stored without compression, yet {packed} bytes packed and {unpacked} unpacked"
         );
         return Err(Finding::error("zip_size", message).hint(AGAIN));
     }
     Ok(Entry {
         name: effective_name(central.name, central.extra)?,
         deflated: central.method == 8,
-        unpacked_bytes: central.unpacked.into(),
+        unpacked_bytes: unpacked,
         crc32: central.crc32,
         data: &bytes[data_start..data_end],
+        marked_folder: central.attributes >> 28 == 0o4 || central.attributes & DOS_FOLDER != 0,
         start: at,
-        end,
+        end: data_end + descriptor,
     })
 }
 
@@ -183,14 +212,7 @@ fn check_kind(central: &Central<'_>) -> Result<(), Finding> {
             .hint("leave it out"));
         }
     }
-    let has_zip64 = [central.packed, central.unpacked, central.local as u32].contains(&ZIP64)
-        || extra_field(central.extra, 1).is_some();
-    if has_zip64 {
-        return Err(
-            Finding::error("zip64", "zip64 sizes, which no hand-in of this size needs").hint(AGAIN)
-        );
-    }
-    if central.disk != 0 {
+    if ![0, u16::MAX].contains(&central.disk) {
         return Err(Finding::error("zip_multi_disk", "the entry lies on another disk").hint(AGAIN));
     }
     Ok(())
@@ -207,39 +229,67 @@ fn agree(what: &str, central: u64, local: u64) -> Result<(), Finding> {
     Err(disagree(format!("{what}: the directory says {central}, the entry's own header {local}")))
 }
 
-/// Sizes (packed, unpacked) of a local header. Writers that stream use zip64 sizes here although
-/// they are small; they must then agree like any other.
-fn local_sizes(packed: u32, unpacked: u32, extra: &[u8]) -> Result<(u64, u64), Finding> {
-    if packed != ZIP64 && unpacked != ZIP64 {
-        return Ok((packed.into(), unpacked.into()));
-    }
-    let field = extra_field(extra, 1);
-    let sizes = field.and_then(|field| Some((u64_at(field, 8)?, u64_at(field, 0)?)));
-    match sizes {
-        Some(sizes) if packed == ZIP64 && unpacked == ZIP64 => Ok(sizes),
-        _ => Err(Finding::error("zip64", "zip64 sizes that do not fit together").hint(AGAIN)),
-    }
+/// The fields of a header that a zip64 field may hold instead, in its order (unpacked size, packed size, place
+/// of the local header). It holds those that are full in the header; some writers repeat the others, which
+/// must then agree.
+fn wide<const N: usize>(
+    plain: [u32; N],
+    disk_too: bool,
+    extra: &[u8],
+) -> Result<[u64; N], Finding> {
+    let refuse = |message: &str| Err(Finding::error("zip64", message).hint(AGAIN));
+    let is_full = plain.map(|value| value == ZIP64);
+    let full = is_full.iter().filter(|full| **full).count();
+    let mut values = plain.map(u64::from);
+    let Some(field) = extra_field(extra, 1) else {
+        return if full > 0 { refuse("the zip64 sizes are missing") } else { Ok(values) };
+    };
+    let given: Vec<u64> = (0..field.len() / 8).filter_map(|i| u64_at(field, 8 * i)).collect();
+    // The disk's number follows where it is full, or where all is repeated.
+    let disk = field.get(8 * given.len()..).unwrap_or_default();
+    let disk_fits = match disk.len() {
+        0 => !disk_too,
+        4 => disk == [0; 4],
+        _ => false,
+    };
+    let fits = if given.len() == full {
+        let own = values.iter_mut().zip(is_full).filter(|(_, full)| *full);
+        own.zip(&given).for_each(|((value, _), given)| *value = *given);
+        true
+    } else {
+        let beyond = is_full.iter().skip(given.len()).any(|full| *full);
+        let mut own = values.iter_mut().zip(is_full).zip(&given);
+        !beyond
+            && given.len() <= N
+            && own.all(|((value, full), given)| {
+                let agrees = full || *value == *given;
+                *value = *given;
+                agrees
+            })
+    };
+    if fits && disk_fits { Ok(values) } else { refuse("zip64 sizes that do not fit together") }
 }
 
-/// Size of the descriptor after an entry's data, which must repeat what the directory says: with or
-/// without signature, with 32- or 64-bit sizes.
-fn descriptor_size(rest: &[u8], central: &Central<'_>) -> Result<usize, Finding> {
+/// Size of the descriptor after an entry's data, when it repeats what the directory says: with or
+/// without signature, with 64- or 32-bit sizes. The longer one first: the shorter one is its beginning where an
+/// entry is empty.
+fn descriptor_size(rest: &[u8], crc32: u32, packed: u64, unpacked: u64) -> Option<usize> {
     for signature in [DESCRIPTOR, b""] {
         let Some(body) = rest.strip_prefix(signature) else {
             continue;
         };
-        if u32_at(body, 0) != Some(central.crc32) {
+        if u32_at(body, 0) != Some(crc32) {
             continue;
         }
-        if (u32_at(body, 4), u32_at(body, 8)) == (Some(central.packed), Some(central.unpacked)) {
-            return Ok(signature.len() + 12);
+        if (u64_at(body, 4), u64_at(body, 12)) == (Some(packed), Some(unpacked)) {
+            return Some(signature.len() + 20);
         }
-        let sizes = (Some(central.packed.into()), Some(central.unpacked.into()));
-        if (u64_at(body, 4), u64_at(body, 12)) == sizes {
-            return Ok(signature.len() + 20);
+        let sizes = (u32_at(body, 4).map(u64::from), u32_at(body, 8).map(u64::from));
+        if sizes == (Some(packed), Some(unpacked)) {
+            return Some(signature.len() + 12);
         }
     }
-    Err(disagree("the descriptor after its data says something else than the directory".to_owned()))
+    None
 }
 
 /// The name, or its UTF-8 form from Info-ZIP's extra field 0x7075, which may only replace a name

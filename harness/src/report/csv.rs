@@ -4,10 +4,11 @@ use super::number::{is_range, of_part, points};
 use super::{Entry, ReportError, Sheet, harmless};
 
 /// The grades as CSV (UTF-8, comma, `\n`). The columns are student id, last and first name, name of
-/// the hand-in, the parts, total, what it is out of, lowest and highest, remarks.
+/// the hand-in, the parts, total, what it is out of, lowest and highest, unconfirmed, remarks.
 ///
 /// `total` is empty where the hand-in could not be judged wholly, so that nobody imports a number
-/// that is not decided; `lowest` and `highest` are filled only there. A part that is a range reads
+/// that is not decided; `lowest` and `highest` are filled only there. `unconfirmed` is what images
+/// alone are worth once the instructor confirms them, and empty where that is nothing. A part that is a range reads
 /// `0..20`.
 ///
 /// # Errors
@@ -20,7 +21,7 @@ pub fn grades(sheet: &Sheet) -> Result<String, ReportError> {
     let mut writer = ::csv::Writer::from_writer(Vec::new());
     let mut head = vec!["student_id", "last_name", "first_name", "hand_in"];
     head.extend(sheet.rules.parts.iter().map(|part| part.id.as_str()));
-    head.extend(["total", "out_of", "lowest", "highest", "remarks"]);
+    head.extend(["total", "out_of", "lowest", "highest", "unconfirmed", "remarks"]);
     let head = head.into_iter().map(cell);
     writer.write_record(head).map_err(|error| format(error.to_string()))?;
     for entry in &sheet.entries {
@@ -49,6 +50,7 @@ fn row(sheet: &Sheet, Entry { record, grade }: &Entry) -> Vec<String> {
     row.push(points(grade.out_of));
     row.push(only(open, grade.points));
     row.push(only(open, grade.points_max));
+    row.push(only(grade.unconfirmed > 0.0, grade.unconfirmed));
     row.push(grade.remarks.join("; "));
     row
 }
@@ -80,10 +82,10 @@ mod tests {
         assert_eq!(
             grades(&sample::sheet()).unwrap(),
             "\
-student_id,last_name,first_name,hand_in,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,lowest,highest,remarks
-260000001,Lovelace,Ada,a2_ada.zip,5,10,20,15,25,20,95,75,,,
-0260000002,Müller,Jörg,two_cosines.tar.gz,5,10,9.85,15,25,0..20,,75,64.85,84.85,
-260000003,山田,花子,山田_花子.zip,2.25,0,8.13,0,12.5,0,22.88,75,,,\"the source does not build: graded on the images alone, an instructor confirms\"
+student_id,last_name,first_name,hand_in,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,lowest,highest,unconfirmed,remarks
+260000001,Lovelace,Ada,a2_ada.zip,5,10,20,15,25,20,95,75,,,,
+0260000002,Müller,Jörg,two_cosines.tar.gz,5,10,9.85,15,25,0..20,,75,64.85,84.85,,
+260000003,山田,花子,山田_花子.zip,0,0,0,0,0,0,0,75,,,11.44,the source does not build; the images alone earn 11.44 points once the instructor confirms
 "
         );
     }

@@ -56,6 +56,8 @@ struct HandIn<'a> {
     conditions: usize,
     points: f64,
     points_max: f64,
+    /// What the images alone are worth once the instructor confirms them.
+    unconfirmed: f64,
     out_of: f64,
     remarks: &'a [String],
     parts: &'a [PartGrade],
@@ -120,6 +122,7 @@ fn hand_in<'a>(Entry { record, grade }: &'a Entry, conditions: &[&Conditions]) -
         conditions: conditions.iter().position(|&c| *c == record.conditions).unwrap_or_default(),
         points: grade.points,
         points_max: grade.points_max,
+        unconfirmed: grade.unconfirmed,
         out_of: grade.out_of,
         remarks: &grade.remarks,
         parts: &grade.parts,

@@ -1,7 +1,7 @@
 //! What is shown: a console text, `report.json`, `grades.csv` and HTML pages.
 //!
-//! What a student gets is the folder `<slug>/` of his hand-in: of held-back scenes it tells only
-//! whether they are right and how wrong. All else is the instructor's: the files of the batch, and
+//! What a student gets is the folder `<slug>/` of their submission: of held-back scenes it tells only
+//! whether they are right and how wrong, it names no other submission and leads nowhere else. All else is the instructor's: the files of the batch, and
 //! `instructor/<slug>/` with all that was found out.
 //!
 //! It decides nothing. Every format lets a hand-in's words through one gate, [`harmless`], and adds
@@ -31,6 +31,7 @@ pub use self::json::{SCHEMA, VERSION, report as json_report};
 pub use self::text::{detail as text_detail, table as text_table};
 
 use crate::assignment::Assignment;
+use crate::evidence::Check;
 use crate::files::write_whole;
 use crate::grading::Record;
 use crate::held_back::HeldBack;
@@ -75,18 +76,26 @@ pub struct Sheet {
 
 impl Entry {
     /// Whether there is more to know than the student may.
-    pub fn has_held_back(&self) -> bool {
-        self.record.evidence.checks.iter().any(|check| check.held_back)
+    pub fn has_private(&self, rules: &Rules) -> bool {
+        let private = |check: &Check| check.held_back || !check.private.is_empty();
+        self.record.evidence.checks.iter().any(private)
+            || self.grade.remarks.iter().any(|remark| is_private(remark, rules))
     }
 
     /// The entry as its student may read it.
-    pub fn for_student(&self) -> Self {
+    pub fn for_student(&self, rules: &Rules) -> Self {
         let mut entry = self.clone();
         for check in &mut entry.record.evidence.checks {
             *check = check.for_student();
         }
+        entry.grade.remarks.retain(|remark| !is_private(remark, rules));
         entry
     }
+}
+
+/// Whether a remark is the reason of a gate that only instructors read.
+fn is_private(remark: &str, rules: &Rules) -> bool {
+    rules.gates.iter().any(|gate| gate.private && gate.reason == remark)
 }
 
 /// Why there is no report.
@@ -163,7 +172,7 @@ impl Sheet {
 
 /// Writes `report.json`, `grades.csv`, `report.html`, and `<slug>/report.html` for each hand-in,
 /// into the folder `out`, which is made when missing, and `instructor/<slug>/report.html` where
-/// scenes were held back. The pictures are expected to lie in `<slug>/`, those of held-back scenes
+/// there is more to know than the student may. The pictures are expected to lie in `<slug>/`, those of held-back scenes
 /// in `instructor/<slug>/` already.
 ///
 /// Each file appears whole or not at all; the pages of the hand-ins come first, so that
@@ -177,7 +186,7 @@ pub fn write(out: &Path, sheet: &Sheet) -> Result<(), ReportError> {
         let slug = &entry.record.slug;
         let page = html_hand_in(sheet, entry, Reader::Student);
         put(&out.join(slug), HTML_FILE, page.as_bytes())?;
-        if entry.has_held_back() {
+        if entry.has_private(&sheet.rules) {
             let page = html_hand_in(sheet, entry, Reader::Instructor);
             put(&out.join(INSTRUCTOR).join(slug), HTML_FILE, page.as_bytes())?;
         }

@@ -70,6 +70,7 @@ fn entry(name: &str, slug: &str, student: [&str; 3], conditions: Conditions) -> 
         parts: Vec::new(),
         points: 0.0,
         points_max: 0.0,
+        unconfirmed: 0.0,
         out_of: 75.0,
         remarks: Vec::new(),
     };
@@ -99,6 +100,7 @@ fn grade(entry: &mut Entry, parts: [(f64, f64, &str, &str); 6]) {
             bonus: part.bonus,
             points,
             points_max,
+            unconfirmed: 0.0,
             reason: reason.into(),
             evidence: evidence.split(", ").filter(|e| !e.is_empty()).map(str::to_owned).collect(),
         })
@@ -242,32 +244,46 @@ fn does_not_build() -> Entry {
     let student = ["花子", "山田", "260000003"];
     let mut entry =
         entry("山田_花子.zip", "hand_in_3", student, conditions("none: no Vulkan driver"));
-    let lost = "the source does not build and no image shows this part";
+    let lost = "there is no code to judge, and no image shows this part";
     grade(
         &mut entry,
         [
             (
-                2.25,
-                2.25,
-                "pixels of diffuse materials are off by 0.5 %",
+                0.0,
+                0.0,
+                "1.13 once the instructor confirms: pixels of diffuse materials are off by 0.5 %",
                 "handed_in.offline.diffuse",
             ),
             (0.0, 0.0, lost, ""),
-            (8.13, 8.13, "lit pixels are off by 2 %", "handed_in.offline.lit"),
+            (
+                0.0,
+                0.0,
+                "4.06 once the instructor confirms: lit pixels are off by 2 %",
+                "handed_in.offline.lit",
+            ),
             (0.0, 0.0, lost, ""),
-            (12.5, 12.5, "pixels of Phong materials are right", "handed_in.realtime.phong"),
+            (
+                0.0,
+                0.0,
+                "6.25 once the instructor confirms: pixels of Phong materials are right",
+                "handed_in.realtime.phong",
+            ),
             (0.0, 0.0, lost, ""),
         ],
     );
+    for (part, unconfirmed) in [(0, 1.13), (2, 4.06), (4, 6.25)] {
+        entry.grade.parts[part].unconfirmed = unconfirmed;
+    }
+    entry.grade.unconfirmed = 11.44;
     entry.grade.remarks = vec![
-        "the source does not build: graded on the images alone, an instructor confirms".into(),
+        "the source does not build; the images alone earn 11.44 points once the instructor confirms".into(),
     ];
     entry.record.diagnostics = "error[E0308]: mismatched types\n  --> src/bsdfs/phong.rs:21:9\n   |\n21 |         \
                                 scale * kd\n   |         ^^^^^^^^^^ expected `Vec3`, found `f32`\n\nerror: aborting \
                                 due to 1 previous error\n"
         .into();
     entry.record.evidence.checks =
-        vec![check("hand_in.build", "", Verdict::Fail, "the source does not build: 1 error", &[])];
+        vec![check("hand_in.build", "", Verdict::Fail, "the source does not build", &[])];
     entry.record.findings = vec![
         Finding::error("config_empty", "studentID is empty")
             .at("config.json")

@@ -66,3 +66,75 @@ fn what_cannot_be_written_names_its_file() {
     let error = write(out.path(), &sample::sheet()).unwrap_err().to_string();
     assert!(error.contains("a2_ada") && error.contains("cannot write the report"), "{error}");
 }
+
+/// All bytes of all files below a folder, their paths included.
+fn all_bytes(folder: &Path) -> Vec<u8> {
+    let files = crate::files::files_below(folder).unwrap();
+    let read = |path: &PathBuf| {
+        let name = path.strip_prefix(folder).unwrap().as_os_str().as_encoded_bytes().to_vec();
+        [name, fs::read(path).unwrap()].concat()
+    };
+    files.iter().flat_map(read).collect()
+}
+
+#[test]
+fn a_student_folder_names_nobody_else_has_no_note_for_instructors_and_leads_nowhere() {
+    let mut sheet = sample::sheet();
+    let mut records: Vec<Record> = sheet.entries.iter().map(|entry| entry.record.clone()).collect();
+    let number = records[0].student.id.clone();
+    for record in &mut records {
+        // All hand in one image; two go by one number.
+        record.images = vec![crate::grading::ImageDigest {
+            scene: "teapot".into(),
+            path: "offline/a.exr".into(),
+            sha256: "same".into(),
+        }];
+    }
+    records[1].student.id = number;
+    crate::grading::judge_shared(&mut records);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let gates = Assignment::load(root).unwrap().rules.gates;
+    for (entry, record) in sheet.entries.iter_mut().zip(records) {
+        let failed = |check: &&Check| check.verdict == crate::evidence::Verdict::Fail;
+        let failed = record.evidence.checks.iter().filter(failed);
+        let closed = failed.flat_map(|check| gates.iter().filter(|gate| gate.check == check.id));
+        let remarks = closed.map(|gate| gate.reason.clone()).collect::<Vec<_>>();
+        assert!(!remarks.is_empty());
+        entry.grade.remarks.extend(remarks);
+        entry.record = record;
+    }
+    sheet.rules.gates = gates;
+    let out = tempfile::tempdir().unwrap();
+    write(out.path(), &sheet).unwrap();
+    for entry in &sheet.entries {
+        let folder = out.path().join(&entry.record.slug);
+        let bytes = all_bytes(&folder);
+        let has =
+            |needle: &str| bytes.windows(needle.len()).any(|window| window == needle.as_bytes());
+        assert!(has(&entry.record.name) && has("another submission"));
+        assert!(!has("or the instructor:"), "a note for the instructor");
+        for Entry { record: other, .. } in sheet.entries.iter().filter(|other| *other != entry) {
+            let student = &other.student;
+            for name in [&other.name, &other.slug, &student.full_name(), &student.last_name] {
+                assert!(!has(name), "{name} is in the folder of {}", entry.record.name);
+            }
+            assert!(student.id == entry.record.student.id || !has(&student.id));
+        }
+        let page = fs::read_to_string(folder.join(HTML_FILE)).unwrap();
+        for quoted in
+            ["href=\"", "src=\""].iter().flat_map(|attribute| page.split(attribute).skip(1))
+        {
+            let target = quoted.split('"').next().unwrap();
+            let there = match target.strip_prefix('#') {
+                Some(id) => page.contains(&format!("id=\"{id}\"")),
+                None => !target.contains("..") && folder.join(target).is_file(),
+            };
+            assert!(there, "{target} on the page of {}", entry.record.name);
+        }
+        // What the student's page leaves out stands on the instructor's.
+        let page = out.path().join(INSTRUCTOR).join(&entry.record.slug).join(HTML_FILE);
+        let page = fs::read_to_string(page).unwrap();
+        assert!(page.contains("For the instructor: the same image is in"));
+        assert!(page.contains("for the instructor: another submission holds the same image"));
+    }
+}

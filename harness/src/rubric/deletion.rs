@@ -90,10 +90,10 @@ mod tests {
     }
 
     /// What a hand-in is worth, and what an instructor is told.
-    fn worth(rules: &Rules, evidence: &Evidence) -> (f64, f64, Vec<String>) {
+    fn worth(rules: &Rules, evidence: &Evidence) -> (f64, f64, f64, Vec<String>) {
         let mut grade = grade(rules, evidence);
         grade.remarks.extend(grade.parts.into_iter().map(|part| part.reason));
-        (grade.points, grade.points_max, grade.remarks)
+        (grade.points, grade.points_max, grade.unconfirmed, grade.remarks)
     }
 
     /// What only a hand-in can break: images without a source, a tree, an image's size, a crash.

@@ -21,6 +21,9 @@ pub struct Grade {
     pub points_max: f64,
     /// The points of all parts that are no bonus.
     pub out_of: f64,
+    /// What the images alone are worth once the instructor confirms them; in neither of the two above.
+    #[serde(default)]
+    pub unconfirmed: f64,
     /// Gates that are closed, and other remarks on the whole.
     pub remarks: Vec<String>,
 }
@@ -40,6 +43,9 @@ pub struct PartGrade {
     pub points: f64,
     /// The most that it may have earned; equal to `points` unless it could not be judged.
     pub points_max: f64,
+    /// What the images alone are worth once the instructor confirms them; in neither of the two above.
+    #[serde(default)]
+    pub unconfirmed: f64,
     /// What decided, in a sentence.
     pub reason: String,
     /// The checks that decided, as `id` or `id @ scene`.
@@ -50,6 +56,7 @@ pub struct PartGrade {
 struct Worth {
     least: f64,
     most: f64,
+    unconfirmed: f64,
     reason: String,
     evidence: Vec<String>,
 }
@@ -132,8 +139,10 @@ fn lower(first: Grade, second: Grade) -> Grade {
         let points = first.points.min(second.points);
         let points_max = first.points_max.min(second.points_max);
         let worth = |part: &PartGrade| (part.points, part.points_max);
+        // No image of a held-back scene is handed in.
+        let unconfirmed = first.unconfirmed;
         let decides = if worth(&second) < worth(&first) { second } else { first };
-        PartGrade { points, points_max, ..decides }
+        PartGrade { points, points_max, unconfirmed, ..decides }
     });
     let mut remarks = first.remarks;
     remarks.extend(second.remarks);
@@ -146,6 +155,7 @@ fn sum(parts: Vec<PartGrade>, out_of: f64, remarks: Vec<String>) -> Grade {
     Grade {
         points: round(parts.iter().map(|part| part.points).sum()),
         points_max: round(parts.iter().map(|part| part.points_max).sum()),
+        unconfirmed: round(parts.iter().map(|part| part.unconfirmed).sum()),
         out_of,
         remarks,
         parts,
@@ -173,15 +183,19 @@ fn grade_together(rules: &Rules, evidence: &Evidence) -> Grade {
     let mut remarks = Vec::new();
     let mut ceiling = 1.0f64;
     for gate in &rules.gates {
-        if evidence.named(&gate.check).any(|check| check.verdict == Verdict::Fail) {
+        let failed = |check: &&Check| check.verdict == Verdict::Fail;
+        let hints = evidence.named(&gate.check).filter(failed).map(|check| &check.hint);
+        if let Some(hint) = hints.min() {
             ceiling = ceiling.min(gate.ceiling);
-            remarks.push(gate.reason.clone());
+            remarks.push(if gate.private || hint.is_empty() {
+                gate.reason.clone()
+            } else {
+                format!("{}: {hint}", gate.reason)
+            });
         }
     }
     if !built {
-        remarks.push(
-            "the source does not build: graded on the images alone, an instructor confirms".into(),
-        );
+        remarks.extend(without_code(rules, evidence, &worths, ceiling));
     }
     let not_run = |check: &&Check| check.verdict == Verdict::NotRun;
     if let Some(check) = evidence.checks.iter().filter(not_run).min_by_key(|check| check.name()) {
@@ -204,6 +218,7 @@ fn grade_together(rules: &Rules, evidence: &Evidence) -> Grade {
             bonus: part.bonus,
             points: round(part.points * worth.least * ceiling),
             points_max: round(part.points * worth.most * ceiling),
+            unconfirmed: round(part.points * worth.unconfirmed * ceiling),
             reason: worth.reason,
             evidence: worth.evidence,
         })
@@ -224,6 +239,7 @@ fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
             return Worth {
                 least: 1.0,
                 most: 1.0,
+                unconfirmed: 0.0,
                 reason: format!("the {} images are right on every scene", part.path),
                 evidence: vec![path.proof.clone()],
             };
@@ -234,20 +250,64 @@ fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
         .unwrap_or_else(|| unjudged(evidence, part))
 }
 
-/// A part of a hand-in that does not build.
+/// A part of a hand-in without code to judge: nothing, until the instructor confirms what the images show.
 fn by_images(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
-    let mut worth = match by_checks(rules, evidence, &part.images_only, part.any_scene) {
-        Some(worth) => worth,
-        None => Worth {
-            least: 0.0,
-            most: 0.0,
-            reason: "the source does not build and no image shows this part".into(),
-            evidence: Vec::new(),
-        },
+    let nothing = |reason: String, evidence| Worth {
+        least: 0.0,
+        most: 0.0,
+        unconfirmed: 0.0,
+        reason,
+        evidence,
     };
-    worth.least *= rules.images_only_ceiling;
-    worth.most *= rules.images_only_ceiling;
-    worth
+    let Some(shown) = by_checks(rules, evidence, &part.images_only, part.any_scene) else {
+        return nothing(
+            "there is no code to judge, and no image shows this part".into(),
+            Vec::new(),
+        );
+    };
+    let trust = rules.images_only_trust.as_ref().filter(|trust| {
+        let mut checks = evidence.named(&trust.check).peekable();
+        part.images_only.contains(&trust.check)
+            && checks.peek().is_some()
+            && checks.all(|check| check.verdict == Verdict::Pass)
+    });
+    let unconfirmed = shown.least * trust.map_or(rules.images_only_ceiling, |trust| trust.ceiling);
+    let points = round(part.points * unconfirmed);
+    let reason = if points == 0.0 {
+        shown.reason
+    } else if trust.is_some() {
+        format!(
+            "{points} once the instructor confirms: there is no code to judge, but an image with the noise of \
+             the student's number: {}",
+            shown.reason
+        )
+    } else {
+        format!(
+            "{points} once the instructor confirms: there is no code to judge, only an image, which anybody's \
+             program may have drawn: {}",
+            shown.reason
+        )
+    };
+    Worth { unconfirmed, ..nothing(reason, shown.evidence) }
+}
+
+/// Why there is no code to judge, and what is worth something all the same.
+fn without_code(
+    rules: &Rules,
+    evidence: &Evidence,
+    worths: &[Worth],
+    ceiling: f64,
+) -> Option<String> {
+    let failed = |check: &&Check| check.verdict != Verdict::Pass;
+    let why = evidence.named(BUILD).filter(failed).map(|check| &check.summary).min()?;
+    let parts = rules.parts.iter().zip(worths);
+    let unconfirmed = parts.map(|(part, worth)| round(part.points * worth.unconfirmed * ceiling));
+    let unconfirmed = round(unconfirmed.sum());
+    Some(if unconfirmed == 0.0 {
+        why.clone()
+    } else {
+        format!("{why}; the images alone earn {unconfirmed} points once the instructor confirms")
+    })
 }
 
 /// What the checks named `ids` say together: the worst counts, or the best where any scene will
@@ -282,7 +342,7 @@ fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String], any_scene: bool
     evidence.sort();
     evidence.dedup();
     let reason = deciding.said().into_owned();
-    Some(Worth { least, most: least, reason, evidence })
+    Some(Worth { least, most: least, unconfirmed: 0.0, reason, evidence })
 }
 
 fn unjudged(evidence: &Evidence, part: &Part) -> Worth {
@@ -294,6 +354,7 @@ fn unjudged(evidence: &Evidence, part: &Part) -> Worth {
     Worth {
         least: 0.0,
         most: if open { 1.0 } else { 0.0 },
+        unconfirmed: 0.0,
         reason: match silent {
             Some(why) => format!("could not be judged: {why}"),
             None => "could not be judged: no evidence was collected".into(),

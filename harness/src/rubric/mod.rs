@@ -9,8 +9,10 @@
 //!    loses the largest of them, never a sum or a mean.
 //! 6. When the proof fails and no part's own evidence says why, the path's `blame` part pays.
 //! 7. What the machine could not ask is a range from 0 to all points, with its reason.
-//! 8. Public and held-back scenes are graded apart by these rules; the lower counts, part by part.
-//! 9. Of the conventions that a path was judged under, the one that is worth most counts.
+//! 8. Without code, a part earns nothing until the instructor confirms what its images show
+//!    ([`PartGrade::unconfirmed`]).
+//! 9. Public and held-back scenes are graded apart by these rules; the lower counts, part by part.
+//! 10. Of the conventions that a path was judged under, the one that is worth most counts.
 
 mod curve;
 mod deletion;
@@ -20,4 +22,4 @@ mod rules;
 pub use curve::Curve;
 pub use deletion::EvidenceRule;
 pub use grade::{BUILD, Grade, PartGrade, grade, settle};
-pub use rules::{Gate, Part, PathRule, Rules};
+pub use rules::{Gate, Part, PathRule, Rules, Trust};

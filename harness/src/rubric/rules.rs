@@ -12,14 +12,29 @@ use super::Curve;
 pub struct Rules {
     /// Error to fraction of points, for failed checks.
     pub curve: Curve,
-    /// Fraction of the points that images alone can earn when the source does not build.
+    /// Fraction of a part's points that images alone can earn when there is no code to judge, once the
+    /// instructor confirms them.
     pub images_only_ceiling: f64,
+    /// What makes images alone worth more.
+    #[serde(default)]
+    pub images_only_trust: Option<Trust>,
     /// What must be in order before anything counts.
     pub gates: Vec<Gate>,
     /// The two halves of the assignment, by name.
     pub paths: BTreeMap<String, PathRule>,
     /// The parts, in the handout's order.
     pub parts: Vec<Part>,
+}
+
+/// A check that shows who drew an image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Trust {
+    /// The check: where all of this name pass, one at least, the images of a part that names it among its
+    /// `images_only` are trusted.
+    pub check: String,
+    /// Fraction of the part's points that they can earn then.
+    pub ceiling: f64,
 }
 
 /// A condition on the whole hand-in.
@@ -32,6 +47,9 @@ pub struct Gate {
     pub ceiling: f64,
     /// Why, in the words of the handout.
     pub reason: String,
+    /// Whether the reason is for the instructor alone.
+    #[serde(default)]
+    pub private: bool,
 }
 
 /// One half of the assignment.
@@ -98,7 +116,9 @@ impl Rules {
                 ));
             }
         }
+        let trust = self.images_only_trust.iter().map(|trust| trust.ceiling);
         let ceilings = self.gates.iter().map(|gate| gate.ceiling).chain([self.images_only_ceiling]);
+        let ceilings = ceilings.chain(trust);
         for ceiling in ceilings {
             if !(0.0..=1.0).contains(&ceiling) {
                 return Some(format!("a ceiling is {ceiling} but must lie in [0, 1]"));

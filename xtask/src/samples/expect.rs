@@ -12,6 +12,8 @@ use umbra::rubric::{self, Rules};
 #[serde(deny_unknown_fields)]
 pub struct Expect {
     total: Option<Range>,
+    /// What its images alone are worth once the instructor confirms.
+    unconfirmed: Option<Range>,
     /// The total on the public scenes alone.
     public: Option<Range>,
     #[serde(default)]
@@ -46,6 +48,11 @@ impl Expect {
         let mut complaints = Vec::new();
         if let Some(range) = self.total {
             complaints.extend(compare("total", hand_in, range));
+        }
+        if let Some(range) = self.unconfirmed {
+            let points = &hand_in["unconfirmed"];
+            let earned = serde_json::json!({ "points": points, "points_max": points });
+            complaints.extend(compare("unconfirmed", &earned, range));
         }
         if let Some(range) = self.public {
             match serde_json::from_value::<Vec<Check>>(hand_in["checks"].clone()) {
@@ -167,6 +174,11 @@ mod tests {
         assert!(
             expect.complaint(&report(55.0, 24.0, 0.5), &rules).contains("found 0.5 to 2 (a range)")
         );
+        let images: Expect = toml::from_str("total = 55\nunconfirmed = 12.5").unwrap();
+        let mut alone = report(55.0, 24.0, 1.5);
+        assert!(images.complaint(&alone, &rules).contains("unconfirmed: expected 12.5"));
+        alone["unconfirmed"] = 12.5.into();
+        assert_eq!(images.complaint(&alone, &rules), "");
         let nothing = serde_json::json!({ "points": 55.0, "points_max": 55.0, "parts": [] });
         assert!(expect.complaint(&nothing, &rules).contains("no part 1.1"));
         assert!(expect.complaint(&Value::Null, &rules).contains("NaN"));

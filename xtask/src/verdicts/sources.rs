@@ -58,11 +58,48 @@ pub fn grade(
         let file = sample.archive.file_name().unwrap_or_default().to_string_lossy();
         let own = hand_ins.iter().find(|hand_in| hand_in["name"] == *file);
         let complaint = match own {
-            Some(hand_in) => sample.expect.complaint(hand_in, rules),
+            Some(hand_in) => {
+                let complaint = sample.expect.complaint(hand_in, rules);
+                if complaint.is_empty() {
+                    names_another(&out, hand_in, hand_ins)
+                } else {
+                    complaint
+                }
+            }
             None => "it is not in the report".into(),
         };
         (!complaint.is_empty()).then(|| format!("source {}: {complaint}", sample.name))
     };
     let complaints = samples.iter().filter_map(complaint).collect();
     Ok(Some(Figure::right("sources", samples.len(), complaints)))
+}
+
+/// What a student's folder tells of any other student, if anything: every byte of it is searched for the
+/// names, numbers and archives of all others.
+fn names_another(out: &Path, own: &Value, all: &[Value]) -> String {
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let folder = out.join(text(&own["slug"]));
+    let files = umbra::files::files_below(&folder);
+    let read = files
+        .and_then(|files| files.iter().map(std::fs::read).collect::<std::io::Result<Vec<_>>>());
+    let bytes = match read {
+        Ok(files) if !files.is_empty() => files.concat(),
+        Ok(_) => return "it has no folder for its student".into(),
+        Err(error) => return format!("{}: {error}", folder.display()),
+    };
+    let others = all.iter().filter(|other| other["slug"] != own["slug"]);
+    let names = others.flat_map(|other| {
+        let student = &other["student"];
+        let full = format!("{} {}", text(&student["first_name"]), text(&student["last_name"]));
+        [full.trim().to_owned(), text(&student["id"]), text(&other["name"])]
+    });
+    let found: Vec<String> = names
+        .filter(|name| !name.is_empty())
+        .filter(|name| bytes.windows(name.len()).any(|window| window == name.as_bytes()))
+        .collect();
+    if found.is_empty() {
+        String::new()
+    } else {
+        format!("its student's folder names {}", found.join(", "))
+    }
 }

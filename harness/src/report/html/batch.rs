@@ -64,7 +64,8 @@ fn row(html: &mut Html, sheet: &Sheet, entry: &Entry) {
     let key = format!("{} {}", student.last_name, student.first_name);
     html.raw("<tr><th scope=\"row\" data-sort=\"").text(&key).raw("\"><a href=\"");
     // The batch's page is the instructor's, too.
-    let folder = if entry.has_held_back() { format!("{INSTRUCTOR}/") } else { String::new() };
+    let folder =
+        if entry.has_private(&sheet.rules) { format!("{INSTRUCTOR}/") } else { String::new() };
     html.address(&format!("{folder}{}/{HTML_FILE}", record.slug)).raw("\">").text(shown);
     html.raw("</a><small>").text(&record.name).raw("</small></th>");
     html.raw("<td class=\"number total ");

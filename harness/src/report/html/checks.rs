@@ -57,6 +57,9 @@ fn article(html: &mut Html, place: usize, check: &Check, public_pictures: &str) 
     if !check.hint.is_empty() {
         html.raw("<p class=\"hint\"><b>Hint</b> ").text(&check.hint).raw("</p>\n");
     }
+    if !check.private.is_empty() {
+        html.raw("<p class=\"notice\">For the instructor: ").text(&check.private).raw("</p>\n");
+    }
     // Without a measure the error is only "wrong", which the verdict says.
     if check.verdict == Verdict::Fail && !check.measures.is_empty() {
         html.raw("<p class=\"error\">Error <b>").text(&value(check.error));

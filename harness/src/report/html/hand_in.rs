@@ -17,19 +17,28 @@ const DIAGNOSTIC_LINES: usize = 400;
 /// could not be judged, what passed, findings, conditions and costs.
 pub fn hand_in(sheet: &Sheet, entry: &Entry, reader: Reader) -> String {
     let known;
-    let (entry, root) = match reader {
-        Reader::Instructor => (entry, "../.."),
+    // A student has the page's folder and nothing above it.
+    let root = "../..";
+    let entry = match reader {
+        Reader::Instructor => entry,
         Reader::Student => {
-            known = entry.for_student();
-            (&known, "..")
+            known = entry.for_student(&sheet.rules);
+            &known
         }
     };
     let Entry { record, grade } = entry;
     let name = record.student.full_name();
     let name = if name.is_empty() { &record.name } else { &name };
     let mut html = begin(&format!("{name} - {}", sheet.title));
-    html.raw("<header class=\"top\">\n<nav><a href=\"").raw(root).raw("/").raw(HTML_FILE);
-    html.raw("\">All hand-ins</a></nav>\n<p class=\"course\">").text(&sheet.title);
+    html.raw("<header class=\"top\">\n");
+    if reader == Reader::Instructor {
+        html.raw("<nav><a href=\"")
+            .raw(root)
+            .raw("/")
+            .raw(HTML_FILE)
+            .raw("\">All hand-ins</a></nav>\n");
+    }
+    html.raw("<p class=\"course\">").text(&sheet.title);
     html.raw("</p>\n<h1>").text(name).raw("</h1>\n<p class=\"who\">");
     if !record.student.id.is_empty() {
         html.text(&record.student.id).raw(" · ");
@@ -52,8 +61,10 @@ pub fn hand_in(sheet: &Sheet, entry: &Entry, reader: Reader) -> String {
         html.raw("<p class=\"notice\">").text(remark).raw("</p>\n");
     }
     if reader == Reader::Instructor {
-        html.raw("<p class=\"notice\">This page shows scenes that are held back: it is for the ");
-        html.raw("instructor, not for the student, who gets <a href=\"");
+        html.raw("<p class=\"notice\">This page shows what students must not see (held-back scenes, other ");
+        html.raw(
+            "submissions): it is for the instructor, not for the student, who gets <a href=\"",
+        );
         html.address(&format!("{root}/{}/{HTML_FILE}", record.slug)).raw("\">another</a>.</p>\n");
     }
     html.raw("</header>\n<main>\n");

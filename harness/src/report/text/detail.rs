@@ -242,7 +242,8 @@ mod tests {
         let sheet = sample::sheet();
         let text = detail(&sheet, &sheet.entries[2], 80, false);
         for line in [
-            "total    22.88/75",
+            "total    0/75",
+            "remark   the source does not build; the images alone earn 11.44 points once the",
             "compiler",
             "  error[E0308]: mismatched types",
             "  error    config.json:3: studentID is empty (hint: write your student number)",

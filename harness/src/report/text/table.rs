@@ -188,10 +188,10 @@ hand-in             student        1.1  1.2   1.3  1.4   2.4    2.5            t
                           out of     5   10    20   15    25    +20
 a2_ada.zip          Ada Lovelace     5   10    20   15    25     20            95/75
 two_cosines.tar.gz  Jörg Müller      5   10  9.85   15    25  0..20  64.85..84.85/75
-山田_花子.zip       花子 山田     2.25    0  8.13    0  12.5      0         22.88/75  1
+山田_花子.zip       花子 山田        0    0     0    0     0      0             0/75  1
 
 remarks
-  1  the source does not build: graded on the images alone, an instructor confirms
+  1  the source does not build; the images alone earn 11.44 points once the instructor confirms
 
 3 hand-ins, 1 not wholly judged (a range of points)
 "

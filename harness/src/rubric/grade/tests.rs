@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::rubric::Curve;
-use crate::rubric::rules::{Gate, PathRule};
+use crate::rubric::rules::{Gate, PathRule, Trust};
 
 /// Two parts on one path, a bonus of its own, one gate.
 fn rules() -> Rules {
@@ -15,12 +15,18 @@ fn rules() -> Rules {
         path: path.into(),
         evidence: vec![evidence.into()],
         fallback: fallback.iter().map(|&f| f.into()).collect(),
-        images_only: vec![format!("images.{id}")],
+        images_only: vec![format!("images.{id}"), "noise".into()],
     };
     let rules = Rules {
         curve: Curve::try_from(vec![[0.0, 0.9], [0.1, 0.5], [1.0, 0.0]]).unwrap(),
-        images_only_ceiling: 0.5,
-        gates: vec![Gate { check: "tree".into(), ceiling: 0.0, reason: "wrong tree".into() }],
+        images_only_ceiling: 0.25,
+        images_only_trust: Some(Trust { check: "noise".into(), ceiling: 0.4 }),
+        gates: vec![Gate {
+            check: "tree".into(),
+            ceiling: 0.0,
+            reason: "wrong tree".into(),
+            private: false,
+        }],
         paths: [("offline".into(), PathRule { proof: "image".into(), blame: "2".into() })].into(),
         parts: vec![
             part("1", 10.0, "offline", "bsdf", &["pixels"]),
@@ -113,16 +119,43 @@ fn evidence_that_does_not_apply_gives_way_to_the_fallback() {
 }
 
 #[test]
-fn images_alone_earn_at_most_the_ceiling_and_a_closed_gate_everything() {
-    let mut checks = vec![
-        check(BUILD, Fail, 1.0),
-        check("images.1", Pass, 0.0),
-        check("images.2", Fail, 0.1),
-        check("image", Pass, 0.0),
-    ];
-    assert_eq!(points(&checks), [5.0, 7.5, 0.0]);
-    checks.push(check("tree", Fail, 1.0));
-    assert_eq!(points(&checks), [0.0, 0.0, 0.0]);
+fn images_alone_earn_nothing_until_the_instructor_confirms() {
+    let without_code = |more: &[Check]| {
+        let base =
+            [check(BUILD, Fail, 1.0), check("images.1", Pass, 0.0), check("image", Pass, 0.0)];
+        let images = [check("images.2", Fail, 0.1)];
+        let grade = grade(&rules(), &Evidence { checks: [&base, &images[..], more].concat() });
+        assert_eq!((grade.points, grade.points_max), (0.0, 0.0));
+        let parts = grade.parts.iter();
+        assert!(parts.clone().all(|part| (part.points, part.points_max) == (0.0, 0.0)));
+        let unconfirmed: Vec<f64> = parts.map(|part| part.unconfirmed).collect();
+        assert_eq!(grade.unconfirmed, unconfirmed.iter().sum::<f64>());
+        (unconfirmed, grade.remarks[0].clone(), grade.parts[0].reason.clone())
+    };
+    let (unconfirmed, remark, reason) = without_code(&[]);
+    assert_eq!(unconfirmed, [2.5, 3.75, 0.0]);
+    assert_eq!(
+        remark,
+        "hand_in.build said so; the images alone earn 6.25 points once the instructor confirms"
+    );
+    assert!(reason.starts_with("2.5 once the instructor confirms: ") && reason.contains("anybody"));
+    // With noise that only the student's number explains they are worth more; not with half of it.
+    let (unconfirmed, _, reason) = without_code(&[check("noise", Pass, 0.0)]);
+    assert_eq!(unconfirmed, [4.0, 6.0, 8.0]);
+    assert!(reason.contains("the noise of the student's number"), "{reason}");
+    let half = [check("noise", Pass, 0.0), check("noise", NotJudged, 0.0)];
+    assert_eq!(without_code(&half).0[..2], [2.5, 3.75]);
+
+    let nothing = grade(&rules(), &Evidence { checks: vec![check(BUILD, Fail, 1.0)] });
+    assert_eq!(
+        (nothing.unconfirmed, &nothing.remarks[..]),
+        (0.0, &["hand_in.build said so".to_owned()][..])
+    );
+    let closed = [check(BUILD, Fail, 1.0), check("images.1", Pass, 0.0), check("tree", Fail, 1.0)];
+    assert_eq!(grade(&rules(), &Evidence { checks: closed.to_vec() }).unconfirmed, 0.0);
+    // Where there is code, images are worth nothing by themselves.
+    let built = [check(BUILD, Pass, 0.0), check("images.1", Pass, 0.0), check("image", Fail, 1.0)];
+    assert_eq!(grade(&rules(), &Evidence { checks: built.to_vec() }).unconfirmed, 0.0);
 }
 
 #[test]
@@ -273,7 +306,7 @@ proptest! {
         let before = grade(&rules(), &Evidence { checks: checks.clone() });
         for part in &before.parts {
             prop_assert!(0.0 <= part.points && part.points <= part.points_max);
-            prop_assert!(part.points_max <= part.out_of);
+            prop_assert!(part.points_max + part.unconfirmed <= part.out_of);
         }
         let mut turned = checks;
         if !turned.is_empty() {

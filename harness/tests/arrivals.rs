@@ -1,0 +1,218 @@
+//! Batches and archives as they arrive, through the real binary: what becomes a row, what is said of it, and
+//! that what is said is true.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used)] // its helpers are tests too
+
+mod support;
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+use similar_asserts::assert_eq;
+use support::zip_bytes::{Entry, Zip};
+
+const IMAGES: [&str; 4] = [
+    "offline/cbox_simple_offline.exr",
+    "offline/teapot_simple_offline.exr",
+    "realtime/cbox_simple_realtime.exr",
+    "realtime/teapot_simple_realtime.exr",
+];
+
+fn config(first: &str, last: &str, number: &str) -> String {
+    let renders = IMAGES.map(|path| format!(r#"{{"scene": "", "render": "{path}"}}"#)).join(", ");
+    format!(
+        r#"{{"firstName": "{first}", "lastName": "{last}", "studentID": "{number}", "renders": [{renders}]}}"#
+    )
+}
+
+/// A zip of these files.
+fn zip(files: &[(&str, &str)]) -> Vec<u8> {
+    Zip::of(files.iter().map(|(path, text)| Entry::deflated(path, text.as_bytes()))).bytes()
+}
+
+/// `config.json`, a source file at `lib`, and the images, all with this content.
+fn submission<'a>(config: &'a str, lib: &'a str, image: &'a str) -> Vec<(&'a str, &'a str)> {
+    let mut files = vec![("config.json", config), (lib, "fn main() { not_rust }")];
+    files.extend(IMAGES.map(|path| (path, image)));
+    files
+}
+
+fn umbra(arguments: &[&str], paths: &[&Path]) -> (Option<i32>, String, String) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let output = Command::new(env!("CARGO_BIN_EXE_umbra"))
+        .args(arguments)
+        .args(paths)
+        .args(["--root", "."])
+        .current_dir(root)
+        .output()
+        .unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code(), text(&output.stdout), text(&output.stderr))
+}
+
+fn put(path: PathBuf, bytes: &[u8]) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn a_class_as_a_learning_platform_lays_it_out() {
+    let place = tempfile::tempdir().unwrap();
+    let at = |name: &str| place.path().join("class").join(name);
+    let own = |student: &str| at(&format!("{student}_assignsubmission_file/a2.zip"));
+    let (ann, bob, dan) = (
+        config("Ann", "Able", "260 000 101"),
+        config("Bob", "Baker", "260000102"),
+        format!("\u{feff}{}", config("Dan", "Delta", "260000104")),
+    );
+    put(own("Ann_1"), &zip(&submission(&ann, "src/lib.rs", "x")));
+    put(own("Bob_2"), &zip(&[("config.json", &bob)]));
+    put(own("Cem_3"), &zip(&[("config.json", "{}"), ("../x", "x")]));
+    put(own("Dan_4"), &zip(&submission(&dan, "code/lib.rs", "")));
+    put(at("Fay_6/a2.zip"), b"<!DOCTYPE html><html>");
+    put(place.path().join("secret/src/lib.rs"), b"fn main() {}");
+    symlink(place.path().join("secret"), at("Eve_5")).unwrap();
+    put(at("index.html"), b"<html>");
+    put(at(".DS_Store"), b"\0");
+    put(at("Gil_7/onlinetext.txt"), b"I forgot");
+
+    let out = place.path().join("out");
+    let arguments = ["grade", "--perturb", "off", "--isolation", "reduced", "--output"];
+    let (code, said, errors) = umbra(&arguments, &[&out, &at("")]);
+    assert_eq!(code, Some(0), "{said}{errors}");
+    assert!(
+        said.contains("skipped, no submissions: .DS_Store, Gil_7/onlinetext.txt, index.html"),
+        "{said}"
+    );
+    let report: Value =
+        serde_json::from_slice(&fs::read(out.join("report.json")).unwrap()).unwrap();
+    let rows = report["hand_ins"].as_array().unwrap();
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let names: Vec<String> = rows.iter().map(|row| text(&row["name"])).collect();
+    let expected =
+        ["Ann_1", "Bob_2", "Cem_3", "Dan_4"].map(|n| format!("{n}_assignsubmission_file/a2.zip"));
+    assert!(names[..4] == expected && names[4..] == ["Eve_5", "Fay_6/a2.zip"], "{names:?}");
+
+    let remarks = |row: usize| {
+        let remarks = rows[row]["remarks"].as_array().unwrap().iter();
+        remarks.map(text).collect::<Vec<_>>().join("\n")
+    };
+    let codes = |row: usize| {
+        let findings = rows[row]["findings"].as_array().unwrap().iter();
+        findings.map(|finding| text(&finding["code"])).collect::<Vec<_>>()
+    };
+    // Only a compiler refuses a source.
+    for row in 1..rows.len() {
+        assert!(!remarks(row).contains("does not build"), "{}: {}", names[row], remarks(row));
+    }
+    // Ann: a number with spaces costs nothing.
+    assert_eq!(rows[0]["student"]["id"], "260000101");
+    assert!(remarks(0).contains("config.json has a slip, which costs nothing: config.json:1: "));
+    assert!(!remarks(0).contains("tree"), "{}", remarks(0));
+    assert_eq!(codes(0).iter().filter(|code| *code == "image_unreadable").count(), 4);
+    // Bob: only config.json.
+    assert!(remarks(1).contains("there is no src/lib.rs"), "{}", remarks(1));
+    assert!(remarks(1).contains("does not follow the tree"), "{}", remarks(1));
+    // Cem: refused, for its own reason.
+    assert_eq!(
+        remarks(2),
+        "it was not unpacked: ../x: entry name refused: expected a plain relative path, found '..'"
+    );
+    // Dan: what --fix would do.
+    assert!(
+        remarks(3).contains("umbra validate --fix mends it: moves code/lib.rs to src/lib.rs"),
+        "{}",
+        remarks(3)
+    );
+    assert_eq!(codes(3).iter().filter(|code| *code == "image_empty").count(), 4);
+    assert_eq!(rows[3]["student"]["first_name"], "Dan");
+    // Eve: a link. Fay: no archive.
+    assert!(remarks(4).contains("found a symbolic link"), "{}", remarks(4));
+    assert!(remarks(5).contains("found a web page"), "{}", remarks(5));
+    for row in rows {
+        assert_eq!((&row["points"], &row["points_max"]), (&0.0.into(), &0.0.into()));
+    }
+}
+
+#[test]
+fn a_folder_without_submissions_is_an_error_and_nothing_is_written() {
+    let place = tempfile::tempdir().unwrap();
+    put(place.path().join("class/notes.txt"), b"x");
+    let out = place.path().join("out");
+    let (code, _, said) = umbra(&["grade", "--output"], &[&out, &place.path().join("class")]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains(
+        "there is no submission: expected archives (.zip, .tar, .tar.gz) or folders with src/"
+    ));
+    assert!(said.trim_end().ends_with("it holds notes.txt"), "{said}");
+    assert!(!out.exists());
+}
+
+#[test]
+fn validate_and_pack_say_which_images_are_no_images() {
+    let place = tempfile::tempdir().unwrap();
+    let config = config("Ada", "Lovelace", "260123456");
+    for (image, word) in [("", "the image is empty (0 bytes)"), ("x", "the image cannot be read: ")]
+    {
+        let files = submission(&config, "src/lib.rs", image);
+        let archive = place.path().join("a2.zip");
+        put(archive.clone(), &zip(&files));
+        let (code, said, errors) = umbra(&["validate"], &[&archive]);
+        assert_eq!(code, Some(0), "{said}{errors}");
+        assert!(said.starts_with("a2.zip: conforms (0 errors, 4 warnings)"), "{said}");
+        for path in IMAGES {
+            assert!(said.contains(&format!("warning: {path}: {word}")), "{said}");
+        }
+        let work = place.path().join("work");
+        for (path, text) in files {
+            put(work.join(path), text.as_bytes());
+        }
+        let out = place.path().join("packed.zip");
+        let (code, _, said) = umbra(&["pack"], &[&work, Path::new("--output"), &out]);
+        assert_eq!(code, Some(0), "{said}");
+        assert!(said.contains(&format!("warning: {}: {word}", IMAGES[0])), "{said}");
+        assert!(out.is_file());
+    }
+}
+
+#[test]
+fn a_submission_that_is_a_link_is_refused_with_and_without_a_slash() {
+    let place = tempfile::tempdir().unwrap();
+    put(place.path().join("secret/src/lib.rs"), b"secret");
+    put(place.path().join("secret.zip"), &zip(&[("config.json", "secret")]));
+    for target in ["secret", "secret.zip"] {
+        let link = place.path().join(format!("link-to-{target}"));
+        symlink(place.path().join(target), &link).unwrap();
+        let (code, said, _) = umbra(&["validate"], &[&link]);
+        assert_eq!(code, Some(1), "{said}");
+        assert!(
+            said.contains("found a symbolic link") && said.contains("name what it leads to"),
+            "{said}"
+        );
+    }
+    let with_slash = place.path().join("link-to-secret").join("");
+    let (_, said, _) = umbra(&["validate"], &[&with_slash]);
+    assert!(said.contains("found a symbolic link"), "{said}");
+}
+
+#[test]
+fn fix_repacks_names_with_backslashes() {
+    let place = tempfile::tempdir().unwrap();
+    let config = config("Ada", "Lovelace", "260123456");
+    let files = submission(&config, "src/lib.rs", "x");
+    let backslash = |path: &str| path.replace('/', "\\");
+    let entries =
+        files.iter().map(|(path, text)| Entry::deflated(&backslash(path), text.as_bytes()));
+    let (archive, out) = (place.path().join("ps5.zip"), place.path().join("out.zip"));
+    put(archive.clone(), &Zip::of(entries).bytes());
+    let (code, said, errors) = umbra(&["validate", "--fix"], &[&out, &archive]);
+    assert_eq!(code, Some(0), "{said}{errors}");
+    assert!(said.contains("warning: names with a backslash between folders"), "{said}");
+    let (code, said, _) = umbra(&["validate"], &[&out]);
+    assert_eq!(code, Some(0));
+    assert!(!said.contains("backslash"), "{said}");
+}
