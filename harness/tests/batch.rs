@@ -47,8 +47,12 @@ impl Batch {
     }
 
     fn start(&self) -> Child {
+        self.start_with(&[self.place.path().join("hand-ins")], &[])
+    }
+
+    fn start_with(&self, paths: &[PathBuf], options: &[&str]) -> Child {
         let mut umbra = Command::new(env!("CARGO_BIN_EXE_umbra"));
-        umbra.arg("grade").arg(self.place.path().join("hand-ins"));
+        umbra.arg("grade").args(paths).args(options);
         umbra.args(["--isolation", "reduced", "--jobs", "1", "--output"]).arg(self.out());
         umbra.args(["--root", "."]).current_dir(root());
         umbra.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
@@ -57,6 +61,27 @@ impl Batch {
     /// Grades to the end: the exit code and what was said on standard error.
     fn grade(&self) -> (Option<i32>, String) {
         said(&self.start().wait_with_output().unwrap())
+    }
+
+    /// Grades some submissions, named from the folder of all, with more options.
+    fn grade_with(&self, names: &[&str], options: &[&str]) -> (Option<i32>, String) {
+        let path = |name: &&str| self.place.path().join("hand-ins").join(name);
+        let paths: Vec<PathBuf> = names.iter().map(path).collect();
+        said(&self.start_with(&paths, options).wait_with_output().unwrap())
+    }
+
+    /// The rows of `grades.csv`: name of the submission, and remarks.
+    fn rows(&self) -> Vec<(String, String)> {
+        let mut csv = csv::Reader::from_path(self.out().join("grades.csv")).unwrap();
+        let rows = csv.records().map(|row| {
+            let row = row.unwrap();
+            (row[3].to_owned(), row[row.len() - 1].to_owned())
+        });
+        rows.collect()
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.rows().into_iter().map(|(name, _)| name).collect()
     }
 
     /// Grades until a record is kept, ends it by a signal, and answers as `grade` does. Before that its
@@ -152,4 +177,90 @@ fn a_hand_in_that_the_machine_fails_on_costs_the_others_nothing() {
     let (code, said) = batch.grade();
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("held-back-seed.txt: expected the seed of held-back scenes"), "{said}");
+}
+
+#[test]
+fn a_class_grows_and_nobody_falls_out_of_it() {
+    let batch = Batch::new(&[("a/ada", WRONG), ("a/bob", WRONG), ("b/eve", WRONG)]);
+    let (code, said) = batch.grade_with(&["a"], &[]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("umbra: 1 of 2: ada: 0/100, ") && said.contains("; about "), "{said}");
+    assert!(said.contains("umbra: 2 of 2: bob: 0/100, "), "{said}");
+    let first = fs::read(batch.instructor("ada/record.json")).unwrap();
+
+    // One more, named alone. A report of all three at once is the same.
+    let (code, said) = batch.grade_with(&["b/eve"], &[]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("2 submissions stay in ") && said.contains(": ada, bob;"), "{said}");
+    assert_eq!(batch.names(), ["ada", "bob", "eve"]);
+    let fresh = Batch::new(&[("ada", WRONG), ("bob", WRONG), ("eve", WRONG)]);
+    assert_eq!(fresh.grade().0, Some(0));
+    assert_eq!(batch.canonical(), fresh.canonical());
+
+    // Another one of the same name is somebody else's.
+    batch.hand_in("c/ada", "fn main() { another }");
+    let (_, said) = batch.grade_with(&["c/ada"], &[]);
+    assert_eq!(batch.names(), ["ada", "ada", "bob", "eve"], "{said}");
+    assert_eq!(fs::read(batch.instructor("ada/record.json")).unwrap(), first);
+
+    // What is gone stays; what was taken out of the report is gone.
+    fs::remove_dir_all(batch.place.path().join("hand-ins/a/bob")).unwrap();
+    fs::remove_dir_all(batch.instructor("ada-2")).unwrap();
+    let (code, said) = batch.grade_with(&["a", "b"], &[]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("1 submission stays in ") && said.contains(": bob;"), "{said}");
+    assert_eq!(batch.names(), ["ada", "bob", "eve"]);
+
+    // Records of other conditions are shown, and said to be such.
+    let record = batch.instructor("bob/record.json");
+    let text = fs::read_to_string(&record).unwrap();
+    let at = text.find("\"batch\":\"").unwrap() + 9;
+    fs::write(&record, format!("{}{}{}", &text[..at], "0".repeat(64), &text[at + 64..])).unwrap();
+    let (_, said) = batch.grade_with(&["b"], &[]);
+    let remarks = batch.rows().into_iter().map(|(_, remarks)| remarks.contains("not comparable"));
+    assert_eq!(remarks.collect::<Vec<bool>>(), [false, true, false], "{said}");
+}
+
+#[test]
+fn one_student_is_graded_alone_or_anew() {
+    let batch = Batch::new(&[("ada", WRONG), ("bob", WRONG), ("eve", WRONG)]);
+    let student = |name: &str, last: &str, id: &str| {
+        let config = format!(
+            r#"{{"firstName": "F", "lastName": "{last}", "studentID": "{id}", "renders": []}}"#
+        );
+        let folder = batch.place.path().join("hand-ins").join(name);
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(folder.join("config.json"), config).unwrap();
+    };
+    student("bob", "Bee", "260000123");
+    let (code, said) = batch.grade_with(&[""], &["--only", "260000123"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("1 of 1: bob (F Bee)"), "{said}");
+    assert!(
+        said.contains("2 submissions are not graded yet") && said.contains(": ada, eve"),
+        "{said}"
+    );
+    assert_eq!(batch.names(), ["bob"]);
+    let (code, said) = batch.grade_with(&[""], &["--only", "eve", "--only", "f bee"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("1 of 2 hand-ins are as they were graded before"), "{said}");
+    assert_eq!(batch.names(), ["bob", "eve"]);
+    let (_, said) = batch.grade_with(&[""], &["--only", "bob", "--force"]);
+    assert!(!said.contains("as they were graded before"), "{said}");
+    let (code, said) = batch.grade_with(&[""], &["--only", "mallory"]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("nobody of 3 submissions is \"mallory\"; expected"), "{said}");
+
+    // Handed in again: the same file name, the same student, in another place.
+    batch.hand_in("late/bob", "fn main() { better }");
+    student("late/bob", "Bee", "260000123");
+    let (code, said) = batch.grade_with(&["late/bob"], &[]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("bob of F Bee is graded anew as bob-2"), "{said}");
+    for _ in 0..2 {
+        assert_eq!(batch.names(), ["bob", "eve"]);
+        assert!(batch.canonical().contains("`better`"));
+        let (_, said) = batch.grade_with(&["eve"], &[]);
+        assert!(said.contains("1 submission stays in "), "{said}");
+    }
 }

@@ -149,3 +149,35 @@ fn a_compiler_that_does_not_end_is_ended() {
     assert_eq!(report.outcome, BuildOutcome::TimedOut, "{:#?}", report.outcome);
     assert!(report.cpu_s < 3.0, "{report:#?}");
 }
+
+#[test]
+fn what_tutorials_use_for_shadow_mapping_is_there() {
+    let text = r#"
+use basecode::bytemuck::{Pod, Zeroable};
+use basecode::gpu::{Gpu, look_at, orthographic, perspective};
+use basecode::wgpu::util::DeviceExt;
+use basecode::{Mat4, Vec3, glam, wgpu};
+
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+#[bytemuck(crate = "basecode::bytemuck")]
+pub struct Light {
+    pub view_projection: [[f32; 4]; 4],
+}
+
+pub fn light(gpu: &Gpu, position: Vec3) -> wgpu::Buffer {
+    let view = look_at(position, Vec3::ZERO, Vec3::Y);
+    let turned = glam::Quat::from_rotation_y(1.0) * Vec3::X;
+    let projection = perspective(90f32.to_radians(), 1.0, 0.1, 100.0);
+    let sun: Mat4 = orthographic(-10.0, 10.0, -10.0, 10.0, 0.1, 100.0) * look_at(turned, Vec3::ZERO, Vec3::Z);
+    let light = Light { view_projection: (projection * view * sun).to_cols_array_2d() };
+    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("light"),
+        contents: basecode::bytemuck::cast_slice(&[light]),
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+    })
+}
+"#;
+    let report = build_text(text, &default_limits());
+    assert!(matches!(report.outcome, BuildOutcome::Built { .. }), "{:#?}", report.outcome);
+}

@@ -208,7 +208,27 @@ fn parts_that_are_solved_in_place_one_by_one_count_at_once() {
         files.iter().for_each(|(file, text)| put(file, text));
         let mut check = Command::new(kit.join("umbra"));
         check.args(["check", "student_template"]).current_dir(&kit);
-        let report = report(&mut check, &kit.join("report"));
+        let (report, said) = report_and_words(&mut check, &kit.join("report"));
+        // The last lines say what changed, what it is worth and what is next; and all of it in the
+        // words of the handout.
+        let jargon = ["witness", "swap", "probe"];
+        let found = jargon.iter().find(|word| said.to_lowercase().contains(*word));
+        assert!(found.is_none(), "after {part}: {found:?} in\n{said}");
+        let lines: Vec<&str> = said.lines().collect();
+        let own = report["hand_ins"][0]["parts"].as_array().unwrap();
+        if let Some(worth) = own.iter().find(|own| own["id"] == *part) {
+            let change = format!("since last time: {part} 0 -> {}", worth["out_of"]);
+            let told = lines.iter().any(|line| format!("{line}.0").starts_with(&change));
+            assert!(told, "{change}: {said}");
+        }
+        assert!(lines.iter().any(|line| line.starts_with("verdict: ")), "{said}");
+        let next = match steps.get(index + 1) {
+            Some((part, _)) if *part == "2.5" => "next: make it ready to hand in: ".to_owned(),
+            Some((part, _)) => format!("next: {part} "),
+            None => "next: make it ready to hand in: ".to_owned(),
+        };
+        let last = lines.iter().rposition(|line| line.starts_with("next: ")).unwrap();
+        assert!(lines[last].starts_with(&next), "{next}: {said}");
         for own in report["hand_ins"][0]["parts"].as_array().unwrap() {
             let id = own["id"].as_str().unwrap();
             let done = steps[..=index].iter().any(|(part, _)| *part == id);
@@ -255,10 +275,17 @@ fn a_check_in_the_kit_says_what_the_grader_says() {
 
 /// Runs umbra and answers its `report.json`.
 fn report(umbra: &mut Command, out: &Path) -> Value {
+    report_and_words(umbra, out).0
+}
+
+/// Runs umbra and answers its `report.json`, and what it says on standard output.
+fn report_and_words(umbra: &mut Command, out: &Path) -> (Value, String) {
     let output = umbra.arg("--output").arg(out).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(matches!(output.status.code(), Some(0 | 1)), "{umbra:?}: {said}");
-    serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap()
+    let report = std::fs::read(out.join("report.json")).unwrap();
+    let words = String::from_utf8_lossy(&output.stdout).into_owned();
+    (serde_json::from_slice(&report).unwrap(), words)
 }
 
 /// Which check said what of which scene, in the order they were made.

@@ -17,6 +17,7 @@
 //! | write an integrator | [`Integrator`], [`Scene::intersect`], [`Scene::occluded`], [`Ray`] |
 //! | write the render loop | [`Renderer::render`], [`RenderJob`], [`Film`], [`Sampler`], [`Camera`] |
 //! | write a realtime pass | [`gpu`], [`gpu::RenderPass`] and `docs/shader_contract.md` |
+//! | draw a shadow map (bonus) | [`gpu::ShadowMap`], [`gpu::perspective`], [`gpu::look_at`] |
 
 mod bvh;
 mod camera;
@@ -43,7 +44,7 @@ pub use ray::{Ray, SurfaceInteraction};
 pub use renderer::{Bsdf, Integrator, RenderJob, Renderer};
 pub use sampler::Sampler;
 pub use scene::{Material, MaterialModel, Scene, Shape, Texture};
-pub use wgpu;
+pub use {bytemuck, glam, wgpu};
 
 /// The constant 1 / pi.
 pub const INV_PI: f32 = std::f32::consts::FRAC_1_PI;

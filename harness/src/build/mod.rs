@@ -11,7 +11,7 @@ mod record;
 mod replay;
 
 pub use diagnostics::{Diagnostic, Place};
-pub use record::{RecordError, Recording, wrapper_main};
+pub use record::{Compiling, RecordError, Recording, wrapper_main};
 pub use replay::{BuildOutcome, BuildReport, compile, default_limits};
 
 /// The crate whose compiler call is recorded.

@@ -1,16 +1,17 @@
 //! Recording the template's compiler call.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::TEMPLATE;
-use super::closure::{Metadata, libraries};
+use super::closure::{Metadata, compiled_package, libraries};
 use crate::files::{files_below, hex};
 
 /// The manifest of this program's own package.
@@ -57,6 +58,36 @@ pub enum RecordError {
     },
 }
 
+/// How far cargo is with what renderers are built on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Compiling {
+    /// Packages that are there.
+    pub done: usize,
+    /// Packages in all.
+    pub packages: usize,
+}
+
+impl Compiling {
+    /// In words, with how long the rest will take after `elapsed` for what is done.
+    pub fn in_words(&self, elapsed: Duration) -> String {
+        let Self { done, packages } = *self;
+        if done == 0 {
+            return format!(
+                "compiling the {packages} crates that renderers are built on; the first time only, some \
+                 minutes"
+            );
+        }
+        let rest = packages.saturating_sub(done);
+        let left = elapsed.mul_f64(rest as f64 / done as f64);
+        let left = match left.as_secs() {
+            0..5 => String::new(),
+            s @ 5..100 => format!(", about {s} s left"),
+            s => format!(", about {} min left", (s + 30) / 60),
+        };
+        format!("compiled {done} of {packages} crates{left}")
+    }
+}
+
 /// A compiler call as the wrapper saw it.
 #[derive(Serialize, Deserialize)]
 struct Call {
@@ -98,11 +129,24 @@ pub fn wrapper_main() -> Option<ExitCode> {
 impl Recording {
     /// The recording for the present state of `workspace`: the stored one, or a new one, made by
     /// letting cargo build the template with `umbra` (this program) as compiler wrapper. Several
-    /// processes may ask at once.
+    /// processes may ask at once. The template itself need not compile: students work in it.
     ///
     /// # Errors
     /// When the workspace cannot be read or cargo fails.
     pub fn obtain(workspace: &Path, umbra: &Path) -> Result<Self, RecordError> {
+        Self::obtain_telling(workspace, umbra, &|_| ())
+    }
+
+    /// The same; `progress` is told how far cargo is while a new recording is made, at first with
+    /// nothing done.
+    ///
+    /// # Errors
+    /// As [`Recording::obtain`].
+    pub fn obtain_telling(
+        workspace: &Path,
+        umbra: &Path,
+        progress: &dyn Fn(Compiling),
+    ) -> Result<Self, RecordError> {
         let sysroot = run(Command::new("rustc").args(["--print", "sysroot"]), workspace)?;
         let sysroot = PathBuf::from(sysroot.trim());
         let rustc = sysroot.join("bin").join(format!("rustc{}", std::env::consts::EXE_SUFFIX));
@@ -120,7 +164,6 @@ impl Recording {
         {
             return Ok(recording);
         }
-        let (call, messages) = record(workspace, umbra, &folder)?;
         let host = run(Command::new(&rustc).args(["--print", "host-tuple"]), workspace)?;
         let mut cargo = Command::new("cargo");
         // Without the filter, cargo would download what other platforms need.
@@ -129,6 +172,7 @@ impl Recording {
         let metadata: Metadata = serde_json::from_str(&metadata).map_err(|error| {
             RecordError::Program { command: "cargo metadata".into(), message: error.to_string() }
         })?;
+        let (call, messages) = record(workspace, umbra, &folder, &metadata, progress)?;
         let libraries = libraries(&messages, &metadata.closure_of(TEMPLATE));
         let closure = stage(&folder, &key, &libraries)?;
         let Call { args, env } = call;
@@ -145,7 +189,13 @@ impl Recording {
 /// Umbra's library is named too, though it is fresh: cargo chooses the features of shared
 /// dependencies for all named packages together, and by the template alone it would choose others
 /// and compile wgpu a second time. A student's kit does not hold it.
-fn record(workspace: &Path, umbra: &Path, folder: &Path) -> Result<(Call, String), RecordError> {
+fn record(
+    workspace: &Path,
+    umbra: &Path,
+    folder: &Path,
+    metadata: &Metadata,
+    progress: &dyn Fn(Compiling),
+) -> Result<(Call, String), RecordError> {
     // Cargo's freshness is a file for each crate; without it this one crate is built again.
     let fingerprints = workspace.join("target/release/.fingerprint");
     for entry in fs::read_dir(&fingerprints).into_iter().flatten().flatten() {
@@ -155,18 +205,35 @@ fn record(workspace: &Path, umbra: &Path, folder: &Path) -> Result<(Call, String
     }
     let file = folder.join("call.json");
     let _ = fs::remove_file(&file);
+    let mut built = vec![TEMPLATE];
+    built.extend(Some("umbra").filter(|_| workspace.join(UMBRA).is_file()));
     let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--release", "--lib", "-p", TEMPLATE]);
-    if workspace.join(UMBRA).is_file() {
-        cargo.args(["-p", "umbra"]);
-    }
+    cargo.args(["build", "--release", "--lib"]);
+    built.iter().for_each(|package| {
+        cargo.args(["-p", package]);
+    });
     cargo.arg("--target-dir").arg(workspace.join("target"));
     cargo.arg("--message-format=json-render-diagnostics");
     cargo.env("RUSTC_WRAPPER", umbra).env(RECORD_VARIABLE, &file);
-    let messages = run(&mut cargo, workspace)?;
-    let bytes = fs::read(&file).map_err(at(&file))?;
-    let mut call: Call =
-        serde_json::from_slice(&bytes).map_err(io::Error::from).map_err(at(&file))?;
+    let packages = metadata.compiled_for(&built);
+    progress(Compiling { done: 0, packages });
+    let mut compiled = HashSet::new();
+    let (messages, ended) = run_by_line(&mut cargo, workspace, &mut |line| {
+        if compiled_package(line).is_some_and(|package| compiled.insert(package)) {
+            progress(Compiling { done: compiled.len().min(packages), packages });
+        }
+    })?;
+    // The template comes last: once its compiler call is there, all that it is linked with is, whether
+    // or not it compiles. What is wrong with it is said when it is judged.
+    let recorded = fs::read(&file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    let mut call: Call = match (recorded, ended) {
+        (Some(call), _) => call,
+        (None, Err(error)) => return Err(error),
+        (None, Ok(())) => {
+            let message = format!("it left no compiler call in {}", file.display());
+            return Err(failed_to(&cargo, message));
+        }
+    };
     // A cache of the user's incremental builds is nothing that a submission may see or write.
     if let Some(at) = call.args.iter().position(|arg| arg.starts_with("incremental=")) {
         call.args.drain(at.saturating_sub(1)..=at);
@@ -242,6 +309,33 @@ fn run(command: &mut Command, workspace: &Path) -> Result<String, RecordError> {
         return Err(failed_to(command, message));
     }
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// Runs a trusted program in the workspace, shows each line of its standard output as it comes, and
+/// answers all of them and whether it succeeded.
+fn run_by_line(
+    command: &mut Command,
+    workspace: &Path,
+    line: &mut dyn FnMut(&str),
+) -> Result<(String, Result<(), RecordError>), RecordError> {
+    command.current_dir(workspace).stdin(Stdio::null());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().map_err(|error| failed_to(command, error.to_string()))?;
+    let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
+    let (mut said, mut lines) = (Vec::new(), String::new());
+    std::thread::scope(|scope| {
+        // Read beside the other: a full pipe would hold the program up.
+        scope.spawn(|| stderr.map(|mut stderr| stderr.read_to_end(&mut said)));
+        for read in stdout.into_iter().flat_map(|stdout| BufReader::new(stdout).lines()) {
+            let Ok(read) = read else { break };
+            line(&read);
+            lines.push_str(&read);
+            lines.push('\n');
+        }
+    });
+    let status = child.wait().map_err(|error| failed_to(command, error.to_string()))?;
+    let said = String::from_utf8_lossy(&said).into_owned();
+    Ok((lines, if status.success() { Ok(()) } else { Err(failed_to(command, said)) }))
 }
 
 fn failed_to(command: &Command, message: String) -> RecordError {

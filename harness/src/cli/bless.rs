@@ -39,7 +39,7 @@ pub fn run(arguments: &BlessArguments, root: Option<&Path>) -> anyhow::Result<u8
             continue;
         }
         let blessing = context.with_store(|store| store.bless(scene))?;
-        context.line.finish_and_clear();
+        context.progress.end();
         println!("{}", blessing.file.display());
         match blessing.old_mean {
             Some(old) => println!("  old mean {old:.6}"),
@@ -75,7 +75,7 @@ fn mistakes(context: &mut Context) -> anyhow::Result<u8> {
         Ok((grading.stored_folder(), grading.look_at_mistakes(&reference, &mistakes, &say)?))
     })?;
     stored.save(&folder)?;
-    context.line.finish_and_clear();
+    context.progress.end();
     for (view, content) in &stored.views {
         println!(
             "{}: {} mistakes",

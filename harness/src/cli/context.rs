@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context as _;
-use indicatif::{ProgressBar, ProgressStyle};
 
+use super::terminal::Progress;
 use crate::assignment::Assignment;
 use crate::decode::Decoder;
 use crate::expected::Store;
@@ -21,34 +21,38 @@ pub struct Context {
     pub assignment: Assignment,
     /// Starts workers.
     pub supervisor: Supervisor,
-    /// A line on standard error that tells what is being done; silent when it is no terminal.
-    pub line: ProgressBar,
+    /// Tells what is being done.
+    pub progress: Progress,
     /// The supervisor's.
     _scratch: Scratch,
 }
 
 impl Context {
-    /// Finds the assignment: at `root`, else at or above the current folder, else above the program.
+    /// The assignment at `root`, else at or above the current folder, else above the program.
+    ///
+    /// # Errors
+    /// When there is none, or it cannot be used.
+    pub fn assignment(root: Option<&Path>) -> anyhow::Result<Assignment> {
+        if let Some(root) = root {
+            return Ok(Assignment::load(root)?);
+        }
+        let here = std::env::current_dir().context("cannot tell the current folder")?;
+        Ok(Assignment::find(&here).or_else(|missing| {
+            let program = std::env::current_exe().unwrap_or_default();
+            Assignment::find(&program).map_err(|_| missing)
+        })?)
+    }
+
+    /// Finds the assignment and makes ready for running things.
+    ///
+    /// # Errors
+    /// When there is no assignment, or no place to work in.
     pub fn new(root: Option<&Path>) -> anyhow::Result<Self> {
-        let assignment = match root {
-            Some(root) => Assignment::load(root)?,
-            None => {
-                let here = std::env::current_dir().context("cannot tell the current folder")?;
-                Assignment::find(&here).or_else(|missing| {
-                    let program = std::env::current_exe().unwrap_or_default();
-                    Assignment::find(&program).map_err(|_| missing)
-                })?
-            }
-        };
+        let assignment = Self::assignment(root)?;
         let scratch = assignment.scratch()?;
-        let line = ProgressBar::new_spinner();
-        line.set_style(
-            ProgressStyle::with_template("{spinner} {msg}")
-                .unwrap_or_else(|_| ProgressStyle::default_spinner()),
-        );
         catch_interrupts();
         let supervisor = Supervisor::of_this_program(scratch.path().to_owned())?;
-        Ok(Self { assignment, supervisor, line, _scratch: scratch })
+        Ok(Self { assignment, supervisor, progress: Progress::new(), _scratch: scratch })
     }
 
     /// Where the reference renderer's library should be, if it is there.
@@ -80,8 +84,7 @@ impl Context {
 
     /// Shows what is being done.
     pub fn say(&self, message: &str) {
-        self.line.set_message(message.to_owned());
-        self.line.tick();
+        self.progress.say(message);
     }
 }
 

@@ -1,6 +1,9 @@
 //! The command line: parses, calls, prints. Each command is one file.
 
+mod batch;
 mod bless;
+mod check;
+mod class;
 mod collect;
 mod compare;
 mod context;
@@ -8,6 +11,7 @@ mod context;
 mod doctor;
 mod grade;
 mod render;
+mod terminal;
 mod tree;
 
 pub use render::AdapterChoice;
@@ -15,7 +19,7 @@ pub use render::AdapterChoice;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::panics;
 
@@ -61,7 +65,7 @@ const BUG: &str = concat!(
 enum Command {
     /// Check your own working folder before handing in: builds src/, renders every public scene
     /// and says what is wrong, where, and what it looks like
-    Check(grade::CheckArguments),
+    Check(check::CheckArguments),
     /// Grade hand-ins: archives (.zip, .tar, .tar.gz), folders, or folders full of them
     Grade(grade::GradeArguments),
     /// Check an archive's tree against the handout's; exit 0 when it conforms, 1 when not
@@ -75,6 +79,11 @@ enum Command {
     /// Say what this machine has: isolation, graphics adapters, compiler; exit 0 when it can grade
     #[cfg(target_os = "linux")]
     Doctor,
+    /// Print a script that completes umbra's commands and options in a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
     /// Render the stored expected images anew with the reference renderer, and replace them
     Bless(bless::BlessArguments),
 }
@@ -178,7 +187,7 @@ struct MachineLacks(String);
 
 fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
     match command {
-        Command::Check(arguments) => grade::check(&arguments, root),
+        Command::Check(arguments) => check::check(&arguments, root),
         Command::Grade(arguments) => grade::grade(&arguments, root),
         Command::Validate(arguments) => tree::validate(&arguments, root),
         Command::Pack(arguments) => tree::pack(&arguments, root),
@@ -186,6 +195,15 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(target_os = "linux")]
         Command::Doctor => doctor::run(),
+        Command::Completions { shell } => {
+            clap_complete::generate(
+                shell,
+                &mut Arguments::command(),
+                "umbra",
+                &mut std::io::stdout(),
+            );
+            Ok(EXIT_OK)
+        }
         Command::Bless(arguments) => bless::run(&arguments, root),
     }
 }

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::{Duration, Instant};
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, bail, ensure};
 use basecode::exr_io::{Precision, write_exr};
 use basecode::scene::{MeshFile, SceneConfig};
 use basecode::{Camera, Image, Vec3};
@@ -14,6 +15,7 @@ use crate::intake::HandInConfig;
 use crate::process::Limits;
 use crate::worker::{
     Adapter, AdapterKind, CameraValue, Job, Matter, Outcome, Request, SceneRef, as_given,
+    draw_in_process,
 };
 
 /// What `umbra render` is told.
@@ -47,6 +49,10 @@ pub struct RenderArguments {
     /// Which adapter draws realtime scenes
     #[arg(long, value_enum, default_value_t = AdapterChoice::Auto)]
     adapter: AdapterChoice,
+    /// Load the plugin into this process, without isolation: for your own plugin, so that a debugger and
+    /// prints work
+    #[arg(long)]
+    in_process: bool,
     /// Options for the plugin; only the reference knows some (`mistake=NAME`)
     #[arg(long, default_value = "", hide = true)]
     options: String,
@@ -204,6 +210,30 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
             shadows: arguments.shadows.is_none_or(|Switch(on)| on),
         }
     };
+    let save = |values: &[f32]| -> anyhow::Result<()> {
+        let pixels = values.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v)).collect();
+        let image = Image { width: width as usize, height: height as usize, pixels };
+        let precision = if config.realtime { Precision::Half } else { Precision::Float };
+        match format {
+            Format::Exr => write_exr(&arguments.output, &image, precision, &[])?,
+            Format::Png => {
+                let picture = clamped(&image);
+                let file = arguments.output.display();
+                std::fs::write(&arguments.output, picture.png()?)
+                    .with_context(|| file.to_string())?;
+                eprintln!("umbra: {file}: {}; write an .exr to compare it", picture.caption);
+            }
+        }
+        Ok(())
+    };
+    if arguments.in_process {
+        ensure!(
+            arguments.plugin != "reference",
+            "--in-process is for a plugin of your own, that you can debug"
+        );
+        save(&draw_in_process(&plugin, &request, &|_, _| ())?)?;
+        return Ok(super::EXIT_OK);
+    }
     let job = Job { plugin: Some(plugin), requests: vec![request] };
     // Whoever renders by hand may wait as long as he likes; Ctrl-C ends it.
     let limits = Limits {
@@ -213,34 +243,29 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
         memory_mib: 16_384,
         ..Limits::default()
     };
+    let begun = Instant::now();
     let mut report = context.supervisor.run_job(&job, &limits, &INTERRUPTED, &mut |progress| {
         let (done, rows) = progress.rows;
+        // What is quick needs no line in a log.
+        if begun.elapsed() < Duration::from_secs(3) {
+            return;
+        }
         context.say(&format!("rendering: {done} of {rows} rows"));
     });
-    context.line.finish_and_clear();
+    context.progress.end();
     if INTERRUPTED.load(std::sync::atomic::Ordering::Relaxed) {
         return Ok(super::EXIT_INTERRUPTED);
     }
     let printed = report
         .runs
         .iter()
-        .map(|run| run.ended.stderr.head.clone() + &run.ended.stderr.tail)
+        .flat_map(|run| [&run.ended.stdout, &run.ended.stderr])
+        .map(|printed| printed.head.clone() + &printed.tail)
         .collect::<String>();
     match report.outcomes.pop() {
         Some(Outcome::Done(answer)) => {
-            let pixels = answer.values.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v)).collect();
-            let image = Image { width: width as usize, height: height as usize, pixels };
-            let precision = if config.realtime { Precision::Half } else { Precision::Float };
-            match format {
-                Format::Exr => write_exr(&arguments.output, &image, precision, &[])?,
-                Format::Png => {
-                    let picture = clamped(&image);
-                    let file = arguments.output.display();
-                    std::fs::write(&arguments.output, picture.png()?)
-                        .with_context(|| file.to_string())?;
-                    eprintln!("umbra: {file}: {}; write an .exr to compare it", picture.caption);
-                }
-            }
+            save(&answer.values)?;
+            eprint!("{printed}");
             Ok(super::EXIT_OK)
         }
         outcome => {

@@ -1,9 +1,10 @@
 //! Records that are kept while a batch goes on: whatever ends it, the same command does only what
 //! is missing. Points are made from records anew each time.
 
-use std::fs;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Mutex;
+use std::{fs, io};
 
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
@@ -11,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 use super::ask::BUDGET;
 use super::pipeline::{Folders, Grading};
-use super::record::Record;
+use super::record::{Record, Student};
 use crate::evidence::{Check, Evidence, Picture, Verdict};
 use crate::expected::scene_digest;
 use crate::files::{files_below, hex, write_whole};
@@ -21,12 +22,25 @@ use crate::panics::Bug;
 const FILE: &str = "record.json";
 /// The file of a bug of Umbra's that a submission met.
 const BUG: &str = "internal-error.json";
+/// What a record's file is called once a newer submission has replaced it.
+const REPLACED: &str = "record.replaced.json";
 
 /// Keeps records and finds them again.
 pub struct Kept {
     /// SHA-256 over all that a record depends on, but for the hand-in.
     batch: [u8; 32],
-    found: AtomicUsize,
+    /// Whether everything is found out anew.
+    force: bool,
+    /// The records of this run that are in their files, by slug: whether they were there before.
+    settled: Mutex<HashMap<String, bool>>,
+}
+
+/// A record of an earlier run.
+pub struct Earlier {
+    /// The record.
+    pub record: Record,
+    /// Whether it was made with the same scenes, limits and program.
+    pub comparable: bool,
 }
 
 /// What is in the file of a bug.
@@ -40,19 +54,23 @@ struct Met {
 /// What is in the file of a record.
 #[derive(Serialize, Deserialize)]
 struct File<R> {
-    /// SHA-256 over all that the record depends on, but for the rules.
+    /// SHA-256 over all that the record depends on, but for the rules; empty when it is not to be found
+    /// again, but only listed.
     key: String,
+    /// The same, but for the submission.
+    #[serde(default)]
+    batch: String,
     /// The parts that were diagnosed, by the rules of then.
     failing: Vec<String>,
     record: R,
 }
 
 impl Kept {
-    /// For the records that `grading` makes.
+    /// For the records that `grading` makes; `force` finds none again.
     ///
     /// # Errors
     /// When something that they depend on cannot be read.
-    pub fn of(grading: &Grading) -> anyhow::Result<Self> {
+    pub fn of(grading: &Grading, force: bool) -> anyhow::Result<Self> {
         let mut hash = Sha256::new();
         let assignment = grading.assignment;
         hash.update(serde_json::to_vec(&(
@@ -77,11 +95,14 @@ impl Kept {
                 hash.update(scene_digest(scene)?);
             }
         }
-        Ok(Self { batch: hash.finalize().into(), found: AtomicUsize::new(0) })
+        Ok(Self { batch: hash.finalize().into(), force, settled: Mutex::default() })
     }
 
     /// The bug that this program met with the submission at `source` before.
     pub(super) fn bug_of(&self, source: &Path, out: &Folders) -> Option<Bug> {
+        if self.force {
+            return None;
+        }
         let bytes = fs::read(out.instructor.join(BUG)).ok()?;
         let met: Met = serde_json::from_slice(&bytes).ok()?;
         (met.key == self.key_of_source(source)).then_some(met.bug)
@@ -120,7 +141,78 @@ impl Kept {
 
     /// How many records were found again.
     pub fn found(&self) -> usize {
-        self.found.load(Ordering::Relaxed)
+        self.settled.lock().map_or(0, |settled| settled.values().filter(|found| **found).count())
+    }
+
+    /// Whether the record of `slug` was found again.
+    pub fn was_found(&self, slug: &str) -> bool {
+        self.settled.lock().is_ok_and(|settled| settled.get(slug) == Some(&true))
+    }
+
+    fn settle(&self, record: &Record, found: bool) {
+        if let Ok(mut settled) = self.settled.lock() {
+            settled.insert(record.slug.clone(), found);
+        }
+    }
+
+    /// Keeps a record of this run that is not kept yet, so that the class is complete: it is listed by
+    /// later runs, but not found again.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn list(&self, record: &Record, out: &Folders) -> anyhow::Result<()> {
+        if self.settled.lock().is_ok_and(|settled| settled.contains_key(&record.slug)) {
+            return Ok(());
+        }
+        self.write("", Vec::new(), record, out)?;
+        self.settle(record, false);
+        Ok(())
+    }
+
+    /// The record that an earlier run kept in an instructor's folder, if any.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn earlier(&self, instructor: &Path) -> anyhow::Result<Option<Earlier>> {
+        let path = instructor.join(FILE);
+        let bytes = match fs::read(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            bytes => bytes.with_context(|| format!("cannot read {}", path.display()))?,
+        };
+        let file: File<Record> = serde_json::from_slice(&bytes).with_context(|| {
+            format!("{}: not a record of this version of Umbra", path.display())
+        })?;
+        Ok(Some(Earlier { comparable: file.batch == hex(&self.batch), record: file.record }))
+    }
+
+    /// Whose record an earlier run kept in an instructor's folder.
+    pub fn student(instructor: &Path) -> Option<Student> {
+        let bytes = fs::read(instructor.join(FILE)).ok()?;
+        let file: File<Record> = serde_json::from_slice(&bytes).ok()?;
+        Some(file.record.student).filter(|student| *student != Student::default())
+    }
+
+    /// Sets the record in an instructor's folder aside: a newer submission takes its place.
+    ///
+    /// # Errors
+    /// When its file cannot be renamed.
+    pub fn replace(&self, instructor: &Path) -> io::Result<()> {
+        fs::rename(instructor.join(FILE), instructor.join(REPLACED))
+    }
+
+    fn write(
+        &self,
+        key: &str,
+        failing: Vec<String>,
+        record: &Record,
+        out: &Folders,
+    ) -> anyhow::Result<Vec<u8>> {
+        let path = out.instructor.join(FILE);
+        let batch = hex(&self.batch);
+        let bytes = serde_json::to_vec(&File { key: key.to_owned(), batch, failing, record })?;
+        let failed = || format!("cannot keep {}", path.display());
+        write_whole(&path, &bytes).with_context(failed)?;
+        Ok(bytes)
     }
 
     /// The key of a record that intake has begun: what was handed in, what is to be said of it so
@@ -141,13 +233,18 @@ impl Kept {
         budget: bool,
         out: &Folders,
     ) -> Option<Record> {
+        if self.force {
+            return None;
+        }
         let bytes = fs::read(out.instructor.join(FILE)).ok()?;
         let file: File<Record> = serde_json::from_slice(&bytes).ok()?;
         let same = file.key == key
             && file.failing == failing(&file.record.evidence)
             && (budget || file.record.evidence.named(BUDGET).next().is_none())
             && pictures(&file.record, out).all(|picture| picture.is_file());
-        self.found.fetch_add(usize::from(same), Ordering::Relaxed);
+        if same {
+            self.settle(&file.record, true);
+        }
         same.then_some(file.record)
     }
 
@@ -165,11 +262,9 @@ impl Kept {
         if record.evidence.checks.iter().any(|check| check.verdict == Verdict::NotRun) {
             return Ok(record);
         }
-        let path = out.instructor.join(FILE);
-        let failed = || format!("cannot keep {}", path.display());
-        let bytes = serde_json::to_vec(&File { key: key.to_owned(), failing, record })?;
-        write_whole(&path, &bytes).with_context(failed)?;
-        let file: File<Record> = serde_json::from_slice(&bytes).with_context(failed)?;
+        let bytes = self.write(key, failing, &record, out)?;
+        self.settle(&record, false);
+        let file: File<Record> = serde_json::from_slice(&bytes).context("a record just kept")?;
         Ok(file.record)
     }
 }
@@ -189,7 +284,7 @@ fn pictures<'a>(record: &'a Record, out: &'a Folders) -> impl Iterator<Item = Pa
 impl Kept {
     /// For the records of a made-up batch.
     pub(super) fn with(batch: [u8; 32]) -> Self {
-        Self { batch, found: AtomicUsize::new(0) }
+        Self { batch, force: false, settled: Mutex::default() }
     }
 }
 

@@ -23,7 +23,7 @@ mod shared;
 pub use case::{Case, Small};
 pub use contain::INTERNAL_ERROR;
 pub use costs::Cost;
-pub use kept::Kept;
+pub use kept::{Earlier, Kept};
 pub use offline::Drawn;
 pub use pipeline::{Folders, Grading, Purpose, RenderPath, TREE};
 pub use realtime::Stages;

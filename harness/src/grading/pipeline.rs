@@ -23,7 +23,7 @@ use crate::diagnosis::{Diagnosis, Stored};
 use crate::evidence::{Check, Evidence, Verdict, rays, shadow_map};
 use crate::expected::Store;
 use crate::held_back::{self, HeldBack};
-use crate::intake::{self, HandIn, HandInConfig, IntakeError, TreeSpec, Validation};
+use crate::intake::{self, HandIn, IntakeError, TreeSpec, Validation};
 use crate::rubric::BUILD;
 use crate::worker::{Adapter, Budget, Patience, Reference, Supervisor};
 
@@ -60,6 +60,10 @@ pub struct Grading<'a> {
     pub threads: u32,
     /// Ctrl-C.
     pub cancel: &'a AtomicBool,
+    /// What is asked about: both halves of the assignment, or one.
+    pub paths: Vec<RenderPath>,
+    /// Whether submitted images are compared with what the code draws.
+    pub compares_submitted: bool,
     /// Records made before and to be made, if they are kept.
     pub kept: Option<Kept>,
     /// What a submission may use on each path, if that is limited.
@@ -119,8 +123,11 @@ impl<'a> Grading<'a> {
             "held-back scenes cannot be made: there is no reference renderer to tell what is right on them; \
              hint: `--perturb off` grades on the public scenes alone"
         );
-        (store.progress)("preparing the compiler");
-        let recording = Recording::obtain(&assignment.root, &store.supervisor.umbra)?;
+        let begun = Instant::now();
+        let recording =
+            Recording::obtain_telling(&assignment.root, &store.supervisor.umbra, &|compiling| {
+                (store.progress)(&compiling.in_words(begun.elapsed()));
+            })?;
         let mut cases = Vec::new();
         for entry in &assignment.scenes {
             (store.progress)(&format!("preparing scene {}", entry.name));
@@ -139,6 +146,8 @@ impl<'a> Grading<'a> {
             reference: store.reference.clone(),
             threads: store.threads,
             cancel,
+            paths: RenderPath::ALL.to_vec(),
+            compares_submitted: true,
             kept: None,
             budget: Some(assignment.limits.budget.clone()),
             reference_costs: ReferenceCosts::default(),
@@ -190,7 +199,7 @@ impl<'a> Grading<'a> {
         let scratch =
             tempfile::Builder::new().prefix("hand-in-").tempdir_in(&self.supervisor.scratch)?;
         let mut record = self.begin(source, slug);
-        say("intake");
+        say("copying the files");
         let copy = scratch.path().join("copy");
         std::fs::create_dir(&copy)?;
         let (tree, limits) = (&self.assignment.tree, &self.assignment.limits.archive);
@@ -208,7 +217,7 @@ impl<'a> Grading<'a> {
             };
         record.digest.clone_from(&hand_in.digest);
         let config = validation.config.clone().unwrap_or_default();
-        record.student = student(&config);
+        record.student = Student::of(&config);
         record.findings.clone_from(&validation.findings);
         record.findings.extend(source);
         let mut checks = vec![tree_check(&validation, &hand_in, tree, purpose)];
@@ -222,15 +231,18 @@ impl<'a> Grading<'a> {
         }
         costs.end("intake", decoder.take_cpu_s());
 
-        say("building");
+        say("compiling the source");
         let plugin = self.build(&hand_in, scratch.path(), &mut record, &mut checks, &mut costs)?;
         let seed = config.sampler_seed().unwrap_or_default();
         let mut drawn = Vec::new();
-        if let Some(plugin) = &plugin {
+        let asks = |path| self.paths.contains(&path);
+        if let Some(plugin) = plugin.as_ref().filter(|_| asks(RenderPath::Offline)) {
             say("rendering offline");
             self.offline(&asker, plugin, seed, &mut checks, &mut drawn)?;
             checks.extend(asker.used_up());
             costs.end("offline", asker.end_path());
+        }
+        if let Some(plugin) = plugin.as_ref().filter(|_| asks(RenderPath::Realtime)) {
             say("drawing realtime");
             let stages = Stages::read(&hand_in.root.join("src"), &self.assignment.template());
             self.realtime(&asker, plugin, &stages, &mut checks, &mut drawn)?;
@@ -238,8 +250,11 @@ impl<'a> Grading<'a> {
             checks.extend(asker.printed_much());
             costs.end("realtime", asker.end_path());
         }
-        say("comparing the images handed in");
-        let handed_in = handed_in::read(&decoder, &hand_in.root, tree, &self.cases)?;
+        let compared: &[Case] = if self.compares_submitted { &self.cases } else { &[] };
+        if self.compares_submitted {
+            say("comparing the submitted images");
+        }
+        let handed_in = handed_in::read(&decoder, &hand_in.root, tree, compared)?;
         record.findings.extend(handed_in.iter().filter_map(|image| image.finding(&hand_in.root)));
         record.findings.sort_by_key(|finding| finding.severity);
         for image in &handed_in {
@@ -513,16 +528,6 @@ impl Costs {
         let wall_s = (now - std::mem::replace(&mut self.since, now)).as_secs_f64();
         self.stages.push(StageCost { name: name.to_owned(), wall_s, cpu_s });
         self.stages.clone()
-    }
-}
-
-fn student(config: &HandInConfig) -> Student {
-    let text =
-        |field: &Option<intake::Field>| field.as_ref().map_or(String::new(), |f| f.text.clone());
-    Student {
-        first_name: text(&config.first_name),
-        last_name: text(&config.last_name),
-        id: text(&config.student_id),
     }
 }
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::shared::ImageDigest;
 use crate::diagnosis::Diagnosis;
 use crate::evidence::Evidence;
-use crate::intake::Finding;
+use crate::intake::{Field, Finding, HandInConfig};
 
 /// One hand-in, after all evidence was collected. Rubric, dates and class list stay outside, so
 /// that grades can be derived from it again without rendering.
@@ -73,6 +73,16 @@ pub struct Conditions {
 }
 
 impl Student {
+    /// As a `config.json` states them.
+    pub fn of(config: &HandInConfig) -> Self {
+        let text = |field: &Option<Field>| field.as_ref().map_or(String::new(), |f| f.text.clone());
+        Self {
+            first_name: text(&config.first_name),
+            last_name: text(&config.last_name),
+            id: text(&config.student_id),
+        }
+    }
+
     /// `First Last`, or what there is of it.
     pub fn full_name(&self) -> String {
         format!("{} {}", self.first_name, self.last_name).trim().to_owned()

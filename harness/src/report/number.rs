@@ -111,6 +111,18 @@ pub(super) fn looks_like(part: &str, diagnoses: &[Diagnosis]) -> Vec<String> {
     words.collect()
 }
 
+/// Words of Umbra's own, and what they are called where only the handout's are known.
+const PLAIN: [(&str, &str); 3] = [
+    ("under the witness BSDF", "with a test BSDF in place of yours,"),
+    ("swap not possible", "cannot be judged alone"),
+    (" directions probed", " directions"),
+];
+
+/// What a check says, without words that only Umbra's documents explain.
+pub(super) fn plain(text: &str) -> String {
+    PLAIN.iter().fold(text.to_owned(), |text, (own, plain)| text.replace(own, plain))
+}
+
 /// `1 hand-in`, `2 hand-ins`.
 pub(super) fn count(number: usize, noun: &str) -> String {
     if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }

@@ -20,7 +20,7 @@ mod table;
 mod wire;
 
 pub use cage::as_given;
-pub use child::child_main;
+pub use child::{child_main, draw_in_process};
 pub use job::{
     Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, RayQuery, Request, SceneRef,
     Stage,

@@ -4,9 +4,24 @@
 //! picture ([`Target`]), vertex buffers ([`Mesh`]), uniform buffers ([`Uniform`]) and pipelines
 //! ([`Gpu::pipeline`]). A [`RenderPass`] fills the uniforms, chooses pipelines, binds and draws,
 //! with the plain calls of [`wgpu::RenderPass`].
+//!
+//! For what tutorials bring along: [`perspective`], [`orthographic`] and [`look_at`] make the matrices of
+//! a second camera; [`crate::glam`], [`crate::bytemuck`] and [`crate::wgpu`] are the libraries that the
+//! base code itself uses. A struct of your own for a buffer is
+//! ```
+//! use basecode::bytemuck::{Pod, Zeroable};
+//!
+//! #[derive(Clone, Copy, Pod, Zeroable)]
+//! #[repr(C)]
+//! #[bytemuck(crate = "basecode::bytemuck")]
+//! struct Light {
+//!     view_projection: [[f32; 4]; 4],
+//! }
+//! ```
 
 mod context;
 mod contract;
+mod matrices;
 mod mesh;
 mod pipeline;
 mod shadow;
@@ -18,6 +33,7 @@ pub use contract::{
     FRAME_GROUP, FrameUniforms, MATERIAL_GROUP, MaterialUniforms, OBJECT_GROUP, ObjectUniforms,
     SHADOW_GROUP, SHADOW_LAYERS, ShadowUniforms, VERTEX_STRIDE,
 };
+pub use matrices::{look_at, orthographic, perspective};
 pub use mesh::Mesh;
 pub use pipeline::{EMITTER_FS, Layouts, Stage};
 pub use shadow::ShadowMap;

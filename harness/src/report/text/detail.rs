@@ -2,26 +2,27 @@
 
 use super::super::harmless::harmless_lines;
 use super::super::number::{
-    self, hints, is_failure, is_range, looks_like, of_part, points, seconds, total,
+    self, count, hints, is_failure, is_range, looks_like, of_part, plain, points, seconds, total,
 };
 use super::super::{Entry, Sheet};
-use super::page::{Page, Style, columns, left, wrap};
+use super::page::{Look, Page, Style, columns, left, wrap};
 use crate::evidence::{Check, Measure, Verdict};
 use crate::intake::{Finding, Severity};
+use crate::rubric::{BUILD, PartGrade};
 
 /// So many lines of the compiler's are shown.
 const DIAGNOSTIC_LINES: usize = 60;
 /// Wide enough for a verdict and two spaces.
 const VERDICT_WIDTH: usize = 17;
 
-/// All that is known of one hand-in: parts with points, reason and hint; every check with value,
-/// bound and verdict; findings; what the compiler said. `width` in terminal columns; no line is
-/// wider. `colours` allows ANSI colours.
-pub fn detail(sheet: &Sheet, entry: &Entry, width: usize, colours: bool) -> String {
+/// One submission: parts with points, and of those that lost some the reason and a hint; what is to be
+/// noticed besides; findings; what the compiler said. With `verbose`, every check with value, bound
+/// and verdict too, and under which conditions they were made.
+pub fn detail(sheet: &Sheet, entry: &Entry, look: Look, verbose: bool) -> String {
     let Entry { record, grade } = entry;
-    let mut page = Page::new(width, colours);
+    let mut page = Page::new(look.width, look.colours);
     page.wrapped(&[], Style::Heading, &sheet.title);
-    page.wrapped(&[(Style::Plain, "hand-in  ")], Style::Plain, &record.name);
+    page.wrapped(&[(Style::Plain, "checked  ")], Style::Plain, &record.name);
     let student = [record.student.full_name(), record.student.id.clone()];
     let student: Vec<String> = student.into_iter().filter(|text| !text.is_empty()).collect();
     let student = if student.is_empty() { "not said".to_owned() } else { student.join(", ") };
@@ -35,11 +36,19 @@ pub fn detail(sheet: &Sheet, entry: &Entry, width: usize, colours: bool) -> Stri
     for remark in &grade.remarks {
         page.wrapped(&[(Style::Bad, "remark   ")], Style::Plain, remark);
     }
-    parts(&mut page, entry);
-    checks(&mut page, &record.evidence.checks);
-    findings(&mut page, &record.findings);
+    parts(&mut page, entry, verbose);
+    if verbose {
+        checks(&mut page, &record.evidence.checks);
+    } else {
+        noticed(&mut page, sheet, entry);
+    }
+    let whole = |part: &PartGrade| part.bonus || points(part.points) == points(part.out_of);
+    let busy = grade.parts.len() < sheet.rules.parts.len() || !grade.parts.iter().all(whole);
+    findings(&mut page, &record.findings, verbose, busy);
     diagnostics(&mut page, &record.diagnostics);
-    costs(&mut page, entry);
+    if verbose {
+        costs(&mut page, entry);
+    }
     page.finish()
 }
 
@@ -48,7 +57,7 @@ fn heading(page: &mut Page, text: &str) {
     page.line(&[(Style::Heading, text)]);
 }
 
-fn parts(page: &mut Page, Entry { record, grade }: &Entry) {
+fn parts(page: &mut Page, Entry { record, grade }: &Entry, verbose: bool) {
     heading(page, "parts");
     let worth = |part| format!("{}/{}", of_part(part), points(part.out_of));
     let ids = grade.parts.iter().map(|part| columns(&part.id)).max().unwrap_or(0);
@@ -59,8 +68,12 @@ fn parts(page: &mut Page, Entry { record, grade }: &Entry) {
         let style = Style::of_points(part.points, part.points_max, part.out_of);
         page.wrapped(&[(Style::Plain, &id), (style, &worth)], Style::Plain, &part.title);
         let indent = " ".repeat(columns(&id) + columns(&worth));
-        page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &part.reason);
-        if style == Style::Good {
+        let lost = style != Style::Good;
+        if lost || verbose {
+            let reason = if verbose { part.reason.clone() } else { plain(&part.reason) };
+            page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &reason);
+        }
+        if !lost {
             continue;
         }
         for words in looks_like(&part.id, &record.diagnoses) {
@@ -74,13 +87,52 @@ fn parts(page: &mut Page, Entry { record, grade }: &Entry) {
                 hint,
             );
         }
-        if !part.evidence.is_empty() {
+        let decided = |check: &&Check| part.evidence.contains(&check.name()) && is_failure(check);
+        let pictures = record.evidence.checks.iter().filter(decided).map(|check| &check.pictures);
+        if let Some(pictures) = pictures.into_iter().find(|pictures| !pictures.is_empty()) {
+            let files: Vec<&str> = pictures.iter().map(|picture| picture.file.as_str()).collect();
+            let lead = [(Style::Plain, indent.as_str()), (Style::Heading, "pictures: ")];
+            page.wrapped(&lead, Style::Faint, &files.join(", "));
+        }
+        if verbose && !part.evidence.is_empty() {
             let evidence = format!("decided by {}", part.evidence.join(", "));
             page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &evidence);
         }
     }
     for words in looks_like("", &record.diagnoses) {
         page.wrapped(&[(Style::Heading, "  also looks like: ")], Style::Plain, &words);
+    }
+}
+
+/// What failed without being the matter of a part: it costs nothing, but somebody should look.
+fn noticed(page: &mut Page, sheet: &Sheet, Entry { record, .. }: &Entry) {
+    let rules = &sheet.rules;
+    let of_part = |check: &Check| {
+        let named = rules.parts.iter().flat_map(|part| part.evidence.iter().chain(&part.fallback));
+        let proofs = rules.paths.values().map(|path| &path.proof);
+        named.chain(proofs).any(|id| *id == check.id) || check.id == BUILD
+    };
+    // What images alone are worth is no matter where there is code.
+    let image_alone = |check: &Check| {
+        let mut parts = rules.parts.iter().flat_map(|part| &part.images_only);
+        check.summary.is_empty() || (parts.any(|id| *id == check.id) && check.hint.is_empty())
+    };
+    let wanted =
+        |check: &&Check| check.verdict == Verdict::Fail && !of_part(check) && !image_alone(check);
+    let mut told: Vec<&str> = Vec::new();
+    for check in record.evidence.checks.iter().filter(wanted) {
+        // Once for each kind: the first scene stands for the others.
+        if told.contains(&check.id.as_str()) {
+            continue;
+        }
+        if told.is_empty() {
+            heading(page, "to be noticed, without cost");
+        }
+        told.push(&check.id);
+        page.wrapped(&[(Style::Open, "  ")], Style::Plain, &plain(&check.summary));
+        if !check.hint.is_empty() {
+            page.wrapped(&[(Style::Heading, "    hint: ")], Style::Plain, &check.hint);
+        }
     }
 }
 
@@ -167,12 +219,24 @@ fn group_of_checks(page: &mut Page, group: &[&Check]) {
     }
 }
 
-fn findings(page: &mut Page, findings: &[Finding]) {
-    if findings.is_empty() {
+/// What intake found. Without `verbose` no notes, and while there is work to do (`busy`) only how much is
+/// to be mended before handing in.
+fn findings(page: &mut Page, findings: &[Finding], verbose: bool, busy: bool) {
+    let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
+    if busy && !verbose {
+        if errors > 0 {
+            page.gap();
+            let text = format!("before you hand in, {} to be mended", count(errors, "thing"));
+            page.wrapped(&[], Style::Faint, &format!("{text}: `umbra validate` lists them"));
+        }
         return;
     }
-    heading(page, "findings");
-    for finding in findings {
+    let wanted = |finding: &&Finding| verbose || finding.severity != Severity::Note;
+    if !findings.iter().any(|finding| wanted(&finding)) {
+        return;
+    }
+    heading(page, if verbose { "findings" } else { "before you hand in" });
+    for finding in findings.iter().filter(wanted) {
         let style = match finding.severity {
             Severity::Error => Style::Bad,
             Severity::Warning => Style::Open,
@@ -234,13 +298,16 @@ mod tests {
     #[test]
     fn known_answer() {
         let sheet = sample::sheet();
-        assert_eq!(detail(&sheet, &sheet.entries[1], 100, false), include_str!("detail_100.txt"));
+        let look = Look { width: 100, colours: false };
+        assert_eq!(detail(&sheet, &sheet.entries[1], look, true), include_str!("detail_100.txt"));
+        let plain = detail(&sheet, &sheet.entries[1], look, false);
+        assert_eq!(plain, include_str!("detail_plain_100.txt"));
     }
 
     #[test]
     fn what_does_not_build_shows_the_compiler() {
         let sheet = sample::sheet();
-        let text = detail(&sheet, &sheet.entries[2], 80, false);
+        let text = detail(&sheet, &sheet.entries[2], Look { width: 80, colours: false }, true);
         for line in [
             "total    0/75",
             "remark   the source does not build; the images alone earn 11.44 points once the",
@@ -269,7 +336,8 @@ mod tests {
             part.reason = evil.repeat(9);
         }
         for width in [1, 7, 20, 33, 80, 200] {
-            let text = detail(&sheet, &sheet.entries[1], width, false);
+            let look = Look { width, colours: false };
+            let text = detail(&sheet, &sheet.entries[1], look, true);
             assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
             for line in text.lines() {
                 assert!(line.width() <= width.max(2), "{width}: {line:?}");
@@ -280,11 +348,12 @@ mod tests {
     #[test]
     fn colours_do_not_change_the_words() {
         let sheet = sample::sheet();
-        let mut text = detail(&sheet, &sheet.entries[1], 80, true);
+        let look = |colours| Look { width: 80, colours };
+        let mut text = detail(&sheet, &sheet.entries[1], look(true), true);
         assert!(text.contains("\u{1b}[31m"));
         for code in ["0", "1", "2", "31", "32", "33"] {
             text = text.replace(&format!("\u{1b}[{code}m"), "");
         }
-        assert_eq!(text, detail(&sheet, &sheet.entries[1], 80, false));
+        assert_eq!(text, detail(&sheet, &sheet.entries[1], look(false), true));
     }
 }

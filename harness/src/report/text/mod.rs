@@ -1,8 +1,11 @@
-//! What the console shows: a table for many hand-ins, every detail for one.
+//! What the console shows: a table for many submissions, the parts of one with what is next to do.
 
+mod closing;
 mod detail;
 mod page;
 mod table;
 
+pub use closing::{Closing, closing};
 pub use detail::detail;
-pub use table::table;
+pub use page::Look;
+pub use table::{in_a_line, table};

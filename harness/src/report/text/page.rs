@@ -40,6 +40,15 @@ impl Style {
     }
 }
 
+/// How a text is to look.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Terminal columns; no line is wider.
+    pub width: usize,
+    /// Whether ANSI colours are allowed.
+    pub colours: bool,
+}
+
 /// Text in the making.
 pub(super) struct Page {
     /// No line is wider, in terminal columns.

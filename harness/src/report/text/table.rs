@@ -1,8 +1,10 @@
 //! The table of many hand-ins.
 
 use super::super::number::{count, due, is_range, of_part, points, total};
-use super::super::{Entry, ReportError, Sheet};
+use super::super::{Entry, ReportError, Sheet, harmless};
 use super::page::{Page, Style, columns, left, right};
+use crate::grading::Record;
+use crate::rubric::Grade;
 
 /// Columns between two columns.
 const GAP: &str = "  ";
@@ -50,6 +52,13 @@ pub fn table(sheet: &Sheet, width: usize, colours: bool) -> Result<String, Repor
     }
     page.wrapped(&[], Style::Plain, &summary);
     Ok(page.finish())
+}
+
+/// One submission in a line: `a2_ada.zip (Ada Lovelace): 95/75`.
+pub fn in_a_line(record: &Record, grade: &Grade) -> String {
+    let student = record.student.full_name();
+    let student = if student.is_empty() { String::new() } else { format!(" ({student})") };
+    harmless(&format!("{}{student}: {}", record.name, total(grade)))
 }
 
 /// Every remark, once.

@@ -1,0 +1,266 @@
+//! Submissions through all stages, and their report: what `umbra check` and `umbra grade` share.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context as _, ensure};
+
+use super::MachineLacks;
+use super::check::Asked;
+use super::class::{self, Source};
+use super::collect::{self, Collected, collect};
+use super::context::{Context, INTERRUPTED, cores};
+use super::grade::{BudgetChoice, IsolationChoice, Perturb};
+use super::render::AdapterChoice;
+use crate::files::write_whole;
+use crate::grading::{Folders, Grading, Kept, Purpose, Record, judge_shared};
+use crate::held_back::recorded_seed;
+use crate::report::{self, Entry, Sheet};
+use crate::rubric;
+use crate::sandbox::Isolation;
+
+/// The file with the seed of a batch's held-back scenes, in the instructor's folder.
+const SEED_FILE: &str = "held-back-seed.txt";
+
+/// The file with what the reference renderer took on this machine, where a slow submission needed it.
+const COSTS_FILE: &str = "reference-costs.json";
+
+/// What a grade says of a submission that was judged in another way than the others of its class.
+const OTHER_CONDITIONS: &str = "graded before with other scenes, limits or another version of Umbra: \
+                                not comparable, grade it again";
+
+/// Submissions to be taken through all stages.
+pub struct Batch<'a> {
+    /// Where they lie, or folders that hold them.
+    pub paths: Vec<PathBuf>,
+    /// The report's folder.
+    pub output: &'a Path,
+    /// What draws.
+    pub adapter: AdapterChoice,
+    /// So many at the same time.
+    pub jobs: usize,
+    /// What for.
+    pub purpose: Purpose,
+    /// What must isolate them.
+    pub isolation: IsolationChoice,
+    /// Nothing for the seed that is recorded with the batch.
+    pub perturb: Option<Perturb>,
+    /// How much time each has in all.
+    pub budget: BudgetChoice,
+    /// What of the assignment is asked; nothing for all of it.
+    pub asked: Option<&'a Asked>,
+    /// Whose submissions alone are graded, unless it is empty.
+    pub only: &'a [String],
+    /// Whether what was found out before is found out anew.
+    pub force: bool,
+    /// Whether to print what each stage cost.
+    pub timings: bool,
+}
+
+impl Batch<'_> {
+    /// Grades all and writes the reports; nothing when Ctrl-C came in between. Answers what was skipped, too.
+    pub fn run(&self, root: Option<&Path>) -> anyhow::Result<Option<(Sheet, Option<String>)>> {
+        for path in &self.paths {
+            ensure!(path.exists(), "{} does not exist", path.display());
+        }
+        let mut context = Context::new(root)?;
+        let collected = match self.purpose {
+            Purpose::Grade => collect(&self.paths, self.output, &context.assignment.tree)?,
+            Purpose::Check => {
+                let sources = self.paths.iter().map(|path| collect::Source::given(path)).collect();
+                Collected { sources, ..Collected::default() }
+            }
+        };
+        super::writable(self.output)?;
+        if self.purpose == Purpose::Grade && context.reference().is_none() {
+            return Err(MachineLacks(
+                "grades are made with the reference renderer and with scenes that are held back, which \
+                 are not here: a student's kit has neither; hint: `umbra check DIR` judges your work \
+                 on the public scenes, as the grader does (instructors: cargo build --release --workspace)"
+                    .into(),
+            )
+            .into());
+        }
+        let isolation = context.supervisor.isolation.isolation();
+        if self.isolation == IsolationChoice::Full && isolation != Isolation::Full {
+            return Err(MachineLacks(format!(
+                "hand-ins are not run here, isolation would be {isolation}; hint: `umbra doctor` says \
+                 what to do, `--isolation reduced` grades all the same"
+            ))
+            .into());
+        }
+        if let Some(asked) = self.asked {
+            asked.restrict(&mut context.assignment)?;
+        }
+        let context = &context;
+        let seed = match self.perturb {
+            Some(Perturb(seed)) => seed,
+            None => Some(recorded_seed(&self.output.join(report::INSTRUCTOR).join(SEED_FILE))?),
+        };
+        let all = class::sources(&collected.sources, self.output);
+        let chosen = class::only(context, self.output, &all, self.only)?;
+        let result = context.with_store(|store| {
+            let adapter = self.adapter.adapter();
+            let mut grading = Grading::prepare(store, adapter, seed, &INTERRUPTED)?;
+            if self.purpose == Purpose::Grade {
+                grading.kept = Some(Kept::of(&grading, self.force)?);
+            }
+            if self.budget == BudgetChoice::None {
+                grading.budget = None;
+            }
+            grading.paths = self.asked.map_or(grading.paths, |asked| asked.paths(context));
+            grading.compares_submitted = self.asked.is_none_or(Asked::is_all);
+            let jobs = self.jobs.min(chosen.len()).max(1);
+            grading.threads = (cores() / jobs as u32).max(1);
+            let results = self.grade_all(context, &grading, &chosen, jobs);
+            let costs = grading.costs_of_reference();
+            if self.purpose == Purpose::Grade && !costs.is_empty() {
+                let file = self.output.join(report::INSTRUCTOR).join(COSTS_FILE);
+                write_whole(&file, &serde_json::to_vec_pretty(&costs)?)
+                    .with_context(|| format!("cannot write {}", file.display()))?;
+            }
+            Ok::<_, anyhow::Error>((results, grading.held_back, grading.kept))
+        });
+        context.progress.end();
+        if INTERRUPTED.load(Ordering::Relaxed) {
+            let goes_on = match (self.purpose, &result) {
+                (Purpose::Grade, Ok((results, ..))) => format!(
+                    ", {} of {} hand-ins are graded; the same command goes on from there",
+                    results.len(),
+                    chosen.len()
+                ),
+                _ => String::new(),
+            };
+            eprintln!("umbra: interrupted{goes_on}");
+            return Ok(None);
+        }
+        let (results, held_back, kept) = result?;
+        let mut records = results.into_iter().collect::<anyhow::Result<Vec<Record>>>()?;
+        let mut incomparable = Vec::new();
+        if let Some(kept) = kept {
+            if kept.found() > 0 {
+                eprintln!(
+                    "umbra: {} of {} hand-ins are as they were graded before",
+                    kept.found(),
+                    chosen.len()
+                );
+            }
+            incomparable = class::join(&kept, self.output, &all, &mut records);
+        }
+        // In an order that does not hang on who was graded when.
+        records.sort_by_key(|record| record.slug.to_lowercase());
+        judge_shared(&mut records);
+        let rules = &context.assignment.rules;
+        let entries = records.into_iter().map(|mut record| {
+            record.evidence = rubric::settle(rules, &record.evidence);
+            let mut grade = rubric::grade(rules, &record.evidence);
+            if let Some(asked) = self.asked {
+                asked.only_of(&mut grade);
+            }
+            if incomparable.contains(&record.slug) {
+                grade.remarks.push(OTHER_CONDITIONS.to_owned());
+            }
+            Entry { record, grade }
+        });
+        let sheet = Sheet::new(&context.assignment, held_back, entries.collect());
+        report::write(self.output, &sheet)?;
+        if self.timings {
+            print_timings(&sheet);
+        }
+        Ok(Some((sheet, collected.skipped())))
+    }
+
+    /// Takes submissions through all stages, in their order; none is begun after Ctrl-C. To be graded, one
+    /// that the machine failed on has a record that says so: the others' are no worse for it.
+    fn grade_all(
+        &self,
+        context: &Context,
+        grading: &Grading,
+        sources: &[&Source],
+        jobs: usize,
+    ) -> Vec<anyhow::Result<Record>> {
+        let next = AtomicUsize::new(0);
+        let results = Mutex::new(Vec::new());
+        let batch = self.purpose == Purpose::Grade;
+        if batch {
+            context.progress.count(sources.len());
+        }
+        let work = || {
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                let Some(Source { path, name, slug }) = sources.get(index) else { return };
+                let say = |stage: &str| {
+                    if batch {
+                        context.progress.at(&format!("{slug}: {stage}"));
+                    } else {
+                        context.say(stage);
+                    }
+                };
+                let out = Folders {
+                    student: self.output.join(slug),
+                    instructor: self.output.join(report::INSTRUCTOR).join(slug),
+                };
+                let begun = Instant::now();
+                let result = match self.purpose {
+                    Purpose::Grade => class::note_source(&out, path)
+                        .and_then(|()| grading.one_of_batch(path, slug, &out, &say)),
+                    Purpose::Check => grading.hand_in(path, slug, &out, self.purpose, &say),
+                };
+                if INTERRUPTED.load(Ordering::Relaxed) && result.is_err() {
+                    return;
+                }
+                let result = match (result, self.purpose) {
+                    (Err(error), Purpose::Grade) => {
+                        let message = format!("{}: {}", path.display(), super::told_once(&error));
+                        context.progress.note(&message);
+                        Ok(grading.unjudged(path, slug))
+                    }
+                    (result, _) => result.with_context(|| path.display().to_string()),
+                };
+                let result = result.map(|record| Record { name: name.clone(), ..record });
+                if let (Ok(record), Some(kept)) = (&result, &grading.kept) {
+                    if let Err(error) = kept.list(record, &out) {
+                        context.progress.note(&super::told_once(&error));
+                    }
+                    let grade = rubric::grade(&context.assignment.rules, &record.evidence);
+                    let cost = if kept.was_found(slug) {
+                        "as graded before".to_owned()
+                    } else {
+                        format!("{:.1} s", begun.elapsed().as_secs_f64())
+                    };
+                    context
+                        .progress
+                        .step(&format!("{}, {cost}", report::in_a_line(record, &grade)));
+                }
+                let Ok(mut results) = results.lock() else { return };
+                results.push((index, result));
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..jobs {
+                scope.spawn(work);
+            }
+        });
+        let mut results = results.into_inner().unwrap_or_default();
+        results.sort_by_key(|(index, _)| *index);
+        results.into_iter().map(|(_, result)| result).collect()
+    }
+}
+
+fn print_timings(sheet: &Sheet) {
+    for entry in &sheet.entries {
+        eprintln!("{}", entry.record.name);
+        let (mut wall_s, mut cpu_s) = (0.0, 0.0);
+        for stage in &entry.record.stages {
+            eprintln!("  {:<10} {:7.2} s wall {:7.2} s cpu", stage.name, stage.wall_s, stage.cpu_s);
+            wall_s += stage.wall_s;
+            cpu_s += stage.cpu_s;
+        }
+        eprintln!(
+            "  {:<10} {wall_s:7.2} s wall {cpu_s:7.2} s cpu (of child processes)",
+            "together"
+        );
+    }
+}

@@ -1,0 +1,345 @@
+//! The class that a batch belongs to: the folder of each submission in the report, what earlier runs
+//! into the same report found out, and whose submissions are asked for.
+
+use std::collections::{HashMap, HashSet, VecDeque};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, ensure};
+
+use super::collect;
+use super::context::Context;
+use crate::files::write_whole;
+use crate::grading::{Earlier, Folders, Kept, Record, Student};
+use crate::report;
+
+/// The file that says where a submission lay, in its instructor's folder.
+const SOURCE: &str = "source.txt";
+/// So many names stand in a message.
+const NAMES: usize = 5;
+
+/// A submission that is there.
+pub struct Source {
+    /// The archive or folder.
+    pub path: PathBuf,
+    /// What reports call it.
+    pub name: String,
+    /// What its folders in the report are called.
+    pub slug: String,
+}
+
+/// Submissions with the folders that they have in the report at `output`: those that they had before,
+/// else what their names allow, made unique.
+pub fn sources(given: &[collect::Source], output: &Path) -> Vec<Source> {
+    let mut taken = HashSet::from([report::INSTRUCTOR.to_owned()]);
+    let mut known: HashMap<String, VecDeque<String>> = HashMap::new();
+    for slug in folders(output) {
+        let file = output.join(report::INSTRUCTOR).join(&slug).join(SOURCE);
+        if let Ok(place) = fs::read_to_string(file) {
+            taken.insert(slug.to_lowercase());
+            known.entry(place).or_default().push_back(slug);
+        }
+    }
+    let source = |collect::Source { path, name }: &collect::Source| {
+        let before = known.get_mut(&place(path)).and_then(VecDeque::pop_front);
+        let slug = before.unwrap_or_else(|| new_slug(name, &mut taken));
+        Source { path: path.clone(), name: name.clone(), slug }
+    };
+    given.iter().map(source).collect()
+}
+
+fn new_slug(name: &str, taken: &mut HashSet<String>) -> String {
+    let safe = |c: char| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '-' };
+    let stem: String = stem(name).chars().map(safe).take(80).collect();
+    let stem = if stem.trim_matches('-').is_empty() { "hand-in".to_owned() } else { stem };
+    let mut slug = stem.clone();
+    let mut number = 2;
+    while !taken.insert(slug.to_lowercase()) {
+        slug = format!("{stem}-{number}");
+        number += 1;
+    }
+    slug
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+fn stem(name: &str) -> &str {
+    name.trim_end_matches(".gz").trim_end_matches(".tar").trim_end_matches(".zip")
+}
+
+/// Where a submission lies, as it is noted.
+fn place(path: &Path) -> String {
+    let whole = path.canonicalize().or_else(|_| std::path::absolute(path));
+    whole.unwrap_or_else(|_| path.to_owned()).to_string_lossy().into_owned()
+}
+
+/// Notes where a submission lies, beside what is found out about it.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn note_source(out: &Folders, path: &Path) -> anyhow::Result<()> {
+    let (file, place) = (out.instructor.join(SOURCE), place(path));
+    if fs::read_to_string(&file).is_ok_and(|noted| noted == place) {
+        return Ok(());
+    }
+    write_whole(&file, place.as_bytes()).with_context(|| format!("cannot write {}", file.display()))
+}
+
+/// The instructor's folders of a report's submissions, sorted.
+fn folders(output: &Path) -> Vec<String> {
+    let entries = output.join(report::INSTRUCTOR).read_dir().into_iter().flatten().flatten();
+    let folders = entries.filter(|entry| entry.path().is_dir());
+    let mut names: Vec<String> =
+        folders.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+    names.sort();
+    names
+}
+
+/// Adds to `records`, made of some of the submissions `all`, what earlier runs into the same report
+/// found out about others, and says so. Answers whose were found out under other conditions.
+pub fn join(kept: &Kept, output: &Path, all: &[Source], records: &mut Vec<Record>) -> Vec<String> {
+    let graded: HashSet<String> = records.iter().map(|record| record.slug.clone()).collect();
+    let (mut incomparable, mut gone) = (Vec::new(), Vec::new());
+    let mut missing: HashSet<&str> = all.iter().map(|source| source.slug.as_str()).collect();
+    missing.retain(|slug| !graded.contains(*slug));
+    for slug in folders(output) {
+        let instructor = output.join(report::INSTRUCTOR).join(&slug);
+        if graded.contains(&slug) {
+            continue;
+        }
+        let Earlier { record, comparable } = match kept.earlier(&instructor) {
+            Ok(Some(earlier)) => earlier,
+            Ok(None) => continue,
+            Err(error) => {
+                eprintln!("umbra: {} is left out: {}", slug, super::told_once(&error));
+                continue;
+            }
+        };
+        let is_given = missing.remove(slug.as_str());
+        if !is_given && let Some(new) = records.iter().find(|new| is_newer(new, &record)) {
+            match kept.replace(&instructor) {
+                Ok(()) => eprintln!(
+                    "umbra: {} of {} is graded anew as {}: it replaces the one in {}",
+                    record.name,
+                    who(&record.student),
+                    new.slug,
+                    instructor.display()
+                ),
+                Err(error) => eprintln!("umbra: {}: {error}", instructor.display()),
+            }
+            continue;
+        }
+        if !is_given {
+            gone.push(record.name.clone());
+        }
+        if !comparable {
+            incomparable.push(slug);
+        }
+        records.push(record);
+    }
+    if !gone.is_empty() {
+        eprintln!(
+            "umbra: {} in {} from earlier runs: {}; to take one out, delete its folder in {}",
+            plural(gone.len(), "submission stays", "submissions stay"),
+            output.display(),
+            some(&gone),
+            output.join(report::INSTRUCTOR).display()
+        );
+    }
+    if !missing.is_empty() {
+        let mut missing: Vec<String> = missing.into_iter().map(str::to_owned).collect();
+        missing.sort();
+        eprintln!(
+            "umbra: {} not graded yet, and not in the report: {}",
+            plural(missing.len(), "submission is", "submissions are"),
+            some(&missing)
+        );
+    }
+    incomparable
+}
+
+/// Whether `new` is handed in again what `old` was: the same file name, by the same student.
+fn is_newer(new: &Record, old: &Record) -> bool {
+    let (a, b) = (&new.student, &old.student);
+    let same = if a.id.is_empty() && b.id.is_empty() {
+        !a.full_name().is_empty() && a.full_name() == b.full_name()
+    } else {
+        a.id.trim() == b.id.trim()
+    };
+    same && new.name == old.name
+}
+
+fn who(student: &Student) -> String {
+    let name = student.full_name();
+    if name.is_empty() { student.id.clone() } else { name }
+}
+
+fn plural(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// The first of several names.
+fn some(names: &[String]) -> String {
+    let shown = names[..names.len().min(NAMES)].join(", ");
+    match names.len().saturating_sub(NAMES) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
+}
+
+/// The submissions of some students: by number, name, or file name; all when nobody is named. Who
+/// handed in what is known from earlier runs, else from the submissions themselves.
+///
+/// # Errors
+/// When somebody has none, and when one cannot be looked into.
+pub fn only<'a>(
+    context: &Context,
+    output: &Path,
+    all: &'a [Source],
+    wanted: &[String],
+) -> anyhow::Result<Vec<&'a Source>> {
+    if wanted.is_empty() {
+        return Ok(all.iter().collect());
+    }
+    let student = |source: &Source| {
+        let instructor = output.join(report::INSTRUCTOR).join(&source.slug);
+        let known = Kept::student(&instructor);
+        known.or_else(|| student_of(context, &source.path)).unwrap_or_default()
+    };
+    let students: Vec<Student> = all.iter().map(student).collect();
+    let mut chosen = vec![false; all.len()];
+    for wanted in wanted {
+        let mut found = false;
+        for (index, (source, student)) in all.iter().zip(&students).enumerate() {
+            let matches = is_called(source, student, wanted);
+            chosen[index] |= matches;
+            found |= matches;
+        }
+        let like = students.iter().map(who).find(|name| !name.is_empty());
+        let like = like.or_else(|| all.first().map(|source| file_name(&source.path)));
+        ensure!(
+            found,
+            "--only: nobody of {} is \"{wanted}\"; expected a student number, a first and last name or a \
+             file name, such as \"{}\"",
+            plural(all.len(), "submission", "submissions"),
+            like.unwrap_or_default()
+        );
+    }
+    Ok(all.iter().zip(chosen).filter(|(_, chosen)| *chosen).map(|(source, _)| source).collect())
+}
+
+fn is_called(source: &Source, student: &Student, wanted: &str) -> bool {
+    let name = file_name(&source.path);
+    let own = [
+        student.id.trim().to_owned(),
+        student.full_name(),
+        student.last_name.trim().to_owned(),
+        source.slug.clone(),
+        stem(&name).to_owned(),
+        name,
+        source.path.to_string_lossy().into_owned(),
+    ];
+    let wanted = wanted.trim().to_lowercase();
+    own.iter().any(|own| !own.is_empty() && own.to_lowercase() == wanted)
+}
+
+/// Whose a submission is, by its config.json; nothing when it cannot be read.
+fn student_of(context: &Context, source: &Path) -> Option<Student> {
+    let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
+    let private = tempfile::tempdir_in(&context.supervisor.scratch).ok()?;
+    let copy = private.path().join("copy");
+    fs::create_dir(&copy).ok()?;
+    context.say(&format!("reading who handed in {}", source.display()));
+    let received = context.decoder().receive(source, &copy, tree, limits).ok()?;
+    received.validation.config.as_ref().map(Student::of)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    fn source(path: &str, slug: &str) -> Source {
+        Source { path: path.into(), name: path.into(), slug: slug.into() }
+    }
+
+    #[test]
+    fn a_submission_keeps_its_folder_and_takes_nobody_else_s() {
+        let place = tempfile::tempdir().unwrap();
+        let (output, class) = (place.path().join("out"), place.path().join("class"));
+        let path = |folder: &str| {
+            fs::create_dir_all(class.join(folder)).unwrap();
+            let path = class.join(folder).join("a2.zip");
+            fs::write(&path, folder).unwrap();
+            path
+        };
+        let note = |sources: &[Source]| {
+            for Source { path, slug, .. } in sources {
+                let at = |name: &str| output.join(name).join(slug);
+                let out = Folders { student: at("."), instructor: at(report::INSTRUCTOR) };
+                note_source(&out, path).unwrap();
+            }
+        };
+        let sources = |paths: &[PathBuf], output: &Path| {
+            let given: Vec<_> = paths.iter().map(|path| collect::Source::given(path)).collect();
+            super::sources(&given, output)
+        };
+        let slugs = |sources: &[Source]| -> Vec<String> {
+            sources.iter().map(|source| source.slug.clone()).collect()
+        };
+        let first = sources(&[path("bob"), path("eve")], &output);
+        assert_eq!(slugs(&first), ["a2", "a2-2"]);
+        note(&first);
+        // One more, and the others in another order, by another way.
+        let again = class.join("eve/../eve/a2.zip");
+        let second = sources(&[path("ann"), again, path("bob")], &output);
+        assert_eq!(slugs(&second), ["a2-3", "a2-2", "a2"]);
+        note(&second);
+        // The same one twice is two, each time.
+        let twice = sources(&[path("bob"), path("bob")], &output);
+        assert_eq!(slugs(&twice), ["a2", "a2-4"]);
+        note(&twice);
+        assert_eq!(slugs(&sources(&[path("bob"), path("bob")], &output)), ["a2", "a2-4"]);
+        let odd = sources(&["instructor".into(), "???".into(), "A2.tar.gz".into()], &output);
+        assert_eq!(slugs(&odd), ["instructor-2", "hand-in", "A2-5"]);
+    }
+
+    #[test]
+    fn a_student_is_called_by_number_name_or_file() {
+        let student = Student {
+            first_name: "Ada".into(),
+            last_name: "Lovelace".into(),
+            id: "260181512".into(),
+        };
+        let source = source("class/a2_ada.tar.gz", "a2_ada-2");
+        for name in ["260181512", "ada lovelace", "LOVELACE", "a2_ada", "a2_ada.tar.gz", "a2_ada-2"]
+        {
+            assert!(is_called(&source, &student, name), "{name}");
+        }
+        for name in ["", "ada", "26018151", "a2", "class"] {
+            assert!(!is_called(&source, &student, name), "{name}");
+        }
+        assert!(!is_called(&source, &Student::default(), " "));
+    }
+
+    #[test]
+    fn the_same_file_of_the_same_student_is_handed_in_again() {
+        let record = sample::sheet().entries.remove(0).record;
+        assert!(is_newer(&record, &record));
+        let with = |name: &str, id: &str, last: &str| {
+            let mut other = record.clone();
+            other.name = name.into();
+            other.student.id = id.into();
+            other.student.last_name = last.into();
+            other
+        };
+        assert!(!is_newer(&record, &with("b.zip", "260000001", "Lovelace")));
+        assert!(!is_newer(&record, &with("a2_ada.zip", "260000009", "Lovelace")));
+        let (a, b) = (with("a.zip", "", "Lovelace"), with("a.zip", "", "Byron"));
+        assert!(is_newer(&a, &a) && !is_newer(&a, &b));
+        let nobody = Record { student: Student::default(), ..a };
+        assert!(!is_newer(&nobody, &nobody));
+    }
+}

@@ -1,0 +1,190 @@
+//! The last lines of a check: the verdict, and what is next to do.
+
+use std::collections::BTreeMap;
+
+use super::super::number::{plain, points, range};
+use super::super::{Entry, Sheet};
+use super::page::{Look, Page, Style};
+use crate::evidence::{Check, Verdict};
+use crate::intake::Severity;
+use crate::rubric::{BUILD, PartGrade};
+
+/// What the last lines are made from, besides the submission itself.
+pub struct Closing<'a> {
+    /// The working folder as the student calls it.
+    pub folder: &'a str,
+    /// Umbra as the student calls it.
+    pub umbra: &'a str,
+    /// Where the page with the pictures is.
+    pub page: &'a str,
+    /// In which files the work for a part is done: `src/bsdfs/phong.rs`.
+    pub files: &'a BTreeMap<String, String>,
+    /// The points of each part when it was checked last, least and most.
+    pub last: &'a BTreeMap<String, (f64, f64)>,
+    /// What alone was asked: `part 2.3 on scene cbox`; empty when everything was.
+    pub asked: &'a str,
+}
+
+/// The last lines: where the page is, what changed since the last time, how many points there are, and
+/// what is next to do.
+pub fn closing(sheet: &Sheet, entry: &Entry, closing: &Closing, look: Look) -> String {
+    let grade = &entry.grade;
+    let mut page = Page::new(look.width, look.colours);
+    page.gap();
+    page.wrapped(&[(Style::Faint, "report: ")], Style::Plain, closing.page);
+    let changes = changes(&grade.parts, closing.last);
+    if !changes.is_empty() {
+        page.wrapped(&[(Style::Heading, "since last time: ")], Style::Plain, &changes.join(", "));
+    }
+    let (bonus, plain): (Vec<&PartGrade>, Vec<&PartGrade>) =
+        grade.parts.iter().partition(|part| part.bonus);
+    let mut verdict = Vec::new();
+    for (parts, what) in [(&plain, "points"), (&bonus, "bonus points")] {
+        if !parts.is_empty() {
+            let sum = |value: fn(&PartGrade) -> f64| parts.iter().map(|part| value(part)).sum();
+            let own = range(sum(|part| part.points), sum(|part| part.points_max));
+            verdict.push(format!("{own} of {} {what}", points(sum(|part| part.out_of))));
+        }
+    }
+    let mut verdict = verdict.join(", ");
+    verdict.push_str(" on the public scenes");
+    if !closing.asked.is_empty() {
+        verdict.push_str(&format!("; asked was only {}, not the rest", closing.asked));
+    }
+    let whole = plain.iter().all(|part| is_whole(part)) && !grade.parts.is_empty();
+    let style = if whole { Style::Good } else { Style::Bad };
+    page.wrapped(&[(style, "verdict: ")], Style::Plain, &verdict);
+    page.wrapped(&[(Style::Heading, "next: ")], Style::Plain, &next(sheet, entry, closing));
+    page.finish()
+}
+
+/// `2.2 0 -> 5` for each part that is worth something else now.
+fn changes(parts: &[PartGrade], last: &BTreeMap<String, (f64, f64)>) -> Vec<String> {
+    let change = |part: &PartGrade| {
+        let &(least, most) = last.get(&part.id)?;
+        let (old, new) = (range(least, most), range(part.points, part.points_max));
+        (old != new).then(|| format!("{} {old} -> {new}", part.id))
+    };
+    parts.iter().filter_map(change).collect()
+}
+
+fn is_whole(part: &PartGrade) -> bool {
+    points(part.points) == points(part.out_of)
+}
+
+/// What is next to do: what hinders most, then the parts in the handout's order, then handing in.
+fn next(sheet: &Sheet, entry: &Entry, closing: &Closing) -> String {
+    let Closing { folder, umbra, .. } = closing;
+    let checks = &entry.record.evidence.checks;
+    let failed = |check: &&Check| check.verdict == Verdict::Fail;
+    if let Some(check) = checks.iter().filter(failed).find(|check| check.id == BUILD) {
+        return format!("{}; the compiler's words are above", check.summary);
+    }
+    let open = |bonus: bool| {
+        let mut parts = entry.grade.parts.iter();
+        parts.find(|part| part.bonus == bonus && !is_whole(part))
+    };
+    if let Some(part) = open(false) {
+        return work_on(part, closing);
+    }
+    if !closing.asked.is_empty() {
+        return match open(true) {
+            Some(part) => work_on(part, closing),
+            None => format!("that is right; `{umbra} check {folder}` asks the rest too"),
+        };
+    }
+    // Images that are not what the code draws.
+    let stale = checks.iter().filter(failed).find(|check| check.id.starts_with("handed_in."));
+    let error = entry.record.findings.iter().find(|found| found.severity == Severity::Error);
+    let ready = match (error, stale) {
+        (Some(finding), _) => {
+            let text = finding.to_string();
+            format!("make it ready to hand in: {}", text.trim_start_matches("error: "))
+        }
+        (None, Some(check)) => format!("make it ready to hand in: {}", check.summary),
+        (None, None) => format!("`{umbra} pack {folder}` makes the archive to hand in"),
+    };
+    match open(true).filter(|_| sheet.rules.parts.iter().any(|part| part.bonus)) {
+        Some(part) => format!("{ready}; or the bonus, {} {}", part.id, part.title),
+        None => ready,
+    }
+}
+
+/// `1.2 Phong reflectance model, in src/bsdfs/phong.rs: wrong at ...`
+fn work_on(part: &PartGrade, closing: &Closing) -> String {
+    let place = closing.files.get(&part.id).map(|file| format!(", in {file}"));
+    format!("{} {}{}: {}", part.id, part.title, place.unwrap_or_default(), plain(&part.reason))
+}
+
+#[cfg(test)]
+mod tests {
+    use similar_asserts::assert_eq;
+
+    use super::super::super::sample;
+    use super::*;
+
+    fn closed(sheet: &Sheet, index: usize, asked: &str, last: &[(&str, f64)]) -> Vec<String> {
+        let files = BTreeMap::from([("1.3".to_owned(), "src/integrators/simple.rs".to_owned())]);
+        let last = last.iter().map(|&(id, points)| (id.to_owned(), (points, points))).collect();
+        let made_of = Closing {
+            folder: "student_template",
+            umbra: "./umbra",
+            page: "umbra-report/a/report.html",
+            files: &files,
+            last: &last,
+            asked,
+        };
+        let look = Look { width: 400, colours: false };
+        let text = closing(sheet, &sheet.entries[index], &made_of, look);
+        text.lines().map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn the_last_lines_are_the_verdict_and_the_next_thing_to_do() {
+        let mut sheet = sample::sheet();
+        let lines = closed(&sheet, 1, "", &[("1.1", 5.0), ("1.3", 0.0), ("1.4", 2.5), ("9", 1.0)]);
+        assert_eq!(lines[1], "report: umbra-report/a/report.html");
+        assert_eq!(lines[2], "since last time: 1.3 0 -> 9.85, 1.4 2.5 -> 15");
+        assert_eq!(
+            lines[3],
+            "verdict: 64.85 of 75 points, 0..20 of 20 bonus points on the public scenes"
+        );
+        assert!(
+            lines[4].starts_with(
+                "next: 1.3 Unshadowed direct illumination, in src/integrators/simple.rs: unshadowed"
+            ),
+            "{lines:?}"
+        );
+        assert!(!lines[4].contains("witness"), "{lines:?}");
+        // What does not build comes first, whatever the parts are worth.
+        let lines = closed(&sheet, 2, "", &[]);
+        assert!(lines[3].starts_with("next: the source does not build: "), "{lines:?}");
+        // All is right: a file is missing, then nothing is.
+        let ready = closed(&sheet, 0, "", &[]);
+        let pack = "next: `./umbra pack student_template` makes the archive to hand in";
+        assert_eq!(ready[3], pack);
+        let mistake = sheet.entries[2].record.findings[0].clone();
+        sheet.entries[0].record.findings.push(mistake);
+        let lines = closed(&sheet, 0, "", &[]);
+        assert!(
+            lines[3].starts_with("next: make it ready to hand in: config.json:3: "),
+            "{lines:?}"
+        );
+    }
+
+    #[test]
+    fn what_was_not_asked_is_said() {
+        let mut sheet = sample::sheet();
+        sheet.entries[1].grade.parts.retain(|part| part.id == "2.4");
+        let lines = closed(&sheet, 1, "part 2.4 on scene cbox", &[]);
+        assert_eq!(
+            lines[2],
+            "verdict: 25 of 25 points on the public scenes; asked was only part 2.4 on scene cbox, not \
+             the rest"
+        );
+        assert_eq!(
+            lines[3],
+            "next: that is right; `./umbra check student_template` asks the rest too"
+        );
+    }
+}
