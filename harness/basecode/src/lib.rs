@@ -28,6 +28,7 @@ mod frame;
 pub mod gpu;
 pub mod image;
 mod ray;
+mod realtime;
 mod renderer;
 mod sampler;
 pub mod scene;

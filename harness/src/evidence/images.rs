@@ -143,6 +143,34 @@ pub fn judge_shaded(
     check
 }
 
+/// How the brightness (cube root) of `actual` follows that of `expected` within the lit surfaces, away
+/// from edges: 1 at best. Nothing when what is expected hardly varies there.
+pub fn shading_correlation(actual: &Image, expected: &Image, mask: &RegionMask) -> Option<f64> {
+    let brightness = |pixel: basecode::Vec3| f64::from(pixel.element_sum()).max(0.0).cbrt();
+    // Of each region: count, sums of a, b, aa, bb, ab.
+    let mut sums = vec![[0.0f64; 6]; mask.regions.len()];
+    for (index, &value) in mask.pixels.iter().enumerate() {
+        if !mask.is_lit_interior(value) || !actual.pixels[index].is_finite() {
+            continue;
+        }
+        let (a, b) = (brightness(actual.pixels[index]), brightness(expected.pixels[index]));
+        let sums = &mut sums[usize::from(value & RegionMask::INDEX)];
+        for (sum, term) in sums.iter_mut().zip([1.0, a, b, a * a, b * b, a * b]) {
+            *sum += term;
+        }
+    }
+    let (mut aa, mut bb, mut ab, mut level) = (0.0, 0.0, 0.0, 0.0);
+    for [n, a, b, a2, b2, product] in sums.into_iter().filter(|sums| sums[0] > 0.0) {
+        aa += a2 - a * a / n;
+        bb += b2 - b * b / n;
+        ab += product - a * b / n;
+        level += b2;
+    }
+    // 3 % of the brightness: flat surfaces tell nothing.
+    let varies = bb > 1e-3 * level;
+    varies.then(|| if aa > 1e-12 * level { ab / (aa * bb).sqrt() } else { 0.0 })
+}
+
 /// A mask in which all but the wanted regions are never compared.
 pub fn only(mask: &RegionMask, wanted: &dyn Fn(&Region) -> bool) -> RegionMask {
     let keep: Vec<bool> = mask.regions.iter().map(wanted).collect();

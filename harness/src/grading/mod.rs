@@ -18,6 +18,7 @@ mod record;
 mod sampler;
 mod seen;
 mod shared;
+mod stages;
 
 pub use case::{Case, Small};
 pub use contain::INTERNAL_ERROR;
@@ -25,7 +26,7 @@ pub use costs::Cost;
 pub use kept::Kept;
 pub use offline::Drawn;
 pub use pipeline::{Folders, Grading, Purpose, RenderPath, TREE};
-pub use realtime::Stages;
 pub use record::{Conditions, Record, StageCost, Student};
 pub use sampler::{CORRELATED, row_correlation};
 pub use shared::{ImageDigest, judge_shared};
+pub use stages::Stages;

@@ -12,9 +12,9 @@ use super::case::Case;
 use super::costs::ReferenceCosts;
 use super::kept::Kept;
 use super::offline::{self, Drawn};
-use super::realtime::{self, Stages};
 use super::record::{Conditions, Record, StageCost, Student};
-use super::{draw, handed_in, isolate, pictures, sampler};
+use super::stages::Stages;
+use super::{draw, handed_in, isolate, pictures, realtime, sampler};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
@@ -165,6 +165,7 @@ impl<'a> Grading<'a> {
             ),
             reference: self.reference.as_deref(),
             sightings: Mutex::default(),
+            quotes: Mutex::default(),
         }
     }
 
@@ -238,6 +239,7 @@ impl<'a> Grading<'a> {
             checks.extend(asker.used_up());
             checks.extend(asker.printed_much());
             costs.end("realtime", asker.end_path());
+            record.diagnostics.push_str(&asker.quoted());
         }
         say("comparing the images handed in");
         let handed_in = handed_in::read(&decoder, &hand_in.root, tree, &self.cases)?;
@@ -412,21 +414,26 @@ impl<'a> Grading<'a> {
         for cases in self.groups() {
             let begin = checks.len();
             let judged = realtime::judge_images(asker, plugin, cases, tolerances);
+            let fails = judged.iter().any(|judged| judged.fails);
             let mut wrong = Vec::new();
-            for (case, (found, images)) in cases.iter().zip(judged) {
+            for (case, judged) in cases.iter().zip(judged) {
+                let mut found = judged.checks;
+                if let Some(why) = stages.nothing_draws() {
+                    found.iter_mut().for_each(|check| realtime::drawn_by_nobody(check, why));
+                }
                 let proof =
                     |check: &Check| check.id == "image.realtime" && check.verdict != Verdict::Pass;
                 if found.iter().any(proof) {
                     wrong.push(case);
                 }
                 checks.extend(found);
-                drawn.extend(images);
+                drawn.extend(judged.drawn);
             }
             shadow_map::set_apart(&mut checks[begin..]);
             self.stop_if_interrupted()?;
             // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
             if !wrong.is_empty() {
-                checks.extend(isolate::isolate(asker, plugin, &wrong, stages, tolerances));
+                checks.extend(isolate::isolate(asker, plugin, &wrong, stages, fails, tolerances));
             }
             mark(&mut checks[begin..], cases);
         }

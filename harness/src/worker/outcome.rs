@@ -26,6 +26,9 @@ pub enum Outcome {
     NotImplemented(String),
     /// The renderer reported an error.
     Failed(String),
+    /// A stage that Umbra's own pass was given does not compile: file, line and column, what is wrong
+    /// there, and the source line on lines of their own.
+    StageRefused(String),
     /// The renderer panicked and said so.
     Panicked(String),
     /// The plugin cannot be used: not loadable, wrong magic, version or size, a write outside

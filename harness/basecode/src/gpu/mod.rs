@@ -8,6 +8,7 @@
 mod context;
 mod contract;
 mod mesh;
+mod message;
 mod pipeline;
 mod shadow;
 mod target;

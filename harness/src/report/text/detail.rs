@@ -192,10 +192,9 @@ fn diagnostics(page: &mut Page, diagnostics: &str) {
         return;
     }
     heading(page, "compiler");
+    // Never wrapped: a caret stands below what it points at.
     for line in lines {
-        for line in wrap(&line, page.width.saturating_sub(2)) {
-            page.line(&[(Style::Plain, "  "), (Style::Plain, &line)]);
-        }
+        page.line(&[(Style::Plain, "  "), (Style::Plain, &line)]);
     }
 }
 
@@ -270,7 +269,8 @@ mod tests {
         for width in [1, 7, 20, 33, 80, 200] {
             let text = detail(&sheet, &sheet.entries[1], width, false);
             assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
-            for line in text.lines() {
+            // What a compiler says is never wrapped.
+            for line in text.lines().filter(|line| !line.ends_with(&"x".repeat(500))) {
                 assert!(line.width() <= width.max(2), "{width}: {line:?}");
             }
         }

@@ -1,0 +1,130 @@
+//! The shader stages of a submission: their texts, and whether there are any but the template's.
+
+use std::path::Path;
+
+use super::draw::STAGES;
+use crate::evidence::stages::{bare, is_template};
+use crate::files::files_below;
+
+/// The stage texts of a submission, and of the template.
+#[derive(Default)]
+pub struct Stages {
+    /// `simple.vs`, `diffuse.fs`, `phong.fs` of the submission; absent where the file is.
+    pub own: [Option<String>; 3],
+    /// The same of the template.
+    pub template: [String; 3],
+    /// Whether anything of the source names the file.
+    named: [bool; 3],
+    /// Whether there is a vertex stage, and a fragment stage, that is not the template's.
+    written: Written,
+}
+
+/// Which kinds of stages a source holds besides the template's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Written {
+    vertex: bool,
+    fragment: bool,
+}
+
+impl Stages {
+    /// Reads the stages below a submission's and the template's `src` folder. A file that is no text
+    /// counts as absent.
+    pub fn read(src: &Path, template: &Path) -> Self {
+        let stage =
+            |src: &Path, name| std::fs::read_to_string(src.join(format!("shaders/{name}.wgsl")));
+        let found = texts(src);
+        let handed_out: Vec<String> = texts(template).iter().map(|text| bare(text)).collect();
+        Self {
+            own: STAGES.map(|name| stage(src, name).ok()),
+            template: STAGES.map(|name| stage(template, name).unwrap_or_default()),
+            named: STAGES
+                .map(|name| found.iter().any(|text| text.contains(&format!("{name}.wgsl")))),
+            written: written(&found, &handed_out),
+        }
+    }
+
+    /// Whether a stage is the template's still.
+    pub fn is_template(&self, index: usize) -> bool {
+        self.own[index].as_ref().is_some_and(|own| is_template(own, &self.template[index]))
+    }
+
+    /// Whether the source names the stage's file, as `include_str!` does.
+    pub fn is_named(&self, index: usize) -> bool {
+        self.named[index]
+    }
+
+    /// Whether the source holds a stage of this kind that is not the template's, in whatever file.
+    pub fn is_elsewhere(&self, index: usize) -> bool {
+        if index == 0 { self.written.vertex } else { self.written.fragment }
+    }
+
+    /// Why no frame can be drawn by the submission's own shaders, if so.
+    pub fn nothing_draws(&self) -> Option<&'static str> {
+        match self.written {
+            Written { vertex: true, fragment: true } => None,
+            Written { vertex: false, fragment: false } => {
+                Some("the source holds no shader but the template's")
+            }
+            Written { vertex: false, .. } => {
+                Some("the source holds no vertex shader but the template's")
+            }
+            Written { .. } => Some("the source holds no fragment shader but the template's"),
+        }
+    }
+}
+
+/// All texts below a folder; what is no text is left out.
+fn texts(folder: &Path) -> Vec<String> {
+    let files = files_below(folder).unwrap_or_default();
+    files.iter().filter_map(|file| std::fs::read_to_string(file).ok()).collect()
+}
+
+/// Looks through texts of any kind: WGSL may stand in a Rust string, or be put together by code. What
+/// equals one of the `handed_out` texts apart from comments and white space does not count.
+fn written(texts: &[String], handed_out: &[String]) -> Written {
+    let mut found = Written::default();
+    for text in texts {
+        let bare = bare(text);
+        if handed_out.contains(&bare) {
+            continue;
+        }
+        let holds = |word: &str| bare.contains(word) || text.contains(word);
+        let made_by_code = holds("ShaderSource") || holds("include_wgsl!");
+        found.vertex |= made_by_code || holds("@vertex");
+        found.fragment |= made_by_code || holds("@fragment");
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VERTEX: &str = "@vertex fn vs_main() -> V { /* TODO */ }";
+    const FRAGMENT: &str = "@fragment fn fs_main() -> F { return F(); }";
+
+    fn of(texts: &[&str]) -> (bool, bool) {
+        let handed_out = [VERTEX, FRAGMENT, "fn main() {}"].map(bare);
+        let texts: Vec<String> = texts.iter().map(|&text| text.to_owned()).collect();
+        let found = written(&texts, &handed_out);
+        (found.vertex, found.fragment)
+    }
+
+    #[test]
+    fn the_templates_stages_are_nobodys_work() {
+        assert_eq!(of(&[]), (false, false));
+        assert_eq!(of(&[VERTEX, FRAGMENT, "fn main() {} // mine"]), (false, false));
+        assert_eq!(of(&["@vertex\nfn vs_main()->V{} // mine", FRAGMENT]), (false, false));
+        // One other word makes it a stage of one's own.
+        assert_eq!(of(&["fn main() { draw() }"]), (false, false));
+        assert_eq!(of(&[VERTEX, "@fragment fn fs_main() -> F { return F(1); }"]), (false, true));
+    }
+
+    #[test]
+    fn stages_count_wherever_they_stand() {
+        assert_eq!(of(&["const ALL: &str = \"@vertex fn v() {} @fragment fn f() {}\";"]), (true, true));
+        assert_eq!(of(&["@ fragment fn mine() {}"]), (false, true));
+        assert_eq!(of(&["let source = wgpu::ShaderSource::Wgsl(generate().into());"]), (true, true));
+        assert_eq!(of(&["device.create_shader_module(wgpu::include_wgsl!(\"a.wgsl\"))"]), (true, true));
+    }
+}
