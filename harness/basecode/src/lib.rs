@@ -28,7 +28,8 @@ mod frame;
 pub mod gpu;
 pub mod image;
 mod ray;
-mod realtime;
+#[doc(hidden)]
+pub mod realtime;
 mod renderer;
 mod sampler;
 pub mod scene;

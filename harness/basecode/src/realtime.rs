@@ -13,14 +13,14 @@ const MESSAGE: &str = "a render pass asked for a ray (Scene::intersect or Scene:
                        none in a realtime frame: its pixels come from the shaders";
 
 /// What a refused ray panics with: no caller could go on without an answer.
-pub(crate) struct RayRefused;
+pub struct RayRefused;
 
 /// The life of one pass, from before it is made until it is closed.
-pub(crate) struct Realtime(());
+pub struct Realtime(());
 
 impl Realtime {
     /// From here on rays are refused, from every thread.
-    pub(crate) fn begin() -> Self {
+    pub fn begin() -> Self {
         if OPEN.fetch_add(1, Ordering::SeqCst) == 0 {
             REFUSED.store(false, Ordering::SeqCst);
         }
@@ -31,7 +31,7 @@ impl Realtime {
     ///
     /// # Errors
     /// [`RayRefused::error`] otherwise.
-    pub(crate) fn without_rays(&self) -> Result<()> {
+    pub fn without_rays(&self) -> Result<()> {
         if REFUSED.load(Ordering::SeqCst) { Err(RayRefused::error()) } else { Ok(()) }
     }
 }
@@ -44,7 +44,7 @@ impl Drop for Realtime {
 
 impl RayRefused {
     /// The same as an error.
-    pub(crate) fn error() -> Error {
+    pub fn error() -> Error {
         Error::Argument(MESSAGE.into())
     }
 }
@@ -54,7 +54,7 @@ impl RayRefused {
 /// # Panics
 /// With [`RayRefused`] while a pass lives.
 #[inline]
-pub(crate) fn refuse_rays() {
+pub fn refuse_rays() {
     if OPEN.load(Ordering::Relaxed) > 0 {
         REFUSED.store(true, Ordering::SeqCst);
         std::panic::panic_any(RayRefused);

@@ -259,6 +259,31 @@ mod tests {
     use super::*;
 
     #[test]
+    fn silhouettes_and_other_surfaces_show_no_light() {
+        let mut mask = RegionMask::background(16, 16);
+        for exponent in [0.0, 20.0] {
+            mask.regions.push(Region { name: "ball".into(), lit: true, exponent });
+        }
+        mask.pixels = (0..256).map(|i| if i % 16 < 8 { 1 } else { 2 }).collect();
+        let image = |value: &dyn Fn(usize) -> f32| Image {
+            width: 16,
+            height: 16,
+            pixels: (0..256).map(|i| Vec3::splat(value(i))).collect(),
+        };
+        let right = image(&|i| 1.0 + (i / 16) as f32 * if i % 16 < 8 { 1.0 } else { 3.0 });
+        let of = |actual: &Image| shading_correlation(actual, &right, &mask);
+        assert!(of(&right).is_some_and(|found| found > 0.999));
+        assert!(of(&image(&|i| 0.3 * right.pixels[i].x + 0.1)).is_some_and(|found| found > 0.9));
+        // One colour for everything, one for each surface, and noise in which rows differ by nothing.
+        assert_eq!(of(&image(&|_| 1.0)), Some(0.0));
+        let by_surface = of(&image(&|i| if i % 16 < 8 { 1.0 } else { 4.0 }));
+        assert!(by_surface.is_some_and(|found| found.abs() < 1e-3));
+        assert!(of(&image(&|i| (i * 7 % 5) as f32)).is_some_and(|found| found.abs() < 0.2));
+        let flat = image(&|_| 1.0);
+        assert_eq!(shading_correlation(&right, &flat, &mask), None);
+    }
+
+    #[test]
     fn normals_that_are_not_renormalised_are_accepted_by_material() {
         let mut mask = RegionMask::background(16, 16);
         for exponent in [0.0, 20.0] {

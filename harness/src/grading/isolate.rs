@@ -72,9 +72,8 @@ pub fn isolate(
                 }
                 Swap::Untouched | Swap::Absent => {
                     let name = STAGES[index];
-                    let summary = format!(
-                        "swap not possible: what draws is not in src/shaders/{name}.wgsl"
-                    );
+                    let summary =
+                        format!("swap not possible: what draws is not in src/shaders/{name}.wgsl");
                     return Check::new(id, &case.entry.name, Verdict::NotJudged, summary);
                 }
                 Swap::Drawn(range) => &swapped[range.clone()],

@@ -235,6 +235,7 @@ impl<'a> Grading<'a> {
             costs.end("offline", asker.end_path());
             say("drawing realtime");
             let stages = Stages::read(&hand_in.root.join("src"), &self.assignment.template());
+            record.findings.extend(stages.findings());
             self.realtime(&asker, plugin, &stages, &mut checks, &mut drawn)?;
             checks.extend(asker.used_up());
             checks.extend(asker.printed_much());

@@ -196,8 +196,9 @@ fn plain_but_for_shadows(
 }
 
 /// Judges shadows that are wrong as an image by visibility alone: against the student's own image
-/// without shadows, or else against that drawn under a vertex stage of ours. `check` is the
-/// verdict on the image, which stands when neither tells.
+/// without shadows, or else against that drawn under a vertex stage of ours, or as the second of two
+/// frames: what the first lacks is the render pass' matter. `check` is the verdict on the image, which
+/// stands when none tells.
 fn judge_visibility(
     asker: &Asker,
     plugin: &Path,
@@ -209,24 +210,25 @@ fn judge_visibility(
     let (name, shadows) = (&case.entry.name, shadows(case));
     let judge = |with: &Image, without: &Image| shadows.judge(name, with, without, tolerances);
     let own = without.and_then(|without| judge(with, without));
-    if let Some(own) = own.as_ref().filter(|own| own.verdict == Verdict::Pass) {
+    let passes = |check: &Check| check.verdict == Verdict::Pass;
+    if let Some(own) = own.as_ref().filter(|own| passes(own)) {
         return own.clone();
     }
-    let vertex = Stage { name: STAGES[0].to_owned(), text: VERTEX.to_owned() };
-    let drawn = |toml: &Path, shadow_map| {
-        let frame = Frame { toml, shadow_map, stages: vec![vertex.clone()], ..Frame::plain(case) };
+    let drawn = |toml: &Path, shadow_map, times, stages: &[Stage]| {
+        let stages = stages.to_vec();
+        let frame = Frame { toml, shadow_map, times, stages, ..Frame::plain(case) };
         let outcome = draw(asker, Some(plugin), &frame);
         let (width, height) = frame.size;
         outcome.answer().map(|answer| ask::image(&answer.values, width, height))
     };
-    let swapped = case
-        .bonus
-        .as_ref()
-        .and_then(|bonus| judge(&drawn(bonus, true)?, &drawn(&case.realtime, false)?));
-    match swapped {
-        Some(swapped) if swapped.verdict == Verdict::Pass => swapped,
-        _ => own.unwrap_or(check),
-    }
+    let vertex = Stage { name: STAGES[0].to_owned(), text: VERTEX.to_owned() };
+    let bonus = case.bonus.as_deref();
+    let again = |times, stages: &[Stage]| {
+        judge(&drawn(bonus?, true, times, stages)?, &drawn(&case.realtime, false, times, stages)?)
+    };
+    let swapped = again(1, &[vertex]).filter(passes);
+    let rescued = swapped.or_else(|| again(2, &[]).filter(passes));
+    rescued.or(own).unwrap_or(check)
 }
 
 /// Where the image shows a surface and where not, and whether light falls on it.

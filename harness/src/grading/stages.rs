@@ -5,6 +5,7 @@ use std::path::Path;
 use super::draw::STAGES;
 use crate::evidence::stages::{bare, is_template};
 use crate::files::files_below;
+use crate::intake::Finding;
 
 /// The stage texts of a submission, and of the template.
 #[derive(Default)]
@@ -56,6 +57,21 @@ impl Stages {
     /// Whether the source holds a stage of this kind that is not the template's, in whatever file.
     pub fn is_elsewhere(&self, index: usize) -> bool {
         if index == 0 { self.written.vertex } else { self.written.fragment }
+    }
+
+    /// Stages that begin with a byte-order mark, which the base code leaves out.
+    pub fn findings(&self) -> Vec<Finding> {
+        let marked = |(name, text): (&&str, &Option<String>)| {
+            let marked = text.as_ref().is_some_and(|text| text.starts_with('\u{feff}'));
+            marked.then(|| {
+                let message =
+                    "begins with a byte-order mark (BOM), which is left out: WGSL has none";
+                Finding::note("stage_bom", message)
+                    .at(format!("src/shaders/{name}.wgsl"))
+                    .hint("save it as UTF-8 without BOM")
+            })
+        };
+        STAGES.iter().zip(&self.own).filter_map(marked).collect()
     }
 
     /// Why no frame can be drawn by the submission's own shaders, if so.
@@ -122,9 +138,18 @@ mod tests {
 
     #[test]
     fn stages_count_wherever_they_stand() {
-        assert_eq!(of(&["const ALL: &str = \"@vertex fn v() {} @fragment fn f() {}\";"]), (true, true));
+        assert_eq!(
+            of(&["const ALL: &str = \"@vertex fn v() {} @fragment fn f() {}\";"]),
+            (true, true)
+        );
         assert_eq!(of(&["@ fragment fn mine() {}"]), (false, true));
-        assert_eq!(of(&["let source = wgpu::ShaderSource::Wgsl(generate().into());"]), (true, true));
-        assert_eq!(of(&["device.create_shader_module(wgpu::include_wgsl!(\"a.wgsl\"))"]), (true, true));
+        assert_eq!(
+            of(&["let source = wgpu::ShaderSource::Wgsl(generate().into());"]),
+            (true, true)
+        );
+        assert_eq!(
+            of(&["device.create_shader_module(wgpu::include_wgsl!(\"a.wgsl\"))"]),
+            (true, true)
+        );
     }
 }

@@ -62,6 +62,7 @@ impl fmt::Display for Outcome {
             Self::Done(_) => f.write_str("answered"),
             Self::NotImplemented(task) => write!(f, "not implemented yet: {task}"),
             Self::Failed(message) => write!(f, "the renderer reports an error: {message}"),
+            Self::StageRefused(message) => f.write_str(message),
             Self::Panicked(message) => write!(f, "the renderer panicked: {message}"),
             Self::Rejected(message) => write!(f, "the plugin was rejected: {message}"),
             Self::CrashedBySignal(signal) => write!(f, "the renderer crashed: {signal}"),

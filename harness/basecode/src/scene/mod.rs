@@ -169,7 +169,8 @@ impl Scene {
     fn bvh(&self) -> &Bvh {
         self.bvh.get_or_init(|| {
             let place = |&(shape, primitive): &(u32, u32)| (shape as usize, primitive as usize);
-            let corners = |(shape, primitive): (usize, usize)| self.shapes[shape].corners(primitive);
+            let corners =
+                |(shape, primitive): (usize, usize)| self.shapes[shape].corners(primitive);
             let blocks = |(shape, _): (usize, usize)| !self.material_of(shape).is_emitter();
             let vertices: Vec<_> = self.triangles.iter().map(place).map(corners).collect();
             let blocks: Vec<_> = self.triangles.iter().map(place).map(blocks).collect();

@@ -5,7 +5,7 @@ use super::super::number::{
     self, hints, is_failure, is_range, looks_like, of_part, points, seconds, total,
 };
 use super::super::{Entry, Sheet};
-use super::page::{Page, Style, columns, left, wrap};
+use super::page::{Page, Style, columns, left};
 use crate::evidence::{Check, Measure, Verdict};
 use crate::intake::{Finding, Severity};
 
@@ -194,7 +194,7 @@ fn diagnostics(page: &mut Page, diagnostics: &str) {
     heading(page, "compiler");
     // Never wrapped: a caret stands below what it points at.
     for line in lines {
-        page.line(&[(Style::Plain, "  "), (Style::Plain, &line)]);
+        page.verbatim(&line);
     }
 }
 
@@ -247,6 +247,18 @@ mod tests {
             "  error    config.json:3: studentID is empty (hint: write your student number)",
         ] {
             assert!(text.lines().any(|found| found == line), "{line:?} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn what_a_compiler_says_is_never_wrapped() {
+        let mut sheet = sample::sheet();
+        let line = format!("69 │ {}", "let shadow = visibility(world_position, n);".repeat(3));
+        let caret = format!("   │ {}^ expected `;`", " ".repeat(100));
+        sheet.entries[2].record.diagnostics = format!("{line}\n{caret}");
+        for width in [20, 80] {
+            let text = detail(&sheet, &sheet.entries[2], width, false);
+            assert!(text.contains(&format!("\n  {line}\n  {caret}\n")), "{text}");
         }
     }
 
