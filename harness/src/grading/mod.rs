@@ -10,6 +10,7 @@ pub mod handed_in;
 mod isolate;
 mod kept;
 mod look;
+mod mend;
 mod offline;
 mod pictures;
 mod pipeline;

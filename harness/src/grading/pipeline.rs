@@ -14,7 +14,7 @@ use super::kept::Kept;
 use super::offline::{self, Drawn};
 use super::record::{Conditions, Record, StageCost, Student};
 use super::stages::Stages;
-use super::{draw, handed_in, isolate, pictures, realtime, sampler};
+use super::{draw, handed_in, isolate, mend, pictures, realtime, sampler};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
@@ -225,22 +225,23 @@ impl<'a> Grading<'a> {
         costs.end("intake", decoder.take_cpu_s());
 
         say("building");
-        let plugin = self.build(&hand_in, scratch.path(), &mut record, &mut checks, &mut costs)?;
+        let built = self.build(&hand_in, scratch.path(), &mut record, &mut checks, &mut costs)?;
         let seed = config.sampler_seed().unwrap_or_default();
         let mut drawn = Vec::new();
-        if let Some(plugin) = &plugin {
+        if let Some((plugin, built)) = &built {
             say("rendering offline");
             self.offline(&asker, plugin, seed, &mut checks, &mut drawn)?;
             checks.extend(asker.used_up());
             costs.end("offline", asker.end_path());
             say("drawing realtime");
-            let stages = Stages::read(&hand_in.root.join("src"), &self.assignment.template());
+            let stages = Stages::read(&built.src, &self.assignment.template());
             record.findings.extend(stages.findings());
             self.realtime(&asker, plugin, &stages, &mut checks, &mut drawn)?;
             checks.extend(asker.used_up());
             checks.extend(asker.printed_much());
             costs.end("realtime", asker.end_path());
-            record.diagnostics.push_str(&asker.quoted());
+            let said = [std::mem::take(&mut record.diagnostics), asker.quoted()];
+            record.diagnostics = said.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("\n");
         }
         say("comparing the images handed in");
         let handed_in = handed_in::read(&decoder, &hand_in.root, tree, &self.cases)?;
@@ -251,6 +252,9 @@ impl<'a> Grading<'a> {
             record.images.extend(digest);
         }
         costs.end("images", decoder.take_cpu_s());
+        if let Some((_, built)) = &built {
+            built.explain(&self.assignment.rules, &mut checks, &mut record.findings);
+        }
         pictures::draw(&mut checks, &self.cases, &drawn, &handed_in, out)?;
         costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
@@ -313,6 +317,7 @@ impl<'a> Grading<'a> {
         Ok((evidence, diagnoses))
     }
 
+    /// Builds the source, mended where it does not build as it is; answers the library with it.
     fn build(
         &self,
         hand_in: &HandIn,
@@ -320,7 +325,7 @@ impl<'a> Grading<'a> {
         record: &mut Record,
         checks: &mut Vec<Check>,
         costs: &mut Costs,
-    ) -> anyhow::Result<Option<PathBuf>> {
+    ) -> anyhow::Result<Option<(PathBuf, mend::Built)>> {
         let src = hand_in.root.join("src");
         if !src.join("lib.rs").is_file() {
             checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no src/lib.rs to build"));
@@ -329,22 +334,25 @@ impl<'a> Grading<'a> {
         let out = scratch.join("out");
         std::fs::create_dir(&out)?;
         let limits = &self.assignment.limits.build;
-        let report =
-            build::compile(&self.recording, self.supervisor, &src, &out, limits, self.cancel)?;
-        costs.end("build", report.cpu_s);
-        let (plugin, summary) = match report.outcome {
-            BuildOutcome::Built { library } => (Some(library), "the source builds".to_owned()),
-            BuildOutcome::CompileError { errors } => {
-                record.diagnostics = errors
-                    .iter()
-                    .map(|error| error.rendered.as_str())
-                    .collect::<Vec<_>>()
-                    .join("\n");
-                let first = errors.first().map(|error| match &error.place {
-                    Some(place) => format!("{}:{}: {}", place.file, place.line, error.message),
-                    None => error.message.clone(),
-                });
-                (None, format!("the source does not build: {}", first.unwrap_or_default()))
+        let compile = |src: &Path| {
+            build::compile(&self.recording, self.supervisor, src, &out, limits, self.cancel)
+        };
+        let template = self.assignment.template();
+        let built = mend::build(&compile, &src, &template, &scratch.join("mended"))?;
+        costs.end("build", built.cpu_s);
+        let rendered = built.errors.iter().map(|error| error.rendered.as_str());
+        record.diagnostics = rendered.collect::<Vec<_>>().join("\n");
+        let first = built.errors.first().map(build::Diagnostic::headline).unwrap_or_default();
+        let (plugin, summary) = match &built.report.outcome {
+            BuildOutcome::Built { library } if built.replaced.is_empty() => {
+                (Some(library.clone()), "the source builds".to_owned())
+            }
+            BuildOutcome::Built { library } => {
+                let summary = format!("the source builds but for files that were replaced: {first}");
+                (Some(library.clone()), summary)
+            }
+            BuildOutcome::CompileError { .. } => {
+                (None, format!("the source does not build: {first}"))
             }
             BuildOutcome::TimedOut => (None, "the compiler ran out of time".to_owned()),
             BuildOutcome::OutOfMemory => (None, "the compiler ran out of memory".to_owned()),
@@ -356,7 +364,7 @@ impl<'a> Grading<'a> {
         };
         let verdict = if plugin.is_some() { Verdict::Pass } else { Verdict::Fail };
         checks.push(Check::new(BUILD, "", verdict, summary));
-        Ok(plugin)
+        Ok(plugin.map(|library| (library, built)))
     }
 
     pub(super) fn offline(

@@ -281,8 +281,7 @@ mod tests {
         for width in [1, 7, 20, 33, 80, 200] {
             let text = detail(&sheet, &sheet.entries[1], width, false);
             assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
-            // What a compiler says is never wrapped.
-            for line in text.lines().filter(|line| !line.ends_with(&"x".repeat(500))) {
+            for line in text.split("\ncompiler\n").next().unwrap_or_default().lines() {
                 assert!(line.width() <= width.max(2), "{width}: {line:?}");
             }
         }
