@@ -121,7 +121,8 @@ impl Built {
                 [] => "no part is lost by it".to_owned(),
                 ids => format!("nothing is earned by code for {}", ids.join(", ")),
             };
-            let message = format!("does not build, and is replaced by the template's: {lost} ({why})");
+            let message =
+                format!("does not build, and is replaced by the template's: {lost} ({why})");
             findings.push(Finding::error("replaced", message).at(seen(file)));
         }
         if !self.replaced.is_empty() {
@@ -140,7 +141,8 @@ fn seen(file: &str) -> String {
 /// The files below `src` that an error is about, as far as the template has them too. What is wrong
 /// with a file of the student's own is the matter of those that use it.
 fn to_replace(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
-    let known = |file: &String| template.join(file).is_file() && may_be_replaced(file, template, copy);
+    let known =
+        |file: &String| template.join(file).is_file() && may_be_replaced(file, template, copy);
     let missing: Vec<String> = missing_files(error).into_iter().filter(known).collect();
     if !missing.is_empty() {
         return missing;
@@ -267,7 +269,8 @@ mod tests {
 
     fn built(source: &[(&str, &str)]) -> (Built, Option<String>) {
         let folder = tempfile::tempdir().expect("scratch");
-        let [src, template, copy] = ["src", "template", "copy"].map(|name| folder.path().join(name));
+        let [src, template, copy] =
+            ["src", "template", "copy"].map(|name| folder.path().join(name));
         write(&template, &TEMPLATE);
         write(&src, &TEMPLATE);
         write(&src, source);
@@ -310,7 +313,8 @@ mod tests {
         write(template, &TEMPLATE);
         write(template, &[("shaders/a.wgsl", "")]);
         let of = |error: Diagnostic| to_replace(&error, template, template);
-        let include = "couldn't read `src/renderpasses/../shaders/a.wgsl`: No such file or directory";
+        let include =
+            "couldn't read `src/renderpasses/../shaders/a.wgsl`: No such file or directory";
         assert_eq!(of(error(include, "src/renderer.rs", "")), ["shaders/a.wgsl"]);
         let include = include.replace("`src/", "`/src/");
         assert_eq!(of(error(&include, "src/renderer.rs", "")), ["shaders/a.wgsl"]);

@@ -241,7 +241,8 @@ impl<'a> Grading<'a> {
             checks.extend(asker.printed_much());
             costs.end("realtime", asker.end_path());
             let said = [std::mem::take(&mut record.diagnostics), asker.quoted()];
-            record.diagnostics = said.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("\n");
+            record.diagnostics =
+                said.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("\n");
         }
         say("comparing the images handed in");
         let handed_in = handed_in::read(&decoder, &hand_in.root, tree, &self.cases)?;
@@ -348,7 +349,8 @@ impl<'a> Grading<'a> {
                 (Some(library.clone()), "the source builds".to_owned())
             }
             BuildOutcome::Built { library } => {
-                let summary = format!("the source builds but for files that were replaced: {first}");
+                let summary =
+                    format!("the source builds but for files that were replaced: {first}");
                 (Some(library.clone()), summary)
             }
             BuildOutcome::CompileError { .. } => {
