@@ -1,6 +1,7 @@
 //! The shader stages of a submission: their texts, and whether there are any but the template's.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use super::draw::STAGES;
 use crate::evidence::stages::{bare, is_template};
@@ -34,13 +35,12 @@ impl Stages {
         let stage =
             |src: &Path, name| std::fs::read_to_string(src.join(format!("shaders/{name}.wgsl")));
         let found = texts(src);
-        let handed_out: Vec<String> = texts(template).iter().map(|text| bare(text)).collect();
         Self {
             own: STAGES.map(|name| stage(src, name).ok()),
             template: STAGES.map(|name| stage(template, name).unwrap_or_default()),
             named: STAGES
-                .map(|name| found.iter().any(|text| text.contains(&format!("{name}.wgsl")))),
-            written: written(&found, &handed_out),
+                .map(|name| found.values().any(|text| text.contains(&format!("{name}.wgsl")))),
+            written: written(&found, &texts(template)),
         }
     }
 
@@ -89,21 +89,25 @@ impl Stages {
     }
 }
 
-/// All texts below a folder; what is no text is left out.
-fn texts(folder: &Path) -> Vec<String> {
+/// All texts below a folder, by their path in it; what is no text is left out.
+fn texts(folder: &Path) -> BTreeMap<PathBuf, String> {
     let files = files_below(folder).unwrap_or_default();
-    files.iter().filter_map(|file| std::fs::read_to_string(file).ok()).collect()
+    let text = |file: PathBuf| {
+        let text = std::fs::read_to_string(&file).ok()?;
+        Some((file.strip_prefix(folder).ok()?.to_owned(), text))
+    };
+    files.into_iter().filter_map(text).collect()
 }
 
-/// Looks through texts of any kind: WGSL may stand in a Rust string, or be put together by code. What
-/// equals one of the `handed_out` texts apart from comments and white space does not count.
-fn written(texts: &[String], handed_out: &[String]) -> Written {
+/// Looks through texts of any kind: WGSL may stand in a Rust string, or be put together by code. A file
+/// that equals the template's, apart from comments and white space, does not count.
+fn written(texts: &BTreeMap<PathBuf, String>, template: &BTreeMap<PathBuf, String>) -> Written {
     let mut found = Written::default();
-    for text in texts {
-        let bare = bare(text);
-        if handed_out.contains(&bare) {
+    for (path, text) in texts {
+        if template.get(path).is_some_and(|template| is_template(text, template)) {
             continue;
         }
+        let bare = bare(text);
         let holds = |word: &str| bare.contains(word) || text.contains(word);
         let made_by_code = holds("ShaderSource") || holds("include_wgsl!");
         found.vertex |= made_by_code || holds("@vertex");
@@ -118,38 +122,38 @@ mod tests {
 
     const VERTEX: &str = "@vertex fn vs_main() -> V { /* TODO */ }";
     const FRAGMENT: &str = "@fragment fn fs_main() -> F { return F(); }";
+    const MAIN: &str = "fn main() {}";
 
-    fn of(texts: &[&str]) -> (bool, bool) {
-        let handed_out = [VERTEX, FRAGMENT, "fn main() {}"].map(bare);
-        let texts: Vec<String> = texts.iter().map(|&text| text.to_owned()).collect();
-        let found = written(&texts, &handed_out);
+    /// Of a source with these texts in place of `a.vs`, `a.fs` and `main.rs` of the template.
+    fn of(texts: [&str; 3]) -> (bool, bool) {
+        let source = |texts: [&str; 3]| {
+            let files = ["a.vs", "a.fs", "main.rs"].into_iter().zip(texts);
+            files.map(|(file, text)| (file.into(), text.to_owned())).collect()
+        };
+        let found = written(&source(texts), &source([VERTEX, FRAGMENT, MAIN]));
         (found.vertex, found.fragment)
     }
 
     #[test]
     fn the_templates_stages_are_nobodys_work() {
-        assert_eq!(of(&[]), (false, false));
-        assert_eq!(of(&[VERTEX, FRAGMENT, "fn main() {} // mine"]), (false, false));
-        assert_eq!(of(&["@vertex\nfn vs_main()->V{} // mine", FRAGMENT]), (false, false));
-        // One other word makes it a stage of one's own.
-        assert_eq!(of(&["fn main() { draw() }"]), (false, false));
-        assert_eq!(of(&[VERTEX, "@fragment fn fs_main() -> F { return F(1); }"]), (false, true));
+        assert_eq!(of([VERTEX, FRAGMENT, MAIN]), (false, false));
+        assert_eq!(of(["", "", "fn main() { draw() } // mine"]), (false, false));
+        assert_eq!(of(["@vertex\nfn vs_main()->V{} // mine", FRAGMENT, MAIN]), (false, false));
+        // One other word makes it a stage of one's own; so does another's place.
+        let other = "@fragment fn fs_main() -> F { return F(1); }";
+        assert_eq!(of([VERTEX, other, MAIN]), (false, true));
+        assert_eq!(of([FRAGMENT, FRAGMENT, MAIN]), (false, true));
     }
 
     #[test]
     fn stages_count_wherever_they_stand() {
+        let main = |text| of(["", "", text]);
         assert_eq!(
-            of(&["const ALL: &str = \"@vertex fn v() {} @fragment fn f() {}\";"]),
+            main("const ALL: &str = \"@vertex fn v() {} @fragment fn f() {}\";"),
             (true, true)
         );
-        assert_eq!(of(&["@ fragment fn mine() {}"]), (false, true));
-        assert_eq!(
-            of(&["let source = wgpu::ShaderSource::Wgsl(generate().into());"]),
-            (true, true)
-        );
-        assert_eq!(
-            of(&["device.create_shader_module(wgpu::include_wgsl!(\"a.wgsl\"))"]),
-            (true, true)
-        );
+        assert_eq!(main("@ fragment fn mine() {}"), (false, true));
+        assert_eq!(main("let source = wgpu::ShaderSource::Wgsl(made().into());"), (true, true));
+        assert_eq!(main("device.create_shader_module(wgpu::include_wgsl!(\"a\"))"), (true, true));
     }
 }
