@@ -9,7 +9,6 @@ use crate::files::files_below;
 use crate::intake::Finding;
 
 /// The stage texts of a submission, and of the template.
-#[derive(Default)]
 pub struct Stages {
     /// `simple.vs`, `diffuse.fs`, `phong.fs` of the submission; absent where the file is.
     pub own: [Option<String>; 3],
@@ -26,6 +25,18 @@ pub struct Stages {
 struct Written {
     vertex: bool,
     fragment: bool,
+}
+
+/// Those of a renderer whose source nobody looks at: nothing is claimed of it.
+impl Default for Stages {
+    fn default() -> Self {
+        Self {
+            own: Default::default(),
+            template: Default::default(),
+            named: [false; 3],
+            written: Written { vertex: true, fragment: true },
+        }
+    }
 }
 
 impl Stages {
