@@ -39,7 +39,7 @@ pub struct Judged {
 /// Whether surfaces lie where they should, for what cannot be judged alone.
 const COVERAGE: &str = "image.realtime.coverage";
 
-/// Silhouettes in plain colours correlate by 0; of the known mistakes of shaders, the worst by 0.4.
+/// Silhouettes correlate by 0, in one colour or one for each surface; what follows the light does by more.
 const LEAST_SHADING: f64 = 0.2;
 
 /// Draws every scene with the plugin and judges the images, those of the bonus too.
