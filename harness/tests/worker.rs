@@ -12,7 +12,7 @@ use umbra::process::{Exit, Limits};
 use umbra::sandbox::Layers;
 use umbra::worker::{
     Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, JobReport, Late, Matter,
-    Outcome, Patience, RayQuery, Request, SceneRef, Supervisor,
+    Outcome, Patience, RayQuery, Request, SceneRef, Stage, Supervisor,
 };
 
 /// A floor in y = 0 from -4 to 4, facing up, a small blocker over x > 2 at y = 1, and a light at
@@ -521,6 +521,70 @@ fn a_cancelled_job_ends_at_once_and_says_so() {
     let stopped = Outcome::NotRun { reason: "cancelled".into(), matter: Matter::Machine };
     assert_eq!(values(&report.outcomes[0]), [0.0; 135]);
     assert_eq!(report.outcomes[1..], [stopped.clone(), stopped]);
+}
+
+/// Stages that fit the contract as far as they go.
+const VERTEX: &str = "struct V { @builtin(position) clip: vec4f, @location(0) p: vec3f, @location(1) n: vec3f }
+@vertex fn vs_main(@location(0) p: vec3f, @location(1) n: vec3f) -> V { return V(vec4f(p, 1.0), p, n); }";
+const FRAGMENT: &str = "@fragment fn fs_main() -> @location(0) vec4f {
+    let red = 0.5;
+    return vec4f(red, 0.0, 0.0, 1.0);
+}";
+
+#[test]
+fn a_stage_that_is_no_wgsl_is_refused_with_its_line_and_others_are_drawn() {
+    let house = House::new();
+    let with = |vertex: &str, phong: &str| {
+        let stage = |(name, text): (&str, &str)| Stage { name: name.into(), text: text.into() };
+        let stages = [("simple.vs", vertex), ("diffuse.fs", FRAGMENT), ("phong.fs", phong)];
+        Request::RenderRealtime {
+            scene: house.scene(""),
+            width: 4,
+            height: 4,
+            shadow_map: false,
+            adapter: Adapter { kind: AdapterKind::Software, name: String::new() },
+            stages: stages.map(stage).into(),
+            cameras: vec![CameraValue {
+                eye: [0.0, 3.0, 0.0],
+                at: [0.0; 3],
+                up: [0.0, 0.0, 1.0],
+                fov_y_deg: 40.0,
+            }],
+        }
+    };
+    let no_semicolon = FRAGMENT.replacen(';', "", 1);
+    let undefined = FRAGMENT.replace("vec4f(red", "vec4f(reed");
+    let another_type = VERTEX.replace("vec4f(p, 1.0)", "vec3f(p)");
+    let layout = FRAGMENT.replace("fs_main", "main");
+    let requests = vec![
+        with(VERTEX, FRAGMENT),
+        with(VERTEX, &no_semicolon),
+        with(VERTEX, &no_semicolon),
+        with(VERTEX, &undefined),
+        with(&another_type, FRAGMENT),
+        with(VERTEX, &layout),
+        with(VERTEX, &format!("\u{feff}{FRAGMENT}")),
+    ];
+    let job = Job { plugin: None, requests };
+    let run = AtomicBool::new(false);
+    let report = house.supervisor.run_job(&job, &house.limits, &run, &mut |_| {});
+    let [right, first, again, name, vertex, unfit, marked] = report.outcomes.try_into().unwrap();
+    assert!(right.answer().is_some(), "{right:?}");
+    let file = "src/shaders/phong.fs.wgsl";
+    let said = format!(
+        "{file}:3:5: expected `;`, found \"return\"\n  ┌─ {file}:3:5\n  │\n3 │     return vec4f(red, 0.0, 0.0, 1.0);\n  \
+         │     ^^^^^^ expected `;`"
+    );
+    assert_eq!(first, Outcome::StageRefused(said));
+    assert_eq!(again, first, "its text is known by then");
+    let begins = |outcome: &Outcome, place: &str| match outcome {
+        Outcome::StageRefused(said) => said.starts_with(place),
+        _ => false,
+    };
+    assert!(begins(&name, &format!("{file}:3:18: no definition in scope for identifier: `reed`")));
+    assert!(begins(&vertex, "src/shaders/simple.vs.wgsl:2:"), "{vertex:?}");
+    assert!(matches!(&unfit, Outcome::Failed(said) if said.contains("fs_main")), "{unfit:?}");
+    assert_eq!(values(&marked), values(&right), "a byte-order mark is no part of a stage");
 }
 
 #[test]

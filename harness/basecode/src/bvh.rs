@@ -9,6 +9,7 @@ use obvhs::bvh2::node::Bvh2Node;
 use obvhs::triangle::Triangle;
 
 use crate::Ray;
+use crate::realtime::refuse_rays;
 
 /// A hierarchy over the triangles of a scene.
 pub struct Bvh {
@@ -64,7 +65,11 @@ const STACK: usize = 48;
 
 impl Bvh {
     /// Builds a hierarchy. `blocks[i]` tells whether triangle i takes part in [`Bvh::any_hit`].
+    ///
+    /// # Panics
+    /// While a render pass lives, as all that wants a ray: a realtime frame has none.
     pub fn new(vertices: &[[Vec3; 3]], blocks: &[bool]) -> Self {
+        refuse_rays();
         let triangles: Vec<Triangle> = vertices
             .iter()
             .map(|&[v0, v1, v2]| Triangle { v0: v0.into(), v1: v1.into(), v2: v2.into() })
@@ -118,6 +123,7 @@ impl Bvh {
     /// matter, or `None` to stop.
     #[inline(always)]
     fn traverse(&self, ray: &Ray, mut leaf: impl FnMut(&WideRay, &[Triangles]) -> Option<f32>) {
+        refuse_rays();
         if self.nodes.is_empty() {
             return;
         }

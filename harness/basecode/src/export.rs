@@ -12,6 +12,7 @@ use glam::{Vec2, Vec3};
 pub use renderer_api as api;
 
 use crate::gpu::{AdapterKind, Gpu, RenderPass, Target};
+use crate::realtime::{RayRefused, Realtime};
 use crate::{
     Bsdf, Camera, CameraConfig, Error, Film, Frame, Material, Ray, RenderJob, Renderer, Result,
     Sampler, Scene, SurfaceInteraction,
@@ -93,6 +94,7 @@ struct OpenPass {
     gpu: Gpu,
     /// By what the device was opened.
     adapter: (AdapterKind, String),
+    realtime: Realtime,
 }
 
 /// Loads a scene into a new renderer.
@@ -254,6 +256,7 @@ unsafe extern "C" fn open_realtime(
         };
         // SAFETY: texts of the host's, valid during the call.
         let name = unsafe { text(&settings.adapter_name)? };
+        let realtime = Realtime::begin();
         let mut gpu = Gpu::reopen(kind, name)?;
         let mut replaced = Vec::new();
         for stage in stages {
@@ -270,11 +273,12 @@ unsafe extern "C" fn open_realtime(
             opened = Some(loaded.renderer.render_pass(kind, &gpu, &loaded.scene, shadow_map)?);
             Ok(())
         })?;
+        realtime.without_rays()?;
         let Some(opened) = opened else {
             return Err(Error::Gpu("the render pass was not made".into()));
         };
         let adapter = (kind, name.to_owned());
-        let opened = Box::new(OpenPass { pass: opened, target, gpu, adapter });
+        let opened = Box::new(OpenPass { pass: opened, target, gpu, adapter, realtime });
         // SAFETY: the host's place for the handle.
         unsafe { *pass = Box::into_raw(opened).cast() };
         Ok(())
@@ -296,8 +300,9 @@ unsafe extern "C" fn draw_frame(
             fov_y_deg: camera.fov_y_deg,
         };
         let camera = Camera::new(config, open.target.width, open.target.height)?;
-        let OpenPass { pass, target, gpu, .. } = open;
-        gpu.checked(&mut || pass.draw(gpu, &camera, target))
+        let OpenPass { pass, target, gpu, realtime, .. } = open;
+        gpu.checked(&mut || pass.draw(gpu, &camera, target))?;
+        realtime.without_rays()
     })
 }
 
@@ -325,7 +330,7 @@ unsafe extern "C" fn close_realtime(pass: api::Pass) {
     let open = unsafe { Box::from_raw(pass.cast::<OpenPass>()) };
     // A panic in a student's `drop` must not cross the boundary; the device goes with it.
     let _ = catch_unwind(AssertUnwindSafe(|| {
-        let OpenPass { pass, target, gpu, adapter: (kind, name) } = *open;
+        let OpenPass { pass, target, gpu, adapter: (kind, name), realtime: _realtime } = *open;
         drop((pass, target));
         gpu.keep(kind, &name);
     }));
@@ -496,6 +501,10 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
 
 /// `todo!()` and `unimplemented!()` are panics with a fixed beginning: not a crash, but work to do.
 fn describe_panic(payload: &(dyn Any + Send)) -> (api::Status, String) {
+    if payload.is::<RayRefused>() {
+        let error = RayRefused::error();
+        return (status_of(&error), error.to_string());
+    }
     let said = panic_text(payload).to_owned();
     let task = ["not yet implemented", "not implemented"].iter().find_map(|p| said.strip_prefix(p));
     if let Some(task) = task {

@@ -29,6 +29,8 @@ mod frame;
 pub mod gpu;
 pub mod image;
 mod ray;
+#[doc(hidden)]
+pub mod realtime;
 mod renderer;
 mod sampler;
 pub mod scene;

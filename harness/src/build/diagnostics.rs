@@ -23,6 +23,16 @@ pub struct Diagnostic {
     pub rendered: String,
 }
 
+impl Diagnostic {
+    /// `FILE:LINE: message`, without the place where there is none.
+    pub fn headline(&self) -> String {
+        match &self.place {
+            Some(Place { file, line }) => format!("{file}:{line}: {}", self.message),
+            None => self.message.clone(),
+        }
+    }
+}
+
 /// What the compiler said.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Diagnostics {

@@ -143,6 +143,34 @@ pub fn judge_shaded(
     check
 }
 
+/// How the brightness (cube root) of `actual` follows that of `expected` within the lit surfaces, away
+/// from edges: 1 at best. Nothing when what is expected hardly varies there.
+pub fn shading_correlation(actual: &Image, expected: &Image, mask: &RegionMask) -> Option<f64> {
+    let brightness = |pixel: basecode::Vec3| f64::from(pixel.element_sum()).max(0.0).cbrt();
+    // Of each region: count, sums of a, b, aa, bb, ab.
+    let mut sums = vec![[0.0f64; 6]; mask.regions.len()];
+    for (index, &value) in mask.pixels.iter().enumerate() {
+        if !mask.is_lit_interior(value) || !actual.pixels[index].is_finite() {
+            continue;
+        }
+        let (a, b) = (brightness(actual.pixels[index]), brightness(expected.pixels[index]));
+        let sums = &mut sums[usize::from(value & RegionMask::INDEX)];
+        for (sum, term) in sums.iter_mut().zip([1.0, a, b, a * a, b * b, a * b]) {
+            *sum += term;
+        }
+    }
+    let (mut aa, mut bb, mut ab, mut level) = (0.0, 0.0, 0.0, 0.0);
+    for [n, a, b, a2, b2, product] in sums.into_iter().filter(|sums| sums[0] > 0.0) {
+        aa += a2 - a * a / n;
+        bb += b2 - b * b / n;
+        ab += product - a * b / n;
+        level += b2;
+    }
+    // 3 % of the brightness: flat surfaces tell nothing.
+    let varies = bb > 1e-3 * level;
+    varies.then(|| if aa > 1e-12 * level { ab / (aa * bb).sqrt() } else { 0.0 })
+}
+
 /// A mask in which all but the wanted regions are never compared.
 pub fn only(mask: &RegionMask, wanted: &dyn Fn(&Region) -> bool) -> RegionMask {
     let keep: Vec<bool> = mask.regions.iter().map(wanted).collect();
@@ -229,6 +257,31 @@ mod tests {
     use basecode::Vec3;
 
     use super::*;
+
+    #[test]
+    fn silhouettes_and_other_surfaces_show_no_light() {
+        let mut mask = RegionMask::background(16, 16);
+        for exponent in [0.0, 20.0] {
+            mask.regions.push(Region { name: "ball".into(), lit: true, exponent });
+        }
+        mask.pixels = (0..256).map(|i| if i % 16 < 8 { 1 } else { 2 }).collect();
+        let image = |value: &dyn Fn(usize) -> f32| Image {
+            width: 16,
+            height: 16,
+            pixels: (0..256).map(|i| Vec3::splat(value(i))).collect(),
+        };
+        let right = image(&|i| 1.0 + (i / 16) as f32 * if i % 16 < 8 { 1.0 } else { 3.0 });
+        let of = |actual: &Image| shading_correlation(actual, &right, &mask);
+        assert!(of(&right).is_some_and(|found| found > 0.999));
+        assert!(of(&image(&|i| 0.3 * right.pixels[i].x + 0.1)).is_some_and(|found| found > 0.9));
+        // One colour for everything, one for each surface, and noise in which rows differ by nothing.
+        assert_eq!(of(&image(&|_| 1.0)), Some(0.0));
+        let by_surface = of(&image(&|i| if i % 16 < 8 { 1.0 } else { 4.0 }));
+        assert!(by_surface.is_some_and(|found| found.abs() < 1e-3));
+        assert!(of(&image(&|i| (i * 7 % 5) as f32)).is_some_and(|found| found.abs() < 0.2));
+        let flat = image(&|_| 1.0);
+        assert_eq!(shading_correlation(&right, &flat, &mask), None);
+    }
 
     #[test]
     fn normals_that_are_not_renormalised_are_accepted_by_material() {

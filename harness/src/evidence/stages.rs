@@ -429,8 +429,8 @@ pub fn is_template(stage: &str, template: &str) -> bool {
     bare(stage) == bare(template)
 }
 
-/// WGSL without comments and white space.
-fn bare(text: &str) -> String {
+/// A source without comments and white space.
+pub fn bare(text: &str) -> String {
     let mut out = String::new();
     let mut rest = text;
     let mut depth = 0usize;

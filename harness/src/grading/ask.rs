@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use basecode::{Image, Ray, Vec3};
 use renderer_api as api;
 
+use super::case::Case;
 use super::control;
 use crate::diagnosis::{Sightings, Tile, View};
 use crate::evidence::{Check, Verdict};
@@ -47,6 +48,8 @@ pub struct Asker<'a> {
     pub reference: Option<&'a Path>,
     /// What was answered, for the diagnosis.
     pub sightings: Mutex<Sightings>,
+    /// What compilers said in several lines, each text once: to be shown line by line.
+    pub quotes: Mutex<Vec<String>>,
 }
 
 impl Asker<'_> {
@@ -105,6 +108,23 @@ impl Asker<'_> {
         }
     }
 
+    /// Keeps what a compiler said about a public scene, where it is more than its first line.
+    pub fn quote(&self, case: &Case, said: &str) {
+        if case.held_back || said.lines().nth(1).is_none() {
+            return;
+        }
+        if let Ok(mut quotes) = self.quotes.lock()
+            && !quotes.iter().any(|quote| quote == said)
+        {
+            quotes.push(said.to_owned());
+        }
+    }
+
+    /// All that was kept so, one text after the other.
+    pub fn quoted(&self) -> String {
+        self.quotes.lock().map_or(String::new(), |quotes| quotes.join("\n\n"))
+    }
+
     /// A scene file for a request.
     pub fn scene(&self, path: &Path) -> SceneRef {
         SceneRef { path: path.to_owned(), options: self.options.clone() }
@@ -160,6 +180,11 @@ pub fn image(values: &[f32], width: u32, height: u32) -> Image {
     Image { width: width as usize, height: height as usize, pixels }
 }
 
+/// The first line of what a compiler said, which says it all in short.
+pub fn headline(said: &str) -> &str {
+    said.lines().next().unwrap_or_default()
+}
+
 /// The check for a question without an answer. `parts` are the parts whose lack is this check's
 /// own matter: what is not implemented elsewhere only hides the answer.
 pub fn unanswered(id: &str, scene: &str, parts: &[&str], outcome: &Outcome) -> Check {
@@ -177,8 +202,9 @@ pub fn unanswered(id: &str, scene: &str, parts: &[&str], outcome: &Outcome) -> C
             check(verdict, format!("not implemented yet: {task}"))
         }
         Outcome::Failed(message) => {
-            check(Verdict::Fail, format!("the renderer reports an error: {message}"))
+            check(Verdict::Fail, format!("the renderer reports an error: {}", headline(message)))
         }
+        Outcome::StageRefused(message) => check(Verdict::Fail, headline(message).to_owned()),
         Outcome::Panicked(message) => {
             check(Verdict::Fail, format!("the renderer panicked: {message}"))
         }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::pipeline::Grading;
-use super::realtime::Stages;
+use super::stages::Stages;
 use crate::files::hex;
 use crate::process::Limits;
 use crate::worker::{Job, Patience, Reference, Request};

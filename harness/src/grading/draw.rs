@@ -21,6 +21,8 @@ pub struct Frame<'a> {
     pub size: (u32, u32),
     /// Whether to draw shadows.
     pub shadow_map: bool,
+    /// How often it is drawn, one after the other; the last one is looked at.
+    pub times: usize,
     /// Stages to replace; all three where there is no plugin.
     pub stages: Vec<Stage>,
 }
@@ -29,7 +31,8 @@ impl<'a> Frame<'a> {
     /// The realtime image of a scene, on the film that it is judged on.
     pub fn plain(case: &'a Case) -> Self {
         let toml = case.realtime.as_path();
-        Self { case, toml, size: case.film(), shadow_map: false, stages: Vec::new() }
+        let (size, stages) = (case.film(), Vec::new());
+        Self { case, toml, size, shadow_map: false, times: 1, stages }
     }
 
     /// A scene's small film under other stages.
@@ -64,9 +67,16 @@ pub fn draw_each(asker: &Asker, plugin: Option<&Path>, frames: &[Frame]) -> Vec<
         shadow_map: frame.shadow_map,
         adapter: adapter.clone(),
         stages: frame.stages.clone(),
-        cameras: vec![frame.case.camera],
+        cameras: vec![frame.case.camera; frame.times],
     };
-    asker.ask(plugin, frames.iter().map(request).collect())
+    let mut outcomes = asker.ask(plugin, frames.iter().map(request).collect());
+    for (outcome, frame) in outcomes.iter_mut().zip(frames) {
+        if let Outcome::Done(answer) = outcome {
+            let floats = answer.values.len() / frame.times;
+            answer.values.drain(..floats * (frame.times - 1));
+        }
+    }
+    outcomes
 }
 
 /// Draws the frames of several scenes with a plugin, all in one worker while it lives, where

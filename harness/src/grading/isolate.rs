@@ -6,11 +6,11 @@ use std::path::Path;
 
 use basecode::{Image, Vec3};
 
-use super::ask::{self, Asker};
+use super::ask::{self, Asker, headline};
 use super::case::Case;
 use super::draw::{Frame, STAGES, draw_each, draw_scenes, named};
-use super::realtime::Stages;
 use super::seen;
+use super::stages::Stages;
 use crate::diagnosis::{Kind, Tile, View};
 use crate::evidence::stages::{
     BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass, judge_vertex,
@@ -30,12 +30,14 @@ const CHECKS: [(&str, &str); 3] = [
 
 /// Judges the student's pass under stages of ours (2.1) and his stages under a pass of ours (2.2
 /// to 2.4) on scenes: one worker draws all frames of the former, another without any code of his
-/// those of the latter.
+/// those of the latter. `fails` says whether there are scenes that the student's own frame of gets
+/// no answer: then a stage that does not compile is to blame, otherwise no frame needs it.
 pub fn isolate(
     asker: &Asker,
     plugin: &Path,
     cases: &[&Case],
     stages: &Stages,
+    fails: bool,
     tolerances: &Tolerances,
 ) -> Vec<Check> {
     let shown = BoundValue::ALL
@@ -47,24 +49,38 @@ pub fn isolate(
     let mut swapped = draw_each(asker, None, &under(cases, &sets).concat()).into_iter();
     let judged = cases.iter().zip(passes).flat_map(|(case, pass)| {
         let swapped: Vec<Outcome> = swapped.by_ref().take(sets.len()).collect();
+        let pass = match bound_values(case, &pass) {
+            Ok(frames) => {
+                seen::pass(asker, case, &frames);
+                judge_bound(case, &frames)
+            }
+            Err(check) => *check,
+        };
+        let takes_ours = pass.verdict != Verdict::NotJudged;
         let stage = |index: usize| {
             let (id, task) = CHECKS[index];
             let outcomes = match &swaps[index] {
-                Swap::Untouched => {
+                Swap::Untouched if takes_ours || !stages.is_elsewhere(index) => {
                     let summary =
                         format!("not implemented yet: {task}: the stage is the template's");
                     return Check::new(id, &case.entry.name, Verdict::NotImplemented, summary);
                 }
-                Swap::Absent => {
+                Swap::Absent if !stages.is_elsewhere(index) => {
+                    let summary =
+                        format!("not implemented yet: {task}: the source holds no such stage");
+                    return Check::new(id, &case.entry.name, Verdict::NotImplemented, summary);
+                }
+                Swap::Untouched | Swap::Absent => {
                     let name = STAGES[index];
-                    let summary = format!("swap not possible: there is no src/shaders/{name}.wgsl");
+                    let summary =
+                        format!("swap not possible: what draws is not in src/shaders/{name}.wgsl");
                     return Check::new(id, &case.entry.name, Verdict::NotJudged, summary);
                 }
                 Swap::Drawn(range) => &swapped[range.clone()],
             };
             let images = match images(case, outcomes) {
                 Ok(images) => images,
-                Err(outcome) => return swap_failed(id, case, &[], outcome),
+                Err(outcome) => return swap_failed(asker, id, case, fails, outcome),
             };
             match images.as_slice() {
                 [positions, normals] => {
@@ -81,15 +97,8 @@ pub fn isolate(
                 }
             }
         };
-        let pass = match bound_values(case, &pass) {
-            Ok(frames) => {
-                seen::pass(asker, case, &frames);
-                judge_bound(case, &frames)
-            }
-            Err(check) => *check,
-        };
-        let mut checks = vec![pass];
-        checks.extend((0..STAGES.len()).map(stage));
+        let mut checks: Vec<Check> = (0..STAGES.len()).map(stage).collect();
+        checks.insert(0, pass);
         checks
     });
     judged.collect()
@@ -105,7 +114,7 @@ fn under<'a>(cases: &[&'a Case], sets: &[Vec<Stage>]) -> Vec<Vec<Frame<'a>>> {
 enum Swap {
     /// Nothing: it is the template's.
     Untouched,
-    /// Nothing: there is no such file.
+    /// Nothing: there is no such file, or nobody names it.
     Absent,
     /// These of the sets of stages show it.
     Drawn(Range<usize>),
@@ -116,7 +125,7 @@ fn swaps(stages: &Stages) -> ([Swap; 3], Vec<Vec<Stage>>) {
     let mut sets = Vec::new();
     let swaps = [0, 1, 2].map(|index| {
         if stages.is_template(index) {
-            return Swap::Untouched;
+            return if stages.is_named(index) { Swap::Untouched } else { Swap::Absent };
         }
         let Some(own) = &stages.own[index] else { return Swap::Absent };
         let begin = sets.len();
@@ -153,19 +162,19 @@ fn pass_check(case: &Case, outcomes: &[Outcome]) -> Check {
 
 /// Each bound value with the frame that shows it, or else the check that says why there is none.
 fn bound_values(case: &Case, outcomes: &[Outcome]) -> Result<Vec<(BoundValue, Image)>, Box<Check>> {
+    let (id, name) = ("pass.uniforms", &case.entry.name);
     let images = match images(case, outcomes) {
         Ok(images) => images,
-        Err(outcome) => {
-            return Err(Box::new(swap_failed("pass.uniforms", case, &["2.1"], outcome)));
-        }
+        // Its own frame decides: a pass with a layout of its own takes no stages of ours.
+        Err(Outcome::Failed(message)) => return Err(Box::new(not_possible(id, case, message))),
+        Err(outcome) => return Err(Box::new(ask::unanswered(id, name, &["2.1"], outcome))),
     };
     // Each frame shows another value. A pass with pipelines of its own takes no stages of ours.
     let is_same = |image: &Image| image.pixels == images[0].pixels;
     let shows = |image: &Image| image.pixels.iter().any(|pixel| *pixel != Vec3::ZERO);
     if images.iter().all(is_same) && images.iter().any(shows) {
         let summary = "swap not possible: the pass draws the same under all stages";
-        let check = Check::new("pass.uniforms", &case.entry.name, Verdict::NotJudged, summary);
-        return Err(Box::new(check));
+        return Err(Box::new(Check::new(id, name, Verdict::NotJudged, summary)));
     }
     Ok(BoundValue::ALL.into_iter().zip(images).collect())
 }
@@ -209,15 +218,25 @@ fn see_fragment(asker: &Asker, case: &Case, image: &Image, phong: bool) {
     asker.see(View::new(Kind::Fragment, &case.entry.name), tile);
 }
 
-/// A swap that the graphics library refuses is no fault: the student may have chosen another
-/// layout. Whether a stage compiles at all shows in the student's own image.
-fn swap_failed(id: &str, case: &Case, parts: &[&str], outcome: &Outcome) -> Check {
+/// The check for a stage that draws nothing under our pass. One that is no WGSL is at fault where a
+/// frame fails; whether another only has a layout of its own shows in the student's own frame.
+fn swap_failed(asker: &Asker, id: &str, case: &Case, fails: bool, outcome: &Outcome) -> Check {
     match outcome {
-        Outcome::Failed(message) => {
-            let first = message.lines().next().unwrap_or_default();
-            let summary = format!("swap not possible: {first}");
+        Outcome::StageRefused(message) if !fails => {
+            let summary = format!("no frame needs it, but {}", headline(message));
             Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
         }
-        other => ask::unanswered(id, &case.entry.name, parts, other),
+        Outcome::StageRefused(message) => {
+            asker.quote(case, message);
+            ask::unanswered(id, &case.entry.name, &[], outcome)
+        }
+        Outcome::Failed(message) => not_possible(id, case, message),
+        other => ask::unanswered(id, &case.entry.name, &[], other),
     }
+}
+
+/// A swap that the graphics library refuses is no fault.
+fn not_possible(id: &str, case: &Case, message: &str) -> Check {
+    let summary = format!("swap not possible: {}", headline(message));
+    Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
 }

@@ -194,7 +194,7 @@ impl Grading<'_> {
         }
         if belongs("2.") {
             let judged = realtime::judge_images(&asker, reference, &self.cases, tolerances);
-            drawn.extend(judged.into_iter().flat_map(|(_, images)| images));
+            drawn.extend(judged.into_iter().flat_map(|judged| judged.drawn));
             // Under the reference's own vertex stage, which is right where a fragment stage is not.
             let frames: Vec<Frame> =
                 self.cases.iter().map(|case| Frame::small(case, Vec::new())).collect();

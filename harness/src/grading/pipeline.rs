@@ -13,9 +13,9 @@ use super::conventions::Answers;
 use super::costs::ReferenceCosts;
 use super::kept::Kept;
 use super::offline::{self, Drawn};
-use super::realtime::{self, Stages};
 use super::record::{Conditions, Record, StageCost, Student};
-use super::{draw, handed_in, isolate, pictures, sampler};
+use super::stages::Stages;
+use super::{draw, handed_in, isolate, mend, pictures, realtime, sampler};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
@@ -178,6 +178,7 @@ impl<'a> Grading<'a> {
             ),
             reference: self.reference.as_deref(),
             sightings: Mutex::default(),
+            quotes: Mutex::default(),
         }
     }
 
@@ -232,23 +233,27 @@ impl<'a> Grading<'a> {
         costs.end("intake", decoder.take_cpu_s());
 
         say("compiling the source");
-        let plugin = self.build(&hand_in, scratch.path(), &mut record, &mut checks, &mut costs)?;
+        let built = self.build(&hand_in, scratch.path(), &mut record, &mut checks, &mut costs)?;
         let seed = config.sampler_seed().unwrap_or_default();
         let mut drawn = Vec::new();
         let asks = |path| self.paths.contains(&path);
-        if let Some(plugin) = plugin.as_ref().filter(|_| asks(RenderPath::Offline)) {
+        if let Some((plugin, _)) = built.as_ref().filter(|_| asks(RenderPath::Offline)) {
             say("rendering offline");
             self.offline(&asker, plugin, seed, &mut checks, &mut drawn)?;
             checks.extend(asker.used_up());
             costs.end("offline", asker.end_path());
         }
-        if let Some(plugin) = plugin.as_ref().filter(|_| asks(RenderPath::Realtime)) {
+        if let Some((plugin, built)) = built.as_ref().filter(|_| asks(RenderPath::Realtime)) {
             say("drawing realtime");
-            let stages = Stages::read(&hand_in.root.join("src"), &self.assignment.template());
+            let stages = Stages::read(&built.src, &self.assignment.template());
+            record.findings.extend(stages.findings());
             self.realtime(&asker, plugin, &stages, &mut checks, &mut drawn)?;
             checks.extend(asker.used_up());
             checks.extend(asker.printed_much());
             costs.end("realtime", asker.end_path());
+            let said = [std::mem::take(&mut record.diagnostics), asker.quoted()];
+            record.diagnostics =
+                said.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("\n");
         }
         let compared: &[Case] = if self.compares_submitted { &self.cases } else { &[] };
         if self.compares_submitted {
@@ -264,11 +269,14 @@ impl<'a> Grading<'a> {
             record.images.extend(digest);
         }
         if let (None, Some(reference), Some(seed)) =
-            (&plugin, &self.reference, config.sampler_seed())
+            (&built, &self.reference, config.sampler_seed())
         {
             checks.extend(handed_in::judge_seeds(&asker, reference, &handed_in, seed));
         }
         costs.end("images", decoder.take_cpu_s() + asker.end_path());
+        if let Some((_, built)) = &built {
+            built.explain(&self.assignment.rules, &mut checks, &mut record.findings);
+        }
         pictures::draw(&mut checks, &self.cases, &drawn, &handed_in, out)?;
         costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
@@ -331,6 +339,7 @@ impl<'a> Grading<'a> {
         Ok((evidence, diagnoses))
     }
 
+    /// Builds the source, mended where it does not build as it is; answers the library with it.
     fn build(
         &self,
         hand_in: &HandIn,
@@ -338,7 +347,7 @@ impl<'a> Grading<'a> {
         record: &mut Record,
         checks: &mut Vec<Check>,
         costs: &mut Costs,
-    ) -> anyhow::Result<Option<PathBuf>> {
+    ) -> anyhow::Result<Option<(PathBuf, mend::Built)>> {
         let src = hand_in.root.join("src");
         if !src.join("lib.rs").is_file() {
             checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no src/lib.rs"));
@@ -347,23 +356,27 @@ impl<'a> Grading<'a> {
         let out = scratch.join("out");
         std::fs::create_dir(&out)?;
         let limits = &self.assignment.limits.build;
-        let report =
-            build::compile(&self.recording, self.supervisor, &src, &out, limits, self.cancel)?;
-        costs.end("build", report.cpu_s);
+        let compile = |src: &Path| {
+            build::compile(&self.recording, self.supervisor, src, &out, limits, self.cancel)
+        };
+        let template = self.assignment.template();
+        let built = mend::build(&compile, &src, &template, &scratch.join("mended"))?;
+        costs.end("build", built.cpu_s);
+        let rendered = built.errors.iter().map(|error| error.rendered.as_str());
+        record.diagnostics = rendered.collect::<Vec<_>>().join("\n");
+        let first = built.errors.first().map(build::Diagnostic::headline).unwrap_or_default();
         let mut hint = String::new();
-        let (plugin, summary) = match report.outcome {
-            BuildOutcome::Built { library } => (Some(library), "the source builds".to_owned()),
-            BuildOutcome::CompileError { errors } => {
-                record.diagnostics = errors
-                    .iter()
-                    .map(|error| error.rendered.as_str())
-                    .collect::<Vec<_>>()
-                    .join("\n");
-                let first = errors.first().map(|error| match &error.place {
-                    Some(place) => format!("{}:{}: {}", place.file, place.line, error.message),
-                    None => error.message.clone(),
-                });
-                hint = first.unwrap_or_default();
+        let (plugin, summary) = match &built.report.outcome {
+            BuildOutcome::Built { library } if built.replaced.is_empty() => {
+                (Some(library.clone()), "the source builds".to_owned())
+            }
+            BuildOutcome::Built { library } => {
+                let summary =
+                    format!("the source builds but for files that were replaced: {first}");
+                (Some(library.clone()), summary)
+            }
+            BuildOutcome::CompileError { .. } => {
+                hint = first;
                 (None, "the source does not build".to_owned())
             }
             BuildOutcome::TimedOut => (None, "the compiler ran out of time".to_owned()),
@@ -376,7 +389,7 @@ impl<'a> Grading<'a> {
         };
         let verdict = if plugin.is_some() { Verdict::Pass } else { Verdict::Fail };
         checks.push(Check::new(BUILD, "", verdict, summary).with_hint(hint));
-        Ok(plugin)
+        Ok(plugin.map(|library| (library, built)))
     }
 
     pub(super) fn offline(
@@ -441,21 +454,26 @@ impl<'a> Grading<'a> {
         for cases in self.groups() {
             let begin = checks.len();
             let judged = realtime::judge_images(asker, plugin, cases, tolerances);
+            let fails = judged.iter().any(|judged| judged.fails);
             let mut wrong = Vec::new();
-            for (case, (found, images)) in cases.iter().zip(judged) {
+            for (case, judged) in cases.iter().zip(judged) {
+                let mut found = judged.checks;
+                if let Some(why) = stages.nothing_draws() {
+                    found.iter_mut().for_each(|check| realtime::drawn_by_nobody(check, why));
+                }
                 let proof =
                     |check: &Check| check.id == "image.realtime" && check.verdict != Verdict::Pass;
                 if found.iter().any(proof) {
                     wrong.push(case);
                 }
                 checks.extend(found);
-                drawn.extend(images);
+                drawn.extend(judged.drawn);
             }
             shadow_map::set_apart(&mut checks[begin..]);
             self.stop_if_interrupted()?;
             // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
             if !wrong.is_empty() {
-                checks.extend(isolate::isolate(asker, plugin, &wrong, stages, tolerances));
+                checks.extend(isolate::isolate(asker, plugin, &wrong, stages, fails, tolerances));
             }
             mark(&mut checks[begin..], cases);
         }

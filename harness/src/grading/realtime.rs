@@ -11,39 +11,12 @@ use super::offline::Drawn;
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels;
 use crate::evidence::shadow_map::Shadows;
-use crate::evidence::stages::{VERTEX, is_template};
+use crate::evidence::stages::VERTEX;
 use crate::evidence::{Check, Verdict};
 use crate::expected::Expected;
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::{Region, RegionMask};
-use crate::worker::{Outcome, Stage};
-
-/// The stage texts of a hand-in, and of the template.
-#[derive(Default)]
-pub struct Stages {
-    /// `simple.vs`, `diffuse.fs`, `phong.fs` of the hand-in; absent where the file is.
-    pub own: [Option<String>; 3],
-    /// The same of the template.
-    pub template: [String; 3],
-}
-
-impl Stages {
-    /// Reads the stages below a hand-in's and the template's `src` folder. A file that is no text
-    /// counts as absent.
-    pub fn read(src: &Path, template: &Path) -> Self {
-        let stage =
-            |src: &Path, name| std::fs::read_to_string(src.join(format!("shaders/{name}.wgsl")));
-        Self {
-            own: STAGES.map(|name| stage(src, name).ok()),
-            template: STAGES.map(|name| stage(template, name).unwrap_or_default()),
-        }
-    }
-
-    /// Whether a stage is the template's still.
-    pub fn is_template(&self, index: usize) -> bool {
-        self.own[index].as_ref().is_some_and(|own| is_template(own, &self.template[index]))
-    }
-}
+use crate::worker::{Matter, Outcome, Stage};
 
 type View = (&'static str, &'static dyn Fn(&Region) -> bool);
 
@@ -54,14 +27,29 @@ const VIEWS: [View; 3] = [
     ("image.realtime.phong", &|region| region.exponent > 0.0),
 ];
 
-/// Draws every scene with the plugin and judges the images, those of the bonus too; answers for
-/// each scene what was found and what was drawn.
+/// What the frames of a scene show.
+pub struct Judged {
+    /// What was found.
+    pub checks: Vec<Check>,
+    /// What was drawn.
+    pub drawn: Vec<Drawn>,
+    /// Whether the frame without shadows got no answer, by the submission's own fault.
+    pub fails: bool,
+}
+
+/// Whether surfaces lie where they should, for what cannot be judged alone.
+const COVERAGE: &str = "image.realtime.coverage";
+
+/// Silhouettes correlate by 0, in one colour or one for each surface; what follows the light does by more.
+const LEAST_SHADING: f64 = 0.2;
+
+/// Draws every scene with the plugin and judges the images, those of the bonus too.
 pub fn judge_images(
     asker: &Asker,
     plugin: &Path,
     cases: &[Case],
     tolerances: &Tolerances,
-) -> Vec<(Vec<Check>, Vec<Drawn>)> {
+) -> Vec<Judged> {
     let is_right = |case: &Case, outcome: &Outcome| {
         let Outcome::Done(answer) = outcome else { return false };
         let (width, height) = case.film();
@@ -70,7 +58,8 @@ pub fn judge_images(
     };
     let plain = draw_plain(asker, plugin, cases, &is_right);
     let judged = cases.iter().zip(plain).map(|(case, plain)| {
-        let (mut checks, plain) = judge_plain(case, &plain, tolerances);
+        let fails = plain.matter() == Some(Matter::Submission);
+        let (mut checks, plain) = judge_plain(asker, case, &plain, tolerances);
         let mut drawn = Vec::from_iter(plain);
         if let Some(toml) = &case.bonus {
             // A worker of its own: the bonus may crash without a trace on the others.
@@ -82,9 +71,20 @@ pub fn judge_images(
             checks.push(Check { id: id.to_owned(), ..check });
             drawn.extend(bonus);
         }
-        (checks, drawn)
+        Judged { checks, drawn, fails }
     });
     judged.collect()
+}
+
+/// A picture that no shader of the submission can have drawn earns nothing, however right it is;
+/// `why` says how that is known.
+pub fn drawn_by_nobody(check: &mut Check, why: &str) {
+    if matches!(check.verdict, Verdict::Pass | Verdict::Fail) {
+        check.verdict = Verdict::Fail;
+        check.error = 1.0;
+        check.hint.clear();
+        check.summary = format!("{why}: no frame counts ({})", check.summary);
+    }
 }
 
 fn judge(
@@ -98,10 +98,19 @@ fn judge(
 }
 
 /// An outcome as an image, or else the check that says why there is none.
-fn drawn(case: &Case, kind: Kind, id: &str, outcome: &Outcome) -> Result<Drawn, Box<Check>> {
+fn drawn(
+    asker: &Asker,
+    case: &Case,
+    kind: Kind,
+    id: &str,
+    outcome: &Outcome,
+) -> Result<Drawn, Box<Check>> {
     let parts = ["2.1", "2.2", "2.3", "2.4", "2.5"];
     let scene = &case.entry.name;
     let Outcome::Done(answer) = outcome else {
+        if let Outcome::Failed(said) = outcome {
+            asker.quote(case, said);
+        }
         return Err(Box::new(ask::unanswered(id, scene, &parts, outcome)));
     };
     let (width, height) = case.film();
@@ -110,16 +119,18 @@ fn drawn(case: &Case, kind: Kind, id: &str, outcome: &Outcome) -> Result<Drawn, 
 }
 
 fn judge_plain(
+    asker: &Asker,
     case: &Case,
     outcome: &Outcome,
     tolerances: &Tolerances,
 ) -> (Vec<Check>, Option<Drawn>) {
-    let drawn = match drawn(case, Kind::Realtime, VIEWS[0].0, outcome) {
+    let drawn = match drawn(asker, case, Kind::Realtime, VIEWS[0].0, outcome) {
         Ok(drawn) => drawn,
+        // Where a part cannot be judged alone either, a frame that is not there decides.
         Err(check) => {
-            // Where stages cannot be exchanged either, nobody but the pass is left to blame.
-            let all = Check { id: "image.realtime.all".to_owned(), ..(*check).clone() };
-            return (vec![*check, all], None);
+            let same = |id: &str| Check { id: id.to_owned(), ..(*check).clone() };
+            let ids = VIEWS.iter().map(|(id, _)| *id).chain([COVERAGE]);
+            return (ids.map(same).collect(), None);
         }
     };
     let Expected { scene, unshadowed_mask: mask, .. } = &case.expected;
@@ -150,7 +161,7 @@ fn judge_bonus(
     tolerances: &Tolerances,
 ) -> (Check, Option<Drawn>) {
     let (kind, id) = (Kind::RealtimeShadows, "bonus.image");
-    let drawn = match drawn(case, kind, id, outcome) {
+    let drawn = match drawn(asker, case, kind, id, outcome) {
         Ok(drawn) => drawn,
         Err(check) => return (*check, None),
     };
@@ -194,8 +205,9 @@ fn plain_but_for_shadows(
 }
 
 /// Judges shadows that are wrong as an image by visibility alone: against the student's own image
-/// without shadows, or else against that drawn under a vertex stage of ours. `check` is the
-/// verdict on the image, which stands when neither tells.
+/// without shadows, or else against that drawn under a vertex stage of ours, or as the second of two
+/// frames: what the first lacks is the render pass' matter. `check` is the verdict on the image, which
+/// stands when none tells.
 fn judge_visibility(
     asker: &Asker,
     plugin: &Path,
@@ -207,27 +219,28 @@ fn judge_visibility(
     let (name, shadows) = (&case.entry.name, shadows(case));
     let judge = |with: &Image, without: &Image| shadows.judge(name, with, without, tolerances);
     let own = without.and_then(|without| judge(with, without));
-    if let Some(own) = own.as_ref().filter(|own| own.verdict == Verdict::Pass) {
+    let passes = |check: &Check| check.verdict == Verdict::Pass;
+    if let Some(own) = own.as_ref().filter(|own| passes(own)) {
         return own.clone();
     }
-    let vertex = Stage { name: STAGES[0].to_owned(), text: VERTEX.to_owned() };
-    let drawn = |toml: &Path, shadow_map| {
-        let frame = Frame { toml, shadow_map, stages: vec![vertex.clone()], ..Frame::plain(case) };
+    let drawn = |toml: &Path, shadow_map, times, stages: &[Stage]| {
+        let stages = stages.to_vec();
+        let frame = Frame { toml, shadow_map, times, stages, ..Frame::plain(case) };
         let outcome = draw(asker, Some(plugin), &frame);
         let (width, height) = frame.size;
         outcome.answer().map(|answer| ask::image(&answer.values, width, height))
     };
-    let swapped = case
-        .bonus
-        .as_ref()
-        .and_then(|bonus| judge(&drawn(bonus, true)?, &drawn(&case.realtime, false)?));
-    match swapped {
-        Some(swapped) if swapped.verdict == Verdict::Pass => swapped,
-        _ => own.unwrap_or(check),
-    }
+    let vertex = Stage { name: STAGES[0].to_owned(), text: VERTEX.to_owned() };
+    let bonus = case.bonus.as_deref();
+    let again = |times, stages: &[Stage]| {
+        judge(&drawn(bonus?, true, times, stages)?, &drawn(&case.realtime, false, times, stages)?)
+    };
+    let swapped = again(1, &[vertex]).filter(passes);
+    let rescued = swapped.or_else(|| again(2, &[]).filter(passes));
+    rescued.or(own).unwrap_or(check)
 }
 
-/// Where the image shows a surface and where not, whatever its colours.
+/// Where the image shows a surface and where not, and whether light falls on it.
 fn judge_coverage(case: &Case, image: &Image) -> Check {
     let mask = &case.expected.unshadowed_mask;
     let (mut counted, mut wrong) = (0usize, 0usize);
@@ -242,12 +255,22 @@ fn judge_coverage(case: &Case, image: &Image) -> Check {
         let covered = *pixel != basecode::Vec3::ZERO;
         wrong += usize::from(covered == background || !pixel.is_finite());
     }
-    let (id, name) = ("image.realtime.coverage", &case.entry.name);
+    let name = &case.entry.name;
     let error = wrong as f64 / counted.max(1) as f64;
-    if error <= 5e-3 {
-        return Check::new(id, name, Verdict::Pass, "surfaces lie where they should");
+    if error > 5e-3 {
+        let summary = format!(
+            "{wrong} of {counted} pixels show a surface where none is, or none where one is"
+        );
+        return Check { error, ..Check::new(COVERAGE, name, Verdict::Fail, summary) };
     }
-    let summary =
-        format!("{wrong} of {counted} pixels show a surface where none is, or none where one is");
-    Check { error, ..Check::new(id, name, Verdict::Fail, summary) }
+    match images::shading_correlation(image, &case.expected.unshadowed, mask) {
+        Some(correlation) if correlation < LEAST_SHADING => {
+            let summary = format!(
+                "surfaces lie where they should, but no light falls on them: within a surface, brightness \
+                 correlates by {correlation:.2} with what is expected, and must by {LEAST_SHADING}"
+            );
+            Check::new(COVERAGE, name, Verdict::Fail, summary)
+        }
+        _ => Check::new(COVERAGE, name, Verdict::Pass, "surfaces lie where they should"),
+    }
 }

@@ -73,6 +73,8 @@ pub enum CallErrorKind {
     Cancelled,
     /// [`api::STATUS_NO_ADAPTER`].
     NoAdapter,
+    /// No plugin's answer: a stage that Umbra's own pass was given is no WGSL.
+    Stage,
     /// No plugin's answer: Umbra itself is at fault.
     Ours,
 }

@@ -86,6 +86,10 @@ pub struct Part {
     /// The checks that decide when the evidence does not apply.
     #[serde(default)]
     pub fallback: Vec<String>,
+    /// The files of the template's `src` that it is done in, for telling what is lost with one that
+    /// does not build.
+    #[serde(default)]
+    pub files: Vec<String>,
     /// The checks on the images handed in, for a hand-in that does not build.
     #[serde(default)]
     pub images_only: Vec<String>,

@@ -9,7 +9,7 @@ use renderer_api as api;
 use super::arena::{Input, Output, Table};
 use super::job::{Request, SceneRef};
 use super::neutral_pass::Neutral;
-use super::table::{Record, STATUS_OURS, STATUS_REJECTED};
+use super::table::{Record, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE};
 use super::wire::{Folder, WireJob, WireRequest, queries, rays, words};
 use crate::plugin::{
     CallError, CallErrorKind, HostPlugin, LoadedScene, OfflineJob, RealtimeJob, Witness,
@@ -179,6 +179,7 @@ fn status(kind: CallErrorKind) -> i32 {
         CallErrorKind::Panicked => api::STATUS_PANICKED,
         CallErrorKind::Cancelled => api::STATUS_CANCELLED,
         CallErrorKind::NoAdapter => api::STATUS_NO_ADAPTER,
+        CallErrorKind::Stage => STATUS_STAGE,
         CallErrorKind::Ours => STATUS_OURS,
     }
 }

@@ -24,6 +24,21 @@ const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
 pub struct Neutral {
     scene: Option<(PathBuf, Scene)>,
     open: Option<Open>,
+    /// Texts that do not compile, each with the reason.
+    refused: Vec<(String, String)>,
+}
+
+/// Why nothing was drawn.
+enum Failure {
+    /// A stage does not compile.
+    Stage(String),
+    Other(Error),
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self::Other(error)
+    }
 }
 
 /// An open device and its pipelines, by the texts of their stages.
@@ -36,8 +51,9 @@ impl Neutral {
     /// Draws a [`Request::RenderRealtime`] into `values`, frame after frame.
     ///
     /// # Errors
-    /// [`CallErrorKind::NoAdapter`] without an adapter, [`CallErrorKind::Failed`] for stages that
-    /// the graphics library refuses, [`CallErrorKind::Ours`] for a request that is not one.
+    /// [`CallErrorKind::NoAdapter`] without an adapter, [`CallErrorKind::Stage`] for a stage that is no
+    /// WGSL, [`CallErrorKind::Failed`] for stages that do not fit this pass or each other,
+    /// [`CallErrorKind::Ours`] for a request that is not one.
     pub fn render(&mut self, request: &Request, values: &mut [f32]) -> Result<(), CallError> {
         let Request::RenderRealtime { scene, width, height, adapter, stages, cameras, .. } =
             request
@@ -49,14 +65,19 @@ impl Neutral {
             let stage = stages.iter().find(|stage| stage.name == name);
             *text = &stage.ok_or_else(|| ours("the neutral pass needs all three stages"))?.text;
         }
+        let refused = &mut self.refused;
+        if let Some((_, why)) = refused.iter().find(|(text, _)| texts.contains(&text.as_str())) {
+            return Err(CallError { kind: CallErrorKind::Stage, message: why.clone() });
+        }
         // A device on which something failed is not used again: here it is dropped on errors.
         let mut open = self.open.take();
-        let mut draw = || -> basecode::Result<()> {
+        let mut draw = || -> Result<(), Failure> {
             let open = match &mut open {
                 Some(open) => open,
                 closed => closed.insert(Open::new(adapter)?),
             };
-            let scene = self.load(&scene.path)?;
+            open.compile(texts, refused)?;
+            let scene = load(&mut self.scene, &scene.path)?;
             let (width, height) = (*width as usize, *height as usize);
             let target = Target::new(&open.gpu, width, height)?;
             let pass = NeutralPass::new(open, scene, texts)?;
@@ -77,26 +98,27 @@ impl Neutral {
             Ok(())
         };
         let drawn = draw();
-        drawn.map(|()| self.open = open).map_err(|error| {
-            let kind = match error {
-                Error::NoAdapter(_) => CallErrorKind::NoAdapter,
-                Error::Gpu(_) => CallErrorKind::Failed,
-                _ => CallErrorKind::Ours,
+        drawn.map(|()| self.open = open).map_err(|failure| {
+            let (kind, message) = match failure {
+                Failure::Stage(why) => (CallErrorKind::Stage, why),
+                Failure::Other(error @ Error::NoAdapter(_)) => {
+                    (CallErrorKind::NoAdapter, error.to_string())
+                }
+                Failure::Other(error @ Error::Gpu(_)) => (CallErrorKind::Failed, error.to_string()),
+                Failure::Other(error) => (CallErrorKind::Ours, error.to_string()),
             };
-            CallError { kind, message: error.to_string() }
+            CallError { kind, message }
         })
     }
+}
 
-    /// The scene of a file, kept because requests about one scene come together.
-    fn load(&mut self, path: &Path) -> basecode::Result<&Scene> {
-        if self.scene.as_ref().is_none_or(|(loaded, _)| loaded != path) {
-            self.scene = Some((path.to_owned(), load_scene(path)?));
-        }
-        match &self.scene {
-            Some((_, scene)) => Ok(scene),
-            None => Err(Error::Argument("no scene is loaded".into())),
-        }
-    }
+/// The scene of a file, kept because requests about one scene come together.
+fn load<'s>(kept: &'s mut Option<(PathBuf, Scene)>, path: &Path) -> basecode::Result<&'s Scene> {
+    let scene = match kept.take() {
+        Some((loaded, scene)) if loaded == path => scene,
+        _ => load_scene(path)?,
+    };
+    Ok(&kept.insert((path.to_owned(), scene)).1)
 }
 
 impl Open {
@@ -107,6 +129,27 @@ impl Open {
             AdapterKind::Hardware => gpu::AdapterKind::Hardware,
         };
         Ok(Self { gpu: Gpu::open(kind, &adapter.name)?, pipelines: Vec::new() })
+    }
+
+    /// Compiles each stage by itself, so that what is no WGSL is told from what only does not fit.
+    fn compile(
+        &self,
+        texts: [&str; 3],
+        refused: &mut Vec<(String, String)>,
+    ) -> Result<(), Failure> {
+        for (name, text) in STAGES.into_iter().zip(texts) {
+            if self.pipelines.iter().any(|(known, _)| known.iter().any(|known| known == text)) {
+                continue;
+            }
+            match self.gpu.check_stage(Stage { name, text }) {
+                Err(Error::Gpu(why)) => {
+                    refused.push((text.to_owned(), why.clone()));
+                    return Err(Failure::Stage(why));
+                }
+                checked => checked?,
+            }
+        }
+        Ok(())
     }
 
     fn pipeline(

@@ -26,6 +26,9 @@ pub enum Outcome {
     NotImplemented(String),
     /// The renderer reported an error.
     Failed(String),
+    /// A stage that Umbra's own pass was given does not compile: file, line and column, what is wrong
+    /// there, and the source line on lines of their own.
+    StageRefused(String),
     /// The renderer panicked and said so.
     Panicked(String),
     /// The plugin cannot be used: not loadable, wrong magic, version or size, a write outside
@@ -59,6 +62,7 @@ impl fmt::Display for Outcome {
             Self::Done(_) => f.write_str("answered"),
             Self::NotImplemented(task) => write!(f, "not implemented yet: {task}"),
             Self::Failed(message) => write!(f, "the renderer reports an error: {message}"),
+            Self::StageRefused(message) => f.write_str(message),
             Self::Panicked(message) => write!(f, "the renderer panicked: {message}"),
             Self::Rejected(message) => write!(f, "the plugin was rejected: {message}"),
             Self::CrashedBySignal(signal) => write!(f, "the renderer crashed: {signal}"),

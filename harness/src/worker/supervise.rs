@@ -15,7 +15,7 @@ use super::command::{Program, command, program_beside, software_driver};
 use super::job::{Job, Request};
 use super::outcome::{Answer, JobReport, Late, Matter, Outcome, WitnessUse, WorkerRun};
 use super::patience::{Allowed, CANNOT_RUN, Patience};
-use super::table::{Noted, RECORD, STATUS_OURS, STATUS_REJECTED};
+use super::table::{Noted, RECORD, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE};
 use super::wire::{Folder, Place, WireJob, WireRequest, take_input};
 use crate::plugin::Witness;
 use crate::process::{self, Ended, Exit, Limits, Lock, signal_name};
@@ -384,6 +384,7 @@ impl Files {
             )),
             api::STATUS_NO_ADAPTER => Outcome::NoAdapter(message),
             STATUS_REJECTED => Outcome::Rejected(message),
+            STATUS_STAGE => Outcome::StageRefused(message),
             STATUS_OURS => Outcome::NotRun { reason: message, matter: Matter::Ours },
             unknown => Outcome::Failed(format!("unknown status {unknown}: {message}")),
         })

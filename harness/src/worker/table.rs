@@ -14,6 +14,8 @@ const MESSAGE_AT: usize = RECORD - MESSAGE_BYTES;
 pub const STATUS_REJECTED: i32 = -1;
 /// Besides `renderer_api`'s statuses: Umbra itself is at fault.
 pub const STATUS_OURS: i32 = -2;
+/// Besides `renderer_api`'s statuses: a stage that Umbra's own pass was given is no WGSL.
+pub const STATUS_STAGE: i32 = -3;
 
 const STARTED: u32 = 1;
 const ANSWERED: u32 = 2;

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Layouts;
+use super::message::readable;
 use crate::{Error, Result};
 
 /// Which kind of adapter to draw with.
@@ -149,9 +150,12 @@ impl Gpu {
         self.stages = stages;
     }
 
-    /// The text of a stage: the host's replacement, or else the renderer's `own`.
+    /// The text of a stage: the host's replacement, or else the renderer's `own`; without the
+    /// byte-order mark that some editors put first and WGSL does not know.
     pub fn stage<'a>(&'a self, name: &str, own: &'a str) -> &'a str {
-        self.stages.iter().find(|(stage, _)| stage == name).map_or(own, |(_, text)| text)
+        let replaced = self.stages.iter().find(|(stage, _)| stage == name);
+        let text = replaced.map_or(own, |(_, text)| text);
+        text.strip_prefix('\u{feff}').unwrap_or(text)
     }
 
     /// Begins to record commands.
@@ -198,7 +202,7 @@ impl Gpu {
                 "the graphics device {:?} is out of memory",
                 self.adapter.name
             ))),
-            Some(error) => Err(Error::Gpu(error.to_string().trim_end().to_owned())),
+            Some(error) => Err(Error::Gpu(readable(&error.to_string()))),
         }
     }
 

@@ -23,6 +23,7 @@ mod context;
 mod contract;
 mod matrices;
 mod mesh;
+mod message;
 mod pipeline;
 mod shadow;
 mod target;

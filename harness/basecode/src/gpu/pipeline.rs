@@ -103,9 +103,21 @@ impl Gpu {
         self.make_pipeline(vertex.name, &self.layouts.depth, vertex, None)
     }
 
+    /// Compiles a stage by itself.
+    ///
+    /// # Errors
+    /// [`crate::Error::Gpu`] where it is no WGSL: file, line and column, what is wrong there, and the
+    /// source line on lines of their own.
+    pub fn check_stage(&self, stage: Stage) -> crate::Result<()> {
+        self.checked(&mut || {
+            drop(self.module(stage));
+            Ok(())
+        })
+    }
+
     fn module(&self, stage: Stage) -> wgpu::ShaderModule {
         self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(&format!("{}.wgsl", stage.name)),
+            label: Some(&format!("src/shaders/{}.wgsl", stage.name)),
             source: wgpu::ShaderSource::Wgsl(self.stage(stage.name, stage.text).into()),
         })
     }

@@ -10,6 +10,7 @@ mod text;
 mod texture;
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use glam::{Vec2, Vec3};
 
@@ -30,7 +31,8 @@ pub struct Scene {
     /// Position and intensity.
     light: Option<(Vec3, Vec3)>,
     remarks: Vec<String>,
-    bvh: Bvh,
+    /// Built for the first ray: a realtime frame has none.
+    bvh: OnceLock<Bvh>,
     /// The largest coordinate of any vertex.
     extent: f32,
     /// Shape and triangle of each triangle in the hierarchy.
@@ -54,14 +56,8 @@ impl Scene {
         let extent = shapes.iter().flat_map(|shape| &shape.positions);
         let extent = extent.fold(Vec3::ZERO, |extent, p| extent.max(p.abs())).max_element();
         let mut triangles = Vec::new();
-        let mut vertices = Vec::new();
-        let mut blocks = Vec::new();
         for (index, shape) in shapes.iter().enumerate() {
-            for primitive in 0..shape.triangles.len() {
-                triangles.push((index as u32, primitive as u32));
-                vertices.push(shape.corners(primitive));
-                blocks.push(!materials[shape.material].is_emitter());
-            }
+            triangles.extend((0..shape.triangles.len()).map(|i| (index as u32, i as u32)));
         }
         let bsdfs = materials.iter().map(|material| match material.model {
             MaterialModel::Mirror => Box::new(Black),
@@ -70,7 +66,7 @@ impl Scene {
         Ok(Self {
             light,
             remarks,
-            bvh: Bvh::new(&vertices, &blocks),
+            bvh: OnceLock::new(),
             extent,
             bsdfs: bsdfs.collect(),
             config,
@@ -153,15 +149,33 @@ impl Scene {
     /// The closest surface along a ray, with `wo` set to where the ray came from.
     ///
     /// The emitter is a surface like any other here.
+    ///
+    /// # Panics
+    /// While a render pass lives: a realtime frame has no rays, its pixels come from the shaders.
     pub fn intersect(&self, ray: &Ray) -> Option<SurfaceInteraction> {
-        let hit = self.bvh.closest_hit(&ray.begun_off_surface(self.extent))?;
+        let hit = self.bvh().closest_hit(&ray.begun_off_surface(self.extent))?;
         Some(self.interaction(ray, &hit))
     }
 
     /// Whether anything lies on a ray between its `min_t` and `max_t`: a shadow query. It stops
     /// at the first hit, whichever that is. Emitters never block.
+    ///
+    /// # Panics
+    /// As [`Scene::intersect`].
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.bvh.any_hit(&ray.begun_off_surface(self.extent))
+        self.bvh().any_hit(&ray.begun_off_surface(self.extent))
+    }
+
+    fn bvh(&self) -> &Bvh {
+        self.bvh.get_or_init(|| {
+            let place = |&(shape, primitive): &(u32, u32)| (shape as usize, primitive as usize);
+            let corners =
+                |(shape, primitive): (usize, usize)| self.shapes[shape].corners(primitive);
+            let blocks = |(shape, _): (usize, usize)| !self.material_of(shape).is_emitter();
+            let vertices: Vec<_> = self.triangles.iter().map(place).map(corners).collect();
+            let blocks: Vec<_> = self.triangles.iter().map(place).map(blocks).collect();
+            Bvh::new(&vertices, &blocks)
+        })
     }
 
     /// Puts `witness` in the place of every BSDF until it is taken away with `None`.

@@ -5,7 +5,7 @@ use super::super::number::{
     self, count, hints, is_failure, is_range, looks_like, of_part, plain, points, seconds, total,
 };
 use super::super::{Entry, Sheet};
-use super::page::{Look, Page, Style, columns, left, wrap};
+use super::page::{Look, Page, Style, columns, left};
 use crate::evidence::{Check, Measure, Verdict};
 use crate::intake::{Finding, Severity};
 use crate::rubric::{BUILD, PartGrade};
@@ -256,10 +256,9 @@ fn diagnostics(page: &mut Page, diagnostics: &str) {
         return;
     }
     heading(page, "compiler");
+    // Never wrapped: a caret stands below what it points at.
     for line in lines {
-        for line in wrap(&line, page.width.saturating_sub(2)) {
-            page.line(&[(Style::Plain, "  "), (Style::Plain, &line)]);
-        }
+        page.verbatim(&line);
     }
 }
 
@@ -320,6 +319,18 @@ mod tests {
     }
 
     #[test]
+    fn what_a_compiler_says_is_never_wrapped() {
+        let mut sheet = sample::sheet();
+        let line = format!("69 │ {}", "let shadow = visibility(world_position, n);".repeat(3));
+        let caret = format!("   │ {}^ expected `;`", " ".repeat(100));
+        sheet.entries[2].record.diagnostics = format!("{line}\n{caret}");
+        for width in [20, 80] {
+            let text = detail(&sheet, &sheet.entries[2], width, false);
+            assert!(text.contains(&format!("\n  {line}\n  {caret}\n")), "{text}");
+        }
+    }
+
+    #[test]
     fn hostile_words_keep_their_place() {
         let mut sheet = sample::sheet();
         let evil = "\u{1b}[2J\u{202e}\0\r\nchecks\r\n";
@@ -335,11 +346,14 @@ mod tests {
         for part in &mut entry.grade.parts {
             part.reason = evil.repeat(9);
         }
+        let said = harmless_lines(&entry.record.diagnostics, DIAGNOSTIC_LINES);
         for width in [1, 7, 20, 33, 80, 200] {
             let look = Look { width, colours: false };
             let text = detail(&sheet, &sheet.entries[1], look, true);
             assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
-            for line in text.lines() {
+            // What a compiler says is shown as it is.
+            let quoted = |line: &&str| said.iter().any(|said| *line == format!("  {said}"));
+            for line in text.lines().filter(|line| !quoted(line)) {
                 assert!(line.width() <= width.max(2), "{width}: {line:?}");
             }
         }

@@ -51,7 +51,7 @@ pub struct Look {
 
 /// Text in the making.
 pub(super) struct Page {
-    /// No line is wider, in terminal columns.
+    /// No line is wider, in terminal columns, but what is quoted.
     pub(super) width: usize,
     colours: bool,
     out: String,
@@ -110,6 +110,13 @@ impl Page {
         for line in lines {
             self.line(&[(Style::Plain, &spaces), (style, &line)]);
         }
+    }
+
+    /// A line of somebody else's, indented, as it is: neither wrapped nor cut off.
+    pub(super) fn verbatim(&mut self, text: &str) {
+        self.out.push_str("  ");
+        self.out.push_str(harmless(text).trim_end());
+        self.gap();
     }
 
     fn styled(&mut self, style: Style, text: &str) {

@@ -14,6 +14,7 @@ fn rules() -> Rules {
         any_scene: path.is_empty(),
         path: path.into(),
         evidence: vec![evidence.into()],
+        files: Vec::new(),
         fallback: fallback.iter().map(|&f| f.into()).collect(),
         images_only: vec![format!("images.{id}"), "noise".into()],
     };

@@ -1,0 +1,334 @@
+//! A source that does not build: the files with errors are replaced by the template's, so that all
+//! else is graded as code.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use crate::build::{BuildOutcome, BuildReport, Diagnostic};
+use crate::evidence::{Check, Verdict};
+use crate::files::files_below;
+use crate::intake::Finding;
+use crate::rubric::Rules;
+
+/// So many times files are replaced: the first time those that are wrong, then those that needed
+/// what was theirs.
+const ROUNDS: usize = 3;
+
+/// The check that says which files were replaced; it costs nothing by itself.
+const REPLACED: &str = "hand_in.replaced";
+
+/// A source as it was built.
+pub struct Built {
+    /// The last compiler call.
+    pub report: BuildReport,
+    /// What the compiler refused in the source as it was submitted.
+    pub errors: Vec<Diagnostic>,
+    /// The source that `report` is about: the submitted one, or the mended copy.
+    pub src: PathBuf,
+    /// The files of the template in it, by their path below `src`, and why each is there.
+    pub replaced: BTreeMap<String, String>,
+    /// CPU seconds of all compiler calls.
+    pub cpu_s: f64,
+}
+
+/// Builds the source in `src` with `compile`. Where that fails, once more with a copy in `copy` (a
+/// folder that is not there yet), in which files of `template` take the place of broken ones. When
+/// that fails too, the answer is that for the source as it was.
+///
+/// # Errors
+/// Those of `compile`, and when the copy cannot be made.
+pub fn build(
+    compile: &dyn Fn(&Path) -> io::Result<BuildReport>,
+    src: &Path,
+    template: &Path,
+    copy: &Path,
+) -> io::Result<Built> {
+    let first = compile(src)?;
+    let mut cpu_s = first.cpu_s;
+    let as_it_is = |report, errors, cpu_s| Built {
+        report,
+        errors,
+        src: src.to_owned(),
+        replaced: BTreeMap::new(),
+        cpu_s,
+    };
+    let BuildOutcome::CompileError { errors } = &first.outcome else {
+        return Ok(as_it_is(first, Vec::new(), cpu_s));
+    };
+    let submitted = errors.clone();
+    let mut errors = errors.clone();
+    copy_tree(src, copy)?;
+    let mut replaced = BTreeMap::new();
+    for _ in 0..ROUNDS {
+        let known = replaced.len();
+        for error in &errors {
+            for file in to_replace(error, template, copy) {
+                replaced.entry(file).or_insert_with(|| error.headline());
+            }
+        }
+        if replaced.len() == known {
+            break;
+        }
+        for file in replaced.keys() {
+            let to = copy.join(file);
+            if let Some(parent) = to.parent() {
+                fs::create_dir_all(parent)?;
+            }
+            fs::copy(template.join(file), to)?;
+        }
+        let report = compile(copy)?;
+        cpu_s += report.cpu_s;
+        errors = match report.outcome {
+            BuildOutcome::Built { .. } => {
+                let src = copy.to_owned();
+                return Ok(Built { report, errors: submitted, src, replaced, cpu_s });
+            }
+            BuildOutcome::CompileError { errors } => errors,
+            BuildOutcome::Cancelled => return Ok(as_it_is(report, submitted, cpu_s)),
+            _ => break,
+        };
+    }
+    Ok(as_it_is(first, submitted, cpu_s))
+}
+
+impl Built {
+    /// What the files that were replaced mean for what was found out: who is to be told, and why a
+    /// part is not implemented.
+    pub fn explain(&self, rules: &Rules, checks: &mut Vec<Check>, findings: &mut Vec<Finding>) {
+        for (file, why) in &self.replaced {
+            let of = |part: &&crate::rubric::Part| part.files.contains(file);
+            let parts: Vec<_> = rules.parts.iter().filter(of).collect();
+            for part in &parts {
+                let own = |check: &&mut Check| {
+                    part.evidence.contains(&check.id) && check.verdict == Verdict::NotImplemented
+                };
+                checks.iter_mut().filter(own).for_each(|check| check.summary.clone_from(why));
+                let images = checks.iter().filter(|check| part.images_only.contains(&check.id));
+                let verdicts: Vec<Verdict> = images.map(|check| check.verdict).collect();
+                if verdicts.contains(&Verdict::Pass) && !verdicts.contains(&Verdict::Fail) {
+                    let message = format!(
+                        "its part {} earns nothing by code, but the submitted images of it are right: an \
+                         instructor decides",
+                        part.id
+                    );
+                    findings.push(Finding::warning("replaced_image_right", message).at(seen(file)));
+                }
+            }
+            let ids: Vec<&str> = parts.iter().map(|part| part.id.as_str()).collect();
+            let lost = match ids.as_slice() {
+                [] => "no part is lost by it".to_owned(),
+                ids => format!("nothing is earned by code for {}", ids.join(", ")),
+            };
+            let message =
+                format!("does not build, and is replaced by the template's: {lost} ({why})");
+            findings.push(Finding::error("replaced", message).at(seen(file)));
+        }
+        if !self.replaced.is_empty() {
+            let files: Vec<String> = self.replaced.keys().map(|file| seen(file)).collect();
+            let summary = format!("replaced by the template's: {}", files.join(", "));
+            checks.push(Check::new(REPLACED, "", Verdict::Fail, summary));
+        }
+    }
+}
+
+/// A path below `src` as the student knows it.
+fn seen(file: &str) -> String {
+    format!("src/{file}")
+}
+
+/// The files below `src` that an error is about, as far as the template has them too. What is wrong
+/// with a file of the student's own is the matter of those that use it.
+fn to_replace(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
+    let known =
+        |file: &String| template.join(file).is_file() && may_be_replaced(file, template, copy);
+    let missing: Vec<String> = missing_files(error).into_iter().filter(known).collect();
+    if !missing.is_empty() {
+        return missing;
+    }
+    let Some(file) = error.place.as_ref().and_then(|place| below_src(&place.file)) else {
+        return Vec::new();
+    };
+    if template.join(&file).is_file() {
+        return Some(file).filter(known).into_iter().collect();
+    }
+    let stem = Path::new(&file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let uses = |file: &String| {
+        let text = fs::read_to_string(copy.join(file)).unwrap_or_default();
+        text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == stem)
+    };
+    let files = files_below(template).unwrap_or_default();
+    let files = files.iter().filter_map(|path| below(path.strip_prefix(template).ok()?));
+    files.filter(known).filter(uses).collect()
+}
+
+/// `lib.rs` says which modules there are: the template's is of use only where they are the same.
+fn may_be_replaced(file: &str, template: &Path, copy: &Path) -> bool {
+    let modules = |folder: &Path| {
+        let text = fs::read_to_string(folder.join("lib.rs")).unwrap_or_default();
+        let lines = text.lines().filter_map(|line| {
+            let line = line.trim().trim_start_matches("pub ");
+            Some(line.strip_prefix("mod ")?.strip_suffix(';')?.trim().to_owned())
+        });
+        lines.collect::<std::collections::BTreeSet<String>>()
+    };
+    file != "lib.rs" || modules(template) == modules(copy)
+}
+
+/// The files that the compiler could not read: included ones, and those of modules.
+fn missing_files(error: &Diagnostic) -> Vec<String> {
+    let said = &error.message;
+    if said.starts_with("couldn't read") || said.contains("utf-8") || said.contains("UTF-8") {
+        return said.split('`').nth(1).and_then(below_src).into_iter().collect();
+    }
+    if !said.starts_with("file not found for module") {
+        return Vec::new();
+    }
+    let help = error.rendered.split("create file ").nth(1).unwrap_or_default();
+    help.lines().next().unwrap_or_default().split('"').filter_map(below_src).collect()
+}
+
+/// A path as the compiler names it, below `src`: `renderpasses/../shaders/a.wgsl` is `shaders/a.wgsl`.
+fn below_src(path: &str) -> Option<String> {
+    let path = path.trim_start_matches('/');
+    below(Path::new(path.strip_prefix("src/")?))
+}
+
+/// A relative path with slashes, without `..`; nothing when it leads out.
+fn below(path: &Path) -> Option<String> {
+    let mut parts: Vec<String> = Vec::new();
+    for component in path.components() {
+        match component {
+            Component::Normal(name) => parts.push(name.to_str()?.to_owned()),
+            Component::CurDir => {}
+            Component::ParentDir => {
+                parts.pop()?;
+            }
+            _ => return None,
+        }
+    }
+    (!parts.is_empty()).then(|| parts.join("/"))
+}
+
+/// Copies a folder of ours, without links: a submission's private copy has none.
+fn copy_tree(from: &Path, to: &Path) -> io::Result<()> {
+    fs::create_dir_all(to)?;
+    for file in files_below(from)? {
+        let Ok(rest) = file.strip_prefix(from) else { continue };
+        let to = to.join(rest);
+        if let Some(parent) = to.parent() {
+            fs::create_dir_all(parent)?;
+        }
+        fs::copy(&file, to)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::Place;
+
+    fn error(message: &str, file: &str, rendered: &str) -> Diagnostic {
+        let place = (!file.is_empty()).then(|| Place { file: file.into(), line: 7 });
+        Diagnostic { message: message.into(), place, rendered: rendered.into() }
+    }
+
+    fn write(folder: &Path, files: &[(&str, &str)]) {
+        for (file, text) in files {
+            let path = folder.join(file);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("scratch");
+            fs::write(path, text).expect("scratch");
+        }
+    }
+
+    /// A compiler for which a source is right when no file holds `!`.
+    fn compile(src: &Path) -> io::Result<BuildReport> {
+        let mut errors = Vec::new();
+        for file in files_below(src)? {
+            let name = seen(&below(file.strip_prefix(src).expect("below")).expect("a path"));
+            if fs::read_to_string(&file)?.contains('!') {
+                errors.push(error("unexpected `!`", &name, ""));
+            }
+        }
+        let library = src.join("lib.so");
+        let outcome = match errors.as_slice() {
+            [] => BuildOutcome::Built { library },
+            _ => BuildOutcome::CompileError { errors },
+        };
+        Ok(BuildReport { outcome, warnings: Vec::new(), wall_s: 0.0, cpu_s: 1.0 })
+    }
+
+    const TEMPLATE: [(&str, &str); 4] = [
+        ("lib.rs", "mod bsdfs;\nmod renderer;\n"),
+        ("bsdfs/mod.rs", "mod phong;"),
+        ("bsdfs/phong.rs", "todo"),
+        ("renderer.rs", "todo"),
+    ];
+
+    fn built(source: &[(&str, &str)]) -> (Built, Option<String>) {
+        let folder = tempfile::tempdir().expect("scratch");
+        let [src, template, copy] =
+            ["src", "template", "copy"].map(|name| folder.path().join(name));
+        write(&template, &TEMPLATE);
+        write(&src, &TEMPLATE);
+        write(&src, source);
+        let built = build(&compile, &src, &template, &copy).expect("scratch");
+        let phong = fs::read_to_string(built.src.join("bsdfs/phong.rs")).ok();
+        assert_eq!(fs::read_to_string(src.join("lib.rs")).ok(), {
+            let own = source.iter().find(|(file, _)| *file == "lib.rs");
+            Some(own.map_or(TEMPLATE[0].1, |(_, text)| text).to_owned())
+        });
+        (built, phong)
+    }
+
+    fn files(built: &Built) -> Vec<&str> {
+        built.replaced.keys().map(String::as_str).collect()
+    }
+
+    #[test]
+    fn files_with_errors_are_the_templates_and_nothing_else_is() {
+        let (right, phong) = built(&[("bsdfs/phong.rs", "mine")]);
+        assert_eq!((files(&right), phong.as_deref()), (vec![], Some("mine")));
+        let (broken, phong) = built(&[("bsdfs/phong.rs", "!"), ("renderer.rs", "mine")]);
+        assert_eq!((files(&broken), phong.as_deref()), (vec!["bsdfs/phong.rs"], Some("todo")));
+        assert_eq!(broken.replaced["bsdfs/phong.rs"], "src/bsdfs/phong.rs:7: unexpected `!`");
+        assert_eq!((broken.errors.len(), broken.cpu_s), (1, 2.0));
+        // `lib.rs` where its modules are the template's, and only there.
+        assert_eq!(files(&built(&[("lib.rs", "pub mod bsdfs;\nmod renderer; !")]).0), [""; 0]);
+        assert_eq!(files(&built(&[("lib.rs", "mod bsdfs;\nmod renderer;\n!")]).0), ["lib.rs"]);
+        // A file of one's own that stays broken whatever is replaced.
+        let own = [("bsdfs/lobe.rs", "!"), ("bsdfs/mod.rs", "mod phong;\nmod lobe;")];
+        let (given_up, phong) = built(&own);
+        assert!(matches!(given_up.report.outcome, BuildOutcome::CompileError { .. }));
+        assert_eq!((files(&given_up), phong.as_deref()), (vec![], Some("todo")));
+        assert!(given_up.src.ends_with("src"), "the source as it was");
+    }
+
+    #[test]
+    fn files_that_are_missing_are_named_by_the_compiler() {
+        let folder = tempfile::tempdir().expect("scratch");
+        let template = folder.path();
+        write(template, &TEMPLATE);
+        write(template, &[("shaders/a.wgsl", "")]);
+        let of = |error: Diagnostic| to_replace(&error, template, template);
+        let include =
+            "couldn't read `src/renderpasses/../shaders/a.wgsl`: No such file or directory";
+        assert_eq!(of(error(include, "src/renderer.rs", "")), ["shaders/a.wgsl"]);
+        let include = include.replace("`src/", "`/src/");
+        assert_eq!(of(error(&include, "src/renderer.rs", "")), ["shaders/a.wgsl"]);
+        let module = "file not found for module `phong`";
+        let help = "help: to create the module `phong`, create file \"src/bsdfs/phong.rs\" or \
+                    \"src/bsdfs/phong/mod.rs\"\n";
+        assert_eq!(of(error(module, "src/bsdfs/mod.rs", help)), ["bsdfs/phong.rs"]);
+        // Somebody else's files are nobody's to replace, wherever a path leads.
+        for file in ["", "src/../../etc/passwd", "/rustc/library/core.rs", "src/mine.rs"] {
+            assert_eq!(of(error("wrong", file, "")), [""; 0]);
+        }
+        // One that the template lacks is the matter of those that name it.
+        assert_eq!(of(error("wrong", "src/bsdfs/phong/lobe.rs", "")), [""; 0]);
+        write(template, &[("bsdfs/phong.rs", "use lobe::peak;")]);
+        assert_eq!(of(error("wrong", "src/bsdfs/lobe.rs", "")), ["bsdfs/phong.rs"]);
+    }
+}
