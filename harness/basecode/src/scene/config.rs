@@ -117,7 +117,9 @@ impl SceneConfig {
         let wrong = |line, message: String| Error::File { path: path.to_owned(), line, message };
         let file: File = toml::from_str(text).map_err(|error| {
             let line = error.span().map(|span| line_at(text, span.start));
-            wrong(line, error.message().to_owned())
+            // The parser names Rust's types.
+            let message = error.message().replace("expected i64", "expected a whole number");
+            wrong(line, message.replace("expected f32", "expected a number"))
         })?;
         let in_range = |section: &str, key: &str, value: i64, max: i64| {
             usize::try_from(value).ok().filter(|_| (1..=max).contains(&value)).ok_or_else(|| {
@@ -225,7 +227,11 @@ mod tests {
             (&format!("{base}[film]\nheight = 99999\n"), "b.toml:4: film.height is 99999"),
             (&format!("{base}[renderer]\nspp = -1\n"), "b.toml:4: renderer.spp is -1"),
             (&format!("{base}[camera]\neye = [0, nan, 0]\n"), "b.toml:4: camera.eye"),
-            (&format!("{base}[camera]\nfov = \"wide\"\n"), "b.toml:4"),
+            (
+                &format!("{base}[camera]\nfov = \"wide\"\n"),
+                "b.toml:4: invalid type: string \"wide\", expected a number",
+            ),
+            (&format!("{base}[film]\nwidth = \"7\"\n"), "expected a whole number"),
             (&format!("{base}[camera]\nfov = 180\n"), "b.toml:4: camera.fov is 180"),
             (&format!("{base}[camera]\nfov = nan\n"), "b.toml:4: camera.fov is NaN"),
             ("[input]\nobjfile = \"\"\n", "b.toml:2: input.objfile names no file"),

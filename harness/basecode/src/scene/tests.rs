@@ -388,3 +388,35 @@ fn a_scene_without_a_light_loads_and_only_asking_for_it_fails() {
     let said = *said.unwrap_err().downcast::<String>().unwrap();
     assert!(said.starts_with("the scene has no light: no shape of "), "{said}");
 }
+
+/// How a student writes a shadow ray, and how the reference does.
+#[test]
+fn no_surface_shadows_itself_in_a_large_scene() {
+    for scale in [1.0, 3e3, 1e4, 1e6] {
+        let corner = |x: f32, z: f32| format!("v {} 0 {}\n", x * scale, z * scale);
+        let obj = format!(
+            "mtllib s.mtl\n{}{}{}{}usemtl grey\nf 1 2 3 4\n",
+            corner(-2.0, 2.0),
+            corner(2.0, 2.0),
+            corner(2.0, -2.0),
+            corner(-2.0, -2.0)
+        );
+        let scene = Folder::new("large", &obj, MTL).load().unwrap();
+        let (eye, light) = (scale * vec3(0.0, 3.0, 4.0), scale * vec3(0.3, 2.0, 0.0));
+        for index in 0..10_000u16 {
+            let (x, z) = (f32::from(index % 100) - 50.0, f32::from(index / 100) - 50.0);
+            let target = scale * 0.0391 * vec3(x, 0.0, z);
+            let i =
+                scene.intersect(&Ray::segment(eye, (target - eye).normalize(), 0.0, f32::INFINITY));
+            let i = i.unwrap_or_else(|| panic!("{target} is missed"));
+            let (distance, direction) = ((light - i.p).length(), (light - i.p).normalize());
+            for epsilon in [Ray::EPSILON, i.epsilon] {
+                let ray = Ray::segment(i.p, direction, epsilon, distance - epsilon);
+                assert!(!scene.occluded(&ray), "{} shadows itself", i.p);
+            }
+            // Another value is the student's own choice.
+            let own = Ray::segment(i.p, direction, 2e-3, distance);
+            assert_eq!(own.begun_off_surface(scene.extent), own);
+        }
+    }
+}
