@@ -142,7 +142,8 @@ fn a_decoder_that_dies_refuses_its_file_and_no_other() {
         if limits.wall_s > 0.0 {
             assert!(decoder.image(&small, "small.exr").unwrap().is_ok());
         }
-        if limits.memory_mib > 48 {
+        // An archive is unpacked before the clock says anything: it counts only while a child stands still.
+        if limits.memory_mib > 48 && limits.wall_s > 0.0 {
             let place = Scratch::new();
             let tree = TreeSpec::default();
             let before = place.outside();

@@ -248,6 +248,7 @@ mod tests {
         let expected = [
             ".DS_Store",
             "Bob_2_assignsubmission_onlinetext/onlinetext.html",
+            "Dan_4/config.json",
             "Eve_5/ (nothing in it)",
             "__MACOSX",
             "index.html",

@@ -179,6 +179,7 @@ mod tests {
             out_of: 20.0,
             bonus: false,
             points,
+            unconfirmed: 0.0,
             points_max: points,
             reason: String::new(),
             evidence: Vec::new(),
@@ -191,6 +192,7 @@ mod tests {
             grade: Grade {
                 parts: vec![part],
                 points,
+                unconfirmed: 0.0,
                 points_max: points,
                 out_of: 20.0,
                 remarks: Vec::new(),

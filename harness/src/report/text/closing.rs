@@ -158,7 +158,7 @@ mod tests {
         assert!(!lines[4].contains("witness"), "{lines:?}");
         // What does not build comes first, whatever the parts are worth.
         let lines = closed(&sheet, 2, "", &[]);
-        assert!(lines[3].starts_with("next: the source does not build: "), "{lines:?}");
+        assert!(lines[3].starts_with("next: the source does not build; "), "{lines:?}");
         // All is right: a file is missing, then nothing is.
         let ready = closed(&sheet, 0, "", &[]);
         let pack = "next: `./umbra pack student_template` makes the archive to hand in";

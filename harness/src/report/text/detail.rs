@@ -325,7 +325,7 @@ mod tests {
         let caret = format!("   │ {}^ expected `;`", " ".repeat(100));
         sheet.entries[2].record.diagnostics = format!("{line}\n{caret}");
         for width in [20, 80] {
-            let text = detail(&sheet, &sheet.entries[2], width, false);
+            let text = detail(&sheet, &sheet.entries[2], Look { width, colours: false }, true);
             assert!(text.contains(&format!("\n  {line}\n  {caret}\n")), "{text}");
         }
     }

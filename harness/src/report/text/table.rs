@@ -193,11 +193,11 @@ mod tests {
             "\
 Assignment 2: Point Lights & Shadows, due 2019-10-06 23:59 -04:00
 
-hand-in             student        1.1  1.2   1.3  1.4   2.4    2.5            total  remarks
-                          out of     5   10    20   15    25    +20
-a2_ada.zip          Ada Lovelace     5   10    20   15    25     20            95/75
-two_cosines.tar.gz  Jörg Müller      5   10  9.85   15    25  0..20  64.85..84.85/75
-山田_花子.zip       花子 山田        0    0     0    0     0      0             0/75  1
+hand-in             student       1.1  1.2   1.3  1.4  2.4    2.5            total  remarks
+                          out of    5   10    20   15   25    +20
+a2_ada.zip          Ada Lovelace    5   10    20   15   25     20            95/75
+two_cosines.tar.gz  Jörg Müller     5   10  9.85   15   25  0..20  64.85..84.85/75
+山田_花子.zip       花子 山田       0    0     0    0    0      0             0/75  1
 
 remarks
   1  the source does not build; the images alone earn 11.44 points once the instructor confirms
@@ -210,7 +210,7 @@ remarks
     #[test]
     fn a_narrow_terminal_shortens_names_and_then_leaves_the_parts_out() {
         for (width, row) in [
-            (82, "two_cosin…  Jörg Mül…     5   10  9.85   15    25  0..20  64.85..84.85/75"),
+            (82, "two_cosine…  Jörg Müll…    5   10  9.85   15   25  0..20  64.85..84.85/75"),
             (50, "two_cosine…  Jörg Müller  64.85..84.85/75"),
         ] {
             let text = table(&sample::sheet(), width, false).unwrap();
