@@ -8,7 +8,7 @@ use umbra::assignment::Assignment;
 use umbra::evidence::{Evidence, Verdict};
 use umbra::expected::Store;
 use umbra::grading::{Conditions, Grading, Record, RenderPath, Stages, Student};
-use umbra::report::{self, Entry, Sheet};
+use umbra::report::{self, Entry, Look, Sheet};
 use umbra::rubric::{self, PartGrade};
 use umbra::worker::{Adapter, AdapterKind};
 
@@ -130,9 +130,11 @@ fn check_reports(sheet: &Sheet) -> anyhow::Result<()> {
     let slug = &sheet.entries[0].record.slug;
     let pages = [read(report::HTML_FILE)?, read(&format!("{slug}/{}", report::HTML_FILE))?];
     let csv = read(report::CSV_FILE)?;
+    let look = Look { width: 120, colours: false };
     let texts = [
         report::text_table(sheet, 120, false)?,
-        report::text_detail(sheet, &sheet.entries[0], 120, false),
+        report::text_detail(sheet, &sheet.entries[0], look, true),
+        report::text_detail(sheet, &sheet.entries[0], look, false),
         read(report::JSON_FILE)?,
         csv.clone(),
         pages.concat(),
