@@ -49,8 +49,8 @@ pub struct Arguments {
     /// Scenes on their own films; without it the large ones are drawn at 128x96
     #[arg(long)]
     full: bool,
-    /// What CI runs: of right renderers one for each number of samples and each other way to be
-    /// right, a third of the mistakes, 60 pairs and 20 triples of these; and of each the path,
+    /// What CI runs: of right renderers one for each number of samples and half of the other ways to
+    /// be right, a sixth of the mistakes, 60 pairs and 20 triples of these; and of each the path,
     /// offline or realtime, that it can show on
     #[arg(long, conflicts_with = "full")]
     quick: bool,

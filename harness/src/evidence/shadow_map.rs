@@ -22,15 +22,16 @@ const VISIBILITY: &str = "lit pixels that are not lit (fraction)";
 /// An image that is wrong and so dark that it tells nothing of its shadows leaves the verdict to
 /// another scene that does, if there is one.
 pub fn set_apart(checks: &mut [Check]) {
+    let shown = |check: &Check| matches!(check.id.as_str(), "bonus.image" | "bonus.probe");
     let tells = |check: &Check| {
         let visibility = check.measures.iter().any(|measure| measure.name == VISIBILITY);
-        check.id == "bonus.image" && (check.verdict == Verdict::Pass || visibility)
+        shown(check) && (check.verdict == Verdict::Pass || visibility)
     };
     if !checks.iter().any(tells) {
         return;
     }
     for check in checks.iter_mut() {
-        if check.id == "bonus.image" && check.verdict == Verdict::Fail && !tells(check) {
+        if shown(check) && check.verdict == Verdict::Fail && !tells(check) {
             check.verdict = Verdict::NotJudged;
             check.summary = format!(
                 "too dark to tell where shadows fall; another scene does ({})",
@@ -226,7 +227,9 @@ mod tests {
             set_apart(&mut checks);
             checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
         };
-        assert_eq!(verdicts(&[wrong, dark.clone()]), [Verdict::Fail, Verdict::NotJudged]);
+        assert_eq!(verdicts(&[wrong.clone(), dark.clone()]), [Verdict::Fail, Verdict::NotJudged]);
+        let probe = Check { id: "bonus.probe".to_owned(), ..dark.clone() };
+        assert_eq!(verdicts(&[wrong, probe]), [Verdict::Fail, Verdict::NotJudged]);
         assert_eq!(verdicts(&[dark.clone(), dark]), [Verdict::Fail, Verdict::Fail]);
     }
 
