@@ -49,8 +49,8 @@ pub struct Arguments {
     /// Scenes on their own films; without it the large ones are drawn at 128x96
     #[arg(long)]
     full: bool,
-    /// What CI runs: of right renderers one for each number of samples and each other way to be
-    /// right, a third of the mistakes, 60 pairs and 20 triples of these; and of each the path,
+    /// What CI runs: of right renderers one for each number of samples and half of the other ways to
+    /// be right, a sixth of the mistakes, 60 pairs and 20 triples of these; and of each the path,
     /// offline or realtime, that it can show on
     #[arg(long, conflicts_with = "full")]
     quick: bool,
@@ -134,7 +134,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         let singles = bench.grade_all(&singles(&catalogue), jobs)?;
         std::fs::write(file, price::table(&catalogue, &singles))
             .with_context(|| file.display().to_string())?;
-        return summary(&[figures::singles(&singles)]);
+        return summary(&[figures::singles(&singles), figures::prices(&singles)]);
     }
     let mut right = Vec::new();
     for (index, spp) in choice::SPP.into_iter().enumerate() {

@@ -228,7 +228,9 @@ mod tests {
             set_apart(&mut checks);
             checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
         };
-        assert_eq!(verdicts(&[wrong, dark.clone()]), [Verdict::Fail, Verdict::NotJudged]);
+        assert_eq!(verdicts(&[wrong.clone(), dark.clone()]), [Verdict::Fail, Verdict::NotJudged]);
+        let probe = Check { id: "bonus.probe".to_owned(), ..dark.clone() };
+        assert_eq!(verdicts(&[wrong, probe]), [Verdict::Fail, Verdict::NotJudged]);
         assert_eq!(verdicts(&[dark.clone(), dark]), [Verdict::Fail, Verdict::Fail]);
     }
 

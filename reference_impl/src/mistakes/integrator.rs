@@ -28,13 +28,15 @@ impl Integrator for Mistaken {
         } else {
             to_light.length()
         };
-        let direction = to_light / distance;
         self.turn(&mut i, ray, to_light);
         let cos_i = Frame::cos_theta(i.wi);
         let cos_o = Frame::cos_theta(i.wo);
         let mut visible = 1.0;
         if self.shadows && !has(M::NoShadows) {
-            visible = visibility(&self.mistakes, scene, ray, &mut i, (direction, distance));
+            // Whatever the BSDF is told, the shadow ray leads from the surface to the light.
+            let way = self.light_position(scene) - i.p;
+            let far = way.length();
+            visible = visibility(&self.mistakes, scene, ray, &mut i, (way / far, far));
         }
         if visible == 0.0 || has(M::IntegratorBlack) {
             return Vec3::ZERO;
@@ -52,7 +54,7 @@ impl Integrator for Mistaken {
         }
         if has(M::CosineInIntegrator) {
             // Where wi is as long as the way to the light, so is its cosine.
-            radiance *= direction.dot(i.frame_ns.n).max(0.0);
+            radiance *= (to_light / distance).dot(i.frame_ns.n).max(0.0);
         }
         if has(M::PiInIntegrator) {
             radiance *= INV_PI;

@@ -49,7 +49,6 @@ impl Row {
                 complaints.push(format!("{} is not judged ({})", part.id, part.reason));
             }
         }
-        complaints.extend(self.price());
         let fails = |check: &Check| check.verdict == Verdict::Fail;
         let declared = self.subject.findings.iter().filter(|_| self.all_shown);
         let unfound = declared.filter(|id| !self.evidence.named(id).any(fails));
@@ -57,8 +56,9 @@ impl Row {
         complaints.join("; ")
     }
 
-    /// What is wrong with what the first part lost, where the scenes show all of it.
-    fn price(&self) -> Option<String> {
+    /// What is wrong with what the first part lost, where the scenes show all of it: the range of the
+    /// mistake's class is another.
+    pub fn price(&self) -> Option<String> {
         let (class, part) = (self.subject.class?, self.subject.parts.first()?);
         let part = self.grade.parts.iter().find(|own| own.id == *part)?;
         // That it loses nothing is another complaint.
