@@ -21,7 +21,7 @@ use crate::{archives, plugins, points, sources};
 /// No case lives longer, whatever it does.
 const OUTER_LIMIT: Duration = Duration::from_secs(60);
 /// All plugins together, when they are graded.
-const OUTER_LIMIT_OF_POINTS: Duration = Duration::from_secs(240);
+const OUTER_LIMIT_OF_POINTS: Duration = Duration::from_secs(900);
 /// An ordinary user; neither root nor the user that root becomes.
 const USER: u32 = 65533;
 /// Carries the stage's folder and the layers to a case.
