@@ -72,18 +72,23 @@ impl Row {
     pub fn well_diagnosed(&self) -> bool {
         let names = &self.subject.mistakes;
         let right = self.subject.parts.is_empty() && self.subject.findings.is_empty();
+        // A finding, such as a seed that makes no difference, belongs to no part.
+        let of_parts = || self.diagnoses.iter().filter(|found| !found.part.is_empty());
         if right {
-            return self.diagnoses.is_empty();
+            return of_parts().count() == 0;
         }
+        // What is fitted is said in words of its own.
+        let fitted = of_parts().any(|found| found.mistakes.is_empty() && found.factor.is_none());
         let said = |found: &Diagnosis| {
             let named = |alike: &Vec<String>| alike.iter().any(|name| names.contains(name));
             found.factor.is_none() && found.mistakes.iter().all(named)
         };
-        let mentioned = |name: &String| {
+        let is_mentioned = |name: &String| {
             let found = self.diagnoses.iter().flat_map(|found| found.mistakes.iter().flatten());
             found.into_iter().any(|known| known == name)
         };
-        self.diagnoses.iter().all(said) && names.iter().all(mentioned)
+        let mentioned = fitted || names.iter().all(is_mentioned);
+        self.diagnoses.iter().all(said) && mentioned
     }
 
     /// What the diagnosis says, in one line.
