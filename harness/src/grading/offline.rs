@@ -188,14 +188,14 @@ fn see_rays(asker: &Asker, case: &Case, lit: &Outcome, (with, without): (&Outcom
     let size = (small.width as usize, small.height as usize);
     if let Outcome::Done(lit) = lit {
         let values = ask::colours(&lit.values).iter().copied();
-        let tile = Tile::of_pixels(size, small.batch.pixels.iter().copied().zip(values));
+        let tile = Tile::of_pixels(size, small.batch.met().copied().zip(values));
         asker.see(View::new(diagnosis::Kind::Lit, name), tile);
     }
     if let (Outcome::Done(with), Outcome::Done(without)) = (with, without) {
         let pairs = ask::colours(&with.values).iter().zip(ask::colours(&without.values));
         let sums = pairs.map(|(a, b)| (a.iter().sum::<f32>(), b.iter().sum::<f32>()));
         // What is black without shadows tells nothing.
-        let told = small.batch.pixels.iter().zip(sums).filter(|(_, (_, without))| *without != 0.0);
+        let told = small.batch.met().zip(sums).filter(|(_, (_, without))| *without != 0.0);
         let visibility = told.map(|(&pixel, (with, without))| (pixel, [with / without; 3]));
         asker.see(View::new(diagnosis::Kind::Shadow, name), Tile::of_pixels(size, visibility));
     }

@@ -80,6 +80,11 @@ impl RayBatch {
         Self { scene: name.to_owned(), rays, pixels, points, lit: count, intensity, light }
     }
 
+    /// The pixels of the lit and of the shadowed rays.
+    pub fn met(&self) -> impl Iterator<Item = &usize> {
+        self.pixels.iter().take(self.points.len())
+    }
+
     /// Unshadowed radiance along ray `index` when the BSDF (cosine included) is `bsdf`.
     fn unshadowed(&self, index: usize, bsdf: [f64; 3]) -> [f64; 3] {
         let r = f64::from(self.points[index].distance);
