@@ -105,7 +105,11 @@ fn believe_the_machine(
 fn record(name: &str, evidence: Evidence) -> Record {
     let hostile =
         evidence.checks.iter().map(|check| check.summary.as_str()).max_by_key(|s| s.len());
-    let said = hostile.unwrap_or_default().to_owned();
+    // A summary holds the first line of what a plugin says; a name may hold all that a page acts on.
+    let said = format!(
+        "{}<script>alert(1)</script><img src=x onerror=alert(1)>",
+        hostile.unwrap_or_default()
+    );
     Record {
         name: said.clone(),
         slug: name.to_owned(),
