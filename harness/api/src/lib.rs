@@ -334,7 +334,8 @@ pub struct Plugin {
             message: *mut Message,
         ) -> Status,
     >,
-    /// Draws one frame for a camera.
+    /// Draws one frame for a camera. With [`STATUS_OK`] the message may hold the number of bytes that were
+    /// uploaded to the device for it, in decimal digits.
     pub draw_frame: Option<
         unsafe extern "C" fn(
             pass: Pass,

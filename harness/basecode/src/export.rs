@@ -290,7 +290,7 @@ unsafe extern "C" fn draw_frame(
     camera: *const api::CameraValue,
     message: *mut api::Message,
 ) -> api::Status {
-    guard(message, || {
+    guard_noting(message, || {
         // SAFETY: a live pass of ours and a valid camera.
         let (open, camera) = unsafe { (&mut *pass.cast::<OpenPass>(), &*camera) };
         let config = CameraConfig {
@@ -301,8 +301,10 @@ unsafe extern "C" fn draw_frame(
         };
         let camera = Camera::new(config, open.target.width, open.target.height)?;
         let OpenPass { pass, target, gpu, realtime, .. } = open;
+        let _ = gpu.take_uploaded();
         gpu.checked(&mut || pass.draw(gpu, &camera, target))?;
-        realtime.without_rays()
+        realtime.without_rays()?;
+        Ok(gpu.take_uploaded().to_string())
     })
 }
 
@@ -452,6 +454,11 @@ static PANIC_PLACE: Mutex<Option<String>> = Mutex::new(None);
 
 /// Runs `body` and turns its error or panic into a status and a message.
 fn guard(message: *mut api::Message, body: impl FnOnce() -> Result<()>) -> api::Status {
+    guard_noting(message, || body().map(|()| String::new()))
+}
+
+/// The same for a call that has something to tell when it succeeds.
+fn guard_noting(message: *mut api::Message, body: impl FnOnce() -> Result<String>) -> api::Status {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         std::panic::set_hook(Box::new(|info| {
@@ -465,7 +472,8 @@ fn guard(message: *mut api::Message, body: impl FnOnce() -> Result<()>) -> api::
         }));
     });
     let (status, said) = match catch_unwind(AssertUnwindSafe(body)) {
-        Ok(Ok(())) => return api::STATUS_OK,
+        Ok(Ok(note)) if note.is_empty() => return api::STATUS_OK,
+        Ok(Ok(note)) => (api::STATUS_OK, note),
         // The status says it already: the message is the task alone, as for `todo!()`.
         Ok(Err(Error::NotImplemented(task))) => (api::STATUS_NOT_IMPLEMENTED, task),
         Ok(Err(error)) => (status_of(&error), error.to_string()),

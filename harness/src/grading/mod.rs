@@ -21,6 +21,7 @@ mod sampler;
 mod seen;
 mod shared;
 mod stages;
+mod uploads;
 
 pub use case::{Case, Small};
 pub use contain::INTERNAL_ERROR;

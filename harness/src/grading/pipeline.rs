@@ -15,7 +15,7 @@ use super::kept::Kept;
 use super::offline::{self, Drawn};
 use super::record::{Conditions, Record, StageCost, Student};
 use super::stages::Stages;
-use super::{draw, handed_in, isolate, mend, pictures, realtime, sampler};
+use super::{draw, handed_in, isolate, mend, pictures, realtime, sampler, uploads};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
@@ -455,10 +455,16 @@ impl<'a> Grading<'a> {
             let begin = checks.len();
             let judged = realtime::judge_images(asker, plugin, cases, tolerances);
             let fails = judged.iter().any(|judged| judged.fails);
+            let per_pixel: Vec<f64> = judged.iter().filter_map(|judged| judged.uploaded).collect();
+            let uploaded = uploads::judge(asker, plugin, cases, &per_pixel);
+            let nothing_draws = stages
+                .nothing_draws()
+                .or_else(|| uploaded.as_ref().and_then(|uploaded| uploaded.nothing_draws));
+            checks.extend(uploaded.map(|uploaded| uploaded.check));
             let mut wrong = Vec::new();
             for (case, judged) in cases.iter().zip(judged) {
                 let mut found = judged.checks;
-                if let Some(why) = stages.nothing_draws() {
+                if let Some(why) = nothing_draws {
                     found.iter_mut().for_each(|check| realtime::drawn_by_nobody(check, why));
                 }
                 let proof =

@@ -35,6 +35,8 @@ pub struct Judged {
     pub drawn: Vec<Drawn>,
     /// Whether the frame without shadows got no answer, by the submission's own fault.
     pub fails: bool,
+    /// Bytes uploaded for that frame, by pixel, where it was drawn and the plugin says so.
+    pub uploaded: Option<f64>,
 }
 
 /// Whether surfaces lie where they should, for what cannot be judged alone.
@@ -58,6 +60,9 @@ pub fn judge_images(
     };
     let plain = draw_plain(asker, plugin, cases, &is_right);
     let judged = cases.iter().zip(plain).map(|(case, plain)| {
+        let uploaded = plain.answer().and_then(|answer| answer.uploaded);
+        let (width, height) = case.film();
+        let uploaded = uploaded.map(|bytes| bytes as f64 / f64::from(width * height));
         let fails = plain.matter() == Some(Matter::Submission);
         let (mut checks, plain) = judge_plain(asker, case, &plain, tolerances);
         let mut drawn = Vec::from_iter(plain);
@@ -71,7 +76,7 @@ pub fn judge_images(
             checks.push(Check { id: id.to_owned(), ..check });
             drawn.extend(bonus);
         }
-        Judged { checks, drawn, fails }
+        Judged { checks, drawn, fails, uploaded }
     });
     judged.collect()
 }

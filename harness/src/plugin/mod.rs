@@ -141,14 +141,19 @@ fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
 
 /// Makes one call with a message buffer and turns its status into a result.
 fn call(call: impl FnOnce(*mut api::Message) -> api::Status) -> Result<(), CallError> {
+    call_noted(call).map(drop)
+}
+
+/// The same; answers what the plugin has to tell although all is well.
+fn call_noted(call: impl FnOnce(*mut api::Message) -> api::Status) -> Result<String, CallError> {
     let mut buffer = vec![0u8; MESSAGE_BYTES];
     let mut message = api::Message { data: buffer.as_mut_ptr(), capacity: buffer.len(), length: 0 };
     let status = call(&mut message);
-    if status == api::STATUS_OK {
-        return Ok(());
-    }
     let length = message.length.min(buffer.len());
     let mut message = String::from_utf8_lossy(&buffer[..length]).into_owned();
+    if status == api::STATUS_OK {
+        return Ok(message);
+    }
     let kind = match status {
         api::STATUS_ERROR => CallErrorKind::Failed,
         api::STATUS_NOT_IMPLEMENTED => CallErrorKind::NotImplemented,

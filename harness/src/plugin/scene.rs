@@ -4,7 +4,7 @@ use std::ptr::{null, null_mut};
 
 use renderer_api as api;
 
-use super::{CHECKED, CallError, WitnessState, call, handle};
+use super::{CHECKED, CallError, WitnessState, call, call_noted, handle};
 
 /// A scene that a plugin loaded; unloaded when dropped.
 pub struct LoadedScene<'p> {
@@ -206,7 +206,8 @@ pub struct OpenPass<'s> {
 }
 
 impl OpenPass<'_> {
-    /// Draws one frame and reads it back into `pixels`, three linear floats a pixel.
+    /// Draws one frame and reads it back into `pixels`, three linear floats a pixel; answers how many
+    /// bytes were uploaded for it, if the plugin says so.
     ///
     /// # Errors
     /// What the plugin answers.
@@ -217,15 +218,16 @@ impl OpenPass<'_> {
         &mut self,
         camera: &api::CameraValue,
         pixels: &mut [f32],
-    ) -> Result<(), CallError> {
+    ) -> Result<Option<u64>, CallError> {
         assert_eq!(pixels.len(), self.floats, "three floats a pixel");
         let draw = self.table.draw_frame.expect(CHECKED);
         let read = self.table.read_frame.expect(CHECKED);
         // SAFETY: a live pass and a valid camera.
-        call(|message| unsafe { draw(self.pass, camera, message) })?;
+        let note = call_noted(|message| unsafe { draw(self.pass, camera, message) })?;
         let (count, pixels) = (pixels.len(), pixels.as_mut_ptr());
         // SAFETY: a live pass; the buffer has the promised size and outlives the call.
-        call(|message| unsafe { read(self.pass, pixels, count, message) })
+        call(|message| unsafe { read(self.pass, pixels, count, message) })?;
+        Ok(note.parse().ok())
     }
 }
 

@@ -121,7 +121,9 @@ fn draw(
                     up: camera.up,
                     fov_y_deg: camera.fov_y_deg,
                 };
-                pass.frame(&camera, frame)?;
+                if let Some(bytes) = pass.frame(&camera, frame)? {
+                    record.uploaded(bytes);
+                }
             }
             Ok(())
         }

@@ -353,7 +353,8 @@ impl Files {
     }
 
     fn outcome(&mut self, index: usize, request: &Request, noted: &Noted) -> io::Result<Outcome> {
-        let Noted::Answered { status, message, seconds, calls, worst_norm_error } = noted else {
+        let Noted::Answered { status, message, seconds, calls, worst_norm_error, uploaded } = noted
+        else {
             return Err(io::Error::other("only an answer becomes an outcome"));
         };
         let message = message.clone();
@@ -374,7 +375,7 @@ impl Files {
                     calls: *calls,
                     worst_norm_error: worst_norm_error.is_finite().then_some(*worst_norm_error),
                 });
-                Outcome::Done(Answer { values, witness, seconds: *seconds })
+                Outcome::Done(Answer { values, witness, uploaded: *uploaded, seconds: *seconds })
             }
             api::STATUS_ERROR => Outcome::Failed(message),
             api::STATUS_NOT_IMPLEMENTED => Outcome::NotImplemented(message),

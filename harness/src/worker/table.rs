@@ -31,7 +31,8 @@ pub struct Record {
     length: AtomicU32,
     done: AtomicU32,
     total: AtomicU32,
-    _reserved: [AtomicU8; MESSAGE_AT - 40],
+    uploaded: AtomicU64,
+    _reserved: [AtomicU8; MESSAGE_AT - 48],
     message: [AtomicU8; MESSAGE_BYTES],
 }
 
@@ -53,6 +54,11 @@ impl Record {
     pub fn witness(&self, witness: &WitnessState) {
         self.calls.store(witness.calls(), Relaxed);
         self.worst_norm_error.store(witness.worst_norm_error().to_bits(), Relaxed);
+    }
+
+    /// Notes how many bytes were uploaded for a frame; one more than that, so that 0 is not said.
+    pub fn uploaded(&self, bytes: u64) {
+        self.uploaded.store(bytes.saturating_add(1), Relaxed);
     }
 
     /// Notes the answer, the state last. A message that is too long is cut.
@@ -90,6 +96,8 @@ pub enum Noted {
         calls: u64,
         /// Largest | |w| - 1 |.
         worst_norm_error: f32,
+        /// Bytes uploaded for the last frame, if it is said.
+        uploaded: Option<u64>,
     },
 }
 
@@ -116,6 +124,7 @@ impl Noted {
                     seconds: if seconds.is_finite() { seconds.max(0.0) } else { 0.0 },
                     calls: u64_at(16),
                     worst_norm_error: f32::from_bits(u32_at(24)),
+                    uploaded: u64_at(40).checked_sub(1),
                 }
             }
             _ => Self::NotStarted,
@@ -146,13 +155,16 @@ mod tests {
         record.progress(3, 9);
         assert_eq!(Noted::parse(&bytes(&record)), Noted::Started { rows: (3, 9) });
         record.answer(2, "task 1.2", 0.25);
-        let Noted::Answered { status, message, seconds, calls, worst_norm_error } =
+        let Noted::Answered { status, message, seconds, calls, worst_norm_error, uploaded } =
             Noted::parse(&bytes(&record))
         else {
             panic!("answered");
         };
         assert_eq!((status, message.as_str(), seconds), (2, "task 1.2", 0.25));
-        assert_eq!((calls, worst_norm_error), (0, 0.0));
+        assert_eq!((calls, worst_norm_error, uploaded), (0, 0.0, None));
+        record.uploaded(0);
+        let noted = Noted::parse(&bytes(&record));
+        assert!(matches!(noted, Noted::Answered { uploaded: Some(0), .. }));
     }
 
     #[test]

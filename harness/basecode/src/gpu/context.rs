@@ -3,8 +3,9 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::Layouts;
 use super::message::readable;
+use super::watched::Watch;
+use super::{Device, Layouts, Queue};
 use crate::{Error, Result};
 
 /// Which kind of adapter to draw with.
@@ -21,9 +22,9 @@ pub enum AdapterKind {
 /// An open graphics device.
 pub struct Gpu {
     /// Creates resources.
-    pub device: wgpu::Device,
+    pub device: Device,
     /// Takes commands.
-    pub queue: wgpu::Queue,
+    pub queue: Queue,
     /// What draws.
     pub adapter: wgpu::AdapterInfo,
     /// The bind group layouts of the shader contract.
@@ -32,7 +33,12 @@ pub struct Gpu {
     /// Bodies of [`Gpu::checked`] that were begun and did not end well.
     unfinished: AtomicUsize,
     trouble: Arc<Mutex<Trouble>>,
+    watch: Arc<Watch>,
 }
+
+/// The name of no stage: what the host replaces under it holds a fragment entry point `umbra_shown`,
+/// by which all fragments of all pipelines are drawn.
+pub const EVERY_FRAGMENT: &str = "every.fs";
 
 /// What the graphics library says outside of any call.
 #[derive(Default)]
@@ -114,7 +120,9 @@ impl Gpu {
         }));
         let layouts = Layouts::new(&device);
         let (stages, unfinished) = (Vec::new(), AtomicUsize::new(0));
-        Ok(Self { device, queue, adapter: info, layouts, stages, unfinished, trouble })
+        let watch = Arc::new(Watch::default());
+        let (device, queue) = (Device::new(device, &watch), Queue::new(queue, &watch));
+        Ok(Self { device, queue, adapter: info, layouts, stages, unfinished, trouble, watch })
     }
 
     /// As [`Gpu::open`], but takes a device of this process that was [kept](Gpu::keep).
@@ -138,7 +146,7 @@ impl Gpu {
         let untroubled =
             self.trouble.lock().is_ok_and(|it| it.lost.is_none() && it.uncaught.is_none());
         if polled && untroubled && *self.unfinished.get_mut() == 0 {
-            self.stages.clear();
+            self.replace_stages(Vec::new());
             if let Ok(mut kept) = KEPT.lock() {
                 *kept = Some(((kind, name.to_owned()), self));
             }
@@ -146,7 +154,10 @@ impl Gpu {
     }
 
     /// Replaces the text of shader stages, by stage name (`simple.vs`, `diffuse.fs`, `phong.fs`).
+    /// [`EVERY_FRAGMENT`] replaces the fragment stages of pipelines that are made from then on.
     pub fn replace_stages(&mut self, stages: Vec<(String, String)>) {
+        let every = stages.iter().find(|(name, _)| name == EVERY_FRAGMENT);
+        self.watch.show(every.map(|(_, text)| text.clone()));
         self.stages = stages;
     }
 
@@ -156,6 +167,11 @@ impl Gpu {
         let replaced = self.stages.iter().find(|(stage, _)| stage == name);
         let text = replaced.map_or(own, |(_, text)| text);
         text.strip_prefix('\u{feff}').unwrap_or(text)
+    }
+
+    /// Bytes that the CPU handed to the device since this was last asked.
+    pub fn take_uploaded(&self) -> u64 {
+        self.watch.take_uploaded()
     }
 
     /// Begins to record commands.
