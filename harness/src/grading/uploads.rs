@@ -50,8 +50,7 @@ pub fn judge(asker: &Asker, plugin: &Path, cases: &[Case], per_pixel: &[f64]) ->
     let outcome = draw(asker, Some(plugin), &frame);
     let image =
         outcome.answer().map(|answer| ask::image(&answer.values, frame.size.0, frame.size.1));
-    let foreign =
-        image.is_some_and(|image| is_something_else(&image, &case.small.unshadowed_mask));
+    let foreign = image.is_some_and(|image| is_something_else(&image, &case.small.unshadowed_mask));
     let nothing_draws =
         foreign.then_some("the pixels are uploaded, and what is drawn with them is not the scene");
     Some(Uploaded { check, nothing_draws })
@@ -61,7 +60,9 @@ pub fn judge(asker: &Asker, plugin: &Path, cases: &[Case], per_pixel: &[f64]) ->
 fn background(mask: &RegionMask) -> impl Iterator<Item = usize> {
     let clear = |value: u16| value & (RegionMask::EDGE | RegionMask::EMITTER) == 0;
     let pixels = mask.pixels.iter().enumerate();
-    pixels.filter(move |(_, value)| clear(**value) && **value & RegionMask::INDEX == 0).map(|(i, _)| i)
+    pixels
+        .filter(move |(_, value)| clear(**value) && **value & RegionMask::INDEX == 0)
+        .map(|(i, _)| i)
 }
 
 /// Whether a frame whose every fragment has one color shows something else than the scene.
@@ -93,7 +94,10 @@ mod tests {
         assert!(is_something_else(&image(&|_| true, SHOWN), &mask));
         assert!(!is_something_else(&image(&|x| x < 8, SHOWN), &mask), "the scene itself");
         assert!(!is_something_else(&image(&|x| x < 9, SHOWN), &mask), "nearly so");
-        assert!(!is_something_else(&image(&|_| true, Vec3::ONE), &mask), "no fragment was replaced");
+        assert!(
+            !is_something_else(&image(&|_| true, Vec3::ONE), &mask),
+            "no fragment was replaced"
+        );
         let full = RegionMask { pixels: vec![1; 200], ..mask };
         assert!(!is_something_else(&image(&|_| true, SHOWN), &full), "no background tells");
     }
