@@ -444,7 +444,8 @@ typedef struct {
                                  UmbraPass *pass,
                                  UmbraMessage *message);
     /*
-     Draws one frame for a camera.
+     Draws one frame for a camera. With [`STATUS_OK`] the message may hold the number of bytes that were
+     uploaded to the device for it, in decimal digits.
      */
     UmbraStatus (*draw_frame)(UmbraPass pass, const UmbraCameraValue *camera, UmbraMessage *message);
     /*

@@ -87,21 +87,28 @@ fn ask<'p>(
             record.witness(&state);
             result
         }
-        image => draw(scene, image, &|done, total| record.progress(done, total), values),
+        image => {
+            let progress = |done, total| record.progress(done, total);
+            if let Some(bytes) = draw(scene, image, &progress, values)? {
+                record.uploaded(bytes);
+            }
+            Ok(())
+        }
     }
 }
 
-/// Renders or draws what a request for an image asks for.
+/// Renders or draws what a request for an image asks for; answers the bytes that were uploaded for
+/// the last frame, if the plugin says so.
 fn draw(
     scene: &LoadedScene,
     request: &Request,
     progress: &(dyn Fn(u32, u32) + Sync),
     values: &mut [f32],
-) -> Result<(), CallError> {
+) -> Result<Option<u64>, CallError> {
     match request {
         &Request::RenderOffline { width, height, spp, seed, threads, shadows, .. } => {
             let job = OfflineJob { width, height, spp, threads, seed, shadows, progress };
-            scene.render_offline(&job, values)
+            scene.render_offline(&job, values).map(|()| None)
         }
         Request::RenderRealtime { width, height, shadow_map, adapter, stages, cameras, .. } => {
             let stages: Vec<_> = stages.iter().map(|stage| (&*stage.name, &*stage.text)).collect();
@@ -113,6 +120,7 @@ fn draw(
                 adapter_name: &adapter.name,
                 stages: &stages,
             })?;
+            let mut uploaded = None;
             let frame_floats = (3 * *width as usize * *height as usize).max(1);
             for (camera, frame) in cameras.iter().zip(values.chunks_exact_mut(frame_floats)) {
                 let camera = api::CameraValue {
@@ -121,11 +129,9 @@ fn draw(
                     up: camera.up,
                     fov_y_deg: camera.fov_y_deg,
                 };
-                if let Some(bytes) = pass.frame(&camera, frame)? {
-                    record.uploaded(bytes);
-                }
+                uploaded = pass.frame(&camera, frame)?;
             }
-            Ok(())
+            Ok(uploaded)
         }
         Request::EvalBsdf { .. } | Request::Radiance { .. } => {
             let message = "not a request for an image".to_owned();
