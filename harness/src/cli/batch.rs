@@ -154,8 +154,9 @@ impl Batch<'_> {
         judge_shared(&mut records);
         let rules = &context.assignment.rules;
         let entries = records.into_iter().map(|mut record| {
-            record.evidence = rubric::settle(rules, &record.evidence);
+            // Graded by all of the evidence: what is settled leaves no second choice of a convention.
             let mut grade = rubric::grade(rules, &record.evidence);
+            record.evidence = rubric::settle(rules, &record.evidence);
             if let Some(asked) = self.asked {
                 asked.only_of(&mut grade);
             }
