@@ -362,3 +362,43 @@ fn an_image_is_written_as_its_name_says_or_refused() {
         assert!(!scene.path(output).exists());
     }
 }
+
+#[test]
+fn a_realtime_frame_is_drawn_without_a_word_and_what_lies_out_of_range_is_said() {
+    let realtime = |scale: f64| {
+        let scene = scaled(&plain(), scale);
+        let toml = fs::read_to_string(scene.path("s.toml")).unwrap();
+        fs::write(scene.path("s.toml"), toml.replace("spp = 4", "realtime = true")).unwrap();
+        scene.run(&["s.toml", "--output", "o.exr"])
+    };
+    assert_eq!(realtime(1.0), (0, String::new()));
+    for scale in [3000.0, 1e-3] {
+        let (code, said) = realtime(scale);
+        assert!(code == 0 && said.starts_with("umbra: warning: s.obj: reaches "), "{said}");
+    }
+}
+
+#[test]
+fn a_plugin_that_cannot_be_loaded_is_named_with_the_loader_s_reason() {
+    let scene = Scene::new(&plain(), MTL);
+    fs::write(scene.path("renderer.so"), "not a library").unwrap();
+    let run = |plugin: &str| {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+        let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
+            .current_dir(scene.0.path())
+            .args(["render", "s.toml", "--output", "o.exr", "--plugin", plugin, "--root"])
+            .arg(root)
+            .output()
+            .unwrap();
+        assert_eq!(run.status.code(), Some(2));
+        String::from_utf8_lossy(&run.stderr).into_owned()
+    };
+    let said = run("renderer.so");
+    assert!(said.contains("cannot load the plugin renderer.so: "), "{said}");
+    assert!(!said.contains("dlopen failed") && !said.contains("/plugin/"), "{said}");
+    let said = run("src");
+    assert!(said.starts_with("umbra: plugin src: No such file"), "{said}");
+    fs::create_dir(scene.path("src")).unwrap();
+    let said = run("src");
+    assert!(said.starts_with("umbra: plugin src: it is a folder, expected a library"), "{said}");
+}

@@ -153,6 +153,9 @@ fn check_scene(toml: &Path) -> anyhow::Result<SceneConfig> {
     let folder = folder.unwrap_or(Path::new("."));
     let real = |path: &Path| path.canonicalize().with_context(|| path.display().to_string());
     let root = real(folder)?;
+    if config.realtime {
+        warn_of_range(&config, &mesh);
+    }
     for file in &mesh.files {
         if !real(file)?.starts_with(&root) {
             bail!(
@@ -163,6 +166,22 @@ fn check_scene(toml: &Path) -> anyhow::Result<SceneConfig> {
         }
     }
     Ok(config)
+}
+
+/// Warns when no vertex lies where the base code's projection draws: the picture would be empty.
+fn warn_of_range(config: &SceneConfig, mesh: &MeshFile) {
+    let forward = (config.camera.at - config.camera.eye).normalize_or_zero();
+    let vertices = mesh.shapes.iter().flat_map(|shape| &shape.positions);
+    let depths = vertices.map(|vertex| (*vertex - config.camera.eye).dot(forward));
+    let farthest = depths.fold(f32::NEG_INFINITY, f32::max);
+    let (near, far) = (Camera::NEAR, Camera::FAR);
+    if !(near..=far).contains(&farthest) {
+        eprintln!(
+            "umbra: warning: {}: reaches {farthest} units before the camera; the base code's projection draws \
+             from {near} to {far}",
+            config.mesh.display()
+        );
+    }
 }
 
 /// Renders the image and writes it: float for what is drawn offline, half for realtime as the
@@ -181,6 +200,14 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     let plugin = plugin_as_given
         .canonicalize()
         .with_context(|| format!("plugin {}", plugin_as_given.display()))?;
+    if plugin.is_dir() {
+        bail!(
+            "plugin {}: it is a folder, expected a library such as {}plugin{}",
+            plugin_as_given.display(),
+            std::env::consts::DLL_PREFIX,
+            std::env::consts::DLL_SUFFIX
+        );
+    }
     let Size(width, height) =
         arguments.size.unwrap_or(Size(config.width as u32, config.height as u32));
     let scene = SceneRef {

@@ -7,6 +7,7 @@
 mod scene;
 mod witness;
 
+use std::error::Error as _;
 use std::ffi::c_void;
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
@@ -90,7 +91,8 @@ impl HostPlugin {
     pub fn load(path: &Path) -> Result<Self, PluginError> {
         let failed = |error: libloading::Error| PluginError::Load {
             path: path.to_owned(),
-            message: error.to_string(),
+            // The loader's own words, not that of the call that failed.
+            message: error.source().unwrap_or(&error).to_string(),
         };
         let library = open(path).map_err(failed)?;
         // SAFETY: the symbol is only looked up; its type is checked by `Plugin::check` below. The

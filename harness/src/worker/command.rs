@@ -73,6 +73,8 @@ pub fn command(
     // Compiling shaders costs most of a small frame. What is compiled stays in the scratch of
     // this one worker: one renderer's shaders are no other's business.
     command.env("MESA_SHADER_CACHE_DISABLE", "false").env("MESA_SHADER_CACHE_DIR", ".");
+    // Mesa's layer that sorts devices looks for a display, and prints that there is none.
+    command.env("NODEVICE_SELECT", "1");
     command.env("LP_NUM_THREADS", limits.threads.to_string());
     command.env("RAYON_NUM_THREADS", limits.threads.to_string());
     let kinds: Vec<AdapterKind> = requests.iter().filter_map(|request| request.adapter()).collect();

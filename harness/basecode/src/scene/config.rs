@@ -147,6 +147,12 @@ impl SceneConfig {
             let message = "input.objfile names no file".to_owned();
             return Err(wrong(line_of_key(text, "input", "objfile"), message));
         }
+        // A worker sees the files under other names; so does whoever moves the folder.
+        if Path::new(&mesh).is_absolute() {
+            let message =
+                format!("input.objfile is {mesh} but must be relative to the folder of this file");
+            return Err(wrong(line_of_key(text, "input", "objfile"), message));
+        }
         let default_kind = if renderer.realtime { "direct" } else { "simple" };
         Ok(Self {
             path: path.to_owned(),
@@ -235,6 +241,10 @@ mod tests {
             (&format!("{base}[camera]\nfov = 180\n"), "b.toml:4: camera.fov is 180"),
             (&format!("{base}[camera]\nfov = nan\n"), "b.toml:4: camera.fov is NaN"),
             ("[input]\nobjfile = \"\"\n", "b.toml:2: input.objfile names no file"),
+            (
+                "[input]\nobjfile = \"/m/b.obj\"\n",
+                "b.toml:2: input.objfile is /m/b.obj but must be relative",
+            ),
         ] {
             let message = parse(text).unwrap_err().to_string();
             assert!(message.contains(expected), "{text:?} gave {message:?}");
