@@ -13,8 +13,8 @@ use support::scratch::{Scratch, assert_accepted, assert_folder_refused, listing,
 use support::tar_bytes::{self, gz, tar};
 use support::zip_bytes::{Entry, Zip, crc32, extra};
 use umbra::intake::{
-    Finding, Format, HandIn, IntakeError, Limits, TreeSpec, Validation, fix, pack, scan_source,
-    unpack, unpack_bytes, validate_hand_in, validate_refusal,
+    Finding, Format, HandIn, IntakeError, Limits, Severity, TreeSpec, Validation, fix, pack,
+    scan_source, unpack, unpack_bytes, validate_hand_in, validate_refusal,
 };
 
 const CONFIG: &str = r#"{
@@ -486,6 +486,39 @@ fn wrong_levels_are_told_apart() {
     // Only the source.
     let bare = validate_files(&moved(|path| path.starts_with("src/").then(|| path.to_owned())));
     assert_eq!(bare.findings.iter().filter(|f| f.code == "tree_missing").count(), 5);
+}
+
+#[test]
+fn what_systems_add_to_a_name_is_known_and_two_of_a_kind_are_none() {
+    for (name, seen) in [
+        ("config.json", "config.json.txt"),
+        ("config.json", "config (1).json"),
+        ("config.json", "Config - Copy.json"),
+        ("src/lib.rs", "src/lib.rs.txt"),
+        ("offline/cbox_simple_offline.exr", "offline/cbox_simple_offline(2).exr"),
+    ] {
+        let renamed = |path: &str| if path == name { seen } else { path }.to_owned();
+        let found = validate_files(&moved(|path| Some(renamed(path))));
+        let wrong: Vec<_> =
+            found.findings.iter().filter(|f| f.severity == Severity::Error).collect();
+        assert!(
+            matches!(wrong.as_slice(), [f] if f.code == "tree_wrong_place" && f.path.as_deref() == Some(seen)),
+            "{}",
+            found.to_text()
+        );
+        let student = found.config.unwrap();
+        assert_eq!(student.sampler_seed(), Some(260_123_456), "{seen}");
+    }
+    // One that is there is the one.
+    let mut files = perfect();
+    files.push(("config (1).json".into(), b"{}".to_vec()));
+    assert!(validate_files(&files).conforms);
+    let mut files = moved(|path| (path != "config.json").then(|| path.to_owned()));
+    for name in ["config (1).json", "config (2).json"] {
+        files.push((name.into(), CONFIG.into()));
+    }
+    let found = validate_files(&files);
+    assert!(found.findings.iter().any(|f| f.code == "tree_missing"), "{}", found.to_text());
 }
 
 // --- pack and fix ---

@@ -108,7 +108,8 @@ fn line_of(file: &TreeFile, found: Option<&str>) -> TreeLine {
 }
 
 /// A file that is probably the expected one: the same path in another case, else the same name in
-/// another folder, the shallowest one; never one of two that are equally likely.
+/// another folder, else a name that a system made of it; the shallowest one, and never one of two that
+/// are equally likely.
 fn find_lost<'a>(file: &TreeFile, paths: &[&'a str], taken: &BTreeSet<&str>) -> Option<&'a str> {
     let free = || paths.iter().copied().filter(|path| !taken.contains(path));
     let names: Vec<&String> = std::iter::once(&file.path).chain(&file.aliases).collect();
@@ -117,8 +118,13 @@ fn find_lost<'a>(file: &TreeFile, paths: &[&'a str], taken: &BTreeSet<&str>) -> 
         return Some(path);
     }
     let base = |path: &str| path.rsplit('/').next().unwrap_or(path).to_lowercase();
-    let mut candidates: Vec<&str> =
-        free().filter(|path| names.iter().any(|name| base(name) == base(path))).collect();
+    let named = |of: &dyn Fn(&str) -> String| -> Vec<&'a str> {
+        free().filter(|path| names.iter().any(|name| base(name) == of(path))).collect()
+    };
+    let mut candidates = named(&base);
+    if candidates.is_empty() {
+        candidates = named(&|path| as_it_was(&base(path)));
+    }
     candidates.sort_by_key(|path| path.matches('/').count());
     match candidates.as_slice() {
         [one] => Some(one),
@@ -127,6 +133,19 @@ fn find_lost<'a>(file: &TreeFile, paths: &[&'a str], taken: &BTreeSet<&str>) -> 
         }
         _ => None,
     }
+}
+
+/// A name without what systems add to it: the `.txt` of an editor that hides it, the ` (1)` of a second
+/// download, the ` - Copy` of a file manager.
+fn as_it_was(name: &str) -> String {
+    let name = name.strip_suffix(".txt").unwrap_or(name);
+    let (stem, end) = name.rsplit_once('.').unwrap_or((name, ""));
+    let numbered = stem.strip_suffix(')').and_then(|stem| stem.rsplit_once('('));
+    let stem = match numbered {
+        Some((before, number)) if number.bytes().all(|c| c.is_ascii_digit()) => before.trim_end(),
+        _ => stem.strip_suffix(" - copy").or(stem.strip_suffix(" copy")).unwrap_or(stem),
+    };
+    format!("{stem}.{end}")
 }
 
 /// Where a file belongs that lies beside a source file in the wrong place: `code/lib.rs` found for

@@ -41,24 +41,27 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
     let mut findings = hand_in.findings.clone();
     findings.extend(tree_findings(&lines, &paths));
     let mut config = None;
-    if let Some(file) = hand_in.file(CONFIG_FILE) {
+    // One in the wrong place says whose submission it is all the same.
+    let config_line = lines.iter().find(|line| line.expected.as_deref() == Some(CONFIG_FILE));
+    let name = config_line.and_then(|line| line.found.as_deref()).unwrap_or(CONFIG_FILE);
+    if let Some(file) = hand_in.file(name) {
         if file.bytes > MAX_CONFIG {
             findings.push(
                 Finding::error(
                     "config_shape",
                     format!("{} bytes, over the limit of {MAX_CONFIG}", file.bytes),
                 )
-                .at(CONFIG_FILE)
+                .at(name)
                 .on_line(1)
                 .hint("start from the template's config.json"),
             );
         } else {
-            let path = hand_in.root.join(CONFIG_FILE);
+            let path = hand_in.root.join(name);
             let bytes = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
             let (parsed, said, is_whole) = HandInConfig::parse(&bytes);
-            findings.extend(said);
             let (present, missing) = places(&lines);
-            findings.extend(check_config(&parsed, is_whole, &present, &missing, tree));
+            let more = check_config(&parsed, is_whole, &present, &missing, tree);
+            findings.extend(said.into_iter().chain(more).map(|finding| finding.at(name)));
             config = Some(parsed);
         }
     }
