@@ -153,6 +153,10 @@ fn json_is_json_alone() {
     assert_eq!((code, &told["equal"], &told["metrics"]["mae"]), (0, &true.into(), &0.0.into()));
     assert_eq!(told["pictures"].as_object().unwrap().len(), 3);
     assert!(pictures.join("difference.png").is_file());
+    let (code, told) = json(&[&a, &b, Path::new("--no-metrics")]);
+    assert_eq!((code, &told["differing"], told.get("metrics")), (1, &3.into(), None));
+    let (_, said, _) = compare(&[&a, &b, Path::new("--no-metrics")]);
+    assert!(said.ends_with("difference 1.5\n"), "{said}");
     let small = folder.path().join("small.exr");
     write_exr(&small, &Image::new(1, 2), Precision::Half, &[]).unwrap();
     let (code, told) = json(&[&small, &b]);

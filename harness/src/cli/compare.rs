@@ -31,6 +31,9 @@ pub struct CompareArguments {
     /// A pixel with a NaN differs, even where both images have one
     #[arg(long)]
     nan_is_error: bool,
+    /// Leave out the metrics, FLIP and SSIM among them, which take most of the time of large images
+    #[arg(long)]
+    no_metrics: bool,
     /// Print one JSON object and nothing else
     #[arg(long)]
     json: bool,
@@ -104,6 +107,7 @@ struct Values {
     largest: Option<Difference>,
     /// The largest among pixels with finite values.
     largest_finite: Option<Difference>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     metrics: Option<Metrics>,
 }
 
@@ -123,7 +127,7 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
     }
     let actual = Side::new(&arguments.actual, actual, wanted)?;
     let expected = Side::new(&arguments.expected, expected, wanted)?;
-    let mut comparison = compare(actual, expected, arguments.nan_is_error);
+    let mut comparison = compare(actual, expected, arguments);
     if let (Some(folder), Some(_)) = (&arguments.pictures, &comparison.values) {
         comparison.pictures = pictures(folder, &comparison)?;
     }
@@ -181,7 +185,7 @@ impl Side {
     }
 }
 
-fn compare(actual: Side, expected: Side, nan_is_error: bool) -> Comparison {
+fn compare(actual: Side, expected: Side, arguments: &CompareArguments) -> Comparison {
     let mut notes = Vec::new();
     let apart = actual.primaries.iter().flatten().zip(expected.primaries.iter().flatten());
     if apart.into_iter().any(|(a, b)| (a - b).is_nan() || (a - b).abs() > SAME_PRIMARIES) {
@@ -192,7 +196,11 @@ fn compare(actual: Side, expected: Side, nan_is_error: bool) -> Comparison {
         ));
     }
     let same_size = (actual.width, actual.height) == (expected.width, expected.height);
-    let values = same_size.then(|| Values::new(&actual.image, &expected.image, nan_is_error));
+    let mut values =
+        same_size.then(|| Values::new(&actual.image, &expected.image, arguments.nan_is_error));
+    if let Some(values) = values.as_mut().filter(|_| !arguments.no_metrics) {
+        values.metrics = Metrics::measure(&actual.image, &expected.image);
+    }
     let equal = values.as_ref().is_some_and(|values| values.differing == 0);
     Comparison { equal, actual, expected, notes, values, pictures: BTreeMap::new() }
 }
@@ -233,7 +241,7 @@ impl Values {
             differing,
             largest: largest.map(told),
             largest_finite: largest_finite.map(told),
-            metrics: Metrics::measure(actual, expected),
+            metrics: None,
         }
     }
 }
