@@ -334,8 +334,10 @@ pub struct Plugin {
             message: *mut Message,
         ) -> Status,
     >,
-    /// Draws one frame for a camera. With [`STATUS_OK`] the message may hold the number of bytes that were
-    /// uploaded to the device for it, in decimal digits.
+    /// Draws one frame for a camera. With [`STATUS_OK`] the message may tell what the pass handed to the
+    /// device from its opening to this frame, as five numbers in decimal digits with spaces between:
+    /// bytes uploaded, textures to draw into, pipelines for pictures that take vertices, pipelines for
+    /// pictures that take none, and other pipelines.
     pub draw_frame: Option<
         unsafe extern "C" fn(
             pass: Pass,

@@ -11,7 +11,7 @@ use std::sync::{Mutex, Once};
 use glam::{Vec2, Vec3};
 pub use renderer_api as api;
 
-use crate::gpu::{AdapterKind, Gpu, RenderPass, Target};
+use crate::gpu::{AdapterKind, Footprint, Gpu, RenderPass, Target};
 use crate::realtime::{RayRefused, Realtime};
 use crate::{
     Bsdf, Camera, CameraConfig, Error, Film, Frame, Material, Ray, RenderJob, Renderer, Result,
@@ -95,6 +95,8 @@ struct OpenPass {
     /// By what the device was opened.
     adapter: (AdapterKind, String),
     realtime: Realtime,
+    /// What making the pass handed to the device.
+    opening: Footprint,
 }
 
 /// Loads a scene into a new renderer.
@@ -267,6 +269,7 @@ unsafe extern "C" fn open_realtime(
         gpu.replace_stages(replaced);
         let target = Target::new(&gpu, settings.width as usize, settings.height as usize)?;
         let shadow_map = settings.shadow_map != 0;
+        let _ = gpu.take_footprint();
         let mut opened = None;
         gpu.checked(&mut || {
             let kind = &loaded.scene.config().kind;
@@ -278,7 +281,8 @@ unsafe extern "C" fn open_realtime(
             return Err(Error::Gpu("the render pass was not made".into()));
         };
         let adapter = (kind, name.to_owned());
-        let opened = Box::new(OpenPass { pass: opened, target, gpu, adapter, realtime });
+        let opening = gpu.take_footprint();
+        let opened = Box::new(OpenPass { pass: opened, target, gpu, adapter, realtime, opening });
         // SAFETY: the host's place for the handle.
         unsafe { *pass = Box::into_raw(opened).cast() };
         Ok(())
@@ -300,11 +304,11 @@ unsafe extern "C" fn draw_frame(
             fov_y_deg: camera.fov_y_deg,
         };
         let camera = Camera::new(config, open.target.width, open.target.height)?;
-        let OpenPass { pass, target, gpu, realtime, .. } = open;
-        let _ = gpu.take_uploaded();
+        let OpenPass { pass, target, gpu, realtime, opening, .. } = open;
+        let _ = gpu.take_footprint();
         gpu.checked(&mut || pass.draw(gpu, &camera, target))?;
         realtime.without_rays()?;
-        Ok(gpu.take_uploaded().to_string())
+        Ok(opening.and(gpu.take_footprint()).to_string())
     })
 }
 
@@ -332,7 +336,8 @@ unsafe extern "C" fn close_realtime(pass: api::Pass) {
     let open = unsafe { Box::from_raw(pass.cast::<OpenPass>()) };
     // A panic in a student's `drop` must not cross the boundary; the device goes with it.
     let _ = catch_unwind(AssertUnwindSafe(|| {
-        let OpenPass { pass, target, gpu, adapter: (kind, name), realtime: _realtime } = *open;
+        let OpenPass { pass, target, gpu, adapter: (kind, name), realtime: _realtime, opening: _ } =
+            *open;
         drop((pass, target));
         gpu.keep(kind, &name);
     }));

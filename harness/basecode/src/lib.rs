@@ -46,7 +46,15 @@ pub use ray::{Ray, SurfaceInteraction};
 pub use renderer::{Bsdf, Integrator, RenderJob, Renderer};
 pub use sampler::Sampler;
 pub use scene::{Material, MaterialModel, Scene, Shape, Texture};
-pub use {bytemuck, glam, wgpu};
+pub use {bytemuck, glam};
+
+/// The graphics library. [`gpu::Device`] and [`gpu::Queue`] stand for its own types of these names, so
+/// that functions which take a `&wgpu::Device` take [`gpu::Gpu::device`].
+pub mod wgpu {
+    pub use ::wgpu::*;
+
+    pub use crate::gpu::{Device, Queue};
+}
 
 /// The constant 1 / pi.
 pub const INV_PI: f32 = std::f32::consts::FRAC_1_PI;

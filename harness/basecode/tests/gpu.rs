@@ -1,8 +1,9 @@
 //! The device, from outside. These tests need a graphics adapter, and fail where there is none.
 
 use basecode::gpu::{
-    AdapterKind, EMITTER_FS, FrameUniforms, Gpu, MaterialUniforms, Mesh, ObjectUniforms, ShadowMap,
-    Stage, Target, Uniform,
+    AdapterKind, DEPTH_FORMAT, EMITTER_FS, EVERY_FRAGMENT, Footprint, FrameUniforms, Gpu,
+    MaterialUniforms, Mesh, OUTLINES, ObjectUniforms, ShadowMap, Stage, Target, UNDRAWN_MAPS,
+    Uniform,
 };
 use basecode::{Camera, CameraConfig, Error, Mat4, Shape, Vec2, Vec3, vec3, wgpu};
 
@@ -168,4 +169,133 @@ fn impossible_sizes_are_refused() {
     assert!(ShadowMap::new(&gpu, 16, &[], 0.0).is_err());
     assert!(ShadowMap::new(&gpu, 16, &[Mat4::IDENTITY; 7], 0.0).is_err());
     assert!(ShadowMap::new(&gpu, 1 << 20, &[Mat4::IDENTITY], 0.0).is_err());
+}
+
+/// What the host's names of no stage make of the square: its color in the middle and in a corner of it,
+/// away from outlines, and how many of the 20 pixels of the middle row show anything.
+fn looked_at(gpu: &mut Gpu, names: &[&str]) -> (Vec3, usize) {
+    const SHOW: &str =
+        "@fragment fn umbra_shown() -> @location(0) vec4f { return vec4f(0.25, 0.5, 0.75, 1.0); }";
+    gpu.replace_stages(names.iter().map(|name| ((*name).to_owned(), SHOW.to_owned())).collect());
+    let target = Target::new(gpu, 20, 20).unwrap();
+    draw(gpu, POSITION_FS, &target).unwrap();
+    let image = target.read_back(gpu).unwrap();
+    let row = &image.pixels[8 * 20..9 * 20];
+    (row[8], row.iter().filter(|pixel| **pixel != Vec3::ZERO).count())
+}
+
+#[test]
+fn the_host_sees_how_a_picture_comes_about() {
+    let mut gpu = gpu();
+    let shown = vec3(0.25, 0.5, 0.75);
+    assert_eq!(looked_at(&mut gpu, &[]), (vec3(8.5, 8.5, 1e6), 10));
+    assert_eq!(looked_at(&mut gpu, &[EVERY_FRAGMENT]), (shown, 10));
+    if gpu.device.features().contains(wgpu::Features::POLYGON_MODE_LINE) {
+        let (_, outlined) = looked_at(&mut gpu, &[EVERY_FRAGMENT, OUTLINES]);
+        assert!((2..=6).contains(&outlined), "{outlined} pixels: both sides and the diagonal");
+    }
+    // What is drawn beside the picture alone is left out, and nobody's look outlives the next.
+    assert_eq!(looked_at(&mut gpu, &[UNDRAWN_MAPS]), (vec3(8.5, 8.5, 1e6), 10));
+}
+
+#[test]
+fn what_a_pass_hands_to_the_device_is_counted() {
+    let gpu = gpu();
+    let target = Target::new(&gpu, 40, 40).unwrap();
+    assert_eq!(gpu.take_footprint(), Footprint { targets: 2, ..Footprint::default() });
+    draw(&gpu, POSITION_FS, &target).unwrap();
+    let found = gpu.take_footprint();
+    assert!((100..2000).contains(&found.uploaded), "{found:?}");
+    assert_eq!((found.targets, found.fed, found.unfed, found.maps), (0, 1, 0, 0));
+    assert_eq!(found.to_string().parse(), Ok(found));
+    assert!("1 2 3 4".parse::<Footprint>().is_err());
+
+    // Functions that take wgpu's own types are watched as well: these are what stands for them.
+    fn uploads(device: &wgpu::Device, queue: &wgpu::Queue) -> wgpu::Device {
+        let usage = wgpu::BufferUsages::COPY_DST;
+        let (size, mapped_at_creation) = (1000, false);
+        let buffer = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation };
+        let buffer = device.create_buffer(&buffer);
+        queue.write_buffer(&buffer, 0, &[0; 1000]);
+        device.clone()
+    }
+    drop(uploads(&gpu.device, &gpu.queue));
+    assert_eq!(gpu.take_footprint(), Footprint { uploaded: 1000, ..Footprint::default() });
+    // A program is no data; one that is longer than any is.
+    let module = |text: String| {
+        let source = wgpu::ShaderSource::Wgsl(text.into());
+        gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
+        gpu.take_footprint().uploaded
+    };
+    assert_eq!(module("const a = 1;".into()), 0);
+    assert!(module(format!("const a = 1;{}", " ".repeat(100_000))) > 30_000);
+}
+
+/// The depth in the middle of a map that the square is drawn into.
+fn depth_of_square(gpu: &Gpu) -> f32 {
+    let map = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width: 64, height: 64, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: DEPTH_FORMAT,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
+    let size = 64 * 64 * 4;
+    let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
+    let buffer = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false };
+    let buffer = gpu.device.create_buffer(&buffer);
+    let camera = CameraConfig { eye: vec3(0.0, 0.0, 4.0), ..CameraConfig::default() };
+    let camera = Camera::new(CameraConfig { at: Vec3::ZERO, ..camera }, 1, 1).unwrap();
+    let drawn = gpu.checked(&mut || {
+        let mesh = Mesh::new(gpu, &square());
+        let pipeline = gpu.depth_pipeline(VS);
+        let frame = Uniform::frame(gpu, &FrameUniforms::new(&camera));
+        let object = Uniform::object(gpu, &ObjectUniforms::new(Mat4::IDENTITY));
+        let mut encoder = gpu.encoder();
+        let view = map.create_view(&wgpu::TextureViewDescriptor::default());
+        let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store: wgpu::StoreOp::Store };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &view,
+                depth_ops: Some(ops),
+                stencil_ops: None,
+            }),
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &frame.bind_group, &[]);
+        pass.set_bind_group(1, &object.bind_group, &[]);
+        pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+        pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..mesh.index_count, 0, 0..1);
+        drop(pass);
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(256),
+            rows_per_image: None,
+        };
+        let to = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+        encoder.copy_texture_to_buffer(map.as_image_copy(), to, map.size());
+        gpu.submit(encoder);
+        buffer.slice(..).map_async(wgpu::MapMode::Read, |_| ());
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        let bytes = buffer.slice(..).get_mapped_range().unwrap();
+        let (floats, _) = bytes.as_chunks::<4>();
+        Ok(f32::from_le_bytes(floats[32 * 64 + 30]))
+    });
+    drawn.unwrap()
+}
+
+#[test]
+fn a_shadow_map_can_be_left_undrawn() {
+    let mut gpu = gpu();
+    let depth = depth_of_square(&gpu);
+    assert!(0.9 < depth && depth < 1.0, "{depth}");
+    let found = gpu.take_footprint();
+    assert_eq!((found.maps, found.targets, found.fed), (1, 1, 0));
+    gpu.replace_stages(vec![(UNDRAWN_MAPS.into(), UNDRAWN_MAPS.into())]);
+    assert_eq!(depth_of_square(&gpu), 1.0);
 }

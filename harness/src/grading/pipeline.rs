@@ -455,12 +455,10 @@ impl<'a> Grading<'a> {
             let begin = checks.len();
             let judged = realtime::judge_images(asker, plugin, cases, tolerances);
             let fails = judged.iter().any(|judged| judged.fails);
-            let per_pixel: Vec<f64> = judged.iter().filter_map(|judged| judged.uploaded).collect();
-            let uploaded = uploads::judge(asker, plugin, cases, &per_pixel);
-            let nothing_draws = stages
-                .nothing_draws()
-                .or_else(|| uploaded.as_ref().and_then(|uploaded| uploaded.nothing_draws));
-            checks.extend(uploaded.map(|uploaded| uploaded.check));
+            let footprints: Vec<_> = judged.iter().map(|judged| judged.footprint).collect();
+            let uploaded = uploads::judge(asker, plugin, cases, &footprints);
+            let nothing_draws = stages.nothing_draws().or(uploaded.nothing_draws);
+            checks.extend(uploaded.checks);
             let mut wrong = Vec::new();
             for (case, judged) in cases.iter().zip(judged) {
                 let mut found = judged.checks;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use basecode::Image;
+use basecode::gpu::{Footprint, UNDRAWN_MAPS};
 
 use super::ask::{self, Asker};
 use super::case::Case;
@@ -35,8 +36,8 @@ pub struct Judged {
     pub drawn: Vec<Drawn>,
     /// Whether the frame without shadows got no answer, by the submission's own fault.
     pub fails: bool,
-    /// Bytes uploaded for that frame, by pixel, where it was drawn and the plugin says so.
-    pub uploaded: Option<f64>,
+    /// What that frame took, where it was drawn and the plugin says so.
+    pub footprint: Option<Footprint>,
 }
 
 /// Whether surfaces lie where they should, for what cannot be judged alone.
@@ -60,9 +61,7 @@ pub fn judge_images(
     };
     let plain = draw_plain(asker, plugin, cases, &is_right);
     let judged = cases.iter().zip(plain).map(|(case, plain)| {
-        let uploaded = plain.answer().and_then(|answer| answer.uploaded);
-        let (width, height) = case.film();
-        let uploaded = uploaded.map(|bytes| bytes as f64 / f64::from(width * height));
+        let footprint = plain.answer().and_then(|answer| answer.footprint);
         let fails = plain.matter() == Some(Matter::Submission);
         let (mut checks, plain) = judge_plain(asker, case, &plain, tolerances);
         let mut drawn = Vec::from_iter(plain);
@@ -71,12 +70,23 @@ pub fn judge_images(
             let frame = Frame { toml, shadow_map: true, ..Frame::plain(case) };
             let outcome = draw(asker, Some(plugin), &frame);
             let plain = drawn.first().map(|drawn| &drawn.image);
-            let (check, bonus) = judge_bonus(asker, plugin, case, &outcome, plain, tolerances);
-            let id = if case.entry.bonus_required { "bonus.probe" } else { "bonus.image" };
+            let (mut check, bonus) = judge_bonus(asker, plugin, case, &outcome, plain, tolerances);
+            let required = case.entry.bonus_required;
+            let id = if required { "bonus.probe" } else { "bonus.image" };
+            // How shadows come about is the same on all scenes.
+            if required && check.verdict == Verdict::Pass {
+                let footprint = outcome.answer().and_then(|answer| answer.footprint);
+                let with = bonus.as_ref().map(|drawn| &drawn.image);
+                if let (Some(footprint), Some(with)) = (footprint, with)
+                    && let Some(why) = no_shadow_map(asker, plugin, &frame, &footprint, with)
+                {
+                    check = Check { error: 1.0, verdict: Verdict::Fail, summary: why, ..check };
+                }
+            }
             checks.push(Check { id: id.to_owned(), ..check });
             drawn.extend(bonus);
         }
-        Judged { checks, drawn, fails, uploaded }
+        Judged { checks, drawn, fails, footprint }
     });
     judged.collect()
 }
@@ -175,6 +185,54 @@ fn judge_bonus(
         check = judge_visibility(asker, plugin, case, (&drawn.image, plain), check, tolerances);
     }
     (check, Some(drawn))
+}
+
+/// So much of the shadowed pixels' number must change when nothing is drawn into a shadow map.
+const LEAST_CHANGED: f64 = 0.2;
+
+/// Why shadows that are right come from no shadow map that is drawn and read, if that is so: the same
+/// frame is drawn once more while what pipelines draw beside the picture leaves no trace. A map that
+/// is drawn by pipelines for pictures cannot be told from one: nothing is claimed then.
+fn no_shadow_map(
+    asker: &Asker,
+    plugin: &Path,
+    frame: &Frame,
+    footprint: &Footprint,
+    with: &Image,
+) -> Option<String> {
+    // A pass whose pipelines are made otherwise is not watched.
+    if footprint.fed == 0 && footprint.unfed == 0 {
+        return None;
+    }
+    if footprint.targets == 0 {
+        let why = "the shadows are right, but the pass makes no texture to draw a shadow map into";
+        return Some(why.to_owned());
+    }
+    if footprint.maps == 0 {
+        return None;
+    }
+    let stage = Stage { name: UNDRAWN_MAPS.to_owned(), text: UNDRAWN_MAPS.to_owned() };
+    let outcome = draw(asker, Some(plugin), &Frame { stages: vec![stage], ..frame.clone() });
+    let without = ask::image(&outcome.answer()?.values, frame.size.0, frame.size.1);
+    let mask = &frame.case.expected.offline.mask;
+    let inside = |value: u16| {
+        value & (RegionMask::EDGE | RegionMask::EMITTER) == 0 && value & RegionMask::INDEX != 0
+    };
+    let least = 0.01 * frame.case.expected.offline.median_lit;
+    let (mut shadowed, mut changed) = (0usize, 0usize);
+    for ((a, b), &value) in with.pixels.iter().zip(&without.pixels).zip(&mask.pixels) {
+        if inside(value) {
+            shadowed += usize::from(!mask.region(value).lit);
+            changed += usize::from((*a - *b).abs().max_element() > least);
+        }
+    }
+    if changed as f64 >= LEAST_CHANGED * shadowed as f64 {
+        return None;
+    }
+    Some(format!(
+        "the shadows are right, but they are the same on all but {changed} pixels when nothing is drawn into \
+         the shadow map"
+    ))
 }
 
 /// The masks that tell where shadows fall.

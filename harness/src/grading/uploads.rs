@@ -1,13 +1,14 @@
 //! Pictures that the CPU uploads: a frame that no shader drew, whatever shaders there are.
 //!
 //! Two things must come together before points are lost. Each frame of each scene uploads as much as
-//! a picture of it is large, which meshes, materials and lights never come to on all scenes. And with
-//! every fragment in one color, whatever pipelines there are, what is drawn is not the scene's
-//! surfaces. One without the other is for the instructor to look at.
+//! a picture of it is large, which meshes, materials and lights never come to on all scenes. And what
+//! is drawn with it is not the scene's surfaces: with every fragment in one color, whatever pipelines
+//! there are, the background is covered as well, or the outlines of triangles fill all surfaces. One
+//! without the other is for the instructor to look at.
 
 use std::path::Path;
 
-use basecode::gpu::EVERY_FRAGMENT;
+use basecode::gpu::{EVERY_FRAGMENT, Footprint, OUTLINES};
 use basecode::{Image, Vec3};
 
 use super::ask::{self, Asker};
@@ -17,8 +18,18 @@ use crate::evidence::{Check, Verdict};
 use crate::imaging::reference::RegionMask;
 use crate::worker::Stage;
 
-/// Bytes for each pixel that are a picture: the least, 8-bit RGB.
-const PICTURE: f64 = 3.0;
+/// Bytes for each pixel that may be a picture: a byte of brightness.
+const PICTURE: f64 = 1.0;
+
+/// Bytes that any pass may upload: uniforms, tables, place holders.
+const ANY: usize = 16 << 10;
+/// Bytes for each shape: material and placement, in buffers of their own.
+const BY_SHAPE: usize = 1 << 10;
+/// Bytes for each triangle: three vertices of 64 bytes.
+const BY_TRIANGLE: usize = 192;
+
+/// A scene tells when its own data are at most this many bytes for each pixel.
+const MOST_OWN: f64 = 4.0;
 
 /// The color of every fragment, and the stage that draws it.
 const SHOWN: Vec3 = Vec3::new(0.25, 0.5, 0.75);
@@ -28,51 +39,116 @@ const SHOW: &str =
 /// So much of the background may be drawn over before it is not the scene that is drawn.
 const MOST_BACKGROUND: f64 = 0.2;
 
-/// What is to be said of frames that are uploaded; nothing when they are not.
+/// So much of the surfaces may be outlines of triangles before these are no larger than pixels. Scenes
+/// of few triangles have 0.1 to 0.3 on small films, triangles of a pixel 0.9 and more.
+const MOST_OUTLINES: f64 = 0.6;
+/// Scenes of more triangles tell nothing by their outlines.
+const FEW_TRIANGLES: usize = 200;
+
+/// What is to be said of how frames come about.
+#[derive(Default)]
 pub struct Uploaded {
-    /// The check for the instructor. Costs nothing by itself.
-    pub check: Check,
+    /// Checks for the instructor. They cost nothing by themselves.
+    pub checks: Vec<Check>,
     /// Why no frame counts, if so.
     pub nothing_draws: Option<&'static str>,
 }
 
-/// Judges the frames of some scenes. `per_pixel` holds the bytes that each uploaded, by pixel, where
-/// it was drawn at all.
-pub fn judge(asker: &Asker, plugin: &Path, cases: &[Case], per_pixel: &[f64]) -> Option<Uploaded> {
-    let least = per_pixel.iter().copied().reduce(f64::min).filter(|least| *least >= PICTURE)?;
-    let summary = format!(
-        "every frame uploads {least:.1} bytes and more for each of its pixels, as if no shader drew them"
-    );
-    let check = Check::new("hand_in.uploads", "", Verdict::Fail, summary);
-    let case = cases.iter().max_by_key(|case| background(&case.small.unshadowed_mask).count())?;
-    let stage = Stage { name: EVERY_FRAGMENT.to_owned(), text: SHOW.to_owned() };
-    let frame = Frame::small(case, vec![stage]);
-    let outcome = draw(asker, Some(plugin), &frame);
-    let image =
-        outcome.answer().map(|answer| ask::image(&answer.values, frame.size.0, frame.size.1));
-    let foreign = image.is_some_and(|image| is_something_else(&image, &case.small.unshadowed_mask));
-    let nothing_draws =
-        foreign.then_some("the pixels are uploaded, and what is drawn with them is not the scene");
-    Some(Uploaded { check, nothing_draws })
+/// Judges the frames of some scenes by what each took, where that is known.
+pub fn judge(
+    asker: &Asker,
+    plugin: &Path,
+    cases: &[Case],
+    footprints: &[Option<Footprint>],
+) -> Uploaded {
+    let mut found = Uploaded::default();
+    let known = || cases.iter().zip(footprints).filter_map(|(case, of)| Some((case, (*of)?)));
+    if known().next().is_some() && known().all(|(_, of)| of.fed == 0 && of.unfed > 0) {
+        let summary =
+            "no pipeline that draws a picture takes vertices: it is made in one piece, or computed";
+        found.checks.push(Check::new("hand_in.no_vertices", "", Verdict::Fail, summary));
+    }
+    let unexplained = known().filter_map(|(case, of)| unexplained(case, &of));
+    let least = unexplained.reduce(f64::min).filter(|least| *least >= PICTURE);
+    if let Some(least) = least {
+        let summary = format!(
+            "every frame uploads {least:.1} bytes and more for each of its pixels besides the scene's own \
+             data, as if no shader drew them"
+        );
+        found.checks.push(Check::new("hand_in.uploads", "", Verdict::Fail, summary));
+        found.nothing_draws = nothing_draws(asker, plugin, cases);
+    }
+    found
 }
 
-/// Pixels away from edges in which the scene shows nothing.
-fn background(mask: &RegionMask) -> impl Iterator<Item = usize> {
+/// Bytes for each pixel that a frame took besides what the scene itself explains; nothing where that
+/// is too much to tell.
+fn unexplained(case: &Case, footprint: &Footprint) -> Option<f64> {
+    let scene = &case.expected.scene;
+    let own = ANY + BY_SHAPE * scene.shapes().len() + BY_TRIANGLE * triangles(case);
+    let (width, height) = case.film();
+    let by_pixel = |bytes: f64| bytes / (f64::from(width) * f64::from(height));
+    (by_pixel(own as f64) <= MOST_OWN).then(|| by_pixel(footprint.uploaded as f64 - own as f64))
+}
+
+fn triangles(case: &Case) -> usize {
+    case.expected.scene.shapes().iter().map(|shape| shape.triangles.len()).sum()
+}
+
+/// Why what is drawn with uploaded pixels is not the scene, if it is not.
+fn nothing_draws(asker: &Asker, plugin: &Path, cases: &[Case]) -> Option<&'static str> {
+    let drawn = |case: &Case, outlines: bool| {
+        let mut stages = vec![Stage { name: EVERY_FRAGMENT.to_owned(), text: SHOW.to_owned() }];
+        stages.extend(
+            outlines.then(|| Stage { name: OUTLINES.to_owned(), text: "outlines".to_owned() }),
+        );
+        let frame = Frame::small(case, stages);
+        let outcome = draw(asker, Some(plugin), &frame);
+        outcome.answer().map(|answer| ask::image(&answer.values, frame.size.0, frame.size.1))
+    };
+    let mask = |case: &&Case| clear(&case.small.unshadowed_mask, true).count();
+    let case = cases.iter().max_by_key(mask)?;
+    if covers_background(&drawn(case, false)?, &case.small.unshadowed_mask) {
+        return Some("the pixels are uploaded, and what is drawn with them is not the scene");
+    }
+    let case = cases.iter().min_by_key(|case| triangles(case))?;
+    if triangles(case) <= FEW_TRIANGLES
+        && covers_surfaces(&drawn(case, true)?, &case.small.unshadowed_mask)
+    {
+        return Some("the pixels are uploaded, and drawn one by one");
+    }
+    None
+}
+
+/// Pixels away from edges in which the scene shows nothing, or surfaces that are no light.
+fn clear(mask: &RegionMask, background: bool) -> impl Iterator<Item = usize> {
     let clear = |value: u16| value & (RegionMask::EDGE | RegionMask::EMITTER) == 0;
     let pixels = mask.pixels.iter().enumerate();
     pixels
-        .filter(move |(_, value)| clear(**value) && **value & RegionMask::INDEX == 0)
+        .filter(move |(_, value)| {
+            clear(**value) && (**value & RegionMask::INDEX == 0) == background
+        })
         .map(|(i, _)| i)
 }
 
-/// Whether a frame whose every fragment has one color shows something else than the scene.
-fn is_something_else(image: &Image, mask: &RegionMask) -> bool {
-    let (mut over, mut all) = (0usize, 0usize);
-    for index in background(mask) {
+/// The fraction of some pixels that show a fragment.
+fn fraction(image: &Image, pixels: impl Iterator<Item = usize>) -> f64 {
+    let (mut shown, mut all) = (0usize, 0usize);
+    for index in pixels {
         all += 1;
-        over += usize::from(image.pixels[index] == SHOWN);
+        shown += usize::from(image.pixels[index] == SHOWN);
     }
-    all > 0 && over as f64 > MOST_BACKGROUND * all as f64
+    shown as f64 / all.max(1) as f64
+}
+
+/// Whether a frame whose every fragment has one color shows something else than the scene.
+fn covers_background(image: &Image, mask: &RegionMask) -> bool {
+    fraction(image, clear(mask, true)) > MOST_BACKGROUND
+}
+
+/// Whether outlines of triangles fill the surfaces of the scene.
+fn covers_surfaces(image: &Image, mask: &RegionMask) -> bool {
+    fraction(image, clear(mask, false)) > MOST_OUTLINES
 }
 
 #[cfg(test)]
@@ -81,7 +157,7 @@ mod tests {
     use crate::imaging::reference::Region;
 
     #[test]
-    fn one_triangle_over_the_film_is_no_scene() {
+    fn what_is_drawn_is_told_from_the_scene() {
         let mut mask = RegionMask::background(20, 10);
         mask.regions.push(Region { name: "ball".into(), lit: true, exponent: 0.0 });
         for (i, value) in mask.pixels.iter_mut().enumerate() {
@@ -91,14 +167,18 @@ mod tests {
             let pixels = (0..200).map(|i| if drawn(i % 20) { color } else { Vec3::ZERO });
             Image { width: 20, height: 10, pixels: pixels.collect() }
         };
-        assert!(is_something_else(&image(&|_| true, SHOWN), &mask));
-        assert!(!is_something_else(&image(&|x| x < 8, SHOWN), &mask), "the scene itself");
-        assert!(!is_something_else(&image(&|x| x < 9, SHOWN), &mask), "nearly so");
-        assert!(
-            !is_something_else(&image(&|_| true, Vec3::ONE), &mask),
-            "no fragment was replaced"
-        );
-        let full = RegionMask { pixels: vec![1; 200], ..mask };
-        assert!(!is_something_else(&image(&|_| true, SHOWN), &full), "no background tells");
+        let foreign =
+            |drawn: &dyn Fn(usize) -> bool, color| covers_background(&image(drawn, color), &mask);
+        assert!(foreign(&|_| true, SHOWN));
+        assert!(!foreign(&|x| x < 8, SHOWN), "the scene itself");
+        assert!(!foreign(&|x| x < 9, SHOWN), "nearly so");
+        assert!(!foreign(&|_| true, Vec3::ONE), "no fragment was replaced");
+        let filled = |drawn: &dyn Fn(usize) -> bool| covers_surfaces(&image(drawn, SHOWN), &mask);
+        assert!(filled(&|x| x < 8), "no larger than pixels");
+        assert!(!filled(&|x| x % 8 < 2), "triangles of some pixels");
+        let full = RegionMask { pixels: vec![1; 200], ..mask.clone() };
+        assert!(!covers_background(&image(&|_| true, SHOWN), &full), "no background tells");
+        let empty = RegionMask { pixels: vec![0; 200], ..mask };
+        assert!(!covers_surfaces(&image(&|_| true, SHOWN), &empty), "no surface tells");
     }
 }

@@ -2,6 +2,7 @@
 
 use std::ptr::{null, null_mut};
 
+use basecode::gpu::Footprint;
 use renderer_api as api;
 
 use super::{CHECKED, CallError, WitnessState, call, call_noted, handle};
@@ -206,8 +207,8 @@ pub struct OpenPass<'s> {
 }
 
 impl OpenPass<'_> {
-    /// Draws one frame and reads it back into `pixels`, three linear floats a pixel; answers how many
-    /// bytes were uploaded for it, if the plugin says so.
+    /// Draws one frame and reads it back into `pixels`, three linear floats a pixel; answers what it
+    /// took, if the plugin says so.
     ///
     /// # Errors
     /// What the plugin answers.
@@ -218,7 +219,7 @@ impl OpenPass<'_> {
         &mut self,
         camera: &api::CameraValue,
         pixels: &mut [f32],
-    ) -> Result<Option<u64>, CallError> {
+    ) -> Result<Option<Footprint>, CallError> {
         assert_eq!(pixels.len(), self.floats, "three floats a pixel");
         let draw = self.table.draw_frame.expect(CHECKED);
         let read = self.table.read_frame.expect(CHECKED);

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use basecode::gpu::Footprint;
 use renderer_api as api;
 
 use super::arena::{Input, Output, Table};
@@ -89,22 +90,22 @@ fn ask<'p>(
         }
         image => {
             let progress = |done, total| record.progress(done, total);
-            if let Some(bytes) = draw(scene, image, &progress, values)? {
-                record.uploaded(bytes);
+            if let Some(footprint) = draw(scene, image, &progress, values)? {
+                record.footprint(&footprint);
             }
             Ok(())
         }
     }
 }
 
-/// Renders or draws what a request for an image asks for; answers the bytes that were uploaded for
-/// the last frame, if the plugin says so.
+/// Renders or draws what a request for an image asks for; answers what the last frame took, if
+/// the plugin says so.
 fn draw(
     scene: &LoadedScene,
     request: &Request,
     progress: &(dyn Fn(u32, u32) + Sync),
     values: &mut [f32],
-) -> Result<Option<u64>, CallError> {
+) -> Result<Option<Footprint>, CallError> {
     match request {
         &Request::RenderOffline { width, height, spp, seed, threads, shadows, .. } => {
             let job = OfflineJob { width, height, spp, threads, seed, shadows, progress };
@@ -120,7 +121,7 @@ fn draw(
                 adapter_name: &adapter.name,
                 stages: &stages,
             })?;
-            let mut uploaded = None;
+            let mut footprint = None;
             let frame_floats = (3 * *width as usize * *height as usize).max(1);
             for (camera, frame) in cameras.iter().zip(values.chunks_exact_mut(frame_floats)) {
                 let camera = api::CameraValue {
@@ -129,9 +130,9 @@ fn draw(
                     up: camera.up,
                     fov_y_deg: camera.fov_y_deg,
                 };
-                uploaded = pass.frame(&camera, frame)?;
+                footprint = pass.frame(&camera, frame)?;
             }
-            Ok(uploaded)
+            Ok(footprint)
         }
         Request::EvalBsdf { .. } | Request::Radiance { .. } => {
             let message = "not a request for an image".to_owned();

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use basecode::gpu::Footprint;
 use serde::{Deserialize, Serialize};
 
 use crate::process::Ended;
@@ -133,9 +134,9 @@ pub struct Answer {
     pub values: Vec<f32>,
     /// What the witness saw, if there was one.
     pub witness: Option<WitnessUse>,
-    /// Bytes that were uploaded for the last frame, by the plugin's word.
+    /// What the last frame took, by the plugin's word.
     #[serde(default)]
-    pub uploaded: Option<u64>,
+    pub footprint: Option<Footprint>,
     /// Seconds it took by the worker's clock: for information, a plugin can forge it.
     pub seconds: f64,
 }
@@ -200,7 +201,7 @@ mod as_base64 {
         fn answers_survive_json_with_nan_and_infinity() {
             let values = vec![1.5, f32::NAN, f32::NEG_INFINITY, -0.0];
             let answer =
-                Answer { values: values.clone(), witness: None, uploaded: None, seconds: 0.5 };
+                Answer { values: values.clone(), witness: None, footprint: None, seconds: 0.5 };
             let text = serde_json::to_string(&answer).unwrap();
             let back: Answer = serde_json::from_str(&text).unwrap();
             let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();

@@ -353,7 +353,8 @@ impl Files {
     }
 
     fn outcome(&mut self, index: usize, request: &Request, noted: &Noted) -> io::Result<Outcome> {
-        let Noted::Answered { status, message, seconds, calls, worst_norm_error, uploaded } = noted
+        let Noted::Answered { status, message, seconds, calls, worst_norm_error, footprint } =
+            noted
         else {
             return Err(io::Error::other("only an answer becomes an outcome"));
         };
@@ -375,7 +376,7 @@ impl Files {
                     calls: *calls,
                     worst_norm_error: worst_norm_error.is_finite().then_some(*worst_norm_error),
                 });
-                Outcome::Done(Answer { values, witness, uploaded: *uploaded, seconds: *seconds })
+                Outcome::Done(Answer { values, witness, footprint: *footprint, seconds: *seconds })
             }
             api::STATUS_ERROR => Outcome::Failed(message),
             api::STATUS_NOT_IMPLEMENTED => Outcome::NotImplemented(message),

@@ -4,6 +4,8 @@
 use std::sync::atomic::Ordering::{Relaxed, Release};
 use std::sync::atomic::{AtomicI32, AtomicU8, AtomicU32, AtomicU64};
 
+use basecode::gpu::Footprint;
+
 use crate::plugin::{MESSAGE_BYTES, WitnessState};
 
 /// Size of a record in bytes.
@@ -31,8 +33,13 @@ pub struct Record {
     length: AtomicU32,
     done: AtomicU32,
     total: AtomicU32,
+    /// One more than the bytes, so that 0 is not said.
     uploaded: AtomicU64,
-    _reserved: [AtomicU8; MESSAGE_AT - 48],
+    targets: AtomicU32,
+    fed: AtomicU32,
+    unfed: AtomicU32,
+    maps: AtomicU32,
+    _reserved: [AtomicU8; MESSAGE_AT - 64],
     message: [AtomicU8; MESSAGE_BYTES],
 }
 
@@ -56,9 +63,14 @@ impl Record {
         self.worst_norm_error.store(witness.worst_norm_error().to_bits(), Relaxed);
     }
 
-    /// Notes how many bytes were uploaded for a frame; one more than that, so that 0 is not said.
-    pub fn uploaded(&self, bytes: u64) {
-        self.uploaded.store(bytes.saturating_add(1), Relaxed);
+    /// Notes what a frame took.
+    pub fn footprint(&self, footprint: &Footprint) {
+        let Footprint { uploaded, targets, fed, unfed, maps } = *footprint;
+        self.uploaded.store(uploaded.saturating_add(1), Relaxed);
+        self.targets.store(targets, Relaxed);
+        self.fed.store(fed, Relaxed);
+        self.unfed.store(unfed, Relaxed);
+        self.maps.store(maps, Relaxed);
     }
 
     /// Notes the answer, the state last. A message that is too long is cut.
@@ -96,8 +108,8 @@ pub enum Noted {
         calls: u64,
         /// Largest | |w| - 1 |.
         worst_norm_error: f32,
-        /// Bytes uploaded for the last frame, if it is said.
-        uploaded: Option<u64>,
+        /// What the last frame took, if it is said.
+        footprint: Option<Footprint>,
     },
 }
 
@@ -124,7 +136,13 @@ impl Noted {
                     seconds: if seconds.is_finite() { seconds.max(0.0) } else { 0.0 },
                     calls: u64_at(16),
                     worst_norm_error: f32::from_bits(u32_at(24)),
-                    uploaded: u64_at(40).checked_sub(1),
+                    footprint: u64_at(40).checked_sub(1).map(|uploaded| Footprint {
+                        uploaded,
+                        targets: u32_at(48),
+                        fed: u32_at(52),
+                        unfed: u32_at(56),
+                        maps: u32_at(60),
+                    }),
                 }
             }
             _ => Self::NotStarted,
@@ -155,16 +173,17 @@ mod tests {
         record.progress(3, 9);
         assert_eq!(Noted::parse(&bytes(&record)), Noted::Started { rows: (3, 9) });
         record.answer(2, "task 1.2", 0.25);
-        let Noted::Answered { status, message, seconds, calls, worst_norm_error, uploaded } =
+        let Noted::Answered { status, message, seconds, calls, worst_norm_error, footprint } =
             Noted::parse(&bytes(&record))
         else {
             panic!("answered");
         };
         assert_eq!((status, message.as_str(), seconds), (2, "task 1.2", 0.25));
-        assert_eq!((calls, worst_norm_error, uploaded), (0, 0.0, None));
-        record.uploaded(0);
+        assert_eq!((calls, worst_norm_error, footprint), (0, 0.0, None));
+        let own = Footprint { uploaded: 0, targets: 7, fed: 8, unfed: 9, maps: 10 };
+        record.footprint(&own);
         let noted = Noted::parse(&bytes(&record));
-        assert!(matches!(noted, Noted::Answered { uploaded: Some(0), .. }));
+        assert!(matches!(noted, Noted::Answered { footprint, .. } if footprint == Some(own)));
     }
 
     #[test]

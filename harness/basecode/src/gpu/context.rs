@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::message::readable;
-use super::watched::Watch;
-use super::{Device, Layouts, Queue};
+use super::watched::{Footprint, Look, Watch};
+use super::{Device, EVERY_FRAGMENT, Layouts, OUTLINES, Queue, UNDRAWN_MAPS};
 use crate::{Error, Result};
 
 /// Which kind of adapter to draw with.
@@ -35,10 +35,6 @@ pub struct Gpu {
     trouble: Arc<Mutex<Trouble>>,
     watch: Arc<Watch>,
 }
-
-/// The name of no stage: what the host replaces under it holds a fragment entry point `umbra_shown`,
-/// by which all fragments of all pipelines are drawn.
-pub const EVERY_FRAGMENT: &str = "every.fs";
 
 /// What the graphics library says outside of any call.
 #[derive(Default)]
@@ -98,6 +94,7 @@ impl Gpu {
         let info = adapter.get_info();
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("umbra"),
+            required_features: adapter.features() & wgpu::Features::POLYGON_MODE_LINE,
             // Large films need more than the defaults; take all that the adapter has.
             required_limits: adapter.limits(),
             memory_hints: wgpu::MemoryHints::MemoryUsage,
@@ -154,10 +151,14 @@ impl Gpu {
     }
 
     /// Replaces the text of shader stages, by stage name (`simple.vs`, `diffuse.fs`, `phong.fs`).
-    /// [`EVERY_FRAGMENT`] replaces the fragment stages of pipelines that are made from then on.
+    /// [`EVERY_FRAGMENT`], [`OUTLINES`] and [`UNDRAWN_MAPS`] change pipelines that are made from then on.
     pub fn replace_stages(&mut self, stages: Vec<(String, String)>) {
-        let every = stages.iter().find(|(name, _)| name == EVERY_FRAGMENT);
-        self.watch.show(every.map(|(_, text)| text.clone()));
+        let find = |wanted: &str| stages.iter().find(|(name, _)| name == wanted);
+        self.watch.set_look(Look {
+            shown: find(EVERY_FRAGMENT).map(|(_, text)| text.clone()),
+            outlines: find(OUTLINES).is_some(),
+            undrawn_maps: find(UNDRAWN_MAPS).is_some(),
+        });
         self.stages = stages;
     }
 
@@ -169,9 +170,9 @@ impl Gpu {
         text.strip_prefix('\u{feff}').unwrap_or(text)
     }
 
-    /// Bytes that the CPU handed to the device since this was last asked.
-    pub fn take_uploaded(&self) -> u64 {
-        self.watch.take_uploaded()
+    /// What was handed to the device since this was last asked.
+    pub fn take_footprint(&self) -> Footprint {
+        self.watch.take_footprint()
     }
 
     /// Begins to record commands.

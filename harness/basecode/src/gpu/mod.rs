@@ -30,7 +30,7 @@ mod target;
 mod uniform;
 mod watched;
 
-pub use context::{AdapterKind, EVERY_FRAGMENT, Gpu};
+pub use context::{AdapterKind, Gpu};
 pub use contract::{
     FRAME_GROUP, FrameUniforms, MATERIAL_GROUP, MaterialUniforms, OBJECT_GROUP, ObjectUniforms,
     SHADOW_GROUP, SHADOW_LAYERS, ShadowUniforms, VERTEX_STRIDE,
@@ -41,7 +41,7 @@ pub use pipeline::{EMITTER_FS, Layouts, Stage};
 pub use shadow::ShadowMap;
 pub use target::{COLOR_FORMAT, DEPTH_FORMAT, Target};
 pub use uniform::Uniform;
-pub use watched::{Device, Queue};
+pub use watched::{Device, EVERY_FRAGMENT, Footprint, OUTLINES, Queue, UNDRAWN_MAPS};
 
 use crate::{Camera, Result};
 

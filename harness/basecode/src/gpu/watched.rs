@@ -1,56 +1,149 @@
 //! Device and queue as render passes get them: wgpu's own, with a look at what a frame is made of.
 //!
-//! Nothing is refused here. The host asks how much was uploaded for a frame, and may have every
-//! fragment drawn by an entry point of its own, whatever pipelines a renderer makes: what is drawn
-//! then shows which surfaces there are.
+//! Nothing is refused here. The host asks what a pass hands to the device for a frame, and may have
+//! pipelines made otherwise than they are asked for: what is drawn then shows how pictures come about.
 
+use std::fmt;
 use std::ops::Deref;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
+use serde::{Deserialize, Serialize};
 use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 
-/// Name of the entry point that the host's [`Watch::show`] must define.
-pub(super) const SHOWN: &str = "umbra_shown";
+use super::COLOR_FORMAT;
+
+/// The name of no stage: what the host replaces under it holds a fragment entry point `umbra_shown`,
+/// by which all fragments that end in a picture are drawn.
+pub const EVERY_FRAGMENT: &str = "every.fs";
+/// The name of no stage: where the host replaces it, only the outlines of triangles are drawn. What
+/// has no outlines on this device, fragments included, stays as it is.
+pub const OUTLINES: &str = "outlines";
+/// The name of no stage: where the host replaces it, what a pipeline draws beside the picture, such as
+/// a shadow map, leaves no trace.
+pub const UNDRAWN_MAPS: &str = "undrawn.maps";
+
+/// Name of the entry point in the text of [`EVERY_FRAGMENT`].
+const SHOWN: &str = "umbra_shown";
+
+/// Textures of this width [texels] are more than a place holder.
+const WIDE: u32 = 32;
+
+/// WGSL up to this length [bytes] is a program; what is longer is data.
+const LONG_WGSL: u64 = 64 << 10;
+
+/// What a pass handed to the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Footprint {
+    /// Bytes of buffers, textures and overlong shaders.
+    pub uploaded: u64,
+    /// Textures to draw into, 32 texels wide or more.
+    pub targets: u32,
+    /// Pipelines for pictures that take vertices.
+    pub fed: u32,
+    /// Pipelines for pictures that take none.
+    pub unfed: u32,
+    /// Pipelines that draw beside the picture, such as a shadow map.
+    pub maps: u32,
+}
+
+impl Footprint {
+    /// This and what came after it.
+    pub fn and(self, later: Self) -> Self {
+        Self {
+            uploaded: self.uploaded.saturating_add(later.uploaded),
+            targets: self.targets.saturating_add(later.targets),
+            fed: self.fed.saturating_add(later.fed),
+            unfed: self.unfed.saturating_add(later.unfed),
+            maps: self.maps.saturating_add(later.maps),
+        }
+    }
+}
+
+/// Reads what [`Footprint`] displays; of anything else nothing.
+impl std::str::FromStr for Footprint {
+    type Err = std::num::ParseIntError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let mut numbers = text.split(' ');
+        let mut next = || numbers.next().unwrap_or_default();
+        Ok(Self {
+            uploaded: next().parse()?,
+            targets: next().parse()?,
+            fed: next().parse()?,
+            unfed: next().parse()?,
+            maps: next().parse()?,
+        })
+    }
+}
+
+/// The numbers, as `draw_frame` tells the host.
+impl fmt::Display for Footprint {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { uploaded, targets, fed, unfed, maps } = self;
+        write!(f, "{uploaded} {targets} {fed} {unfed} {maps}")
+    }
+}
+
+/// How the host has pipelines made.
+#[derive(Clone, Default)]
+pub(super) struct Look {
+    /// The text of [`EVERY_FRAGMENT`].
+    pub shown: Option<String>,
+    /// [`OUTLINES`].
+    pub outlines: bool,
+    /// [`UNDRAWN_MAPS`].
+    pub undrawn_maps: bool,
+}
 
 /// What device and queue know together.
 #[derive(Default)]
 pub(super) struct Watch {
-    /// Bytes that the CPU handed to the device.
     uploaded: AtomicU64,
-    /// WGSL with the entry point [`SHOWN`] that all fragments are drawn by.
-    shown: Mutex<Option<String>>,
+    targets: AtomicU32,
+    fed: AtomicU32,
+    unfed: AtomicU32,
+    maps: AtomicU32,
+    look: Mutex<Look>,
 }
 
 impl Watch {
-    /// Has all fragments drawn by the entry point in `wgsl`, from the next module on; or none.
-    pub(super) fn show(&self, wgsl: Option<String>) {
-        if let Ok(mut shown) = self.shown.lock() {
-            *shown = wgsl;
+    /// Has modules and pipelines made so, from the next one on.
+    pub(super) fn set_look(&self, look: Look) {
+        if let Ok(mut current) = self.look.lock() {
+            *current = look;
         }
     }
 
-    /// Bytes uploaded since the last call.
-    pub(super) fn take_uploaded(&self) -> u64 {
-        self.uploaded.swap(0, Ordering::Relaxed)
+    /// What was handed over since the last call.
+    pub(super) fn take_footprint(&self) -> Footprint {
+        Footprint {
+            uploaded: self.uploaded.swap(0, Relaxed),
+            targets: self.targets.swap(0, Relaxed),
+            fed: self.fed.swap(0, Relaxed),
+            unfed: self.unfed.swap(0, Relaxed),
+            maps: self.maps.swap(0, Relaxed),
+        }
     }
 
     fn upload(&self, bytes: u64) {
-        self.uploaded.fetch_add(bytes, Ordering::Relaxed);
+        self.uploaded.fetch_add(bytes, Relaxed);
     }
 
-    fn shown(&self) -> Option<String> {
-        self.shown.lock().ok().and_then(|shown| shown.clone())
+    fn look(&self) -> Look {
+        self.look.lock().map(|look| look.clone()).unwrap_or_default()
     }
 }
 
 /// [`wgpu::Device`], which it stands for wherever one is wanted.
+#[derive(Clone)]
 pub struct Device {
     device: wgpu::Device,
     watch: Arc<Watch>,
 }
 
 /// [`wgpu::Queue`], which it stands for wherever one is wanted.
+#[derive(Clone)]
 pub struct Queue {
     queue: wgpu::Queue,
     watch: Arc<Watch>,
@@ -79,13 +172,13 @@ impl Device {
 
     /// As [`wgpu::Device::create_shader_module`].
     pub fn create_shader_module(&self, desc: wgpu::ShaderModuleDescriptor) -> wgpu::ShaderModule {
-        let wgpu::ShaderModuleDescriptor { label, source } = desc;
-        let source = match (source, self.watch.shown()) {
-            (wgpu::ShaderSource::Wgsl(text), Some(shown)) => {
-                wgpu::ShaderSource::Wgsl(format!("{text}\n{shown}\n").into())
+        let wgpu::ShaderModuleDescriptor { label, mut source } = desc;
+        if let wgpu::ShaderSource::Wgsl(text) = &mut source {
+            self.watch.upload((text.len() as u64).saturating_sub(LONG_WGSL));
+            if let Some(shown) = self.watch.look().shown {
+                *text = format!("{text}\n{shown}\n").into();
             }
-            (source, _) => source,
-        };
+        }
         self.device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source })
     }
 
@@ -94,11 +187,49 @@ impl Device {
         &self,
         desc: &wgpu::RenderPipelineDescriptor,
     ) -> wgpu::RenderPipeline {
+        let look = self.watch.look();
+        let targets: Vec<Option<wgpu::ColorTargetState>>;
         let mut desc = desc.clone();
-        if let Some(fragment) = desc.fragment.as_mut().filter(|_| self.watch.shown().is_some()) {
+        if !draws_picture(&desc) {
+            self.watch.maps.fetch_add(1, Relaxed);
+            if look.undrawn_maps {
+                if let Some(depth) = &mut desc.depth_stencil {
+                    depth.depth_write_enabled = Some(false);
+                    depth.depth_compare = Some(wgpu::CompareFunction::Never);
+                }
+                if let Some(fragment) = &mut desc.fragment {
+                    let unwritten = |target: &Option<wgpu::ColorTargetState>| {
+                        let write_mask = wgpu::ColorWrites::empty();
+                        target.clone().map(|target| wgpu::ColorTargetState { write_mask, ..target })
+                    };
+                    targets = fragment.targets.iter().map(unwritten).collect();
+                    fragment.targets = &targets;
+                }
+            }
+            return self.device.create_render_pipeline(&desc);
+        }
+        let fed = desc.vertex.buffers.iter().any(Option::is_some);
+        let pipelines = if fed { &self.watch.fed } else { &self.watch.unfed };
+        pipelines.fetch_add(1, Relaxed);
+        let outlined = self.device.features().contains(wgpu::Features::POLYGON_MODE_LINE);
+        if look.outlines && outlined {
+            desc.primitive.polygon_mode = wgpu::PolygonMode::Line;
+        }
+        if let Some(fragment) = &mut desc.fragment
+            && look.shown.is_some()
+            && (!look.outlines || outlined)
+        {
             fragment.entry_point = Some(SHOWN);
         }
         self.device.create_render_pipeline(&desc)
+    }
+
+    /// As [`wgpu::Device::create_texture`].
+    pub fn create_texture(&self, desc: &wgpu::TextureDescriptor) -> wgpu::Texture {
+        if desc.usage.contains(wgpu::TextureUsages::RENDER_ATTACHMENT) && desc.size.width >= WIDE {
+            self.watch.targets.fetch_add(1, Relaxed);
+        }
+        self.device.create_texture(desc)
     }
 
     /// As [`wgpu::Device::create_buffer`].
@@ -126,6 +257,12 @@ impl Device {
         self.watch.upload(data.len() as u64);
         self.device.create_texture_with_data(queue, desc, order, data)
     }
+}
+
+/// Whether a pipeline draws into a picture, by the format of its colours.
+fn draws_picture(desc: &wgpu::RenderPipelineDescriptor) -> bool {
+    let targets = desc.fragment.as_ref().map_or(&[][..], |fragment| fragment.targets);
+    targets.iter().flatten().any(|target| target.format == COLOR_FORMAT)
 }
 
 impl Queue {
