@@ -10,6 +10,7 @@ pub mod images;
 pub mod loops;
 pub mod physical;
 pub mod pixels;
+pub mod premultiplied;
 pub mod price;
 pub mod rays;
 pub mod shading;

@@ -38,7 +38,7 @@ pub fn price(
         let (x, y) = (index % image.width, index / image.width);
         let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
         let Some(point) = SurfacePoint::cast(scene, ray) else { continue };
-        points.push(shaded_point(scene, &point, &point_of(scene, &camera)));
+        points.push(seen_by_shader(scene, &camera, &point));
         for (list, (_, places)) in others.iter_mut().zip(&elsewhere) {
             list.push(shaded_point(scene, &point, places));
         }
@@ -88,6 +88,11 @@ fn elsewhere(scene: &Scene, camera: &Camera) -> Vec<(&'static str, Places)> {
         ("the light stands at the origin", Places { light: Vec3::ZERO, eye }),
         ("light and viewer are exchanged", Places { light: eye, eye: light }),
     ]
+}
+
+/// A point of a scene as a right shader sees it.
+pub fn seen_by_shader(scene: &Scene, camera: &Camera, point: &SurfacePoint) -> ShadedPoint {
+    shaded_point(scene, point, &point_of(scene, camera))
 }
 
 /// A point as a right shader sees it: textures are averages, mirrors a plain diffuse colour.

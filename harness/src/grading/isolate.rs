@@ -12,6 +12,7 @@ use super::draw::{Frame, STAGES, draw_each, draw_scenes, named};
 use super::seen;
 use super::stages::Stages;
 use crate::diagnosis::{Kind, Tile, View};
+use crate::evidence::premultiplied::Premultiplied;
 use crate::evidence::stages::{
     BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass, judge_vertex,
 };
@@ -40,24 +41,28 @@ pub fn isolate(
     fails: bool,
     tolerances: &Tolerances,
 ) -> Vec<Check> {
-    let shown = BoundValue::ALL
+    let bound_values_shown = BoundValue::ALL
         .map(|bound| named([VERTEX.to_owned(), bound.stage(false), bound.stage(true)]));
     let (swaps, sets) = swaps(stages);
     let is_right =
         |index, frames: &[Outcome]| pass_check(cases[index], frames).verdict == Verdict::Pass;
-    let passes = draw_scenes(asker, plugin, &under(cases, &shown), &is_right);
+    let passes = draw_scenes(asker, plugin, &under(cases, &bound_values_shown), &is_right);
     let mut swapped = draw_each(asker, None, &under(cases, &sets).concat()).into_iter();
-    let judged = cases.iter().zip(passes).flat_map(|(case, pass)| {
+    let mut shown = Shown::default();
+    let mut checks = Vec::new();
+    for (&case, pass) in cases.iter().zip(passes) {
         let swapped: Vec<Outcome> = swapped.by_ref().take(sets.len()).collect();
         let pass = match bound_values(case, &pass) {
             Ok(frames) => {
                 seen::pass(asker, case, &frames);
-                judge_bound(case, &frames)
+                let check = judge_bound(case, &frames);
+                shown.passes.push((case, frames));
+                check
             }
             Err(check) => *check,
         };
         let takes_ours = pass.verdict != Verdict::NotJudged;
-        let stage = |index: usize| {
+        let mut stage = |index: usize| {
             let (id, task) = CHECKS[index];
             let outcomes = match &swaps[index] {
                 Swap::Untouched if takes_ours || !stages.is_elsewhere(index) => {
@@ -90,6 +95,7 @@ pub fn isolate(
                 [image] => {
                     see_fragment(asker, case, image, index == 2);
                     seen::fragment(asker, case, image, index == 2);
+                    shown.fragments.push((case, index, image.clone()));
                     fragment(id, case, image, index == 2, tolerances)
                 }
                 _ => {
@@ -97,11 +103,64 @@ pub fn isolate(
                 }
             }
         };
-        let mut checks: Vec<Check> = (0..STAGES.len()).map(stage).collect();
-        checks.insert(0, pass);
+        checks.push(pass);
+        checks.extend((0..STAGES.len()).map(&mut stage));
+    }
+    checks.extend(shown.judge_premultiplied(tolerances));
+    checks
+}
+
+/// What pass and fragment stages show of scenes.
+#[derive(Default)]
+struct Shown<'a> {
+    passes: Vec<(&'a Case, Vec<(BoundValue, Image)>)>,
+    /// With the stage's index.
+    fragments: Vec<(&'a Case, usize, Image)>,
+}
+
+impl Shown<'_> {
+    /// The checks under each convention that the pass keeps on all scenes, and a fragment stage with it.
+    fn judge_premultiplied(&self, tolerances: &Tolerances) -> Vec<Check> {
+        let fits = |check: &Check| check.verdict != Verdict::Fail;
+        if self.passes.iter().all(|(case, frames)| fits(&judge_bound(case, frames))) {
+            return Vec::new();
+        }
+        let mut checks = Vec::new();
+        for convention in Premultiplied::all() {
+            let pass = self.passes.iter().map(|(case, frames)| {
+                let (scene, surface) = (&case.expected.scene, &case.small.surface);
+                let undone = |(bound, frame): &(BoundValue, Image)| {
+                    (*bound, convention.undone_bound(scene, surface, *bound, frame))
+                };
+                judge_bound(case, &frames.iter().map(undone).collect::<Vec<_>>())
+            });
+            let kept: Option<Vec<Check>> = pass.map(|check| Some(check).filter(fits)).collect();
+            let Some(kept) = kept else { continue };
+            let fragments: Vec<(usize, Check)> = self
+                .fragments
+                .iter()
+                .map(|(case, index, image)| {
+                    let (scene, surface) = (&case.expected.scene, &case.small.surface);
+                    let image = convention.undone_stage(scene, surface, image);
+                    (*index, fragment(CHECKS[*index].0, case, &image, *index == 2, tolerances))
+                })
+                .collect();
+            let keeps = |wanted: usize| {
+                let own = || fragments.iter().filter(|(index, _)| *index == wanted);
+                own().all(|(_, check)| fits(check))
+                    && own().any(|(_, check)| check.verdict == Verdict::Pass)
+            };
+            if keeps(1) || keeps(2) {
+                let name = convention.name();
+                let judged = kept.into_iter().chain(fragments.into_iter().map(|(_, check)| check));
+                checks.extend(judged.map(|check| {
+                    let summary = format!("{} (judged so: {name})", check.summary);
+                    Check { convention: name.clone(), summary, ..check }
+                }));
+            }
+        }
         checks
-    });
-    judged.collect()
+    }
 }
 
 /// The frames of each scene under all sets of stages.
