@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use umbra::build::{BuildOutcome, BuildReport, Recording, compile, default_limits};
+use umbra::grading::mend;
 use umbra::process::Limits;
 use umbra::worker::{BsdfQuery, BsdfSource, Job, Request, SceneRef, Supervisor};
 
@@ -180,4 +181,81 @@ pub fn light(gpu: &Gpu, position: Vec3) -> wgpu::Buffer {
 "#;
     let report = build_text(text, &default_limits());
     assert!(matches!(report.outcome, BuildOutcome::Built { .. }), "{:#?}", report.outcome);
+}
+
+/// A right renderer in which a file has a text instead of another; an empty file is not there.
+fn mend_with(changes: &[(&str, &str, &str)]) -> mend::Built {
+    let dir = tempfile::tempdir().unwrap();
+    let [src, out, copy] = ["src", "out", "copy"].map(|name| dir.path().join(name));
+    std::fs::create_dir(&out).unwrap();
+    let template = workspace().join("expected/a2/template");
+    for from in [&template, &workspace().join("samples/perfect/src")] {
+        for file in umbra::files::files_below(from).unwrap() {
+            let to = src.join(file.strip_prefix(from).unwrap());
+            std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+            std::fs::copy(file, to).unwrap();
+        }
+    }
+    for (file, from, to) in changes {
+        let path = src.join(file);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{file} holds no {from:?}");
+        let text = if from.is_empty() { String::new() } else { text.replacen(from, to, 1) };
+        if text.is_empty() {
+            std::fs::remove_file(path).unwrap();
+        } else {
+            std::fs::write(path, text).unwrap();
+        }
+    }
+    let supervisor = Supervisor::new(umbra().to_owned(), out.clone());
+    let cancel = AtomicBool::new(false);
+    let compile =
+        |src: &Path| compile(recording(), &supervisor, src, &out, &default_limits(), &cancel);
+    mend::build(&compile, &src, &template, &copy).unwrap()
+}
+
+#[test]
+fn what_the_compiler_refuses_is_the_templates_and_the_rest_is_built() {
+    let new =
+        ("bsdfs/phong.rs", "pub fn new(material: &Material)", "pub fn new(m: &Material, n: f32)");
+    let kinds: [(&[(&str, &str, &str)], &[&str]); 12] = [
+        // A type error, a file that is missing, one that does not parse.
+        (&[("bsdfs/phong.rs", "f * cos_i", "f + 1")], &["bsdfs/phong.rs"]),
+        (&[("bsdfs/phong.rs", "", "")], &["bsdfs/phong.rs"]),
+        (&[("integrators/simple.rs", "{", "(")], &["integrators/simple.rs"]),
+        (&[("renderpasses/simple.rs", "&self.frame.bind_group", "")], &["renderpasses/simple.rs"]),
+        // A stage that is included and missing.
+        (&[("shaders/phong.fs.wgsl", "", "")], &["shaders/phong.fs.wgsl"]),
+        // No `mod`; an error in lib.rs.
+        (&[("bsdfs/mod.rs", "mod phong;", "")], &["bsdfs/mod.rs"]),
+        (&[("lib.rs", "Ok(Self)", "Ok(1)")], &["lib.rs"]),
+        // A method that the trait does not have, and one that it wants.
+        (&[("bsdfs/phong.rs", "fn eval(", "fn pdf(")], &["bsdfs/phong.rs"]),
+        (&[("renderpasses/simple.rs", "fn draw(", "fn paint(")], &["renderpasses/simple.rs"]),
+        // Right in itself, but no longer what the template's own lines use.
+        (&[new], &["bsdfs/phong.rs"]),
+        (
+            &[(
+                "integrators/simple.rs",
+                "pub shadows: bool,",
+                "pub shadows: bool,\n    pub bias: f32,",
+            )],
+            &["integrators/simple.rs"],
+        ),
+        // Two at once.
+        (
+            &[("bsdfs/diffuse.rs", "impl Bsdf", "imp Bsdf"), ("renderer.rs", "use", "us")],
+            &["bsdfs/diffuse.rs", "renderer.rs"],
+        ),
+    ];
+    for (changes, expected) in kinds {
+        let built = mend_with(changes);
+        let replaced: Vec<&str> = built.replaced.keys().map(String::as_str).collect();
+        let is_built = matches!(built.report.outcome, BuildOutcome::Built { .. });
+        assert!(is_built && replaced == expected, "{changes:?}: {replaced:?} {:#?}", built.errors);
+        let rendered: Vec<&str> = built.errors.iter().map(|error| &*error.rendered).collect();
+        let rendered = rendered.concat();
+        assert!(rendered.contains("--> src/") && rendered.contains('^'), "{rendered}");
+        assert!(!rendered.contains(workspace().to_str().unwrap()), "{rendered}");
+    }
 }

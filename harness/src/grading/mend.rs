@@ -1,7 +1,7 @@
 //! A source that does not build: the files with errors are replaced by the template's, so that all
 //! else is graded as code.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
@@ -151,7 +151,11 @@ fn to_replace(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
         return Vec::new();
     };
     if template.join(&file).is_file() {
-        return Some(file).filter(known).into_iter().collect();
+        return match differs(&file, template, copy) && known(&file) {
+            true => vec![file],
+            // The template's own line is right as long as what it uses is.
+            false => culprits(error, template, copy).into_iter().filter(known).collect(),
+        };
     }
     let stem = Path::new(&file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let uses = |file: &String| {
@@ -163,6 +167,43 @@ fn to_replace(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
     files.filter(known).filter(uses).collect()
 }
 
+/// Whether a file is another than the template's of that name.
+fn differs(file: &str, template: &Path, copy: &Path) -> bool {
+    fs::read(copy.join(file)).ok() != fs::read(template.join(file)).ok()
+}
+
+/// The files other than the template's that an error in one of the template's lines comes from: those
+/// that it points at too, or else those that define, or are called, what it names.
+fn culprits(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
+    let lines = error.rendered.lines().map(str::trim_start);
+    let places = lines.filter_map(|line| {
+        let place = line.strip_prefix("--> ").or_else(|| line.strip_prefix("::: "))?;
+        below_src(place.split(':').next()?)
+    });
+    let mut pointed: Vec<String> = places.filter(|file| template.join(file).is_file()).collect();
+    pointed.retain(|file| differs(file, template, copy));
+    if !pointed.is_empty() {
+        return pointed;
+    }
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let quoted = error.rendered.split('`').skip(1).step_by(2);
+    let named: BTreeSet<&str> = quoted.flat_map(|name| name.split(|c: char| !is_word(c))).collect();
+    let is_named = |file: &String| {
+        let stem = Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
+        let text = fs::read_to_string(copy.join(file)).unwrap_or_default();
+        let words: Vec<&str> =
+            text.split(|c: char| !is_word(c)).filter(|w| !w.is_empty()).collect();
+        let defines = |pair: &[&str]| DEFINING.contains(&pair[0]) && named.contains(pair[1]);
+        named.contains(&*stem) || words.windows(2).any(defines)
+    };
+    let files = files_below(template).unwrap_or_default();
+    let files = files.iter().filter_map(|path| below(path.strip_prefix(template).ok()?));
+    files.filter(|file| differs(file, template, copy)).filter(is_named).collect()
+}
+
+/// What stands before a name that is defined.
+const DEFINING: [&str; 8] = ["struct", "enum", "trait", "fn", "type", "const", "static", "mod"];
+
 /// `lib.rs` says which modules there are: the template's is of use only where they are the same.
 fn may_be_replaced(file: &str, template: &Path, copy: &Path) -> bool {
     let modules = |folder: &Path| {
@@ -171,7 +212,7 @@ fn may_be_replaced(file: &str, template: &Path, copy: &Path) -> bool {
             let line = line.trim().trim_start_matches("pub ");
             Some(line.strip_prefix("mod ")?.strip_suffix(';')?.trim().to_owned())
         });
-        lines.collect::<std::collections::BTreeSet<String>>()
+        lines.collect::<BTreeSet<String>>()
     };
     file != "lib.rs" || modules(template) == modules(copy)
 }
@@ -326,6 +367,21 @@ mod tests {
         for file in ["", "src/../../etc/passwd", "/rustc/library/core.rs", "src/mine.rs"] {
             assert_eq!(of(error("wrong", file, "")), [""; 0]);
         }
+        // The template's own line is right: wrong is what it points at, or what it names.
+        let copy = tempfile::tempdir().expect("scratch");
+        let copy = copy.path();
+        write(copy, &TEMPLATE);
+        write(copy, &[("bsdfs/phong.rs", "pub struct Phong { n: f32 }")]);
+        let of =
+            |rendered: &str| to_replace(&error("wrong", "src/lib.rs", rendered), template, copy);
+        assert_eq!(
+            of("error: wrong\n --> src/lib.rs:7:1\nnote: here\n ::: src/bsdfs/phong.rs:1:2\n"),
+            ["bsdfs/phong.rs"]
+        );
+        assert_eq!(of("error: missing field `n` in initializer of `Phong`\n"), ["bsdfs/phong.rs"]);
+        assert_eq!(of("error: no `Lobe` in `bsdfs::phong`\n"), ["bsdfs/phong.rs"]);
+        assert_eq!(of("error: missing field `n` in initializer of `Lobe`\n"), [""; 0]);
+        let of = |error: Diagnostic| to_replace(&error, template, template);
         // One that the template lacks is the matter of those that name it.
         assert_eq!(of(error("wrong", "src/bsdfs/phong/lobe.rs", "")), [""; 0]);
         write(template, &[("bsdfs/phong.rs", "use lobe::peak;")]);

@@ -11,7 +11,7 @@ pub mod handed_in;
 mod isolate;
 mod kept;
 mod look;
-mod mend;
+pub mod mend;
 mod offline;
 mod pictures;
 mod pipeline;
