@@ -1,0 +1,7 @@
+//! Realtime drawing.
+
+mod normal;
+mod simple;
+
+pub use normal::NormalPass;
+pub use simple::SimplePass;
