@@ -444,8 +444,10 @@ typedef struct {
                                  UmbraPass *pass,
                                  UmbraMessage *message);
     /*
-     Draws one frame for a camera. With [`STATUS_OK`] the message may hold the number of bytes that were
-     uploaded to the device for it, in decimal digits.
+     Draws one frame for a camera. With [`STATUS_OK`] the message may tell what the pass handed to the
+     device from its opening to this frame, as five numbers in decimal digits with spaces between:
+     bytes uploaded, textures to draw into, pipelines for pictures that take vertices, pipelines for
+     pictures that take none, and other pipelines.
      */
     UmbraStatus (*draw_frame)(UmbraPass pass, const UmbraCameraValue *camera, UmbraMessage *message);
     /*
