@@ -183,8 +183,11 @@ pub fn light(gpu: &Gpu, position: Vec3) -> wgpu::Buffer {
     assert!(matches!(report.outcome, BuildOutcome::Built { .. }), "{:#?}", report.outcome);
 }
 
+/// A file, and what it has instead of a text.
+type Change<'a> = (&'a str, &'a str, &'a str);
+
 /// A right renderer in which a file has a text instead of another; an empty file is not there.
-fn mend_with(changes: &[(&str, &str, &str)]) -> mend::Built {
+fn mend_with(changes: &[Change]) -> mend::Built {
     let dir = tempfile::tempdir().unwrap();
     let [src, out, copy] = ["src", "out", "copy"].map(|name| dir.path().join(name));
     std::fs::create_dir(&out).unwrap();
@@ -218,7 +221,7 @@ fn mend_with(changes: &[(&str, &str, &str)]) -> mend::Built {
 fn what_the_compiler_refuses_is_the_templates_and_the_rest_is_built() {
     let new =
         ("bsdfs/phong.rs", "pub fn new(material: &Material)", "pub fn new(m: &Material, n: f32)");
-    let kinds: [(&[(&str, &str, &str)], &[&str]); 12] = [
+    let kinds: [(&[Change], &[&str]); 12] = [
         // A type error, a file that is missing, one that does not parse.
         (&[("bsdfs/phong.rs", "f * cos_i", "f + 1")], &["bsdfs/phong.rs"]),
         (&[("bsdfs/phong.rs", "", "")], &["bsdfs/phong.rs"]),

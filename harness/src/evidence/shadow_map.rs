@@ -31,8 +31,13 @@ pub fn set_apart(checks: &mut [Check]) {
     if !checks.iter().any(tells) {
         return;
     }
+    // What fails although the picture is right is not too dark.
+    let is_right = |check: &Check| {
+        !check.measures.is_empty() && check.measures.iter().all(|measure| measure.passed)
+    };
     for check in checks.iter_mut() {
-        if is_bonus(check) && check.verdict == Verdict::Fail && !tells(check) {
+        let dark = !tells(check) && !is_right(check);
+        if is_bonus(check) && check.verdict == Verdict::Fail && dark {
             check.verdict = Verdict::NotJudged;
             check.summary = format!(
                 "too dark to tell where shadows fall; another scene does ({})",
@@ -230,7 +235,13 @@ mod tests {
         };
         assert_eq!(verdicts(&[wrong.clone(), dark.clone()]), [Verdict::Fail, Verdict::NotJudged]);
         let probe = Check { id: "bonus.probe".to_owned(), ..dark.clone() };
-        assert_eq!(verdicts(&[wrong, probe]), [Verdict::Fail, Verdict::NotJudged]);
+        assert_eq!(verdicts(&[wrong, probe.clone()]), [Verdict::Fail, Verdict::NotJudged]);
+        let right = Check::new("bonus.image", "teapot", Verdict::Pass, "");
+        let no_map = Check {
+            measures: vec![Measure::at_most("image.interior", "pixels that differ", 0.0, 1.0)],
+            ..probe
+        };
+        assert_eq!(verdicts(&[right, no_map]), [Verdict::Pass, Verdict::Fail]);
         assert_eq!(verdicts(&[dark.clone(), dark]), [Verdict::Fail, Verdict::Fail]);
     }
 
