@@ -1,5 +1,7 @@
 //! The device, from outside. These tests need a graphics adapter, and fail where there is none.
 
+#![allow(clippy::unwrap_used)] // its helpers are tests too
+
 use basecode::gpu::{
     AdapterKind, DEPTH_FORMAT, EMITTER_FS, EVERY_FRAGMENT, Footprint, FrameUniforms, Gpu,
     MaterialUniforms, Mesh, OUTLINES, ObjectUniforms, ShadowMap, Stage, Target, UNDRAWN_MAPS,
