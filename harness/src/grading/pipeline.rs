@@ -604,5 +604,5 @@ fn config_check(validation: &Validation) -> Option<Check> {
     let slip = validation.findings.iter().find(|finding| own(finding) && finding.line.is_some())?;
     let line = slip.line.unwrap_or(1);
     let words = format!("{}:{line}: {}", intake::CONFIG_FILE, slip.message);
-    Some(Check::new(CONFIG, "", Verdict::Fail, words.clone()).with_hint(words))
+    Some(Check::new(CONFIG, "", Verdict::Fail, "config.json has a slip").with_hint(words))
 }
