@@ -6,9 +6,10 @@ use std::sync::LazyLock;
 use basecode::exr_io::{Precision, decode_exr, write_exr};
 use basecode::{Image, Vec3};
 use umbra::assignment::SceneEntry;
+use umbra::evidence::Check;
 use umbra::evidence::images::{self, Kind};
 use umbra::evidence::rays::RayBatch;
-use umbra::evidence::{Check, stages};
+use umbra::evidence::vertex::{VertexFilm, judge_vertex};
 use umbra::expected::{Expected, SurfaceBuffer, load_scene, regions};
 use umbra::grading::handed_in::{HandedIn, judge as judge_submitted};
 use umbra::grading::{Case, Drawn, ImageDigest, Small};
@@ -17,7 +18,7 @@ use umbra::imaging::metrics::Metrics;
 use umbra::imaging::noise::NoisyPixels;
 use umbra::imaging::pictures::{signed_error, tone_mapped};
 use umbra::imaging::reference::{ReferenceImage, RegionMask};
-use umbra::worker::CameraValue;
+use umbra::worker::{CameraValue, Matrices};
 
 const WIDTH: usize = 48;
 const HEIGHT: usize = 36;
@@ -81,8 +82,13 @@ static CASE: LazyLock<Case> = LazyLock::new(|| {
         unshadowed,
         unshadowed_mask,
     };
-    let camera =
-        CameraValue { eye: [0.0, 3.0, 5.0], at: [0.0; 3], up: [0.0, 1.0, 0.0], fov_y_deg: 50.0 };
+    let camera = CameraValue {
+        eye: [0.0, 3.0, 5.0],
+        at: [0.0; 3],
+        up: [0.0, 1.0, 0.0],
+        fov_y_deg: 50.0,
+        matrices: Matrices::Usual,
+    };
     Case {
         entry: SceneEntry {
             name: "a".into(),
@@ -137,7 +143,8 @@ pub fn judge(bytes: &[u8]) {
     }
     let Small { surface, mask, .. } = &case.small;
     let camera = case.expected.scene.camera(WIDTH, HEIGHT).expect("a camera");
-    check(&[stages::judge_vertex("a", &camera, surface, mask, &image, &image)]);
+    let film = VertexFilm { scene: &case.expected.scene, camera, surface, mask };
+    check(&[judge_vertex("a", &film, [[&image, &image]; 3])]);
     ImageDigest::new("a", "a.exr", &image);
     let (reference, mask) = (&case.expected.offline.mean, &case.expected.offline.mask);
     let scale = case.expected.offline.median_lit;

@@ -41,10 +41,8 @@ fn build_text(text: &str, limits: &Limits) -> BuildReport {
 
 #[test]
 fn a_recording_is_made_once_and_stages_nothing_but_the_closure() {
-    let begin = std::time::Instant::now();
     let again = Recording::obtain(workspace(), umbra()).unwrap();
     assert_eq!(&again, recording());
-    assert!(begin.elapsed().as_secs() < 100);
     let names: Vec<String> = std::fs::read_dir(&again.closure)
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())

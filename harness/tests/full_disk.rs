@@ -94,7 +94,13 @@ fn a_worker_that_cannot_run_for_want_of_space_costs_nothing() {
     let mut request = request;
     if let Request::RenderRealtime { cameras, .. } = &mut request {
         let (eye, at, up) = ([0.0, 1.0, 5.0], [0.0; 3], [0.0, 1.0, 0.0]);
-        cameras.push(umbra::worker::CameraValue { eye, at, up, fov_y_deg: 40.0 });
+        cameras.push(umbra::worker::CameraValue {
+            eye,
+            at,
+            up,
+            fov_y_deg: 40.0,
+            matrices: Default::default(),
+        });
     }
     let job = Job { plugin: None, requests: vec![request] };
     let limits = Assignment::load(root()).unwrap().limits.run;

@@ -349,6 +349,7 @@ fn the_reference_draws_the_same_bits_inside_and_outside() {
             at: [0.0, 1.0, 0.0],
             up: [0.0, 1.0, 0.0],
             fov_y_deg: 20.0,
+            matrices: umbra::worker::Matrices::Usual,
         }],
     };
     let requests = [

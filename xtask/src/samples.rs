@@ -349,12 +349,7 @@ impl Packer {
                 shadow_map: config.bonus,
                 adapter: Adapter { kind: AdapterKind::Software, name: String::new() },
                 stages: Vec::new(),
-                cameras: vec![CameraValue {
-                    eye: camera.eye.into(),
-                    at: camera.at.into(),
-                    up: camera.up.into(),
-                    fov_y_deg: camera.fov_y_deg,
-                }],
+                cameras: vec![CameraValue::from(camera)],
             }
         } else {
             Request::RenderOffline {

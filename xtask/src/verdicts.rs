@@ -42,10 +42,10 @@ const SMALL_FILM: [u32; 2] = [128, 96];
 /// What `xtask verdicts` is told.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Grade only mistakes, pairs, variants and samples whose name holds this; `plain` for the
+    /// Grade only mistakes, pairs, variants and samples whose name holds this (repeatable); `plain` for the
     /// reference, `unseen scenes` for what confirms the thresholds
     #[arg(long, value_name = "NAME")]
-    only: Option<String>,
+    only: Vec<String>,
     /// Scenes on their own films; without it the large ones are drawn at 128x96
     #[arg(long)]
     full: bool,
@@ -54,8 +54,8 @@ pub struct Arguments {
     /// offline or realtime, that it can show on
     #[arg(long, conflicts_with = "full")]
     quick: bool,
-    /// Grade every mistake alone and write what it costs to this file, nothing else
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["quick", "only"])]
+    /// Grade mistakes alone and write what they cost to this file, nothing else
+    #[arg(long, value_name = "FILE", conflicts_with = "quick")]
     table: Option<PathBuf>,
     /// Print the evidence behind every point lost
     #[arg(long)]
@@ -121,7 +121,9 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         plain: Vec::new(),
     };
     let jobs = arguments.jobs.unwrap_or(cores + 1).max(1);
-    let named = |name: &str| arguments.only.as_ref().is_none_or(|only| name.contains(only));
+    let named = |name: &str| {
+        arguments.only.is_empty() || arguments.only.iter().any(|only| name.contains(only.as_str()))
+    };
     let chosen = |subjects: Vec<Subject>| {
         subjects.into_iter().filter(|subject| named(&subject.name())).collect::<Vec<_>>()
     };
@@ -131,7 +133,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         bench.grade_plain()?;
     }
     if let Some(file) = &arguments.table {
-        let singles = bench.grade_all(&singles(&catalogue), jobs)?;
+        let singles = bench.grade_all(&chosen(singles(&catalogue)), jobs)?;
         std::fs::write(file, price::table(&catalogue, &singles))
             .with_context(|| file.display().to_string())?;
         return summary(&[figures::singles(&singles), figures::prices(&singles)]);
@@ -167,7 +169,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
     figures.extend(together.figures(&bench, &catalogue, &matrix.singles, jobs)?);
     let rules = deletion::figure(&matrix, &assignment.rules);
     // Some rules show in pairs alone, some in right variants.
-    if arguments.only.is_none() && !arguments.quick {
+    if arguments.only.is_empty() && !arguments.quick {
         figures.push(rules);
     }
     let unseen = named(confirm::NAME) && arguments.perturb.is_none();

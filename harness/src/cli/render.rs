@@ -216,7 +216,8 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     };
     let request = if config.realtime {
         let shadow_map = arguments.shadows.map_or(config.bonus, |Switch(on)| on);
-        let (adapter, cameras) = (arguments.adapter.adapter(), vec![camera_of(&config)]);
+        let (adapter, cameras) =
+            (arguments.adapter.adapter(), vec![CameraValue::from(config.camera)]);
         Request::RenderRealtime {
             scene,
             width,
@@ -319,17 +320,6 @@ fn own_seed(file: &Path) -> Option<u64> {
     let configs = file.ancestors().skip(1).take(2).map(|folder| folder.join("config.json"));
     let mut found = configs.filter_map(|path| std::fs::read(path).ok());
     found.find_map(|bytes| HandInConfig::parse(&bytes).0.sampler_seed())
-}
-
-/// The camera of a scene file, as workers are told.
-pub fn camera_of(config: &SceneConfig) -> CameraValue {
-    let camera = &config.camera;
-    CameraValue {
-        eye: camera.eye.into(),
-        at: camera.at.into(),
-        up: camera.up.into(),
-        fov_y_deg: camera.fov_y_deg,
-    }
 }
 
 #[cfg(test)]

@@ -302,6 +302,7 @@ pub fn judge(
         answers.price(None)
     });
     check.error = price.map_or(0.0, |price| price.error);
+    check.mistake = price.map_or_else(String::new, |price| price.name());
     let of_shape = probes.iter().any(|probe| probe.query.source == api::BSDF_OF_SHAPE);
     let rule = if of_shape { "bsdf.textured" } else { "bsdf.value" };
     check.measures = vec![

@@ -33,6 +33,9 @@ pub struct Check {
     /// explains it (`evidence::price`), if that is less.
     #[serde(deserialize_with = "or_nan")]
     pub error: f64,
+    /// The single mistake that explains the answer best; empty where none does better than nothing.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub mistake: String,
     /// One sentence: what was found, where, expected and actual.
     pub summary: String,
     /// What may be the cause, in a few words; empty when there is nothing to say.
@@ -64,11 +67,12 @@ pub enum Verdict {
 }
 
 /// Every rule that can fail a check, by what judges: one or several of them make up a check.
-pub const RULES: [&str; 28] = [
+pub const RULES: [&str; 29] = [
     "bsdf.value",
     "bsdf.textured",
     "rays.lit",
     "rays.black",
+    "rays.material",
     "shadow.lit",
     "shadow.dark",
     "loop.agreement",
@@ -133,6 +137,7 @@ impl Check {
             weight: 1.0,
             verdict,
             error: if verdict == Verdict::Pass { 0.0 } else { 1.0 },
+            mistake: String::new(),
             summary: summary.into(),
             hint: String::new(),
             private: String::new(),

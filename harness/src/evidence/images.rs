@@ -2,7 +2,8 @@
 
 use basecode::Image;
 
-use super::{Check, Measure, Verdict};
+use super::price::Price;
+use super::{Check, Measure, Verdict, loops};
 use crate::expected::Expected;
 use crate::imaging::compare::{compare_offline, compare_realtime_linear, compare_srgb8};
 use crate::imaging::evidence::{CompareError, ImageEvidence, Tolerances};
@@ -79,6 +80,20 @@ pub fn judge(
         }
         Err(error) => Check::new(id, scene, Verdict::NotJudged, error.to_string()),
     }
+}
+
+/// What an image costs that is `raw` off: a slip in how it is written explains it, or nothing.
+pub fn film_price(image: &Image, right: &Image, mask: &RegionMask, raw: f64) -> Price {
+    let colours = |image: &Image| image.pixels.iter().map(|p| p.to_array()).collect::<Vec<_>>();
+    let room = |index: usize| {
+        let never = RegionMask::EDGE | RegionMask::EMITTER;
+        (mask.pixels[index] & never == 0).then_some(0.0)
+    };
+    let size = (image.width, image.height);
+    if size != (right.width, right.height) {
+        return Price::of_raw(raw);
+    }
+    loops::film_price(size, &colours(image), &colours(right), &room, raw)
 }
 
 /// Whether two images of one scene come from one renderer: equal within noise offline, within a

@@ -1,7 +1,7 @@
 //! Part 1.3: the render loop, apart from what it shades. A render must be what the renderer's own
 //! integrator answers along rays of the host's choice, right or wrong.
 
-use super::price::{Class, Price};
+use super::price::{self, Class, Price};
 use super::rays::{RELATIVE, STRAY_FRACTION};
 use super::{Check, Measure, Verdict};
 use crate::imaging::reference::RegionMask;
@@ -75,71 +75,175 @@ pub fn judge_agreement(
             let room = |index: usize| inside(index).then_some(0.0);
             let price = film_price(size, image, rays, &room, apart / total);
             measures.extend(price.measure());
-            Check { error: price.error, ..Check::new(id, scene, Verdict::Fail, summary) }
-                .with_hint(hint)
+            Check {
+                error: price.error,
+                mistake: price.name(),
+                ..Check::new(id, scene, Verdict::Fail, summary)
+            }
+            .with_hint(hint)
         }
     };
     check.measures = measures;
     check
 }
 
-/// One slip in how an image is written: its name, how it scales noise, what it makes of right pixels.
-type Change<'a> = (&'static str, f32, Box<dyn Fn(usize) -> [f32; 3] + 'a>);
-
-/// The slips that are looked for; `right` is what each pixel should be.
-fn changes<'a>(
-    (width, height): (usize, usize),
-    right: &'a [[f32; 3]],
-    factor: f32,
-) -> Vec<Change<'a>> {
-    let at = move |x: usize, y: usize| right[y.min(height - 1) * width + x.min(width - 1)];
-    let turned = |name, from: fn(usize, usize, usize, usize) -> (usize, usize)| -> Change<'a> {
-        let value = move |index: usize| {
-            let (x, y) = from(index % width, index / width, width, height);
-            at(x, y)
-        };
-        (name, 1.0, Box::new(value))
-    };
-    let each = |name, change: fn(f32) -> f32| -> Change<'a> {
-        (name, 1.0, Box::new(move |index: usize| right[index].map(change)))
-    };
-    // Half a pixel beside, toward each corner: the mean of four pixels.
-    let beside = |name, dx: usize, dy: usize| -> Change<'a> {
-        let value = move |index: usize| {
-            let (x, y) = (index % width + dx, index / width + dy);
-            let four = [(x, y), (x.saturating_sub(1), y), (x, y.saturating_sub(1))];
-            let last = (x.saturating_sub(1), y.saturating_sub(1));
-            let four = [four[0], four[1], four[2], last].map(|(x, y)| at(x, y));
-            std::array::from_fn(|c| four.iter().map(|value| value[c]).sum::<f32>() / 4.0)
-        };
-        (name, 1.0, Box::new(value))
-    };
-    let mut changes = vec![
-        turned("rows from bottom to top", |x, y, _, height| (x, height - 1 - y)),
-        turned("columns from right to left", |x, y, width, _| (width - 1 - x, y)),
-        turned("turned by half", |x, y, width, height| (width - 1 - x, height - 1 - y)),
-        // Written as rows of the other length.
-        turned("rows and columns exchanged", |x, y, width, height| {
-            let index = y * width + x;
-            (index / height, index % height)
-        }),
-        each("clamped to 1", |v| v.clamp(0.0, 1.0)),
-        each("gamma baked in", |v| v.max(0.0).powf(1.0 / 2.2)),
-        each("magnitude", f32::abs),
-        beside("half a pixel beside", 0, 0),
-        beside("half a pixel beside", 1, 0),
-        beside("half a pixel beside", 0, 1),
-        beside("half a pixel beside", 1, 1),
-    ];
-    let value = move |index: usize| right[index].map(|v| factor * v);
-    changes.push(("a constant factor", factor.abs().max(1.0), Box::new(value)));
-    changes
+/// A slip in how an image is written.
+struct Change<'a> {
+    name: &'static str,
+    /// The largest value that right noise is multiplied by.
+    noise: f32,
+    /// The least and the largest value that each pixel shows then; nothing where none is known.
+    value: Box<dyn Fn(usize) -> Option<[[f32; 3]; 2]> + 'a>,
 }
+
+/// What each pixel should be.
+#[derive(Clone, Copy)]
+struct Film<'a> {
+    width: usize,
+    height: usize,
+    pixels: &'a [[f32; 3]],
+    /// Whether an edge runs through a pixel: what lies between it and the next is not known.
+    edge: &'a dyn Fn(usize) -> bool,
+}
+
+impl<'a> Film<'a> {
+    fn at(&self, x: usize, y: usize) -> [f32; 3] {
+        self.pixels[y.min(self.height - 1) * self.width + x.min(self.width - 1)]
+    }
+
+    /// The least and the largest values of the pixels whose centres are nearest around a place
+    /// [pixels]: two each way. Nothing outside the film.
+    fn around(&self, x: f64, y: f64) -> Option<[[f32; 3]; 2]> {
+        let inside = |v: f64, size: usize| v > -1.0 && v < size as f64;
+        if !(inside(x, self.width) && inside(y, self.height)) {
+            return None;
+        }
+        let (mut least, mut most) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for dy in -1..=1 {
+            for dx in -1..=1 {
+                let near = |v: f64, d: i32| (v.round() + f64::from(d)).max(0.0);
+                let (px, py) = (near(x, dx), near(y, dy));
+                if (px - x).abs() > 1.0 || (py - y).abs() > 1.0 {
+                    continue;
+                }
+                let (px, py) = (px as usize, py as usize);
+                if (self.edge)(py.min(self.height - 1) * self.width + px.min(self.width - 1)) {
+                    return None;
+                }
+                let value = self.at(px, py);
+                for c in 0..3 {
+                    least[c] = least[c].min(value[c]);
+                    most[c] = most[c].max(value[c]);
+                }
+            }
+        }
+        // Between the pixels light may be a little brighter or darker than at each.
+        for c in 0..3 {
+            let more = BETWEEN * (most[c] - least[c]);
+            (least[c], most[c]) = (least[c] - more, most[c] + more);
+        }
+        Some([least, most])
+    }
+
+    /// Each pixel shows what belongs to another place: `from` of its column and row [pixels].
+    fn moved(self, name: &'static str, from: impl Fn(f64, f64) -> (f64, f64) + 'a) -> Change<'a> {
+        let value = move |index: usize| {
+            let (x, y) = from((index % self.width) as f64, (index / self.width) as f64);
+            self.around(x, y)
+        };
+        Change { name, noise: 1.0, value: Box::new(value) }
+    }
+
+    /// Each pixel shows a function of what it should be.
+    fn changed(
+        self,
+        name: &'static str,
+        noise: f32,
+        change: impl Fn([f32; 3]) -> [f32; 3] + 'a,
+    ) -> Change<'a> {
+        let value = move |index: usize| Some([change(self.pixels[index]); 2]);
+        Change { name, noise, value: Box::new(value) }
+    }
+
+    /// The slips that are looked for; `factor` is what most pixels are multiplied by.
+    fn changes(self, factor: f32) -> Vec<Change<'a>> {
+        let (width, height) = (self.width as f64, self.height as f64);
+        let (last_x, last_y) = (width - 1.0, height - 1.0);
+        let mut changes = vec![
+            self.changed("a constant factor", factor.abs().max(1.0), move |v| {
+                v.map(|v| factor * v)
+            }),
+            self.changed("clamped to 1", 1.0, |v| v.map(|v| v.clamp(0.0, 1.0))),
+            self.changed("gamma baked in", 1.0, |v| v.map(|v| v.max(0.0).powf(1.0 / 2.2))),
+            self.changed("sRGB baked in", 1.0, |v| v.map(srgb)),
+            self.changed("gamma taken out", 1.0, |v| v.map(|v| v.max(0.0).powf(2.2))),
+            self.changed("tone mapped", 1.0, |v| v.map(|v| v / (1.0 + v.max(0.0)))),
+            self.changed("tone mapped", 1.0, |v| v.map(|v| 1.0 - (-v).exp())),
+            self.changed("magnitude", 1.0, |v| v.map(f32::abs)),
+            self.moved("rows from bottom to top", move |x, y| (x, last_y - y)),
+            self.moved("columns from right to left", move |x, y| (last_x - x, y)),
+            self.moved("turned by half", move |x, y| (last_x - x, last_y - y)),
+            self.moved("turned by a quarter", move |x, y| (y, last_y - x)),
+            self.moved("turned by a quarter the other way", move |x, y| (last_x - y, x)),
+            self.moved("rows and columns exchanged", |x, y| (y, x)),
+            // Written as rows of the other length.
+            self.moved("rows and columns exchanged in memory", move |x, y| {
+                let index = y * width + x;
+                (index % height, (index / height).floor())
+            }),
+            self.moved("rows and columns exchanged in memory", move |x, y| {
+                let index = y * width + x;
+                ((index / height).floor(), index % height)
+            }),
+        ];
+        for [r, g, b] in [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]] {
+            changes.push(self.changed("channels exchanged", 1.0, move |v| [v[r], v[g], v[b]]));
+        }
+        for (dx, dy) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
+            changes.push(self.moved("a pixel beside", move |x, y| (x + dx, y + dy)));
+        }
+        for (dx, dy) in [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)] {
+            changes.push(self.moved("half a pixel beside", move |x, y| (x + dx, y + dy)));
+        }
+        let (centre_x, centre_y) = (0.5 * last_x, 0.5 * last_y);
+        let zoomed = |name, by_x: f64, by_y: f64| {
+            let from = move |x: f64, y: f64| {
+                (centre_x + by_x * (x - centre_x), centre_y + by_y * (y - centre_y))
+            };
+            self.moved(name, from)
+        };
+        let aspect = width / height;
+        for by in [aspect, 1.0 / aspect] {
+            changes.push(zoomed("the field of view is that of the other axis", by, by));
+            changes.push(zoomed("the aspect ratio is missing", by, 1.0));
+            changes.push(zoomed("the aspect ratio is missing", 1.0, by));
+        }
+        // Half an angle, a whole one, degrees of another: within an eighth of any.
+        changes.extend((-24..=24).filter(|step| *step != 0).map(|step: i32| {
+            let by = 2f64.powf(f64::from(step) / 16.0);
+            zoomed("another field of view", by, by)
+        }));
+        changes
+    }
+}
+
+/// The sRGB curve, for radiance in [0, 1] and beyond.
+fn srgb(v: f32) -> f32 {
+    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// By how much of what pixels around a place differ it may lie outside of them.
+const BETWEEN: f32 = 0.25;
+/// So much of the film, at least, must be known to tell a slip.
+const KNOWN: f64 = 0.1;
+
+/// So many pixels are looked at.
+const PRICED: usize = 6000;
 
 /// What an image costs that is not what it should be: a slip in how it is written explains it, or
 /// nothing. `room` is how far a pixel may be off, where it tells anything.
-fn film_price(
-    size: (usize, usize),
+pub fn film_price(
+    (width, height): (usize, usize),
     image: &[[f32; 3]],
     right: &[[f32; 3]],
     room: &dyn Fn(usize) -> Option<f32>,
@@ -147,23 +251,37 @@ fn film_price(
 ) -> Price {
     // Nothing is drawn: no slip explains that.
     let Some(factor) = factor(image, right) else { return Price::of_raw(raw) };
-    let changes = changes(size, right, factor);
-    changes.iter().fold(Price::of_raw(raw), |price, (name, noise, value)| {
+    let edge = |index: usize| room(index).is_none();
+    let film = Film { width, height, pixels: right, edge: &edge };
+    let step = image.len().div_ceil(PRICED).max(1);
+    // What is drawn is an image, of whatever.
+    let start = Price::of_raw(raw).or(price::UNKNOWN, Class::Unknown, 0.0);
+    film.changes(factor).iter().fold(start, |price, change| {
         let (mut apart, mut total) = (0.0, 0.0);
-        for (index, a) in image.iter().enumerate() {
+        let (mut all, mut known) = (0usize, 0usize);
+        for (index, a) in image.iter().enumerate().step_by(step) {
             let Some(room) = room(index) else { continue };
-            for (a, b) in a.iter().zip(value(index)) {
-                let difference = (a - b).abs();
-                total += if b.is_finite() { f64::from(b.abs()) } else { 0.0 };
-                if a.is_finite()
-                    && b.is_finite()
-                    && difference > noise * room + RELATIVE as f32 * b.abs()
-                {
-                    apart += f64::from(difference);
+            all += 1;
+            let Some([least, most]) = (change.value)(index) else { continue };
+            known += 1;
+            for ((&a, least), most) in a.iter().zip(least).zip(most) {
+                if !(least.is_finite() && most.is_finite()) {
+                    continue;
                 }
+                let size = f64::from(least.abs().max(most.abs()));
+                total += size;
+                let difference = match a.is_finite() {
+                    true => f64::from((least - a).max(a - most).max(0.0)),
+                    false => size,
+                };
+                let room = f64::from(change.noise * room) + RELATIVE * size;
+                apart += if difference > room { difference } else { 0.0 };
             }
         }
-        price.or(name, Class::Slip, apart / total.max(f64::MIN_POSITIVE))
+        if (known as f64) < KNOWN * all as f64 {
+            return price;
+        }
+        price.or(change.name, Class::Slip, apart / total.max(f64::MIN_POSITIVE))
     })
 }
 
@@ -256,20 +374,17 @@ impl Pixel {
         self.range > 0.2 * typical
     }
 
-    /// In which of four directions an edge's brightness rises most: along x, along y, along the
-    /// diagonal on which x and y grow together, along the other.
+    /// In which of [`DIRECTIONS`] an edge's brightness rises or falls most.
     fn direction(&self) -> usize {
         let [x, y] = self.slope;
-        let (long, short) = (x.abs().max(y.abs()), x.abs().min(y.abs()));
-        // tan 22.5 degrees.
-        match short > 0.4142 * long {
-            true if x * y > 0.0 => 2,
-            true => 3,
-            false => usize::from(y.abs() > x.abs()),
-        }
+        let turns = y.atan2(x) / std::f64::consts::PI;
+        (turns * DIRECTIONS as f64).round().rem_euclid(DIRECTIONS as f64) as usize
     }
 }
 
+/// Edges are told apart by direction, half a turn in so many steps: where both axes have the same
+/// number, all samples lie on one side of the edges of one direction.
+const DIRECTIONS: usize = 8;
 /// Variance over squared range, at least, where an edge leaves a tenth of the pixel on either side.
 const EDGE_VARIANCE: f64 = 0.1;
 /// A pixel is off from this many standard errors on.
@@ -295,7 +410,7 @@ pub fn judge_samples(
     film: &SampledFilm,
     image: &[[f32; 3]],
     rays: &[[f32; 3]],
-) -> Check {
+) -> (Check, Edges) {
     let id = "loop.samples";
     let per = RAYS as usize;
     let (width, height) = (film.width as usize, film.height as usize);
@@ -308,7 +423,7 @@ pub fn judge_samples(
     means.sort_by(f64::total_cmp);
     let Some(&typical) = means.get(means.len() / 2) else {
         let summary = "radiance along rays is black: there is nothing to agree with";
-        return Check::new(id, scene, Verdict::NotJudged, summary);
+        return (Check::new(id, scene, Verdict::NotJudged, summary), Edges::default());
     };
     // Both the image's samples and the rays scatter.
     let both = 2.0 / f64::from(SAMPLES);
@@ -325,7 +440,7 @@ pub fn judge_samples(
     let (mut counted, mut off, mut inside) = (0usize, 0usize, 0usize);
     let (mut apart, mut total) = (0.0, 0.0);
     let mut first = None;
-    let mut edges = [(0usize, 0.0); 4];
+    let mut edges = Edges::default();
     let (mut bias, mut edge_count) = (0.0, 0usize);
     for (index, pixel) in own.iter().enumerate() {
         let Some(pixel) = pixel else { continue };
@@ -343,17 +458,13 @@ pub fn judge_samples(
         }
         if pixel.is_edge(typical) {
             let z = difference / (around(index) * both).sqrt();
-            let (count, squares) = &mut edges[pixel.direction()];
+            let (count, squares) = &mut edges.0[pixel.direction()];
             (*count, *squares) = (*count + 1, *squares + z * z);
             (bias, edge_count) = (bias + z, edge_count + 1);
         }
     }
     let off_fraction = off as f64 / counted as f64;
-    let ratio = |(count, squares): &(usize, f64)| squares / *count as f64;
-    let told = edges.iter().filter(|(count, _)| *count >= LEAST_EDGES);
-    let all = edges.iter().fold((0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
-    let told = told.chain([&all].into_iter().filter(|all| all.0 >= LEAST_EDGES));
-    let worst = told.map(ratio).fold(0.0, f64::max);
+    let worst = edges.worst();
     let bias = if edge_count < LEAST_EDGES { 0.0 } else { bias.abs() / (edge_count as f64).sqrt() };
     let mut measures = vec![
         Measure::at_most(
@@ -380,7 +491,7 @@ pub fn judge_samples(
         let summary = format!(
             "{SAMPLES} samples a pixel average what the integrator answers at {counted} pixels"
         );
-        return Check { measures, ..Check::new(id, scene, Verdict::Pass, summary) };
+        return (Check { measures, ..Check::new(id, scene, Verdict::Pass, summary) }, edges);
     }
     let summary = match first.filter(|_| !pixels) {
         Some((index, found, mean)) => format!(
@@ -424,8 +535,46 @@ pub fn judge_samples(
         price = film_price((width, height), image, &means, &room, raw);
     }
     measures.extend(price.measure());
-    Check { error: price.error, measures, ..Check::new(id, scene, Verdict::Fail, summary) }
-        .with_hint(hint)
+    let check = Check::new(id, scene, Verdict::Fail, summary).with_hint(hint);
+    (Check { error: price.error, mistake: price.name(), measures, ..check }, edges)
+}
+
+/// What the edges of all scenes tell together: each alone has few of most directions.
+pub fn judge_edges(edges: &Edges) -> Check {
+    let id = "loop.samples";
+    let name = "mean square error on the edges of one direction over that of independent samples";
+    let measure = Measure::at_most("loop.edges", name, edges.worst(), EDGE_RATIO);
+    if measure.passed {
+        let summary = "samples spread over their pixels in every direction";
+        return Check { measures: vec![measure], ..Check::new(id, "", Verdict::Pass, summary) };
+    }
+    let summary = format!(
+        "edges of one direction are {:.1} times as far off as {SAMPLES} independent samples a pixel would leave them",
+        measure.value
+    );
+    let check = Check::new(id, "", Verdict::Fail, summary);
+    let check = Check { error: Class::Slip.price(), measures: vec![measure], ..check };
+    check.with_hint("look at whether both axes have random numbers of their own")
+}
+
+/// How far off the pixels on edges are, by direction: how many, and the sum of their squared z.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Edges([(usize, f64); DIRECTIONS]);
+
+impl Edges {
+    /// Adds those of another scene.
+    pub fn add(&mut self, other: &Self) {
+        for (own, other) in self.0.iter_mut().zip(other.0) {
+            *own = (own.0 + other.0, own.1 + other.1);
+        }
+    }
+
+    /// The largest mean of any direction, or of all, that has enough pixels.
+    fn worst(&self) -> f64 {
+        let all = self.0.iter().fold((0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+        let told = self.0.iter().chain([&all]).filter(|(count, _)| *count >= LEAST_EDGES);
+        told.map(|(count, squares)| squares / *count as f64).fold(0.0, f64::max)
+    }
 }
 
 #[cfg(test)]

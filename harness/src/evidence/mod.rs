@@ -16,5 +16,6 @@ pub mod rays;
 pub mod shading;
 pub mod shadow_map;
 pub mod stages;
+pub mod vertex;
 
 pub use check::{Check, Evidence, Measure, Picture, RULES, Verdict};

@@ -3,7 +3,7 @@
 use basecode::{Camera, Frame, Image, MaterialModel, Scene, Vec3};
 use renderer_api as api;
 
-use super::price::{Answers, Class, Price, shader_changes};
+use super::price::{self, Answers, Class, Price, shader_changes};
 use super::shading::{ShadedPoint, Shading};
 use crate::expected::SurfacePoint;
 use crate::imaging::reference::{Region, RegionMask};
@@ -31,19 +31,18 @@ pub fn price(
     let pixels: Vec<usize> =
         mask.pixels.iter().enumerate().filter(|(_, value)| clear(value)).map(|(i, _)| i).collect();
     let step = pixels.len().div_ceil(PIXELS).max(1);
-    let elsewhere = elsewhere(scene, &camera);
-    let (mut points, mut found) = (Vec::new(), Vec::new());
-    let mut others = vec![Vec::new(); elsewhere.len()];
+    let places = Places { light: scene.first_light_position(), eye: camera.eye() };
+    let mut surfaces = Vec::new();
+    let mut found = Vec::new();
     for index in pixels.into_iter().step_by(step) {
         let (x, y) = (index % image.width, index / image.width);
         let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
         let Some(point) = SurfacePoint::cast(scene, ray) else { continue };
-        points.push(seen_by_shader(scene, &camera, &point));
-        for (list, (_, places)) in others.iter_mut().zip(&elsewhere) {
-            list.push(shaded_point(scene, &point, places));
-        }
+        surfaces.push(point);
         found.push(image.pixels[index].into());
     }
+    let shaded = |point: &SurfacePoint| places.shaded_point(scene, point);
+    let points: Vec<ShadedPoint> = surfaces.iter().map(shaded).collect();
     let of = |index: usize, shading: &Shading| shading.radiance(&points[index]);
     let sum: f64 =
         (0..points.len()).map(|index| of(index, &Shading::default()).iter().sum::<f64>()).sum();
@@ -59,60 +58,140 @@ pub fn price(
         relative: RELATIVE,
         changes: &changes,
     };
+    if found.iter().all(|value| *value == [0.0; 3]) {
+        return Price { mistake: Some(price::BLACK), ..Price::of_raw(raw) };
+    }
     let price = answers.price(Some(raw));
-    elsewhere.iter().zip(&others).fold(price, |price, ((name, _), points)| {
+    inputs(scene, &camera).iter().fold(price, |price, (name, class, shaded)| {
+        let points: Vec<ShadedPoint> = surfaces.iter().map(|point| shaded(point)).collect();
         let of = |index: usize, shading: &Shading| shading.radiance(&points[index]);
-        let left = Answers { of: &of, changes: &[], ..answers }.price(None).raw;
-        price.or(name, Class::Concept, left)
+        let answers = Answers { of: &of, changes: &[], ..answers };
+        // Where it is black there is nothing to tell it from any other darkness.
+        if answers.total() < LEAST_LEFT * points.len() as f64 {
+            return price;
+        }
+        price.or(name, *class, answers.residual_of_right())
     })
 }
 
+/// Of the mean radiance so much must be left by a mistake that an image is said to show.
+const LEAST_LEFT: f64 = 1e-4;
+
 /// Where a shader takes light and eye to be, world space.
+#[derive(Clone, Copy)]
 struct Places {
     light: Vec3,
     eye: Vec3,
 }
 
-/// Where they are.
-fn point_of(scene: &Scene, camera: &Camera) -> Places {
-    Places { light: scene.first_light_position(), eye: camera.eye() }
-}
+/// What a shader gets wrong of what it is given: the mistake, and what it shades instead.
+type Input<'a> = (&'static str, Class, Box<dyn Fn(&SurfacePoint) -> ShadedPoint + 'a>);
 
-/// Where shaders take them to be that mix spaces.
-fn elsewhere(scene: &Scene, camera: &Camera) -> Vec<(&'static str, Places)> {
-    let Places { light, eye } = point_of(scene, camera);
-    let seen = camera.view().transform_point3(light);
-    vec![
-        ("the light is in view space", Places { light: seen, eye }),
-        ("the viewer stands at the origin", Places { light, eye: Vec3::ZERO }),
-        ("the light stands at the origin", Places { light: Vec3::ZERO, eye }),
-        ("light and viewer are exchanged", Places { light: eye, eye: light }),
-    ]
+/// The mistakes that are looked for.
+fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
+    let right = Places { light: scene.first_light_position(), eye: camera.eye() };
+    let seen = camera.view().transform_point3(right.light);
+    let at = |name, class, places: Places| -> Input<'a> {
+        (name, class, Box::new(move |point| places.shaded_point(scene, point)))
+    };
+    let changed = |name, change: fn(&mut ShadedPoint)| -> Input<'a> {
+        let shaded = move |point: &SurfacePoint| {
+            let mut shaded = right.shaded_point(scene, point);
+            change(&mut shaded);
+            shaded
+        };
+        (name, Class::Slip, Box::new(shaded))
+    };
+    let mut inputs = vec![
+        at(price::LIGHT_IN_VIEW_SPACE, Class::Slip, Places { light: seen, ..right }),
+        at(price::VIEWER_AT_ORIGIN, Class::Slip, Places { eye: Vec3::ZERO, ..right }),
+        at(price::LIGHT_AT_ORIGIN, Class::Concept, Places { light: Vec3::ZERO, ..right }),
+        at(
+            "light and viewer are exchanged",
+            Class::Concept,
+            Places { light: right.eye, eye: right.light },
+        ),
+        changed(price::LIGHT_NEGATED, |p| p.wi = p.wi.map(|v| -v)),
+        changed(price::VIEWER_NEGATED, |p| p.wo = p.wo.map(|v| -v)),
+        changed("the intensity is clamped to 1", |p| p.intensity = p.intensity.map(|v| v.min(1.0))),
+        changed("the intensity is grey", |p| p.intensity = [p.intensity[0]; 3]),
+    ];
+    let of = |name, class, shaded: Box<dyn Fn(&SurfacePoint) -> ShadedPoint + 'a>| -> Input<'a> {
+        (name, class, shaded)
+    };
+    inputs.extend([
+        of(
+            "the distance is that of the viewer",
+            Class::Slip,
+            Box::new(move |point| ShadedPoint {
+                distance: f64::from((right.eye - point.position).length()),
+                ..right.shaded_point(scene, point)
+            }),
+        ),
+        of(
+            "the direction to the viewer is the viewer's position",
+            Class::Slip,
+            Box::new(move |point| {
+                let frame = Frame::from_normal(point.normal);
+                let wo = frame.to_local(right.eye.normalize_or_zero()).to_array().map(f64::from);
+                ShadedPoint { wo, ..right.shaded_point(scene, point) }
+            }),
+        ),
+        of(
+            "the direction to the light is the light's position",
+            Class::Concept,
+            Box::new(move |point| {
+                let frame = Frame::from_normal(point.normal);
+                let wi = frame.to_local(right.light.normalize_or_zero()).to_array().map(f64::from);
+                let distance = f64::from(right.light.length());
+                ShadedPoint { wi, distance, ..right.shaded_point(scene, point) }
+            }),
+        ),
+        of(
+            "the normal points up",
+            Class::Concept,
+            Box::new(move |point| {
+                right.shaded_point(scene, &SurfacePoint { normal: Vec3::Y, ..*point })
+            }),
+        ),
+    ]);
+    for exponent in [1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 16.0, 20.0, 32.0, 50.0, 64.0, 100.0, 128.0] {
+        let shaded = move |point: &SurfacePoint| {
+            let mut shaded = right.shaded_point(scene, point);
+            shaded.material.exponent = exponent;
+            shaded
+        };
+        inputs.push(of("the exponent is a constant", Class::Slip, Box::new(shaded)));
+    }
+    inputs
 }
 
 /// A point of a scene as a right shader sees it.
 pub fn seen_by_shader(scene: &Scene, camera: &Camera, point: &SurfacePoint) -> ShadedPoint {
-    shaded_point(scene, point, &point_of(scene, camera))
+    let places = Places { light: scene.first_light_position(), eye: camera.eye() };
+    places.shaded_point(scene, point)
 }
 
-/// A point as a right shader sees it: textures are averages, mirrors a plain diffuse colour.
-fn shaded_point(scene: &Scene, point: &SurfacePoint, places: &Places) -> ShadedPoint {
-    let material = scene.material_of(point.shape);
-    let phong = material.model == MaterialModel::Phong;
-    let frame = Frame::from_normal(point.normal);
-    let local = |v: Vec3| frame.to_local(v.normalize()).to_array().map(f64::from);
-    let to_light = places.light - point.position;
-    ShadedPoint {
-        material: api::MaterialValue {
-            model: if phong { api::MATERIAL_PHONG } else { api::MATERIAL_DIFFUSE },
-            diffuse: material.diffuse.average().into(),
-            specular: material.specular.average().into(),
-            exponent: material.exponent,
-        },
-        scale: f64::from(material.energy_scale()),
-        wo: local(places.eye - point.position),
-        wi: local(to_light),
-        intensity: scene.first_light_intensity().to_array().map(f64::from),
-        distance: f64::from(to_light.length()),
+impl Places {
+    /// A point as a right shader sees it: textures are averages, mirrors a plain diffuse colour.
+    fn shaded_point(&self, scene: &Scene, point: &SurfacePoint) -> ShadedPoint {
+        let material = scene.material_of(point.shape);
+        let phong = material.model == MaterialModel::Phong;
+        let frame = Frame::from_normal(point.normal);
+        let local = |v: Vec3| frame.to_local(v.normalize()).to_array().map(f64::from);
+        let to_light = self.light - point.position;
+        ShadedPoint {
+            material: api::MaterialValue {
+                model: if phong { api::MATERIAL_PHONG } else { api::MATERIAL_DIFFUSE },
+                diffuse: material.diffuse.average().into(),
+                specular: material.specular.average().into(),
+                exponent: material.exponent,
+            },
+            scale: f64::from(material.energy_scale()),
+            wo: local(self.eye - point.position),
+            wi: local(to_light),
+            intensity: scene.first_light_intensity().to_array().map(f64::from),
+            distance: f64::from(to_light.length()),
+        }
     }
 }

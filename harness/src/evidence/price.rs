@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use super::shading::{Angle, Clamp, Shading};
+use super::shading::{Angle, Clamp, Directions, Shading};
 use super::{Check, Measure, Verdict};
 
 /// What a mistake is to a teacher.
@@ -17,6 +17,8 @@ pub enum Class {
     Slip,
     /// Something that the part is about is missing: 40 to 80 %.
     Concept,
+    /// Nothing known explains it, but something is there: 80 %.
+    Unknown,
 }
 
 impl Class {
@@ -25,6 +27,7 @@ impl Class {
         match self {
             Self::Slip => 0.02,
             Self::Concept => 0.2,
+            Self::Unknown => 0.4,
         }
     }
 }
@@ -67,10 +70,14 @@ enum Fitted {
     Channels,
     /// One of each group of questions: a wrong scale of the material's.
     Groups,
+    /// One of each group and channel: a wrong colour of the material's.
+    Colors,
     /// One of the diffuse term.
     Diffuse,
     /// One of the specular term.
     Specular,
+    /// What is added, over the diffuse reflectance.
+    Ambient,
 }
 
 /// What answers cost.
@@ -90,6 +97,11 @@ impl Price {
         // What is no number is as wrong as can be.
         let raw = if raw <= 1.0 { raw } else { 1.0 };
         Self { error: raw, raw, mistake: None }
+    }
+
+    /// The single mistake that explains the answers best, if there is one.
+    pub fn name(&self) -> String {
+        self.mistake.unwrap_or_default().to_owned()
     }
 
     /// Says what the error is, when a single mistake made it smaller.
@@ -115,11 +127,57 @@ impl Check {
         if self.verdict == Verdict::Fail && self.error > 0.0 {
             let price = price(self.error);
             self.error = price.error;
+            self.mistake = price.name();
             self.measures.extend(price.measure());
         }
         self
     }
 }
+
+/// Where one mistake explains a check on most scenes, and nothing known explains it on the others, it
+/// costs what it costs on most of them: on one a seam or an edge may leave more unexplained. Where it
+/// leaves nothing lit ([`DARKENING`]) that is no worse.
+pub fn agree(checks: &mut [Check]) {
+    let mut of_id: BTreeMap<(String, String), Vec<usize>> = BTreeMap::new();
+    for (index, check) in checks.iter().enumerate() {
+        if check.verdict == Verdict::Fail {
+            let key = (check.id.clone(), check.convention.clone());
+            of_id.entry(key).or_default().push(index);
+        }
+    }
+    for own in of_id.into_values() {
+        let unknown = |index: &usize| ["", UNKNOWN, BLACK].contains(&&*checks[*index].mistake);
+        let (others, told): (Vec<usize>, Vec<usize>) = own.into_iter().partition(unknown);
+        let Some(name) = told.first().map(|&index| checks[index].mistake.clone()) else { continue };
+        let one = told.iter().all(|&index| checks[index].mistake == name);
+        if !one || told.len() < others.len() {
+            continue;
+        }
+        let mut errors: Vec<f64> = told.iter().map(|&index| checks[index].error).collect();
+        errors.sort_by(f64::total_cmp);
+        let median = errors[errors.len() / 2];
+        let darkens = DARKENING.contains(&name.as_str());
+        for index in told.into_iter().chain(others.into_iter().filter(|_| darkens)) {
+            checks[index].error = checks[index].error.min(median);
+        }
+    }
+}
+
+/// What is said of a check whose answers are all black.
+pub const BLACK: &str = "nothing is lit";
+/// The mistakes that can leave nothing lit on a scene.
+const DARKENING: [&str; 5] =
+    [LIGHT_NEGATED, VIEWER_NEGATED, VIEWER_AT_ORIGIN, LIGHT_IN_VIEW_SPACE, LIGHT_AT_ORIGIN];
+/// wi is negated.
+pub const LIGHT_NEGATED: &str = "the direction to the light is negated";
+/// wo is negated.
+pub const VIEWER_NEGATED: &str = "the direction to the viewer is negated";
+/// wo leads to the origin.
+pub const VIEWER_AT_ORIGIN: &str = "the viewer stands at the origin";
+/// The light's position is multiplied by the view matrix.
+pub const LIGHT_IN_VIEW_SPACE: &str = "the light is in view space";
+/// wi leads to the origin.
+pub const LIGHT_AT_ORIGIN: &str = "the light stands at the origin";
 
 /// What the values of a changed renderer are multiplied by, channel by channel.
 struct Factors {
@@ -142,18 +200,25 @@ impl Default for Factors {
 
 /// At most this many questions are looked at: a price is no finer than a percent.
 const QUESTIONS: usize = 4000;
+/// Answers that follow the right ones so closely are more than nothing.
+pub const LIKE: f64 = 0.3;
+/// What is said of them.
+pub const UNKNOWN: &str = "something that no single known mistake explains";
 /// A factor below this leaves nothing of a term.
 const NOTHING: f64 = 1e-3;
 
 impl Answers<'_> {
     /// What the answers cost; `raw` is how far off they are, where that is known better.
     pub fn price(&self, raw: Option<f64>) -> Price {
-        let step = self.found.len().div_ceil(QUESTIONS).max(1);
-        let questions: Vec<usize> = (0..self.found.len()).step_by(step).collect();
+        let questions = self.questions();
         let right = Shading::default();
         let price = Price::of_raw(
             raw.unwrap_or_else(|| self.residual(&questions, &right, &Factors::default())),
         );
+        let price = match self.likeness(&questions) {
+            likeness if likeness >= LIKE => price.or(UNKNOWN, Class::Unknown, 0.0),
+            _ => price,
+        };
         self.changes.iter().fold(price, |price, change| {
             let (shading, factors, class) = match (change.shading, change.fitted) {
                 (Some(shading), _) => (shading, Factors::default(), change.class),
@@ -165,6 +230,38 @@ impl Answers<'_> {
             };
             price.or(change.name, class, self.residual(&questions, &shading, &factors))
         })
+    }
+
+    /// Sum of differences from what is right over the sum of that, in the worst group.
+    pub fn residual_of_right(&self) -> f64 {
+        self.residual(&self.questions(), &Shading::default(), &Factors::default())
+    }
+
+    /// Sum of the right answers, in units.
+    pub fn total(&self) -> f64 {
+        let right = Shading::default();
+        let sizes = self.questions().into_iter().map(|index| {
+            let sum: f64 = (self.of)(index, &right).iter().filter(|v| v.is_finite()).sum();
+            sum / (3.0 * (self.unit)(index))
+        });
+        sizes.sum()
+    }
+
+    /// The questions that are looked at.
+    fn questions(&self) -> Vec<usize> {
+        let step = self.found.len().div_ceil(QUESTIONS).max(1);
+        (0..self.found.len()).step_by(step).collect()
+    }
+
+    /// How the answers follow the right ones: the correlation of both.
+    fn likeness(&self, questions: &[usize]) -> f64 {
+        let right = Shading::default();
+        let pairs = questions.iter().flat_map(|&index| {
+            let (expected, unit) = ((self.of)(index, &right), (self.unit)(index));
+            let found = self.found[index];
+            (0..3).map(move |c| (f64::from(found[c]) / unit, expected[c] / unit))
+        });
+        correlation(pairs)
     }
 
     /// Sum of differences from what `shading` answers over the sum of that, in the worst group.
@@ -192,6 +289,15 @@ impl Answers<'_> {
         }
         let errors = groups.values().map(|(apart, total)| apart / total.max(f64::MIN_POSITIVE));
         errors.fold(0.0, f64::max)
+    }
+
+    /// The questions of each group.
+    fn by_group(&self, questions: &[usize]) -> BTreeMap<usize, Vec<usize>> {
+        let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for &index in questions {
+            groups.entry((self.group)(index)).or_default().push(index);
+        }
+        groups
     }
 
     /// A factor, as the answers have it. Nothing when it cannot be told, or leaves nothing.
@@ -230,12 +336,8 @@ impl Answers<'_> {
                 some.then_some((right, Factors::of(factors), Class::Slip))
             }
             Fitted::Groups => {
-                let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-                for &index in questions {
-                    groups.entry((self.group)(index)).or_default().push(index);
-                }
                 let mut factors = Factors::default();
-                for (group, own) in groups {
+                for (group, own) in self.by_group(questions) {
                     let factor = ratios(&own, &all, &right, None)?;
                     if factor.abs() < NOTHING {
                         return None;
@@ -244,10 +346,28 @@ impl Answers<'_> {
                 }
                 Some((right, factors, Class::Slip))
             }
+            Fitted::Colors => {
+                let mut factors = Factors::default();
+                for (group, own) in self.by_group(questions) {
+                    // Where a channel of the right answer is black, no factor tells.
+                    let factor = all.map(|c| ratios(&own, &[c], &right, None).unwrap_or(1.0));
+                    if factor.iter().all(|factor| factor.abs() < NOTHING) {
+                        return None;
+                    }
+                    factors.by_group.insert(group, factor);
+                }
+                Some((right, factors, Class::Concept))
+            }
             Fitted::Diffuse => {
                 let factor = ratios(questions, &all, &diffuse, Some(&specular))?;
                 let shading = Shading { factor: [factor, 1.0], ..right };
                 Some((shading, Factors::default(), class(factor)))
+            }
+            Fitted::Ambient => {
+                let one = Shading { factor: [0.0; 2], ambient: 1.0, ..right };
+                let ambient = ratios(questions, &all, &one, Some(&right))?;
+                let shading = Shading { ambient, ..right };
+                Some((shading, Factors::default(), Class::Slip))
             }
             Fitted::Specular => {
                 let factor = ratios(questions, &all, &specular, Some(&diffuse))?;
@@ -258,6 +378,44 @@ impl Answers<'_> {
     }
 }
 
+/// What it costs beside a slip that shadows leave this fraction of the light: little at half of it,
+/// most of the points where nearly none is missing.
+pub fn fading(light: f64) -> f64 {
+    0.03 * light * light + light.powi(16)
+}
+
+/// Shadows are there where at least so much of what should be lit is: acne darkens half of it and more.
+const LIT: f64 = 0.05;
+/// And where at least so much of what should be dark is.
+const DARK: f64 = 0.4;
+
+/// The same price, for shadows that are wrong on these fractions of what is lit and what is dark, if
+/// nearly all of one is right: acne darkens some of what is lit, too large a bias lights some of what
+/// is dark.
+pub fn partly(price: Price, lit_wrong: f64, dark_wrong: f64) -> Price {
+    let few = 0.02;
+    let price = match dark_wrong <= few && lit_wrong <= 1.0 - LIT {
+        true => price.or("some lit points are in shadow", Class::Slip, 0.015 * lit_wrong),
+        false => price,
+    };
+    match lit_wrong <= few && dark_wrong <= 1.0 - DARK {
+        true => price.or("some shadows are missing", Class::Slip, 0.025 * dark_wrong),
+        false => price,
+    }
+}
+
+/// Pearson's correlation of pairs; those that are no numbers are left out. 0 where either does not
+/// vary.
+pub fn correlation(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let [mut n, mut a, mut b, mut aa, mut bb, mut ab] = [0.0f64; 6];
+    for (x, y) in pairs.filter(|(x, y)| x.is_finite() && y.is_finite()) {
+        (n, a, b) = (n + 1.0, a + x, b + y);
+        (aa, bb, ab) = (aa + x * x, bb + y * y, ab + x * y);
+    }
+    let (aa, bb, ab) = (aa - a * a / n, bb - b * b / n, ab - a * b / n);
+    if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
+}
+
 /// What can be wrong in a diffuse BSDF.
 pub fn diffuse_changes() -> Vec<Change> {
     let right = Shading::default();
@@ -265,11 +423,16 @@ pub fn diffuse_changes() -> Vec<Change> {
         fit("a constant factor", Fitted::All),
         fit("a factor by channel", Fitted::Channels),
         fit("a factor by material", Fitted::Groups),
+        fit("another colour", Fitted::Colors),
     ];
-    let slip =
-        |name, shading| Change { name, class: Class::Slip, shading: Some(shading), fitted: None };
+    let of =
+        |class| move |name, shading| Change { name, class, shading: Some(shading), fitted: None };
+    let (slip, concept) = (of(Class::Slip), of(Class::Concept));
     changes.extend([
-        slip("cos theta_i is missing", Shading { cos_i: [0.0; 2], ..right }),
+        concept("cos theta_i is missing", Shading { cos_i: [0.0; 2], ..right }),
+        concept("the diffuse reflectance is missing", Shading { albedo: |_| 1.0, ..right }),
+        slip("the diffuse reflectance is squared", Shading { albedo: |a| a * a, ..right }),
+        slip("the diffuse reflectance is its square root", Shading { albedo: f64::sqrt, ..right }),
         slip("cos theta_i is there twice", Shading { cos_i: [2.0; 2], ..right }),
         slip("cos theta_i is there three times", Shading { cos_i: [3.0; 2], ..right }),
         slip(
@@ -283,6 +446,8 @@ pub fn diffuse_changes() -> Vec<Change> {
         slip("neither wo nor wi is tested", Shading { tests_wo: false, tests_wi: false, ..right }),
         slip("abs() around cos theta_i", Shading { absolute: true, ..right }),
         slip("abs() around both cosines", Shading { absolute: true, tests_wo: false, ..right }),
+        slip("x of wi in place of its cosine", Shading { axis: 0, ..right }),
+        slip("y of wi in place of its cosine", Shading { axis: 1, ..right }),
         slip("red and blue exchanged", Shading { channels: [2, 1, 0], ..right }),
         slip("channels turned", Shading { channels: [1, 2, 0], ..right }),
         slip("channels turned the other way", Shading { channels: [2, 0, 1], ..right }),
@@ -332,7 +497,12 @@ pub fn phong_changes() -> Vec<Change> {
         slip("cos alpha is not clamped", Shading { clamp: Clamp::Nothing, ..right }),
         slip("cos alpha is raised before it is clamped", Shading { clamp: Clamp::Power, ..right }),
         slip("the mirror direction is negated", Shading { angle: Angle::Reversed, ..right }),
-        slip("wo is not mirrored", Shading { angle: Angle::Unmirrored, ..right }),
+        slip("wo is mirrored on x alone", Shading { angle: Angle::OneAxis(0), ..right }),
+        slip("wo is mirrored on y alone", Shading { angle: Angle::OneAxis(1), ..right }),
+        concept("wo is not mirrored", Shading { angle: Angle::Unmirrored, ..right }),
+        concept("alpha is taken from the normal", Shading { angle: Angle::Normal, ..right }),
+        slip("Ks is grey", Shading { specular_channels: [0; 3], ..right }),
+        slip("red and blue of Ks exchanged", Shading { specular_channels: [2, 1, 0], ..right }),
         concept(
             "the half vector in place of the mirror direction",
             Shading { angle: Angle::Half, ..right },
@@ -359,6 +529,11 @@ pub fn light_changes() -> Vec<Change> {
         slip("r in place of r^2", Shading { falloff: 1.0, ..right }),
         slip("r^3 in place of r^2", Shading { falloff: 3.0, ..right }),
         slip("r^4 in place of r^2", Shading { falloff: 4.0, ..right }),
+        slip("1 + r^2 in place of r^2", Shading { softened: true, ..right }),
+        slip(
+            "incident light is clamped to 1",
+            Shading { incident: |incident| incident.clamp(0.0, 1.0), ..right },
+        ),
         slip("wi is not of unit length", Shading { long_wi: true, ..right }),
     ]
 }
@@ -378,7 +553,22 @@ pub fn integrator_changes() -> Vec<Change> {
         slip("divided by cos theta_i", cosines(0.0, 0.0)),
         slip("cos theta_o is multiplied", cosines(1.0, 1.0)),
         slip("divided by cos theta_o", cosines(1.0, -1.0)),
-        concept("wi reaches the BSDF in world space", Shading { world_wi: true, ..right }),
+        concept("no BSDF is asked", Shading { asks: false, ..right }),
+    ]);
+    let directions = |directions| Shading { directions, ..right };
+    changes.extend([
+        concept("wi reaches the BSDF in world space", directions(Directions::WorldWi)),
+        slip("wo reaches the BSDF in world space", directions(Directions::WorldWo)),
+        concept("wi and wo reach the BSDF in world space", directions(Directions::World)),
+        slip("the frame's normal is negated", directions(Directions::NegatedNormal)),
+        slip("wi is negated", directions(Directions::NegatedWi)),
+        slip("wo is negated", directions(Directions::NegatedWo)),
+        slip("wi and wo are exchanged", directions(Directions::Exchanged)),
+        slip("wo stands for wi", directions(Directions::WoTwice)),
+        slip("wi stands for wo", directions(Directions::WiTwice)),
+        concept("wi is the light's position", directions(Directions::LightFromOrigin)),
+        concept("wi leads from the viewer to the light", directions(Directions::LightFromViewer)),
+        slip("r is the distance along the ray", Shading { along_ray: true, ..right }),
     ]);
     changes
 }
@@ -400,6 +590,7 @@ pub fn shader_changes(phong: bool) -> Vec<Change> {
         }),
         output("radiance clamped to 1", |v| v.clamp(0.0, 1.0)),
     ]);
+    bsdf.push(fit("an ambient term", Fitted::Ambient));
     let fitted = |change: &Change| change.fitted.is_none();
     bsdf.into_iter().chain(light_changes().into_iter().filter(fitted)).collect()
 }

@@ -33,20 +33,65 @@ pub struct Shading {
     pub tests_wo: bool,
     /// Whether a surface lit from behind is black.
     pub tests_wi: bool,
+    /// The component of wi that stands for cos theta_i: 2 is right.
+    pub axis: usize,
     /// Whether cos theta_i is replaced by its magnitude.
     pub absolute: bool,
     /// Which of red, green and blue each channel takes.
     pub channels: [usize; 3],
+    /// The same for the specular term alone, after `channels`.
+    pub specular_channels: [usize; 3],
+    /// What is made of the diffuse reflectance.
+    pub albedo: fn(f64) -> f64,
     /// Whether Kd and Ks are exchanged.
     pub exchanged: bool,
     /// The power of 1/r.
     pub falloff: f64,
+    /// Whether 1 / (1 + r^2) stands for 1 / r^2.
+    pub softened: bool,
+    /// What is made of the intensity over the squared distance.
+    pub incident: fn(f64) -> f64,
     /// Whether wi reaches the BSDF with the length r.
     pub long_wi: bool,
-    /// Whether wi reaches the BSDF in world space.
-    pub world_wi: bool,
+    /// The directions that an integrator hands to the BSDF.
+    pub directions: Directions,
+    /// Whether the distance along the camera ray stands for that of the light.
+    pub along_ray: bool,
+    /// Whether an integrator asks the BSDF at all.
+    pub asks: bool,
+    /// What is added where a surface is lit, times the diffuse reflectance.
+    pub ambient: f64,
     /// What is made of radiance before it is written.
     pub output: fn(f64) -> f64,
+}
+
+/// The directions that an integrator hands to a BSDF.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Directions {
+    /// wi and wo in the local frame: right.
+    Local,
+    /// wi in world space.
+    WorldWi,
+    /// wo in world space.
+    WorldWo,
+    /// Both in world space.
+    World,
+    /// Both in the frame of the negated normal.
+    NegatedNormal,
+    /// wi negated.
+    NegatedWi,
+    /// wo negated.
+    NegatedWo,
+    /// wi in the place of wo, and wo in that of wi.
+    Exchanged,
+    /// wo in both places.
+    WoTwice,
+    /// wi in both places.
+    WiTwice,
+    /// The light's position, as a direction, in the place of wi.
+    LightFromOrigin,
+    /// The direction from the viewer to the light in the place of wi.
+    LightFromViewer,
 }
 
 /// What is clamped to 0.
@@ -71,6 +116,10 @@ pub enum Angle {
     Unmirrored,
     /// Between the normal and the half vector (Blinn).
     Half,
+    /// Between wi and wo mirrored on this axis of the tangents alone, 0 or 1.
+    OneAxis(usize),
+    /// Between wi and the normal.
+    Normal,
 }
 
 impl Default for Shading {
@@ -87,12 +136,20 @@ impl Default for Shading {
             clamp: Clamp::Base,
             tests_wo: true,
             tests_wi: true,
+            axis: 2,
             absolute: false,
             channels: [0, 1, 2],
+            specular_channels: [0, 1, 2],
+            albedo: |albedo| albedo,
             exchanged: false,
             falloff: 2.0,
+            softened: false,
+            incident: |incident| incident,
             long_wi: false,
-            world_wi: false,
+            directions: Directions::Local,
+            along_ray: false,
+            asks: true,
+            ambient: 0.0,
             output: |radiance| radiance,
         }
     }
@@ -129,7 +186,7 @@ impl Shading {
         let ShadedPoint { material, scale, wo, wi, intensity, distance } = point;
         let cos_o = wo[2];
         let length = if self.long_wi { *distance } else { 1.0 };
-        let cos_i = length * if self.absolute { wi[2].abs() } else { wi[2] };
+        let cos_i = length * if self.absolute { wi[self.axis].abs() } else { wi[self.axis] };
         if (self.tests_wo && cos_o <= 0.0) || (self.tests_wi && cos_i <= 0.0) {
             return [0.0; 3];
         }
@@ -143,14 +200,25 @@ impl Shading {
                 * power(cos_o, self.cos_o[term])
         });
         let diffuse = diffuse / std::f64::consts::PI;
-        let incident = distance.powf(-self.falloff);
+        let incident = self.attenuation(*distance);
         let (kd, ks) = match self.exchanged && phong {
             true => (material.specular, material.diffuse),
             false => (material.diffuse, material.specular),
         };
-        let value =
-            [0, 1, 2].map(|c| diffuse * f64::from(kd[c]) + specular * lobe * f64::from(ks[c]));
-        std::array::from_fn(|c| (self.output)(intensity[c] * incident * value[self.channels[c]]))
+        let value = [0, 1, 2].map(|c| {
+            let ks = f64::from(ks[self.specular_channels[c]]);
+            diffuse * (self.albedo)(f64::from(kd[c])) + specular * lobe * ks
+        });
+        std::array::from_fn(|c| {
+            let reflected = (self.incident)(intensity[c] * incident) * value[self.channels[c]];
+            (self.output)(reflected + self.ambient * f64::from(kd[c]))
+        })
+    }
+
+    /// What the intensity is multiplied by at this distance of the light.
+    pub fn attenuation(&self, distance: f64) -> f64 {
+        let attenuation = distance.powf(-self.falloff);
+        if self.softened { attenuation / (1.0 + attenuation) } else { attenuation }
     }
 
     /// This change, made to another shading instead of the right one: of what conventions change
@@ -176,6 +244,11 @@ impl Shading {
                 Angle::Mirror => mirror,
                 Angle::Reversed => -mirror,
                 Angle::Unmirrored => wi[0] * wo[0] + wi[1] * wo[1] + wi[2] * wo[2],
+                Angle::OneAxis(axis) => {
+                    let signs = [[-1.0, 1.0], [1.0, -1.0]][axis];
+                    signs[0] * wi[0] * wo[0] + signs[1] * wi[1] * wo[1] + wi[2] * wo[2]
+                }
+                Angle::Normal => wi[2],
                 Angle::Half => {
                     let h: [f64; 3] = std::array::from_fn(|i| wi[i] + wo[i]);
                     h[2] / (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt().max(f64::MIN_POSITIVE)
@@ -184,7 +257,7 @@ impl Shading {
         let base = if self.clamp == Clamp::Base { cos_alpha.max(0.0) } else { cos_alpha };
         let power = base.powf((self.round)(self.exponent[0] * n + self.exponent[1]));
         let power = if self.clamp == Clamp::Power { power.max(0.0) } else { power };
-        (self.normalization)(n) * power
+        (self.normalization)((self.round)(n)) * power
     }
 }
 

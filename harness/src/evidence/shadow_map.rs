@@ -2,6 +2,7 @@
 
 use basecode::Image;
 
+use super::price::{self, Class, Price};
 use super::{Check, Measure, Verdict};
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::RegionMask;
@@ -104,6 +105,7 @@ impl Shadows<'_> {
         // For shadowed and for lit pixels: all, those that tell something, those that are wrong.
         let mut counts = [[0usize; 3]; 2];
         let mut first = None;
+        let mut known_pixels = Vec::new();
         for (index, lit) in self.pixels() {
             let (a, b) = (with.pixels[index], without.pixels[index]);
             let [all, known, wrong] = &mut counts[usize::from(lit)];
@@ -112,6 +114,9 @@ impl Shadows<'_> {
                 continue;
             }
             *known += 1;
+            let phong = self.unshadowed.region(self.unshadowed.pixels[index]).exponent > 0.0;
+            let visibility = f64::from(a.element_sum()) / f64::from(b.element_sum());
+            known_pixels.push(Known { lit, phong, visibility });
             let off = if lit { (a - b).abs() } else { a.abs() };
             // Asked this way round, a NaN is wrong.
             let right = off.max_element() <= HALF_LIGHT * b.abs().max_element();
@@ -130,7 +135,7 @@ impl Shadows<'_> {
             tolerances.interior_fraction + f64::from(tolerances.spare_pixels) / known as f64
         };
         let [dark, lit] = counts;
-        let measures = vec![
+        let mut measures = vec![
             Measure::at_most("bonus.lit", VISIBILITY, fraction(lit), bound(lit)),
             Measure::at_most(
                 "bonus.dark",
@@ -166,12 +171,91 @@ impl Shadows<'_> {
                     }
                     _ => "",
                 };
-                let error = fraction(lit) + fraction(dark);
-                Check { error, ..Check::new(id, scene, Verdict::Fail, summary) }.with_hint(hint)
+                let price = price(&known_pixels, fraction(lit), fraction(dark));
+                measures.extend(price.measure());
+                let check = Check::new(id, scene, Verdict::Fail, summary);
+                Check { error: price.error, mistake: price.name(), ..check }.with_hint(hint)
             }
         };
         check.measures = measures;
         Some(check)
+    }
+}
+
+/// What a pixel says of shadows.
+#[derive(Clone, Copy)]
+struct Known {
+    /// Whether the light reaches it.
+    lit: bool,
+    /// Whether its material is Phong.
+    phong: bool,
+    /// What is left of the light, as the frames have it.
+    visibility: f64,
+}
+
+/// The mistake of shadows where light belongs, and the reverse.
+const EXCHANGED: &str = "lit and dark are exchanged";
+
+/// What wrong shadows cost, with the fractions of lit and of shadowed pixels that are wrong. Both
+/// count apart and add up.
+fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64) -> Price {
+    // Without a shadow anywhere, or light, nothing is there.
+    let dark = pixels.iter().filter(|pixel| pixel.visibility < f64::from(HALF_LIGHT)).count();
+    let [least, most] = [0.01, 0.99].map(|fraction| fraction * pixels.len() as f64);
+    let price = Price::of_raw(lit_wrong + dark_wrong);
+    let price = match dark as f64 > least && (dark as f64) < most {
+        true => price.or(price::UNKNOWN, Class::Unknown, 0.0),
+        false => price,
+    };
+    let residual = |light: &dyn Fn(&Known) -> f64| {
+        let wrong = |lit: bool| {
+            let own = pixels.iter().filter(|pixel| pixel.lit == lit);
+            let (mut all, mut wrong) = (0usize, 0usize);
+            for pixel in own {
+                all += 1;
+                // Asked this way round, a NaN is wrong.
+                let right = (pixel.visibility - light(pixel)).abs() <= f64::from(HALF_LIGHT);
+                wrong += usize::from(!right);
+            }
+            wrong as f64 / all.max(1) as f64
+        };
+        wrong(true) + wrong(false)
+    };
+    let mut price = price;
+    // Mistakes that leave some shadow here, which is there: without any they look like none at all.
+    let some_dark = |light: &dyn Fn(&Known) -> f64| {
+        let dark = pixels.iter().filter(|pixel| !pixel.lit);
+        let left = dark.clone().filter(|pixel| light(pixel) == 0.0);
+        let seen = left.clone().filter(|pixel| pixel.visibility < 0.5).count();
+        left.clone().count() as f64 > 0.05 * dark.count() as f64 && 2 * seen > left.count()
+    };
+    for (name, class, light) in [
+        (EXCHANGED, Class::Slip, (|p: &Known| f64::from(u8::from(!p.lit))) as fn(&Known) -> f64),
+        ("no shadow falls on Phong materials", Class::Concept, |p| {
+            f64::from(u8::from(p.lit || p.phong))
+        }),
+        ("no shadow falls on diffuse materials", Class::Concept, |p| {
+            f64::from(u8::from(p.lit || !p.phong))
+        }),
+    ] {
+        if name == EXCHANGED || some_dark(&light) {
+            price = price.or(name, class, residual(&light));
+        }
+    }
+    let price = price::partly(price, lit_wrong, dark_wrong);
+    let mut dark: Vec<f64> = pixels.iter().filter(|p| !p.lit).map(|p| p.visibility).collect();
+    dark.retain(|visibility| visibility.is_finite());
+    dark.sort_by(f64::total_cmp);
+    match dark.get(dark.len() / 2) {
+        Some(&left) if left > 0.0 && left < 1.0 => {
+            let light = |pixel: &Known| if pixel.lit { 1.0 } else { left };
+            price.or(
+                "shadows leave some light",
+                Class::Slip,
+                price::fading(left) + residual(&light),
+            )
+        }
+        _ => price,
     }
 }
 

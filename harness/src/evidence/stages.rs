@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use basecode::{Camera, Image, MaterialModel, Scene, Vec3};
 
-use super::price::{Class, Price};
+use super::price::{self, Class, Price};
 use super::{Check, Measure, Verdict};
 use crate::expected::SurfaceBuffer;
 use crate::imaging::reference::RegionMask;
@@ -98,19 +98,27 @@ impl BoundValue {
 
     /// What a right pass binds for a shape; nothing where the contract leaves it open.
     pub fn expected(self, scene: &Scene, camera: &Camera, shape: usize) -> Option<Vec3> {
-        let material = scene.material_of(shape);
-        let phong = material.model == MaterialModel::Phong;
-        let scale = material.energy_scale();
+        let phong = scene.material_of(shape).model == MaterialModel::Phong;
         match self {
             Self::CameraPosition => Some(camera.eye()),
             Self::LightPosition => Some(scene.first_light_position()),
             Self::LightIntensity => Some(scene.first_light_intensity()),
+            Self::RhoD | Self::RhoS | Self::Exponent => self.bound(scene, shape, phong),
+        }
+    }
+
+    /// What shows of the material of a shape that is drawn by the Phong pipeline, or by the diffuse one.
+    fn bound(self, scene: &Scene, shape: usize, phong_draws: bool) -> Option<Vec3> {
+        let material = scene.material_of(shape);
+        let scale = material.energy_scale();
+        match self {
             Self::RhoD => Some(scale * material.diffuse.average()),
-            Self::RhoS if phong => Some(scale * material.specular.average()),
-            Self::RhoS => (material.model == MaterialModel::Mirror).then_some(Vec3::ZERO),
+            // A mirror has no specular term, whoever draws it.
+            Self::RhoS if material.model == MaterialModel::Mirror => Some(Vec3::ZERO),
+            Self::RhoS if phong_draws => Some(scale * material.specular.average()),
             // Blue tells the pipeline apart: a diffuse material must be drawn by `diffuse.fs`.
-            Self::Exponent if phong => Some(Vec3::new(material.exponent, 0.0, 1.0)),
-            Self::Exponent => None,
+            Self::Exponent if phong_draws => Some(Vec3::new(material.exponent, 0.0, 1.0)),
+            _ => None,
         }
     }
 }
@@ -118,14 +126,7 @@ impl BoundValue {
 /// The tolerance of a bound value, relative to its largest component: it travels as f32.
 const BOUND_RELATIVE: f32 = 1e-4;
 /// So many interior pixels may still differ: a rasteriser's coverage along seams inside a shape.
-const STRAY_FRACTION: f64 = 5e-3;
-/// The tolerance of a position, relative to its distance from the camera: rasterised attributes
-/// against a ray's hit.
-const POSITION_RELATIVE: f32 = 2e-3;
-/// How far surfaces may lie from their place on the film [pixels]: hardware snaps vertices to 1/256.
-const OFFSET_PX: f64 = 0.04;
-/// The tolerance of a unit normal.
-const NORMAL_ABSOLUTE: f32 = 1e-2;
+pub(super) const STRAY_FRACTION: f64 = 5e-3;
 
 /// Part 2.1: judges the frames that a student's pass drew with stages that show one bound value each.
 pub fn judge_pass(
@@ -197,20 +198,60 @@ pub fn judge_pass(
             } else {
                 ""
             };
-            let price = Price::of_raw(wrong_total as f64 / total as f64);
+            let raw = wrong_total as f64 / total as f64;
+            let price = Price::of_raw(raw);
+            let nothing = frames.iter().all(|(_, frame)| {
+                interior(surface, mask).all(|(index, _)| frame.pixels[index] == Vec3::ZERO)
+            });
             let price = match measures.iter().filter(|measure| !measure.passed).count() {
+                _ if nothing => price,
+                1 if other_pipeline(scene, surface, mask, frames) => price.or(
+                    "Phong materials are drawn by the diffuse pipeline",
+                    Class::Concept,
+                    0.0,
+                ),
                 1 => price.or("one value is wrong", Class::Slip, 0.0),
                 2 => price.or("two values are wrong", Class::Concept, 0.0),
-                _ => price,
+                _ => price.or(price::UNKNOWN, Class::Unknown, 0.0),
             };
-            let price = wrong_shapes(scene, &camera, surface, mask, frames).price(price);
+            let price = match nothing {
+                true => price,
+                false => wrong_shapes(scene, &camera, surface, mask, frames).price(price.or(
+                    "some of the film is wrong",
+                    Class::Slip,
+                    0.25 * raw,
+                )),
+            };
             measures.extend(price.measure());
-            Check { error: price.error, ..Check::new(id, scene_name, Verdict::Fail, summary) }
-                .with_hint(hint)
+            Check {
+                error: price.error,
+                mistake: price.name(),
+                ..Check::new(id, scene_name, Verdict::Fail, summary)
+            }
+            .with_hint(hint)
         }
     };
     check.measures = measures;
     check
+}
+
+/// Whether all Phong materials in view are drawn by the diffuse pipeline, and so few pixels are wrong
+/// for another reason.
+fn other_pipeline(
+    scene: &Scene,
+    surface: &SurfaceBuffer,
+    mask: &RegionMask,
+    frames: &[(BoundValue, Image)],
+) -> bool {
+    let Some((_, frame)) = frames.iter().find(|(bound, _)| *bound == BoundValue::Exponent) else {
+        return false;
+    };
+    let phong = interior(surface, mask)
+        .filter(|(_, shape)| scene.material_of(*shape).model == MaterialModel::Phong);
+    let (all, blue) = phong.fold((0usize, 0usize), |(all, blue), (index, _)| {
+        (all + 1, blue + usize::from(frame.pixels[index].z != 0.0))
+    });
+    all > 0 && blue as f64 <= STRAY_FRACTION * all as f64
 }
 
 /// What is wrong with the shapes of a pass whose values are wrong.
@@ -219,26 +260,97 @@ struct WrongShapes {
     shapes: usize,
     /// Those that show a wrong value.
     wrong: usize,
-    /// Whether each of those shows what belongs to one other shape, or to none.
-    exchanged: bool,
-    /// Whether each shows its albedos without the energy scale.
-    unscaled: bool,
+    /// The slips that explain each of those.
+    slips: Vec<&'static str>,
 }
 
 impl WrongShapes {
     fn price(&self, price: Price) -> Price {
-        let mut price = price;
-        if self.exchanged {
-            price = price.or("a shape has another's material", Class::Slip, 0.0);
+        let explained =
+            self.slips.iter().fold(price, |price, name| price.or(name, Class::Slip, 0.0));
+        match self.wrong == 1 && self.shapes > 1 {
+            true => explained.or("one shape is wrong or missing", Class::Slip, 0.0),
+            false => explained,
         }
-        if self.unscaled {
-            price = price.or("albedos without the energy scale", Class::Slip, 0.0);
-        }
-        if self.wrong == 1 && self.shapes > 1 {
-            price = price.or("one shape is wrong or missing", Class::Slip, 0.0);
-        }
-        price
     }
+}
+
+/// The slip that a shape shows what belongs to another.
+const ANOTHERS: &str = "a shape has another's material";
+
+/// What a shape shows of a value, if a pass makes a slip: nothing where it is left open.
+type Slip<'a> = (&'static str, Box<dyn Fn(BoundValue, usize) -> Option<Vec3> + 'a>);
+
+/// The slips of a pass that concern materials.
+fn slips<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Slip<'a>> {
+    let right = move |bound: BoundValue, shape| bound.expected(scene, camera, shape);
+    let phong = move |shape| scene.material_of(shape).model == MaterialModel::Phong;
+    let count = scene.shapes().len();
+    let mut slips: Vec<Slip> = vec![
+        (
+            "albedos without the energy scale",
+            Box::new(move |bound, shape| {
+                let expected = right(bound, shape)?;
+                let scaled = matches!(bound, BoundValue::RhoD | BoundValue::RhoS);
+                let scale = scene.material_of(shape).energy_scale();
+                Some(if scaled { expected / scale } else { expected })
+            }),
+        ),
+        (
+            "the energy scale twice",
+            Box::new(move |bound, shape| {
+                let expected = right(bound, shape)?;
+                let scaled = matches!(bound, BoundValue::RhoD | BoundValue::RhoS);
+                let scale = scene.material_of(shape).energy_scale();
+                Some(if scaled { expected * scale } else { expected })
+            }),
+        ),
+        (
+            "albedos are grey",
+            Box::new(move |bound, shape| {
+                let expected = right(bound, shape)?;
+                let scaled = matches!(bound, BoundValue::RhoD | BoundValue::RhoS);
+                Some(if scaled { Vec3::splat(expected.x) } else { expected })
+            }),
+        ),
+        (
+            "rho_d and rho_s are exchanged",
+            Box::new(move |bound, shape| {
+                let scale = scene.material_of(shape).energy_scale();
+                match bound {
+                    BoundValue::RhoD => Some(scale * scene.material_of(shape).specular.average()),
+                    BoundValue::RhoS if phong(shape) => {
+                        Some(scale * scene.material_of(shape).diffuse.average())
+                    }
+                    _ => right(bound, shape),
+                }
+            }),
+        ),
+        (
+            "diffuse and Phong pipeline are exchanged",
+            Box::new(move |bound, shape| match bound {
+                BoundValue::RhoD | BoundValue::RhoS => bound.bound(scene, shape, !phong(shape)),
+                // What the other pipeline shows: blue tells.
+                BoundValue::Exponent if phong(shape) => {
+                    Some(Vec3::new(scene.material_of(shape).exponent, 0.0, 0.0))
+                }
+                _ => right(bound, shape),
+            }),
+        ),
+    ];
+    // Another's material, with the other's pipeline or one's own.
+    for other in (0..count).map(Some).chain([None]) {
+        let before = move |shape: usize| other.unwrap_or(shape.saturating_sub(1)).min(count - 1);
+        slips.push((ANOTHERS, Box::new(move |bound, shape| right(bound, before(shape)))));
+        let own_pipeline = move |bound: BoundValue, shape| match bound {
+            BoundValue::RhoD | BoundValue::RhoS | BoundValue::Exponent => {
+                bound.bound(scene, before(shape), phong(shape))
+            }
+            _ => right(bound, shape),
+        };
+        slips.push((ANOTHERS, Box::new(own_pipeline)));
+    }
+    slips
 }
 
 fn wrong_shapes(
@@ -252,167 +364,33 @@ fn wrong_shapes(
         (found - expected).abs().max_element()
             <= BOUND_RELATIVE * expected.abs().max_element().max(1e-3)
     };
-    // What each shape shows, at its pixel in the middle of the list.
     let mut pixels: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (index, shape) in interior(surface, mask) {
         pixels.entry(shape).or_default().push(index);
     }
-    let shapes = scene.shapes().len();
-    let mut seen = WrongShapes { shapes: pixels.len(), wrong: 0, exchanged: true, unscaled: true };
-    for (shape, pixels) in &pixels {
-        let shows = |expected: &dyn Fn(BoundValue) -> Option<Vec3>| {
-            frames.iter().all(|(bound, frame)| {
-                let right = |index: &&usize| {
-                    expected(*bound).is_none_or(|expected| close(frame.pixels[**index], expected))
-                };
-                let strays = pixels.len() - pixels.iter().filter(right).count();
-                strays as f64 <= STRAY_FRACTION * pixels.len() as f64
-            })
-        };
-        let of = |shape: usize| move |bound: BoundValue| bound.expected(scene, camera, shape);
-        if shows(&of(*shape)) {
-            continue;
-        }
-        seen.wrong += 1;
-        seen.exchanged &= (0..shapes).any(|other| other != *shape && shows(&of(other)));
-        let scale = scene.material_of(*shape).energy_scale();
-        seen.unscaled &= shows(&|bound| {
-            let expected = bound.expected(scene, camera, *shape)?;
-            let scaled = matches!(bound, BoundValue::RhoD | BoundValue::RhoS);
-            Some(if scaled { expected / scale } else { expected })
-        });
-    }
-    seen
-}
-
-/// Part 2.2: judges the world positions and normals that a student's vertex stage forwards, and
-/// where on the film they land.
-pub fn judge_vertex(
-    scene_name: &str,
-    camera: &Camera,
-    surface: &SurfaceBuffer,
-    mask: &RegionMask,
-    positions: &Image,
-    normals: &Image,
-) -> Check {
-    let id = "stage.vertex";
-    let (mut counted, mut wrong_position, mut wrong_normal, mut missing) =
-        (0usize, 0usize, 0usize, 0usize);
-    let (mut not_negated, mut not_flipped) = (0usize, 0usize);
-    let mut offsets = Vec::new();
-    for (index, _) in interior(surface, mask) {
-        let (ray, Some(point)) = &surface.pixels[index] else { continue };
-        counted += 1;
-        let (p, n) = (positions.pixels[index], normals.pixels[index]);
-        let reach = POSITION_RELATIVE * (point.position - ray.origin).length();
-        missing += usize::from(p == Vec3::ZERO && n == Vec3::ZERO);
-        // What is no number is never right.
-        let right_position = (p - point.position).length() <= reach;
-        let right_normal = (n - point.normal).length() <= NORMAL_ABSOLUTE;
-        wrong_position += usize::from(!right_position);
-        wrong_normal += usize::from(!right_normal);
-        if right_position {
-            offsets.push(offset_px(camera, surface, index, p));
-        }
-        let negated = (n + point.normal).length() <= NORMAL_ABSOLUTE;
-        not_negated += usize::from(!negated);
-        let (x, y) = (index % surface.width, index / surface.width);
-        let flipped = positions.pixels[(surface.height - 1 - y) * surface.width + x];
-        let upside_down = (flipped - point.position).length() <= 4.0 * reach;
-        not_flipped += usize::from(!upside_down);
-    }
-    if counted == 0 {
-        return Check::new(
-            id,
-            scene_name,
-            Verdict::NotJudged,
-            "no pixel away from edges shows a surface",
-        );
-    }
-    let fraction = |wrong: usize| wrong as f64 / counted as f64;
-    let mut measures = vec![
-        Measure::at_most(
-            "vertex.position",
-            "world positions wrong (fraction of pixels)",
-            fraction(wrong_position),
-            STRAY_FRACTION,
-        ),
-        Measure::at_most(
-            "vertex.normal",
-            "world normals wrong (fraction of pixels)",
-            fraction(wrong_normal),
-            STRAY_FRACTION,
-        ),
-    ];
-    let offset_px = median_length(&mut offsets);
-    let name = "surfaces off their place on the film (pixels, median)";
-    measures.push(Measure::at_most("vertex.clip", name, offset_px, OFFSET_PX));
-    let passed = measures.iter().all(|measure| measure.passed);
-    let mut check = if passed {
-        let summary = "positions and normals reach the fragment stage in world space";
-        Check::new(id, scene_name, Verdict::Pass, summary)
-    } else {
-        let mut summary = format!(
-            "of {counted} pixels, {missing} show nothing, {wrong_position} another world position and {wrong_normal} \
-             another world normal than expected"
-        );
-        if offset_px > OFFSET_PX {
-            summary += &format!("; surfaces lie {offset_px:.2} pixels beside their place");
-        }
-        let price = Price::of_raw(fraction(wrong_position.max(wrong_normal)));
-        let strays = |wrong: usize| fraction(wrong) <= STRAY_FRACTION;
-        let price = match (strays(wrong_position), strays(wrong_normal)) {
-            (true, false) => price.or("the normal alone is wrong", Class::Concept, 0.0).or(
-                "the normal is negated",
-                Class::Slip,
-                fraction(not_negated),
-            ),
-            (false, true) => price.or("the position alone is wrong", Class::Concept, 0.0),
-            (true, true) => {
-                Price::of_raw(1.0).or("surfaces lie beside their place", Class::Slip, 0.0)
-            }
-            (false, false) => price,
-        };
-        let price = price.or("the image is upside down", Class::Slip, fraction(not_flipped));
-        measures.extend(price.measure());
-        // Elsewhere it may be either, or the clip-space position: what the diagnosis tells.
-        let most = |wrong: usize| wrong * 2 > counted;
-        let hint = match (most(missing), most(wrong_position), most(wrong_normal)) {
-            _ if strays(wrong_position) && strays(wrong_normal) => {
-                "the image is shifted: look at the clip-space position"
-            }
-            (true, ..) => "nothing is drawn where it should be: look at the clip-space position",
-            (_, true, false) => "look at the model matrix and at what is forwarded as position",
-            (_, false, true) => "look at the normal matrix and at what is forwarded as normal",
-            _ => "",
-        };
-        let check = Check::new(id, scene_name, Verdict::Fail, summary);
-        Check { error: price.error, ..check }.with_hint(hint)
+    let shows = |shape: usize, expected: &dyn Fn(BoundValue) -> Option<Vec3>| {
+        let pixels = &pixels[&shape];
+        frames.iter().all(|(bound, frame)| {
+            let Some(expected) = expected(*bound) else { return true };
+            let wrong =
+                pixels.iter().filter(|index| !close(frame.pixels[**index], expected)).count();
+            wrong as f64 <= STRAY_FRACTION * pixels.len() as f64
+        })
     };
-    check.measures = measures;
-    check
-}
-
-/// How far a world position lies from the centre of the pixel that shows it [pixels, x and y].
-fn offset_px(camera: &Camera, film: &SurfaceBuffer, index: usize, position: Vec3) -> [f32; 2] {
-    let (x, y) = (index % film.width, index / film.width);
-    let ndc = (camera.projection() * camera.view()).project_point3(position);
-    let (width, height) = (film.width as f32, film.height as f32);
-    let at = [(0.5 + 0.5 * ndc.x) * width, (0.5 - 0.5 * ndc.y) * height];
-    [at[0] - x as f32 - 0.5, at[1] - y as f32 - 0.5]
-}
-
-/// The length of the median offset; 0 when there is none.
-fn median_length(offsets: &mut [[f32; 2]]) -> f64 {
-    let mut median = |axis: usize| {
-        offsets.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
-        offsets.get(offsets.len() / 2).map_or(0.0, |offset| f64::from(offset[axis]))
+    let right = |shape: usize| shows(shape, &|bound| bound.expected(scene, camera, shape));
+    let wrong: Vec<usize> = pixels.keys().copied().filter(|shape| !right(*shape)).collect();
+    // One shape may have another's material while the others have their own.
+    let explains = |(name, value): &Slip| {
+        let all = pixels.keys().copied().filter(|shape| *name != ANOTHERS || wrong.contains(shape));
+        all.into_iter().all(|shape| shows(shape, &|bound| value(bound, shape)))
     };
-    median(0).hypot(median(1))
+    let slips = slips(scene, camera);
+    let slips = slips.iter().filter(|slip| explains(slip)).map(|(name, _)| *name).collect();
+    WrongShapes { shapes: pixels.len(), wrong: wrong.len(), slips }
 }
 
 /// Pixels away from edges and emitters, with the shape that they show.
-fn interior<'a>(
+pub(super) fn interior<'a>(
     surface: &'a SurfaceBuffer,
     mask: &'a RegionMask,
 ) -> impl Iterator<Item = (usize, usize)> + 'a {

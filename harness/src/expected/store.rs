@@ -153,12 +153,7 @@ impl Store<'_> {
                 shadow_map: false,
                 adapter: Adapter { kind, name: String::new() },
                 stages: Vec::new(),
-                cameras: vec![CameraValue {
-                    eye: camera.eye.into(),
-                    at: camera.at.into(),
-                    up: camera.up.into(),
-                    fov_y_deg: camera.fov_y_deg,
-                }],
+                cameras: vec![CameraValue::from(camera)],
             };
             let image = self.render(request)?;
             Ok(ExrLayers { layers: [("raw".into(), image)].into(), ..Default::default() })

@@ -71,7 +71,8 @@ impl SurfacePoint {
 /// units times the distance of the light: the original's epsilon is 1e-3, students use 1e-5 to 5e-3.
 /// Near a light, or in a large or small scene, the distance is that at which [`UNIT`] is one.
 const NEAREST_START: f32 = 1e-5;
-const FARTHEST_START: f32 = 5e-3;
+/// The farther one.
+pub const FARTHEST_START: f32 = 5e-3;
 /// The unit of length over a hit's epsilon: one where a point is seen from five units away.
 const UNIT: f32 = 2e3;
 /// A triangle that the light grazes or leaves while its shading normal still faces it shadows

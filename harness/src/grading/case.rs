@@ -14,6 +14,8 @@ use crate::worker::{CameraValue, RayQuery};
 
 /// The widest film on which rays and stages are judged: enough to show every surface.
 const SMALL_WIDTH: u32 = 96;
+/// A film so many times as wide is searched for points close to what shadows them.
+const FINE: usize = 3;
 
 /// A scene made ready for judging. Made once, used for every hand-in.
 pub struct Case {
@@ -116,7 +118,9 @@ impl Case {
         let surface = SurfaceBuffer::new(scene, w, h)?;
         let mask = regions(scene, w, h, true)?;
         let asked = without_mirrors(scene, &surface, &mask);
+        let fine = SurfaceBuffer::new(scene, FINE * w, FINE * h)?;
         let batch = RayBatch::new(&entry.name, scene, &surface, &asked);
+        let batch = batch.with_contacts(scene, &fine, w);
         let small = Small {
             width,
             height,
@@ -129,18 +133,12 @@ impl Case {
             mask,
             batch,
         };
-        let camera = &config.camera;
         Ok(Self {
             offline,
             realtime,
             bonus: entry.bonus.as_ref().map(at).transpose()?,
             spp: config.spp as u32,
-            camera: CameraValue {
-                eye: camera.eye.into(),
-                at: camera.at.into(),
-                up: camera.up.into(),
-                fov_y_deg: camera.fov_y_deg,
-            },
+            camera: CameraValue::from(config.camera),
             expected,
             small,
             entry: entry.clone(),

@@ -6,7 +6,7 @@ use super::draw;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, AdapterKind, CameraValue, Job, Matter, Outcome, Request, blames_the_machine,
+    Adapter, AdapterKind, CameraValue, Job, Matrices, Matter, Outcome, Request, blames_the_machine,
 };
 
 /// Settles the outcomes of `job` that blame the machine: what a renderer of ours does is the
@@ -95,6 +95,7 @@ fn own_pass(request: &Request) -> Request {
                 at: [0.0; 3],
                 up: [0.0, 1.0, 0.0],
                 fov_y_deg: 40.0,
+                matrices: Matrices::Usual,
             }],
         },
     }

@@ -13,6 +13,7 @@ use crate::diagnosis::{self, Tile, View};
 use crate::evidence::Check;
 use crate::evidence::bsdf::{self, BsdfKind, BsdfProbe};
 use crate::evidence::convention::{self, Convention, Conventional, Party};
+use crate::evidence::loops::Edges;
 use crate::evidence::physical::Probes;
 use crate::evidence::price;
 use crate::evidence::rays::{self, Unshadowed};
@@ -26,6 +27,8 @@ use crate::worker::{Outcome, Request};
 pub struct Answers<'a> {
     bsdfs: Vec<BsdfAnswer>,
     lights: Vec<LightAnswer<'a>>,
+    /// The edges of all films of several samples per pixel.
+    pub edges: Edges,
 }
 
 /// A BSDF's values at probes, or the check that says why there are none.
@@ -210,7 +213,12 @@ impl LightAnswer<'_> {
         let answers: Vec<Unshadowed> = answers
             .iter()
             .zip(&of)
-            .map(|(answer, of)| Unshadowed { witness: answer.name, of, values: &answer.values })
+            .map(|(answer, of)| Unshadowed {
+                witness: answer.name,
+                of,
+                values: &answer.values,
+                black_below: !matches!(answer.witness, Witness::Flat(_)),
+            })
             .collect();
         then(&answers)
     }

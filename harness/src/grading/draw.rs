@@ -5,7 +5,7 @@ use std::path::Path;
 use super::ask::Asker;
 use super::case::Case;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
-use crate::worker::{Outcome, Request, Stage};
+use crate::worker::{CameraValue, Matrices, Outcome, Request, Stage};
 
 /// The names of the stages, in order.
 pub const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
@@ -23,6 +23,8 @@ pub struct Frame<'a> {
     pub shadow_map: bool,
     /// How often it is drawn, one after the other; the last one is looked at.
     pub times: usize,
+    /// Whether it is drawn once for each of [`Matrices::ALL`] instead, and each is looked at.
+    pub each_matrices: bool,
     /// Stages to replace; all three where there is no plugin.
     pub stages: Vec<Stage>,
 }
@@ -32,7 +34,7 @@ impl<'a> Frame<'a> {
     pub fn plain(case: &'a Case) -> Self {
         let toml = case.realtime.as_path();
         let (size, stages) = (case.film(), Vec::new());
-        Self { case, toml, size, shadow_map: false, times: 1, stages }
+        Self { case, toml, size, shadow_map: false, times: 1, each_matrices: false, stages }
     }
 
     /// A scene's small film under other stages.
@@ -67,7 +69,12 @@ pub fn draw_each(asker: &Asker, plugin: Option<&Path>, frames: &[Frame]) -> Vec<
         shadow_map: frame.shadow_map,
         adapter: adapter.clone(),
         stages: frame.stages.clone(),
-        cameras: vec![frame.case.camera; frame.times],
+        cameras: match frame.each_matrices {
+            true => {
+                Matrices::ALL.map(|matrices| CameraValue { matrices, ..frame.case.camera }).into()
+            }
+            false => vec![frame.case.camera; frame.times],
+        },
     };
     let mut outcomes = asker.ask(plugin, frames.iter().map(request).collect());
     for (outcome, frame) in outcomes.iter_mut().zip(frames) {

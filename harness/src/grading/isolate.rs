@@ -13,9 +13,8 @@ use super::seen;
 use super::stages::Stages;
 use crate::diagnosis::{Kind, Tile, View};
 use crate::evidence::premultiplied::Premultiplied;
-use crate::evidence::stages::{
-    BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass, judge_vertex,
-};
+use crate::evidence::stages::{BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass};
+use crate::evidence::vertex::{VertexFilm, judge_vertex};
 use crate::evidence::{Check, Verdict};
 use crate::evidence::{images, pixels};
 use crate::imaging::evidence::Tolerances;
@@ -47,7 +46,12 @@ pub fn isolate(
     let is_right =
         |index, frames: &[Outcome]| pass_check(cases[index], frames).verdict == Verdict::Pass;
     let passes = draw_scenes(asker, plugin, &under(cases, &bound_values_shown), &is_right);
-    let mut swapped = draw_each(asker, None, &under(cases, &sets).concat()).into_iter();
+    let mut frames = under(cases, &sets).concat();
+    for frame in &mut frames {
+        let own = |stage: &Stage| stage.name == STAGES[0] && stage.text != VERTEX;
+        frame.each_matrices = frame.stages.iter().any(own);
+    }
+    let mut swapped = draw_each(asker, None, &frames).into_iter();
     let mut shown = Shown::default();
     let mut checks = Vec::new();
     for (&case, pass) in cases.iter().zip(passes) {
@@ -88,9 +92,9 @@ pub fn isolate(
                 Err(outcome) => return swap_failed(asker, id, case, fails, outcome),
             };
             match images.as_slice() {
-                [positions, normals] => {
-                    seen::vertex(asker, case, positions, normals);
-                    vertex(case, positions, normals)
+                [p0, p1, p2, n0, n1, n2] => {
+                    seen::vertex(asker, case, p0, n0);
+                    vertex(case, [[p0, n0], [p1, n1], [p2, n2]])
                 }
                 [image] => {
                     see_fragment(asker, case, image, index == 2);
@@ -203,13 +207,14 @@ fn swaps(stages: &Stages) -> ([Swap; 3], Vec<Vec<Stage>>) {
 
 /// The images of a scene's frames, or the first outcome that is none.
 fn images<'a>(case: &Case, outcomes: &'a [Outcome]) -> Result<Vec<Image>, &'a Outcome> {
-    let image = |outcome: &'a Outcome| match outcome {
-        Outcome::Done(answer) => {
-            Ok(ask::image(&answer.values, case.small.width, case.small.height))
-        }
-        other => Err(other),
-    };
-    outcomes.iter().map(image).collect()
+    let (width, height) = (case.small.width, case.small.height);
+    let floats = (3 * width * height) as usize;
+    let mut images = Vec::new();
+    for outcome in outcomes {
+        let Outcome::Done(answer) = outcome else { return Err(outcome) };
+        images.extend(answer.values.chunks(floats).map(|frame| ask::image(frame, width, height)));
+    }
+    Ok(images)
 }
 
 fn pass_check(case: &Case, outcomes: &[Outcome]) -> Check {
@@ -243,13 +248,13 @@ fn judge_bound(case: &Case, frames: &[(BoundValue, Image)]) -> Check {
     judge_pass(&case.entry.name, scene, &small.surface, &small.unshadowed_mask, frames)
 }
 
-fn vertex(case: &Case, positions: &Image, normals: &Image) -> Check {
+fn vertex(case: &Case, frames: [[&Image; 2]; 3]) -> Check {
     let (name, small) = (&case.entry.name, &case.small);
-    let camera = case.expected.scene.camera(small.surface.width, small.surface.height);
-    match camera {
+    let scene = &case.expected.scene;
+    match scene.camera(small.surface.width, small.surface.height) {
         Ok(camera) => {
-            let mask = &small.unshadowed_mask;
-            judge_vertex(name, &camera, &small.surface, mask, positions, normals)
+            let (surface, mask) = (&small.surface, &small.unshadowed_mask);
+            judge_vertex(name, &VertexFilm { scene, camera, surface, mask }, frames)
         }
         Err(error) => Check::new("stage.vertex", name, Verdict::NotRun, error.to_string()),
     }

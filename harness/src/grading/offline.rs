@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use basecode::{Image, Ray};
+use basecode::{Image, MaterialModel, Ray, Scene, Texture};
 
 use super::ask::{self, Asker};
 use super::case::Case;
@@ -16,7 +16,7 @@ use crate::evidence::{loops, rays};
 use crate::expected::SurfacePoint;
 use crate::imaging::evidence::Tolerances;
 use crate::plugin::Witness;
-use crate::worker::{Outcome, Request};
+use crate::worker::{BsdfQuery, BsdfSource, Outcome, Request};
 
 /// The witnesses that an integrator is judged under, with their names for reports.
 const WITNESSES: [(Witness, &str); 4] = [
@@ -77,6 +77,9 @@ pub fn judge_scene<'a>(
     requests.push(radiance(&chosen, Witness::True, true));
     requests.push(radiance(&centres, Witness::True, true));
     requests.push(render(small.width, small.height, 1, 1, 1));
+    let plain = plain_surfaces(case);
+    let queries = plain.iter().map(|(_, query)| *query).collect();
+    requests.push(Request::EvalBsdf { scene: scene.clone(), queries });
     let (width, height) = case.film();
     requests.push(render(width, height, case.spp, seed, threads));
     if let Some(film) = &small.sampled {
@@ -95,6 +98,7 @@ pub fn judge_scene<'a>(
         true_on,
         at_centres,
         one_spp,
+        own,
         full,
         sampled @ ..,
     ] = outcomes.as_slice()
@@ -118,8 +122,9 @@ pub fn judge_scene<'a>(
         checks.push(judge_shadows(case, &own, (true_on, true_off), (true_on, true_off)));
     } else {
         let asked = witnessed.iter().zip(WITNESSES);
-        let asked: Vec<_> =
+        let mut asked: Vec<_> =
             asked.map(|(outcome, (witness, name))| (*outcome, witness, name)).collect();
+        asked.push((flat_off, FLAT, "constant, below the surface too"));
         answers.push_light(case, &asked);
         let flat = |point: &SurfacePoint| value(FLAT, point.wi, point.wo);
         let shadows = judge_shadows(case, &flat, (flat_on, flat_off), (true_on, true_off));
@@ -133,6 +138,12 @@ pub fn judge_scene<'a>(
             seen::shadows(asker, case, with, without);
         }
         checks.push(shadows);
+        if let (Outcome::Done(own), Outcome::Done(radiance)) = (own, true_off) {
+            let rays = plain.iter().map(|(ray, _)| *ray);
+            let own: Vec<_> = rays.zip(ask::colours(&own.values).iter().copied()).collect();
+            let radiance = ask::colours(&radiance.values);
+            checks.push(rays::judge_material(&small.batch, &own, radiance));
+        }
         see_rays(asker, case, w1, (flat_on, flat_off));
     }
     checks.push(match (one_spp, at_centres) {
@@ -156,7 +167,12 @@ pub fn judge_scene<'a>(
         checks.push(match (along, image) {
             (Outcome::Done(along), Outcome::Done(image)) => {
                 let (image, along) = (ask::colours(&image.values), ask::colours(&along.values));
-                loops::judge_samples(name, &sampled.film, image, along)
+                let (check, edges) = loops::judge_samples(name, &sampled.film, image, along);
+                // Where the samples are wrong already, edges are too.
+                if check.verdict == Verdict::Pass {
+                    answers.edges.add(&edges);
+                }
+                check
             }
             (Outcome::Done(_), missing) => ask::unanswered("loop.samples", name, &[], missing),
             // Where the rays fail in the same way, it is not the loop's fault.
@@ -180,6 +196,31 @@ pub fn judge_scene<'a>(
             (checks, None)
         }
     }
+}
+
+/// What to ask a renderer about its own BSDF where lit rays end: the ray, and the question. Surfaces of
+/// one colour alone: beside a texel's edge a right renderer may take either.
+fn plain_surfaces(case: &Case) -> Vec<(usize, BsdfQuery)> {
+    let scene = &case.expected.scene;
+    let batch = &case.small.batch;
+    let lit = batch.points.iter().take(batch.lit).enumerate();
+    let asked = lit.filter_map(|(ray, point)| {
+        let material = scene.material_of(point.shape);
+        let bitmap = |texture| matches!(texture, &Texture::Bitmap(_));
+        let plain = !bitmap(&material.diffuse) && !bitmap(&material.specular);
+        let handed_in = plain && material.model != MaterialModel::Mirror;
+        handed_in.then(|| {
+            let (shape, primitive) = (point.shape as u32, point.primitive as u32);
+            let query = BsdfQuery {
+                source: BsdfSource::Shape { shape, primitive },
+                uv: [0.5; 2],
+                wo: point.wo.into(),
+                wi: point.wi.into(),
+            };
+            (ray, query)
+        })
+    });
+    asked.collect()
 }
 
 /// Keeps for the diagnosis what witnesses say of light and visibility.
@@ -232,12 +273,28 @@ fn judge_shadows(
                 _ => (without, without),
             };
             let scene = &case.expected.scene;
-            let blocked = |ray: &Ray| scene.occluded(ray);
-            rays::judge_shadows(&case.small.batch, bsdf, (with, without), shaded, &blocked)
+            let occluders = rays::Occluders {
+                blocker: &|ray| blocker(scene, ray),
+                is_phong: &|shape| scene.material_of(shape).model == MaterialModel::Phong,
+            };
+            rays::judge_shadows(&case.small.batch, bsdf, (with, without), shaded, &occluders)
         }
         (Outcome::Done(_), missing) => {
             Check { verdict: Verdict::NotJudged, ..ask::unanswered(id, name, &[], missing) }
         }
         (missing, _) => ask::unanswered(id, name, &["1.4"], missing),
     }
+}
+
+/// The first shape along a ray that blocks it: emitters do not.
+fn blocker(scene: &Scene, ray: &Ray) -> Option<usize> {
+    let mut rest = *ray;
+    while scene.occluded(&rest) {
+        let hit = scene.intersect(&rest)?;
+        if !scene.material_of(hit.shape).is_emitter() {
+            return Some(hit.shape);
+        }
+        rest.min_t = hit.t + hit.epsilon;
+    }
+    None
 }

@@ -20,7 +20,7 @@ use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
 use crate::diagnosis::{Diagnosis, Stored};
-use crate::evidence::{Check, Evidence, Verdict, rays, shadow_map};
+use crate::evidence::{Check, Evidence, Verdict, loops, price, rays, shadow_map};
 use crate::expected::Store;
 use crate::held_back::{self, HeldBack};
 use crate::intake::{self, HandIn, IntakeError, TreeSpec, Validation};
@@ -428,7 +428,11 @@ impl<'a> Grading<'a> {
                 drawn.extend(image);
             }
             checks.extend(answers.judge());
+            if cases.iter().any(|case| case.small.sampled.is_some()) {
+                checks.push(loops::judge_edges(&answers.edges));
+            }
             rays::set_apart(&mut checks[begin..]);
+            price::agree(&mut checks[begin..]);
             mark(&mut checks[begin..], cases);
         }
         Ok(())
@@ -479,6 +483,7 @@ impl<'a> Grading<'a> {
             if !wrong.is_empty() {
                 checks.extend(isolate::isolate(asker, plugin, &wrong, stages, fails, tolerances));
             }
+            price::agree(&mut checks[begin..]);
             mark(&mut checks[begin..], cases);
         }
         self.stop_if_interrupted()

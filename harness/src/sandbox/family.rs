@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::os::fd::OwnedFd;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 use nix::errno::Errno;
@@ -77,7 +78,7 @@ pub fn lock(policy: &Policy) -> Result<Ready, SandboxError> {
     nix::sys::stat::umask(Mode::from_bits_truncate(0o022));
     // Not dumpable: nobody else of this user may look into these processes or trace them.
     prctl::set_dumpable(false).map_err(|cause| error("hide its memory", cause))?;
-    let report_file = policy.report.as_ref().map(File::create).transpose();
+    let report_file = policy.report.as_deref().map(begin_report).transpose();
     let report_file = report_file
         .map_err(|cause| SandboxError::new("launcher", "write the sandbox's report", cause))?;
     match begin(policy) {
@@ -307,10 +308,19 @@ fn mirror(code: i32) -> ! {
     exit(code)
 }
 
+/// Room for a report: foreign code that fills the disk first must not hinder it. JSON may end in spaces.
+const REPORT_BYTES: usize = 4096;
+
+fn begin_report(path: &Path) -> io::Result<File> {
+    let mut file = File::create(path)?;
+    file.write_all(&[b' '; REPORT_BYTES])?;
+    Ok(file)
+}
+
 fn write_report(file: Option<File>, report: &Result<InForce, SandboxError>) {
-    if let (Some(mut file), Ok(text)) = (file, serde_json::to_vec(report)) {
+    if let (Some(file), Ok(text)) = (file, serde_json::to_vec(report)) {
         // A report that cannot be written is an empty one, which is an error to its reader.
-        let _ = file.write_all(&text);
+        let _ = file.write_all_at(&text, 0);
     }
 }
 

@@ -377,7 +377,7 @@ impl SandboxError {
 pub fn read_report(path: &Path) -> Result<InForce, SandboxError> {
     let error = |cause: String| SandboxError::new("launcher", "read the sandbox's report", cause);
     let text = std::fs::read_to_string(path).map_err(|cause| error(cause.to_string()))?;
-    if text.is_empty() {
+    if text.trim().is_empty() {
         return Err(error("the child ended before it was locked".to_owned()));
     }
     serde_json::from_str::<Result<InForce, SandboxError>>(&text)

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use basecode::CameraConfig;
 use renderer_api as api;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -176,6 +177,39 @@ pub struct CameraValue {
     pub up: [f32; 3],
     /// Full vertical field of view in degrees.
     pub fov_y_deg: f32,
+    /// Which matrices are bound; a plugin binds its own.
+    #[serde(default)]
+    pub matrices: Matrices,
+}
+
+impl From<CameraConfig> for CameraValue {
+    fn from(camera: CameraConfig) -> Self {
+        Self {
+            eye: camera.eye.into(),
+            at: camera.at.into(),
+            up: camera.up.into(),
+            fov_y_deg: camera.fov_y_deg,
+            matrices: Matrices::Usual,
+        }
+    }
+}
+
+/// What the two matrices of `frame` hold under Umbra's own pass. Their product is always the same, so
+/// that a vertex stage that multiplies by both in order draws the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Matrices {
+    /// What their names say.
+    #[default]
+    Usual,
+    /// The view matrix holds the product, the projection matrix nothing.
+    InView,
+    /// The projection matrix holds the product, the view matrix nothing.
+    InProjection,
+}
+
+impl Matrices {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Usual, Self::InView, Self::InProjection];
 }
 
 impl Request {

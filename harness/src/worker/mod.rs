@@ -22,8 +22,8 @@ mod wire;
 pub use cage::as_given;
 pub use child::{child_main, draw_in_process};
 pub use job::{
-    Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, RayQuery, Request, SceneRef,
-    Stage,
+    Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, Matrices, RayQuery, Request,
+    SceneRef, Stage,
 };
 pub use outcome::{Answer, JobReport, Late, Matter, Outcome, WitnessUse, WorkerRun};
 pub use patience::{Budget, Patience, Reference, blames_the_machine};

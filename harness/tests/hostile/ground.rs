@@ -293,6 +293,7 @@ impl Ground {
                 at: [0.0; 3],
                 up: [0.0, 0.0, 1.0],
                 fov_y_deg: 40.0,
+                matrices: umbra::worker::Matrices::Usual,
             }],
         }
     }

@@ -80,7 +80,7 @@ fn inverse(mut i: u32) -> f32 {
 
 fn judge(image: &[[f32; 3]]) -> Check {
     let film = SampledFilm::new(WIDTH, HEIGHT);
-    judge_samples("s", &film, image, &own(&film))
+    judge_samples("s", &film, image, &own(&film)).0
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn averages_are_judged_whatever_is_shaded() {
         if lit.is_empty() { 0.0 } else { mean(&lit) }
     };
     let film = SampledFilm::new(WIDTH, HEIGHT);
-    let edge = judge_samples("s", &film, &render(independent, lit_only), &own(&film));
+    let (edge, _) = judge_samples("s", &film, &render(independent, lit_only), &own(&film));
     assert_eq!(edge.verdict, Verdict::Fail, "{edge:?}");
     let background = |values: &[f32]| mean(values) + if mean(values) == 0.0 { 0.2 } else { 0.0 };
     assert_eq!(judge(&render(independent, background)).verdict, Verdict::Fail);

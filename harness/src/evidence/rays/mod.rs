@@ -4,16 +4,19 @@
 //! not paid twice. Only rays that hang on nothing are asked: away from every edge, both directions
 //! well above the surface, the light in sight (or out of it) whatever the shadow ray's epsilon.
 
+mod material;
 mod shadows;
 mod unshadowed;
 
-use basecode::{Frame, Ray, Scene, Vec3};
+use basecode::{Frame, MaterialModel, Ray, Scene, Vec3};
 
-use super::shading::{Shading, power};
-use crate::expected::{SurfaceBuffer, SurfacePoint};
+use super::Check;
+use super::shading::{Directions, Shading, power};
+use crate::expected::{FARTHEST_START, Sight, SurfaceBuffer, SurfacePoint};
 use crate::imaging::reference::RegionMask;
 
-pub use shadows::{judge_shadows, set_apart};
+pub use material::judge_material;
+pub use shadows::{Occluders, judge_shadows};
 pub use unshadowed::{Unshadowed, judge_unshadowed, passes_unshadowed};
 
 /// Directions closer to the surface than this cosine are left out.
@@ -23,8 +26,18 @@ pub(super) const RELATIVE: f64 = 3e-3;
 /// So many of the rays may still differ: a student's own intersection code meets other triangles
 /// along seams that no mask knows.
 pub(super) const STRAY_FRACTION: f64 = 2e-3;
+/// Shadowed rays are asked whose occluder is nearer than this, over the light's distance.
+const CONTACT: f32 = 0.03;
+/// So many of these.
+const CONTACTS: usize = 150;
 /// So many black rays are asked.
 const BLACK: usize = 200;
+
+/// What one check's verdict means to another's, on all scenes together.
+pub fn set_apart(checks: &mut [Check]) {
+    shadows::set_apart(checks);
+    material::set_apart(checks);
+}
 
 /// The rays of one scene, and what is right along them.
 #[derive(Clone, Debug, Default)]
@@ -80,6 +93,48 @@ impl RayBatch {
         Self { scene: name.to_owned(), rays, pixels, points, lit: count, intensity, light }
     }
 
+    /// The same, with shadowed rays close behind what blocks them, of a finer film: a small one has
+    /// few. `width` is that of the film the batch was chosen on, a divisor of the finer one's.
+    pub fn with_contacts(mut self, scene: &Scene, fine: &SurfaceBuffer, width: usize) -> Self {
+        let times = fine.width / width;
+        let blocked = |x: usize, y: usize| {
+            let (ray, point) = &fine.pixels[y * fine.width + x];
+            let point = point.as_ref().filter(|point| point.sight == Sight::Blocked)?;
+            let material = scene.material_of(point.shape);
+            let above = |w| Frame::cos_theta(w) > MIN_COSINE;
+            let judged =
+                above(point.wo) && above(point.wi) && material.model != MaterialModel::Mirror;
+            (judged && !material.is_emitter()).then_some((ray, point))
+        };
+        let mut contacts = Vec::new();
+        for y in 1..fine.height.saturating_sub(1) {
+            for x in 1..fine.width - 1 {
+                let Some((ray, point)) = blocked(x, y) else { continue };
+                let around = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)];
+                let same = |(x, y)| blocked(x, y).is_some_and(|(_, p)| p.shape == point.shape);
+                if !around.into_iter().all(same) {
+                    continue;
+                }
+                let toward = (self.light - point.position) / point.distance;
+                let start = FARTHEST_START * point.distance;
+                let near = Ray::segment(point.position, toward, start, CONTACT * point.distance);
+                if let Some(hit) = scene.intersect(&near) {
+                    let pixel = (y / times) * width + x / times;
+                    contacts.push((hit.t / point.distance, pixel, *ray, *point));
+                }
+            }
+        }
+        contacts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let step = contacts.len().div_ceil(CONTACTS).max(1);
+        for (_, pixel, ray, point) in contacts.into_iter().step_by(step) {
+            let at = self.points.len();
+            self.points.push(point);
+            self.rays.insert(at, ray);
+            self.pixels.insert(at, pixel);
+        }
+        self
+    }
+
     /// The pixels of the lit and of the shadowed rays.
     pub fn met(&self) -> impl Iterator<Item = &usize> {
         self.pixels.iter().take(self.points.len())
@@ -96,6 +151,30 @@ impl RayBatch {
         (self.light - self.points[index].position) / self.points[index].distance
     }
 
+    /// (wi, wo) as they reach the BSDF along ray `index`.
+    fn directions(&self, index: usize, directions: Directions) -> (Vec3, Vec3) {
+        let point = &self.points[index];
+        let (wi, wo) = (point.wi, point.wo);
+        let (world_wi, world_wo) = (self.to_light(index), -point.ray.direction.normalize());
+        let frame = Frame::from_normal(point.normal);
+        let local = |v: Vec3| frame.to_local(v.normalize_or_zero());
+        match directions {
+            Directions::Local => (wi, wo),
+            Directions::WorldWi => (world_wi, wo),
+            Directions::WorldWo => (wi, world_wo),
+            Directions::World => (world_wi, world_wo),
+            // The tangents turn too, which no witness tells.
+            Directions::NegatedNormal => (-wi, -wo),
+            Directions::NegatedWi => (-wi, wo),
+            Directions::NegatedWo => (wi, -wo),
+            Directions::Exchanged => (wo, wi),
+            Directions::WoTwice => (wo, wo),
+            Directions::WiTwice => (wi, wi),
+            Directions::LightFromOrigin => (local(self.light), wo),
+            Directions::LightFromViewer => (local(self.light - point.ray.origin), wo),
+        }
+    }
+
     /// Radiance along lit ray `index` of an integrator that lights as `shading` says, under a BSDF
     /// whose value for (wi, wo) is `bsdf`.
     pub fn witnessed(
@@ -105,17 +184,23 @@ impl RayBatch {
         bsdf: &dyn Fn(Vec3, Vec3) -> [f64; 3],
     ) -> [f64; 3] {
         let point = &self.points[index];
-        let r = f64::from(point.distance);
-        let wi = if shading.world_wi { self.to_light(index) } else { point.wi };
+        let r = match shading.directions {
+            Directions::LightFromOrigin => self.light.length(),
+            Directions::LightFromViewer => (self.light - point.ray.origin).length(),
+            _ if shading.along_ray => (point.position - point.ray.origin).length(),
+            _ => point.distance,
+        };
+        let r = f64::from(r);
+        let (wi, wo) = self.directions(index, shading.directions);
         let wi = if shading.long_wi { point.distance * wi } else { wi };
-        let value = bsdf(wi, point.wo);
+        let value = if shading.asks { bsdf(wi, wo) } else { [1.0; 3] };
         let [cos_i, cos_o] = [point.wi, point.wo].map(|w| f64::from(Frame::cos_theta(w)));
         let incident = shading.factor[0]
-            * r.powf(-shading.falloff)
+            * shading.attenuation(r)
             * power(cos_i, shading.cos_i[0] - 1.0)
             * power(cos_o, shading.cos_o[0]);
         std::array::from_fn(|c| {
-            f64::from(self.intensity[c]) * incident * value[shading.channels[c]]
+            (shading.incident)(f64::from(self.intensity[c]) * incident) * value[shading.channels[c]]
         })
     }
 }

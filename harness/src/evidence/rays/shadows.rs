@@ -1,9 +1,9 @@
 //! Part 1.4: visibility along shadow rays.
 
-use basecode::Ray;
+use basecode::{Ray, Vec3};
 
 use super::{RELATIVE, RayBatch, STRAY_FRACTION};
-use crate::evidence::price::{Class, Price};
+use crate::evidence::price::{self, Class, Price};
 use crate::evidence::{Check, Measure, Verdict};
 use crate::expected::SurfacePoint;
 
@@ -11,6 +11,8 @@ use crate::expected::SurfacePoint;
 const NEARLY_ALL: f64 = 0.99;
 /// The mistake of shadows that are not black.
 const LEAVES_LIGHT: &str = "shadows leave some light";
+/// The mistake of lit points that are darker with shadows on.
+const LOSES_LIGHT: &str = "lit points lose some light";
 /// So many of the lit rays must not be black without shadows.
 const LEAST_KNOWN: f64 = 0.25;
 /// A visibility below this is dark, above one minus it lit; anything between is neither.
@@ -20,14 +22,14 @@ const HALF_LIGHT: f64 = 0.02;
 /// (`without`), under the same BSDF whose value is `bsdf`.
 ///
 /// Errors on lit and on shadowed rays count apart and add up, so that an image that is all lit or
-/// all dark is worth nothing. `blocked` says whether the scene blocks a ray. `shaded` is radiance with and without shadows under the renderer's own
+/// all dark is worth nothing. `shaded` is radiance with and without shadows under the renderer's own
 /// BSDFs, right or wrong: along a lit ray the shadow query leaves what is shaded as it was.
 pub fn judge_shadows(
     batch: &RayBatch,
     bsdf: &dyn Fn(&SurfacePoint) -> [f64; 3],
     (with, without): (&[[f32; 3]], &[[f32; 3]]),
     shaded: (&[[f32; 3]], &[[f32; 3]]),
-    blocked: &dyn Fn(&Ray) -> bool,
+    occluders: &Occluders,
 ) -> Check {
     let id = "shadow.rays";
     let dark = batch.points.len() - batch.lit;
@@ -112,75 +114,131 @@ pub fn judge_shadows(
     };
     check.measures = measures;
     if check.verdict == Verdict::Fail {
-        let price = price(batch, &known, lit_fraction + dark_fraction, blocked);
+        let price = price(batch, &known, lit_fraction + dark_fraction, occluders);
         check.error = price.error;
+        check.mistake = price.name();
         check.measures.extend(price.measure());
     }
     check
 }
 
-/// A shadow ray with one thing wrong.
-enum Change {
-    /// It begins at this distance from the surface and ends at this one; both of the light's.
-    Ends(&'static str, fn(f32) -> (f32, f32)),
-    /// It leads away from the light.
-    Reversed,
-    /// What is lit is dark, and what is dark is lit.
-    Inverted,
+/// What a scene says of shadow rays.
+#[derive(Clone, Copy)]
+pub struct Occluders<'a> {
+    /// The shape that blocks a ray first, if one does.
+    pub blocker: &'a dyn Fn(&Ray) -> Option<usize>,
+    /// Whether a shape's material is Phong.
+    pub is_phong: &'a dyn Fn(usize) -> bool,
 }
 
-/// Mistakes with shadow rays, each a slip.
-const CHANGES: [Change; 16] = [
-    Change::Reversed,
-    Change::Inverted,
-    Change::Ends("the shadow ray does not end", |_| (Ray::EPSILON, f32::INFINITY)),
-    Change::Ends("the shadow ray ends at r^2", |r| (Ray::EPSILON, r * r)),
-    Change::Ends("the shadow ray ends at 2 r", |r| (Ray::EPSILON, 2.0 * r)),
-    Change::Ends("the shadow ray ends at 1.5 r", |r| (Ray::EPSILON, 1.5 * r)),
-    Change::Ends("the shadow ray ends at 1.1 r", |r| (Ray::EPSILON, 1.1 * r)),
-    Change::Ends("the shadow ray ends at .98 r", |r| (Ray::EPSILON, 0.98 * r)),
-    Change::Ends("the shadow ray ends at .95 r", |r| (Ray::EPSILON, 0.95 * r)),
-    Change::Ends("the shadow ray ends at .9 r", |r| (Ray::EPSILON, 0.9 * r)),
-    Change::Ends("the shadow ray ends at .8 r", |r| (Ray::EPSILON, 0.8 * r)),
-    Change::Ends("the shadow ray ends at .75 r", |r| (Ray::EPSILON, 0.75 * r)),
-    Change::Ends("the shadow ray starts .01 off", |r| (0.01, 0.999 * r)),
-    Change::Ends("the shadow ray starts .02 off", |r| (0.02, 0.999 * r)),
-    Change::Ends("the shadow ray starts .05 off", |r| (0.05, 0.999 * r)),
-    Change::Ends("the shadow ray starts .1 off", |r| (0.1, 0.999 * r)),
-];
+/// A mistake with shadow rays: what it is, and how much of the light reaches the point of a ray then.
+type Change<'a> = (&'static str, Box<dyn Fn(usize) -> f64 + 'a>);
 
-impl Change {
-    fn name(&self) -> &'static str {
-        match self {
-            Self::Ends(name, _) => name,
-            Self::Reversed => "the shadow ray leads away from the light",
-            Self::Inverted => "lit and dark are exchanged",
-        }
-    }
+/// The one that is no slip: the end is part of what the handout asks for.
+const ENDLESS: &str = "the shadow ray does not end";
 
-    /// Whether a point is lit by a renderer with this mistake.
-    fn lights(&self, batch: &RayBatch, index: usize, blocked: &dyn Fn(&Ray) -> bool) -> bool {
-        let point = &batch.points[index];
-        let (r, toward) = (point.distance, batch.to_light(index));
-        let ray = |toward, start, end| Ray::segment(point.position, toward, start, end);
-        match self {
-            Self::Ends(_, ends) => {
-                let (start, end) = ends(r);
-                !(start < end && blocked(&ray(toward, start, end)))
-            }
-            Self::Reversed => !blocked(&ray(-toward, Ray::EPSILON, 0.999 * r)),
-            Self::Inverted => index >= batch.lit,
-        }
+/// The mistakes that are looked for.
+fn changes<'a>(batch: &'a RayBatch, occluders: &'a Occluders<'a>) -> Vec<Change<'a>> {
+    let lit = |blocked: bool| if blocked { 0.0 } else { 1.0 };
+    let blocks = |ray: &Ray| ray.min_t < ray.max_t && (occluders.blocker)(ray).is_some();
+    let right = move |index: usize| lit(index >= batch.lit);
+    let mut changes: Vec<Change> = Vec::new();
+    let mut of = |name, ray: fn(&SurfacePoint, Vec3, f32) -> Ray| {
+        let light = move |index: usize| {
+            let point = &batch.points[index];
+            lit(blocks(&ray(point, batch.to_light(index), point.distance)))
+        };
+        changes.push((name, Box::new(light)));
+    };
+    let eps = Ray::EPSILON;
+    of("the shadow ray leads away from the light", |p, w, r| {
+        Ray::segment(p.position, -w, Ray::EPSILON, 0.999 * r)
+    });
+    of("the shadow ray starts at the light, and leads away from the surface", |p, w, r| {
+        Ray::segment(p.position + r * w, w, Ray::EPSILON, 0.999 * r)
+    });
+    of("the shadow ray starts at the camera", |p, w, r| {
+        Ray::segment(p.ray.origin, w, Ray::EPSILON, 0.999 * r)
+    });
+    of("the shadow ray leads along wi in the local frame", |p, _, r| {
+        Ray::segment(p.position, p.wi, Ray::EPSILON, 0.999 * r)
+    });
+    of("the shadow ray starts below the surface", |p, w, r| {
+        Ray::segment(p.position - 1e-2 * p.normal, w, Ray::EPSILON, 0.999 * r)
+    });
+    of("the shadow ray starts off the surface, .1 along the normal", |p, w, r| {
+        Ray::segment(p.position + 0.1 * p.normal, w, Ray::EPSILON, 0.999 * r)
+    });
+    // The ends of the ray: of the light's distance, or of the scene's units.
+    for (name, times, end) in [
+        (ENDLESS, 0.0, f32::INFINITY),
+        ("the shadow ray ends at 2 r", 2.0, 0.0),
+        ("the shadow ray ends at 1.5 r", 1.5, 0.0),
+        ("the shadow ray ends at 1.1 r", 1.1, 0.0),
+        ("the shadow ray ends at .98 r", 0.98, 0.0),
+        ("the shadow ray ends at .95 r", 0.95, 0.0),
+        ("the shadow ray ends at .9 r", 0.9, 0.0),
+        ("the shadow ray ends at .8 r", 0.8, 0.0),
+        ("the shadow ray ends at .75 r", 0.75, 0.0),
+        ("the shadow ray ends at .5 r", 0.5, 0.0),
+        ("the shadow ray ends at .25 r", 0.25, 0.0),
+        ("the shadow ray ends at 1", 0.0, 1.0),
+        ("the shadow ray ends at 1 short of the light", 1.0, -1.0),
+        ("the shadow ray ends at .1 short of the light", 1.0, -0.1),
+    ] {
+        let light = move |index: usize| {
+            let (p, w) = (&batch.points[index], batch.to_light(index));
+            lit(blocks(&Ray::segment(p.position, w, eps, times * p.distance + end)))
+        };
+        changes.push((name, Box::new(light)));
     }
+    let squared = move |index: usize| {
+        let (p, w) = (&batch.points[index], batch.to_light(index));
+        lit(blocks(&Ray::segment(p.position, w, eps, p.distance * p.distance)))
+    };
+    changes.push(("the shadow ray ends at r^2", Box::new(squared)));
+    for (name, start) in [
+        ("the shadow ray starts .01 off", 0.01),
+        ("the shadow ray starts .02 off", 0.02),
+        ("the shadow ray starts .05 off", 0.05),
+        ("the shadow ray starts .1 off", 0.1),
+        ("the shadow ray starts .2 off", 0.2),
+        ("the shadow ray starts .5 off", 0.5),
+        ("the shadow ray starts 1 off", 1.0),
+    ] {
+        let light = move |index: usize| {
+            let (p, w) = (&batch.points[index], batch.to_light(index));
+            lit(blocks(&Ray::segment(p.position, w, start, 0.999 * p.distance)))
+        };
+        changes.push((name, Box::new(light)));
+    }
+    let blocker = move |index: usize| {
+        let (p, w) = (&batch.points[index], batch.to_light(index));
+        (occluders.blocker)(&Ray::segment(p.position, w, eps, 0.999 * p.distance))
+    };
+    let phong = move |index: usize| (occluders.is_phong)(batch.points[index].shape);
+    changes.push(("lit and dark are exchanged", Box::new(move |i| 1.0 - right(i))));
+    changes.push((
+        "a surface's own shape casts no shadow on it",
+        Box::new(move |i| lit(blocker(i).is_some_and(|shape| shape != batch.points[i].shape))),
+    ));
+    changes.push((
+        "the first shape alone casts shadows",
+        Box::new(move |i| lit(blocker(i) == Some(0))),
+    ));
+    changes.push((
+        "no shadow falls on Phong materials",
+        Box::new(move |i| if phong(i) { 1.0 } else { right(i) }),
+    ));
+    changes.push((
+        "no shadow falls on diffuse materials",
+        Box::new(move |i| if phong(i) { right(i) } else { 1.0 }),
+    ));
+    changes
 }
 
 /// What wrong visibility costs. Errors of lit and of dark rays count apart and add up.
-fn price(
-    batch: &RayBatch,
-    known: &[(usize, f64)],
-    raw: f64,
-    blocked: &dyn Fn(&Ray) -> bool,
-) -> Price {
+fn price(batch: &RayBatch, known: &[(usize, f64)], raw: f64, occluders: &Occluders) -> Price {
     let of = |wanted: bool| known.iter().filter(move |(index, _)| (*index < batch.lit) == wanted);
     let counts = [of(true).count().max(1), of(false).count().max(1)].map(|n| n as f64);
     // The fraction of lit rays whose visibility is not `light`, and that of dark ones.
@@ -195,20 +253,51 @@ fn price(
         };
         wrong(true) / counts[0] + wrong(false) / counts[1]
     };
-    let price = CHANGES.iter().fold(Price::of_raw(raw), |price, change| {
-        let light = |index: usize| f64::from(u8::from(change.lights(batch, index, blocked)));
-        price.or(change.name(), Class::Slip, residual(&light))
+    let right = |index: usize| f64::from(u8::from(index < batch.lit));
+    let pairs = known.iter().map(|(index, visibility)| (*visibility, right(*index)));
+    let start = match price::correlation(pairs) {
+        likeness if likeness >= price::LIKE => {
+            Price::of_raw(raw).or(price::UNKNOWN, Class::Unknown, 0.0)
+        }
+        _ => Price::of_raw(raw),
+    };
+    let price = changes(batch, occluders).iter().fold(start, |price, (name, light)| {
+        let class = if *name == ENDLESS { Class::Concept } else { Class::Slip };
+        price.or(name, class, residual(light))
     });
-    // Shadows that leave some light: the more, the worse.
-    let mut dark: Vec<f64> = of(false).map(|(_, visibility)| *visibility).collect();
-    dark.retain(|visibility| visibility.is_finite());
-    dark.sort_by(f64::total_cmp);
-    let left = dark.get(dark.len() / 2).copied().unwrap_or_default();
-    if !(left > 0.0 && left < 1.0) {
-        return price;
+    // Acne darkens some of what is lit, an offset too large lets some light through.
+    let [lit_wrong, dark_wrong] = [true, false].map(|lit| {
+        let off = |visibility: f64| !((visibility - f64::from(u8::from(lit))).abs() < HALF_LIGHT);
+        of(lit).filter(|(_, visibility)| off(*visibility)).count() as f64
+    });
+    let price = price::partly(price, lit_wrong / counts[0], dark_wrong / counts[1]);
+    // What nearly all dark rays, or lit ones, have of the light.
+    let level = |wanted: bool| {
+        let mut seen: Vec<f64> = of(wanted).map(|(_, visibility)| *visibility).collect();
+        seen.retain(|visibility| visibility.is_finite());
+        seen.sort_by(f64::total_cmp);
+        seen.get(seen.len() / 2).copied().unwrap_or_default()
+    };
+    let (lit, dark) = (level(true), level(false));
+    let price = match dark > 0.0 && dark < 1.0 {
+        true => price.or(
+            LEAVES_LIGHT,
+            Class::Slip,
+            price::fading(dark)
+                + residual(&|index| {
+                    if index < batch.lit { 1.0 } else { dark }
+                }),
+        ),
+        false => price,
+    };
+    match lit > 0.0 && lit < 1.0 {
+        true => price.or(
+            LOSES_LIGHT,
+            Class::Slip,
+            price::fading(1.0 - lit) + residual(&|index| if index < batch.lit { lit } else { 0.0 }),
+        ),
+        false => price,
     }
-    let light = |index: usize| if index < batch.lit { 1.0 } else { left };
-    price.or(LEAVES_LIGHT, Class::Slip, left * left + residual(&light))
 }
 
 /// Whether radiance is the same but for rounding; what is no number in both is no matter of shadows.
@@ -285,7 +374,7 @@ fn charge_what_is_never_tested(checks: &mut [Check]) {
         return;
     }
     for check in checks.iter_mut().filter(|check| check.verdict == Verdict::Fail) {
-        let left = check.measures.iter().any(|measure| measure.name.ends_with(LEAVES_LIGHT));
+        let left = [LEAVES_LIGHT, LOSES_LIGHT].contains(&check.mistake.as_str());
         if let Some((lit, dark)) = fractions(check).filter(|_| !left) {
             check.error = Price::of_raw(lit + dark).error;
         }

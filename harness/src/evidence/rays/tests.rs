@@ -55,7 +55,7 @@ fn unshadowed(factor: impl Fn(usize, &SurfacePoint) -> f64) -> Check {
     let values = answers(&batch, factor);
     let of =
         |index: usize, shading: &Shading| batch.witnessed(index, shading, &|_, _| [1.0, 0.5, 0.25]);
-    let answer = Unshadowed { witness: "constant", of: &of, values: &values };
+    let answer = Unshadowed { witness: "constant", of: &of, values: &values, black_below: true };
     judge_unshadowed(&batch, &[answer], &Convention::default(), &price::integrator_changes())
 }
 
@@ -81,12 +81,13 @@ fn known_factors_are_named() {
     assert!(unshadowed(|_, _| 0.0).hint.contains("is 0"));
 }
 
+const NOTHING: Occluders = Occluders { blocker: &|_| None, is_phong: &|_| false };
+
 fn shadows(with: impl Fn(usize) -> f64, without: impl Fn(usize) -> f64) -> Check {
     let batch = batch();
     let with = answers(&batch, |index, _| with(index));
     let without = answers(&batch, |index, _| without(index));
-    let check =
-        judge_shadows(&batch, &witness, (&with, &without), (&without, &without), &|_| false);
+    let check = judge_shadows(&batch, &witness, (&with, &without), (&without, &without), &NOTHING);
     let mut checks = [check];
     set_apart(&mut checks);
     let [check] = checks;
@@ -100,7 +101,7 @@ fn a_shadow_query_that_moves_what_is_shaded_is_seen() {
     let without = answers(&batch, |_, _| 1.0);
     let judge = |on: f64, off: f64| {
         let (on, off) = (answers(&batch, |_, _| on), answers(&batch, |_, _| off));
-        judge_shadows(&batch, &witness, (&right, &without), (&on, &off), &|_| false).verdict
+        judge_shadows(&batch, &witness, (&right, &without), (&on, &off), &NOTHING).verdict
     };
     assert_eq!(judge(0.0, 0.7), Verdict::Fail);
     assert_eq!(judge(0.71, 0.7), Verdict::Fail);
@@ -202,7 +203,8 @@ fn rays_that_no_light_reaches_must_be_black() {
         let of = |index: usize, shading: &Shading| {
             batch.witnessed(index, shading, &|_, _| [1.0, 0.5, 0.25])
         };
-        let answer = Unshadowed { witness: "constant", of: &of, values: &values };
+        let answer =
+            Unshadowed { witness: "constant", of: &of, values: &values, black_below: true };
         judge_unshadowed(&batch, &[answer], &Convention::default(), &[])
     };
     assert_eq!(judge(0.0).verdict, Verdict::Pass);

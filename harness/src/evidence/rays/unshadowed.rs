@@ -15,6 +15,8 @@ pub struct Unshadowed<'a> {
     pub of: &'a dyn Fn(usize, &Shading) -> [f64; 3],
     /// Radiance along every ray of the batch.
     pub values: &'a [[f32; 3]],
+    /// Whether it is black below the surface.
+    pub black_below: bool,
 }
 
 /// Whether radiance is right along all rays but strays, under a convention.
@@ -60,7 +62,8 @@ pub fn judge_unshadowed(
         }
     }
     let lit_is_right = measures.iter().all(|measure| measure.passed);
-    let shining = answers.iter().map(|answer| shining(batch, answer)).max().unwrap_or_default();
+    let below = answers.iter().filter(|answer| answer.black_below);
+    let shining = below.map(|answer| shining(batch, answer)).max().unwrap_or_default();
     if black > 0 {
         let fraction = shining as f64 / black as f64;
         let name = "rays that must be black and are not (fraction)";
@@ -76,7 +79,7 @@ pub fn judge_unshadowed(
             let price = price_of(batch, answers, &right, changes, worst.error);
             measures.extend(price.measure());
             let check = Check::new(id, &batch.scene, Verdict::Fail, worst.summary);
-            Check { error: price.error, ..check }.with_hint(worst.hint)
+            Check { error: price.error, mistake: price.name(), ..check }.with_hint(worst.hint)
         }
         _ => Check { error: 0.0, ..Check::new(id, &batch.scene, Verdict::Fail, String::new()) },
     };

@@ -8,7 +8,7 @@ const LOOKUP: &str =
 const INVERTED: &str =
     "return 1.0 - textureSampleCompareLevel(shadow_map, shadow_sampler, uv, face, ndc.z);";
 const BIASED: &str =
-    "return textureSampleCompareLevel(shadow_map, shadow_sampler, uv, face, ndc.z - 0.02);";
+    "return textureSampleCompareLevel(shadow_map, shadow_sampler, uv, face, ndc.z - 0.2);";
 const FACE: &str = "let face = face_of(moved - light);";
 const UV: &str = "vec2f(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y);";
 const V_UP: &str = "vec2f(0.5 + 0.5 * ndc.x, 0.5 + 0.5 * ndc.y);";

@@ -1,0 +1,108 @@
+//! Part 1.3: whether the BSDF that an integrator asks is that of the surface that the ray meets.
+
+use basecode::Frame;
+
+use super::{RayBatch, STRAY_FRACTION};
+use crate::evidence::convention::Convention;
+use crate::evidence::price::Class;
+use crate::evidence::{Check, Measure, Verdict};
+
+/// The check.
+pub const ID: &str = "radiance.material";
+/// Largest relative difference of a right answer: frames in f32, raised to high exponents.
+const RELATIVE: f64 = 0.02;
+/// The same, as a fraction of the batch's mean radiance.
+const OF_MEAN: f64 = 1e-3;
+/// A ray of a batch, with what the renderer's own BSDF answers where it ends.
+pub type OwnValue = (usize, [f32; 3]);
+
+/// Judges radiance along lit rays without shadows (`radiance`, by ray) by the renderer's own BSDFs,
+/// right or wrong: their values, cosine included, times I / r^2, under any convention.
+///
+/// What is wrong with the light is another check's matter: see [`set_apart`].
+pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]]) -> Check {
+    let not_judged = |summary: &str| Check::new(ID, &batch.scene, Verdict::NotJudged, summary);
+    if own.is_empty() {
+        return not_judged("no lit ray ends on a surface of one colour");
+    }
+    let sum: f64 = own.iter().flat_map(|(ray, _)| radiance[*ray]).map(f64::from).sum();
+    if !(sum > 0.0) {
+        return not_judged("radiance along rays is black, or no number");
+    }
+    let mean = sum / (3 * own.len()) as f64;
+    // How many rays are wrong under a convention, and the first of them.
+    let wrong = |convention: &Convention| {
+        let mut wrong = own.iter().filter(|(ray, value)| {
+            let expected = expected(batch, *ray, *value, convention);
+            let found = radiance[*ray].map(f64::from);
+            !found.iter().zip(expected).all(|(found, expected)| {
+                let both_broken = !found.is_finite() && !expected.is_finite();
+                both_broken
+                    || (found - expected).abs() <= RELATIVE * expected.abs() + OF_MEAN * mean
+            })
+        });
+        let first =
+            wrong.next().map(|(ray, value)| (*ray, expected(batch, *ray, *value, convention)));
+        (wrong.count() + usize::from(first.is_some()), first)
+    };
+    let unit = Convention::all().into_iter().filter(|convention| convention.long_wi.is_none());
+    let Some((wrong, first)) =
+        unit.map(|convention| wrong(&convention)).min_by_key(|found| found.0)
+    else {
+        return not_judged("there is no convention");
+    };
+    let name = "rays that are not what their surface's own BSDF makes of the light (fraction)";
+    let measure =
+        Measure::at_most("rays.material", name, wrong as f64 / own.len() as f64, STRAY_FRACTION);
+    let check = match first.filter(|_| !measure.passed) {
+        None => {
+            let summary = format!("the BSDF of the surface is asked along {} rays", own.len());
+            Check::new(ID, &batch.scene, Verdict::Pass, summary)
+        }
+        Some((ray, expected)) => {
+            let p = batch.points[ray].position;
+            let triple = |v: [f64; 3]| format!("({:.4}, {:.4}, {:.4})", v[0], v[1], v[2]);
+            let summary = format!(
+                "{wrong} of {} rays are not what the BSDF of their surface makes of the light; first at ({:.3}, \
+                 {:.3}, {:.3}): expected {}, found {}",
+                own.len(),
+                p.x,
+                p.y,
+                p.z,
+                triple(expected),
+                triple(radiance[ray].map(f64::from)),
+            );
+            let check = Check::new(ID, &batch.scene, Verdict::Fail, summary);
+            Check { error: Class::Slip.price(), ..check }
+                .with_hint("is it the material of the surface that the ray meets?")
+        }
+    };
+    Check { measures: vec![measure], ..check }
+}
+
+/// Radiance of a right integrator that asks the BSDF, whose value is `own`.
+fn expected(batch: &RayBatch, ray: usize, own: [f32; 3], convention: &Convention) -> [f64; 3] {
+    let cos_i = f64::from(Frame::cos_theta(batch.points[ray].wi));
+    let integrator = convention.integrator();
+    let factor = integrator.factor[0] * cos_i.powf(integrator.cos_i[0] - 1.0);
+    batch.unshadowed(ray, own.map(|value| factor * f64::from(value)))
+}
+
+/// Where the light is wrong, the material is not judged: on any scene, since light and material are
+/// the integrator's on all.
+pub fn set_apart(checks: &mut [Check]) {
+    let of = |id: &str, verdict| {
+        checks
+            .iter()
+            .any(|check| check.id == id && check.verdict == verdict && check.convention.is_empty())
+    };
+    let light_is_wrong = of("radiance.lit", Verdict::Fail);
+    if !light_is_wrong {
+        return;
+    }
+    for check in checks.iter_mut().filter(|check| check.id == ID && check.verdict == Verdict::Fail)
+    {
+        check.verdict = Verdict::NotJudged;
+        check.summary = format!("radiance is wrong under other BSDFs too ({})", check.summary);
+    }
+}

@@ -1,0 +1,386 @@
+//! Part 2.2: what a vertex stage forwards, and where on the film it lands.
+//!
+//! Three things are told apart: the world position, the world normal and the clip-space position. A
+//! position that lies on a surface is right, wherever on the film it shows.
+
+use basecode::{Camera, Image, Ray, Scene, SurfaceInteraction, Vec3};
+
+use super::price::{Class, Price};
+use super::stages::{STRAY_FRACTION, interior};
+use super::{Check, Measure, Verdict};
+use crate::expected::{SurfaceBuffer, SurfacePoint};
+use crate::imaging::reference::RegionMask;
+
+/// The tolerance of a position, relative to its distance from the camera: rasterised attributes
+/// against a ray's hit.
+const POSITION_RELATIVE: f32 = 2e-3;
+/// How far surfaces may lie from their place on the film [pixels]: hardware snaps vertices to 1/256.
+const OFFSET_PX: f64 = 0.04;
+/// The tolerance of a unit normal.
+const NORMAL_ABSOLUTE: f32 = 1e-2;
+/// So much of what should be seen must be, to tell anything of what is forwarded.
+const LEAST_SHOWN: f64 = 0.02;
+
+/// A scene on a small film.
+pub struct VertexFilm<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its camera, on this film.
+    pub camera: Camera,
+    /// What each pixel shows.
+    pub surface: &'a SurfaceBuffer,
+    /// Where edges are.
+    pub mask: &'a RegionMask,
+}
+
+/// World positions and normals, as the fragment stage receives them.
+type Frames<'a> = [&'a Image; 2];
+
+/// Part 2.2: judges the world positions and normals that a student's vertex stage forwards, and
+/// where on the film they land. `frames` are drawn under each of [`crate::worker::Matrices::ALL`]: the
+/// first decides, the others tell what is wrong.
+pub fn judge_vertex(scene_name: &str, film: &VertexFilm, frames: [Frames; 3]) -> Check {
+    let id = "stage.vertex";
+    let seen = frames.map(|frames| Seen::of(film, frames));
+    let [usual, in_view, in_projection] = &seen;
+    if usual.counted == 0 {
+        let summary = "no pixel away from edges shows a surface";
+        return Check::new(id, scene_name, Verdict::NotJudged, summary);
+    }
+    let [wrong_position, wrong_normal] = [usual.wrong_position, usual.wrong_normal];
+    let offset_px = usual.offset_px;
+    let at_most = |rule, name, value, bound| Measure::at_most(rule, name, value, bound);
+    let mut measures = vec![
+        at_most(
+            "vertex.position",
+            "world positions wrong (fraction of pixels)",
+            usual.fraction(wrong_position),
+            STRAY_FRACTION,
+        ),
+        at_most(
+            "vertex.normal",
+            "world normals wrong (fraction of pixels)",
+            usual.fraction(wrong_normal),
+            STRAY_FRACTION,
+        ),
+        at_most(
+            "vertex.clip",
+            "surfaces off their place on the film (pixels, median)",
+            offset_px,
+            OFFSET_PX,
+        ),
+    ];
+    if measures.iter().all(|measure| measure.passed) {
+        let summary = "positions and normals reach the fragment stage in world space";
+        return Check { measures, ..Check::new(id, scene_name, Verdict::Pass, summary) };
+    }
+    let mut summary = format!(
+        "of {} pixels, {} show nothing, {wrong_position} another world position and {wrong_normal} another world \
+         normal than expected",
+        usual.counted, usual.missing
+    );
+    if offset_px > OFFSET_PX {
+        summary += &format!("; surfaces lie {offset_px:.2} pixels beside their place");
+    }
+    let price = price(film, &seen, &frames);
+    measures.extend(price.measure());
+    let few = |wrong: usize| usual.fraction(wrong) <= STRAY_FRACTION;
+    let most = |wrong: usize| wrong * 2 > usual.counted;
+    let hint = match (most(usual.missing), most(wrong_position), most(wrong_normal)) {
+        _ if few(wrong_position) && few(wrong_normal) => {
+            "the image is shifted: look at the clip-space position"
+        }
+        _ if in_view.lands() && in_projection.lands() => {
+            "the projection belongs on the left: clip = projection * view * world"
+        }
+        _ if in_view.lands() => "the clip-space position lacks the projection",
+        _ if in_projection.lands() => "the clip-space position lacks the view matrix",
+        (true, ..) => "nothing is drawn where it should be: look at the clip-space position",
+        (_, true, false) => "look at the model matrix and at what is forwarded as position",
+        (_, false, true) => "look at the normal matrix and at what is forwarded as normal",
+        _ => "",
+    };
+    let check = Check::new(id, scene_name, Verdict::Fail, summary);
+    Check { error: price.error, mistake: price.name(), measures, ..check }.with_hint(hint)
+}
+
+/// What frames show.
+struct Seen {
+    /// Pixels that show a surface, away from edges.
+    counted: usize,
+    /// Those of them that show nothing.
+    missing: usize,
+    /// Those whose position is not that of the pixel.
+    wrong_position: usize,
+    /// Those whose normal is not that of the pixel.
+    wrong_normal: usize,
+    /// Pixels of the film that show anything.
+    shown: usize,
+    /// Those of them whose position lies on no surface.
+    nowhere: usize,
+    /// Those whose normal is not that of the surface where the position lies.
+    turned: usize,
+    /// The median distance of right positions from the centre of their pixel [pixels].
+    offset_px: f64,
+}
+
+impl Seen {
+    fn of(film: &VertexFilm, [positions, normals]: Frames) -> Self {
+        let VertexFilm { scene, camera, surface, mask } = film;
+        let mut seen = Self {
+            counted: 0,
+            missing: 0,
+            wrong_position: 0,
+            wrong_normal: 0,
+            shown: 0,
+            nowhere: 0,
+            turned: 0,
+            offset_px: 0.0,
+        };
+        let shows = |index: usize| {
+            positions.pixels[index] != Vec3::ZERO || normals.pixels[index] != Vec3::ZERO
+        };
+        let mut offsets = Vec::new();
+        for (index, _) in interior(surface, mask) {
+            let (ray, Some(point)) = &surface.pixels[index] else { continue };
+            seen.counted += 1;
+            let (p, n) = (positions.pixels[index], normals.pixels[index]);
+            seen.missing += usize::from(!shows(index));
+            // What is no number is never right.
+            let right_position = is_near(p, point.position, ray.origin);
+            let right_normal = (n - point.normal).length() <= NORMAL_ABSOLUTE;
+            seen.wrong_position += usize::from(!right_position);
+            seen.wrong_normal += usize::from(!right_normal);
+            if right_position {
+                offsets.push(offset_px(film, index, p));
+            }
+        }
+        seen.offset_px = median_length(&mut offsets);
+        for index in 0..positions.pixels.len() {
+            let (p, n) = (positions.pixels[index], normals.pixels[index]);
+            if !shows(index) || mask.pixels[index] & RegionMask::EMITTER != 0 {
+                continue;
+            }
+            seen.shown += 1;
+            match surface_at(scene, p, camera.eye()) {
+                None => seen.nowhere += 1,
+                Some(hit) => {
+                    let right = (n - hit.frame_ns.n).length() <= NORMAL_ABSOLUTE;
+                    seen.turned += usize::from(!right);
+                }
+            }
+        }
+        seen
+    }
+
+    fn fraction(&self, wrong: usize) -> f64 {
+        wrong as f64 / self.counted as f64
+    }
+
+    /// Whether what is drawn tells anything.
+    fn tells(&self) -> bool {
+        self.shown as f64 > LEAST_SHOWN * self.counted as f64
+    }
+
+    /// Whether world positions are right: at their pixels, or elsewhere on the film. Edges between
+    /// surfaces are blends.
+    fn positions_are_right(&self) -> bool {
+        let few = self.nowhere as f64 <= EDGES * self.shown as f64;
+        self.tells() && (few || self.fraction(self.wrong_position) <= STRAY_FRACTION)
+    }
+
+    fn normals_are_right(&self) -> bool {
+        let few = (self.nowhere + self.turned) as f64 <= EDGES * self.shown as f64;
+        self.tells() && (few || self.fraction(self.wrong_normal) <= STRAY_FRACTION)
+    }
+
+    /// Whether surfaces lie where they should on the film.
+    fn lands(&self) -> bool {
+        let right = |wrong| self.fraction(wrong) <= STRAY_FRACTION;
+        let either = right(self.wrong_position) || right(self.wrong_normal);
+        let neither = !self.positions_are_right() && !self.normals_are_right();
+        (either || (neither && right(self.missing))) && self.offset_px <= OFFSET_PX
+    }
+}
+
+/// So many of the pixels shown may be blends of surfaces along edges.
+const EDGES: f64 = 0.1;
+
+/// What wrong frames cost: each of the three things alone, together as much as they add up to.
+fn price(film: &VertexFilm, seen: &[Seen; 3], frames: &[Frames; 3]) -> Price {
+    let [usual, in_view, in_projection] = seen;
+    // Where nothing shows because of the matrices, the frames that show most tell the rest.
+    let most = (0..3).max_by_key(|&index| (seen[index].shown, 3 - index)).unwrap_or_default();
+    let told = &seen[most];
+    if !told.tells() {
+        return Price::of_raw(1.0);
+    }
+    let mut error = 0.0;
+    let mut names: Vec<&str> = Vec::new();
+    let mut add = |name: &'static str, class: Class| {
+        error += class.price();
+        names.push(name);
+    };
+    if !usual.lands() {
+        match (in_view.lands(), in_projection.lands()) {
+            (true, true) => add("view and projection are exchanged", Class::Slip),
+            (true, false) => add("the projection is missing", Class::Concept),
+            (false, true) => add("the view matrix is missing", Class::Concept),
+            (false, false) => match slip_of_place(film, frames) {
+                Some(name) => add(name, Class::Slip),
+                None => add("another clip-space position", Class::Concept),
+            },
+        }
+    }
+    if !told.positions_are_right() {
+        match factor_of_positions(film, frames[most][0]) {
+            true => add("the position is multiplied by a constant", Class::Slip),
+            false => add("another world position", Class::Concept),
+        }
+    }
+    if !told.normals_are_right() {
+        match slip_of_normals(film, frames[most][1]) {
+            Some(name) => add(name, Class::Slip),
+            None => add("another world normal", Class::Concept),
+        }
+    }
+    let name = match names.as_slice() {
+        [] => "a few pixels are wrong",
+        [name] => name,
+        _ => "several things",
+    };
+    let raw = usual.fraction(usual.wrong_position.max(usual.wrong_normal).max(usual.missing));
+    let raw = if raw <= STRAY_FRACTION { 1.0 } else { raw };
+    Price { error: error.max(Class::Slip.price()).min(raw), raw, mistake: Some(name) }
+}
+
+/// Whether positions lie beside their pixel by a slip: mirrored, upside down, or a constant offset.
+fn slip_of_place(film: &VertexFilm, frames: &[Frames; 3]) -> Option<&'static str> {
+    let positions = frames[0][0];
+    let (width, height) = (film.surface.width, film.surface.height);
+    let place = |by: [f32; 2]| {
+        let of = |index: usize, p: Vec3| {
+            let [x, y] = place_px(film, p);
+            let (own_x, own_y) = ((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
+            let x = if by[0] < 0.0 { width as f32 - x } else { x };
+            let y = if by[1] < 0.0 { height as f32 - y } else { y };
+            [x - own_x, y - own_y]
+        };
+        let shown = positions.pixels.iter().enumerate().filter(|(_, p)| **p != Vec3::ZERO);
+        shown.map(|(index, p)| of(index, *p)).collect::<Vec<_>>()
+    };
+    // Nearly all within half a pixel of a common offset of a few.
+    let constant = |offsets: &[[f32; 2]], most: f32| {
+        let mut sorted = offsets.to_vec();
+        let mut median = |axis: usize| {
+            sorted.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
+            sorted.get(sorted.len() / 2).map_or(f32::NAN, |offset| offset[axis])
+        };
+        let middle = [median(0), median(1)];
+        let near =
+            |offset: &&[f32; 2]| (0..2).all(|axis| (offset[axis] - middle[axis]).abs() <= 0.5);
+        let few = offsets.len() - offsets.iter().filter(near).count();
+        middle.iter().all(|offset| offset.abs() <= most)
+            && few as f64 <= EDGES * offsets.len() as f64
+    };
+    let of = |by: [f32; 2], most: f32, name| constant(&place(by), most).then_some(name);
+    of([1.0, 1.0], width as f32 / 4.0, "surfaces lie beside their place")
+        .or_else(|| of([1.0, -1.0], 1.5, "the image is upside down"))
+        .or_else(|| of([-1.0, 1.0], 1.5, "the image is mirrored"))
+        .or_else(|| of([-1.0, -1.0], 1.5, "the image is turned by half"))
+}
+
+/// Whether positions are those of their pixels times one constant.
+fn factor_of_positions(film: &VertexFilm, positions: &Image) -> bool {
+    let pairs = || {
+        interior(film.surface, film.mask).filter_map(|(index, _)| {
+            let (ray, point) = &film.surface.pixels[index];
+            Some((positions.pixels[index], point.as_ref()?.position, ray.origin))
+        })
+    };
+    let mut ratios: Vec<f32> = pairs()
+        .map(|(p, right, _)| p.length() / right.length())
+        .filter(|r| r.is_finite())
+        .collect();
+    ratios.sort_by(f32::total_cmp);
+    let Some(&factor) = ratios.get(ratios.len() / 2).filter(|factor| **factor > 1e-3) else {
+        return false;
+    };
+    let all = pairs().count();
+    let wrong = pairs().filter(|(p, right, eye)| !is_near(*p / factor, *right, *eye)).count();
+    wrong as f64 <= EDGES * all as f64
+}
+
+/// What a normal may be instead: a name, and the normal.
+type Change = (&'static str, Box<dyn Fn(&SurfacePoint) -> Vec3>);
+
+/// Whether normals are those of their pixels, negated, with axes exchanged, or the positions instead.
+fn slip_of_normals(film: &VertexFilm, normals: &Image) -> Option<&'static str> {
+    const EXCHANGED: &str = "the normal has its axes exchanged";
+    let axes = |name, [x, y, z]: [usize; 3], signs: [f32; 3]| -> Change {
+        let change = move |p: &SurfacePoint| {
+            Vec3::from(signs) * Vec3::new(p.normal[x], p.normal[y], p.normal[z])
+        };
+        (name, Box::new(change))
+    };
+    let mut changes = vec![
+        axes("the normal is negated", [0, 1, 2], [-1.0; 3]),
+        axes("x of the normal is negated", [0, 1, 2], [-1.0, 1.0, 1.0]),
+        axes("y of the normal is negated", [0, 1, 2], [1.0, -1.0, 1.0]),
+        axes("z of the normal is negated", [0, 1, 2], [1.0, 1.0, -1.0]),
+    ];
+    let orders = [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+    changes.extend(orders.map(|order| axes(EXCHANGED, order, [1.0; 3])));
+    let position = |p: &SurfacePoint| p.position.normalize_or_zero();
+    changes.push(("the position stands for the normal", Box::new(position)));
+    changes.into_iter().find_map(|(name, change)| {
+        let (mut all, mut wrong) = (0usize, 0usize);
+        for (index, _) in interior(film.surface, film.mask) {
+            let Some(point) = &film.surface.pixels[index].1 else { continue };
+            all += 1;
+            let right = (normals.pixels[index] - change(point)).length() <= 2.0 * NORMAL_ABSOLUTE;
+            wrong += usize::from(!right);
+        }
+        (wrong as f64 <= EDGES * all as f64).then_some(name)
+    })
+}
+
+/// Whether a position is another, seen from `eye`.
+fn is_near(p: Vec3, other: Vec3, eye: Vec3) -> bool {
+    (p - other).length() <= POSITION_RELATIVE * (other - eye).length()
+}
+
+/// The surface on which a position lies, seen from `eye`.
+fn surface_at(scene: &Scene, p: Vec3, eye: Vec3) -> Option<SurfaceInteraction> {
+    let reach = POSITION_RELATIVE * (p - eye).length();
+    if !p.is_finite() || reach == 0.0 {
+        return None;
+    }
+    let axes = [(p - eye).normalize(), Vec3::X, Vec3::Y, Vec3::Z];
+    axes.into_iter()
+        .find_map(|axis| scene.intersect(&Ray::segment(p - reach * axis, axis, 0.0, 2.0 * reach)))
+}
+
+/// Where on the film a world position belongs [pixels from left and top].
+fn place_px(film: &VertexFilm, position: Vec3) -> [f32; 2] {
+    let camera = &film.camera;
+    let ndc = (camera.projection() * camera.view()).project_point3(position);
+    let (width, height) = (film.surface.width as f32, film.surface.height as f32);
+    [(0.5 + 0.5 * ndc.x) * width, (0.5 - 0.5 * ndc.y) * height]
+}
+
+/// How far a world position lies from the centre of the pixel that shows it [pixels, x and y].
+fn offset_px(film: &VertexFilm, index: usize, position: Vec3) -> [f32; 2] {
+    let (x, y) = (index % film.surface.width, index / film.surface.width);
+    let [own_x, own_y] = place_px(film, position);
+    [own_x - x as f32 - 0.5, own_y - y as f32 - 0.5]
+}
+
+/// The length of the median offset; 0 when there is none.
+fn median_length(offsets: &mut [[f32; 2]]) -> f64 {
+    let mut median = |axis: usize| {
+        offsets.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
+        offsets.get(offsets.len() / 2).map_or(0.0, |offset| f64::from(offset[axis]))
+    };
+    median(0).hypot(median(1))
+}
