@@ -215,6 +215,10 @@ impl Answers<'_> {
         let price = Price::of_raw(
             raw.unwrap_or_else(|| self.residual(&questions, &right, &Factors::default())),
         );
+        // Nothing explains darkness but that nothing is there.
+        if self.found.iter().all(|value| *value == [0.0; 3]) {
+            return price;
+        }
         let price = match self.likeness(&questions) {
             likeness if likeness >= LIKE => price.or(UNKNOWN, Class::Unknown, 0.0),
             _ => price,
