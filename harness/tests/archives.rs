@@ -1,13 +1,9 @@
 //! Hostile archives, one test each: the finding, the entry it names, nothing written outside the
 //! destination, nothing left inside it.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
-mod support;
-
-use support::scratch::{assert_accepted, assert_refused};
-use support::tar_bytes::{self, gz, pax_record, tar};
-use support::zip_bytes::{Entry, Zip, crc32, deflated, extra};
+use crate::support::scratch::{assert_accepted, assert_refused};
+use crate::support::tar_bytes::{self, gz, pax_record, tar};
+use crate::support::zip_bytes::{Entry, Zip, crc32, deflated, extra};
 
 /// A second, honest entry: a refusal must not keep it.
 fn good() -> Entry {

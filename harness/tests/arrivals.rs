@@ -2,18 +2,15 @@
 //! that what is said is true.
 
 #![cfg(unix)]
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
-mod support;
 
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::support::zip_bytes::{Entry, Zip};
 use serde_json::Value;
 use similar_asserts::assert_eq;
-use support::zip_bytes::{Entry, Zip};
 
 const IMAGES: [&str; 4] = [
     "offline/cbox_simple_offline.exr",

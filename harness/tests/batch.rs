@@ -1,7 +1,6 @@
 //! A batch is ended in every way and goes on: what was found out is kept, and is worth the same.
 
 #![cfg(unix)]
-#![allow(clippy::unwrap_used)] // its helpers are tests too
 
 use std::fs;
 use std::path::{Path, PathBuf};

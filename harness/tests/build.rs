@@ -1,7 +1,5 @@
 //! Compiling hand-ins by the recorded call.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;

@@ -1,7 +1,5 @@
 //! The deciding comparison: known answers by hand, and a small Monte Carlo renderer whose truth is known.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
 use std::f32::consts::TAU;
 
 use basecode::image::Image;

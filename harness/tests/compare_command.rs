@@ -1,7 +1,5 @@
 //! `umbra compare`: what is equal, what is said of what differs, and what is not compared.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

@@ -1,18 +1,14 @@
 //! Hostile files are decoded in locked children: the answer is what this process would have found,
 //! and a child that dies takes nothing with it.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
-mod support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use crate::support::scratch::{Scratch, small_limits, with_decoder};
+use crate::support::zip_bytes::{Entry, Zip};
 use basecode::exr_io::{ExrLayers, Precision, read_exr, write_exr, write_exr_layers};
 use basecode::{Image, Vec3};
-use support::scratch::{Scratch, small_limits, with_decoder};
-use support::zip_bytes::{Entry, Zip};
 use umbra::assignment::Assignment;
 use umbra::decode::Decoder;
 use umbra::intake::{IntakeError, TreeSpec, scan_source, unpack, validate_hand_in};

@@ -1,8 +1,6 @@
 //! The stored answers of known mistakes: each is told from all others, none is seen where another
 //! is made that the catalogue lacks, and a fresh render of the reference gives the same.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 

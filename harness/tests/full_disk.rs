@@ -3,7 +3,6 @@
 //! Each test mounts a tiny file system in a mount namespace of its thread alone, which only root may do.
 
 #![cfg(target_os = "linux")]
-#![allow(clippy::unwrap_used)] // its helpers are tests too
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;

@@ -1,8 +1,6 @@
 //! Images of a hand-in as evidence: their noise, copies of them, pictures of something else. The
 //! scene is a small Monte Carlo renderer whose truth is known.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
 use basecode::Image;
 use glam::{Vec3, vec3};
 use umbra::evidence::handed_in::{

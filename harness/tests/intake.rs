@@ -1,17 +1,15 @@
 //! Hand-ins that are right, nearly right and wrong in the usual ways: copies, validation as a
 //! student reads it, packing and fixing.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
-mod support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::scratch::{
+    Scratch, assert_accepted, assert_folder_refused, listing, with_decoder,
+};
+use crate::support::tar_bytes::{self, gz, tar};
+use crate::support::zip_bytes::{Entry, Zip, crc32, extra};
 use similar_asserts::assert_eq;
-use support::scratch::{Scratch, assert_accepted, assert_folder_refused, listing, with_decoder};
-use support::tar_bytes::{self, gz, tar};
-use support::zip_bytes::{Entry, Zip, crc32, extra};
 use umbra::intake::{
     Finding, Format, HandIn, IntakeError, Limits, Severity, TreeSpec, Validation, fix, pack,
     scan_source, unpack, unpack_bytes, validate_hand_in, validate_refusal,

@@ -1,13 +1,9 @@
 //! Any bytes at all: no panic, nothing written outside the destination, limits kept.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
-mod support;
-
+use crate::support::scratch::{Scratch, listing, small_limits};
+use crate::support::tar_bytes::{self, gz, tar};
+use crate::support::zip_bytes::{Entry, Zip};
 use proptest::prelude::*;
-use support::scratch::{Scratch, listing, small_limits};
-use support::tar_bytes::{self, gz, tar};
-use support::zip_bytes::{Entry, Zip};
 use umbra::intake::{
     HandInConfig, IntakeError, TreeSpec, check_config, scan_text, validate_hand_in,
 };

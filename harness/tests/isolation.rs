@@ -2,7 +2,6 @@
 //! what it draws is the same as without. Each attack is run without isolation, too, and succeeds
 //! there: a test that passes without a sandbox proves nothing.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
 #![cfg(target_os = "linux")]
 
 use std::net::TcpListener;

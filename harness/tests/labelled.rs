@@ -1,8 +1,6 @@
 //! A hundred small mistakes that the catalogue lacks, each with its label: term, quantity, value.
 //! Their answers are computed here from closed forms; what is said of them is counted.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
 #[path = "labelled/answers.rs"]
 mod answers;
 

@@ -1,8 +1,6 @@
 //! Metrics against published implementations. The numbers come from `golden/metrics.txt`, which `golden/metrics.py`
 //! printed; both make the same small images by whole-number arithmetic.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
 use std::collections::HashMap;
 use std::time::Instant;
 

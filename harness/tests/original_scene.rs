@@ -3,8 +3,6 @@
 //! faces counted from the end, a triangle without area, materials without `Ks` or `Ns`, `illum` 5 and
 //! 8, keys that nobody knows, and a light 2e-6 wide.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

@@ -2,7 +2,6 @@
 //! else's file, again and again. Nothing behind the link may ever be copied.
 
 #![cfg(target_os = "linux")]
-#![allow(clippy::unwrap_used)] // its helpers are tests too
 
 use std::fs;
 use std::os::unix::fs::symlink;

@@ -1,13 +1,9 @@
 //! Archives that real programs made of one small submission: each is read as that program meant it, and
 //! `--fix` makes a plain one of it. How they were made stands in `fixtures/README.md`.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
-mod support;
-
 use std::path::{Path, PathBuf};
 
-use support::scratch::{Scratch, with_decoder};
+use crate::support::scratch::{Scratch, with_decoder};
 use umbra::intake::{Limits, Severity, TreeSpec, fix, unpack};
 
 /// What is to be said of an archive besides that it is right.

@@ -1,8 +1,6 @@
 //! `umbra render` on scenes as exporters, hands and other programs leave them: the right picture, or
 //! an error that names the user's own file and line. Means were made with independent readers.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,8 +1,6 @@
 //! How close right renders come to the thresholds: 2,000 seeds of the reference on every film, at four numbers of
 //! samples. No rule may use half of what it allows, so that chance rejects no right renderer in a career of grading.
 
-#![allow(clippy::unwrap_used)] // its helpers are tests too
-
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};

@@ -63,7 +63,7 @@ pub fn price(
     }
     let price = answers.price(Some(raw));
     inputs(scene, &camera).iter().fold(price, |price, (name, class, shaded)| {
-        let points: Vec<ShadedPoint> = surfaces.iter().map(|point| shaded(point)).collect();
+        let points: Vec<ShadedPoint> = surfaces.iter().map(shaded).collect();
         let of = |index: usize, shading: &Shading| shading.radiance(&points[index]);
         let answers = Answers { of: &of, changes: &[], ..answers };
         // Where it is black there is nothing to tell it from any other darkness.

@@ -11,7 +11,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use umbra::sandbox::{Bind, EXIT_NOT_LOCKED, Kind, Layers, locked_pid};
 
-use crate::ground::{Ground, Who, everyone, open_to_all, piped, survivors, wait};
+use super::ground::{Ground, Who, everyone, open_to_all, piped, survivors, wait};
 
 #[test]
 fn endings_are_mirrored() {
@@ -162,13 +162,13 @@ fn results_are_collected_by_process_1() {
             policy.layers.rlimits = false;
             policy.collect.push(Bind::new(&host, "/scratch/out/result"));
             let mut command = umbra::sandbox::command(
-                Path::new(crate::ground::UMBRA),
+                Path::new(super::ground::UMBRA),
                 &policy,
                 Path::new("/bin/sh"),
                 ["-c", script],
             )
             .expect("orders");
-            crate::ground::as_user(&mut command, who);
+            super::ground::as_user(&mut command, who);
             command.env("PATH", "/usr/bin");
             let status = wait(command.spawn().expect("the binary under test"));
             (status.code(), std::fs::read(&host).expect("a file"))

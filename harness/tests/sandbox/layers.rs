@@ -4,7 +4,7 @@ use std::path::Path;
 
 use umbra::sandbox::{Bind, Kind, Layers};
 
-use crate::ground::{Ground, Who, everyone, open_to_all};
+use super::ground::{Ground, Who, everyone, open_to_all};
 
 /// Only this layer, with what it needs to work at all.
 fn only(name: &str, who: Who) -> Layers {

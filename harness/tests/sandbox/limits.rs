@@ -4,7 +4,7 @@ use std::path::Path;
 
 use umbra::sandbox::{Kind, Layers, Limits};
 
-use crate::ground::{Ground, Who, everyone, piped};
+use super::ground::{Ground, Who, everyone, piped};
 
 fn small() -> Limits {
     Limits { cpu_s: 1, memory_mib: 1024, file_size_mib: 1, open_files: 64, tasks: 16 }

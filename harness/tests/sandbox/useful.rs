@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 use umbra::sandbox::policy::{PLUGIN, SRC, TOOLCHAIN};
 use umbra::sandbox::{Bind, Isolation, Kind, Layers, Policy, command, doctor};
 
-use crate::ground::{Ground, UMBRA, Who, as_user, everyone, open_to_all};
+use super::ground::{Ground, UMBRA, Who, as_user, everyone, open_to_all};
 
 fn sysroot() -> String {
     let output = Command::new("rustc").args(["--print", "sysroot"]).output().expect("rustc");

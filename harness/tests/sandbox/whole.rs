@@ -3,7 +3,7 @@
 use nix::libc;
 use umbra::sandbox::{Isolation, Kind, Layers};
 
-use crate::ground::{Ground, Who, everyone};
+use super::ground::{Ground, Who, everyone};
 
 #[test]
 fn nothing_gets_through() {

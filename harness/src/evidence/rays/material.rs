@@ -26,7 +26,7 @@ pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]])
         return not_judged("no lit ray ends on a surface of one colour");
     }
     let sum: f64 = own.iter().flat_map(|(ray, _)| radiance[*ray]).map(f64::from).sum();
-    if !(sum > 0.0) {
+    if sum.is_nan() || sum <= 0.0 {
         return not_judged("radiance along rays is black, or no number");
     }
     let mean = sum / (3 * own.len()) as f64;

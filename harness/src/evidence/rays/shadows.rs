@@ -267,8 +267,9 @@ fn price(batch: &RayBatch, known: &[(usize, f64)], raw: f64, occluders: &Occlude
     });
     // Acne darkens some of what is lit, an offset too large lets some light through.
     let [lit_wrong, dark_wrong] = [true, false].map(|lit| {
-        let off = |visibility: f64| !((visibility - f64::from(u8::from(lit))).abs() < HALF_LIGHT);
-        of(lit).filter(|(_, visibility)| off(*visibility)).count() as f64
+        let level = f64::from(u8::from(lit));
+        let right = |visibility: f64| (visibility - level).abs() < HALF_LIGHT;
+        of(lit).filter(|(_, visibility)| !right(*visibility)).count() as f64
     });
     let price = price::partly(price, lit_wrong / counts[0], dark_wrong / counts[1]);
     // What nearly all dark rays, or lit ones, have of the light.

@@ -1,0 +1,32 @@
+//! The tests of `umbra` from outside, one program of all: each that were one of its own would link the
+//! whole grader again.
+
+#![allow(clippy::unwrap_used)] // their helpers are tests too
+
+mod archives;
+mod arrivals;
+mod batch;
+mod brute_force;
+mod build;
+mod compare;
+mod compare_command;
+mod decode;
+mod diagnosis;
+mod expected;
+mod full_disk;
+mod fuzz_corpus;
+mod handed_in;
+mod intake;
+mod intake_properties;
+mod isolation;
+mod labelled;
+mod metrics;
+mod original_scene;
+mod race;
+mod real_archives;
+mod render_command;
+#[path = "sandbox/main.rs"]
+mod sandbox;
+mod statistics;
+mod support;
+mod worker;
