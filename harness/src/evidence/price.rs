@@ -481,6 +481,8 @@ pub fn phong_changes() -> Vec<Change> {
             "the energy scale is missing from the diffuse term",
             Shading { scaled: [false, true], ..right },
         ),
+        slip("each channel has an energy scale", Shading { scale_by_channel: true, ..right }),
+        slip("the magnitude of cos alpha", Shading { clamp: Clamp::Magnitude, ..right }),
         slip("n + 1 for n + 2", lobe(|n| (n + 1.0) / std::f64::consts::TAU)),
         slip("n for n + 2", lobe(|n| n / std::f64::consts::TAU)),
         slip("n + 3 for n + 2", lobe(|n| (n + 3.0) / std::f64::consts::TAU)),

@@ -15,6 +15,8 @@ pub struct Shading {
     pub factor: [f64; 2],
     /// Whether each term is multiplied by the material's energy scale.
     pub scaled: [bool; 2],
+    /// Whether each channel has an energy scale of its own.
+    pub scale_by_channel: bool,
     /// The power of cos theta_i in each term.
     pub cos_i: [f64; 2],
     /// The power of cos theta_o in each term.
@@ -103,6 +105,8 @@ pub enum Clamp {
     Power,
     /// Nothing: fractional powers are no numbers.
     Nothing,
+    /// Nothing, but its magnitude is raised: the lobe shines both ways.
+    Magnitude,
 }
 
 /// The angle that a lobe depends on.
@@ -127,6 +131,7 @@ impl Default for Shading {
         Self {
             factor: [1.0; 2],
             scaled: [true; 2],
+            scale_by_channel: false,
             cos_i: [1.0; 2],
             cos_o: [0.0; 2],
             exponent: [1.0, 0.0],
@@ -207,7 +212,9 @@ impl Shading {
         };
         let value = [0, 1, 2].map(|c| {
             let ks = f64::from(ks[self.specular_channels[c]]);
-            diffuse * (self.albedo)(f64::from(kd[c])) + specular * lobe * ks
+            let own = (f64::from(kd[c]) + ks).max(0.99);
+            let factor = if self.scale_by_channel { 0.99 / own / scale } else { 1.0 };
+            factor * (diffuse * (self.albedo)(f64::from(kd[c])) + specular * lobe * ks)
         });
         std::array::from_fn(|c| {
             let reflected = (self.incident)(intensity[c] * incident) * value[self.channels[c]];
@@ -254,7 +261,11 @@ impl Shading {
                     h[2] / (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt().max(f64::MIN_POSITIVE)
                 }
             };
-        let base = if self.clamp == Clamp::Base { cos_alpha.max(0.0) } else { cos_alpha };
+        let base = match self.clamp {
+            Clamp::Base => cos_alpha.max(0.0),
+            Clamp::Magnitude => cos_alpha.abs(),
+            Clamp::Power | Clamp::Nothing => cos_alpha,
+        };
         let power = base.powf((self.round)(self.exponent[0] * n + self.exponent[1]));
         let power = if self.clamp == Clamp::Power { power.max(0.0) } else { power };
         (self.normalization)((self.round)(n)) * power

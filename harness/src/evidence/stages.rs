@@ -198,8 +198,8 @@ pub fn judge_pass(
             } else {
                 ""
             };
-            let raw = wrong_total as f64 / total as f64;
-            let price = Price::of_raw(raw);
+            let price = Price::of_raw(wrong_total as f64 / total as f64);
+            let most_wrong = measures.iter().map(|measure| measure.value).fold(0.0, f64::max);
             let nothing = frames.iter().all(|(_, frame)| {
                 interior(surface, mask).all(|(index, _)| frame.pixels[index] == Vec3::ZERO)
             });
@@ -219,7 +219,7 @@ pub fn judge_pass(
                 false => wrong_shapes(scene, &camera, surface, mask, frames).price(price.or(
                     "some of the film is wrong",
                     Class::Slip,
-                    0.25 * raw,
+                    0.08 * most_wrong,
                 )),
             };
             measures.extend(price.measure());
@@ -275,6 +275,8 @@ impl WrongShapes {
     }
 }
 
+/// The slip that diffuse shapes are drawn by the Phong pipeline, and the reverse.
+const EXCHANGED: &str = "diffuse and Phong pipeline are exchanged";
 /// The slip that a shape shows what belongs to another.
 const ANOTHERS: &str = "a shape has another's material";
 
@@ -327,7 +329,7 @@ fn slips<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Slip<'a>> {
             }),
         ),
         (
-            "diffuse and Phong pipeline are exchanged",
+            EXCHANGED,
             Box::new(move |bound, shape| match bound {
                 BoundValue::RhoD | BoundValue::RhoS => bound.bound(scene, shape, !phong(shape)),
                 // What the other pipeline shows: blue tells.
@@ -380,7 +382,19 @@ fn wrong_shapes(
     let right = |shape: usize| shows(shape, &|bound| bound.expected(scene, camera, shape));
     let wrong: Vec<usize> = pixels.keys().copied().filter(|shape| !right(*shape)).collect();
     // One shape may have another's material while the others have their own.
+    // The blue of the exponent's frame: which pipeline draws.
+    let by_phong = |shape: usize| {
+        let exponents = frames.iter().find(|(bound, _)| *bound == BoundValue::Exponent);
+        exponents.is_none_or(|(_, frame)| {
+            let pixels = &pixels[&shape];
+            2 * pixels.iter().filter(|index| frame.pixels[**index].z != 0.0).count() > pixels.len()
+        })
+    };
+    let is_phong = |shape: usize| scene.material_of(shape).model == MaterialModel::Phong;
     let explains = |(name, value): &Slip| {
+        if *name == EXCHANGED && !pixels.keys().all(|&shape| is_phong(shape) || by_phong(shape)) {
+            return false;
+        }
         let all = pixels.keys().copied().filter(|shape| *name != ANOTHERS || wrong.contains(shape));
         all.into_iter().all(|shape| shows(shape, &|bound| value(bound, shape)))
     };

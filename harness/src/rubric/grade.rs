@@ -78,10 +78,19 @@ pub fn settle(rules: &Rules, evidence: &Evidence) -> Evidence {
         let ids: BTreeSet<&String> =
             rules.parts.iter().filter(own).flat_map(|part| &part.evidence).collect();
         let is_own = |check: &&Check| ids.contains(&check.id);
-        let conventions: BTreeSet<&str> =
+        let mut conventions: BTreeSet<&str> =
             evidence.checks.iter().filter(is_own).map(|check| check.convention.as_str()).collect();
-        if conventions.iter().all(|convention| convention.is_empty()) {
+        conventions.remove("");
+        if conventions.is_empty() {
             continue;
+        }
+        // What was settled before has no checks under the handout's left.
+        let judged_under_another = |check: &&Check| !check.convention.is_empty() && is_own(check);
+        let hang: BTreeSet<&String> =
+            evidence.checks.iter().filter(judged_under_another).map(|check| &check.id).collect();
+        let handouts = |check: &Check| check.convention.is_empty() && hang.contains(&check.id);
+        if evidence.checks.iter().any(handouts) {
+            conventions.insert("");
         }
         let under = |convention: &str| {
             // A check under this convention stands for the same one under the handout's.
@@ -141,12 +150,17 @@ fn lower(first: Grade, second: Grade) -> Grade {
         let worth = |part: &PartGrade| (part.points, part.points_max);
         // No image of a held-back scene is handed in.
         let unconfirmed = first.unconfirmed;
-        let decides = if worth(&second) < worth(&first) { second } else { first };
+        // A reason that everybody may read comes first.
+        let public = first.points_max < first.out_of;
+        let decides = if worth(&second) < worth(&first) && !public { second } else { first };
         PartGrade { points, points_max, unconfirmed, ..decides }
     });
     let mut remarks = first.remarks;
-    remarks.extend(second.remarks);
-    remarks.dedup();
+    for remark in second.remarks {
+        if !remarks.contains(&remark) {
+            remarks.push(remark);
+        }
+    }
     sum(parts.collect(), first.out_of, remarks)
 }
 
@@ -236,6 +250,12 @@ fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
     if let Some(path) = rules.paths.get(&part.path) {
         let mut proof = evidence.named(&path.proof).peekable();
         if proof.peek().is_some() && proof.all(|check| check.verdict == Verdict::Pass) {
+            let own = |id: &&String| part.evidence.contains(id);
+            let unseen: Vec<String> = path.unseen.iter().filter(own).cloned().collect();
+            let unseen = by_checks(rules, evidence, &unseen, part.any_scene);
+            if let Some(worth) = unseen.filter(|worth| worth.least < 1.0) {
+                return worth;
+            }
             return Worth {
                 least: 1.0,
                 most: 1.0,

@@ -58,6 +58,9 @@ pub struct Gate {
 pub struct PathRule {
     /// The check that, passed on every scene, earns all parts of this path in full.
     pub proof: String,
+    /// The checks that a right image does not stand for: what they say of a part counts all the same.
+    #[serde(default)]
+    pub unseen: Vec<String>,
     /// The part that pays when the proof fails and no part's own evidence says why.
     pub blame: String,
 }

@@ -1,5 +1,6 @@
 //! The line of figures that ends a run, and what is wrong where one is not full.
 
+use super::price;
 use super::row::Row;
 
 /// Everything that was graded.
@@ -45,13 +46,15 @@ pub fn singles(rows: &[Row]) -> Figure {
     Figure::right("singles", rows.len(), complaints(rows))
 }
 
-/// How many single mistakes cost what their class says. Those that do not are printed and fail
-/// nothing: the classes were written before anything was measured, and some prices lie beside them.
+/// How many single mistakes cost what their class says, those aside that nothing tells from another
+/// class ([`price::excuse`]): they are printed.
 pub fn prices(rows: &[Row]) -> Figure {
     let beside = rows.iter().filter_map(|row| Some((row.subject.name(), row.price()?)));
-    let beside: Vec<_> = beside.map(|(name, said)| println!("price: {name}: {said}")).collect();
-    let text = format!("prices={}/{}", rows.len() - beside.len(), rows.len());
-    Figure { text, complaints: Vec::new() }
+    let (excused, complaints): (Vec<_>, Vec<_>) =
+        beside.partition(|(name, _)| price::excuse(name).is_some());
+    excused.iter().for_each(|(name, said)| println!("price: {name}: {said}"));
+    let complaints = complaints.into_iter().map(|(name, said)| format!("{name}: {said}"));
+    Figure::right("prices", rows.len(), complaints.collect())
 }
 
 /// The least fraction of single mistakes that the diagnosis must say something of: it says nothing

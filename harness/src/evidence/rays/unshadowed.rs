@@ -115,8 +115,10 @@ fn price_of(
         let (answer, ray) = (&answers[index / batch.lit], index % batch.lit);
         (answer.of)(ray, &shading.over(right))
     };
-    let sum: f64 =
-        (0..found.len()).map(|index| of(index, &Shading::default()).iter().sum::<f64>()).sum();
+    let sum: f64 = {
+        let sizes = |index| of(index, &Shading::default()).map(f64::abs).iter().sum::<f64>();
+        (0..found.len()).map(sizes).sum()
+    };
     let mean = (sum / (3 * found.len()) as f64).max(f64::MIN_POSITIVE);
     let group = |index: usize| index / batch.lit;
     let unit = |_| mean;
@@ -145,10 +147,12 @@ impl Difference {
             let mut excess = 0.0f64;
             for c in 0..3 {
                 let (a, b) = (f64::from(value[c]), expected[c]);
-                let difference = if a.is_finite() { (a - b).abs() } else { 10.0 * b };
-                excess = excess.max(difference / (RELATIVE * b).max(f64::MIN_POSITIVE));
+                // Witnesses may be negative, as where wi has the length r.
+                let size = b.abs();
+                let difference = if a.is_finite() { (a - b).abs() } else { 10.0 * size };
+                excess = excess.max(difference / (RELATIVE * size).max(f64::MIN_POSITIVE));
                 apart += difference;
-                total += b;
+                total += size;
                 if b > 0.0 && a.is_finite() {
                     ratios.push(a / b);
                 }

@@ -28,10 +28,17 @@ fn rules() -> Rules {
             reason: "wrong tree".into(),
             private: false,
         }],
-        paths: [("offline".into(), PathRule { proof: "image".into(), blame: "2".into() })].into(),
+        paths: [(
+            "offline".into(),
+            PathRule { proof: "image".into(), unseen: vec!["unseen".into()], blame: "2".into() },
+        )]
+        .into(),
         parts: vec![
             part("1", 10.0, "offline", "bsdf", &["pixels"]),
-            part("2", 30.0, "offline", "rays", &[]),
+            Part {
+                evidence: vec!["rays".into(), "unseen".into()],
+                ..part("2", 30.0, "offline", "rays", &[])
+            },
             part("3", 20.0, "", "bonus", &[]),
         ],
     };
@@ -249,6 +256,26 @@ fn under(convention: &str, bsdf: f64, rays: f64) -> Vec<Check> {
         ..check(id, if error == 0.0 { Pass } else { Fail }, error)
     };
     vec![of("bsdf", bsdf), of("rays", rays)]
+}
+
+#[test]
+fn settled_evidence_stays_as_it_is() {
+    for (own, other) in [(1.0, 0.0), (0.0, 1.0)] {
+        let checks = [under("", own, 0.5), under("other", other, 0.5)].concat();
+        let once = settle(&rules(), &Evidence { checks });
+        assert_eq!(settle(&rules(), &once), once);
+        assert_eq!(grade(&rules(), &once).points, grade_settled(&rules(), &once).points);
+    }
+}
+
+#[test]
+fn what_no_image_shows_counts_beside_right_images() {
+    let image = check("image", Pass, 0.0);
+    assert_eq!(points(&[image.clone(), check("unseen", Fail, 0.1)])[..2], [10.0, 15.0]);
+    assert_eq!(
+        points(&[image, check("unseen", Pass, 0.0), check("rays", Fail, 1.0)])[..2],
+        [10.0, 30.0]
+    );
 }
 
 #[test]
