@@ -152,7 +152,7 @@ fn a_folder_without_submissions_is_an_error_and_nothing_is_written() {
 #[test]
 fn validate_and_pack_say_which_images_are_no_images() {
     let place = tempfile::tempdir().unwrap();
-    let config = config("Ada", "Lovelace", "260123456");
+    let config = config("Ada", "Lampglow", "260123456");
     for (image, word) in [("", "the image is empty (0 bytes)"), ("x", "the image cannot be read: ")]
     {
         let files = submission(&config, "src/lib.rs", image);
@@ -199,7 +199,7 @@ fn a_submission_that_is_a_link_is_refused_with_and_without_a_slash() {
 #[test]
 fn fix_repacks_names_with_backslashes() {
     let place = tempfile::tempdir().unwrap();
-    let config = config("Ada", "Lovelace", "260123456");
+    let config = config("Ada", "Lampglow", "260123456");
     let files = submission(&config, "src/lib.rs", "x");
     let backslash = |path: &str| path.replace('/', "\\");
     let entries =

@@ -17,7 +17,7 @@ use umbra::intake::{
 
 const CONFIG: &str = r#"{
   "firstName": "Ada",
-  "lastName": "Lovelace",
+  "lastName": "Lampglow",
   "studentID": "260123456",
   "renders": [
     { "scene": "Teapot", "render": "offline/teapot_simple_offline.exr" },
@@ -89,7 +89,7 @@ fn validate(source: &Path) -> Result<Validation, IntakeError> {
 }
 
 fn validate_files(files: &[(String, Vec<u8>)]) -> Validation {
-    validate_bytes(&zip_of(files), "a2_ada_lovelace.zip")
+    validate_bytes(&zip_of(files), "a2_ada_lampglow.zip")
 }
 
 // --- copies ---
@@ -98,15 +98,15 @@ fn validate_files(files: &[(String, Vec<u8>)]) -> Validation {
 fn every_format_gives_the_same_copy() {
     let files = perfect();
     let folder = tempfile::tempdir().unwrap();
-    let source = folder.path().join("a2_ada_lovelace");
+    let source = folder.path().join("a2_ada_lampglow");
     write_folder(&source, &files);
     let scratch = Scratch::new();
     let from_folder =
         unpack(&source, &scratch.dest, &TreeSpec::default(), &Limits::default()).unwrap();
     assert_eq!(from_folder.format, Format::Folder);
-    assert_eq!(from_folder.name, "a2_ada_lovelace");
+    assert_eq!(from_folder.name, "a2_ada_lampglow");
     assert_eq!(from_folder.findings, []);
-    let wrapped = moved(|path| Some(format!("a2_ada_lovelace/{path}")));
+    let wrapped = moved(|path| Some(format!("a2_ada_lampglow/{path}")));
     for (bytes, name, format) in [
         (zip_of(&files), "a.zip", Format::Zip),
         (tar_of(&files), "a.tar", Format::Tar),
@@ -355,7 +355,7 @@ fn text_of_a_perfect_hand_in() {
     assert_eq!(
         validate_files(&perfect()).to_text(),
         "\
-a2_ada_lovelace.zip: conforms (0 errors, 0 warnings)
+a2_ada_lampglow.zip: conforms (0 errors, 0 warnings)
 
   expected                             found
   config.json                          config.json                          ok
@@ -385,7 +385,7 @@ fn text_of_a_wrong_tree() {
     assert_eq!(
         validate_files(&files).to_text(),
         "\
-a2_ada_lovelace.zip: does not conform (3 errors, 3 warnings)
+a2_ada_lampglow.zip: does not conform (3 errors, 3 warnings)
 
   expected                             found
   config.json                          config.json                          ok
@@ -554,7 +554,7 @@ fn working_folder() -> Vec<(String, Vec<u8>)> {
 fn packed_archives_conform_and_hold_only_what_is_needed() {
     let folder = tempfile::tempdir().unwrap();
     let packed = pack_in(folder.path(), &working_folder()).unwrap();
-    assert_eq!(packed.archive, folder.path().join("a2_ada_lovelace.zip"));
+    assert_eq!(packed.archive, folder.path().join("a2_ada_lampglow.zip"));
     let mut want: Vec<String> = perfect().into_iter().map(|(name, _)| name).collect();
     want.push("realtime/teapot_bonus.exr".to_owned());
     want.sort();
@@ -711,7 +711,7 @@ fn a_slip_in_the_config_is_a_warning_and_the_tree_is_as_it_is() {
         ("UTF-16", utf16),
         ("Latin-1", [b"{ // \xe9t\xe9\n".as_slice(), &CONFIG.as_bytes()[1..]].concat()),
         ("comma at the end", swapped("exr\" }\n  ]", "exr\" },\n  ],")),
-        ("no comma", swapped("\"Lovelace\",", "\"Lovelace\"")),
+        ("no comma", swapped("\"Lampglow\",", "\"Lampglow\"")),
         ("single quotes", swapped("\"", "'")),
         ("curly quotes", swapped("\"Ada\"", "\u{201c}Ada\u{201d}")),
         ("comment", swapped("\"Ada\",", "\"Ada\", // my name")),
@@ -738,7 +738,7 @@ fn a_slip_in_the_config_is_a_warning_and_the_tree_is_as_it_is() {
         assert_eq!(config.sampler_seed(), Some(260_123_456), "{what}");
         names.push(config.last_name.map(|field| field.text));
     }
-    assert!(names.iter().all(|name| name.as_deref() == Some("Lovelace")), "{names:?}");
+    assert!(names.iter().all(|name| name.as_deref() == Some("Lampglow")), "{names:?}");
     // Without a number nobody knows whose it is; the tree is right all the same.
     for config in ["", "nothing of the kind", "{}", "\0\0\0", "{\"studentID\": \"260000000\"}"] {
         let mut files = perfect();

@@ -57,7 +57,7 @@ fn every_archive_is_read_as_it_was_meant_and_mended_to_a_plain_one() {
 #[test]
 fn a_submission_of_2019_lacks_nothing_but_the_language() {
     let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/a2_grace_hopper_2019.zip");
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/a2_fern_gleamton_2019.zip");
     let (tree, limits) = (TreeSpec::default(), Limits::default());
     let scratch = Scratch::new();
     let (validation, images) = with_decoder(|decoder| {
@@ -76,7 +76,7 @@ fn a_submission_of_2019_lacks_nothing_but_the_language() {
     );
     let config = validation.config.unwrap();
     assert_eq!(config.sampler_seed(), Some(260_019_061));
-    assert_eq!(config.first_name.unwrap().text, "Grace");
-    assert_eq!(config.last_name.unwrap().text, "Hopper");
+    assert_eq!(config.first_name.unwrap().text, "Fern");
+    assert_eq!(config.last_name.unwrap().text, "Gleamton");
     assert_eq!(config.renders.len(), 5);
 }

@@ -183,8 +183,8 @@ mod tests {
             record
         };
         let mut batch = vec![
-            named("ada", "260 123-456", "Ada", "Lovelace"),
-            named("ada-again", "260123456", "LOVELACE,", "ada"),
+            named("ada", "260 123-456", "Ada", "Lampglow"),
+            named("ada-again", "260123456", "LAMPGLOW,", "ada"),
             named("eve", "260123456", "Eve", ""),
             named("bob", "260123457", "Eve", ""),
             named("nameless", "260123456", "", ""),

@@ -251,7 +251,7 @@ mod tests {
     /// Codes and lines of the findings on a config with this list of renders.
     fn check(renders: &str, paths: &[&str]) -> Vec<String> {
         let text = format!(
-            "{{\"firstName\": \"Ada\", \"lastName\": \"Lovelace\",\n\"studentID\": \"42\", \"renders\": [\n{renders}\n]}}"
+            "{{\"firstName\": \"Ada\", \"lastName\": \"Lampglow\",\n\"studentID\": \"42\", \"renders\": [\n{renders}\n]}}"
         );
         codes(&text, paths)
     }

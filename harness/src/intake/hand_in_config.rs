@@ -181,7 +181,7 @@ impl HandInConfig {
         }
     }
 
-    /// `Ada King Lovelace`: the last word is the last name; `Lovelace, Ada` says so itself. `ada_lovelace` is
+    /// `Ada King Lampglow`: the last word is the last name; `Lampglow, Ada` says so itself. `ada_lampglow` is
     /// how archives are named.
     fn set_full_name(&mut self, Field { text, line }: &Field) {
         let sign = |c: char| c.is_whitespace() || (c == '_' && !text.contains(char::is_whitespace));
@@ -382,15 +382,15 @@ mod tests {
 
     #[test]
     fn reads_every_common_form() {
-        let ada = ("Ada".to_owned(), "Lovelace".to_owned(), Some(260_123_456));
+        let ada = ("Ada".to_owned(), "Lampglow".to_owned(), Some(260_123_456));
         for text in [
-            r#"{"firstName": "Ada", "lastName": "Lovelace", "studentID": "260123456"}"#,
-            r#"{"first_name": " Ada ", "last_name": "Lovelace", "student_id": 260123456}"#,
-            r#"{"name": "Ada Lovelace", "id": 260123456, "email": "a@b.c"}"#,
-            r#"{"firstlast": "Ada Lovelace", "studentID": 260123456}"#,
-            r#"{"firstlast": "Ada_Lovelace", "studentID": 260123456}"#,
-            r#"{"fullName": "Lovelace, Ada", "Student Number": "260123456"}"#,
-            r#"{"student": {"firstName": "Ada", "lastName": "Lovelace", "id": "260123456"}, "renders": []}"#,
+            r#"{"firstName": "Ada", "lastName": "Lampglow", "studentID": "260123456"}"#,
+            r#"{"first_name": " Ada ", "last_name": "Lampglow", "student_id": 260123456}"#,
+            r#"{"name": "Ada Lampglow", "id": 260123456, "email": "a@b.c"}"#,
+            r#"{"firstlast": "Ada Lampglow", "studentID": 260123456}"#,
+            r#"{"firstlast": "Ada_Lampglow", "studentID": 260123456}"#,
+            r#"{"fullName": "Lampglow, Ada", "Student Number": "260123456"}"#,
+            r#"{"student": {"firstName": "Ada", "lastName": "Lampglow", "id": "260123456"}, "renders": []}"#,
         ] {
             assert_eq!(names(text), ada, "{text}");
             assert_eq!(codes(text), [""; 0], "{text}");
@@ -401,10 +401,10 @@ mod tests {
 
     #[test]
     fn slips_are_warnings_and_who_it_is_is_known() {
-        let ada = ("Ada".to_owned(), "Lovelace".to_owned(), Some(260_123_456));
+        let ada = ("Ada".to_owned(), "Lampglow".to_owned(), Some(260_123_456));
         let config = |id: &str| {
             format!(
-                "{{\n\"firstName\": \"Ada\",\n\"lastName\": \"Lovelace\",\n\"studentID\": {id}\n}}"
+                "{{\n\"firstName\": \"Ada\",\n\"lastName\": \"Lampglow\",\n\"studentID\": {id}\n}}"
             )
         };
         for id in [
@@ -422,23 +422,23 @@ mod tests {
         }
         for (text, code) in [
             (
-                r#"{"fristName": "Ada", "lastNmae": "Lovelace", "studnetID": 260123456}"#,
+                r#"{"fristName": "Ada", "lastNmae": "Lampglow", "studnetID": 260123456}"#,
                 "config_key@1",
             ),
             (
-                r#"[{"firstName": "Ada", "lastName": "Lovelace", "id": 260123456}]"#,
+                r#"[{"firstName": "Ada", "lastName": "Lampglow", "id": 260123456}]"#,
                 "config_shape@1",
             ),
-            ("firstName: Ada\nlastName: Lovelace\nstudentID: 260123456\n", "json_syntax@1"),
+            ("firstName: Ada\nlastName: Lampglow\nstudentID: 260123456\n", "json_syntax@1"),
             (
-                "firstName = \"Ada\"\nlastName = \"Lovelace\"\nstudentID = 260123456\n",
+                "firstName = \"Ada\"\nlastName = \"Lampglow\"\nstudentID = 260123456\n",
                 "json_syntax@1",
             ),
             (
-                "{\"firstName\": \"Ada\", \"lastName\": \"Lovelace\"\n*\"studentID\": \"260123456\"",
+                "{\"firstName\": \"Ada\", \"lastName\": \"Lampglow\"\n*\"studentID\": \"260123456\"",
                 "json_syntax@2",
             ),
-            ("{\"firstlast\": \"Ada Lovelace\",\n* \"studentID\": \"260123456\"}", "json_syntax@2"),
+            ("{\"firstlast\": \"Ada Lampglow\",\n* \"studentID\": \"260123456\"}", "json_syntax@2"),
         ] {
             assert_eq!(names(text), ada, "{text}");
             assert!(codes(text).contains(&code.to_owned()), "{text}: {:?}", codes(text));

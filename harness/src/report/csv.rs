@@ -83,7 +83,7 @@ mod tests {
             grades(&sample::sheet()).unwrap(),
             "\
 student_id,last_name,first_name,hand_in,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,lowest,highest,unconfirmed,remarks
-260000001,Lovelace,Ada,a2_ada.zip,5,10,20,15,25,20,95,75,,,,
+260000001,Lampglow,Ada,a2_ada.zip,5,10,20,15,25,20,95,75,,,,
 0260000002,Müller,Jörg,two_cosines.tar.gz,5,10,9.85,15,25,0..20,,75,64.85,84.85,,
 260000003,山田,花子,山田_花子.zip,0,0,0,0,0,0,0,75,,,11.44,the source does not build; the images alone earn 11.44 points once the instructor confirms
 "

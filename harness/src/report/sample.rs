@@ -124,7 +124,7 @@ fn check(
 }
 
 fn perfect() -> Entry {
-    let student = ["Ada", "Lovelace", "260000001"];
+    let student = ["Ada", "Lampglow", "260000001"];
     let mut entry = entry("a2_ada.zip", "a2_ada", student, conditions("llvmpipe (LLVM 15)"));
     let right = "the offline images are right on every scene";
     let drawn = "the realtime images are right on every scene";

@@ -126,7 +126,7 @@ pub fn assert_refused(bytes: &[u8], name: &str, code: &str, path: &str) -> Findi
 #[track_caller]
 pub fn assert_folder_refused(make: impl Fn(&Path), code: &str, path: &str) -> Finding {
     let scratch = Scratch::new();
-    let source = scratch.root.path().join("a2_ada_lovelace");
+    let source = scratch.root.path().join("a2_ada_lampglow");
     fs::create_dir(&source).unwrap();
     make(&source);
     let before = scratch.outside();

@@ -54,7 +54,7 @@ pub fn table(sheet: &Sheet, width: usize, colours: bool) -> Result<String, Repor
     Ok(page.finish())
 }
 
-/// One submission in a line: `a2_ada.zip (Ada Lovelace): 95/75`.
+/// One submission in a line: `a2_ada.zip (Ada Lampglow): 95/75`.
 pub fn in_a_line(record: &Record, grade: &Grade) -> String {
     let student = record.student.full_name();
     let student = if student.is_empty() { String::new() } else { format!(" ({student})") };
@@ -195,7 +195,7 @@ Assignment 2: Point Lights & Shadows, due 2019-10-06 23:59 -04:00
 
 hand-in             student       1.1  1.2   1.3  1.4  2.4    2.5            total  remarks
                           out of    5   10    20   15   25    +20
-a2_ada.zip          Ada Lovelace    5   10    20   15   25     20            95/75
+a2_ada.zip          Ada Lampglow    5   10    20   15   25     20            95/75
 two_cosines.tar.gz  Jörg Müller     5   10  9.85   15   25  0..20  64.85..84.85/75
 山田_花子.zip       花子 山田       0    0     0    0    0      0             0/75  1
 
