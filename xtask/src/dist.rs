@@ -159,7 +159,7 @@ fn add_expected(root: &Path, kit: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Copies a file, or a folder with all below but tests, which want what the kit lacks.
+/// Copies a file, or a folder with all below but our own tests, which want what the kit lacks.
 fn copy(from: &Path, to: &Path) -> Result<()> {
     if !from.is_dir() {
         fs::create_dir_all(to.parent().unwrap_or(Path::new("")))?;
@@ -170,7 +170,8 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     for entry in from.read_dir()? {
         let entry = entry?;
         let name = entry.file_name();
-        let left_out = name == "tests" && from.join("Cargo.toml").is_file();
+        let is_package = from.join("Cargo.toml").is_file() && !from.ends_with(TEMPLATE);
+        let left_out = name == "tests" && is_package;
         if !left_out && name != "target" && !name.as_encoded_bytes().starts_with(b".") {
             copy(&entry.path(), &to.join(name))?;
         }

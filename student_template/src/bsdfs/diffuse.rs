@@ -19,8 +19,9 @@ impl DiffuseBsdf {
 
 impl Bsdf for DiffuseBsdf {
     fn eval(&self, i: &SurfaceInteraction) -> Vec3 {
-        // TODO(A2) 1.1: black unless both `i.wo` and `i.wi` face the surface (`Frame::cos_theta`);
-        // otherwise the albedo at `i` (`self.albedo.eval`) over pi, times the cosine of `i.wi`.
-        todo!("1.1 diffuse BSDF: return albedo / pi * cos_i")
+        // TODO(A2) 1.1: test whether the incoming and outgoing rays are front-facing to the surface
+        // (`Frame::cos_theta` of `i.wi` and `i.wo`); if not, return black. Otherwise, return the
+        // albedo divided by pi and multiplied by the cosine foreshortening factor.
+        todo!("1.1 diffuse BSDF")
     }
 }

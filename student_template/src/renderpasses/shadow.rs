@@ -13,9 +13,9 @@ const SHADOW_VS: Stage =
 
 /// Draws what blocks the scene's light.
 pub fn draw_shadow_map(gpu: &Gpu, scene: &Scene) -> Result<ShadowMap> {
-    // TODO(A2) 2.5 (bonus): make a `ShadowMap` with the matrices of the light's views (one that
-    // covers the scene, or six that look in all directions), draw the scene's depth into each
-    // layer (`ShadowMap::begin`, `Gpu::depth_pipeline`), emitters left out. Then look it up in the
-    // fragment stages.
-    Err(Error::NotImplemented("2.5 shadow mapping (bonus): draw what the light sees".into()))
+    // TODO(A2) 2.5 (bonus): rasterize the scene from the point of view of the light source and store
+    // its depth: a `ShadowMap` has one layer for each view of the light (one that covers the scene,
+    // or six that look in all directions), drawn with `ShadowMap::begin` and `Gpu::depth_pipeline`.
+    // Leave emitters out. Then look the map up in the fragment shaders.
+    Err(Error::NotImplemented("2.5 shadow mapping (bonus)".into()))
 }

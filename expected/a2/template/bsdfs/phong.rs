@@ -35,9 +35,9 @@ fn reflect(w: Vec3) -> Vec3 {
 
 impl Bsdf for PhongBsdf {
     fn eval(&self, i: &SurfaceInteraction) -> Vec3 {
-        // TODO(A2) 1.2: black unless both directions face the surface; otherwise equation (1) of
-        // the handout, with both albedos multiplied by `self.scale`, times the cosine of `i.wi`.
-        // Alpha is the angle between the perfect specular direction and the light.
-        todo!("1.2 Phong BSDF: return scale * (rho_d / pi + rho_s * ...) * cos_i")
+        // TODO(A2) 1.2: test for front-facing incoming and outgoing rays, evaluate the Phong BRDF in
+        // equation (1) of the handout, and return this value multiplied by the cosine
+        // foreshortening factor. Multiply each albedo by `self.scale` to ensure energy conservation.
+        todo!("1.2 Phong BSDF")
     }
 }

@@ -26,15 +26,15 @@ impl Integrator for SimpleIntegrator {
 
 /// The light that the surface at `i` reflects toward `i.wo`, whatever stands in between.
 fn unshadowed(scene: &Scene, mut i: SurfaceInteraction) -> Vec3 {
-    // TODO(A2) 1.3: set `i.wi` to the direction of the light (`scene.first_light_position`) in the
-    // local frame (`i.frame_ns.to_local`), evaluate the BSDF (`scene.bsdf`), which includes the
-    // cosine already, and multiply by what arrives from the light (`scene.first_light_intensity`).
-    todo!("1.3 unshadowed direct illumination: return intensity / r^2 * bsdf.eval")
+    // TODO(A2) 1.3: retrieve the light's position and its intensity, retrieve the surface's BSDF
+    // (`scene.bsdf`), transform the world-space incoming direction `i.wi` to the surface's local
+    // coordinates (`i.frame_ns.to_local`), and evaluate the BRDF and incident lighting locally.
+    todo!("1.3 unshadowed direct illumination")
 }
 
 /// Whether nothing stands between the surface at `i` and the light.
 fn light_is_visible(scene: &Scene, i: &SurfaceInteraction) -> bool {
-    // TODO(A2) 1.4: cast a shadow ray (`scene.occluded`) from `i.p` toward the light. What lies
-    // behind the light casts no shadow: mind both ends of the ray (`Ray::segment`).
-    todo!("1.4 hard shadows: ask scene.occluded along a ray that ends at the light")
+    // TODO(A2) 1.4: create a shadow ray (`Ray::segment`), set the ray's bounds accordingly, and
+    // evaluate the visibility between the surface and the light with it (`scene.occluded`).
+    todo!("1.4 hard shadows")
 }

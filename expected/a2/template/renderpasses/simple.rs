@@ -81,24 +81,23 @@ impl SimplePass {
 
     /// Sets the light's share of the frame uniforms.
     fn set_light(&self, frame: &mut FrameUniforms) {
-        // TODO(A2) 2.1: `frame.light_position` and `frame.light_intensity`.
-        todo!("2.1 render pass: set the light's position and intensity in the frame uniforms")
+        // TODO(A2) 2.1: pass the light position and intensity using uniforms.
+        todo!("2.1 render pass: the light")
     }
 
     /// Binds and draws every object.
     fn draw_objects(&self, pass: &mut wgpu::RenderPass) {
-        // TODO(A2) 2.1: for each object choose the pipeline by its material (emitters are white,
-        // mirrors are diffuse), bind all four groups, set vertex and index buffer, and draw.
-        // `normal.rs` does the same for one pipeline.
-        todo!("2.1 render pass: choose the pipeline, bind the four groups, draw each object")
+        // TODO(A2) 2.1: bind the appropriate shaders (depending on the material: emitters are plain
+        // white, mirrors are diffuse) and draw the object. `normal.rs` is a model for one pipeline.
+        todo!("2.1 render pass: the objects")
     }
 }
 
 /// What the fragment stages need to know of a material.
 fn material_uniforms(material: &Material) -> MaterialUniforms {
-    // TODO(A2) 2.1: the average colours of the two textures, each times the material's energy
-    // scale, and the exponent.
-    todo!("2.1 render pass: pack the material's albedos and exponent")
+    // TODO(A2) 2.1: pass material-specific parameters using uniforms. The shaders get the average
+    // color of a texture, and each albedo multiplied by the material's energy scale.
+    todo!("2.1 render pass: the material")
 }
 
 impl RenderPass for SimplePass {
