@@ -11,66 +11,85 @@ use glam::DVec3;
 /// Width and height of a probe's film unless the probe needs more.
 const FILM: [u32; 2] = [128, 96];
 
-/// A probe and one line on what it shows.
+/// A probe, and what it holds and shows.
 type Probe = (fn() -> Scene, &'static str);
 
-/// Every probe in the order of the table.
+/// Every probe in the order of the list.
 const PROBES: [Probe; 14] = [
     (
         materials::scale,
-        "Kd + Ks over 1 in one channel or in all, beside spheres where `scale` is 1: a missing, inverted or misplaced `scale`, `scale` on a diffuse material",
+        "Kd + Ks exceeds 1 in one channel or in all, beside spheres where `scale` is 1. It shows \
+         a missing, inverted or misplaced `scale`, and `scale` on a diffuse material.",
     ),
     (
         materials::exponents,
-        "strips of exponent 1, 9.8, 101.5, 50 and 2, seen at grazing angles, cos alpha < 0 at their far end: pow before clamp, NaN, n + 1 for n + 2",
+        "Strips of exponent 1, 9.8, 101.5, 50 and 2, seen at grazing angles. At their far end cos \
+         alpha is negative. It shows a power before the clamp, NaN, and n + 1 for n + 2.",
     ),
     (
         materials::coloured,
-        "a dim, coloured light on coloured Kd and Ks, nothing above 1: swapped channels, a light or material taken as grey",
+        "A dim, coloured light on coloured Kd and Ks, with no value above 1. It shows swapped \
+         channels, and a light or material taken as grey.",
     ),
     (
         materials::textured,
-        "map_Kd and map_Ks with texture coordinates from below 0 to above 1, not symmetric: constant albedo, flipped v, clamp for wrap-around",
+        "`map_Kd` and `map_Ks` with texture coordinates from below 0 to above 1. The textures are \
+         not symmetric. It shows a constant albedo, a flipped v, and a clamp instead of \
+         wrap-around.",
     ),
     (
         materials::open,
-        "bumpy diffuse and Phong strips without any occluder, everything in view lit: unshadowed radiance alone, whatever the shadows do; a sample that is not at the pixel's centre",
+        "Bumpy diffuse and Phong strips without any occluder, all of them lit. It shows \
+         unshadowed radiance alone, whatever the shadows do, and a sample that is not at the \
+         pixel's center.",
     ),
     (
         geometry::behind,
-        "a plate beyond the light along the shadow rays, a shelf nearer than 1 with an occluder close to the light, a floor beyond 2: missing max_t, max_t = r^2",
+        "A plate beyond the light along the shadow rays, a shelf nearer than 1 with an occluder \
+         close to the light, and a floor beyond 2. It shows a missing `max_t`, and `max_t` = r^2.",
     ),
     (
         geometry::emitter,
-        "a large hexagon as emitter whose index mean is not the mean of its corners, its centroid or its first corner: light position, emitter that shadows its own light",
+        "A large hexagon as the emitter. Its index mean differs from the mean of its corners, \
+         from its centroid and from its first corner. It shows a wrong light position, and an \
+         emitter that shadows its own light.",
     ),
     (
         geometry::backfaces,
-        "surfaces that face the camera but not the light, the light but not the camera, neither, both; an open bowl: missing test of wo or wi, abs of a cosine",
+        "Surfaces that face the camera but not the light, the light but not the camera, neither, \
+         or both, and an open bowl. It shows a missing test of `wo` or `wi`, and `abs` of a \
+         cosine.",
     ),
     (
         geometry::contact,
-        "occluders 0.02 and 0.2 above the floor and a fin that stands on it: a shadow epsilon of 0.1, peter-panning",
+        "Occluders 0.02 and 0.2 above the floor, and a fin that stands on it. It shows a shadow \
+         epsilon of 0.1 and peter-panning.",
     ),
     (
         geometry::near_light,
-        "leaves at 94 % and 97.5 % of the way from the floor to the light, their shadows on diffuse and Phong surfaces: a shadow ray that ends too early",
+        "Leaves at 94 % and 97.5 % of the way from the floor to the light, with shadows on \
+         diffuse and Phong surfaces. It shows a shadow ray that ends too early.",
     ),
     (
         geometry::both_shadows,
-        "shadows that fall on a diffuse floor, a Phong floor and a Phong sphere, all within one frustum of 30 degrees: a shadow map that one of the two shaders does not look up",
+        "Shadows that fall on a diffuse floor, a Phong floor and a Phong sphere. All lie within \
+         one frustum of 30 degrees. It shows a shadow map that one of the two shaders does not \
+         look up.",
     ),
     (
         materials::speckled,
-        "map_Kd and map_Ks whose largest values sum to more than 1, whose averages to less, in one channel alone: `scale` from the average, at the point or by channel",
+        "The largest values of `map_Kd` and `map_Ks` sum to more than 1, their averages to less, \
+         in one channel alone. It shows a `scale` from the average, at the point, or by channel.",
     ),
     (
         materials::mirror,
-        "two mirrors (`illum 5`) beside diffuse and Phong spheres: black offline, a plain diffuse Kd in realtime",
+        "Two mirrors (`illum 5`) beside diffuse and Phong spheres. A mirror is black offline, and \
+         a plain diffuse Kd in realtime.",
     ),
     (
         geometry::rows,
-        "vertical stripes, the same in every row but for the noise of their edges: one seed for all rows, a sampler shared by threads",
+        "Vertical stripes, the same in every row but for the noise of their edges. It shows one \
+         seed for all rows, and a sampler that threads share.",
     ),
 ];
 
@@ -79,23 +98,37 @@ pub fn all() -> Vec<Scene> {
     PROBES.iter().map(|(scene, _)| scene()).collect()
 }
 
-/// The table of the probes.
+/// The list of the probes, for people.
 pub fn readme() -> File {
     let mut text = String::from(
-        "# Probe scenes\n\nMade by `xtask scenes`. Each shows faults that the four scenes of the assignment hide. One point light each, offline at 16 spp (`open`: 1) and realtime;\n\
-         `both_shadows` with shadows in realtime as well.\n\n\
-         | scene | film | light at | what it shows |\n|---|---|---|---|\n",
+        "# Probe scenes\n\n\
+         `xtask scenes` makes these. Each shows faults that the four scenes of the assignment hide. Each has one point light,\n\
+         an offline version at 16 samples per pixel and a realtime version. `open` has 1 sample per pixel. `both_shadows` has a\n\
+         realtime version with shadows as well.\n\n",
     );
     for (scene, shows) in PROBES {
         let scene = scene();
         let light = scene.light().map(|x| (x * 1000.0).round() / 1000.0);
         let [width, height] = scene.film;
-        text += &format!(
-            "| `{}` | {width}x{height} | {}, {}, {} | {shows} |\n",
-            scene.name, light.x, light.y, light.z
-        );
+        let (name, [x, y, z]) = (&scene.name, light.to_array());
+        text += &item(&format!("**`{name}`** ({width}x{height}, light at {x}, {y}, {z}). {shows}"));
     }
     File { path: "probes/README.md".to_string(), bytes: text.into_bytes() }
+}
+
+/// An item of a Markdown list, in lines of at most 120 columns.
+fn item(text: &str) -> String {
+    let (mut item, mut width) = (String::from("-"), 1);
+    for word in text.split(' ') {
+        if width + 1 + word.chars().count() > 120 {
+            item += "\n ";
+            width = 1;
+        }
+        item += " ";
+        item += word;
+        width += 1 + word.chars().count();
+    }
+    item + "\n"
 }
 
 /// An empty probe scene.
