@@ -82,7 +82,7 @@ fn a_class_as_a_learning_platform_lays_it_out() {
     let (code, said, errors) = umbra(&arguments, &[&out, &at("")]);
     assert_eq!(code, Some(0), "{said}{errors}");
     assert!(
-        said.contains("skipped, no submissions: .DS_Store, Gil_7/onlinetext.txt, index.html"),
+        said.contains("skipped, not submissions: .DS_Store, Gil_7/onlinetext.txt, index.html"),
         "{said}"
     );
     let report: Value =

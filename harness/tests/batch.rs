@@ -132,13 +132,13 @@ fn what_was_graded_before_the_end_is_kept_whatever_the_end() {
     let (interrupted, code, said) = batch.grade_until("abe", Signal::SIGINT);
     assert_eq!(code, Some(130), "{said}");
     assert_eq!((scratch_of(killed), scratch_of(interrupted)), (0, 0));
-    assert!(said.contains("of 4 hand-ins are graded; the same command goes on"), "{said}");
+    assert!(said.contains("of 4 submissions are graded; the same command resumes"), "{said}");
     assert!(!batch.out().join("report.json").exists());
 
     batch.hand_in("bob", WRONG);
     let (code, said) = batch.grade();
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("2 of 4 hand-ins are as they were graded before"), "{said}");
+    assert!(said.contains("2 of 4 submissions keep their earlier grades"), "{said}");
     assert_eq!(fs::read(batch.instructor("ada/record.json")).unwrap(), kept);
 
     let fresh = Batch::new(&[("abe", WRONG), ("ada", WRONG), ("bob", WRONG), ("eve", "what?")]);
@@ -163,14 +163,14 @@ fn a_hand_in_that_the_machine_fails_on_costs_the_others_nothing() {
     fs::remove_dir(batch.instructor("bob/record.json")).unwrap();
     let (code, said) = batch.grade();
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("2 of 3 hand-ins are as they were graded before"), "{said}");
+    assert!(said.contains("2 of 3 submissions keep their earlier grades"), "{said}");
     let csv = fs::read_to_string(batch.out().join("grades.csv")).unwrap();
     assert!(!csv.contains("ungraded"), "{csv}");
 
     // Another text is graded anew; the same one under other conditions too.
     batch.hand_in("bob", "fn main() { other }");
     let (_, said) = batch.grade();
-    assert!(said.contains("2 of 3 hand-ins are as they were graded before"), "{said}");
+    assert!(said.contains("2 of 3 submissions keep their earlier grades"), "{said}");
     assert!(batch.canonical().contains("`other`"));
     fs::write(batch.instructor("held-back-seed.txt"), "off").unwrap();
     let (code, said) = batch.grade();
@@ -242,7 +242,7 @@ fn one_student_is_graded_alone_or_anew() {
     assert_eq!(batch.names(), ["bob"]);
     let (code, said) = batch.grade_with(&[""], &["--only", "eve", "--only", "f bee"]);
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("1 of 2 hand-ins are as they were graded before"), "{said}");
+    assert!(said.contains("1 of 2 submissions keep their earlier grades"), "{said}");
     assert_eq!(batch.names(), ["bob", "eve"]);
     let (_, said) = batch.grade_with(&[""], &["--only", "bob", "--force"]);
     assert!(!said.contains("as they were graded before"), "{said}");
@@ -255,7 +255,7 @@ fn one_student_is_graded_alone_or_anew() {
     student("late/bob", "Bee", "260000123");
     let (code, said) = batch.grade_with(&["late/bob"], &[]);
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("bob of F Bee is graded anew as bob-2"), "{said}");
+    assert!(said.contains("bob of F Bee is graded again as bob-2"), "{said}");
     for _ in 0..2 {
         assert_eq!(batch.names(), ["bob", "eve"]);
         assert!(batch.canonical().contains("`better`"));

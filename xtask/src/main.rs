@@ -26,11 +26,11 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
-    /// Pack the sample hand-ins into target/umbra/samples, with the images that their code draws.
+    /// Pack the sample submissions into target/umbra/samples, with the images that their code draws.
     Samples,
-    /// Make what is given out.
+    /// Make the student's kit.
     Dist(dist::Arguments),
-    /// Grade the reference with known mistakes on, and without: print the matrix part x mistake.
+    /// Grade the reference with known mistakes, and without; print the matrix part x mistake.
     Verdicts(verdicts::Arguments),
 }
 

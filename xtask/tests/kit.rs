@@ -226,9 +226,9 @@ fn parts_that_are_solved_in_place_one_by_one_count_at_once() {
         }
         assert!(lines.iter().any(|line| line.starts_with("verdict: ")), "{said}");
         let next = match steps.get(index + 1) {
-            Some((part, _)) if *part == "2.5" => "next: make it ready to hand in: ".to_owned(),
+            Some((part, _)) if *part == "2.5" => "next: make it ready to submit: ".to_owned(),
             Some((part, _)) => format!("next: {part} "),
-            None => "next: make it ready to hand in: ".to_owned(),
+            None => "next: make it ready to submit: ".to_owned(),
         };
         let last = lines.iter().rposition(|line| line.starts_with("next: ")).unwrap();
         assert!(lines[last].starts_with(&next), "{next}: {said}");

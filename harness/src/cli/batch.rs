@@ -86,7 +86,7 @@ impl Batch<'_> {
         let isolation = context.supervisor.isolation.isolation();
         if self.isolation == IsolationChoice::Full && isolation != Isolation::Full {
             return Err(MachineLacks(format!(
-                "hand-ins are not run here, isolation would be {isolation}; hint: `umbra doctor` says \
+                "submissions are not run here, isolation would be {isolation}; hint: `umbra doctor` says \
                  what to do, `--isolation reduced` grades all the same"
             ))
             .into());
@@ -127,7 +127,7 @@ impl Batch<'_> {
         if INTERRUPTED.load(Ordering::Relaxed) {
             let goes_on = match (self.purpose, &result) {
                 (Purpose::Grade, Ok((results, ..))) => format!(
-                    ", {} of {} hand-ins are graded; the same command goes on from there",
+                    ", {} of {} submissions are graded; the same command resumes there",
                     results.len(),
                     chosen.len()
                 ),
@@ -142,7 +142,7 @@ impl Batch<'_> {
         if let Some(kept) = kept {
             if kept.found() > 0 {
                 eprintln!(
-                    "umbra: {} of {} hand-ins are as they were graded before",
+                    "umbra: {} of {} submissions keep their earlier grades",
                     kept.found(),
                     chosen.len()
                 );
@@ -227,7 +227,7 @@ impl Batch<'_> {
                     }
                     let grade = rubric::grade(&context.assignment.rules, &record.evidence);
                     let cost = if kept.was_found(slug) {
-                        "as graded before".to_owned()
+                        "unchanged".to_owned()
                     } else {
                         format!("{:.1} s", begun.elapsed().as_secs_f64())
                     };

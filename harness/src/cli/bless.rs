@@ -9,15 +9,15 @@ use crate::diagnosis::Catalogue;
 use crate::grading::Grading;
 use crate::worker::{Adapter, AdapterKind};
 
-/// The film of scenes that a hand-in holds images of: what mistakes do there shows on a small one.
+/// The film of scenes that a submission holds images of: what mistakes do there shows on a small one.
 const SMALL_FILM: [u32; 2] = [128, 96];
 
-/// What `umbra bless` is told.
+/// Options of `umbra bless`.
 #[derive(clap::Args)]
 pub struct BlessArguments {
-    /// Names of the scenes [default: all that are stored]
+    /// Scenes to render [default: all that are stored]
     scenes: Vec<String>,
-    /// Instead, what known mistakes look like: the reference renderer makes each of them
+    /// Render what known mistakes look like instead; the reference renderer makes each of them
     #[arg(long, conflicts_with = "scenes")]
     mistakes: bool,
 }
@@ -69,7 +69,7 @@ fn mistakes(context: &mut Context) -> anyhow::Result<u8> {
         let adapter = Adapter { kind: AdapterKind::Software, name: String::new() };
         let grading = Grading::prepare(store, adapter, None, &INTERRUPTED)?;
         if let Err(why) = &grading.adapter {
-            bail!("realtime cannot be drawn here: {why}");
+            bail!("cannot draw realtime here: {why}");
         }
         let say = |message: &str| context.say(message);
         Ok((grading.stored_folder(), grading.look_at_mistakes(&reference, &mistakes, &say)?))

@@ -26,15 +26,15 @@ const TASK: &str = "TODO(A2) ";
 /// Text is not wider than this, however wide the terminal is.
 const READABLE_COLUMNS: usize = 110;
 
-/// What `umbra check` is told.
+/// Options of `umbra check`.
 #[derive(clap::Args)]
 pub struct CheckArguments {
     /// Your working folder (config.json, src/, offline/, realtime/) or an archive
     hand_in: PathBuf,
-    /// Check only this part, such as 2.3; may be given several times
+    /// Check only this part, such as 2.3; may be repeated
     #[arg(long, value_name = "PART")]
     part: Vec<String>,
-    /// Check on this scene only, such as teapot; may be given several times
+    /// Check only on this scene, such as teapot; may be repeated
     #[arg(long, value_name = "NAME")]
     scene: Vec<String>,
     /// Print every check with its values and bounds
@@ -117,7 +117,7 @@ impl Asked {
         grade.points = grade.parts.iter().map(|part| part.points).sum();
         grade.points_max = grade.parts.iter().map(|part| part.points_max).sum();
         grade.out_of = grade.parts.iter().map(|part| part.out_of).sum();
-        grade.remarks.push(format!("asked was only {}, not the rest", self.in_words()));
+        grade.remarks.push(format!("only {} was checked, not the rest", self.in_words()));
     }
 
     fn asks(&self, part: &str) -> bool {
@@ -207,7 +207,7 @@ fn plan(folder: &Path, asked: &str, last_s: Option<f64>) -> String {
     let asked = if asked.is_empty() { String::new() } else { format!(", {asked} only") };
     let time = match last_s {
         Some(s) => format!("last time it took {} s", s.ceil()),
-        None => "usually less than a minute, on a slow machine some".to_owned(),
+        None => "usually less than a minute, a few minutes on a slow machine".to_owned(),
     };
     format!(
         "checking {}{asked}: compiles src/, draws the scenes, compares; {time}",

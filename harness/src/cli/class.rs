@@ -51,7 +51,7 @@ pub fn sources(given: &[collect::Source], output: &Path) -> Vec<Source> {
 fn new_slug(name: &str, taken: &mut HashSet<String>) -> String {
     let safe = |c: char| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '-' };
     let stem: String = stem(name).chars().map(safe).take(80).collect();
-    let stem = if stem.trim_matches('-').is_empty() { "hand-in".to_owned() } else { stem };
+    let stem = if stem.trim_matches('-').is_empty() { "submission".to_owned() } else { stem };
     let mut slug = stem.clone();
     let mut number = 2;
     while !taken.insert(slug.to_lowercase()) {
@@ -113,7 +113,7 @@ pub fn join(kept: &Kept, output: &Path, all: &[Source], records: &mut Vec<Record
             Ok(Some(earlier)) => earlier,
             Ok(None) => continue,
             Err(error) => {
-                eprintln!("umbra: {} is left out: {}", slug, super::told_once(&error));
+                eprintln!("umbra: {} is skipped: {}", slug, super::told_once(&error));
                 continue;
             }
         };
@@ -121,7 +121,7 @@ pub fn join(kept: &Kept, output: &Path, all: &[Source], records: &mut Vec<Record
         if !is_given && let Some(new) = records.iter().find(|new| is_newer(new, &record)) {
             match kept.replace(&instructor) {
                 Ok(()) => eprintln!(
-                    "umbra: {} of {} is graded anew as {}: it replaces the one in {}",
+                    "umbra: {} of {} is graded again as {}: it replaces the one in {}",
                     record.name,
                     who(&record.student),
                     new.slug,
@@ -141,7 +141,7 @@ pub fn join(kept: &Kept, output: &Path, all: &[Source], records: &mut Vec<Record
     }
     if !gone.is_empty() {
         eprintln!(
-            "umbra: {} in {} from earlier runs: {}; to take one out, delete its folder in {}",
+            "umbra: {} in {} from earlier runs: {}; to remove one, delete its folder in {}",
             plural(gone.len(), "submission stays", "submissions stay"),
             output.display(),
             some(&gone),
@@ -160,7 +160,7 @@ pub fn join(kept: &Kept, output: &Path, all: &[Source], records: &mut Vec<Record
     incomparable
 }
 
-/// Whether `new` is handed in again what `old` was: the same file name, by the same student.
+/// Whether `new` resubmits `old`: the same file name, by the same student.
 fn is_newer(new: &Record, old: &Record) -> bool {
     let (a, b) = (&new.student, &old.student);
     let same = if a.id.is_empty() && b.id.is_empty() {
@@ -251,7 +251,7 @@ fn student_of(context: &Context, source: &Path) -> Option<Student> {
     let private = tempfile::tempdir_in(&context.supervisor.scratch).ok()?;
     let copy = private.path().join("copy");
     fs::create_dir(&copy).ok()?;
-    context.say(&format!("reading who handed in {}", source.display()));
+    context.say(&format!("reading whose submission {} is", source.display()));
     let received = context.decoder().receive(source, &copy, tree, limits).ok()?;
     received.validation.config.as_ref().map(Student::of)
 }
@@ -303,7 +303,7 @@ mod tests {
         note(&twice);
         assert_eq!(slugs(&sources(&[path("bob"), path("bob")], &output)), ["a2", "a2-4"]);
         let odd = sources(&["instructor".into(), "???".into(), "A2.tar.gz".into()], &output);
-        assert_eq!(slugs(&odd), ["instructor-2", "hand-in", "A2-5"]);
+        assert_eq!(slugs(&odd), ["instructor-2", "submission", "A2-5"]);
     }
 
     #[test]

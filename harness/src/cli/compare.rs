@@ -17,7 +17,7 @@ const FULL_SCALE: f32 = 0.1;
 /// Chromaticities closer than this are the same (they are written with four digits).
 const SAME_PRIMARIES: f32 = 1e-3;
 
-/// What `umbra compare` is told.
+/// Options of `umbra compare`.
 #[derive(clap::Args)]
 pub struct CompareArguments {
     /// The actual image
@@ -25,10 +25,10 @@ pub struct CompareArguments {
     /// The expected image
     expected: PathBuf,
     /// The layer to compare, such as `mean` of a stored expected image; a file with only plain R, G
-    /// and B is taken as it is [default: plain R, G and B, or the only layer]
+    /// and B is used as it is [default: plain R, G and B, or the only layer]
     #[arg(long, value_name = "NAME")]
     layer: Option<String>,
-    /// A pixel with a NaN differs, even where both images have one
+    /// Count a pixel with a NaN as different, even where both images have one
     #[arg(long)]
     nan_is_error: bool,
     /// Leave out the metrics, FLIP and SSIM among them, which take most of the time of large images

@@ -6,7 +6,7 @@ use basecode::gpu::{AdapterKind, Gpu};
 
 use crate::sandbox::{Isolation, doctor::examine};
 
-/// Prints what there is; exit 0 when hand-ins can be graded with full isolation.
+/// Prints what there is; exit 0 when submissions can be graded with full isolation.
 pub fn run() -> anyhow::Result<u8> {
     let examination = examine(&std::env::current_exe()?);
     println!("isolation");
@@ -54,7 +54,7 @@ fn compiler(program: &str) -> bool {
             true
         }
         Ok(output) => {
-            println!("  {program:<16} no   it ends with {}", output.status);
+            println!("  {program:<16} no   exits with {}", output.status);
             false
         }
         Err(error) => {

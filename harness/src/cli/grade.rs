@@ -11,39 +11,39 @@ use crate::evidence::Verdict;
 use crate::grading::{INTERNAL_ERROR, Purpose};
 use crate::report::{self, Sheet};
 
-/// What `umbra grade` is told.
+/// Options of `umbra grade`.
 #[derive(clap::Args)]
 pub struct GradeArguments {
     /// Archives, submission folders, or folders that hold them at any depth, as a learning platform lays them out
     #[arg(required = true)]
     hand_ins: Vec<PathBuf>,
-    /// Where to write report.html, report.json, grades.csv and each submission's own report. What was
-    /// found out is kept there too: the same command goes on where it was ended, and takes up what is
-    /// new or has changed; other submissions join the class that is there
+    /// Where to write report.html, report.json, grades.csv and each submission's own report. Results
+    /// are kept there too: the same command resumes an interrupted batch and grades what is new or has
+    /// changed; other submissions join the class that is there
     #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
     output: PathBuf,
     /// Which adapter draws realtime scenes; software gives every machine the same pixels
     #[arg(long, value_enum, default_value_t = AdapterChoice::Software)]
     adapter: AdapterChoice,
-    /// Hand-ins that are graded at the same time [default: one for each core]
+    /// Submissions to grade at the same time [default: one for each core]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
-    /// What must isolate hand-ins: full refuses a machine that cannot, reduced takes what there is
-    /// and says so in the report (see `umbra doctor`)
+    /// The isolation to demand: full refuses a machine without it, reduced uses what there is and says
+    /// so in the report (see `umbra doctor`)
     #[arg(long, value_enum, default_value_t = IsolationChoice::Full)]
     isolation: IsolationChoice,
-    /// Seed of the held-back scenes, to reproduce a batch; off grades on the public scenes alone
-    /// [default: the batch's secret one, made when there is none in --output]
+    /// Seed of the held-back scenes, to reproduce a batch; off uses the public scenes alone [default:
+    /// the secret seed in --output, made when there is none]
     #[arg(long, value_name = "SEED|off", overrides_with = "perturb")]
     perturb: Option<Perturb>,
-    /// Grade only this student's, by number, name or file name; the others stay as they were graded
+    /// Grade only this student's submission, by number, name or file name; the others keep their grades
     #[arg(long, value_name = "STUDENT")]
     only: Vec<String>,
-    /// Grade anew what was graded before, although nothing has changed
+    /// Grade again what has not changed since it was graded
     #[arg(long)]
     force: bool,
-    /// The time that each submission has in all: as config.json says (ten times the reference renderer's
-    /// CPU time), or none, which grades fully what used it up before
+    /// Total time of each submission: as config.json says (ten times the reference renderer's CPU time),
+    /// or none, which fully grades a submission that used up its time before
     #[arg(long, value_enum, default_value_t = BudgetChoice::Config)]
     budget: BudgetChoice,
     /// Print what each stage cost
@@ -56,7 +56,7 @@ pub struct GradeArguments {
 pub enum BudgetChoice {
     /// As config.json says
     Config,
-    /// As much as it takes
+    /// No limit
     None,
 }
 
@@ -83,11 +83,11 @@ impl FromStr for Perturb {
 pub enum IsolationChoice {
     /// Every layer
     Full,
-    /// What this machine has
+    /// Whatever this machine has
     Reduced,
 }
 
-/// Grades hand-ins and prints the table; exit 0 when all could be graded, whatever their points.
+/// Grades submissions and prints the table; exit 0 when all could be graded, whatever their points.
 pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let batch = Batch {
         paths: arguments.hand_ins.clone(),
@@ -106,11 +106,11 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
     let Some((sheet, skipped)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
     print!("{}", report::text_table(&sheet, terminal::width(), terminal::colours())?);
     if let Some(skipped) = skipped {
-        println!("skipped, no submissions: {skipped}");
+        println!("skipped, not submissions: {skipped}");
     }
     println!("report: {}", arguments.output.join(report::HTML_FILE).display());
     if let Some(held_back) = &sheet.held_back {
-        println!("held-back seed {0}; --perturb {0} reproduces", held_back.seed);
+        println!("held-back seed {0}; --perturb {0} reproduces this batch", held_back.seed);
     }
     Ok(exit_code(&sheet))
 }

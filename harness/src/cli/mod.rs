@@ -23,9 +23,9 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::panics;
 
-/// Everything went well, and what was asked about is in order.
+/// Success.
 pub const EXIT_OK: u8 = 0;
-/// What was asked about is not in order: a hand-in that does not conform, images that differ.
+/// The answer is no: a submission does not conform, images differ, points are missing.
 pub const EXIT_NOT_IN_ORDER: u8 = 1;
 /// The command line or an input file cannot be used.
 pub const EXIT_USAGE: u8 = 2;
@@ -49,34 +49,34 @@ struct Arguments {
     root: Option<PathBuf>,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 in order; 1 not in order (does not conform, images differ, \
-points were lost in a check); 2 the command line or an input cannot be used; 3 the machine lacks \
-something; 70 a bug of Umbra's; 130 interrupted.";
+const EXIT_CODES: &str = "Exit codes: 0 success; 1 the answer is no (points were lost in a check, the tree \
+does not conform, images differ); 2 the command line or an input cannot be used; 3 the machine lacks \
+something; 70 an internal error of Umbra; 130 interrupted.";
 
 /// What is said of a panic, after its own words.
 const BUG: &str = concat!(
-    "this is a bug of Umbra's, nobody else's fault. Please report it to its maintainers with the line \
-     above, the command line, the file it was about and the version, ",
+    "this is an internal error of Umbra, nobody else's fault. Please report it to its maintainers with \
+     the line above, the command line, the file involved and the version, ",
     env!("CARGO_PKG_VERSION"),
-    "; RUST_BACKTRACE=1 says more"
+    "; RUST_BACKTRACE=1 prints more"
 );
 
 #[derive(Subcommand)]
 enum Command {
-    /// Check your own working folder before handing in: builds src/, renders every public scene
-    /// and says what is wrong, where, and what it looks like
+    /// Check your own working folder before you submit: builds src/, renders every public scene and
+    /// says what is wrong, where, and what it looks like
     Check(check::CheckArguments),
-    /// Grade hand-ins: archives (.zip, .tar, .tar.gz), folders, or folders full of them
+    /// Grade submissions: archives (.zip, .tar, .tar.gz), folders, or folders full of them
     Grade(grade::GradeArguments),
-    /// Check an archive's tree against the handout's; exit 0 when it conforms, 1 when not
+    /// Check an archive's tree against the handout's; exits with 0 when it conforms, 1 when not
     Validate(tree::ValidateArguments),
-    /// Pack a working folder into an archive as the handout demands
+    /// Pack a working folder into an archive that conforms to the handout
     Pack(tree::PackArguments),
     /// Render a scene with a plugin, offline or realtime as the scene says
     Render(render::RenderArguments),
     /// Compare two EXR images
     Compare(compare::CompareArguments),
-    /// Say what this machine has: isolation, graphics adapters, compiler; exit 0 when it can grade
+    /// Show what this machine has: isolation, graphics adapters, compiler; exits with 0 when it can grade
     #[cfg(target_os = "linux")]
     Doctor,
     /// Print a script that completes umbra's commands and options in a shell
@@ -84,7 +84,7 @@ enum Command {
         /// The shell
         shell: clap_complete::Shell,
     },
-    /// Render the stored expected images anew with the reference renderer, and replace them
+    /// Render the stored expected images again with the reference renderer, and replace them
     Bless(bless::BlessArguments),
 }
 
@@ -170,7 +170,7 @@ fn writable(output: &Path) -> anyhow::Result<()> {
     if !temporary.is_dir() {
         let named =
             if std::env::var_os("TMPDIR").is_some() { "TMPDIR" } else { "temporary folder" };
-        return Err(lacks(format!("{named} is {}, which is no folder", temporary.display())));
+        return Err(lacks(format!("{named} is {}, which is not a folder", temporary.display())));
     }
     for folder in [output, &temporary] {
         std::fs::create_dir_all(folder)

@@ -18,29 +18,29 @@ use crate::worker::{
     draw_in_process,
 };
 
-/// What `umbra render` is told.
+/// Options of `umbra render`.
 #[derive(clap::Args)]
 pub struct RenderArguments {
     /// The scene's TOML file
     scene: PathBuf,
-    /// Who renders: `reference`, or the path of a plugin's library
+    /// The renderer: `reference`, or the path of a plugin's library
     #[arg(long, value_name = "reference|PATH")]
     plugin: String,
-    /// Where to write the image: `.exr` has linear radiance; `.png` is for looking at, clamped to
-    /// [0, 1] and encoded as sRGB
+    /// Where to write the image: `.exr` holds linear radiance; `.png` is clamped to [0, 1] and encoded
+    /// as sRGB, for viewing
     #[arg(long, short, value_name = "OUT.exr|OUT.png")]
     output: PathBuf,
     /// Samples per pixel, offline [default: the scene's]
     #[arg(long)]
     spp: Option<u32>,
-    /// Seed of the samplers [default: the student number in the config.json of the hand-in that the
+    /// Seed of the samplers [default: the student number in the config.json of the submission that the
     /// image is written into, else 0]
     #[arg(long)]
     seed: Option<u64>,
     /// Threads to render with [default: all cores]
     #[arg(long)]
     threads: Option<u32>,
-    /// Shadows: offline they are on, realtime as the scene's `bonus` says
+    /// Whether to draw shadows [default: offline on, realtime as the scene's `bonus` says]
     #[arg(long, value_name = "on|off")]
     shadows: Option<Switch>,
     /// Film size in pixels [default: the scene's]
@@ -49,11 +49,11 @@ pub struct RenderArguments {
     /// Which adapter draws realtime scenes
     #[arg(long, value_enum, default_value_t = AdapterChoice::Auto)]
     adapter: AdapterChoice,
-    /// Load the plugin into this process, without isolation: for your own plugin, so that a debugger and
-    /// prints work
+    /// Load the plugin into this process, without isolation, so that a debugger and prints work; only
+    /// for your own plugin
     #[arg(long)]
     in_process: bool,
-    /// Options for the plugin; only the reference knows some (`mistake=NAME`)
+    /// Options for the plugin; only the reference renderer has any (`mistake=NAME`)
     #[arg(long, default_value = "", hide = true)]
     options: String,
 }
@@ -257,7 +257,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     if arguments.in_process {
         ensure!(
             arguments.plugin != "reference",
-            "--in-process is for a plugin of your own, that you can debug"
+            "--in-process is for your own plugin, to debug it"
         );
         save(&draw_in_process(&plugin, &request, &|_, _| ())?)?;
         return Ok(super::EXIT_OK);
@@ -314,7 +314,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     }
 }
 
-/// The student number of the hand-in that a file lies in, at its root or one folder deeper.
+/// The student number of the submission that a file lies in, at its root or one folder deeper.
 fn own_seed(file: &Path) -> Option<u64> {
     let file = std::path::absolute(file).ok()?;
     let configs = file.ancestors().skip(1).take(2).map(|folder| folder.join("config.json"));

@@ -1,4 +1,4 @@
-//! `umbra validate` and `umbra pack`: a hand-in's tree, without running anything of it.
+//! `umbra validate` and `umbra pack`: a submission's tree, without running anything of it.
 
 use std::path::{Path, PathBuf};
 
@@ -7,22 +7,22 @@ use anyhow::bail;
 use super::context::Context;
 use crate::intake::{self, IntakeError, Severity};
 
-/// What `umbra validate` is told.
+/// Options of `umbra validate`.
 #[derive(clap::Args)]
 pub struct ValidateArguments {
     /// The archive or folder
     archive: PathBuf,
-    /// Repack a nearly right one (wrong level, other names, junk) into a conforming archive
+    /// Repack a nearly conforming submission (wrong level, other names, junk) into a conforming archive
     #[arg(long, value_name = "OUT.zip")]
     fix: Option<PathBuf>,
 }
 
-/// What `umbra pack` is told.
+/// Options of `umbra pack`.
 #[derive(clap::Args)]
 pub struct PackArguments {
     /// The working folder: config.json, src/, offline/, realtime/
     folder: PathBuf,
-    /// Where to write the archive, a file or a folder [default: the current folder]
+    /// Where to write the archive: a file or a folder [default: the current folder]
     #[arg(long, short, value_name = "OUT")]
     output: Option<PathBuf>,
 }

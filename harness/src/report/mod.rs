@@ -105,12 +105,12 @@ fn is_private(remark: &str, rules: &Rules) -> bool {
 pub enum ReportError {
     /// A report of nothing would look like a batch that went well.
     #[error(
-        "no hand-in to report: expected at least one (hint: name an archive, a folder, or a folder of them)"
+        "no submission to report: expected at least one (hint: name an archive, a folder, or a folder of them)"
     )]
     Empty,
     /// The folder of a hand-in's page has no usable name.
     #[error(
-        "hand-in {name:?}: expected a plain and unique folder name for its report, found {slug:?}"
+        "submission {name:?}: expected a plain and unique folder name for its report, found {slug:?}"
     )]
     Slug {
         /// The hand-in.

@@ -18,7 +18,7 @@ pub fn batch(sheet: &Sheet) -> Result<String, ReportError> {
     let mut html = begin(&sheet.title);
     html.raw("<header class=\"top\">\n<p class=\"course\">").text(&sheet.course);
     html.raw("</p>\n<h1>").text(&sheet.title).raw("</h1>\n<p>");
-    html.text(&count(sheet.entries.len(), "hand-in"));
+    html.text(&count(sheet.entries.len(), "submission"));
     let open = |entry: &&Entry| is_range(entry.grade.points, entry.grade.points_max);
     match sheet.entries.iter().filter(open).count() {
         0 => {}
@@ -37,7 +37,7 @@ pub fn batch(sheet: &Sheet) -> Result<String, ReportError> {
 fn table(html: &mut Html, sheet: &Sheet) {
     html.raw("<div class=\"scroll\" role=\"region\" aria-label=\"Grades\" tabindex=\"0\">\n");
     html.raw(
-        "<table class=\"grades sortable\">\n<thead><tr><th scope=\"col\">Student, hand-in</th>",
+        "<table class=\"grades sortable\">\n<thead><tr><th scope=\"col\">Student, submission</th>",
     );
     html.raw("<th scope=\"col\" class=\"number\">Total<small>of ");
     html.text(&points(sheet.rules.total_points())).raw("</small></th>");
@@ -127,12 +127,14 @@ fn conditions(html: &mut Html, sheet: &Sheet) {
     }
     html.raw("<section>\n<h2>Conditions</h2>\n");
     if seen.len() > 1 {
-        html.raw("<p class=\"notice\">These hand-ins were not graded under the same conditions: ");
+        html.raw(
+            "<p class=\"notice\">These submissions were not graded under the same conditions: ",
+        );
         html.raw("their points are not strictly comparable.</p>\n");
     }
     for (conditions, number) in &seen {
         if seen.len() > 1 {
-            html.raw("<p>").text(&count(*number, "hand-in")).raw(":</p>\n");
+            html.raw("<p>").text(&count(*number, "submission")).raw(":</p>\n");
         }
         super::hand_in::conditions(html, conditions);
     }
@@ -142,7 +144,7 @@ fn conditions(html: &mut Html, sheet: &Sheet) {
         html.raw("<p>Held-back scenes: ").text(&scenes.join(", ")).raw("; seed ");
         html.show(held_back.seed).raw(", <code>--perturb ").show(held_back.seed);
         html.raw(
-            "</code> reproduces them. Give students nothing but the folders of their hand-ins: ",
+            "</code> reproduces them. Give students nothing but the folders of their submissions: ",
         );
         html.raw("this page, report.json, grades.csv and the folder <code>").raw(INSTRUCTOR);
         html.raw("</code> are for the instructor.</p>\n");

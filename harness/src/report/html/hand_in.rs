@@ -36,7 +36,7 @@ pub fn hand_in(sheet: &Sheet, entry: &Entry, reader: Reader) -> String {
             .raw(root)
             .raw("/")
             .raw(HTML_FILE)
-            .raw("\">All hand-ins</a></nav>\n");
+            .raw("\">All submissions</a></nav>\n");
     }
     html.raw("<p class=\"course\">").text(&sheet.title);
     html.raw("</p>\n<h1>").text(name).raw("</h1>\n<p class=\"who\">");

@@ -9,7 +9,7 @@ fn pages_say_what_matters() {
         "<a href=\"./instructor/two_cosines/report.html\">Jörg Müller</a><small>two_cosines.tar.gz</small>",
         "<td class=\"number total open\" data-sort=\"64.85\">64.85..84.85</td>",
         "<td class=\"number open\" data-sort=\"0\">0..20</td>",
-        "3 hand-ins, 1 not wholly judged",
+        "3 submissions, 1 not wholly judged",
         "not graded under the same conditions",
         "1 warning, 1 note",
         "<a href=\"./a2_ada/report.html\">Ada",
@@ -29,7 +29,7 @@ fn pages_say_what_matters() {
         "<summary>2 checks could not be judged</summary>",
         "<code>src/lib.rs:12</code> the source uses unsafe",
     ] {
-        assert!(page.contains(words), "{words:?} is not in the hand-in's page");
+        assert!(page.contains(words), "{words:?} is not in the submission's page");
     }
     let page = hand_in(&sheet, &sheet.entries[2], Reader::Student);
     assert!(page.contains("expected `Vec3`, found `f32`"));

@@ -49,7 +49,7 @@ pub fn closing(sheet: &Sheet, entry: &Entry, closing: &Closing, look: Look) -> S
     let mut verdict = verdict.join(", ");
     verdict.push_str(" on the public scenes");
     if !closing.asked.is_empty() {
-        verdict.push_str(&format!("; asked was only {}, not the rest", closing.asked));
+        verdict.push_str(&format!("; only {} was checked, not the rest", closing.asked));
     }
     let whole = plain.iter().all(|part| is_whole(part)) && !grade.parts.is_empty();
     let style = if whole { Style::Good } else { Style::Bad };
@@ -90,7 +90,7 @@ fn next(sheet: &Sheet, entry: &Entry, closing: &Closing) -> String {
     if !closing.asked.is_empty() {
         return match open(true) {
             Some(part) => work_on(part, closing),
-            None => format!("that is right; `{umbra} check {folder}` asks the rest too"),
+            None => format!("that is right; `{umbra} check {folder}` checks the rest too"),
         };
     }
     // Images that are not what the code draws.
@@ -99,10 +99,10 @@ fn next(sheet: &Sheet, entry: &Entry, closing: &Closing) -> String {
     let ready = match (error, stale) {
         (Some(finding), _) => {
             let text = finding.to_string();
-            format!("make it ready to hand in: {}", text.trim_start_matches("error: "))
+            format!("make it ready to submit: {}", text.trim_start_matches("error: "))
         }
-        (None, Some(check)) => format!("make it ready to hand in: {}", check.summary),
-        (None, None) => format!("`{umbra} pack {folder}` makes the archive to hand in"),
+        (None, Some(check)) => format!("make it ready to submit: {}", check.summary),
+        (None, None) => format!("`{umbra} pack {folder}` makes the archive to submit"),
     };
     match open(true).filter(|_| sheet.rules.parts.iter().any(|part| part.bonus)) {
         Some(part) => format!("{ready}; or the bonus, {} {}", part.id, part.title),
@@ -161,13 +161,13 @@ mod tests {
         assert!(lines[3].starts_with("next: the source does not build; "), "{lines:?}");
         // All is right: a file is missing, then nothing is.
         let ready = closed(&sheet, 0, "", &[]);
-        let pack = "next: `./umbra pack student_template` makes the archive to hand in";
+        let pack = "next: `./umbra pack student_template` makes the archive to submit";
         assert_eq!(ready[3], pack);
         let mistake = sheet.entries[2].record.findings[0].clone();
         sheet.entries[0].record.findings.push(mistake);
         let lines = closed(&sheet, 0, "", &[]);
         assert!(
-            lines[3].starts_with("next: make it ready to hand in: config.json:3: "),
+            lines[3].starts_with("next: make it ready to submit: config.json:3: "),
             "{lines:?}"
         );
     }
@@ -179,12 +179,12 @@ mod tests {
         let lines = closed(&sheet, 1, "part 2.4 on scene cbox", &[]);
         assert_eq!(
             lines[2],
-            "verdict: 25 of 25 points on the public scenes; asked was only part 2.4 on scene cbox, not \
+            "verdict: 25 of 25 points on the public scenes; only part 2.4 on scene cbox was checked, not \
              the rest"
         );
         assert_eq!(
             lines[3],
-            "next: that is right; `./umbra check student_template` asks the rest too"
+            "next: that is right; `./umbra check student_template` checks the rest too"
         );
     }
 }

@@ -226,7 +226,7 @@ fn findings(page: &mut Page, findings: &[Finding], verbose: bool, busy: bool) {
     if busy && !verbose {
         if errors > 0 {
             page.gap();
-            let text = format!("before you hand in, {} to be mended", count(errors, "thing"));
+            let text = format!("before you submit, {} to be mended", count(errors, "thing"));
             page.wrapped(&[], Style::Faint, &format!("{text}: `umbra validate` lists them"));
         }
         return;
@@ -235,7 +235,7 @@ fn findings(page: &mut Page, findings: &[Finding], verbose: bool, busy: bool) {
     if !findings.iter().any(|finding| wanted(&finding)) {
         return;
     }
-    heading(page, if verbose { "findings" } else { "before you hand in" });
+    heading(page, if verbose { "findings" } else { "before you submit" });
     for finding in findings.iter().filter(wanted) {
         let style = match finding.severity {
             Severity::Error => Style::Bad,

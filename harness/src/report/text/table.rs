@@ -45,7 +45,7 @@ pub fn table(sheet: &Sheet, width: usize, colours: bool) -> Result<String, Repor
     }
     page.gap();
     let open = |entry: &&Entry| is_range(entry.grade.points, entry.grade.points_max);
-    let mut summary = count(sheet.entries.len(), "hand-in");
+    let mut summary = count(sheet.entries.len(), "submission");
     match sheet.entries.iter().filter(open).count() {
         0 => {}
         open => summary.push_str(&format!(", {open} not wholly judged (a range of points)")),
@@ -107,7 +107,7 @@ impl Layout {
                 widest(&part.id, &own).max(most(part).len())
             })
             .collect();
-        let name = widest("hand-in", &|entry| entry.record.name.clone());
+        let name = widest("submission", &|entry| entry.record.name.clone());
         let student = widest("student", &|entry| entry.record.student.full_name());
         let fixed = GAP.len() * 2 + total + if noted > 0 { noted + GAP.len() } else { 0 };
         let with_parts = fixed + parts.iter().map(|part| part + GAP.len()).sum::<usize>();
@@ -121,7 +121,7 @@ impl Layout {
 
     fn head(&self, page: &mut Page, sheet: &Sheet) {
         let mut head =
-            format!("{}{GAP}{}", left("hand-in", self.name), left("student", self.student));
+            format!("{}{GAP}{}", left("submission", self.name), left("student", self.student));
         let mut best = right("out of", columns(&head));
         if let Some(parts) = &self.parts {
             for (part, &width) in sheet.rules.parts.iter().zip(parts) {
@@ -193,7 +193,7 @@ mod tests {
             "\
 Assignment 2: Point Lights & Shadows, due 2019-10-06 23:59 -04:00
 
-hand-in             student       1.1  1.2   1.3  1.4  2.4    2.5            total  remarks
+submission          student       1.1  1.2   1.3  1.4  2.4    2.5            total  remarks
                           out of    5   10    20   15   25    +20
 a2_ada.zip          Ada Lampglow    5   10    20   15   25     20            95/75
 two_cosines.tar.gz  Jörg Müller     5   10  9.85   15   25  0..20  64.85..84.85/75
@@ -202,7 +202,7 @@ two_cosines.tar.gz  Jörg Müller     5   10  9.85   15   25  0..20  64.85..84.8
 remarks
   1  the source does not build; the images alone earn 11.44 points once the instructor confirms
 
-3 hand-ins, 1 not wholly judged (a range of points)
+3 submissions, 1 not wholly judged (a range of points)
 "
         );
     }
@@ -249,6 +249,6 @@ remarks
     fn an_empty_batch_is_an_error() {
         let sheet = Sheet { entries: Vec::new(), ..sample::sheet() };
         let error = table(&sheet, 80, false).unwrap_err();
-        assert!(error.to_string().starts_with("no hand-in to report: expected at least one"));
+        assert!(error.to_string().starts_with("no submission to report: expected at least one"));
     }
 }
