@@ -13,7 +13,9 @@ const AVERAGE: f64 = 20.0;
 #[test]
 fn documents_are_short_of_breath() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the repository");
-    let files = markdown_below(root);
+    let mut files = markdown_below(root);
+    // A table that `xtask verdicts --table` writes.
+    files.retain(|file| !file.ends_with("docs/points.md"));
     assert!(files.len() > 20, "only {} files", files.len());
     let faults: Vec<String> = files
         .iter()
