@@ -78,6 +78,7 @@ pub fn judge_images(
                 let footprint = outcome.answer().and_then(|answer| answer.footprint);
                 let with = bonus.as_ref().map(|drawn| &drawn.image);
                 if let (Some(footprint), Some(with)) = (footprint, with)
+                    && shows_its_shadows(case, with, plain, tolerances)
                     && let Some(why) = no_shadow_map(asker, plugin, &frame, &footprint, with)
                 {
                     check = Check { error: 1.0, verdict: Verdict::Fail, summary: why, ..check };
@@ -186,6 +187,21 @@ fn judge_bonus(
         check = judge_visibility(asker, plugin, case, (&drawn.image, plain), check, tolerances);
     }
     (check, Some(drawn))
+}
+
+/// Whether a frame itself shows shadows that are right: by another stage than the submission's they may be
+/// right where its own frame shows nothing.
+fn shows_its_shadows(
+    case: &Case,
+    with: &Image,
+    plain: Option<&Image>,
+    tolerances: &Tolerances,
+) -> bool {
+    let view: View = ("bonus.image", &|_| true);
+    let as_image = judge(case, Kind::RealtimeShadows, with, view, tolerances);
+    let by_visibility = || shadows(case).judge(&case.entry.name, with, plain?, tolerances);
+    as_image.verdict == Verdict::Pass
+        || by_visibility().is_some_and(|check| check.verdict == Verdict::Pass)
 }
 
 /// So much of the shadowed pixels' number must change when nothing is drawn into a shadow map.

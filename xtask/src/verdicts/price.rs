@@ -17,7 +17,10 @@ const RANGES: [(Class, &str, [f64; 2]); 5] = [
 
 /// Mistakes that may cost all of their part, whatever their class: nothing that is drawn or traced tells
 /// them from having done nothing. And one that may cost less, since it looks like a slip.
-const TOLD_APART_BY_NOTHING: [(&str, &str); 16] = [
+const TOLD_APART_BY_NOTHING: [(&str, &str); 19] = [
+    ("shadow-no-max-t", "looks like an end somewhere beyond the light"),
+    ("shadow-map-empty", "no shadow falls anywhere"),
+    ("shadow-map-from-camera", "no shadow falls where one belongs"),
     ("shadow-from-camera", "no shadow falls anywhere"),
     ("shadow-first-shape-only", "no shadow falls anywhere"),
     ("shadow-offset-inward", "everything lies in shadow"),
@@ -75,14 +78,13 @@ pub fn table(catalogue: &Catalogue, singles: &[Row]) -> String {
         let own = catalogue.mistakes.iter().filter(|mistake| mistake.family == family);
         let rows: Vec<String> = own.filter_map(|mistake| line(mistake, singles)).collect();
         if !rows.is_empty() {
-            let head = "| mistake | what | class | points lost |\n|---|---|---|---|\n";
-            let _ = write!(text, "\n## {family}\n\n{head}{}", rows.concat());
+            let _ = write!(text, "\n## {family}\n{}", rows.concat());
         }
     }
     text
 }
 
-/// A mistake's line of the table; nothing for one that was not graded.
+/// A mistake's lines of the list; nothing for one that was not graded.
 fn line(mistake: &KnownMistake, singles: &[Row]) -> Option<String> {
     let row = singles.iter().find(|row| row.subject.mistakes == [mistake.name.as_str()])?;
     let lost = row.grade.parts.iter().filter(|part| part.points < part.out_of);
@@ -94,8 +96,8 @@ fn line(mistake: &KnownMistake, singles: &[Row]) -> Option<String> {
         lost += &format!(" ({why})");
     }
     let class = format!("{:?}", mistake.class).to_lowercase();
-    let what = mistake.looks_like.replace('|', "\\|");
-    Some(format!("| `{}` | {what} | {class} | {lost} |\n", mistake.name))
+    let what = &mistake.looks_like;
+    Some(format!("- `{}`, {class}, loses {lost}:\n  {what}\n", mistake.name))
 }
 
 #[cfg(test)]
@@ -118,7 +120,7 @@ mod tests {
     fn the_published_table_names_every_mistake() {
         let text = std::fs::read_to_string(crate::root().join("docs/points.md")).unwrap();
         for mistake in Catalogue::known().unwrap().mistakes {
-            assert!(text.contains(&format!("| `{}` |", mistake.name)), "{}", mistake.name);
+            assert!(text.contains(&format!("- `{}`, ", mistake.name)), "{}", mistake.name);
         }
     }
 }
