@@ -136,7 +136,7 @@ impl Check {
 
 /// Where one mistake explains a check on most scenes, and nothing known explains it on the others, it
 /// costs what it costs on most of them: on one a seam or an edge may leave more unexplained. Where it
-/// leaves nothing lit ([`DARKENING`]) that is no worse.
+/// leaves nothing lit (`DARKENING`) that is no worse.
 pub fn agree(checks: &mut [Check]) {
     let mut of_id: BTreeMap<(String, String), Vec<usize>> = BTreeMap::new();
     for (index, check) in checks.iter().enumerate() {
