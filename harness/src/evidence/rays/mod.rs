@@ -53,6 +53,8 @@ pub struct RayBatch {
     pub points: Vec<SurfacePoint>,
     /// How many of the rays end on lit points.
     pub lit: usize,
+    /// How many of the shadowed ones, the last, were added close behind what blocks them.
+    pub contacts: usize,
     /// Radiant intensity of the light [W sr^-1].
     pub intensity: Vec3,
     /// Position of the light, world space.
@@ -90,7 +92,16 @@ impl RayBatch {
             rays.push(ray);
         }
         let (intensity, light) = (scene.first_light_intensity(), scene.first_light_position());
-        Self { scene: name.to_owned(), rays, pixels, points, lit: count, intensity, light }
+        Self {
+            scene: name.to_owned(),
+            rays,
+            pixels,
+            points,
+            lit: count,
+            contacts: 0,
+            intensity,
+            light,
+        }
     }
 
     /// The same, with shadowed rays close behind what blocks them, of a finer film: a small one has
@@ -131,13 +142,14 @@ impl RayBatch {
             self.points.push(point);
             self.rays.insert(at, ray);
             self.pixels.insert(at, pixel);
+            self.contacts += 1;
         }
         self
     }
 
-    /// The pixels of the lit and of the shadowed rays.
+    /// The pixels of the lit and of the shadowed rays, without those of contacts: another film chose them.
     pub fn met(&self) -> impl Iterator<Item = &usize> {
-        self.pixels.iter().take(self.points.len())
+        self.pixels.iter().take(self.points.len() - self.contacts)
     }
 
     /// Unshadowed radiance along ray `index` when the BSDF (cosine included) is `bsdf`.
