@@ -30,6 +30,7 @@ fn batch() -> RayBatch {
         pixels: (0..60).collect(),
         points,
         lit: 40,
+        contacts: 0,
         intensity: Vec3::new(1.0, 2.0, 3.0),
         light: Vec3::Z,
     }
