@@ -198,29 +198,15 @@ pub fn judge_pass(
             } else {
                 ""
             };
-            let price = Price::of_raw(wrong_total as f64 / total as f64);
-            let most_wrong = measures.iter().map(|measure| measure.value).fold(0.0, f64::max);
-            let nothing = frames.iter().all(|(_, frame)| {
-                interior(surface, mask).all(|(index, _)| frame.pixels[index] == Vec3::ZERO)
-            });
-            let price = match measures.iter().filter(|measure| !measure.passed).count() {
-                _ if nothing => price,
-                1 if other_pipeline(scene, surface, mask, frames) => price.or(
-                    "Phong materials are drawn by the diffuse pipeline",
-                    Class::Concept,
-                    0.0,
-                ),
-                1 => price.or("one value is wrong", Class::Slip, 0.0),
-                2 => price.or("two values are wrong", Class::Concept, 0.0),
-                _ => price.or(price::UNKNOWN, Class::Unknown, 0.0),
-            };
-            let price = match nothing {
-                true => price,
-                false => wrong_shapes(scene, &camera, surface, mask, frames).price(price.or(
-                    "some of the film is wrong",
-                    Class::Slip,
-                    0.08 * most_wrong,
-                )),
+            let wrong = wrong_total as f64 / total as f64;
+            let price = match wrong {
+                // A pass that shows hardly one value is no pass, whatever it draws.
+                wrong if wrong > NO_PASS => Price::of_raw(wrong),
+                wrong => {
+                    let other = other_pipeline(scene, surface, mask, frames);
+                    let shapes = wrong_shapes(scene, &camera, surface, mask, frames);
+                    shapes.price(price_of_values(wrong, &measures, other))
+                }
             };
             measures.extend(price.measure());
             Check {
@@ -235,8 +221,27 @@ pub fn judge_pass(
     check
 }
 
-/// Whether all Phong materials in view are drawn by the diffuse pipeline, and so few pixels are wrong
-/// for another reason.
+/// From this fraction of wrong pixels on, all values together, a pass has set nothing.
+const NO_PASS: f64 = 0.9;
+
+/// What values cost of which this fraction is wrong, all together; `measures` has that of each, and
+/// `other_pipeline` says whether the diffuse pipeline draws Phong materials.
+fn price_of_values(wrong: f64, measures: &[Measure], other_pipeline: bool) -> Price {
+    let price = match measures.iter().filter(|measure| !measure.passed).count() {
+        1 if other_pipeline => Price::of_raw(wrong).or(
+            "Phong materials are drawn by the diffuse pipeline",
+            Class::Concept,
+            0.0,
+        ),
+        1 => Price::of_raw(wrong).or("one value is wrong", Class::Slip, 0.0),
+        2 => Price::of_raw(wrong).or("two values are wrong", Class::Concept, 0.0),
+        _ => Price::of_raw(wrong).or(price::UNKNOWN, Class::Unknown, 0.0),
+    };
+    let most_wrong = measures.iter().map(|measure| measure.value).fold(0.0, f64::max);
+    price.or("some of the film is wrong", Class::Slip, 0.08 * most_wrong)
+}
+
+/// Whether all Phong materials in view are drawn by the diffuse pipeline.
 fn other_pipeline(
     scene: &Scene,
     surface: &SurfaceBuffer,
