@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 
 use super::shading::{Angle, Clamp, Directions, Shading};
 use super::{Check, Measure, Verdict};
+use crate::imaging::srgb;
 
 /// What a mistake is to a teacher.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -590,10 +591,7 @@ pub fn shader_changes(phong: bool) -> Vec<Change> {
     };
     bsdf.extend([
         output("gamma baked into radiance", |v| v.max(0.0).powf(1.0 / 2.2)),
-        output("sRGB baked into radiance", |v| {
-            let v = v.max(0.0);
-            if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
-        }),
+        output("sRGB baked into radiance", |v| srgb::encode(v.max(0.0))),
         output("radiance clamped to 1", |v| v.clamp(0.0, 1.0)),
     ]);
     bsdf.push(fit("an ambient term", Fitted::Ambient));
@@ -603,4 +601,49 @@ pub fn shader_changes(phong: bool) -> Vec<Change> {
 
 fn fit(name: &'static str, fitted: Fitted) -> Change {
     Change { name, class: Class::Slip, shading: None, fitted: Some(fitted) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn failed(scene: &str, mistake: &str, error: f64) -> Check {
+        let check = Check::new("stage.phong", scene, Verdict::Fail, "");
+        Check { mistake: mistake.to_owned(), error, ..check }
+    }
+
+    fn agreed(checks: &[(&str, f64)]) -> Vec<f64> {
+        let scenes = ["a", "b", "c", "d"];
+        let own = scenes.iter().zip(checks);
+        let mut checks: Vec<Check> =
+            own.map(|(scene, (mistake, error))| failed(scene, mistake, *error)).collect();
+        agree(&mut checks);
+        checks.iter().map(|check| check.error).collect()
+    }
+
+    #[test]
+    fn one_mistake_on_most_scenes_costs_its_median() {
+        let slip = "r in place of r^2";
+        assert_eq!(agreed(&[(slip, 0.02), (slip, 0.03), (slip, 0.3)]), [0.02, 0.03, 0.03]);
+        // Two mistakes, or one that most scenes do not show, stay as they are.
+        assert_eq!(agreed(&[(slip, 0.02), ("another", 0.3)]), [0.02, 0.3]);
+        assert_eq!(agreed(&[(slip, 0.02), ("", 0.5), ("", 0.6)]), [0.02, 0.5, 0.6]);
+        // What leaves nothing lit elsewhere explains that too; another slip does not.
+        assert_eq!(agreed(&[(VIEWER_AT_ORIGIN, 0.02), (BLACK, 1.0)]), [0.02, 0.02]);
+        assert_eq!(agreed(&[(slip, 0.02), (BLACK, 1.0)]), [0.02, 1.0]);
+    }
+
+    #[test]
+    fn shadows_that_are_partly_there_are_a_slip_and_missing_ones_are_not() {
+        let of = |lit, dark| partly(Price::of_raw(lit + dark), lit, dark).error;
+        assert!((of(0.5, 0.0) - 0.0275).abs() < 1e-9 && (of(0.0, 0.5) - 0.0325).abs() < 1e-9);
+        assert_eq!((of(1.0, 0.0), of(0.0, 1.0), of(0.3, 0.3)), (1.0, 1.0, 0.6));
+    }
+
+    #[test]
+    fn correlation_tells_what_follows() {
+        let of = |f: fn(f64) -> f64| correlation((0..50).map(|i| (f(f64::from(i)), f64::from(i))));
+        assert!((of(|x| 3.0 * x - 1.0) - 1.0).abs() < 1e-9 && (of(|x| -x) + 1.0).abs() < 1e-9);
+        assert_eq!((of(|_| 2.0), of(|_| f64::NAN)), (0.0, 0.0));
+    }
 }

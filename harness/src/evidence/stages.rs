@@ -199,12 +199,12 @@ pub fn judge_pass(
                 ""
             };
             let wrong = wrong_total as f64 / total as f64;
-            let price = match wrong {
-                // A pass that shows hardly one value is no pass, whatever it draws.
-                wrong if wrong > NO_PASS => Price::of_raw(wrong),
-                wrong => {
+            let shapes = wrong_shapes(scene, &camera, surface, mask, frames);
+            // A pass that shows hardly one value, on no shape, is no pass, whatever it draws.
+            let price = match wrong > NO_PASS && shapes.wrong == shapes.shapes {
+                true => Price::of_raw(wrong),
+                false => {
                     let other = other_pipeline(scene, surface, mask, frames);
-                    let shapes = wrong_shapes(scene, &camera, surface, mask, frames);
                     shapes.price(price_of_values(wrong, &measures, other))
                 }
             };

@@ -159,3 +159,48 @@ fn averages_are_judged_whatever_is_shaded() {
     let broken = judge(&render(independent, |_| f32::NAN));
     assert!(broken.verdict == Verdict::Fail && broken.error > 0.9, "{broken:?}");
 }
+
+#[test]
+fn slips_with_the_film_are_priced_and_other_pictures_are_not() {
+    let (width, height) = (24, 16);
+    let at = |x: usize, y: usize| {
+        let (x, y) = (x as f32, y as f32);
+        [0.2 + 0.03 * x, 0.5 + 0.01 * x * y, 1.0 + 0.05 * y]
+    };
+    let film = |value: &dyn Fn(usize, usize) -> [f32; 3]| -> Vec<[f32; 3]> {
+        (0..width * height).map(|i| value(i % width, i / width)).collect()
+    };
+    let right = film(&at);
+    let error =
+        |image: &[[f32; 3]]| film_price((width, height), image, &right, &|_| Some(0.0), 1.0).error;
+    let slips: [&dyn Fn(usize, usize) -> [f32; 3]; 5] = [
+        &|x, y| at(x, height - 1 - y),
+        &|x, y| at(x.saturating_sub(1), y),
+        &|x, y| at(x, y).map(|v| 2.5 * v),
+        &|x, y| at(x, y).map(|v| v.min(1.0)),
+        &|x, y| {
+            let [r, g, b] = at(x, y);
+            [b, g, r]
+        },
+    ];
+    for (index, slip) in slips.into_iter().enumerate() {
+        let error = error(&film(slip));
+        assert!((0.0199..0.03).contains(&error), "{index}: {error}");
+    }
+    // One colour, and stripes that have nothing to do with the picture.
+    let stripes = film(&|x, y| [0.5 + 0.5 * ((x * 7 + y * 13) % 5) as f32; 3]);
+    assert!(error(&stripes) > 0.4, "{}", error(&stripes));
+    assert_eq!(error(&film(&|_, _| [0.0; 3])), 1.0);
+}
+
+#[test]
+fn edges_of_one_direction_are_seen_on_all_scenes_together() {
+    let mut all = Edges::default();
+    let mut one = Edges::default();
+    one.0[6] = (20, 36.0);
+    assert_eq!(judge_edges(&one).verdict, Verdict::Pass, "too few to tell");
+    (0..3).for_each(|_| all.add(&one));
+    let check = judge_edges(&all);
+    assert_eq!((check.verdict, check.error), (Verdict::Fail, Class::Slip.price()));
+    assert!((check.measures[0].value - 1.8).abs() < 1e-9, "{check:?}");
+}
