@@ -270,6 +270,13 @@ impl Store<'_> {
         Ok(if made.is_file() { made } else { self.assignment.cache().join("expected").join(name) })
     }
 
+    /// Whether the reference renderer was built after a file of the cache was made.
+    fn outdated(&self, file: &Path) -> bool {
+        let changed = |path: &Path| path.metadata().and_then(|metadata| metadata.modified()).ok();
+        let ours = file.starts_with(self.assignment.cache());
+        ours && self.reference.as_deref().and_then(changed) > changed(file)
+    }
+
     /// Reads layers of a cache file, or makes and keeps them.
     fn layers<const N: usize>(
         &self,
@@ -278,8 +285,8 @@ impl Store<'_> {
         make: impl FnOnce() -> anyhow::Result<ExrLayers>,
     ) -> anyhow::Result<[Image; N]> {
         let mut content = match read_exr_layers(file) {
-            Ok(content) => content,
-            Err(_) => {
+            Ok(content) if !self.outdated(file) => content,
+            _ => {
                 let content = make()?;
                 let folder = file.parent().unwrap_or(Path::new(""));
                 std::fs::create_dir_all(folder)?;
