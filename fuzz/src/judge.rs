@@ -6,10 +6,10 @@ use std::sync::LazyLock;
 use basecode::exr_io::{Precision, decode_exr, write_exr};
 use basecode::{Image, Vec3};
 use umbra::assignment::SceneEntry;
-use umbra::evidence::Check;
 use umbra::evidence::images::{self, Kind};
 use umbra::evidence::rays::RayBatch;
 use umbra::evidence::vertex::{VertexFilm, judge_vertex};
+use umbra::evidence::{Check, CheckId};
 use umbra::expected::{Expected, SurfaceBuffer, load_scene, regions};
 use umbra::grading::handed_in::{HandedIn, judge as judge_submitted};
 use umbra::grading::{Case, Drawn, ImageDigest, Small};
@@ -139,7 +139,15 @@ pub fn judge(bytes: &[u8]) {
     // The same bits may come from the code itself.
     for kind in [Kind::Offline { spp: 1 }, Kind::Realtime, Kind::RealtimeShadows] {
         let expected = &case.expected;
-        check(&[images::judge("image", "a", kind, &image, expected, &|_| true, &tolerances)]);
+        check(&[images::judge(
+            CheckId::ImageOffline,
+            "a",
+            kind,
+            &image,
+            expected,
+            &|_| true,
+            &tolerances,
+        )]);
     }
     let Small { surface, mask, .. } = &case.small;
     let camera = case.expected.scene.camera(WIDTH, HEIGHT).expect("a camera");

@@ -163,7 +163,8 @@ impl Assignment {
             serde_json::from_str(&text).map_err(|error| AssignmentError::Parse {
                 path: path.clone(),
                 line: error.line(),
-                message: error.to_string(),
+                // The place stands before the message already.
+                message: error.to_string().split(" at line ").next().unwrap_or_default().to_owned(),
             })?;
         if let Some(message) = assignment.problem() {
             return Err(AssignmentError::Contradiction { path, message });

@@ -9,7 +9,7 @@ use umbra::assignment::Assignment;
 use umbra::diagnosis::{
     Catalogue, Diagnosis, Facts, Kind, KnownMistake, LoopSeen, Sightings, Stored, StoredView,
 };
-use umbra::evidence::{Check, Evidence, Verdict};
+use umbra::evidence::{Check, CheckId, Evidence, Verdict};
 use umbra::expected::Store;
 use umbra::grading::Grading;
 use umbra::worker::{Adapter, AdapterKind, Supervisor};
@@ -46,11 +46,11 @@ fn evidence(stored: &Stored, mistake: &KnownMistake) -> Evidence {
     };
     let mut failing = mistake.findings.clone();
     if seen(Kind::Lit) {
-        failing.push("radiance.lit".into());
+        failing.push(CheckId::RadianceLit);
     } else if seen(Kind::Offline) {
-        failing.push("loop.agreement".into());
+        failing.push(CheckId::LoopAgreement);
     }
-    let checks = failing.iter().map(|id| Check::new(id, "s", Verdict::Fail, "wrong"));
+    let checks = failing.iter().map(|id| Check::new(*id, "s", Verdict::Fail, "wrong"));
     Evidence { checks: checks.collect() }
 }
 
@@ -144,7 +144,7 @@ fn right_answers_look_like_nothing_whatever_fails() {
 fn scenes_that_nothing_is_stored_of_say_nothing() {
     let (stored, catalogue) = (stored(), Catalogue::known().unwrap());
     let evidence =
-        Evidence { checks: vec![Check::new("loop.agreement", "s", Verdict::Fail, "wrong")] };
+        Evidence { checks: vec![Check::new(CheckId::LoopAgreement, "s", Verdict::Fail, "wrong")] };
     let rays = Image {
         width: 16,
         height: 12,

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use basecode::Image;
 use umbra::assignment::{Assignment, SceneEntry};
 use umbra::evidence::images::{Kind, judge};
-use umbra::evidence::{Check, Evidence, Verdict};
+use umbra::evidence::{Check, CheckId, Evidence, Verdict};
 use umbra::expected::{Expected, Store};
 use umbra::process::Limits;
 use umbra::rubric::grade;
@@ -91,10 +91,10 @@ fn judged(
     assignment: &Assignment,
 ) -> (bool, String) {
     let rules = &assignment.rules;
-    let id = if kind == Kind::Realtime { "image.realtime" } else { "image.offline" };
+    let id = if kind == Kind::Realtime { CheckId::ImageRealtime } else { CheckId::ImageOffline };
     let check = judge(id, name, kind, image, expected, &|_| true, &assignment.tolerances);
     let said = check.summary.clone();
-    let right = |id: &String| Check::new(id, name, Verdict::Pass, "right");
+    let right = |id: &CheckId| Check::new(*id, name, Verdict::Pass, "right");
     let mut checks: Vec<Check> =
         rules.parts.iter().flat_map(|part| &part.evidence).map(right).collect();
     checks.push(check);

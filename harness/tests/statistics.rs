@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use basecode::Image;
 use umbra::assignment::{Assignment, SceneEntry};
+use umbra::evidence::CheckId;
 use umbra::evidence::loops::judge_agreement;
 use umbra::expected::{Expected, Store, SurfaceBuffer};
 use umbra::grading::{CORRELATED, row_correlation};
@@ -104,8 +105,8 @@ fn two_thousand_seeds_stay_under_half_of_every_threshold() {
     for rule in rules.into_iter().chain([
         "centre: interior",
         "origin: bias",
-        "loop.agreement",
-        "sampler.rows",
+        CheckId::LoopAgreement.name(),
+        CheckId::SamplerRows.name(),
     ]) {
         assert!(used.contains_key(rule), "{rule} was never asked");
     }
@@ -183,7 +184,7 @@ impl Bench<'_> {
         let (drawn, along) = (drawn.as_chunks::<3>().0, along.as_chunks::<3>().0);
         let check = judge_agreement(scene, &expected.offline.mask, drawn, along);
         for measure in &check.measures {
-            used.add(&check.id, measure.value, measure.bound, &|| measure.name.clone());
+            used.add(check.id.name(), measure.value, measure.bound, &|| measure.name.clone());
         }
     }
 
@@ -196,7 +197,7 @@ impl Bench<'_> {
         for (number, pair) in self.ask(requests).windows(2).enumerate() {
             let correlation = row_correlation(&pair[0], &pair[1], 3 * film[0] as usize);
             let place = || format!("seeds {number} and {}", number + 1);
-            used.add("sampler.rows", correlation, CORRELATED, &place);
+            used.add(CheckId::SamplerRows.name(), correlation, CORRELATED, &place);
         }
     }
 

@@ -1,5 +1,6 @@
 //! `xtask`: the chores of this repository that are not part of grading.
 
+mod checks;
 mod dist;
 mod parallel;
 mod samples;
@@ -26,6 +27,8 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
+    /// Write the list of checks into docs/evidence.md.
+    Checks,
     /// Pack the sample submissions into target/umbra/samples, with the images that their code draws.
     Samples,
     /// Make the student's kit.
@@ -44,6 +47,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Scenes { check: true } => scenes::check(),
         Command::Scenes { check: false } => scenes::write(),
+        Command::Checks => checks::run(root(), false),
         Command::Samples => samples::pack(root(), &|_| true).map(|samples| {
             let paths = samples.iter().map(|sample| sample.archive.display().to_string());
             paths.collect::<Vec<_>>().join("\n")

@@ -9,6 +9,7 @@ mod compare;
 mod context;
 #[cfg(target_os = "linux")]
 mod doctor;
+mod explain;
 mod grade;
 mod render;
 mod terminal;
@@ -76,6 +77,8 @@ enum Command {
     Render(render::RenderArguments),
     /// Compare two EXR images
     Compare(compare::CompareArguments),
+    /// Explain a check, a rule or a part: what is asked, what its error means, where its bound lies
+    Explain(explain::ExplainArguments),
     /// Show what this machine has: isolation, graphics adapters, compiler; exits with 0 when it can grade
     #[cfg(target_os = "linux")]
     Doctor,
@@ -193,6 +196,7 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Pack(arguments) => tree::pack(&arguments, root),
         Command::Render(arguments) => render::run(&arguments, root),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Explain(arguments) => explain::run(&arguments, root),
         #[cfg(target_os = "linux")]
         Command::Doctor => doctor::run(),
         Command::Completions { shell } => {

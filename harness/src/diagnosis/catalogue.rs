@@ -3,6 +3,7 @@
 //! Each is a switch of the reference renderer (`mistake=NAME` in its options); that both know the
 //! same names is tested in `reference_impl`.
 
+use crate::evidence::CheckId;
 use serde::{Deserialize, Serialize};
 
 /// The text that [`Catalogue::known`] reads.
@@ -62,7 +63,7 @@ pub struct KnownMistake {
     pub class: Class,
     /// The findings that it leads to although it costs nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub findings: Vec<String>,
+    pub findings: Vec<CheckId>,
     /// Other mistakes that look the same in everything that is asked: they are named together.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alike: Vec<String>,

@@ -10,7 +10,7 @@ use super::loops;
 use super::nearest::{Exhibit, Guess, Nearest, is_black, nearest};
 use super::stored::{Material, Stored};
 use super::view::{Kind, Sightings, View};
-use crate::evidence::{Evidence, Picture, Verdict};
+use crate::evidence::{CheckId, Evidence, Picture, Verdict};
 use crate::imaging::ratio::ratio_name;
 
 /// What one failing part looks like.
@@ -53,7 +53,7 @@ pub struct Facts<'a> {
 /// The checks of a part, and the view that isolates it.
 struct Question {
     part: &'static str,
-    checks: &'static [&'static str],
+    checks: &'static [CheckId],
     isolated: &'static [Kind],
     /// The image that shows it too.
     image: Kind,
@@ -64,7 +64,7 @@ struct Question {
 const QUESTIONS: [Question; 9] = {
     const fn question(
         part: &'static str,
-        checks: &'static [&'static str],
+        checks: &'static [CheckId],
         isolated: &'static [Kind],
         image: Kind,
         material: Option<Material>,
@@ -73,15 +73,21 @@ const QUESTIONS: [Question; 9] = {
     }
     let (diffuse, phong) = (Some(Material::Diffuse), Some(Material::Phong));
     [
-        question("1.1", &["bsdf.diffuse"], &[Kind::Diffuse], Kind::Offline, diffuse),
-        question("1.2", &["bsdf.phong"], &[Kind::Phong], Kind::Offline, phong),
-        question("1.3", &["radiance.lit", "loop.agreement"], &[Kind::Lit], Kind::Offline, None),
-        question("1.4", &["shadow.rays"], &[Kind::Shadow], Kind::Offline, None),
-        question("2.1", &["pass.uniforms"], &[], Kind::Realtime, None),
-        question("2.2", &["stage.vertex"], &[], Kind::Realtime, None),
-        question("2.3", &["stage.diffuse"], &[Kind::Fragment], Kind::Realtime, diffuse),
-        question("2.4", &["stage.phong"], &[Kind::Fragment], Kind::Realtime, phong),
-        question("2.5", &["bonus.image"], &[Kind::Bonus], Kind::Bonus, None),
+        question("1.1", &[CheckId::BsdfDiffuse], &[Kind::Diffuse], Kind::Offline, diffuse),
+        question("1.2", &[CheckId::BsdfPhong], &[Kind::Phong], Kind::Offline, phong),
+        question(
+            "1.3",
+            &[CheckId::RadianceLit, CheckId::LoopAgreement],
+            &[Kind::Lit],
+            Kind::Offline,
+            None,
+        ),
+        question("1.4", &[CheckId::ShadowRays], &[Kind::Shadow], Kind::Offline, None),
+        question("2.1", &[CheckId::PassUniforms], &[], Kind::Realtime, None),
+        question("2.2", &[CheckId::StageVertex], &[], Kind::Realtime, None),
+        question("2.3", &[CheckId::StageDiffuse], &[Kind::Fragment], Kind::Realtime, diffuse),
+        question("2.4", &[CheckId::StagePhong], &[Kind::Fragment], Kind::Realtime, phong),
+        question("2.5", &[CheckId::BonusImage], &[Kind::Bonus], Kind::Bonus, None),
     ]
 };
 
@@ -103,19 +109,19 @@ impl Facts<'_> {
         self.failing.iter().any(|failing| failing == part)
     }
 
-    fn verdict_of(&self, check: &str, verdict: Verdict) -> bool {
+    fn verdict_of(&self, check: CheckId, verdict: Verdict) -> bool {
         let seen = |check: &crate::evidence::Check| !check.held_back && check.verdict == verdict;
         self.evidence.named(check).any(seen)
     }
 
     fn unwritten(&self, question: &Question) -> bool {
-        question.checks.iter().any(|check| self.verdict_of(check, Verdict::NotImplemented))
+        question.checks.iter().any(|&check| self.verdict_of(check, Verdict::NotImplemented))
     }
 
     /// Mistakes that a finding gives away.
     fn by_findings(&self) -> Vec<Diagnosis> {
         let found = |mistake: &&KnownMistake| {
-            let fails = |id: &String| self.verdict_of(id, Verdict::Fail);
+            let fails = |id: &CheckId| self.verdict_of(*id, Verdict::Fail);
             !mistake.findings.is_empty() && mistake.findings.iter().all(fails)
         };
         let mistakes = self.catalogue.mistakes.iter().filter(found);
@@ -132,7 +138,7 @@ impl Facts<'_> {
         let [isolated, image] = [question.isolated, &[question.image]]
             .map(|kinds| self.exhibits(kinds, question.material));
         // Shadows where none should be: images of the bonus tell nothing of how it draws them.
-        if part == "2.5" && self.verdict_of("bonus.default", Verdict::Fail) {
+        if part == "2.5" && self.verdict_of(CheckId::BonusDefault, Verdict::Fail) {
             return None;
         }
         if part == "1.3" {
@@ -189,8 +195,8 @@ impl Facts<'_> {
         let own = |mistake: &KnownMistake| mistake.parts.iter().any(|part| part == "1.3");
         let looping =
             |mistake: &KnownMistake| matches!(&*mistake.family, "loop" | "film" | "camera");
-        let rays_fail = self.verdict_of("radiance.lit", Verdict::Fail);
-        let loop_fails = self.verdict_of("loop.agreement", Verdict::Fail);
+        let rays_fail = self.verdict_of(CheckId::RadianceLit, Verdict::Fail);
+        let loop_fails = self.verdict_of(CheckId::LoopAgreement, Verdict::Fail);
         let radiance = || {
             let seen = if lit.is_empty() { image } else { lit };
             let known = self.among(seen, |mistake| own(mistake) && !looping(mistake));

@@ -6,7 +6,7 @@ use renderer_api as api;
 use super::convention::Convention;
 use super::price::{self, Answers};
 use super::shading::{ShadedPoint, Shading, energy_scale};
-use super::{Check, Measure, Verdict};
+use super::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::imaging::ratio::ratio_name;
 
 /// Which BSDF is probed.
@@ -208,8 +208,8 @@ pub fn judge(
     convention: &Convention,
 ) -> Check {
     let (id, name) = match kind {
-        BsdfKind::Diffuse => ("bsdf.diffuse", "diffuse"),
-        BsdfKind::Phong => ("bsdf.phong", "Phong"),
+        BsdfKind::Diffuse => (CheckId::BsdfDiffuse, "diffuse"),
+        BsdfKind::Phong => (CheckId::BsdfPhong, "Phong"),
     };
     if values.len() != probes.len() {
         let summary = format!("{} answers to {} BSDF queries", values.len(), probes.len());
@@ -304,7 +304,7 @@ pub fn judge(
     check.error = price.map_or(0.0, |price| price.error);
     check.mistake = price.map_or_else(String::new, |price| price.name());
     let of_shape = probes.iter().any(|probe| probe.query.source == api::BSDF_OF_SHAPE);
-    let rule = if of_shape { "bsdf.textured" } else { "bsdf.value" };
+    let rule = if of_shape { RuleId::BsdfTextured } else { RuleId::BsdfValue };
     check.measures = vec![
         Measure::at_most(rule, "directions answered wrongly (fraction)", fraction, 0.0),
         Measure::at_most(rule, "values not finite (count)", not_finite as f64, 0.0),

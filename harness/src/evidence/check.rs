@@ -4,6 +4,8 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::registry::{CheckId, RuleId};
+
 /// Everything that was found out about one hand-in. Plain data: the rubric needs nothing else.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
@@ -14,8 +16,8 @@ pub struct Evidence {
 /// One question that was put to a hand-in, and its answer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Check {
-    /// Which question: a name that the rubric refers to, such as `bsdf.diffuse`.
-    pub id: String,
+    /// Which question.
+    pub id: CheckId,
     /// The scene it was asked on; empty when none.
     pub scene: String,
     /// Whether that scene is held back from the student.
@@ -66,44 +68,12 @@ pub enum Verdict {
     NotRun,
 }
 
-/// Every rule that can fail a check, by what judges: one or several of them make up a check.
-pub const RULES: [&str; 29] = [
-    "bsdf.value",
-    "bsdf.textured",
-    "rays.lit",
-    "rays.black",
-    "rays.material",
-    "shadow.lit",
-    "shadow.dark",
-    "loop.agreement",
-    "loop.pixels",
-    "loop.edges",
-    "loop.edge_bias",
-    "image.size",
-    "image.non_finite",
-    "image.negative",
-    "image.interior",
-    "image.blob",
-    "image.edge",
-    "image.bias",
-    "pass.camera_position",
-    "pass.light_position",
-    "pass.light_intensity",
-    "pass.rho_d",
-    "pass.rho_s",
-    "pass.exponent",
-    "vertex.position",
-    "vertex.normal",
-    "vertex.clip",
-    "bonus.lit",
-    "bonus.dark",
-];
-
 /// One value against its bound.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measure {
-    /// The rule that it is judged by: one of [`super::RULES`]; empty when it only informs.
-    pub rule: String,
+    /// The rule that it is judged by; nothing when it only informs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rule: Option<RuleId>,
     /// What was measured, with its unit.
     pub name: String,
     /// The value.
@@ -128,9 +98,9 @@ pub struct Picture {
 
 impl Check {
     /// A check with nothing but a verdict and a sentence; the error is 0 for a pass and 1 otherwise.
-    pub fn new(id: &str, scene: &str, verdict: Verdict, summary: impl Into<String>) -> Self {
+    pub fn new(id: CheckId, scene: &str, verdict: Verdict, summary: impl Into<String>) -> Self {
         Self {
-            id: id.to_owned(),
+            id,
             scene: scene.to_owned(),
             held_back: false,
             convention: String::new(),
@@ -173,7 +143,7 @@ impl Check {
             convention: self.convention.clone(),
             weight: self.weight,
             error: coarse(self.error),
-            ..Self::new(&self.id, &self.scene, self.verdict, self.said())
+            ..Self::new(self.id, &self.scene, self.verdict, self.said())
         }
     }
 
@@ -201,7 +171,12 @@ fn coarse(error: f64) -> f64 {
 
 impl Measure {
     /// A value that passes when it is at most `bound`; NaN never passes.
-    pub fn at_most(rule: &str, name: impl Into<String>, value: f64, bound: f64) -> Self {
-        Self { rule: rule.to_owned(), name: name.into(), value, bound, passed: value <= bound }
+    pub fn at_most(
+        rule: impl Into<Option<RuleId>>,
+        name: impl Into<String>,
+        value: f64,
+        bound: f64,
+    ) -> Self {
+        Self { rule: rule.into(), name: name.into(), value, bound, passed: value <= bound }
     }
 }

@@ -129,6 +129,7 @@ pub fn judge(questions: &[Conventional]) -> Vec<Check> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evidence::CheckId;
 
     fn question(party: Party, kept: Convention) -> Conventional<'static> {
         Conventional {
@@ -136,7 +137,7 @@ mod tests {
             passes: Box::new(move |convention| *convention == kept),
             judge: Box::new(move |convention| {
                 let right = if *convention == kept { Verdict::Pass } else { Verdict::Fail };
-                Check::new("radiance.lit", "s", right, "")
+                Check::new(CheckId::RadianceLit, "s", right, "")
             }),
         }
     }

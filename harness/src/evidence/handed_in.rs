@@ -2,7 +2,7 @@
 
 use basecode::Image;
 
-use super::{Check, Measure, Verdict};
+use super::{Check, CheckId, Measure, Verdict};
 use crate::imaging::likeness::{Likeness, likeness};
 use crate::imaging::noise::{Noise, NoisyPixels};
 use crate::imaging::reference::RegionMask;
@@ -31,7 +31,8 @@ const UNLIKE: Likeness = Likeness { brightness: 0.25, edges: 0.1 };
 /// Whether an offline image has the noise of the scene's `spp` samples per pixel; `noise` is what was
 /// measured, if it could be.
 pub fn judge_noise(scene: &str, path: &str, noise: Option<Noise>, spp: u32) -> Check {
-    let check = |verdict, summary: String| Check::new("handed_in.noise", scene, verdict, summary);
+    let check =
+        |verdict, summary: String| Check::new(CheckId::SubmittedNoise, scene, verdict, summary);
     let Some(noise) = noise.filter(|_| spp > 1) else {
         return check(
             Verdict::NotJudged,
@@ -41,8 +42,8 @@ pub fn judge_noise(scene: &str, path: &str, noise: Option<Noise>, spp: u32) -> C
     let ratio = noise.spp / f64::from(spp);
     let off = OFF.max(1.0 + STANDARD_ERRORS * noise.relative_error);
     let measures = vec![
-        Measure::at_most("", "samples per pixel that it looks like over the scene's", ratio, off),
-        Measure::at_most("", "the scene's over those", 1.0 / ratio, off),
+        Measure::at_most(None, "samples per pixel that it looks like over the scene's", ratio, off),
+        Measure::at_most(None, "the scene's over those", 1.0 / ratio, off),
     ];
     let looks = match noise.spp {
         spp if spp >= 1e4 => "no noise at all".to_owned(),
@@ -73,13 +74,14 @@ pub fn judge_noise(scene: &str, path: &str, noise: Option<Noise>, spp: u32) -> C
 /// what a right renderer draws with that seed, in the order of the base code. Seeding by row is only advice
 /// and a sampler may be used in any order, so that another noise is no fault.
 pub fn judge_seed(scene: &str, path: &str, alike: Option<f64>) -> Check {
-    let check = |verdict, summary: String| Check::new("handed_in.seed", scene, verdict, summary);
+    let check =
+        |verdict, summary: String| Check::new(CheckId::SubmittedSeed, scene, verdict, summary);
     let Some(alike) = alike else {
         let why = "too few of its noisy pixels are right to compare its noise";
         return check(Verdict::NotJudged, format!("{path}: {why}"));
     };
     let name = "1 - correlation with the noise that the student's number predicts";
-    let measures = vec![Measure::at_most("", name, 1.0 - alike, 1.0 - SAME_NOISE)];
+    let measures = vec![Measure::at_most(None, name, 1.0 - alike, 1.0 - SAME_NOISE)];
     let found = if alike >= SAME_NOISE {
         let said = "has the noise that the base code draws with the student's number";
         check(Verdict::Pass, format!("{path} {said}"))
@@ -103,7 +105,8 @@ pub fn judge_copied(
     noisy: Option<&NoisyPixels>,
     published: &[(&str, &Image)],
 ) -> Check {
-    let check = |verdict, summary: String| Check::new("handed_in.copied", scene, verdict, summary);
+    let check =
+        |verdict, summary: String| Check::new(CheckId::SubmittedCopied, scene, verdict, summary);
     let Some(noisy) = noisy else {
         return check(Verdict::NotJudged, format!("{path}: the scene has too few noisy pixels"));
     };
@@ -126,11 +129,12 @@ pub fn judge_scene(
     right: &[&Image],
     mask: &RegionMask,
 ) -> Check {
-    let check = |verdict, summary: String| Check::new("handed_in.scene", scene, verdict, summary);
+    let check =
+        |verdict, summary: String| Check::new(CheckId::SubmittedScene, scene, verdict, summary);
     let found = likeness(image, right, mask);
     let unlike = |name: &str, found: f64, least: f64| {
         let name = format!("1 - correlation of {name} (one of the two must be within its bound)");
-        Measure::at_most("", name, 1.0 - found, 1.0 - least)
+        Measure::at_most(None, name, 1.0 - found, 1.0 - least)
     };
     let measures = vec![
         unlike("brightness", found.brightness, UNLIKE.brightness),

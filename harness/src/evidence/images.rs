@@ -3,7 +3,7 @@
 use basecode::Image;
 
 use super::price::Price;
-use super::{Check, Measure, Verdict, loops};
+use super::{Check, CheckId, Measure, RuleId, Verdict, loops};
 use crate::expected::Expected;
 use crate::imaging::compare::{compare_offline, compare_realtime_linear, compare_srgb8};
 use crate::imaging::evidence::{CompareError, ImageEvidence, Tolerances};
@@ -31,7 +31,7 @@ pub enum Kind {
 
 /// Judges `actual`; regions for which `wanted` is false are left out.
 pub fn judge(
-    id: &str,
+    id: CheckId,
     scene: &str,
     kind: Kind,
     actual: &Image,
@@ -75,7 +75,7 @@ pub fn judge(
     match compared {
         Ok(found) => describe(id, scene, &found, actual, reference, &mask),
         Err(error @ CompareError::Size { .. }) => {
-            let measures = vec![Measure::at_most("image.size", error.to_string(), 1.0, 0.0)];
+            let measures = vec![Measure::at_most(RuleId::ImageSize, error.to_string(), 1.0, 0.0)];
             Check { measures, ..Check::new(id, scene, Verdict::Fail, error.to_string()) }
         }
         Err(error) => Check::new(id, scene, Verdict::NotJudged, error.to_string()),
@@ -117,7 +117,7 @@ pub fn same_origin(
 
 /// Judges a frame drawn by code, linear floats, against the image at pixel centres.
 pub fn judge_realtime(
-    id: &str,
+    id: CheckId,
     scene: &str,
     actual: &Image,
     centre: &Image,
@@ -133,7 +133,7 @@ pub fn judge_realtime(
 /// As [`judge_realtime`], but what stages draw that do not renormalise the interpolated normal
 /// (`raw`) is as good, for all materials or for the diffuse or Phong ones alone.
 pub fn judge_shaded(
-    id: &str,
+    id: CheckId,
     scene: &str,
     actual: &Image,
     (centre, raw): (&Image, Option<&Image>),
@@ -199,7 +199,7 @@ pub fn only(mask: &RegionMask, wanted: &dyn Fn(&Region) -> bool) -> RegionMask {
 }
 
 fn describe(
-    id: &str,
+    id: CheckId,
     scene: &str,
     found: &ImageEvidence,
     actual: &Image,
@@ -207,7 +207,7 @@ fn describe(
     mask: &RegionMask,
 ) -> Check {
     let measures = found.checks.iter().map(|check| Measure {
-        rule: format!("image.{}", check.id.split(':').next().unwrap_or_default()),
+        rule: format!("image.{}", check.id.split(':').next().unwrap_or_default()).parse().ok(),
         name: format!("{}: {}", check.id, check.detail),
         value: check.value,
         bound: check.bound,
@@ -312,7 +312,15 @@ mod tests {
         };
         let (right, raw) = (image(&|_| 1.0), image(&|_| 0.95));
         let judge = |actual: &Image, raw: Option<&Image>| {
-            judge_shaded("i", "s", actual, (&right, raw), &mask, &Tolerances::default()).verdict
+            judge_shaded(
+                CheckId::StageDiffuse,
+                "s",
+                actual,
+                (&right, raw),
+                &mask,
+                &Tolerances::default(),
+            )
+            .verdict
         };
         assert_eq!(judge(&right, Some(&raw)), Verdict::Pass);
         assert_eq!(judge(&raw, Some(&raw)), Verdict::Pass);

@@ -3,7 +3,7 @@
 
 use super::price::{self, Class, Price};
 use super::rays::{RELATIVE, STRAY_FRACTION};
-use super::{Check, Measure, Verdict};
+use super::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::imaging::reference::RegionMask;
 use crate::imaging::srgb;
 
@@ -18,7 +18,7 @@ pub fn judge_agreement(
     image: &[[f32; 3]],
     rays: &[[f32; 3]],
 ) -> Check {
-    let id = "loop.agreement";
+    let id = CheckId::LoopAgreement;
     let largest = rays.iter().flatten().filter(|v| v.is_finite()).fold(0.0f32, |m, &v| m.max(v));
     if largest == 0.0 {
         let summary = "radiance along rays is black: there is nothing to agree with";
@@ -50,7 +50,7 @@ pub fn judge_agreement(
     }
     let fraction = wrong as f64 / counted.max(1) as f64;
     let measure = Measure::at_most(
-        "loop.agreement",
+        RuleId::LoopAgreement,
         "pixels that differ (fraction)",
         fraction,
         STRAY_FRACTION,
@@ -411,7 +411,7 @@ pub fn judge_samples(
     image: &[[f32; 3]],
     rays: &[[f32; 3]],
 ) -> (Check, Edges) {
-    let id = "loop.samples";
+    let id = CheckId::LoopSamples;
     let per = RAYS as usize;
     let (width, height) = (film.width as usize, film.height as usize);
     let own: Vec<Option<Pixel>> = rays
@@ -468,19 +468,19 @@ pub fn judge_samples(
     let bias = if edge_count < LEAST_EDGES { 0.0 } else { bias.abs() / (edge_count as f64).sqrt() };
     let mut measures = vec![
         Measure::at_most(
-            "loop.pixels",
+            RuleId::LoopPixels,
             "pixels that are not the average of the integrator's answers (fraction)",
             off_fraction,
             OFF_FRACTION + SPARE_PIXELS / counted as f64,
         ),
         Measure::at_most(
-            "loop.edges",
+            RuleId::LoopEdges,
             "mean square error on edges over that of independent samples",
             worst,
             EDGE_RATIO,
         ),
         Measure::at_most(
-            "loop.edge_bias",
+            RuleId::LoopEdgeBias,
             "mean error on edges, in standard deviations",
             bias,
             EDGE_BIAS,
@@ -541,9 +541,9 @@ pub fn judge_samples(
 
 /// What the edges of all scenes tell together: each alone has few of most directions.
 pub fn judge_edges(edges: &Edges) -> Check {
-    let id = "loop.samples";
+    let id = CheckId::LoopSamples;
     let name = "mean square error on the edges of one direction over that of independent samples";
-    let measure = Measure::at_most("loop.edges", name, edges.worst(), EDGE_RATIO);
+    let measure = Measure::at_most(RuleId::LoopEdges, name, edges.worst(), EDGE_RATIO);
     if measure.passed {
         let summary = "samples spread over their pixels in every direction";
         return Check { measures: vec![measure], ..Check::new(id, "", Verdict::Pass, summary) };

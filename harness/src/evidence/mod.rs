@@ -13,9 +13,11 @@ pub mod pixels;
 pub mod premultiplied;
 pub mod price;
 pub mod rays;
+mod registry;
 pub mod shading;
 pub mod shadow_map;
 pub mod stages;
 pub mod vertex;
 
-pub use check::{Check, Evidence, Measure, Picture, RULES, Verdict};
+pub use check::{Check, Evidence, Measure, Picture, Verdict};
+pub use registry::{CheckId, CheckInfo, RuleId};

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use renderer_api as api;
 
 use super::bsdf::{BsdfKind, materials};
-use super::{Check, Measure, Verdict};
+use super::{Check, CheckId, Measure, Verdict};
 
 /// Largest relative difference between f(wo, wi) and f(wi, wo): f32 arithmetic, steep powers.
 const ASYMMETRY: f64 = 1e-2;
@@ -98,17 +98,17 @@ impl Probes {
             }
         }
         let id = match kind {
-            BsdfKind::Diffuse => "bsdf.diffuse.physical",
-            BsdfKind::Phong => "bsdf.phong.physical",
+            BsdfKind::Diffuse => CheckId::BsdfDiffusePhysical,
+            BsdfKind::Phong => CheckId::BsdfPhongPhysical,
         };
         let measures = vec![
             Measure::at_most(
-                "",
+                None,
                 "|f(wo, wi) - f(wi, wo)|, relative, at most",
                 asymmetry,
                 ASYMMETRY,
             ),
-            Measure::at_most("", "directional albedo, at most", albedo, ALBEDO),
+            Measure::at_most(None, "directional albedo, at most", albedo, ALBEDO),
         ];
         let possible = measures.iter().all(|measure| measure.passed);
         let verdict = if possible { Verdict::Pass } else { Verdict::Fail };

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use super::shading::{Angle, Clamp, Directions, Shading};
-use super::{Check, Measure, Verdict};
+use super::{Check, CheckId, Measure, Verdict};
 use crate::imaging::srgb;
 
 /// What a mistake is to a teacher.
@@ -112,7 +112,7 @@ impl Price {
             "difference from what is right; counts {:.3} as one mistake: {mistake}",
             self.error
         );
-        Some(Measure { passed: true, ..Measure::at_most("", name, self.raw, 1.0) })
+        Some(Measure { passed: true, ..Measure::at_most(None, name, self.raw, 1.0) })
     }
 
     /// The same, when a mistake of this class leaves `residual` unexplained.
@@ -139,10 +139,10 @@ impl Check {
 /// costs what it costs on most of them: on one a seam or an edge may leave more unexplained. Where it
 /// leaves nothing lit (`DARKENING`) that is no worse.
 pub fn agree(checks: &mut [Check]) {
-    let mut of_id: BTreeMap<(String, String), Vec<usize>> = BTreeMap::new();
+    let mut of_id: BTreeMap<(CheckId, String), Vec<usize>> = BTreeMap::new();
     for (index, check) in checks.iter().enumerate() {
         if check.verdict == Verdict::Fail {
-            let key = (check.id.clone(), check.convention.clone());
+            let key = (check.id, check.convention.clone());
             of_id.entry(key).or_default().push(index);
         }
     }
@@ -608,7 +608,7 @@ mod tests {
     use super::*;
 
     fn failed(scene: &str, mistake: &str, error: f64) -> Check {
-        let check = Check::new("stage.phong", scene, Verdict::Fail, "");
+        let check = Check::new(CheckId::StagePhong, scene, Verdict::Fail, "");
         Check { mistake: mistake.to_owned(), error, ..check }
     }
 

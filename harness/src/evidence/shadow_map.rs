@@ -3,7 +3,7 @@
 use basecode::Image;
 
 use super::price::{self, Class, Price};
-use super::{Check, Measure, Verdict};
+use super::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::RegionMask;
 
@@ -24,7 +24,8 @@ const VISIBILITY: &str = "lit pixels that are not lit (fraction)";
 /// An image that is wrong and so dark that it tells nothing of its shadows leaves the verdict to
 /// another scene that does, if there is one.
 pub fn set_apart(checks: &mut [Check]) {
-    let is_bonus = |check: &Check| check.id == "bonus.image" || check.id == "bonus.probe";
+    let is_bonus =
+        |check: &Check| check.id == CheckId::BonusImage || check.id == CheckId::BonusProbe;
     let tells = |check: &Check| {
         let visibility = check.measures.iter().any(|measure| measure.name == VISIBILITY);
         is_bonus(check) && (check.verdict == Verdict::Pass || visibility)
@@ -136,15 +137,15 @@ impl Shadows<'_> {
         };
         let [dark, lit] = counts;
         let mut measures = vec![
-            Measure::at_most("bonus.lit", VISIBILITY, fraction(lit), bound(lit)),
+            Measure::at_most(RuleId::BonusLit, VISIBILITY, fraction(lit), bound(lit)),
             Measure::at_most(
-                "bonus.dark",
+                RuleId::BonusDark,
                 "shadowed pixels that are not dark (fraction)",
                 fraction(dark),
                 bound(dark),
             ),
         ];
-        let id = "bonus.image";
+        let id = CheckId::BonusImage;
         let mut check = match first.filter(|_| measures.iter().any(|measure| !measure.passed)) {
             None => {
                 let summary =
@@ -311,18 +312,18 @@ mod tests {
         let shadows = Shadows { mask: &mask, unshadowed: &unshadowed, median_lit: 1.0 };
         let lit = image(|_| 1.0);
         let wrong = shadows.judge("teapot", &lit, &lit, &Tolerances::default()).unwrap();
-        let dark = Check::new("bonus.image", "cbox", Verdict::Fail, "black");
+        let dark = Check::new(CheckId::BonusImage, "cbox", Verdict::Fail, "black");
         let verdicts = |checks: &[Check]| {
             let mut checks = checks.to_vec();
             set_apart(&mut checks);
             checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
         };
         assert_eq!(verdicts(&[wrong.clone(), dark.clone()]), [Verdict::Fail, Verdict::NotJudged]);
-        let probe = Check { id: "bonus.probe".to_owned(), ..dark.clone() };
+        let probe = Check { id: CheckId::BonusProbe.to_owned(), ..dark.clone() };
         assert_eq!(verdicts(&[wrong, probe.clone()]), [Verdict::Fail, Verdict::NotJudged]);
-        let right = Check::new("bonus.image", "teapot", Verdict::Pass, "");
+        let right = Check::new(CheckId::BonusImage, "teapot", Verdict::Pass, "");
         let no_map = Check {
-            measures: vec![Measure::at_most("image.interior", "pixels that differ", 0.0, 1.0)],
+            measures: vec![Measure::at_most(RuleId::ImageInterior, "pixels that differ", 0.0, 1.0)],
             ..probe
         };
         assert_eq!(verdicts(&[right, no_map]), [Verdict::Pass, Verdict::Fail]);

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use basecode::{Camera, Image, MaterialModel, Scene, Vec3};
 
 use super::price::{self, Class, Price};
-use super::{Check, Measure, Verdict};
+use super::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::expected::SurfaceBuffer;
 use crate::imaging::reference::RegionMask;
 
@@ -69,14 +69,14 @@ impl BoundValue {
     }
 
     /// The rule that it is judged by.
-    fn rule(self) -> &'static str {
+    fn rule(self) -> RuleId {
         match self {
-            Self::CameraPosition => "pass.camera_position",
-            Self::LightPosition => "pass.light_position",
-            Self::LightIntensity => "pass.light_intensity",
-            Self::RhoD => "pass.rho_d",
-            Self::RhoS => "pass.rho_s",
-            Self::Exponent => "pass.exponent",
+            Self::CameraPosition => RuleId::PassCameraPosition,
+            Self::LightPosition => RuleId::PassLightPosition,
+            Self::LightIntensity => RuleId::PassLightIntensity,
+            Self::RhoD => RuleId::PassRhoD,
+            Self::RhoS => RuleId::PassRhoS,
+            Self::Exponent => RuleId::PassExponent,
         }
     }
 
@@ -136,7 +136,7 @@ pub fn judge_pass(
     mask: &RegionMask,
     frames: &[(BoundValue, Image)],
 ) -> Check {
-    let id = "pass.uniforms";
+    let id = CheckId::PassUniforms;
     let Ok(camera) = scene.camera(surface.width, surface.height) else {
         return Check::new(id, scene_name, Verdict::NotJudged, "the scene has no camera");
     };

@@ -7,7 +7,7 @@ use basecode::{Camera, Image, Ray, Scene, SurfaceInteraction, Vec3};
 
 use super::price::{Class, Price};
 use super::stages::{STRAY_FRACTION, interior};
-use super::{Check, Measure, Verdict};
+use super::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::expected::{SurfaceBuffer, SurfacePoint};
 use crate::imaging::reference::RegionMask;
 
@@ -40,7 +40,7 @@ type Frames<'a> = [&'a Image; 2];
 /// where on the film they land. `frames` are drawn under each of [`crate::worker::Matrices::ALL`]: the
 /// first decides, the others tell what is wrong.
 pub fn judge_vertex(scene_name: &str, film: &VertexFilm, frames: [Frames; 3]) -> Check {
-    let id = "stage.vertex";
+    let id = CheckId::StageVertex;
     let seen = frames.map(|frames| Seen::of(film, frames));
     let [usual, in_view, in_projection] = &seen;
     if usual.counted == 0 {
@@ -52,19 +52,19 @@ pub fn judge_vertex(scene_name: &str, film: &VertexFilm, frames: [Frames; 3]) ->
     let at_most = |rule, name, value, bound| Measure::at_most(rule, name, value, bound);
     let mut measures = vec![
         at_most(
-            "vertex.position",
+            RuleId::VertexPosition,
             "world positions wrong (fraction of pixels)",
             usual.fraction(wrong_position),
             STRAY_FRACTION,
         ),
         at_most(
-            "vertex.normal",
+            RuleId::VertexNormal,
             "world normals wrong (fraction of pixels)",
             usual.fraction(wrong_normal),
             STRAY_FRACTION,
         ),
         at_most(
-            "vertex.clip",
+            RuleId::VertexClip,
             "surfaces off their place on the film (pixels, median)",
             offset_px,
             OFFSET_PX,

@@ -10,7 +10,7 @@ use renderer_api as api;
 use super::case::Case;
 use super::control;
 use crate::diagnosis::{Sightings, Tile, View};
-use crate::evidence::{Check, Verdict};
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::process::Limits;
 use crate::worker::{
     Adapter, BsdfQuery, BsdfSource, Job, JobReport, Matter, Outcome, Patience, RayQuery, Request,
@@ -18,9 +18,9 @@ use crate::worker::{
 };
 
 /// The check that fails when a submission used up its time on a path: the rest was not asked.
-pub const BUDGET: &str = "submission.budget";
+pub const BUDGET: CheckId = CheckId::SubmissionBudget;
 /// The check that fails, and costs nothing, when a renderer prints more than is kept.
-const OUTPUT: &str = "submission.output";
+const OUTPUT: CheckId = CheckId::SubmissionOutput;
 
 /// The error of a question that was not asked any more: it leaves no point that could be seen.
 const NOT_ASKED: f64 = 0.9999;
@@ -187,7 +187,7 @@ pub fn headline(said: &str) -> &str {
 
 /// The check for a question without an answer. `parts` are the parts whose lack is this check's
 /// own matter: what is not implemented elsewhere only hides the answer.
-pub fn unanswered(id: &str, scene: &str, parts: &[&str], outcome: &Outcome) -> Check {
+pub fn unanswered(id: CheckId, scene: &str, parts: &[&str], outcome: &Outcome) -> Check {
     let check = |verdict, summary: String| Check::new(id, scene, verdict, summary);
     match outcome {
         Outcome::Done(_) => check(Verdict::NotJudged, "answered".into()),
@@ -250,7 +250,7 @@ mod tests {
     fn an_endless_loop_is_named_with_scene_part_and_limit() {
         let late = Late { computing: true, limit_s: 3.0, reference_s: Some(0.041) };
         let said = |late: Late, scene: &str, parts: &[&str]| {
-            unanswered("radiance.lit", scene, parts, &Outcome::TimedOut(late)).summary
+            unanswered(CheckId::RadianceLit, scene, parts, &Outcome::TimedOut(late)).summary
         };
         assert_eq!(
             said(late, "teapot", &["1.3"]),
@@ -267,9 +267,9 @@ mod tests {
     #[test]
     fn what_was_not_asked_costs_the_part_and_is_not_its_first_reason() {
         let not_asked = Outcome::NotRun { reason: "not asked".into(), matter: Matter::Submission };
-        let not_asked = unanswered("a", "s", &["1.3"], &not_asked);
+        let not_asked = unanswered(CheckId::RadianceLit, "s", &["1.3"], &not_asked);
         let late = Late { computing: true, limit_s: 3.0, reference_s: None };
-        let hangs = unanswered("a", "s", &["1.3"], &Outcome::TimedOut(late));
+        let hangs = unanswered(CheckId::RadianceLit, "s", &["1.3"], &Outcome::TimedOut(late));
         assert_eq!((not_asked.verdict, hangs.verdict), (Verdict::Fail, Verdict::Fail));
         assert!(not_asked.error < hangs.error && 25.0 * (1.0 - not_asked.error) < 0.005);
     }

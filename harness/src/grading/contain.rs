@@ -5,11 +5,11 @@ use std::path::Path;
 use super::kept::Kept;
 use super::pipeline::{Folders, Grading, Purpose};
 use super::record::Record;
-use crate::evidence::{Check, Evidence, Verdict};
+use crate::evidence::{Check, CheckId, Evidence, Verdict};
 use crate::panics::{self, Bug};
 
 /// The check that fails when Umbra itself did: the submission is ungraded.
-pub const INTERNAL_ERROR: &str = "submission.internal_error";
+pub const INTERNAL_ERROR: CheckId = CheckId::SubmissionInternalError;
 
 impl Grading<'_> {
     /// Grades one of a batch, as [`Grading::hand_in`] does. A panic of Umbra's makes a record that says

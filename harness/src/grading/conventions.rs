@@ -10,7 +10,6 @@ use super::ask::{self, Asker};
 use super::case::Case;
 use super::seen;
 use crate::diagnosis::{self, Tile, View};
-use crate::evidence::Check;
 use crate::evidence::bsdf::{self, BsdfKind, BsdfProbe};
 use crate::evidence::convention::{self, Convention, Conventional, Party};
 use crate::evidence::loops::Edges;
@@ -18,6 +17,7 @@ use crate::evidence::physical::Probes;
 use crate::evidence::price;
 use crate::evidence::rays::{self, Unshadowed};
 use crate::evidence::shading::{ShadedPoint, Shading};
+use crate::evidence::{Check, CheckId};
 use crate::expected::SurfacePoint;
 use crate::plugin::{Witness, WitnessQuery};
 use crate::worker::{Outcome, Request};
@@ -124,8 +124,8 @@ impl<'a> Answers<'a> {
         outcome: &Outcome,
     ) {
         let (id, part, view) = match kind {
-            BsdfKind::Diffuse => ("bsdf.diffuse", "1.1", diagnosis::Kind::Diffuse),
-            BsdfKind::Phong => ("bsdf.phong", "1.2", diagnosis::Kind::Phong),
+            BsdfKind::Diffuse => (CheckId::BsdfDiffuse, "1.1", diagnosis::Kind::Diffuse),
+            BsdfKind::Phong => (CheckId::BsdfPhong, "1.2", diagnosis::Kind::Phong),
         };
         let values = match outcome {
             Outcome::Done(answer) => {
@@ -153,7 +153,8 @@ impl<'a> Answers<'a> {
                 Ok(WitnessAnswer { witness: *witness, name, values })
             }
             other => {
-                let unanswered = ask::unanswered("radiance.lit", &case.entry.name, &["1.3"], other);
+                let unanswered =
+                    ask::unanswered(CheckId::RadianceLit, &case.entry.name, &["1.3"], other);
                 Err(Box::new(unanswered))
             }
         });

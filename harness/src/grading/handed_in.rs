@@ -14,26 +14,26 @@ use crate::evidence::handed_in::{
     has_own_noise, judge_copied, judge_noise, judge_scene, judge_seed,
 };
 use crate::evidence::images::{self, Kind};
-use crate::evidence::{Check, Verdict};
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::noise::NoisyPixels;
 use crate::imaging::reference::Region;
 use crate::intake::{Finding, TreeSpec};
 use crate::worker::Request;
 
-type View = (&'static str, fn(&Region) -> bool);
+type View = (CheckId, fn(&Region) -> bool);
 
 const OFFLINE: [View; 5] = [
-    ("handed_in.offline", |_| true),
-    ("handed_in.offline.diffuse", |region| region.exponent == 0.0 && region.lit),
-    ("handed_in.offline.phong", |region| region.exponent > 0.0 && region.lit),
-    ("handed_in.offline.lit", |region| region.lit),
-    ("handed_in.offline.shadowed", |region| !region.lit),
+    (CheckId::SubmittedOffline, |_| true),
+    (CheckId::SubmittedOfflineDiffuse, |region| region.exponent == 0.0 && region.lit),
+    (CheckId::SubmittedOfflinePhong, |region| region.exponent > 0.0 && region.lit),
+    (CheckId::SubmittedOfflineLit, |region| region.lit),
+    (CheckId::SubmittedOfflineShadowed, |region| !region.lit),
 ];
 const REALTIME: [View; 3] = [
-    ("handed_in.realtime.all", |_| true),
-    ("handed_in.realtime.diffuse", |region| region.exponent == 0.0),
-    ("handed_in.realtime.phong", |region| region.exponent > 0.0),
+    (CheckId::SubmittedRealtimeAll, |_| true),
+    (CheckId::SubmittedRealtimeDiffuse, |region| region.exponent == 0.0),
+    (CheckId::SubmittedRealtimePhong, |region| region.exponent > 0.0),
 ];
 
 /// An image in a hand-in.
@@ -114,12 +114,12 @@ pub fn judge(
     let image = match image {
         Ok(image) => image,
         Err(error) => {
-            let failed = |(id, _): &View| Check::new(id, name, Verdict::Fail, error.clone());
+            let failed = |(id, _): &View| Check::new(*id, name, Verdict::Fail, error.clone());
             return (views(kind).iter().map(failed).collect(), None);
         }
     };
     for (id, wanted) in views(kind) {
-        checks.push(images::judge(id, name, kind, image, expected, wanted, tolerances));
+        checks.push(images::judge(*id, name, kind, image, expected, wanted, tolerances));
     }
     let right = checks.first().is_some_and(|check| check.verdict == Verdict::Pass);
     let drawn_as = match kind {
@@ -137,7 +137,7 @@ pub fn judge(
     };
     checks.push(if right || own {
         let summary = format!("{path} is right, or what the code draws of the scene");
-        Check::new("handed_in.scene", name, Verdict::Pass, summary)
+        Check::new(CheckId::SubmittedScene, name, Verdict::Pass, summary)
     } else {
         judge_scene(name, path, image, &[&expected.offline.mean, &expected.unshadowed], mask)
     });
@@ -200,7 +200,7 @@ fn judge_origin(
     drawn: &Image,
     tolerances: &Tolerances,
 ) -> Check {
-    let (id, name) = ("handed_in.origin", &case.entry.name);
+    let (id, name) = (CheckId::SubmittedOrigin, &case.entry.name);
     if images::same_origin(kind, handed_in, drawn, &case.expected, tolerances) {
         return Check::new(id, name, Verdict::Pass, format!("{path} is what the code draws"));
     }

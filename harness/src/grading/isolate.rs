@@ -15,17 +15,17 @@ use crate::diagnosis::{Kind, Tile, View};
 use crate::evidence::premultiplied::Premultiplied;
 use crate::evidence::stages::{BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass};
 use crate::evidence::vertex::{VertexFilm, judge_vertex};
-use crate::evidence::{Check, Verdict};
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::evidence::{images, pixels};
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::{Region, RegionMask};
 use crate::worker::{Outcome, Stage};
 
 /// The checks of the three stages, and the tasks that they belong to.
-const CHECKS: [(&str, &str); 3] = [
-    ("stage.vertex", "2.2 vertex shader"),
-    ("stage.diffuse", "2.3 diffuse fragment shader"),
-    ("stage.phong", "2.4 Phong fragment shader"),
+const CHECKS: [(CheckId, &str); 3] = [
+    (CheckId::StageVertex, "2.2 vertex shader"),
+    (CheckId::StageDiffuse, "2.3 diffuse fragment shader"),
+    (CheckId::StagePhong, "2.4 Phong fragment shader"),
 ];
 
 /// Judges the student's pass under stages of ours (2.1) and his stages under a pass of ours (2.2
@@ -226,7 +226,7 @@ fn pass_check(case: &Case, outcomes: &[Outcome]) -> Check {
 
 /// Each bound value with the frame that shows it, or else the check that says why there is none.
 fn bound_values(case: &Case, outcomes: &[Outcome]) -> Result<Vec<(BoundValue, Image)>, Box<Check>> {
-    let (id, name) = ("pass.uniforms", &case.entry.name);
+    let (id, name) = (CheckId::PassUniforms, &case.entry.name);
     let images = match images(case, outcomes) {
         Ok(images) => images,
         // Its own frame decides: a pass with a layout of its own takes no stages of ours.
@@ -256,11 +256,17 @@ fn vertex(case: &Case, frames: [[&Image; 2]; 3]) -> Check {
             let (surface, mask) = (&small.surface, &small.unshadowed_mask);
             judge_vertex(name, &VertexFilm { scene, camera, surface, mask }, frames)
         }
-        Err(error) => Check::new("stage.vertex", name, Verdict::NotRun, error.to_string()),
+        Err(error) => Check::new(CheckId::StageVertex, name, Verdict::NotRun, error.to_string()),
     }
 }
 
-fn fragment(id: &str, case: &Case, image: &Image, phong: bool, tolerances: &Tolerances) -> Check {
+fn fragment(
+    id: CheckId,
+    case: &Case,
+    image: &Image,
+    phong: bool,
+    tolerances: &Tolerances,
+) -> Check {
     let small = &case.small;
     let own = |region: &Region| (region.exponent > 0.0) == phong;
     let wanted = images::only(&small.unshadowed_mask, &own);
@@ -284,7 +290,7 @@ fn see_fragment(asker: &Asker, case: &Case, image: &Image, phong: bool) {
 
 /// The check for a stage that draws nothing under our pass. One that is no WGSL is at fault where a
 /// frame fails; whether another only has a layout of its own shows in the student's own frame.
-fn swap_failed(asker: &Asker, id: &str, case: &Case, fails: bool, outcome: &Outcome) -> Check {
+fn swap_failed(asker: &Asker, id: CheckId, case: &Case, fails: bool, outcome: &Outcome) -> Check {
     match outcome {
         Outcome::StageRefused(message) if !fails => {
             let summary = format!("no frame needs it, but {}", headline(message));
@@ -300,7 +306,7 @@ fn swap_failed(asker: &Asker, id: &str, case: &Case, fails: bool, outcome: &Outc
 }
 
 /// A swap that the graphics library refuses is no fault.
-fn not_possible(id: &str, case: &Case, message: &str) -> Check {
+fn not_possible(id: CheckId, case: &Case, message: &str) -> Check {
     let summary = format!("swap not possible: {}", headline(message));
     Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
 }

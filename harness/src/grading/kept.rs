@@ -291,6 +291,7 @@ impl Kept {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evidence::CheckId;
     use crate::report::sample;
 
     #[test]
@@ -339,7 +340,7 @@ mod tests {
         let out = Folders { student: out(), instructor: out() };
         let kept = Kept::with([1; 32]);
         let mut record = sample::sheet().entries.remove(0).record;
-        let not_run = Check::new("bonus.image", "", Verdict::NotRun, "no adapter");
+        let not_run = Check::new(CheckId::BonusImage, "", Verdict::NotRun, "no adapter");
         record.evidence.checks.push(not_run);
         assert_eq!(kept.keep("key", Vec::new(), record.clone(), &out).unwrap(), record);
         assert_eq!(place.path().read_dir().unwrap().count(), 0);
@@ -354,7 +355,7 @@ mod tests {
         let own = key(1, &record, &[]);
         assert_eq!(own, key(1, &record.clone(), &[]));
         let other = Record { digest: "other".into(), ..record.clone() };
-        let tree = Check::new("hand_in.tree", "", Verdict::Fail, "");
+        let tree = Check::new(CheckId::SubmissionTree, "", Verdict::Fail, "");
         let others = [key(2, &record, &[]), key(1, &other, &[]), key(1, &record, &[tree])];
         assert!(!others.contains(&own), "{others:?}");
     }

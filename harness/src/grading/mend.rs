@@ -7,7 +7,7 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use crate::build::{BuildOutcome, BuildReport, Diagnostic};
-use crate::evidence::{Check, Verdict};
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::files::files_below;
 use crate::intake::Finding;
 use crate::rubric::Rules;
@@ -17,7 +17,7 @@ use crate::rubric::Rules;
 const ROUNDS: usize = 3;
 
 /// The check that says which files were replaced; it costs nothing by itself.
-const REPLACED: &str = "hand_in.replaced";
+const REPLACED: CheckId = CheckId::SubmissionReplaced;
 
 /// A source as it was built.
 pub struct Built {

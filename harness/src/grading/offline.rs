@@ -11,7 +11,7 @@ use super::seen;
 use crate::diagnosis::{self, LoopSeen, Tile, View};
 use crate::evidence::images::{self, Kind};
 use crate::evidence::shading::{ShadedPoint, Shading};
-use crate::evidence::{Check, Verdict};
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::evidence::{loops, rays};
 use crate::expected::SurfacePoint;
 use crate::imaging::evidence::Tolerances;
@@ -104,7 +104,7 @@ pub fn judge_scene<'a>(
     ] = outcomes.as_slice()
     else {
         let summary = "the worker gave no outcomes: a bug of Umbra's";
-        return (vec![Check::new("image.offline", name, Verdict::NotRun, summary)], None);
+        return (vec![Check::new(CheckId::ImageOffline, name, Verdict::NotRun, summary)], None);
     };
     let witnessed = [w0, w1, w2, w3];
     let bypassed = witnessed.iter().all(|outcome| {
@@ -154,13 +154,13 @@ pub fn judge_scene<'a>(
         }
         (Outcome::Done(_), missing) => Check {
             verdict: Verdict::NotJudged,
-            ..ask::unanswered("loop.agreement", name, &[], missing)
+            ..ask::unanswered(CheckId::LoopAgreement, name, &[], missing)
         },
         // Where the rays fail in the same way, it is not the loop's fault.
-        (missing, Outcome::Done(_)) => ask::unanswered("loop.agreement", name, &[], missing),
+        (missing, Outcome::Done(_)) => ask::unanswered(CheckId::LoopAgreement, name, &[], missing),
         (missing, _) => Check {
             verdict: Verdict::NotJudged,
-            ..ask::unanswered("loop.agreement", name, &[], missing)
+            ..ask::unanswered(CheckId::LoopAgreement, name, &[], missing)
         },
     });
     if let ([along, image], Some(sampled)) = (sampled, &small.sampled) {
@@ -174,11 +174,13 @@ pub fn judge_scene<'a>(
                 }
                 check
             }
-            (Outcome::Done(_), missing) => ask::unanswered("loop.samples", name, &[], missing),
+            (Outcome::Done(_), missing) => {
+                ask::unanswered(CheckId::LoopSamples, name, &[], missing)
+            }
             // Where the rays fail in the same way, it is not the loop's fault.
             (missing, _) => Check {
                 verdict: Verdict::NotJudged,
-                ..ask::unanswered("loop.samples", name, &[], missing)
+                ..ask::unanswered(CheckId::LoopSamples, name, &[], missing)
             },
         });
     }
@@ -186,13 +188,13 @@ pub fn judge_scene<'a>(
         Outcome::Done(answer) => {
             let image = ask::image(&answer.values, width, height);
             let kind = Kind::Offline { spp: case.spp };
-            let (id, expected) = ("image.offline", &case.expected);
+            let (id, expected) = (CheckId::ImageOffline, &case.expected);
             checks.push(images::judge(id, name, kind, &image, expected, &|_| true, tolerances));
             (checks, Some(Drawn { scene: name.clone(), kind, image }))
         }
         other => {
             let parts = ["1.1", "1.2", "1.3", "1.4"];
-            checks.push(ask::unanswered("image.offline", name, &parts, other));
+            checks.push(ask::unanswered(CheckId::ImageOffline, name, &parts, other));
             (checks, None)
         }
     }
@@ -261,7 +263,7 @@ fn judge_shadows(
     (with, without): (&Outcome, &Outcome),
     shaded: (&Outcome, &Outcome),
 ) -> Check {
-    let (id, name) = ("shadow.rays", &case.entry.name);
+    let (id, name) = (CheckId::ShadowRays, &case.entry.name);
     match (with, without) {
         (Outcome::Done(with), Outcome::Done(without)) => {
             let (with, without) = (ask::colours(&with.values), ask::colours(&without.values));

@@ -9,7 +9,7 @@ use super::handed_in::HandedIn;
 use super::offline::Drawn;
 use super::pipeline::Folders;
 use crate::evidence::images::Kind;
-use crate::evidence::{Check, Picture, Verdict};
+use crate::evidence::{Check, CheckId, Picture, Verdict};
 use crate::imaging::pictures::{signed_error, tone_mapped};
 
 /// The relative error that the difference picture shows in full colour.
@@ -31,27 +31,29 @@ pub fn draw(
         let own = |kind: Kind| {
             drawn.iter().find(|d| d.scene == check.scene && d.kind == kind).map(|d| &d.image)
         };
-        let actual = match check.id.as_str() {
-            "image.offline" => own(Kind::Offline { spp: case.spp }),
-            "image.realtime" => own(Kind::Realtime),
-            "bonus.image" | "bonus.probe" => own(Kind::RealtimeShadows),
+        let actual = match check.id {
+            CheckId::ImageOffline => own(Kind::Offline { spp: case.spp }),
+            CheckId::ImageRealtime => own(Kind::Realtime),
+            CheckId::BonusImage | CheckId::BonusProbe => own(Kind::RealtimeShadows),
             _ => handed_in.iter().find_map(|image| image.shown_by(check)),
         };
         if let Some(actual) = actual {
             let out = if check.held_back { &out.instructor } else { &out.student };
-            check.pictures = triple(&check.id, case, actual, out)?;
+            check.pictures = triple(check.id, case, actual, out)?;
         }
     }
     Ok(())
 }
 
-fn triple(id: &str, case: &Case, actual: &Image, out: &Path) -> anyhow::Result<Vec<Picture>> {
+fn triple(id: CheckId, case: &Case, actual: &Image, out: &Path) -> anyhow::Result<Vec<Picture>> {
     let expected = &case.expected;
     let (reference, mask) = match id {
-        "image.realtime" | "handed_in.realtime.all" => {
+        CheckId::ImageRealtime | CheckId::SubmittedRealtimeAll => {
             (&expected.unshadowed, &expected.unshadowed_mask)
         }
-        "bonus.image" | "bonus.probe" => (&expected.offline.centre, &expected.offline.mask),
+        CheckId::BonusImage | CheckId::BonusProbe => {
+            (&expected.offline.centre, &expected.offline.mask)
+        }
         _ => (&expected.offline.mean, &expected.offline.mask),
     };
     std::fs::create_dir_all(out)?;
@@ -63,7 +65,7 @@ fn triple(id: &str, case: &Case, actual: &Image, out: &Path) -> anyhow::Result<V
         ("difference", signed_error(actual, reference, mask, scale, FULL_SCALE)),
     ] {
         let Some(picture) = picture else { continue };
-        let file = format!("{}-{}-{title}.png", case.entry.name, id.replace('.', "-"));
+        let file = format!("{}-{}-{title}.png", case.entry.name, id.name().replace('.', "-"));
         std::fs::write(out.join(&file), picture.png()?)?;
         pictures.push(Picture { title: format!("{title} ({})", picture.caption), file });
     }

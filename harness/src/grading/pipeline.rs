@@ -20,7 +20,7 @@ use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
 use crate::diagnosis::{Diagnosis, Stored};
-use crate::evidence::{Check, Evidence, Verdict, loops, price, rays, shadow_map};
+use crate::evidence::{Check, CheckId, Evidence, Verdict, loops, price, rays, shadow_map};
 use crate::expected::Store;
 use crate::held_back::{self, HeldBack};
 use crate::intake::{self, HandIn, IntakeError, TreeSpec, Validation};
@@ -28,13 +28,13 @@ use crate::rubric::BUILD;
 use crate::worker::{Adapter, Budget, Patience, Reference, Supervisor};
 
 /// The check that says whether the hand-in follows the tree.
-pub const TREE: &str = "hand_in.tree";
+pub const TREE: CheckId = CheckId::SubmissionTree;
 
 /// The check that says whether `config.json` is as it should be; it costs nothing.
-const CONFIG: &str = "hand_in.config";
+const CONFIG: CheckId = CheckId::SubmissionConfig;
 
 /// The check that fails nobody: it says that the machine did.
-const JUDGED: &str = "hand_in.judged";
+const JUDGED: CheckId = CheckId::SubmissionJudged;
 
 /// By how much the standard error of a region's mean grows when its rows share their noise: the
 /// root of its height in pixels; the highlights that are judged apart are about 9 pixels high.
@@ -409,7 +409,9 @@ impl<'a> Grading<'a> {
         let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
         let findings = sampler::judge(asker, plugin, &scene)?;
         let mut tolerances = self.assignment.tolerances.clone();
-        if findings.iter().any(|found| found.id != "sampler.seed" && found.verdict == Verdict::Fail)
+        if findings
+            .iter()
+            .any(|found| found.id != CheckId::SamplerSeed && found.verdict == Verdict::Fail)
         {
             // Pixels are as noisy as they should be, but not independent, so that the mean of a
             // region is noisier than they tell: a finding, no wrong image.
@@ -469,8 +471,9 @@ impl<'a> Grading<'a> {
                 if let Some(why) = nothing_draws {
                     found.iter_mut().for_each(|check| realtime::drawn_by_nobody(check, why));
                 }
-                let proof =
-                    |check: &Check| check.id == "image.realtime" && check.verdict != Verdict::Pass;
+                let proof = |check: &Check| {
+                    check.id == CheckId::ImageRealtime && check.verdict != Verdict::Pass
+                };
                 if found.iter().any(proof) {
                     wrong.push(case);
                 }
@@ -537,7 +540,7 @@ fn mark(checks: &mut [Check], cases: &[Case]) {
         check.held_back = held_back;
         let case = cases.iter().find(|case| case.entry.name == check.scene);
         // Shadows where none belong are no matter of the scene.
-        let own = case.filter(|_| check.id != "bonus.default");
+        let own = case.filter(|_| check.id != CheckId::BonusDefault);
         check.weight = own.map_or(1.0, |case| case.entry.weight);
     }
 }

@@ -13,19 +13,19 @@ use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels;
 use crate::evidence::shadow_map::Shadows;
 use crate::evidence::stages::VERTEX;
-use crate::evidence::{Check, Verdict};
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::expected::Expected;
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::{Region, RegionMask};
 use crate::worker::{Matter, Outcome, Stage};
 
-type View = (&'static str, &'static dyn Fn(&Region) -> bool);
+type View = (CheckId, &'static dyn Fn(&Region) -> bool);
 
 /// The image as a whole, and by material.
 const VIEWS: [View; 3] = [
-    ("image.realtime", &|_| true),
-    ("image.realtime.diffuse", &|region| region.exponent == 0.0),
-    ("image.realtime.phong", &|region| region.exponent > 0.0),
+    (CheckId::ImageRealtime, &|_| true),
+    (CheckId::ImageRealtimeDiffuse, &|region| region.exponent == 0.0),
+    (CheckId::ImageRealtimePhong, &|region| region.exponent > 0.0),
 ];
 
 /// What the frames of a scene show.
@@ -41,7 +41,7 @@ pub struct Judged {
 }
 
 /// Whether surfaces lie where they should, for what cannot be judged alone.
-const COVERAGE: &str = "image.realtime.coverage";
+const COVERAGE: CheckId = CheckId::ImageRealtimeCoverage;
 
 /// Silhouettes correlate by 0, in one colour or one for each surface; what follows the light does by more.
 const LEAST_SHADING: f64 = 0.2;
@@ -72,7 +72,7 @@ pub fn judge_images(
             let plain = drawn.first().map(|drawn| &drawn.image);
             let (mut check, bonus) = judge_bonus(asker, plugin, case, &outcome, plain, tolerances);
             let required = case.entry.bonus_required;
-            let id = if required { "bonus.probe" } else { "bonus.image" };
+            let id = if required { CheckId::BonusProbe } else { CheckId::BonusImage };
             // How shadows come about is the same on all scenes.
             if required && check.verdict == Verdict::Pass {
                 let footprint = outcome.answer().and_then(|answer| answer.footprint);
@@ -84,7 +84,7 @@ pub fn judge_images(
                     check = Check { error: 1.0, verdict: Verdict::Fail, summary: why, ..check };
                 }
             }
-            checks.push(Check { id: id.to_owned(), ..check });
+            checks.push(Check { id, ..check });
             drawn.extend(bonus);
         }
         Judged { checks, drawn, fails, footprint }
@@ -118,7 +118,7 @@ fn drawn(
     asker: &Asker,
     case: &Case,
     kind: Kind,
-    id: &str,
+    id: CheckId,
     outcome: &Outcome,
 ) -> Result<Drawn, Box<Check>> {
     let parts = ["2.1", "2.2", "2.3", "2.4", "2.5"];
@@ -144,7 +144,7 @@ fn judge_plain(
         Ok(drawn) => drawn,
         // Where a part cannot be judged alone either, a frame that is not there decides.
         Err(check) => {
-            let same = |id: &str| Check { id: id.to_owned(), ..(*check).clone() };
+            let same = |id: CheckId| Check { id, ..(*check).clone() };
             let ids = VIEWS.iter().map(|(id, _)| *id).chain([COVERAGE]);
             return (ids.map(same).collect(), None);
         }
@@ -177,7 +177,7 @@ fn judge_bonus(
     plain: Option<&Image>,
     tolerances: &Tolerances,
 ) -> (Check, Option<Drawn>) {
-    let (kind, id) = (Kind::RealtimeShadows, "bonus.image");
+    let (kind, id) = (Kind::RealtimeShadows, CheckId::BonusImage);
     let drawn = match drawn(asker, case, kind, id, outcome) {
         Ok(drawn) => drawn,
         Err(check) => return (*check, None),
@@ -197,7 +197,7 @@ fn shows_its_shadows(
     plain: Option<&Image>,
     tolerances: &Tolerances,
 ) -> bool {
-    let view: View = ("bonus.image", &|_| true);
+    let view: View = (CheckId::BonusImage, &|_| true);
     let as_image = judge(case, Kind::RealtimeShadows, with, view, tolerances);
     let by_visibility = || shadows(case).judge(&case.entry.name, with, plain?, tolerances);
     as_image.verdict == Verdict::Pass
@@ -280,7 +280,7 @@ fn plain_but_for_shadows(
     }
     let summary = "the default run draws shadows: only the bonus scene may";
     let mut checks = judged.to_vec();
-    checks.push(Check::new("bonus.default", name, Verdict::Fail, summary));
+    checks.push(Check::new(CheckId::BonusDefault, name, Verdict::Fail, summary));
     Some(checks)
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use basecode::scene::SceneConfig;
 
 use super::ask::Asker;
-use crate::evidence::{Check, Verdict};
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::worker::{Outcome, Request};
 
 /// Rows whose noise is correlated by this much or more share their seeds: 1 when they do, 0 but for
@@ -34,7 +34,7 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
         .map(|answer| answer.values.as_slice())
         .collect();
     let &[one, four, again, other] = images.as_slice() else { return Ok(Vec::new()) };
-    let check = |id: &str, good: bool, said: &str, hint: &str| {
+    let check = |id: CheckId, good: bool, said: &str, hint: &str| {
         let verdict = if good { Verdict::Pass } else { Verdict::Fail };
         Check::new(id, "", verdict, said).with_hint(if good { "" } else { hint })
     };
@@ -43,7 +43,7 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
     let correlation = row_correlation(one, other, 3 * width as usize);
     Ok(vec![
         check(
-            "sampler.threads",
+            CheckId::SamplerThreads,
             same,
             if same {
                 "the image does not depend on the number of threads"
@@ -53,13 +53,13 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
             "threads share a sampler: give every row one of its own",
         ),
         check(
-            "sampler.rows",
+            CheckId::SamplerRows,
             correlation < CORRELATED,
             &format!("the noise of a row has a correlation of {correlation:.2} with the row above"),
             "every row starts with the same seed: offset it by the row",
         ),
         check(
-            "sampler.seed",
+            CheckId::SamplerSeed,
             bits(one) != bits(other),
             if bits(one) == bits(other) {
                 "two seeds give the same image"

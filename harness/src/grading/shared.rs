@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::record::Record;
-use crate::evidence::{Check, Verdict};
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::files::hex;
 use crate::imaging::srgb;
 
 /// The check of images.
-const SHARED: &str = "handed_in.shared";
+const SHARED: CheckId = CheckId::SubmittedShared;
 /// The check of student numbers.
-const NUMBER: &str = "hand_in.number";
+const NUMBER: CheckId = CheckId::SubmissionNumber;
 
 /// What is kept of an image that was handed in, to find it again in another hand-in.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -72,7 +72,7 @@ pub fn judge_shared(records: &mut [Record]) {
     }
     for record in records {
         let person = person(record);
-        record.evidence.checks.retain(|check| ![SHARED, NUMBER].contains(&check.id.as_str()));
+        record.evidence.checks.retain(|check| ![SHARED, NUMBER].contains(&check.id));
         let mut found = Vec::new();
         for ImageDigest { scene, path, sha256 } in &record.images {
             let others = others(&owners[sha256], &person);
@@ -147,7 +147,9 @@ mod tests {
             student: Student { id: id.into(), ..Student::default() },
             findings: Vec::new(),
             diagnostics: String::new(),
-            evidence: Evidence { checks: vec![Check::new("a", "", Verdict::Pass, "")] },
+            evidence: Evidence {
+                checks: vec![Check::new(CheckId::ImageOffline, "", Verdict::Pass, "")],
+            },
             diagnoses: Vec::new(),
             images: vec![image],
             stages: Vec::new(),
@@ -156,7 +158,7 @@ mod tests {
     }
 
     /// What is said for the instructor of each that failed a check; to the student no other is named.
-    fn failed<'a>(records: &'a [Record], id: &str) -> BTreeMap<&'a str, String> {
+    fn failed(records: &[Record], id: CheckId) -> BTreeMap<&str, String> {
         let said = |record: &Record| {
             let own = record.evidence.checks.iter().filter(|check| check.id == id);
             let failed = own.filter(|check| check.verdict == Verdict::Fail);

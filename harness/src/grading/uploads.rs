@@ -14,7 +14,7 @@ use basecode::{Image, Vec3};
 use super::ask::{self, Asker};
 use super::case::Case;
 use super::draw::{Frame, draw};
-use crate::evidence::{Check, Verdict};
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::imaging::reference::RegionMask;
 use crate::worker::Stage;
 
@@ -66,7 +66,7 @@ pub fn judge(
     if known().next().is_some() && known().all(|(_, of)| of.fed == 0 && of.unfed > 0) {
         let summary =
             "no pipeline that draws a picture takes vertices: it is made in one piece, or computed";
-        found.checks.push(Check::new("hand_in.no_vertices", "", Verdict::Fail, summary));
+        found.checks.push(Check::new(CheckId::SubmissionNoVertices, "", Verdict::Fail, summary));
     }
     let unexplained = known().filter_map(|(case, of)| unexplained(case, &of));
     let least = unexplained.reduce(f64::min).filter(|least| *least >= PICTURE);
@@ -75,7 +75,7 @@ pub fn judge(
             "every frame uploads {least:.1} bytes and more for each of its pixels besides the scene's own \
              data, as if no shader drew them"
         );
-        found.checks.push(Check::new("hand_in.uploads", "", Verdict::Fail, summary));
+        found.checks.push(Check::new(CheckId::SubmissionUploads, "", Verdict::Fail, summary));
         found.nothing_draws = nothing_draws(asker, plugin, cases);
     }
     found

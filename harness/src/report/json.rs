@@ -9,7 +9,7 @@ use serde_json::ser::{CharEscape, Formatter, PrettyFormatter};
 use super::number::significant;
 use super::{Entry, ReportError, Sheet, harmless};
 use crate::diagnosis::Diagnosis;
-use crate::evidence::Check;
+use crate::evidence::{Check, CheckInfo};
 use crate::grading::{Conditions, StageCost, Student};
 use crate::held_back::HeldBack;
 use crate::intake::Finding;
@@ -45,6 +45,8 @@ struct About<'a> {
     course: &'a str,
     due: &'a str,
     rules: &'a Rules,
+    /// What each check that occurs asks, and what its error and bound mean.
+    checks: BTreeMap<&'static str, CheckInfo>,
 }
 
 #[derive(Serialize)]
@@ -89,6 +91,8 @@ pub fn report(sheet: &Sheet) -> Result<String, ReportError> {
         .iter()
         .map(|Entry { record, .. }| (record.slug.as_str(), record.stages.as_slice()))
         .collect();
+    let checks = sheet.entries.iter().flat_map(|entry| &entry.record.evidence.checks);
+    let checks = checks.map(|check| (check.id.name(), check.id.info())).collect();
     let report = Report {
         schema: SCHEMA,
         version: VERSION,
@@ -98,6 +102,7 @@ pub fn report(sheet: &Sheet) -> Result<String, ReportError> {
             course: &sheet.course,
             due: &sheet.due,
             rules: &sheet.rules,
+            checks,
         },
         conditions,
         held_back: sheet.held_back.as_ref(),

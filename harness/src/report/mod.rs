@@ -29,7 +29,8 @@ pub use self::harmless::harmless;
 pub use self::html::{Reader, batch as html_batch, hand_in as html_hand_in};
 pub use self::json::{SCHEMA, VERSION, report as json_report};
 pub use self::text::{
-    Closing, Look, closing as text_closing, detail as text_detail, in_a_line, table as text_table,
+    Closing, Look, closing as text_closing, detail as text_detail, explain, explain_all, in_a_line,
+    table as text_table,
 };
 
 use crate::assignment::Assignment;

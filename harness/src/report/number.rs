@@ -91,7 +91,8 @@ pub(super) fn is_failure(check: &Check) -> bool {
 pub(super) fn hints<'a>(part: &PartGrade, checks: &'a [Check]) -> Vec<&'a str> {
     let mut hints: Vec<&str> = Vec::new();
     for check in checks {
-        let decided = part.evidence.iter().any(|name| *name == check.id || *name == check.name());
+        let decided =
+            part.evidence.iter().any(|name| name == check.id.name() || *name == check.name());
         let hint = check.hint.as_str();
         if decided && check.verdict != Verdict::Pass && !hint.is_empty() && !hints.contains(&hint) {
             hints.push(hint);

@@ -3,7 +3,7 @@
 
 use super::{Entry, Sheet};
 use crate::diagnosis::Diagnosis;
-use crate::evidence::{Check, Evidence, Measure, Picture, Verdict};
+use crate::evidence::{Check, CheckId, Evidence, Measure, Picture, Verdict};
 use crate::grading::{Conditions, Record, StageCost, Student};
 use crate::held_back::HeldBack;
 use crate::intake::Finding;
@@ -26,18 +26,18 @@ pub(crate) fn sheet() -> Sheet {
 }
 
 fn rules() -> Rules {
-    let part = |id: &str, title: &str, points: f64, bonus: bool, evidence: &str| {
+    let part = |id: &str, title: &str, points: f64, bonus: bool, evidence: CheckId| {
         format!(
             r#"{{"id": "{id}", "title": "{title}", "points": {points}, "bonus": {bonus}, "evidence": ["{evidence}"]}}"#
         )
     };
     let parts = [
-        part("1.1", "Diffuse reflectance model", 5.0, false, "bsdf.diffuse"),
-        part("1.2", "Phong reflectance model", 10.0, false, "bsdf.phong"),
-        part("1.3", "Unshadowed direct illumination", 20.0, false, "radiance.lit"),
-        part("1.4", "Direct illumination with hard shadows", 15.0, false, "shadow.rays"),
-        part("2.4", "Phong fragment shader", 25.0, false, "stage.phong"),
-        part("2.5", "Shadow mapping (bonus)", 20.0, true, "bonus.image"),
+        part("1.1", "Diffuse reflectance model", 5.0, false, CheckId::BsdfDiffuse),
+        part("1.2", "Phong reflectance model", 10.0, false, CheckId::BsdfPhong),
+        part("1.3", "Unshadowed direct illumination", 20.0, false, CheckId::RadianceLit),
+        part("1.4", "Direct illumination with hard shadows", 15.0, false, CheckId::ShadowRays),
+        part("2.4", "Phong fragment shader", 25.0, false, CheckId::StagePhong),
+        part("2.5", "Shadow mapping (bonus)", 20.0, true, CheckId::BonusImage),
     ]
     .join(",");
     let curve = "[[0, 0.9], [0.01, 0.85], [0.1, 0.5], [0.5, 0.1], [1, 0]]";
@@ -112,14 +112,14 @@ fn grade(entry: &mut Entry, parts: [(f64, f64, &str, &str); 6]) {
 }
 
 fn check(
-    id: &str,
+    id: CheckId,
     scene: &str,
     verdict: Verdict,
     summary: &str,
     measures: &[(&str, f64, f64)],
 ) -> Check {
     let measures =
-        measures.iter().map(|&(name, value, bound)| Measure::at_most("", name, value, bound));
+        measures.iter().map(|&(name, value, bound)| Measure::at_most(None, name, value, bound));
     Check { measures: measures.collect(), ..Check::new(id, scene, verdict, summary) }
 }
 
@@ -140,15 +140,21 @@ fn perfect() -> Entry {
         ],
     );
     entry.record.evidence.checks = vec![
-        check("hand_in.build", "", Verdict::Pass, "the source builds", &[]),
+        check(CheckId::SubmissionBuild, "", Verdict::Pass, "the source builds", &[]),
         check(
-            "image.offline",
+            CheckId::ImageOffline,
             "cbox",
             Verdict::Pass,
             "right",
             &[("pixels off (fraction)", 2e-5, 1e-3), ("bias (fraction)", 1.2e-4, 3e-3)],
         ),
-        check("bonus.image", "cbox", Verdict::Pass, "shadows are right", &[("acne", 0.0, 0.01)]),
+        check(
+            CheckId::BonusImage,
+            "cbox",
+            Verdict::Pass,
+            "shadows are right",
+            &[("acne", 0.0, 0.01)],
+        ),
     ];
     entry
 }
@@ -176,7 +182,7 @@ fn two_cosines() -> Entry {
         ],
     );
     let mut radiance = check(
-        "radiance.lit",
+        CheckId::RadianceLit,
         "cbox",
         Verdict::Fail,
         lit,
@@ -209,9 +215,9 @@ fn two_cosines() -> Entry {
         })
         .into();
     entry.record.evidence.checks = vec![
-        check("hand_in.build", "", Verdict::Pass, "the source builds", &[]),
+        check(CheckId::SubmissionBuild, "", Verdict::Pass, "the source builds", &[]),
         check(
-            "bsdf.diffuse",
+            CheckId::BsdfDiffuse,
             "",
             Verdict::Pass,
             "the diffuse BSDF is right for 4096 queries",
@@ -219,14 +225,14 @@ fn two_cosines() -> Entry {
         ),
         radiance,
         check(
-            "stage.phong",
+            CheckId::StagePhong,
             "",
             Verdict::NotJudged,
             "the stages do not fit the shader contract",
             &[],
         ),
         check(
-            "bonus.image",
+            CheckId::BonusImage,
             "teapot",
             Verdict::NotRun,
             "no graphics adapter: install mesa-vulkan-drivers",
@@ -252,21 +258,21 @@ fn does_not_build() -> Entry {
                 0.0,
                 0.0,
                 "1.13 once the instructor confirms: pixels of diffuse materials are off by 0.5 %",
-                "handed_in.offline.diffuse",
+                "submitted.offline.diffuse",
             ),
             (0.0, 0.0, lost, ""),
             (
                 0.0,
                 0.0,
                 "4.06 once the instructor confirms: lit pixels are off by 2 %",
-                "handed_in.offline.lit",
+                "submitted.offline.lit",
             ),
             (0.0, 0.0, lost, ""),
             (
                 0.0,
                 0.0,
                 "6.25 once the instructor confirms: pixels of Phong materials are right",
-                "handed_in.realtime.phong",
+                "submitted.realtime.phong",
             ),
             (0.0, 0.0, lost, ""),
         ],
@@ -283,7 +289,7 @@ fn does_not_build() -> Entry {
                                 due to 1 previous error\n"
         .into();
     entry.record.evidence.checks =
-        vec![check("hand_in.build", "", Verdict::Fail, "the source does not build", &[])];
+        vec![check(CheckId::SubmissionBuild, "", Verdict::Fail, "the source does not build", &[])];
     entry.record.findings = vec![
         Finding::error("config_empty", "studentID is empty")
             .at("config.json")

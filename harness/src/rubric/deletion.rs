@@ -4,15 +4,15 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use super::Rules;
-use crate::evidence::{Evidence, Measure, RULES, Verdict};
+use crate::evidence::{CheckId, Evidence, Measure, RuleId, Verdict};
 
 /// A rule that decides, to be deleted.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum EvidenceRule {
     /// All checks of this name: evidence of a part, its fallback, a proof, a gate.
-    Check(String),
-    /// One of [`RULES`]: what judges inside checks.
-    Measure(&'static str),
+    Check(CheckId),
+    /// What judges inside checks.
+    Measure(RuleId),
     /// What is left unexplained on this path costs its `blame` part.
     Blame(String),
 }
@@ -25,15 +25,17 @@ impl EvidenceRule {
         let checks = named.flatten().chain(rules.gates.iter().map(|gate| &gate.check));
         let checks = checks.chain(rules.paths.values().map(|path| &path.proof));
         let blames = rules.paths.keys().map(|path| Self::Blame(path.clone()));
-        let measures = RULES.into_iter().map(Self::Measure);
-        checks.map(|id| Self::Check(id.clone())).chain(blames).chain(measures).collect()
+        let measures = RuleId::ALL.iter().map(|rule| Self::Measure(*rule));
+        checks.map(|id| Self::Check(*id)).chain(blames).chain(measures).collect()
     }
 
     /// Whether only a hand-in can break it: by its tree or its images.
     pub fn is_of_hand_ins(&self) -> bool {
         match self {
-            Self::Check(id) => id.starts_with("handed_in.") || id.starts_with("hand_in."),
-            Self::Measure(rule) => *rule == "image.size",
+            Self::Check(id) => {
+                id.name().starts_with("submission.") || id.name().starts_with("submitted.")
+            }
+            Self::Measure(rule) => *rule == RuleId::ImageSize,
             Self::Blame(_) => false,
         }
     }
@@ -47,9 +49,10 @@ impl EvidenceRule {
             Self::Measure(rule) => {
                 let failed = evidence.checks.iter_mut().filter(|c| c.verdict == Verdict::Fail);
                 for check in failed {
-                    let broken = |m: &&mut Measure| !m.passed && !m.rule.is_empty();
+                    let broken = |m: &&mut Measure| !m.passed && m.rule.is_some();
                     let mut broken = check.measures.iter_mut().filter(broken).peekable();
-                    if broken.peek().is_some() && broken.all(|measure| measure.rule == *rule) {
+                    if broken.peek().is_some() && broken.all(|measure| measure.rule == Some(*rule))
+                    {
                         (check.verdict, check.error) = (Verdict::Pass, 0.0);
                     }
                 }
@@ -98,21 +101,21 @@ mod tests {
     fn every_rule_of_hand_ins_is_needed() {
         let rules = rules();
         let all = EvidenceRule::all(&rules);
-        let pass = |id: &String| Check::new(id, "teapot", Verdict::Pass, "right");
+        let pass = |id: CheckId| Check::new(id, "teapot", Verdict::Pass, "right");
         let images = rules.parts.iter().flat_map(|part| &part.images_only);
         let gates = rules.gates.iter().map(|gate| &gate.check);
-        let images: BTreeSet<&String> = images.chain(gates).collect();
-        let mut right: Vec<Check> = images.iter().map(|id| pass(id)).collect();
+        let images: BTreeSet<CheckId> = images.chain(gates).copied().collect();
+        let mut right: Vec<Check> = images.iter().map(|id| pass(*id)).collect();
         right.push(Check::new(BUILD, "", Verdict::Fail, "does not build"));
         let mut other_size = right.clone();
         for check in other_size.iter_mut().filter(|check| check.id != BUILD) {
             check.verdict = Verdict::Fail;
-            check.measures = vec![Measure::at_most("image.size", "is 2x4", 1.0, 0.0)];
+            check.measures = vec![Measure::at_most(RuleId::ImageSize, "is 2x4", 1.0, 0.0)];
         }
         // Wrong in one respect alone.
-        let but = |id: &&String| {
+        let but = |id: &CheckId| {
             let mut checks = right.clone();
-            let own = checks.iter_mut().filter(|check| check.id == **id);
+            let own = checks.iter_mut().filter(|check| check.id == *id);
             own.for_each(|check| (check.verdict, check.error) = (Verdict::Fail, 1.0));
             checks
         };
@@ -134,19 +137,20 @@ mod tests {
     #[test]
     fn a_check_that_failed_by_one_rule_alone_passes_without_it() {
         let rules = rules();
-        let mut check = Check::new("image.offline", "cbox", Verdict::Fail, "wrong");
+        let mut check = Check::new(CheckId::ImageOffline, "cbox", Verdict::Fail, "wrong");
         let broken = |rule| Measure::at_most(rule, "", 2.0, 1.0);
-        check.measures = vec![broken("image.blob"), Measure::at_most("image.edge", "", 0.0, 1.0)];
+        check.measures =
+            vec![broken(RuleId::ImageBlob), Measure::at_most(RuleId::ImageEdge, "", 0.0, 1.0)];
         let verdict = |check: &Check, rule| {
             let evidence = Evidence { checks: vec![check.clone()] };
             EvidenceRule::Measure(rule).delete(&rules, &evidence).1.checks[0].verdict
         };
-        assert_eq!(verdict(&check, "image.blob"), Verdict::Pass);
-        assert_eq!(verdict(&check, "image.edge"), Verdict::Fail);
-        check.measures.push(broken("image.bias"));
-        assert_eq!(verdict(&check, "image.blob"), Verdict::Fail);
+        assert_eq!(verdict(&check, RuleId::ImageBlob), Verdict::Pass);
+        assert_eq!(verdict(&check, RuleId::ImageEdge), Verdict::Fail);
+        check.measures.push(broken(RuleId::ImageBias));
+        assert_eq!(verdict(&check, RuleId::ImageBlob), Verdict::Fail);
         // What failed without a measure (a crash) is no rule's matter.
         check.measures.clear();
-        assert_eq!(verdict(&check, "image.blob"), Verdict::Fail);
+        assert_eq!(verdict(&check, RuleId::ImageBlob), Verdict::Fail);
     }
 }

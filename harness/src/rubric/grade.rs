@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::rules::{Part, Rules};
-use crate::evidence::{Check, Evidence, Verdict};
+use crate::evidence::{Check, CheckId, Evidence, Verdict};
 
 /// The check that says whether the source was built; images alone count when it failed.
-pub const BUILD: &str = "hand_in.build";
+pub const BUILD: CheckId = CheckId::SubmissionBuild;
 
 /// The points of one hand-in.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,8 +75,8 @@ pub fn settle(rules: &Rules, evidence: &Evidence) -> Evidence {
     let mut settled = evidence.clone();
     for path in rules.paths.keys() {
         let own = |part: &&Part| part.path == *path;
-        let ids: BTreeSet<&String> =
-            rules.parts.iter().filter(own).flat_map(|part| &part.evidence).collect();
+        let ids: BTreeSet<CheckId> =
+            rules.parts.iter().filter(own).flat_map(|part| part.evidence.clone()).collect();
         let is_own = |check: &&Check| ids.contains(&check.id);
         let mut conventions: BTreeSet<&str> =
             evidence.checks.iter().filter(is_own).map(|check| check.convention.as_str()).collect();
@@ -86,8 +86,8 @@ pub fn settle(rules: &Rules, evidence: &Evidence) -> Evidence {
         }
         // What was settled before has no checks under the handout's left.
         let judged_under_another = |check: &&Check| !check.convention.is_empty() && is_own(check);
-        let hang: BTreeSet<&String> =
-            evidence.checks.iter().filter(judged_under_another).map(|check| &check.id).collect();
+        let hang: BTreeSet<CheckId> =
+            evidence.checks.iter().filter(judged_under_another).map(|check| check.id).collect();
         let handouts = |check: &Check| check.convention.is_empty() && hang.contains(&check.id);
         if evidence.checks.iter().any(handouts) {
             conventions.insert("");
@@ -98,13 +98,13 @@ pub fn settle(rules: &Rules, evidence: &Evidence) -> Evidence {
                 .checks
                 .iter()
                 .filter(|check| check.convention == convention)
-                .map(|check| (&check.id, &check.scene, check.held_back))
+                .map(|check| (check.id, &check.scene, check.held_back))
                 .collect();
             let keep = |check: &&Check| {
                 !ids.contains(&check.id)
                     || check.convention == convention
                     || (check.convention.is_empty()
-                        && !stands.contains(&(&check.id, &check.scene, check.held_back)))
+                        && !stands.contains(&(check.id, &check.scene, check.held_back)))
             };
             Evidence { checks: settled.checks.iter().filter(keep).cloned().collect() }
         };
@@ -198,7 +198,7 @@ fn grade_together(rules: &Rules, evidence: &Evidence) -> Grade {
     let mut ceiling = 1.0f64;
     for gate in &rules.gates {
         let failed = |check: &&Check| check.verdict == Verdict::Fail;
-        let hints = evidence.named(&gate.check).filter(failed).map(|check| &check.hint);
+        let hints = evidence.named(gate.check).filter(failed).map(|check| &check.hint);
         if let Some(hint) = hints.min() {
             ceiling = ceiling.min(gate.ceiling);
             remarks.push(if gate.private || hint.is_empty() {
@@ -248,10 +248,10 @@ fn round(points: f64) -> f64 {
 /// A part of a hand-in that builds.
 fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
     if let Some(path) = rules.paths.get(&part.path) {
-        let mut proof = evidence.named(&path.proof).peekable();
+        let mut proof = evidence.named(path.proof).peekable();
         if proof.peek().is_some() && proof.all(|check| check.verdict == Verdict::Pass) {
-            let own = |id: &&String| part.evidence.contains(id);
-            let unseen: Vec<String> = path.unseen.iter().filter(own).cloned().collect();
+            let own = |id: &&CheckId| part.evidence.contains(id);
+            let unseen: Vec<CheckId> = path.unseen.iter().filter(own).copied().collect();
             let unseen = by_checks(rules, evidence, &unseen, part.any_scene);
             if let Some(worth) = unseen.filter(|worth| worth.least < 1.0) {
                 return worth;
@@ -261,7 +261,7 @@ fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
                 most: 1.0,
                 unconfirmed: 0.0,
                 reason: format!("the {} images are right on every scene", part.path),
-                evidence: vec![path.proof.clone()],
+                evidence: vec![path.proof.to_string()],
             };
         }
     }
@@ -286,7 +286,7 @@ fn by_images(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
         );
     };
     let trust = rules.images_only_trust.as_ref().filter(|trust| {
-        let mut checks = evidence.named(&trust.check).peekable();
+        let mut checks = evidence.named(trust.check).peekable();
         part.images_only.contains(&trust.check)
             && checks.peek().is_some()
             && checks.all(|check| check.verdict == Verdict::Pass)
@@ -332,11 +332,16 @@ fn without_code(
 
 /// What the checks named `ids` say together: the worst counts, or the best where any scene will
 /// do. `None` when none of them judges.
-fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String], any_scene: bool) -> Option<Worth> {
+fn by_checks(
+    rules: &Rules,
+    evidence: &Evidence,
+    ids: &[CheckId],
+    any_scene: bool,
+) -> Option<Worth> {
     let judging = |check: &&Check| {
         matches!(check.verdict, Verdict::Pass | Verdict::Fail | Verdict::NotImplemented)
     };
-    let checks: Vec<&Check> = ids.iter().flat_map(|id| evidence.named(id)).collect();
+    let checks: Vec<&Check> = ids.iter().flat_map(|id| evidence.named(*id)).collect();
     if checks.iter().any(|check| check.verdict == Verdict::NotRun) {
         return None;
     }
@@ -347,8 +352,8 @@ fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String], any_scene: bool
         let words = |check: &Check| (check.name(), check.said().into_owned());
         fa.total_cmp(&fb).then_with(|| words(b).cmp(&words(a)))
     };
-    let of = |id: &String| judged.iter().copied().filter(|check| check.id == **id).collect();
-    let deciding = ids.iter().filter_map(|id| {
+    let of = |id: CheckId| judged.iter().copied().filter(|check| check.id == id).collect();
+    let deciding = ids.iter().filter_map(|&id| {
         let checks: Vec<&Check> = of(id);
         if any_scene { checks.into_iter().max_by(order) } else { checks.into_iter().min_by(order) }
     });
@@ -367,7 +372,7 @@ fn by_checks(rules: &Rules, evidence: &Evidence, ids: &[String], any_scene: bool
 
 fn unjudged(evidence: &Evidence, part: &Part) -> Worth {
     let ids = part.evidence.iter().chain(&part.fallback);
-    let checks: Vec<&Check> = ids.flat_map(|id| evidence.named(id)).collect();
+    let checks: Vec<&Check> = ids.flat_map(|id| evidence.named(*id)).collect();
     let silent = checks.iter().map(|check| check.said()).min();
     // Only what the machine could not ask is a range: the rest is the submission's own.
     let open = checks.is_empty() || checks.iter().any(|check| check.verdict == Verdict::NotRun);
@@ -386,7 +391,7 @@ fn unjudged(evidence: &Evidence, part: &Part) -> Worth {
 /// Rule 5: a wrong image that no part explains is paid by the path's `blame` part.
 fn blame_the_unexplained(rules: &Rules, evidence: &Evidence, worths: &mut [Worth]) {
     for (name, path) in &rules.paths {
-        let failed = evidence.named(&path.proof).filter(|check| check.verdict == Verdict::Fail);
+        let failed = evidence.named(path.proof).filter(|check| check.verdict == Verdict::Fail);
         let worst = failed.min_by(|a, b| {
             let (fa, fb) = (fraction(rules, a), fraction(rules, b));
             fa.total_cmp(&fb).then_with(|| (&a.scene, a.said()).cmp(&(&b.scene, b.said())))
@@ -423,7 +428,7 @@ fn fraction(rules: &Rules, check: &Check) -> f64 {
 
 impl Evidence {
     /// The checks with a name.
-    pub fn named<'a>(&'a self, id: &'a str) -> impl Iterator<Item = &'a Check> {
+    pub fn named(&self, id: CheckId) -> impl Iterator<Item = &Check> {
         self.checks.iter().filter(move |check| check.id == id)
     }
 }
@@ -432,7 +437,7 @@ impl Check {
     /// `id` or `id @ scene`.
     pub fn name(&self) -> String {
         if self.scene.is_empty() {
-            self.id.clone()
+            self.id.to_string()
         } else {
             format!("{} @ {}", self.id, self.scene)
         }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::Curve;
+use crate::evidence::CheckId;
 
 /// How evidence becomes points.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,7 +33,7 @@ pub struct Rules {
 pub struct Trust {
     /// The check: where all of this name pass, one at least, the images of a part that names it among its
     /// `images_only` are trusted.
-    pub check: String,
+    pub check: CheckId,
     /// Fraction of the part's points that they can earn then.
     pub ceiling: f64,
 }
@@ -42,7 +43,7 @@ pub struct Trust {
 #[serde(deny_unknown_fields)]
 pub struct Gate {
     /// The check that must not fail.
-    pub check: String,
+    pub check: CheckId,
     /// Fraction of the points that can be earned when it fails; with 1 it is only remarked on.
     pub ceiling: f64,
     /// Why, in the words of the handout.
@@ -57,10 +58,10 @@ pub struct Gate {
 #[serde(deny_unknown_fields)]
 pub struct PathRule {
     /// The check that, passed on every scene, earns all parts of this path in full.
-    pub proof: String,
+    pub proof: CheckId,
     /// The checks that a right image does not stand for: what they say of a part counts all the same.
     #[serde(default)]
-    pub unseen: Vec<String>,
+    pub unseen: Vec<CheckId>,
     /// The part that pays when the proof fails and no part's own evidence says why.
     pub blame: String,
 }
@@ -82,20 +83,20 @@ pub struct Part {
     #[serde(default)]
     pub path: String,
     /// The checks that isolate it; the worst scene counts.
-    pub evidence: Vec<String>,
+    pub evidence: Vec<CheckId>,
     /// Whether the best scene counts instead: the student was free to choose one.
     #[serde(default)]
     pub any_scene: bool,
     /// The checks that decide when the evidence does not apply.
     #[serde(default)]
-    pub fallback: Vec<String>,
+    pub fallback: Vec<CheckId>,
     /// The files of the template's `src` that it is done in, for telling what is lost with one that
     /// does not build.
     #[serde(default)]
     pub files: Vec<String>,
     /// The checks on the images handed in, for a hand-in that does not build.
     #[serde(default)]
-    pub images_only: Vec<String>,
+    pub images_only: Vec<CheckId>,
 }
 
 impl Rules {
@@ -132,6 +133,29 @@ impl Rules {
             }
         }
         None
+    }
+
+    /// What a check counts for, in words: `1.3`, `fallback of 2.3`, `gate`...; empty when for nothing.
+    pub fn role(&self, check: CheckId) -> String {
+        let named = |list: fn(&Part) -> &Vec<CheckId>| {
+            let own = self.parts.iter().filter(|part| list(part).contains(&check));
+            own.map(|part| part.id.as_str()).collect::<Vec<_>>().join(", ")
+        };
+        let proves = self.paths.iter().filter(|(_, path)| path.proof == check);
+        let mut roles: Vec<String> = proves.map(|(name, _)| format!("proof of {name}")).collect();
+        for (role, parts) in [
+            ("", named(|part| &part.evidence)),
+            ("fallback of ", named(|part| &part.fallback)),
+            ("images alone of ", named(|part| &part.images_only)),
+        ] {
+            if !parts.is_empty() {
+                roles.push(format!("{role}{parts}"));
+            }
+        }
+        if let Some(gate) = self.gates.iter().find(|gate| gate.check == check) {
+            roles.push(if gate.ceiling < 1.0 { "gate" } else { "remark" }.to_owned());
+        }
+        roles.join("; ")
     }
 
     /// The points of all parts that are no bonus.

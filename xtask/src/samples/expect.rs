@@ -115,7 +115,7 @@ mod tests {
 
     fn rules() -> Rules {
         let text = r#"{"curve": [[0, 0.9], [1, 0]], "images_only_ceiling": 0.5, "gates": [], "paths": {},
-            "parts": [{"id": "1.1", "title": "", "points": 5, "evidence": ["a"]}]}"#;
+            "parts": [{"id": "1.1", "title": "", "points": 5, "evidence": ["bsdf.diffuse"]}]}"#;
         serde_json::from_str(text).unwrap()
     }
 
@@ -123,12 +123,12 @@ mod tests {
     fn the_public_total_leaves_held_back_scenes_out() {
         let check = |held_back: bool, verdict: &str| {
             serde_json::json!({
-                "id": "a", "scene": "s", "verdict": verdict, "error": 1.0, "summary": "",
+                "id": "bsdf.diffuse", "scene": "s", "verdict": verdict, "error": 1.0, "summary": "",
                 "held_back": held_back, "hint": "", "measures": [], "pictures": []
             })
         };
         let build = serde_json::json!({
-            "id": "hand_in.build", "scene": "", "held_back": false, "verdict": "pass", "error": 0.0, "summary": "",
+            "id": "submission.build", "scene": "", "held_back": false, "verdict": "pass", "error": 0.0, "summary": "",
             "hint": "", "measures": [], "pictures": []
         });
         let checks = [build, check(false, "pass"), check(true, "fail")];

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result};
 use umbra::diagnosis::{Catalogue, Class, RightVariant};
+use umbra::evidence::CheckId;
 use umbra::grading::RenderPath;
 
 /// Samples per pixel of right renderers; none for what the scenes ask for.
@@ -69,7 +70,7 @@ pub struct Subject {
     /// The parts in which it must lose points.
     pub parts: Vec<String>,
     /// The findings that it must lead to.
-    pub findings: Vec<String>,
+    pub findings: Vec<CheckId>,
     /// Whether the diagnosis must name it.
     pub named: bool,
     /// What the first part's loss must be like, where that is known.

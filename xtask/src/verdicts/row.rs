@@ -2,7 +2,7 @@
 
 use umbra::assignment::Assignment;
 use umbra::diagnosis::Diagnosis;
-use umbra::evidence::{Check, Evidence, Verdict};
+use umbra::evidence::{Check, Evidence, Measure, Verdict};
 use umbra::rubric::Grade;
 
 use super::choice::Subject;
@@ -51,7 +51,7 @@ impl Row {
         }
         let fails = |check: &Check| check.verdict == Verdict::Fail;
         let declared = self.subject.findings.iter().filter(|_| self.all_shown);
-        let unfound = declared.filter(|id| !self.evidence.named(id).any(fails));
+        let unfound = declared.filter(|id| !self.evidence.named(**id).any(fails));
         complaints.extend(unfound.map(|id| format!("{id} finds nothing")));
         complaints.join("; ")
     }
@@ -123,8 +123,9 @@ impl Row {
                 println!("    {}: {} [{}]", part.id, part.reason, part.evidence.join(", "));
                 let checks = self.evidence.checks.iter();
                 for check in checks.filter(|check| part.evidence.contains(&check.name())) {
-                    let values = check.measures.iter().filter(|m| !m.passed || m.rule.is_empty());
-                    let values = values.map(|m| format!("{} {:.4} ({})", m.rule, m.value, m.name));
+                    let values = check.measures.iter().filter(|m| !m.passed || m.rule.is_none());
+                    let rule = |m: &Measure| m.rule.map_or("", |rule| rule.name());
+                    let values = values.map(|m| format!("{} {:.4} ({})", rule(m), m.value, m.name));
                     let values = values.collect::<Vec<_>>().join("; ");
                     println!("        {} error {:.4}: {values}", check.name(), check.error);
                 }

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use umbra::diagnosis::{Catalogue, KnownMistake};
-use umbra::evidence::{Check, Verdict};
+use umbra::evidence::{Check, CheckId, Verdict};
 
 use super::choice::Subject;
 use super::figures::Figure;
@@ -156,7 +156,7 @@ fn gains(row: &Row, alone: &[&Row]) -> Vec<String> {
 /// Whether the mistakes mend each other: their image is nearer to the right one than with any of
 /// them left out, on some path.
 fn mends(row: &Row, alone: &[&Row]) -> bool {
-    ["image.offline", "image.realtime", "bonus.image"].into_iter().any(|image| {
+    [CheckId::ImageOffline, CheckId::ImageRealtime, CheckId::BonusImage].into_iter().any(|image| {
         let together = distance(row, image);
         let alone =
             alone.iter().map(|single| distance(single, image)).fold(f64::INFINITY, f64::min);
@@ -165,7 +165,7 @@ fn mends(row: &Row, alone: &[&Row]) -> bool {
 }
 
 /// How far a renderer's images are from the right ones, all scenes together.
-fn distance(row: &Row, image: &str) -> f64 {
+fn distance(row: &Row, image: CheckId) -> f64 {
     let error = |check: &Check| if check.verdict == Verdict::Pass { 0.0 } else { check.error };
     row.evidence.named(image).map(error).sum()
 }
@@ -179,7 +179,7 @@ mod tests {
 
     fn row(names: &[&str], points: f64, error: f64) -> Row {
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
-        let check = Check { error, ..Check::new("image.offline", "s", Verdict::Fail, "") };
+        let check = Check { error, ..Check::new(CheckId::ImageOffline, "s", Verdict::Fail, "") };
         let part = PartGrade {
             id: "1.3".into(),
             title: String::new(),

@@ -5,10 +5,10 @@ use basecode::Frame;
 use super::{RayBatch, STRAY_FRACTION};
 use crate::evidence::convention::Convention;
 use crate::evidence::price::Class;
-use crate::evidence::{Check, Measure, Verdict};
+use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict};
 
 /// The check.
-pub const ID: &str = "radiance.material";
+pub const ID: CheckId = CheckId::RadianceMaterial;
 /// Largest relative difference of a right answer: frames in f32, raised to high exponents.
 const RELATIVE: f64 = 0.02;
 /// The same, as a fraction of the batch's mean radiance.
@@ -52,8 +52,12 @@ pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]])
         return not_judged("there is no convention");
     };
     let name = "rays that are not what their surface's own BSDF makes of the light (fraction)";
-    let measure =
-        Measure::at_most("rays.material", name, wrong as f64 / own.len() as f64, STRAY_FRACTION);
+    let measure = Measure::at_most(
+        RuleId::RaysMaterial,
+        name,
+        wrong as f64 / own.len() as f64,
+        STRAY_FRACTION,
+    );
     let check = match first.filter(|_| !measure.passed) {
         None => {
             let summary = format!("the BSDF of the surface is asked along {} rays", own.len());
@@ -91,12 +95,12 @@ fn expected(batch: &RayBatch, ray: usize, own: [f32; 3], convention: &Convention
 /// Where the light is wrong, the material is not judged: on any scene, since light and material are
 /// the integrator's on all.
 pub fn set_apart(checks: &mut [Check]) {
-    let of = |id: &str, verdict| {
+    let of = |id: CheckId, verdict| {
         checks
             .iter()
             .any(|check| check.id == id && check.verdict == verdict && check.convention.is_empty())
     };
-    let light_is_wrong = of("radiance.lit", Verdict::Fail);
+    let light_is_wrong = of(CheckId::RadianceLit, Verdict::Fail);
     if !light_is_wrong {
         return;
     }

@@ -4,7 +4,7 @@ use basecode::{Ray, Vec3};
 
 use super::{RELATIVE, RayBatch, STRAY_FRACTION};
 use crate::evidence::price::{self, Class, Price};
-use crate::evidence::{Check, Measure, Verdict};
+use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::expected::SurfacePoint;
 
 /// Nothing is in shadow, or nothing lit, where more of the rays than this are wrong.
@@ -31,7 +31,7 @@ pub fn judge_shadows(
     shaded: (&[[f32; 3]], &[[f32; 3]]),
     occluders: &Occluders,
 ) -> Check {
-    let id = "shadow.rays";
+    let id = CheckId::ShadowRays;
     let dark = batch.points.len() - batch.lit;
     if dark == 0 || batch.lit == 0 {
         let summary = "the scene has no ray in full light, or none in full shadow, away from edges";
@@ -79,15 +79,15 @@ pub fn judge_shadows(
     let changed = with.iter().zip(without).filter(|(with, without)| with != without).count();
     let changed = changed as f64 / batch.points.len() as f64;
     let measures = vec![
-        Measure::at_most("", SWITCHED, changed, 1.0),
+        Measure::at_most(None, SWITCHED, changed, 1.0),
         Measure::at_most(
-            "shadow.lit",
+            RuleId::ShadowLit,
             "lit rays that are not lit (fraction)",
             lit_fraction,
             STRAY_FRACTION,
         ),
         Measure::at_most(
-            "shadow.dark",
+            RuleId::ShadowDark,
             "shadowed rays that are not dark (fraction)",
             dark_fraction,
             STRAY_FRACTION,
@@ -333,17 +333,19 @@ const LIGHT_ELSEWHERE: f64 = 0.9;
 /// there is another scene whose radiance is right and whose shadows are judged.
 pub fn set_apart(checks: &mut [Check]) {
     charge_what_is_never_tested(checks);
-    let is = |check: &Check, id: &str, verdict| check.id == id && check.verdict == verdict;
+    let is = |check: &Check, id: CheckId, verdict| check.id == id && check.verdict == verdict;
     let nearly_all = |check: &&Check| check.measures.iter().any(|m| m.value > LIGHT_ELSEWHERE);
     let named =
         |checks: Vec<&Check>| checks.iter().map(|check| check.scene.clone()).collect::<Vec<_>>();
-    let radiance = |verdict| checks.iter().filter(move |check| is(check, "radiance.lit", verdict));
+    let radiance =
+        |verdict| checks.iter().filter(move |check| is(check, CheckId::RadianceLit, verdict));
     let right = named(radiance(Verdict::Pass).collect());
     let mut wrong = named(radiance(Verdict::Fail).filter(nearly_all).collect());
     // Right under a convention is right.
     wrong.retain(|scene| !right.contains(scene));
     let judged = |check: &Check| {
-        is(check, "shadow.rays", Verdict::Pass) || is(check, "shadow.rays", Verdict::Fail)
+        is(check, CheckId::ShadowRays, Verdict::Pass)
+            || is(check, CheckId::ShadowRays, Verdict::Fail)
     };
     let switched = |check: &Check| {
         let of = check.measures.iter().find(|measure| measure.name == SWITCHED);
@@ -352,7 +354,7 @@ pub fn set_apart(checks: &mut [Check]) {
     // Black on lit rays, with shadows and without, by a renderer that obeys the switch elsewhere.
     let obeys = checks.iter().any(|check| judged(check) && switched(check) > 0.0);
     let no_dark_is_lit = |check: &Check| check.measures.last().is_some_and(|dark| dark.passed);
-    for check in checks.iter_mut().filter(|check| is(check, "shadow.rays", Verdict::Fail)) {
+    for check in checks.iter_mut().filter(|check| is(check, CheckId::ShadowRays, Verdict::Fail)) {
         if obeys && switched(check) == 0.0 && no_dark_is_lit(check) {
             check.verdict = Verdict::NotJudged;
             check.summary =
@@ -362,7 +364,7 @@ pub fn set_apart(checks: &mut [Check]) {
     if !checks.iter().any(|check| judged(check) && right.contains(&check.scene)) {
         return;
     }
-    for check in checks.iter_mut().filter(|check| is(check, "shadow.rays", Verdict::Fail)) {
+    for check in checks.iter_mut().filter(|check| is(check, CheckId::ShadowRays, Verdict::Fail)) {
         if wrong.contains(&check.scene) {
             check.verdict = Verdict::NotJudged;
             check.summary = format!(
@@ -377,8 +379,9 @@ pub fn set_apart(checks: &mut [Check]) {
 /// is in shadow on any scene, or nothing lit, no slip explains it.
 fn charge_what_is_never_tested(checks: &mut [Check]) {
     let fractions = |check: &Check| {
-        let of = |rule: &str| check.measures.iter().find(|measure| measure.rule == rule);
-        (check.id == "shadow.rays").then_some((of("shadow.lit")?.value, of("shadow.dark")?.value))
+        let of = |rule| check.measures.iter().find(|measure| measure.rule == Some(rule));
+        (check.id == CheckId::ShadowRays)
+            .then_some((of(RuleId::ShadowLit)?.value, of(RuleId::ShadowDark)?.value))
     };
     let all: Vec<(f64, f64)> = checks.iter().filter_map(fractions).collect();
     let all_lit = all.iter().all(|(lit, dark)| *dark > NEARLY_ALL && *lit <= NEARLY_ALL);

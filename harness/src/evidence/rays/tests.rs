@@ -3,7 +3,7 @@ use basecode::Vec3;
 use super::shadows::judge_shadows;
 use super::*;
 use crate::evidence::convention::Convention;
-use crate::evidence::{Check, Measure, Verdict, price};
+use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict, price};
 use crate::expected::Sight;
 
 /// Forty lit and twenty dark rays at various distances and angles.
@@ -145,7 +145,7 @@ fn visibility_is_judged_apart_from_radiance() {
 
 #[test]
 fn shadows_are_judged_where_radiance_is_right() {
-    let check = |id: &str, scene: &str, verdict| Check::new(id, scene, verdict, "");
+    let check = |id: CheckId, scene: &str, verdict| Check::new(id, scene, verdict, "");
     let verdicts = |checks: &[Check]| {
         let mut checks = checks.to_vec();
         set_apart(&mut checks);
@@ -153,18 +153,23 @@ fn shadows_are_judged_where_radiance_is_right() {
     };
     let (pass, fail) = (Verdict::Pass, Verdict::Fail);
     let wrong = |fraction| {
-        let measures =
-            vec![Measure::at_most("rays.lit", "rays wrong (fraction)", fraction, STRAY_FRACTION)];
-        Check { measures, ..check("radiance.lit", "emitter", fail) }
+        let measures = vec![Measure::at_most(
+            RuleId::RaysLit,
+            "rays wrong (fraction)",
+            fraction,
+            STRAY_FRACTION,
+        )];
+        Check { measures, ..check(CheckId::RadianceLit, "emitter", fail) }
     };
-    let emitter = [wrong(0.99), check("shadow.rays", "emitter", fail)];
+    let emitter = [wrong(0.99), check(CheckId::ShadowRays, "emitter", fail)];
     // Wrong everywhere: shadows are judged all the same.
     assert_eq!(verdicts(&emitter), [fail, fail]);
-    let right = [check("radiance.lit", "cbox", pass), check("shadow.rays", "cbox", fail)];
+    let right =
+        [check(CheckId::RadianceLit, "cbox", pass), check(CheckId::ShadowRays, "cbox", fail)];
     let both = [emitter.as_slice(), right.as_slice()].concat();
     assert_eq!(verdicts(&both), [fail, Verdict::NotJudged, pass, fail]);
     // A scene without shadows is no other scene to judge them on.
-    let open = [emitter.as_slice(), &[check("radiance.lit", "open", pass)]].concat();
+    let open = [emitter.as_slice(), &[check(CheckId::RadianceLit, "open", pass)]].concat();
     assert_eq!(verdicts(&open), [fail, fail, pass]);
     // Wrong on some surfaces alone: the light stands where it should.
     let some = [&[wrong(0.3)], &emitter[1..], right.as_slice()].concat();

@@ -4,7 +4,7 @@ use super::{RELATIVE, RayBatch, STRAY_FRACTION};
 use crate::evidence::convention::Convention;
 use crate::evidence::price::{self, Answers, Change, Class};
 use crate::evidence::shading::Shading;
-use crate::evidence::{Check, Measure, Verdict};
+use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::imaging::ratio::ratio_name;
 
 /// The answers to a batch under one witness, shadows off.
@@ -40,7 +40,7 @@ pub fn judge_unshadowed(
     convention: &Convention,
     changes: &[Change],
 ) -> Check {
-    let id = "radiance.lit";
+    let id = CheckId::RadianceLit;
     let black = batch.rays.len() - batch.points.len();
     if batch.lit + black == 0 || answers.is_empty() {
         let summary = "the scene has no lit ray away from edges".to_owned();
@@ -52,7 +52,7 @@ pub fn judge_unshadowed(
     for answer in answers.iter().filter(|_| batch.lit > 0) {
         let difference = Difference::of(batch, answer, &right);
         measures.push(Measure::at_most(
-            "rays.lit",
+            RuleId::RaysLit,
             format!("rays wrong under the witness BSDF \"{}\" (fraction)", answer.witness),
             difference.wrong,
             STRAY_FRACTION,
@@ -67,7 +67,7 @@ pub fn judge_unshadowed(
     if black > 0 {
         let fraction = shining as f64 / black as f64;
         let name = "rays that must be black and are not (fraction)";
-        measures.push(Measure::at_most("rays.black", name, fraction, STRAY_FRACTION));
+        measures.push(Measure::at_most(RuleId::RaysBlack, name, fraction, STRAY_FRACTION));
     }
     let passed = measures.iter().all(|measure| measure.passed);
     let mut check = match worst {

@@ -4,6 +4,7 @@ use super::super::number::{count, due, is_range, of_part, points, range};
 use super::super::{Entry, HTML_FILE, INSTRUCTOR, ReportError, Sheet};
 use super::markup::Html;
 use super::{SORT, begin, class, end, part_class};
+use crate::evidence::CheckId;
 use crate::grading::Conditions;
 use crate::intake::Severity;
 
@@ -106,9 +107,9 @@ fn parts(html: &mut Html, sheet: &Sheet) {
     for part in &sheet.rules.parts {
         html.raw("<tr><th scope=\"row\">").text(&part.id).raw("</th><td>").text(&part.title);
         html.raw("</td><td class=\"number\">").raw(if part.bonus { "+" } else { "" });
-        html.text(&points(part.points)).raw("</td><td>").text(&part.evidence.join(", "));
+        html.text(&points(part.points)).raw("</td><td>").text(&names(&part.evidence));
         if !part.fallback.is_empty() {
-            html.raw("; when they do not apply: ").text(&part.fallback.join(", "));
+            html.raw("; when they do not apply: ").text(&names(&part.fallback));
         }
         html.raw("</td></tr>\n");
     }
@@ -150,4 +151,9 @@ fn conditions(html: &mut Html, sheet: &Sheet) {
         html.raw("</code> are for the instructor.</p>\n");
     }
     html.raw("</section>\n");
+}
+/// Names of checks, for a cell of the table.
+fn names(checks: &[CheckId]) -> String {
+    let names: Vec<&str> = checks.iter().map(|check| check.name()).collect();
+    names.join(", ")
 }

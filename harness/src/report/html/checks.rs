@@ -46,7 +46,7 @@ fn folded(
 fn article(html: &mut Html, place: usize, check: &Check, public_pictures: &str) {
     html.raw("<article id=\"check-").show(place).raw("\">\n<h3>");
     badge(html, check.verdict);
-    html.raw(" <code>").text(&check.id).raw("</code>");
+    html.raw(" <code>").text(check.id.name()).raw("</code>");
     if !check.scene.is_empty() {
         html.raw(" <span class=\"scene\">on ").text(&check.scene).raw("</span>");
     }

@@ -120,7 +120,7 @@ fn parts(html: &mut Html, Entry { record, grade }: &Entry, public_pictures: &str
 fn decided_by(html: &mut Html, part: &PartGrade, all: &[Check]) {
     for (index, name) in part.evidence.iter().enumerate() {
         html.raw(if index == 0 { "<p class=\"decided\">Decided by " } else { ", " });
-        let place = all.iter().position(|check| check.name() == *name || check.id == *name);
+        let place = all.iter().position(|check| check.name() == *name || check.id.name() == name);
         match place {
             Some(place) => {
                 html.raw("<a href=\"#check-").show(place).raw("\">").text(name).raw("</a>");
@@ -138,7 +138,8 @@ fn mark<'a>(part: &'a PartGrade, entry: &Entry) -> Option<(f64, &'a str)> {
     let decided = |name: String, id: &str| part.evidence.iter().any(|e| *e == name || e == id);
     let checks = entry.record.evidence.checks.iter();
     let failed = checks.filter(|check| check.verdict == Verdict::Fail);
-    let errors = failed.filter(|check| decided(check.name(), &check.id)).map(|check| check.error);
+    let errors =
+        failed.filter(|check| decided(check.name(), check.id.name())).map(|check| check.error);
     let worst = errors.filter(|error| error.is_finite()).max_by(f64::total_cmp)?;
     (part.points < part.out_of).then_some((worst, part.id.as_str()))
 }

@@ -94,7 +94,8 @@ fn next(sheet: &Sheet, entry: &Entry, closing: &Closing) -> String {
         };
     }
     // Images that are not what the code draws.
-    let stale = checks.iter().filter(failed).find(|check| check.id.starts_with("handed_in."));
+    let stale =
+        checks.iter().filter(failed).find(|check| check.id.name().starts_with("submitted."));
     let error = entry.record.findings.iter().find(|found| found.severity == Severity::Error);
     let ready = match (error, stale) {
         (Some(finding), _) => {

@@ -6,7 +6,7 @@ use super::super::number::{
 };
 use super::super::{Entry, Sheet};
 use super::page::{Look, Page, Style, columns, left};
-use crate::evidence::{Check, Measure, Verdict};
+use crate::evidence::{Check, CheckId, Measure, Verdict};
 use crate::intake::{Finding, Severity};
 use crate::rubric::{BUILD, PartGrade};
 
@@ -119,16 +119,16 @@ fn noticed(page: &mut Page, sheet: &Sheet, Entry { record, .. }: &Entry) {
     };
     let wanted =
         |check: &&Check| check.verdict == Verdict::Fail && !of_part(check) && !image_alone(check);
-    let mut told: Vec<&str> = Vec::new();
+    let mut told: Vec<CheckId> = Vec::new();
     for check in record.evidence.checks.iter().filter(wanted) {
         // Once for each kind: the first scene stands for the others.
-        if told.contains(&check.id.as_str()) {
+        if told.contains(&check.id) {
             continue;
         }
         if told.is_empty() {
             heading(page, "to be noticed, without cost");
         }
-        told.push(&check.id);
+        told.push(check.id);
         page.wrapped(&[(Style::Open, "  ")], Style::Plain, &plain(&check.summary));
         if !check.hint.is_empty() {
             page.wrapped(&[(Style::Heading, "    hint: ")], Style::Plain, &check.hint);

@@ -2,10 +2,12 @@
 
 mod closing;
 mod detail;
+mod explain;
 mod page;
 mod table;
 
 pub use closing::{Closing, closing};
 pub use detail::detail;
+pub use explain::{explain, explain_all};
 pub use page::Look;
 pub use table::{in_a_line, table};

@@ -1,0 +1,123 @@
+//! `umbra explain`: what a check, a rule or a part of the assignment is about.
+
+use super::page::{Look, Page, Style};
+use crate::evidence::{CheckId, RuleId};
+use crate::rubric::{Part, Rules};
+
+/// Explains what has this name: a check, a rule, or a part of the assignment.
+///
+/// # Errors
+/// When nothing has the name; the message names what is most alike.
+pub fn explain(rules: &Rules, name: &str, look: Look) -> Result<String, String> {
+    let mut page = Page::new(look.width, look.colours);
+    if let Some(part) = rules.parts.iter().find(|part| part.id == name) {
+        explain_part(&mut page, rules, part);
+        return Ok(page.finish());
+    }
+    match (name.parse::<CheckId>(), name.parse::<RuleId>()) {
+        (Ok(check), _) => explain_check(&mut page, rules, check),
+        (Err(_), Ok(rule)) => {
+            page.line(&[(Style::Heading, rule.name())]);
+            page.wrapped(&[], Style::Plain, "A rule: a bound on one measured value. It can fail:");
+            for &check in CheckId::ALL.iter().filter(|check| check.info().rules.contains(&rule)) {
+                page.gap();
+                explain_check(&mut page, rules, check);
+            }
+        }
+        (Err(error), _) => return Err(error),
+    }
+    Ok(page.finish())
+}
+
+/// All checks, a line each.
+pub fn explain_all(rules: &Rules, look: Look) -> String {
+    let mut page = Page::new(look.width, look.colours);
+    page.wrapped(&[], Style::Plain, "`umbra explain NAME` says more of a check, a rule or a part.");
+    page.gap();
+    for &check in CheckId::ALL {
+        let name = format!("{:<28}", check.name());
+        let question = check.info().question;
+        let end = [". ", "? "].into_iter().filter_map(|end| question.find(end)).min();
+        let first = end.map_or(question, |end| &question[..=end]);
+        let role = rules.role(check);
+        let text = format!("[{}] {first}", if role.is_empty() { "no points" } else { &role });
+        page.wrapped(&[(Style::Heading, &name)], Style::Plain, &text);
+    }
+    page.finish()
+}
+
+fn explain_part(page: &mut Page, rules: &Rules, part: &Part) {
+    let worth = if part.bonus { "points on top" } else { "points" };
+    page.line(&[(Style::Heading, &format!("{} {}", part.id, part.title))]);
+    page.wrapped(&[], Style::Plain, &format!("{} {worth}.", part.points));
+    if let Some(path) = rules.paths.get(&part.path) {
+        let text = format!("All of them where `{}` passes on every scene. Else:", path.proof);
+        page.wrapped(&[], Style::Plain, &text);
+    }
+    for &check in part.evidence.iter().chain(&part.fallback) {
+        page.gap();
+        explain_check(page, rules, check);
+    }
+    if !part.images_only.is_empty() {
+        let names: Vec<_> = part.images_only.iter().map(|check| check.name()).collect();
+        page.gap();
+        let text = format!("Where there is no code to judge: {}.", names.join(", "));
+        page.wrapped(&[], Style::Plain, &text);
+    }
+}
+
+fn explain_check(page: &mut Page, rules: &Rules, check: CheckId) {
+    let info = check.info();
+    let role = rules.role(check);
+    let role = if role.is_empty() { String::new() } else { format!(" ({role})") };
+    page.line(&[(Style::Heading, check.name()), (Style::Plain, &role)]);
+    let plain = |text: &str| text.replace(['`', '*'], "");
+    page.wrapped(&[(Style::Plain, "  ")], Style::Plain, &plain(info.question));
+    let names: Vec<_> = info.rules.iter().map(|rule| rule.name()).collect();
+    let rules = names.join(", ");
+    for (title, text) in [("error", info.error), ("bound", info.bound), ("rules", &rules)] {
+        if !text.is_empty() {
+            page.wrapped(&[(Style::Open, &format!("  {title}  "))], Style::Plain, &plain(text));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assignment::Assignment;
+
+    fn rules() -> Rules {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+        Assignment::load(root).unwrap().rules
+    }
+
+    const LOOK: Look = Look { width: 80, colours: false };
+
+    #[test]
+    fn checks_rules_and_parts_are_explained_and_a_slip_is_told() {
+        let of = |name| explain(&rules(), name, LOOK);
+        let check = of("shadow.rays").unwrap();
+        assert!(check.starts_with("shadow.rays (1.4)\n  Asks for radiance"), "{check}");
+        assert!(check.contains("  rules  shadow.lit, shadow.dark"), "{check}");
+        // Every check that the rule can fail.
+        let rule = of("image.blob").unwrap();
+        assert!(rule.contains("image.offline (") && rule.contains("stage.phong (2.4)"), "{rule}");
+        let part = of("1.3").unwrap();
+        assert!(part.contains("20 points.") && part.contains("\nloop.samples (1.3)"), "{part}");
+        assert_eq!(
+            of("shadow.ray").unwrap_err(),
+            "there is no check \"shadow.ray\"; did you mean \"shadow.rays\"?"
+        );
+    }
+
+    #[test]
+    fn all_checks_are_listed_once() {
+        let list = explain_all(&rules(), LOOK);
+        for check in CheckId::ALL {
+            let own = list.lines().filter(|line| line.starts_with(&format!("{check} "))).count();
+            assert_eq!(own, 1, "{check}");
+        }
+        assert!(list.lines().all(|line| line.len() <= 80), "{list}");
+    }
+}
