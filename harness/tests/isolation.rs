@@ -251,7 +251,7 @@ fn an_ordinary_user_is_isolated_as_well() {
     let output = tests.args(["--skip", "a_build"]).uid(65533).gid(65533).output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{said}");
-    assert!(said.contains("test result: ok. 7 passed"), "{said}");
+    assert!(said.contains("test result: ok. 8 passed"), "{said}");
 }
 
 #[test]
@@ -319,25 +319,17 @@ fn messages_name_no_path_of_the_host() {
     }
 }
 
-#[test]
-fn the_reference_draws_the_same_bits_inside_and_outside() {
-    let house = House::new();
-    let scene = |name: &str| {
-        let path = workspace().join("scenes/a2/cbox/tinyrender").join(name);
-        assert!(path.is_file(), "{}", path.display());
-        SceneRef { path, options: String::new() }
-    };
-    let offline = Request::RenderOffline {
-        scene: scene("cbox_simple_offline.toml"),
-        width: 40,
-        height: 30,
-        spp: 2,
-        seed: 7,
-        threads: 2,
-        shadows: true,
-    };
-    let realtime = |kind| Request::RenderRealtime {
-        scene: scene("cbox_simple_realtime.toml"),
+/// A scene file of the Cornell box.
+fn cornell_box(name: &str) -> SceneRef {
+    let path = workspace().join("scenes/a2/cbox/tinyrender").join(name);
+    assert!(path.is_file(), "{}", path.display());
+    SceneRef { path, options: String::new() }
+}
+
+/// A small frame of it.
+fn realtime(kind: AdapterKind) -> Request {
+    Request::RenderRealtime {
+        scene: cornell_box("cbox_simple_realtime.toml"),
         width: 40,
         height: 30,
         shadow_map: false,
@@ -350,6 +342,53 @@ fn the_reference_draws_the_same_bits_inside_and_outside() {
             fov_y_deg: 20.0,
             matrices: umbra::worker::Matrices::Usual,
         }],
+    }
+}
+
+#[test]
+fn shaders_of_a_trusted_worker_serve_others_and_nobody_changes_them() {
+    let house = House::new();
+    let left = house.dir.path().join("shaders");
+    std::fs::create_dir(&left).unwrap();
+    let contents = || {
+        let mut files = umbra::files::files_below(&left).unwrap();
+        files.sort();
+        let content = |file: &PathBuf| (file.clone(), std::fs::read(file).unwrap());
+        files.iter().map(content).collect::<Vec<_>>()
+    };
+    let draw = |supervisor: &Supervisor| {
+        let report = run(supervisor, &reference(), vec![realtime(AdapterKind::Software)]);
+        match &report.outcomes[0] {
+            Outcome::Done(answer) => answer.values.clone(),
+            other => panic!("{other:?}"),
+        }
+    };
+    let full = house.isolated(Layers::full());
+    let first = draw(&Supervisor { leaves_shaders: Some(left.clone()), ..full.clone() });
+    let compiled = contents();
+    assert!(!compiled.is_empty(), "nothing was left");
+    // A worker that is given them compiles none again, and leaves those alone that it was given.
+    let again = house.dir.path().join("again");
+    std::fs::create_dir(&again).unwrap();
+    let given = Supervisor { shaders: vec![left.clone()], ..full };
+    let second = draw(&Supervisor { leaves_shaders: Some(again.clone()), ..given });
+    assert!(first == second, "compiled shaders change a picture");
+    assert!(contents() == compiled, "a worker changed what it was given");
+    let names = |folder: &Path| umbra::files::files_below(folder).unwrap().len();
+    assert_eq!(names(&again), names(&left), "some were compiled again, under other names");
+}
+
+#[test]
+fn the_reference_draws_the_same_bits_inside_and_outside() {
+    let house = House::new();
+    let offline = Request::RenderOffline {
+        scene: cornell_box("cbox_simple_offline.toml"),
+        width: 40,
+        height: 30,
+        spp: 2,
+        seed: 7,
+        threads: 2,
+        shadows: true,
     };
     let requests = [
         ("cores", offline),

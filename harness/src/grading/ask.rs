@@ -28,7 +28,7 @@ const NOT_ASKED: f64 = 0.9999;
 /// What it takes to run one hand-in.
 pub struct Asker<'a> {
     /// Starts workers.
-    pub supervisor: &'a Supervisor,
+    pub supervisor: Supervisor,
     /// What each may use.
     pub limits: Limits,
     /// Ctrl-C.

@@ -49,6 +49,13 @@ pub fn named(texts: [String; 3]) -> Vec<Stage> {
     named.map(|(&name, text)| Stage { name: name.to_owned(), text }).collect()
 }
 
+/// Draws once what workers draw again and again, so that their shaders are compiled: with a trusted
+/// renderer, or by Umbra's neutral pass with these stages. Why it fails is told when it counts.
+pub fn compile_shaders(asker: &Asker, renderer: Option<&Path>, mut frames: Vec<Frame>) {
+    frames.iter_mut().for_each(|frame| frame.size = (16, 16));
+    draw_each(asker, renderer, &frames);
+}
+
 /// Draws one frame in a worker of its own.
 pub fn draw(asker: &Asker, plugin: Option<&Path>, frame: &Frame) -> Outcome {
     draw_each(asker, plugin, std::slice::from_ref(frame)).pop().unwrap_or_else(|| {

@@ -28,6 +28,11 @@ const CHECKS: [(CheckId, &str); 3] = [
     (CheckId::StagePhong, "2.4 Phong fragment shader"),
 ];
 
+/// The stages of ours that show what a pass binds.
+pub fn bound_values_shown() -> [Vec<Stage>; BoundValue::ALL.len()] {
+    BoundValue::ALL.map(|bound| named([VERTEX.to_owned(), bound.stage(false), bound.stage(true)]))
+}
+
 /// Judges the student's pass under stages of ours (2.1) and his stages under a pass of ours (2.2
 /// to 2.4) on scenes: one worker draws all frames of the former, another without any code of his
 /// those of the latter. `fails` says whether there are scenes that the student's own frame of gets
@@ -40,8 +45,7 @@ pub fn isolate(
     fails: bool,
     tolerances: &Tolerances,
 ) -> Vec<Check> {
-    let bound_values_shown = BoundValue::ALL
-        .map(|bound| named([VERTEX.to_owned(), bound.stage(false), bound.stage(true)]));
+    let bound_values_shown = bound_values_shown();
     let (swaps, sets) = swaps(stages);
     let is_right =
         |index, frames: &[Outcome]| pass_check(cases[index], frames).verdict == Verdict::Pass;

@@ -6,11 +6,13 @@ use std::sync::{Mutex, OnceLock};
 use std::time::Instant;
 
 use anyhow::Context;
+use tempfile::TempDir;
 
 use super::ask::Asker;
 use super::case::Case;
 use super::conventions::Answers;
 use super::costs::ReferenceCosts;
+use super::draw::Frame;
 use super::kept::Kept;
 use super::offline::{self, Drawn};
 use super::record::{Conditions, Record, StageCost, Student};
@@ -45,7 +47,9 @@ pub struct Grading<'a> {
     /// The assignment.
     pub assignment: &'a Assignment,
     /// Starts workers.
-    pub supervisor: &'a Supervisor,
+    pub supervisor: Supervisor,
+    /// Keeps the compiled shaders that the supervisor gives to workers.
+    compiled: Option<TempDir>,
     /// The template's compiler call.
     pub recording: Recording,
     /// The scenes, ready: the public ones first.
@@ -135,10 +139,10 @@ impl<'a> Grading<'a> {
             cases.push(case.with_context(|| format!("scene \"{}\" cannot be used", entry.name))?);
         }
         let held_back = perturb.map(|seed| hold_back(store, seed, &mut cases)).transpose()?;
-        let supervisor = store.supervisor;
         let mut grading = Self {
             assignment,
-            supervisor,
+            supervisor: store.supervisor.clone(),
+            compiled: None,
             recording,
             cases,
             held_back,
@@ -158,14 +162,58 @@ impl<'a> Grading<'a> {
         {
             grading.adapter = Err(why);
         }
+        grading.compile_shaders()?;
         Ok(grading)
+    }
+
+    /// Has the reference renderer draw once what every renderer is asked to, so that workers need not
+    /// compile the same shaders again and again.
+    fn compile_shaders(&mut self) -> anyhow::Result<()> {
+        let (Some(reference), Ok(_)) = (&self.reference, &self.adapter) else { return Ok(()) };
+        let Some(case) = self.cases.iter().find(|case| case.bonus.is_some()) else { return Ok(()) };
+        let plain = Frame::plain(case);
+        let toml = case.bonus.as_deref().unwrap_or(&case.realtime);
+        let mut frames = vec![plain.clone(), Frame { toml, shadow_map: true, ..plain }];
+        let shown = isolate::bound_values_shown();
+        frames.extend(shown.map(|stages| Frame::small(case, stages)));
+        let folder = self.shaders_of(&mut self.asker(""), Some(reference), frames)?;
+        self.supervisor.shaders.push(folder.path().to_owned());
+        self.compiled = Some(folder);
+        Ok(())
+    }
+
+    /// The same for the stages of a submission, by Umbra's own pass: no foreign code runs there. They are
+    /// given to the workers of `asker` while the answer lives.
+    fn compile_own(&self, asker: &mut Asker, stages: &Stages) -> anyhow::Result<Option<TempDir>> {
+        let (Some(own), Some(case)) = (stages.all_own(), self.cases.first()) else {
+            return Ok(None);
+        };
+        let folder = self.shaders_of(asker, None, vec![Frame::small(case, own)])?;
+        asker.supervisor.shaders.push(folder.path().to_owned());
+        Ok(Some(folder))
+    }
+
+    /// The shaders that some frames need, compiled.
+    fn shaders_of(
+        &self,
+        asker: &mut Asker,
+        renderer: Option<&Path>,
+        frames: Vec<Frame>,
+    ) -> anyhow::Result<TempDir> {
+        let builder =
+            tempfile::Builder::new().prefix("shaders-").tempdir_in(&self.supervisor.scratch);
+        let folder = builder?;
+        asker.supervisor.leaves_shaders = Some(folder.path().to_owned());
+        draw::compile_shaders(asker, renderer, frames);
+        asker.supervisor.leaves_shaders = None;
+        Ok(folder)
     }
 
     pub(super) fn asker(&self, options: &str) -> Asker<'_> {
         let mut limits = self.assignment.limits.run.clone();
         limits.threads = self.threads;
         Asker {
-            supervisor: self.supervisor,
+            supervisor: self.supervisor.clone(),
             limits,
             cancel: self.cancel,
             adapter: self.adapter.clone(),
@@ -194,8 +242,8 @@ impl<'a> Grading<'a> {
         purpose: Purpose,
         say: &dyn Fn(&str),
     ) -> anyhow::Result<Record> {
-        let asker = self.asker("");
-        let decoder = Decoder::new(self.supervisor, &self.assignment.limits.decode, self.cancel);
+        let mut asker = self.asker("");
+        let decoder = Decoder::new(&self.supervisor, &self.assignment.limits.decode, self.cancel);
         let mut costs = Costs { since: Instant::now(), stages: Vec::new() };
         let scratch =
             tempfile::Builder::new().prefix("hand-in-").tempdir_in(&self.supervisor.scratch)?;
@@ -247,6 +295,7 @@ impl<'a> Grading<'a> {
             say("drawing realtime");
             let stages = Stages::read(&built.src, &self.assignment.template());
             record.findings.extend(stages.findings());
+            let _compiled = self.compile_own(&mut asker, &stages)?;
             self.realtime(&asker, plugin, &stages, &mut checks, &mut drawn)?;
             checks.extend(asker.used_up());
             checks.extend(asker.printed_much());
@@ -325,13 +374,14 @@ impl<'a> Grading<'a> {
         stages: &Stages,
         paths: &[RenderPath],
     ) -> anyhow::Result<(Evidence, Vec<Diagnosis>)> {
-        let asker = self.asker(options);
+        let mut asker = self.asker(options);
         let (mut checks, mut drawn) = (Vec::new(), Vec::new());
         if paths.contains(&RenderPath::Offline) {
             self.offline(&asker, library, seed, &mut checks, &mut drawn)?;
             asker.patience.renew();
         }
         if paths.contains(&RenderPath::Realtime) {
+            let _compiled = self.compile_own(&mut asker, stages)?;
             self.realtime(&asker, library, stages, &mut checks, &mut drawn)?;
         }
         let evidence = Evidence { checks };
@@ -357,7 +407,7 @@ impl<'a> Grading<'a> {
         std::fs::create_dir(&out)?;
         let limits = &self.assignment.limits.build;
         let compile = |src: &Path| {
-            build::compile(&self.recording, self.supervisor, src, &out, limits, self.cancel)
+            build::compile(&self.recording, &self.supervisor, src, &out, limits, self.cancel)
         };
         let template = self.assignment.template();
         let built = mend::build(&compile, &src, &template, &scratch.join("mended"))?;

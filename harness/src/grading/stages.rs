@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::draw::STAGES;
+use super::draw::{STAGES, named};
 use crate::evidence::stages::{bare, is_template};
 use crate::files::files_below;
 use crate::intake::Finding;
+use crate::worker::Stage;
 
 /// The stage texts of a submission, and of the template.
 pub struct Stages {
@@ -53,6 +54,12 @@ impl Stages {
                 .map(|name| found.values().any(|text| text.contains(&format!("{name}.wgsl")))),
             written: written(&found, &texts(template)),
         }
+    }
+
+    /// All three, when none is missing or the template's.
+    pub fn all_own(&self) -> Option<Vec<Stage>> {
+        let own = |index: usize| self.own[index].clone().filter(|_| !self.is_template(index));
+        Some(named([own(0)?, own(1)?, own(2)?]))
     }
 
     /// Whether a stage is the template's still.

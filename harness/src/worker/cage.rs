@@ -8,6 +8,7 @@ use std::path::{Component, Path, PathBuf};
 use basecode::scene::SceneConfig;
 
 use super::job::{AdapterKind, Job, Request};
+use super::shaders;
 use super::wire::Folder;
 use crate::sandbox::policy::{JOB, PLUGIN, SCENE};
 use crate::sandbox::{Bind, Gpu, Kind, Layers, Policy};
@@ -63,6 +64,24 @@ impl Cage {
         }
         let job = if layers.mount_ns { PathBuf::from(JOB) } else { dir.to_owned() };
         Ok(Self { policy, plugin, scenes, job })
+    }
+}
+
+impl Cage {
+    /// Gives it compiled shaders where it draws, and lets it leave its own in `leaves`.
+    pub fn shaders(&mut self, requests: &[&Request], given: &[PathBuf], leaves: Option<&Path>) {
+        // Without a mount namespace there is no place for them.
+        let draws = requests.iter().any(|request| request.adapter().is_some());
+        if !draws || !self.policy.layers.mount_ns {
+            return;
+        }
+        for (number, folder) in given.iter().enumerate() {
+            let inside = shaders::given(Path::new(JOB), number);
+            self.policy.read_only.push(Bind::new(folder, inside));
+        }
+        if let Some(folder) = leaves {
+            self.policy.read_write.push(Bind::new(folder, shaders::left(Path::new(JOB))));
+        }
     }
 }
 

@@ -10,6 +10,7 @@ use renderer_api as api;
 use super::arena::{Input, Output, Table};
 use super::job::{Request, SceneRef};
 use super::neutral_pass::Neutral;
+use super::shaders;
 use super::table::{Record, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE};
 use super::wire::{Folder, WireJob, WireRequest, queries, rays, words};
 use crate::plugin::{
@@ -44,6 +45,7 @@ fn work(dir: &Path) -> std::io::Result<()> {
     };
     let name = plugin.as_ref().map(HostPlugin::name).unwrap_or_default();
     loading.answer(api::STATUS_OK, &name, 0.0);
+    shaders::take(dir);
     let (mut scene, mut neutral) = (None, Neutral::default());
     for (index, request) in job.requests.iter().enumerate() {
         let record = table.request(index);
@@ -61,6 +63,7 @@ fn work(dir: &Path) -> std::io::Result<()> {
             Err(error) => record.answer(status(error.kind), &error.message, seconds),
         }
     }
+    shaders::leave(dir);
     // Scenes are left to the end of the process: unloading is foreign code with nothing to give.
     std::mem::forget(scene);
     Ok(())

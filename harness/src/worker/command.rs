@@ -70,8 +70,8 @@ pub fn command(
     let mut command = program.command();
     command.arg(&cage.job).current_dir(Folder(dir).scratch()).env_clear();
     command.env("LANG", "C").env("HOME", "/nonexistent");
-    // Compiling shaders costs most of a small frame. What is compiled stays in the scratch of
-    // this one worker: one renderer's shaders are no other's business.
+    // What is compiled stays in the scratch of this one worker: one renderer's shaders are no
+    // other's business (`shaders`).
     command.env("MESA_SHADER_CACHE_DISABLE", "false").env("MESA_SHADER_CACHE_DIR", ".");
     // Mesa's layer that sorts devices looks for a display, and prints that there is none.
     command.env("NODEVICE_SELECT", "1");

@@ -15,6 +15,7 @@ mod job;
 mod neutral_pass;
 mod outcome;
 mod patience;
+mod shaders;
 mod supervise;
 mod table;
 mod wire;

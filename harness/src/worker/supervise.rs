@@ -35,6 +35,10 @@ pub struct Supervisor {
     pub scratch: PathBuf,
     /// What isolates workers and compilers. A layer that cannot be had is an error of the machine.
     pub isolation: Layers,
+    /// Folders with compiled shaders of trusted workers, which each worker that draws gets copies of.
+    pub shaders: Vec<PathBuf>,
+    /// Where workers leave the shaders that they compile; only for those that run no foreign code.
+    pub leaves_shaders: Option<PathBuf>,
     /// Whatever runs holds it for reading; who must have the machine for itself, for writing.
     pub machine: Arc<RwLock<()>>,
 }
@@ -61,7 +65,14 @@ impl Supervisor {
 
     /// Starts workers of the program `umbra`, with full isolation where there is a sandbox.
     pub fn new(umbra: PathBuf, scratch: PathBuf) -> Self {
-        Self { umbra, scratch, isolation: Layers::of_this_system(), machine: Arc::default() }
+        Self {
+            umbra,
+            scratch,
+            isolation: Layers::of_this_system(),
+            shaders: Vec::new(),
+            leaves_shaders: None,
+            machine: Arc::default(),
+        }
     }
 
     /// The same with as much isolation as this machine gives, tried for real.
@@ -220,7 +231,8 @@ impl Supervisor {
         let private = tempfile::Builder::new().prefix("umbra-worker-").tempdir_in(&self.scratch)?;
         let requests: Vec<_> = pending.iter().map(|&index| &job.requests[index]).collect();
         fs::create_dir(Folder(private.path()).scratch())?;
-        let cage = Cage::new(private.path(), job, &requests, self.isolation)?;
+        let mut cage = Cage::new(private.path(), job, &requests, self.isolation)?;
+        cage.shaders(&requests, &self.shaders, self.leaves_shaders.as_deref());
         let mut files = Files::prepare(private.path(), &cage, &requests)?;
         let program = Program::open(&program_beside(&self.umbra))?;
         let driver = software_driver();

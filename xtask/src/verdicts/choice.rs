@@ -26,7 +26,7 @@ pub const PLAIN_SEED: u64 = SEEDS[0];
 /// other, such as an intensity that was never set.
 const PAIRS: [[&str; 2]; 26] = [
     ["diffuse-no-pi", "phong-n-plus-1"],
-    ["diffuse-no-cosine", "light-two-cosines"],
+    ["diffuse-no-pi", "light-two-cosines"],
     ["diffuse-no-wi-test", "shadow-none"],
     ["diffuse-no-pi", "film-flipped-rows"],
     ["phong-no-scale", "light-no-falloff"],
@@ -43,7 +43,7 @@ const PAIRS: [[&str; 2]; 26] = [
     ["camera-horizontal-fov", "diffuse-channels-swapped"],
     ["loop-jitter-shifted", "pass-rho-s-unset"],
     ["pass-exponent-unset", "diffuse-fs-no-pi"],
-    ["pass-rho-d-unset", "vertex-normal-view-space"],
+    ["pass-rho-s-unset", "vertex-normal-view-space"],
     ["vertex-position-view-space", "phong-fs-two-cosines"],
     ["diffuse-fs-two-cosines", "phong-fs-two-cosines"],
     ["diffuse-fs-no-falloff", "phong-fs-n-plus-1"],
