@@ -9,6 +9,7 @@ mod renderpasses;
 use basecode::gpu::{Gpu, RenderPass};
 use basecode::{
     Bsdf, Error, Film, Integrator, Material, MaterialModel, RenderJob, Renderer, Result, Scene,
+    ShadingKind,
 };
 
 use mistakes::Mistakes;
@@ -48,16 +49,15 @@ impl Renderer for Reference {
         }
     }
 
-    fn integrator(&self, kind: &str, shadows: bool) -> Result<Box<dyn Integrator>> {
+    fn integrator(&self, kind: ShadingKind, shadows: bool) -> Result<Box<dyn Integrator>> {
         let mistaken = self.mistakes.integrator(shadows);
         match (kind, mistaken) {
-            ("simple" | "direct", Some(mistaken)) => Ok(mistaken),
-            ("simple" | "direct", None) => Ok(Box::new(integrators::SimpleIntegrator {
+            (ShadingKind::Simple, Some(mistaken)) => Ok(mistaken),
+            (ShadingKind::Simple, None) => Ok(Box::new(integrators::SimpleIntegrator {
                 shadows,
                 diffuse_mirrors: self.realtime_materials,
             })),
-            ("normal", _) => Ok(Box::new(integrators::NormalIntegrator)),
-            _ => Err(Error::Argument(format!("there is no integrator \"{kind}\""))),
+            (ShadingKind::Normal, _) => Ok(Box::new(integrators::NormalIntegrator)),
         }
     }
 
@@ -74,17 +74,16 @@ impl Renderer for Reference {
 
     fn render_pass(
         &self,
-        kind: &str,
+        kind: ShadingKind,
         gpu: &Gpu,
         scene: &Scene,
         shadow_map: bool,
     ) -> Result<Box<dyn RenderPass>> {
         match kind {
-            "simple" | "direct" => {
+            ShadingKind::Simple => {
                 Ok(Box::new(renderpasses::SimplePass::new(gpu, scene, shadow_map, &self.mistakes)?))
             }
-            "normal" => Ok(Box::new(renderpasses::NormalPass::new(gpu, scene)?)),
-            _ => Err(Error::Argument(format!("there is no render pass \"{kind}\""))),
+            ShadingKind::Normal => Ok(Box::new(renderpasses::NormalPass::new(gpu, scene)?)),
         }
     }
 }

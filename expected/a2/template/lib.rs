@@ -7,7 +7,8 @@ mod renderpasses;
 
 use basecode::gpu::{Gpu, RenderPass};
 use basecode::{
-    Bsdf, Error, Film, Integrator, Material, MaterialModel, RenderJob, Renderer, Result, Scene,
+    Bsdf, Film, Integrator, Material, MaterialModel, RenderJob, Renderer, Result, Scene,
+    ShadingKind,
 };
 
 /// Point lights and shadows, offline and realtime.
@@ -25,11 +26,10 @@ impl Renderer for Student {
         }
     }
 
-    fn integrator(&self, kind: &str, shadows: bool) -> Result<Box<dyn Integrator>> {
+    fn integrator(&self, kind: ShadingKind, shadows: bool) -> Result<Box<dyn Integrator>> {
         match kind {
-            "simple" | "direct" => Ok(Box::new(integrators::SimpleIntegrator { shadows })),
-            "normal" => Ok(Box::new(integrators::NormalIntegrator)),
-            _ => Err(Error::Argument(format!("there is no integrator \"{kind}\""))),
+            ShadingKind::Simple => Ok(Box::new(integrators::SimpleIntegrator { shadows })),
+            ShadingKind::Normal => Ok(Box::new(integrators::NormalIntegrator)),
         }
     }
 
@@ -45,17 +45,16 @@ impl Renderer for Student {
 
     fn render_pass(
         &self,
-        kind: &str,
+        kind: ShadingKind,
         gpu: &Gpu,
         scene: &Scene,
         shadow_map: bool,
     ) -> Result<Box<dyn RenderPass>> {
         match kind {
-            "simple" | "direct" => {
+            ShadingKind::Simple => {
                 Ok(Box::new(renderpasses::SimplePass::new(gpu, scene, shadow_map)?))
             }
-            "normal" => Ok(Box::new(renderpasses::NormalPass::new(gpu, scene)?)),
-            _ => Err(Error::Argument(format!("there is no render pass \"{kind}\""))),
+            ShadingKind::Normal => Ok(Box::new(renderpasses::NormalPass::new(gpu, scene)?)),
         }
     }
 }

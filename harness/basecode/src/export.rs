@@ -191,7 +191,7 @@ unsafe extern "C" fn radiance(
             let values = std::slice::from_raw_parts_mut(values.cast::<Vec3>(), count);
             (&*scene.cast::<Loaded>(), &*settings, std::slice::from_raw_parts(rays, count), values)
         };
-        let kind = &loaded.scene.config().kind;
+        let kind = loaded.scene.config().kind;
         let integrator = loaded.renderer.integrator(kind, settings.shadows != 0)?;
         let sampler = Sampler::new(settings.seed);
         for (ray, value) in rays.iter().zip(values) {
@@ -219,7 +219,7 @@ unsafe extern "C" fn render_offline(
         let pixels =
             unsafe { std::slice::from_raw_parts_mut(pixels.cast::<Vec3>(), width * height) };
         let callbacks = Callbacks(settings);
-        let kind = &loaded.scene.config().kind;
+        let kind = loaded.scene.config().kind;
         let integrator = loaded.renderer.integrator(kind, settings.shadows != 0)?;
         let job = RenderJob {
             width,
@@ -272,7 +272,7 @@ unsafe extern "C" fn open_realtime(
         let _ = gpu.take_footprint();
         let mut opened = None;
         gpu.checked(&mut || {
-            let kind = &loaded.scene.config().kind;
+            let kind = loaded.scene.config().kind;
             opened = Some(loaded.renderer.render_pass(kind, &gpu, &loaded.scene, shadow_map)?);
             Ok(())
         })?;

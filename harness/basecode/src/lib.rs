@@ -43,7 +43,7 @@ pub use frame::Frame;
 pub use glam::{Mat3, Mat4, Vec2, Vec3, Vec4, vec2, vec3, vec4};
 pub use image::Image;
 pub use ray::{Ray, SurfaceInteraction};
-pub use renderer::{Bsdf, Integrator, RenderJob, Renderer};
+pub use renderer::{Bsdf, Integrator, RenderJob, Renderer, ShadingKind};
 pub use sampler::Sampler;
 pub use scene::{Material, MaterialModel, Scene, Shape, Texture};
 pub use {bytemuck, glam};

@@ -21,11 +21,11 @@ pub trait Renderer: Send + Sync {
     /// The BSDF of a material, mirrors excepted.
     fn bsdf(&self, material: &Material) -> Box<dyn Bsdf>;
 
-    /// The integrator that a scene asks for by its kind: `simple` or `normal`.
+    /// The integrator that draws a scene of this kind. `shadows`: whether blockers cast any.
     ///
     /// # Errors
-    /// When there is no such integrator.
-    fn integrator(&self, kind: &str, shadows: bool) -> Result<Box<dyn Integrator>>;
+    /// When the renderer has no such integrator.
+    fn integrator(&self, kind: ShadingKind, shadows: bool) -> Result<Box<dyn Integrator>>;
 
     /// Renders `job` into `film`, which has the job's size: the render loop.
     ///
@@ -39,18 +39,28 @@ pub trait Renderer: Send + Sync {
         film: &mut Film,
     ) -> Result<()>;
 
-    /// The realtime pass that a scene asks for by its kind: `direct` or `normal`.
-    /// `shadow_map` tells whether to draw shadows (the bonus).
+    /// The realtime pass that draws a scene of this kind. `shadow_map`: whether to draw shadows
+    /// (the bonus).
     ///
     /// # Errors
-    /// When there is no such pass, or the graphics library refuses it.
+    /// When the renderer has no such pass, or the graphics library refuses it.
     fn render_pass(
         &self,
-        kind: &str,
+        kind: ShadingKind,
         gpu: &Gpu,
         scene: &Scene,
         shadow_map: bool,
     ) -> Result<Box<dyn RenderPass>>;
+}
+
+/// How a scene is shaded, offline and realtime: `type` in the `[renderer]` section of its file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShadingKind {
+    /// Direct light from the point light: `"simple"` or `"direct"`, and what a scene gets that
+    /// says nothing.
+    Simple,
+    /// Normals as colors, from the previous assignment: `"normal"`.
+    Normal,
 }
 
 /// A bidirectional scattering distribution function.

@@ -4,7 +4,7 @@
 use basecode::gpu::{Gpu, RenderPass, Stage, Target};
 use basecode::{
     Bsdf, Camera, Film, Integrator, Material, Ray, RenderJob, Renderer, Result, Sampler, Scene,
-    SurfaceInteraction, Vec3, wgpu,
+    ShadingKind, SurfaceInteraction, Vec3, wgpu,
 };
 
 struct Hostile {
@@ -146,7 +146,7 @@ impl Renderer for Hostile {
         Box::new(Black)
     }
 
-    fn integrator(&self, _: &str, _: bool) -> Result<Box<dyn Integrator>> {
+    fn integrator(&self, _: ShadingKind, _: bool) -> Result<Box<dyn Integrator>> {
         self.act();
         Ok(Box::new(Black))
     }
@@ -156,7 +156,13 @@ impl Renderer for Hostile {
         Ok(())
     }
 
-    fn render_pass(&self, _: &str, gpu: &Gpu, _: &Scene, _: bool) -> Result<Box<dyn RenderPass>> {
+    fn render_pass(
+        &self,
+        _: ShadingKind,
+        gpu: &Gpu,
+        _: &Scene,
+        _: bool,
+    ) -> Result<Box<dyn RenderPass>> {
         self.act();
         self.act_on(gpu);
         Ok(Box::new(Black))

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use basecode::gpu::{AdapterKind, Gpu, Target};
-use basecode::{Camera, CameraConfig, Image, Ray, Renderer, Scene, Vec3, vec3};
+use basecode::{Camera, CameraConfig, Image, Ray, Renderer, Scene, ShadingKind, Vec3, vec3};
 
 use crate::Reference;
 
@@ -128,7 +128,7 @@ fn camera(eye: Vec3, at: Vec3, fov_y_deg: f32, width: usize, height: usize) -> C
 
 /// What the reference draws of `scene`, for each camera.
 fn draw(
-    kind: &str,
+    kind: ShadingKind,
     scene: &Scene,
     shadow_map: bool,
     cameras: &[Camera],
@@ -148,7 +148,7 @@ fn draw(
 
 /// Radiance through the pixel centres by the offline renderer.
 fn trace(
-    kind: &str,
+    kind: ShadingKind,
     scene: &Scene,
     shadows: bool,
     camera: &Camera,

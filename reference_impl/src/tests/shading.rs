@@ -1,6 +1,6 @@
 //! Unshadowed shading: closed forms, and the offline renderer.
 
-use basecode::{Vec3, vec3};
+use basecode::{ShadingKind, Vec3, vec3};
 
 use super::{Build, agree, camera, draw, floor_point, interior, trace};
 
@@ -37,7 +37,7 @@ fn a_floor_under_a_light_is_the_closed_form() {
         build.floor("floor");
         let scene = build.load();
         let camera = camera(eye, Vec3::ZERO, 40.0, size.0, size.1);
-        let image = &draw("direct", &scene, false, &[camera], size)[0];
+        let image = &draw(ShadingKind::Simple, &scene, false, &[camera], size)[0];
         let mut count = 0;
         for y in 0..size.1 {
             for x in 0..size.0 {
@@ -69,7 +69,7 @@ fn back_faces_are_black_and_emitters_white() {
     let scene = build.load();
     let below = camera(vec3(0.0, -4.0, 0.0), Vec3::ZERO, 30.0, size.0, size.1);
     let above = camera(vec3(0.3, 4.0, 0.0), Vec3::ZERO, 30.0, size.0, size.1);
-    let images = draw("direct", &scene, false, &[below, above], size);
+    let images = draw(ShadingKind::Simple, &scene, false, &[below, above], size);
     assert!(images[0].pixels.iter().all(|pixel| *pixel == Vec3::ZERO));
     assert_eq!(images[1].at(16, 16), Vec3::ONE);
     assert!(images[1].at(0, 0) != Vec3::ONE && images[1].at(0, 0).min_element() > 0.0);
@@ -88,20 +88,20 @@ fn still_life(material: &str) -> Build {
 #[test]
 fn realtime_is_offline_at_the_pixel_centre() {
     let size = (160, 120);
-    for (kind, offline) in [("direct", "simple"), ("normal", "normal")] {
+    for kind in [ShadingKind::Simple, ShadingKind::Normal] {
         for material in
             ["Kd 0.2 0.5 0.7\nillum 7", "Kd 0.4 0.3 0.2\nKs 0.9 0.8 0.7\nNs 101.5\nillum 2"]
         {
             let scene = still_life(material).load();
             let camera = camera(vec3(0.0, 1.5, 4.0), vec3(0.0, 0.5, 0.0), 35.0, size.0, size.1);
             let drawn = &draw(kind, &scene, false, &[camera], size)[0];
-            let expected = trace(offline, &scene, false, &camera, size);
+            let expected = trace(kind, &scene, false, &camera, size);
             let inside = interior(&scene, &camera, size, 1);
             let mut compared = 0;
             for (index, (a, b)) in drawn.pixels.iter().zip(&expected.pixels).enumerate() {
                 if inside[index] {
                     compared += 1;
-                    assert!(agree(*a, *b), "{kind} {material:?} pixel {index}: {a} {b}");
+                    assert!(agree(*a, *b), "{kind:?} {material:?} pixel {index}: {a} {b}");
                 }
             }
             assert!(compared > drawn.pixels.len() * 9 / 10, "only {compared} pixels compared");

@@ -1,6 +1,6 @@
 //! The shadow map: lit or dark where it should be, no acne, no peter-panning.
 
-use basecode::{Camera, Scene, Vec3, vec3};
+use basecode::{Camera, Scene, ShadingKind, Vec3, vec3};
 
 use super::{Build, agree, camera, draw, floor_point, interior, trace};
 
@@ -21,8 +21,8 @@ fn a_card_above_a_floor_casts_the_shadow_that_geometry_says() {
         build.polygon("white", &corners.map(|(x, z)| vec3(x, 1.0, z)));
         let scene = build.load();
         let camera = camera(vec3(-0.5, 0.7, 4.0), vec3(-0.5, 0.0, 0.0), 40.0, size.0, size.1);
-        let image = &draw("direct", &scene, true, &[camera], size)[0];
-        let unshadowed = &draw("direct", &scene, false, &[camera], size)[0];
+        let image = &draw(ShadingKind::Simple, &scene, true, &[camera], size)[0];
+        let unshadowed = &draw(ShadingKind::Simple, &scene, false, &[camera], size)[0];
         let (mut lit, mut dark) = (0, 0);
         for y in 0..size.1 {
             for x in 0..size.0 {
@@ -66,7 +66,9 @@ fn nothing_shadows_itself() {
         let scene = build.load();
         let cameras = [vec3(0.0, 1.5, 4.0), vec3(3.0, 2.5, -2.0)]
             .map(|eye| camera(eye, vec3(0.0, 0.4, 0.0), 40.0, size.0, size.1));
-        for (camera, image) in cameras.iter().zip(draw("direct", &scene, true, &cameras, size)) {
+        for (camera, image) in
+            cameras.iter().zip(draw(ShadingKind::Simple, &scene, true, &cameras, size))
+        {
             let compared = compare_with_rays(&scene, camera, &image, size);
             assert!(compared > 0.85, "{light}: only {compared} of the pixels compared");
         }
@@ -81,7 +83,7 @@ fn compare_with_rays(
     image: &basecode::Image,
     size: (usize, usize),
 ) -> f64 {
-    let expected = trace("simple", scene, true, camera, size);
+    let expected = trace(ShadingKind::Simple, scene, true, camera, size);
     let inside = interior(scene, camera, size, 2);
     let light = scene.first_light_position();
     let mut compared = 0;
@@ -120,7 +122,9 @@ fn all_six_faces_of_the_cube_see_their_blockers() {
     let eye = vec3(-0.4, -0.3, -0.35);
     let cameras = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z]
         .map(|direction| camera(eye, eye + direction, 80.0, size.0, size.1));
-    for (camera, image) in cameras.iter().zip(draw("direct", &scene, true, &cameras, size)) {
+    for (camera, image) in
+        cameras.iter().zip(draw(ShadingKind::Simple, &scene, true, &cameras, size))
+    {
         let dark = image.pixels.iter().filter(|pixel| **pixel == Vec3::ZERO).count();
         assert!(dark > 150, "only {dark} pixels are dark");
         let compared = compare_with_rays(&scene, camera, &image, size);
@@ -140,7 +144,7 @@ fn corners_of_a_room_stay_lit() {
         let eye = vec3(-0.6, -0.7, 0.2);
         let camera = camera(eye, vec3(-2.0, -2.0, 0.2), 0.6, size.0, size.1);
         let camera = turned(camera, size);
-        let image = &draw("direct", &scene, true, &[camera], size)[0];
+        let image = &draw(ShadingKind::Simple, &scene, true, &[camera], size)[0];
         let dark = image.pixels.iter().filter(|pixel| **pixel == Vec3::ZERO).count();
         assert_eq!(dark, 0, "{light}: dark pixels along the corner");
     }
@@ -172,7 +176,7 @@ fn shadows_begin_where_things_stand() {
         // A pixel is 0.0004 wide where the wall meets the floor.
         let camera = camera(vec3(1.2, 1.0, 0.0), vec3(0.02, 0.0, 0.0), 0.6, size.0, size.1);
         let camera = turned(camera, size);
-        let image = &draw("direct", &scene, true, &[camera], size)[0];
+        let image = &draw(ShadingKind::Simple, &scene, true, &[camera], size)[0];
         let (mut gap, mut seen) = (0.0f64, 0);
         for y in 0..size.1 {
             for x in 0..size.0 {

@@ -7,7 +7,7 @@ mod surface;
 
 use basecode::gpu::{Gpu, RenderPass};
 use basecode::{
-    Bsdf, Error, Film, Integrator, Material, RenderJob, Renderer, Result, Scene, export_renderer,
+    Bsdf, Error, Film, Integrator, Material, RenderJob, Renderer, Result, Scene, ShadingKind, export_renderer,
 };
 
 struct Assignment2;
@@ -21,8 +21,8 @@ impl Renderer for Assignment2 {
         Box::new(surface::Surface::new(material))
     }
 
-    fn integrator(&self, kind: &str, shadows: bool) -> Result<Box<dyn Integrator>> {
-        if kind == "normal" {
+    fn integrator(&self, kind: ShadingKind, shadows: bool) -> Result<Box<dyn Integrator>> {
+        if kind == ShadingKind::Normal {
             return Err(Error::Argument("normals were assignment 1".into()));
         }
         Ok(Box::new(rays::Direct { shadows }))
@@ -40,12 +40,12 @@ impl Renderer for Assignment2 {
 
     fn render_pass(
         &self,
-        kind: &str,
+        kind: ShadingKind,
         gpu: &Gpu,
         scene: &Scene,
         shadow_map: bool,
     ) -> Result<Box<dyn RenderPass>> {
-        if kind == "normal" {
+        if kind == ShadingKind::Normal {
             return Err(Error::Argument("normals were assignment 1".into()));
         }
         Ok(Box::new(raster::Raster::new(gpu, scene, shadow_map)?))

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::text::decode;
-use crate::{CameraConfig, Error, Result};
+use crate::{CameraConfig, Error, Result, ShadingKind};
 
 /// A scene file as it was written, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,9 +22,8 @@ pub struct SceneConfig {
     pub height: usize,
     /// Offline (false) or realtime (true).
     pub realtime: bool,
-    /// Which integrator or render pass: `simple` or `direct` for this assignment, `normal` for
-    /// the previous one.
-    pub kind: String,
+    /// Which integrator or render pass draws it.
+    pub kind: ShadingKind,
     /// Samples per pixel, offline.
     pub spp: usize,
     /// Whether realtime draws shadows (the bonus).
@@ -153,7 +152,16 @@ impl SceneConfig {
                 format!("input.objfile is {mesh} but must be relative to the folder of this file");
             return Err(wrong(line_of_key(text, "input", "objfile"), message));
         }
-        let default_kind = if renderer.realtime { "direct" } else { "simple" };
+        let kind = match renderer.kind.as_deref() {
+            None | Some("simple" | "direct") => ShadingKind::Simple,
+            Some("normal") => ShadingKind::Normal,
+            Some(other) => {
+                let message = format!(
+                    "renderer.type is \"{other}\" but must be \"simple\", \"direct\" or \"normal\""
+                );
+                return Err(wrong(line_of_key(text, "renderer", "type"), message));
+            }
+        };
         Ok(Self {
             path: path.to_owned(),
             mesh: path.parent().unwrap_or(Path::new("")).join(mesh),
@@ -161,7 +169,7 @@ impl SceneConfig {
             width: in_range("film", "width", file.film.width, MAX_FILM_SIDE)?,
             height: in_range("film", "height", file.film.height, MAX_FILM_SIDE)?,
             realtime: renderer.realtime,
-            kind: renderer.kind.unwrap_or_else(|| default_kind.to_owned()),
+            kind,
             spp: in_range("renderer", "spp", renderer.spp, 1 << 20)?,
             bonus: renderer.bonus,
             unknown_keys: unknown_keys(text),
@@ -220,7 +228,24 @@ mod tests {
         assert_eq!((config.width, config.height, config.spp), (768, 576, 1));
         assert_eq!(config.mesh, Path::new("a/tinyrender/../mesh/b.obj"));
         assert_eq!(config.camera, CameraConfig::default());
-        assert_eq!((config.realtime, config.kind.as_str(), config.bonus), (false, "simple", false));
+        let found = (config.realtime, config.kind, config.bonus);
+        assert_eq!(found, (false, ShadingKind::Simple, false));
+    }
+
+    #[test]
+    fn simple_and_direct_are_the_same_kind_on_both_paths() {
+        let base = "[input]\nobjfile = \"b.obj\"\n[renderer]\n";
+        for realtime in ["", "realtime = true\n"] {
+            for (line, expected) in [
+                ("", ShadingKind::Simple),
+                ("type = \"simple\"", ShadingKind::Simple),
+                ("type = 'direct'", ShadingKind::Simple),
+                ("type = \"normal\"", ShadingKind::Normal),
+            ] {
+                let config = parse(&format!("{base}{realtime}{line}\n")).unwrap();
+                assert_eq!(config.kind, expected, "{realtime}{line}");
+            }
+        }
     }
 
     #[test]
@@ -232,6 +257,13 @@ mod tests {
             (&format!("{base}[film]\nwidth = 0\n"), "b.toml:4: film.width is 0"),
             (&format!("{base}[film]\nheight = 99999\n"), "b.toml:4: film.height is 99999"),
             (&format!("{base}[renderer]\nspp = -1\n"), "b.toml:4: renderer.spp is -1"),
+            (
+                &format!("{base}[renderer]\nspp = 4\ntype = \"glass\"\n"),
+                "b.toml:5: renderer.type is \"glass\" but must be \"simple\", \"direct\" or \"normal\"",
+            ),
+            (&format!("{base}[renderer]\ntype = \"Simple\"\n"), "b.toml:4: renderer.type is"),
+            (&format!("{base}[renderer]\ntype = \"\"\n"), "b.toml:4: renderer.type is \"\""),
+            (&format!("{base}[renderer]\ntype = 1\n"), "b.toml:4: invalid type: integer"),
             (&format!("{base}[camera]\neye = [0, nan, 0]\n"), "b.toml:4: camera.eye"),
             (
                 &format!("{base}[camera]\nfov = \"wide\"\n"),
