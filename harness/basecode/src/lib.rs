@@ -18,6 +18,72 @@
 //! | write the render loop | [`Renderer::render`], [`RenderJob`], [`Film`], [`Sampler`], [`Camera`] |
 //! | write a realtime pass | [`gpu`], [`gpu::RenderPass`] and `docs/shader_contract.md` |
 //! | draw a shadow map (bonus) | [`gpu::ShadowMap`], [`gpu::perspective`], [`gpu::look_at`] |
+//!
+//! # A minimal renderer
+//! It draws every surface the color of its normal, offline only. Compiled as a `cdylib`, this is a
+//! plugin that `umbra render --plugin` loads.
+//! ```
+//! use basecode::gpu::{Gpu, RenderPass};
+//! use basecode::*;
+//!
+//! struct Normals;
+//!
+//! impl Integrator for Normals {
+//!     fn radiance(&self, scene: &Scene, ray: &Ray, _: &Sampler) -> Vec3 {
+//!         scene.intersect(ray).map_or(Vec3::ZERO, |hit| hit.frame_ns.n.abs())
+//!     }
+//! }
+//!
+//! impl Bsdf for Normals {
+//!     fn eval(&self, _: &SurfaceInteraction) -> Vec3 {
+//!         Vec3::ZERO // Reflects nothing.
+//!     }
+//! }
+//!
+//! impl Renderer for Normals {
+//!     fn new(_options: &str) -> Result<Self> {
+//!         Ok(Normals)
+//!     }
+//!     fn bsdf(&self, _: &Material) -> Box<dyn Bsdf> {
+//!         Box::new(Normals)
+//!     }
+//!     fn integrator(&self, _: ShadingKind, _shadows: bool) -> Result<Box<dyn Integrator>> {
+//!         Ok(Box::new(Normals))
+//!     }
+//!     fn render(&self, scene: &Scene, by: &dyn Integrator, job: &RenderJob, film: &mut Film) -> Result<()> {
+//!         let camera = scene.camera(job.width, job.height)?;
+//!         job.for_each_row(film, &|y, row| {
+//!             let sampler = Sampler::new(job.seed + y as u64);
+//!             for (x, pixel) in row.iter_mut().enumerate() {
+//!                 *pixel = by.radiance(scene, &camera.ray(x as f32 + 0.5, y as f32 + 0.5), &sampler);
+//!             }
+//!         })
+//!     }
+//!     fn render_pass(&self, _: ShadingKind, _: &Gpu, _: &Scene, _: bool) -> Result<Box<dyn RenderPass>> {
+//!         Err(Error::NotImplemented("realtime".into()))
+//!     }
+//! }
+//!
+//! export_renderer!(Normals, "normals", "1.0");
+//! # fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
+//! #     // One triangle that fills the view and faces the eye: its normal is +z.
+//! #     let dir = std::env::temp_dir().join(format!("basecode-doctest-{}", std::process::id()));
+//! #     std::fs::create_dir_all(&dir)?;
+//! #     std::fs::write(dir.join("t.obj"), "mtllib t.mtl\nv -9 -9 0\nv 9 -9 0\nv 0 9 0\nusemtl m\nf 1 2 3\n")?;
+//! #     std::fs::write(dir.join("t.mtl"), "newmtl m\nKd 1 1 1\nillum 7\n")?;
+//! #     let text = "[input]\nobjfile = 't.obj'\n[camera]\neye = [0, 0, 4]\nat = [0, 0, 0]\nup = [0, 1, 0]\nfov = 30\n";
+//! #     std::fs::write(dir.join("t.toml"), text)?;
+//! #     let renderer = Normals::new("")?;
+//! #     let scene = Scene::load(&dir.join("t.toml"), &|material| renderer.bsdf(material))?;
+//! #     std::fs::remove_dir_all(&dir)?;
+//! #     let job = RenderJob { width: 4, height: 3, spp: 1, seed: 0, threads: 1, progress: &|_, _| {}, cancelled: &|| false };
+//! #     let mut pixels = [Vec3::ZERO; 12];
+//! #     let integrator = renderer.integrator(ShadingKind::Normal, false)?;
+//! #     renderer.render(&scene, integrator.as_ref(), &job, &mut Film::new(4, &mut pixels))?;
+//! #     assert_eq!(pixels, [Vec3::Z; 12]);
+//! #     Ok(())
+//! # }
+//! ```
 
 mod bvh;
 mod camera;
