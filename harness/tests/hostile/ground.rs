@@ -5,7 +5,6 @@ use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
 use umbra::build::{BuildOutcome, Recording, compile, default_limits};
-use umbra::evidence::CheckId;
 use umbra::process::Limits;
 use umbra::sandbox::{Isolation, Layers};
 use umbra::worker::{
@@ -229,7 +228,7 @@ impl Ground {
             vertex.lines().filter(|line| line.contains("world")).map(str::to_owned).collect();
         lines.extend([
             "right end to end".to_owned(),
-            CheckId::RadianceLit.to_owned(),
+            "radiance.lit".to_owned(),
             "held-back".to_owned(),
             "the inverse square of the distance".to_owned(),
         ]);

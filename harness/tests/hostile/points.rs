@@ -90,7 +90,7 @@ fn believe_the_machine(
     let (library, deed) = (Path::new(&library), "lost_device");
     let (evidence, _) = grading.plugin(library, deed, 1, stages, &RenderPath::ALL)?;
     let grade = rubric::grade(&assignment.rules, &evidence);
-    let proofs = evidence.checks.iter().filter(|check| check.id.starts_with("image."));
+    let proofs = evidence.checks.iter().filter(|check| check.id.name().starts_with("image."));
     anyhow::ensure!(
         grade.points == 0.0
             && grade.points_max >= 55.0
