@@ -13,7 +13,7 @@ use umbra::intake::{
     Finding, HandInConfig, IntakeError, Limits, TreeSpec, scan_source, unpack_bytes,
     validate_hand_in,
 };
-use umbra::worker::{Noted, RECORD};
+use umbra::worker::{SLOT_BYTES, SlotState};
 
 pub use judge::judge;
 
@@ -139,11 +139,11 @@ fn scene(obj: &[u8], mtl: &[u8]) {
 
 /// What workers and decoders leave for their parent.
 pub fn worker(bytes: &[u8]) {
-    let mut record = [0; RECORD];
-    for chunk in bytes.chunks(RECORD) {
+    let mut record = [0; SLOT_BYTES];
+    for chunk in bytes.chunks(SLOT_BYTES) {
         record[..chunk.len()].copy_from_slice(chunk);
-        if let Noted::Answered { message, seconds, .. } = Noted::parse(&record) {
-            assert!(message.chars().count() <= RECORD && seconds >= 0.0 && seconds.is_finite());
+        if let SlotState::Answered { message, seconds, .. } = SlotState::parse(&record) {
+            assert!(message.chars().count() <= SLOT_BYTES && seconds >= 0.0 && seconds.is_finite());
         }
     }
     if let Some((_, content)) = read_answer(bytes.to_vec()) {

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use umbra::process::Limits;
 use umbra::sandbox::{Bind, Kind, Policy, command, doctor};
-use umbra::worker::{Job, Matter, Outcome, Request, SceneRef, Supervisor};
+use umbra::worker::{Fault, Job, Outcome, Request, SceneRef, Supervisor};
 
 const RUNS: usize = 200;
 
@@ -84,7 +84,7 @@ fn worker(supervisor: &Supervisor) -> anyhow::Result<Duration> {
     let (job, never) = (Job { plugin: None, requests }, AtomicBool::new(false));
     let report = supervisor.run_job(&job, &Limits::default(), &never, &mut |_| ());
     let time = begin.elapsed();
-    let began = matches!(&report.outcomes[..], [Outcome::NotRun { matter: Matter::Ours, .. }]);
+    let began = matches!(&report.outcomes[..], [Outcome::NotRun { fault: Fault::Internal, .. }]);
     anyhow::ensure!(began && report.runs.len() == 1, "no worker ran: {report:?}");
     Ok(time)
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use basecode::{Image, Vec3};
 use umbra::assignment::Assignment;
 use umbra::diagnosis::{
-    Catalogue, Diagnosis, Facts, Kind, KnownMistake, LoopSeen, Sightings, Stored, StoredView,
+    Catalogue, Diagnosis, Input, Kind, KnownMistake, LoopSeen, Observations, Stored, StoredView,
 };
 use umbra::evidence::{Check, CheckId, Evidence, Verdict};
 use umbra::expected::Store;
@@ -32,10 +32,10 @@ fn catalogue() -> Catalogue {
 }
 
 /// What a renderer with this mistake answers, as it is stored.
-fn answers(stored: &Stored, mistake: &KnownMistake) -> Sightings {
+fn answers(stored: &Stored, mistake: &KnownMistake) -> Observations {
     let tile = |view: &StoredView| view.mistakes.get(&mistake.name).unwrap_or(&view.right).clone();
     let tiles = stored.views.iter().map(|(view, content)| (view.clone(), tile(content)));
-    Sightings { tiles: tiles.collect(), ..Default::default() }
+    Observations { tiles: tiles.collect(), ..Default::default() }
 }
 
 /// The checks that fail: of part 1.3 those whose views show it.
@@ -56,14 +56,14 @@ fn evidence(stored: &Stored, mistake: &KnownMistake) -> Evidence {
 
 /// What is said of one mistake, by a catalogue that may lack it.
 fn said(stored: &Stored, mistake: &KnownMistake, catalogue: &Catalogue) -> Vec<Diagnosis> {
-    let facts = Facts {
+    let input = Input {
         evidence: &evidence(stored, mistake),
         failing: &mistake.parts,
-        sightings: &answers(stored, mistake),
+        observations: &answers(stored, mistake),
         stored,
         catalogue,
     };
-    facts.diagnose()
+    input.diagnose()
 }
 
 #[test]
@@ -130,14 +130,14 @@ fn right_answers_look_like_nothing_whatever_fails() {
     let nothing = catalogue.mistakes[0].clone();
     let everything = ["1.1", "1.2", "1.3", "1.4", "2.1", "2.2", "2.3", "2.4", "2.5"];
     let right = KnownMistake { name: "none".into(), ..nothing };
-    let facts = Facts {
+    let input = Input {
         evidence: &Evidence::default(),
         failing: &everything.map(str::to_owned),
-        sightings: &answers(&stored, &right),
+        observations: &answers(&stored, &right),
         stored: &stored,
         catalogue: &catalogue,
     };
-    assert_eq!(facts.diagnose(), []);
+    assert_eq!(input.diagnose(), []);
 }
 
 #[test]
@@ -154,14 +154,14 @@ fn scenes_that_nothing_is_stored_of_say_nothing() {
     let flipped = LoopSeen { image: Image { pixels: rows.collect(), ..rays }, rays: rays.clone() };
     let names = |scene: &str| {
         let loops = [(scene.to_owned(), flipped.clone())].into();
-        let facts = Facts {
+        let input = Input {
             evidence: &evidence,
             failing: &["1.3".to_owned()],
-            sightings: &Sightings { loops, ..Default::default() },
+            observations: &Observations { loops, ..Default::default() },
             stored: &stored,
             catalogue: &catalogue,
         };
-        facts.diagnose().into_iter().flat_map(|found| found.mistakes).collect::<Vec<_>>()
+        input.diagnose().into_iter().flat_map(|found| found.mistakes).collect::<Vec<_>>()
     };
     assert_eq!(names("cbox"), [["film-flipped-rows"]]);
     assert!(names("held back").is_empty());

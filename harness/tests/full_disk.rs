@@ -15,7 +15,7 @@ use umbra::assignment::Assignment;
 use umbra::build::{Recording, compile};
 use umbra::decode::Decoder;
 use umbra::worker::{
-    Adapter, AdapterKind, Job, Matter, Outcome, Request, SceneRef, Supervisor, blames_the_machine,
+    Adapter, AdapterKind, Fault, Job, Outcome, Request, SceneRef, Supervisor, blames_the_machine,
 };
 
 const UMBRA: &str = env!("CARGO_BIN_EXE_umbra");
@@ -105,6 +105,6 @@ fn a_worker_that_cannot_run_for_want_of_space_costs_nothing() {
     let limits = Assignment::load(root()).unwrap().limits.run;
     let report = supervisor.run_job(&job, &limits, &AtomicBool::new(false), &mut |_| {});
     let outcome = &report.outcomes[0];
-    assert_eq!(outcome.matter(), Some(Matter::Machine), "{outcome:?}");
+    assert_eq!(outcome.fault(), Some(Fault::Environment), "{outcome:?}");
     assert!(matches!(outcome, Outcome::NotRun { .. }) && !blames_the_machine(outcome));
 }

@@ -16,7 +16,7 @@ use umbra::build::{BuildOutcome, Recording, compile, default_limits};
 use umbra::process::Limits;
 use umbra::sandbox::{Isolation, Layers};
 use umbra::worker::{
-    Adapter, AdapterKind, CameraValue, Job, JobReport, Matter, Outcome, Request, SceneRef,
+    Adapter, AdapterKind, CameraValue, Fault, Job, JobReport, Outcome, Request, SceneRef,
     Supervisor,
 };
 
@@ -299,7 +299,7 @@ fn a_layer_that_cannot_be_had_is_the_machines_matter() {
     let never = AtomicBool::new(false);
     let report = liar.run_job(&job, &Limits::default(), &never, &mut |_| {});
     assert!(
-        matches!(&report.outcomes[0], Outcome::NotRun { matter: Matter::Machine, .. }),
+        matches!(&report.outcomes[0], Outcome::NotRun { fault: Fault::Environment, .. }),
         "{report:?}"
     );
 }

@@ -10,7 +10,7 @@ use umbra::diagnosis::fit::{
     Accuracy, Bound, Deviation, Fitted, Reflector, Sample, ShadowRay, Subject, Value, VertexSeen,
     explain, explain_pass, explain_shadows, explain_vertex,
 };
-use umbra::diagnosis::{Stored, Tile, View};
+use umbra::diagnosis::{Stored, Thumbnail, View};
 
 /// The least difference of two answers that counts, relatively.
 const DIFFERENT: f64 = 1e-3;
@@ -60,7 +60,7 @@ fn in_the_catalogue(stored: &Stored, mistake: &Labelled) -> Option<String> {
     };
     let values: Vec<[f32; 3]> =
         mistake.answers().values().iter().map(|v| v.map(|v| v as f32)).collect();
-    let (tile, stored) = (Tile::of_list(&values), stored.views.get(&view)?);
+    let (tile, stored) = (Thumbnail::of_list(&values), stored.views.get(&view)?);
     let same = |known: &&String| {
         let known = stored.mistakes[*known].values().iter().zip(tile.values());
         let mut known = known.filter(|(a, b)| a.is_finite() && b.is_finite());

@@ -300,11 +300,11 @@ fn the_grader_sees_the_same_lit_and_shadowed_points_at_any_size() {
             umbra::expected::load_scene(&scaled(&occluders(), scale).path("s.toml")).unwrap();
         let buffer = umbra::expected::SurfaceBuffer::new(&scene, 64, 48).unwrap();
         let sight =
-            |(_, point): &(_, Option<umbra::expected::SurfacePoint>)| point.map(|p| p.sight);
+            |(_, point): &(_, Option<umbra::expected::SurfacePoint>)| point.map(|p| p.visibility);
         buffer.pixels.iter().map(sight).collect::<Vec<_>>()
     };
     let expected = sights(1.0);
-    for sight in [umbra::expected::Sight::Clear, umbra::expected::Sight::Blocked] {
+    for sight in [umbra::expected::Visibility::Clear, umbra::expected::Visibility::Blocked] {
         assert!(expected.iter().filter(|found| **found == Some(sight)).count() > 50, "{sight:?}");
     }
     for scale in SCALES {

@@ -9,8 +9,8 @@ use umbra::plugin::{Witness, WitnessQuery};
 use umbra::process::{Exit, Limits};
 use umbra::sandbox::Layers;
 use umbra::worker::{
-    Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, JobReport, Late, Matter,
-    Outcome, Patience, RayQuery, Request, SceneRef, Stage, Supervisor,
+    Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Fault, Job, JobReport, Late, Outcome,
+    RayQuery, Request, RetryBudget, SceneRef, Stage, Supervisor,
 };
 
 /// A floor in y = 0 from -4 to 4, facing up, a small blocker over x > 2 at y = 1, and a light at
@@ -434,14 +434,15 @@ fn questions_of_one_worker_have_limits_of_their_own() {
     let ask = |modes: &[&str]| {
         let requests = modes.iter().map(|mode| house.offline(mode, 1, 1)).collect();
         let job = Job { plugin: Some(plugin.clone()), requests };
-        let (never, patience) = (AtomicBool::new(false), Patience::with(None, None));
+        let (never, patience) = (AtomicBool::new(false), RetryBudget::with(None, None));
         let limits = Limits { wall_s: 1.0, cpu_s: 20, ..house.limits.clone() };
         house.supervisor.run_job_patiently(&job, &limits, &patience, &never, &mut |_| {})
     };
     // On a machine so busy that a plain render is late too, nothing is decided: asked again.
     let busy = |report: &JobReport| {
-        let machine =
-            |outcome: &Outcome| matches!(outcome, Outcome::NotRun { matter: Matter::Machine, .. });
+        let machine = |outcome: &Outcome| {
+            matches!(outcome, Outcome::NotRun { fault: Fault::Environment, .. })
+        };
         report.outcomes.iter().any(machine)
     };
     let report = std::iter::repeat_with(|| ask(&["", "", "loop", "", ""]))
@@ -464,7 +465,7 @@ fn a_timeout_counts_when_it_is_confirmed_alone_on_the_machine() {
     // What a worker did before is known to the next only without isolation.
     house.supervisor.isolation = Layers::NONE;
     let plugin = house.compile("fault.c", &[]);
-    let ask = |modes: &[&str], patience: &Patience| {
+    let ask = |modes: &[&str], patience: &RetryBudget| {
         let requests = modes.iter().map(|mode| house.offline(mode, 1, 1)).collect();
         let job = Job { plugin: Some(plugin.clone()), requests };
         let (limits, never) = (&house.limits, AtomicBool::new(false));
@@ -482,7 +483,7 @@ fn a_timeout_counts_when_it_is_confirmed_alone_on_the_machine() {
             std::thread::sleep(Duration::from_secs(2));
         });
         tell.recv().unwrap();
-        ask(&["", &once, ""], &Patience::default())
+        ask(&["", &once, ""], &RetryBudget::default())
     });
     assert!(begin.elapsed() >= Duration::from_secs(2), "{:?}", begin.elapsed());
     for outcome in &report.outcomes {
@@ -492,11 +493,11 @@ fn a_timeout_counts_when_it_is_confirmed_alone_on_the_machine() {
     assert_eq!(asked, [&[0, 1, 2][..], &[1], &[2]]);
 
     // One that hangs is confirmed once, and not again in the next job of the same path.
-    let patience = Patience::default();
+    let patience = RetryBudget::default();
     let report = ask(&["sleep", "sleep", ""], &patience);
     let not_asked = Outcome::NotRun {
         reason: "not asked: the renderer ran out of time before".into(),
-        matter: Matter::Submission,
+        fault: Fault::Submission,
     };
     assert_eq!(report.outcomes, [late(false, 1.0), late(false, 1.0), not_asked.clone()]);
     assert_eq!(report.runs.len(), 3);
@@ -518,7 +519,7 @@ fn a_cancelled_job_ends_at_once_and_says_so() {
         cancel.store(true, std::sync::atomic::Ordering::Relaxed);
     });
     assert_eq!(last, 1, "the first request was answered when progress was told");
-    let stopped = Outcome::NotRun { reason: "cancelled".into(), matter: Matter::Machine };
+    let stopped = Outcome::NotRun { reason: "cancelled".into(), fault: Fault::Environment };
     assert_eq!(values(&report.outcomes[0]), [0.0; 135]);
     assert_eq!(report.outcomes[1..], [stopped.clone(), stopped]);
 }
@@ -612,12 +613,12 @@ fn scenes_and_passes_that_fail_say_why() {
     let report = house.run(&reference(), vec![bsdf, realtime(AdapterKind::Software)]);
     assert!(matches!(&report.outcomes[0], Outcome::Failed(m) if m.contains("missing.toml")));
     assert!(matches!(&report.outcomes[1], Outcome::NoAdapter(_)), "{:?}", report.outcomes[1]);
-    assert_eq!(report.outcomes[1].matter(), Some(Matter::Machine));
+    assert_eq!(report.outcomes[1].fault(), Some(Fault::Environment));
 
     let job = Job { plugin: None, requests: vec![realtime(AdapterKind::Any)] };
     let run = AtomicBool::new(false);
     let report = house.supervisor.run_job(&job, &house.limits, &run, &mut |_| {});
-    assert_ne!(report.outcomes[0].matter(), Some(Matter::Submission), "{:?}", report.outcomes);
+    assert_ne!(report.outcomes[0].fault(), Some(Fault::Submission), "{:?}", report.outcomes);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::diagnostics::parse;
 use super::record::externs;
 use super::{Diagnostic, Recording, TEMPLATE};
-use crate::process::{self, Exit, Limits, Lock, signal_name};
+use crate::process::{self, Confinement, Exit, Limits, signal_name};
 use crate::sandbox::policy::{CLOSURE, SCRATCH, SRC, TOOLCHAIN};
 use crate::sandbox::{Bind, Kind, Policy};
 use crate::worker::Supervisor;
@@ -116,7 +116,7 @@ fn compile_once(
     policy.collect.push(Bind::new(&library, Path::new(SCRATCH).join(&file)));
     policy.scratch.without_mount = Some(scratch.path().to_owned());
     policy.report = Some(report.path().to_owned());
-    let lock = Lock::new(limits, policy.clone());
+    let lock = Confinement::new(limits, policy.clone());
     let sandboxed = lock.sandbox.is_some();
     // What the compiler is told: where it sees things, and where it may write.
     let (seen_src, temporary) = (policy.seen(&src), policy.scratch_path());

@@ -15,9 +15,9 @@ use super::context::{Context, INTERRUPTED, cores};
 use super::grade::{BudgetChoice, IsolationChoice, Perturb};
 use super::render::AdapterChoice;
 use crate::files::write_whole;
-use crate::grading::{Folders, Grading, Kept, Purpose, Record, judge_shared};
+use crate::grading::{Folders, Grading, Mode, Record, RecordCache, judge_shared};
 use crate::held_back::recorded_seed;
-use crate::report::{self, Entry, Sheet};
+use crate::report::{self, BatchReport, Entry};
 use crate::rubric;
 use crate::sandbox::Isolation;
 
@@ -42,7 +42,7 @@ pub struct Batch<'a> {
     /// So many at the same time.
     pub jobs: usize,
     /// What for.
-    pub purpose: Purpose,
+    pub purpose: Mode,
     /// What must isolate them.
     pub isolation: IsolationChoice,
     /// Nothing for the seed that is recorded with the batch.
@@ -61,20 +61,23 @@ pub struct Batch<'a> {
 
 impl Batch<'_> {
     /// Grades all and writes the reports; nothing when Ctrl-C came in between. Answers what was skipped, too.
-    pub fn run(&self, root: Option<&Path>) -> anyhow::Result<Option<(Sheet, Option<String>)>> {
+    pub fn run(
+        &self,
+        root: Option<&Path>,
+    ) -> anyhow::Result<Option<(BatchReport, Option<String>)>> {
         for path in &self.paths {
             ensure!(path.exists(), "{} does not exist", path.display());
         }
         let mut context = Context::new(root)?;
         let collected = match self.purpose {
-            Purpose::Grade => collect(&self.paths, self.output, &context.assignment.tree)?,
-            Purpose::Check => {
+            Mode::Grade => collect(&self.paths, self.output, &context.assignment.tree)?,
+            Mode::Check => {
                 let sources = self.paths.iter().map(|path| collect::Source::given(path)).collect();
                 Collected { sources, ..Collected::default() }
             }
         };
         super::writable(self.output)?;
-        if self.purpose == Purpose::Grade && context.reference().is_none() {
+        if self.purpose == Mode::Grade && context.reference().is_none() {
             return Err(MachineLacks(
                 "grades are made with the reference renderer and with scenes that are held back, which \
                  are not here: a student's kit has neither; hint: `umbra check DIR` judges your work \
@@ -104,8 +107,8 @@ impl Batch<'_> {
         let result = context.with_store(|store| {
             let adapter = self.adapter.adapter();
             let mut grading = Grading::prepare(store, adapter, seed, &INTERRUPTED)?;
-            if self.purpose == Purpose::Grade {
-                grading.kept = Some(Kept::of(&grading, self.force)?);
+            if self.purpose == Mode::Grade {
+                grading.kept = Some(RecordCache::of(&grading, self.force)?);
             }
             if self.budget == BudgetChoice::None {
                 grading.budget = None;
@@ -116,7 +119,7 @@ impl Batch<'_> {
             grading.threads = (cores() / jobs as u32).max(1);
             let results = self.grade_all(context, &grading, &chosen, jobs);
             let costs = grading.costs_of_reference();
-            if self.purpose == Purpose::Grade && !costs.is_empty() {
+            if self.purpose == Mode::Grade && !costs.is_empty() {
                 let file = self.output.join(report::INSTRUCTOR).join(COSTS_FILE);
                 write_whole(&file, &serde_json::to_vec_pretty(&costs)?)
                     .with_context(|| format!("cannot write {}", file.display()))?;
@@ -126,7 +129,7 @@ impl Batch<'_> {
         context.progress.end();
         if INTERRUPTED.load(Ordering::Relaxed) {
             let goes_on = match (self.purpose, &result) {
-                (Purpose::Grade, Ok((results, ..))) => format!(
+                (Mode::Grade, Ok((results, ..))) => format!(
                     ", {} of {} submissions are graded; the same command resumes there",
                     results.len(),
                     chosen.len()
@@ -165,7 +168,7 @@ impl Batch<'_> {
             }
             Entry { record, grade }
         });
-        let sheet = Sheet::new(&context.assignment, held_back, entries.collect());
+        let sheet = BatchReport::new(&context.assignment, held_back, entries.collect());
         report::write(self.output, &sheet)?;
         if self.timings {
             print_timings(&sheet);
@@ -184,7 +187,7 @@ impl Batch<'_> {
     ) -> Vec<anyhow::Result<Record>> {
         let next = AtomicUsize::new(0);
         let results = Mutex::new(Vec::new());
-        let batch = self.purpose == Purpose::Grade;
+        let batch = self.purpose == Mode::Grade;
         if batch {
             context.progress.count(sources.len());
         }
@@ -205,15 +208,15 @@ impl Batch<'_> {
                 };
                 let begun = Instant::now();
                 let result = match self.purpose {
-                    Purpose::Grade => class::note_source(&out, path)
+                    Mode::Grade => class::note_source(&out, path)
                         .and_then(|()| grading.one_of_batch(path, slug, &out, &say)),
-                    Purpose::Check => grading.hand_in(path, slug, &out, self.purpose, &say),
+                    Mode::Check => grading.hand_in(path, slug, &out, self.purpose, &say),
                 };
                 if INTERRUPTED.load(Ordering::Relaxed) && result.is_err() {
                     return;
                 }
                 let result = match (result, self.purpose) {
-                    (Err(error), Purpose::Grade) => {
+                    (Err(error), Mode::Grade) => {
                         let message = format!("{}: {}", path.display(), super::told_once(&error));
                         context.progress.note(&message);
                         Ok(grading.unjudged(path, slug))
@@ -250,7 +253,7 @@ impl Batch<'_> {
     }
 }
 
-fn print_timings(sheet: &Sheet) {
+fn print_timings(sheet: &BatchReport) {
     for entry in &sheet.entries {
         eprintln!("{}", entry.record.name);
         let (mut wall_s, mut cpu_s) = (0.0, 0.0);

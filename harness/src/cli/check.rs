@@ -15,7 +15,7 @@ use super::render::AdapterChoice;
 use super::{class, collect, terminal};
 use crate::assignment::Assignment;
 use crate::files::{files_below, write_whole};
-use crate::grading::{Purpose, RenderPath};
+use crate::grading::{Mode, RenderPath};
 use crate::report::{self, Closing, Look};
 use crate::rubric::{Grade, Part};
 
@@ -168,7 +168,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         output: &arguments.output,
         adapter: arguments.adapter,
         jobs: 1,
-        purpose: Purpose::Check,
+        purpose: Mode::Check,
         isolation: IsolationChoice::Reduced,
         perturb: Some(Perturb(None)),
         budget: BudgetChoice::Config,

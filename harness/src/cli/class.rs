@@ -10,7 +10,7 @@ use anyhow::{Context as _, ensure};
 use super::collect;
 use super::context::Context;
 use crate::files::write_whole;
-use crate::grading::{Earlier, Folders, Kept, Record, Student};
+use crate::grading::{Earlier, Folders, Record, RecordCache, Student};
 use crate::report;
 
 /// The file that says where a submission lay, in its instructor's folder.
@@ -99,7 +99,12 @@ fn folders(output: &Path) -> Vec<String> {
 
 /// Adds to `records`, made of some of the submissions `all`, what earlier runs into the same report
 /// found out about others, and says so. Answers whose were found out under other conditions.
-pub fn join(kept: &Kept, output: &Path, all: &[Source], records: &mut Vec<Record>) -> Vec<String> {
+pub fn join(
+    kept: &RecordCache,
+    output: &Path,
+    all: &[Source],
+    records: &mut Vec<Record>,
+) -> Vec<String> {
     let graded: HashSet<String> = records.iter().map(|record| record.slug.clone()).collect();
     let (mut incomparable, mut gone) = (Vec::new(), Vec::new());
     let mut missing: HashSet<&str> = all.iter().map(|source| source.slug.as_str()).collect();
@@ -205,7 +210,7 @@ pub fn only<'a>(
     }
     let student = |source: &Source| {
         let instructor = output.join(report::INSTRUCTOR).join(&source.slug);
-        let known = Kept::student(&instructor);
+        let known = RecordCache::student(&instructor);
         known.or_else(|| student_of(context, &source.path)).unwrap_or_default()
     };
     let students: Vec<Student> = all.iter().map(student).collect();

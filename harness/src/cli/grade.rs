@@ -8,8 +8,8 @@ use super::context::cores;
 use super::render::AdapterChoice;
 use super::terminal;
 use crate::evidence::Verdict;
-use crate::grading::{INTERNAL_ERROR, Purpose};
-use crate::report::{self, Sheet};
+use crate::grading::{INTERNAL_ERROR, Mode};
+use crate::report::{self, BatchReport};
 
 /// Options of `umbra grade`.
 #[derive(clap::Args)]
@@ -94,7 +94,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         output: &arguments.output,
         adapter: arguments.adapter,
         jobs: arguments.jobs.unwrap_or(cores() as usize).max(1),
-        purpose: Purpose::Grade,
+        purpose: Mode::Grade,
         isolation: arguments.isolation,
         perturb: arguments.perturb,
         budget: arguments.budget,
@@ -116,7 +116,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
 }
 
 /// What a batch ends with: a bug of ours counts more than what the machine lacks.
-fn exit_code(sheet: &Sheet) -> u8 {
+fn exit_code(sheet: &BatchReport) -> u8 {
     let mut checks = sheet.entries.iter().flat_map(|entry| &entry.record.evidence.checks);
     if checks.any(|check| check.id == INTERNAL_ERROR && check.verdict == Verdict::Fail) {
         return super::EXIT_BUG;

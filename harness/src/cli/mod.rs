@@ -34,7 +34,7 @@ pub const EXIT_USAGE: u8 = 2;
 pub const EXIT_MACHINE: u8 = 3;
 /// A bug of Umbra's: of a batch, all other submissions have their reports.
 pub const EXIT_BUG: u8 = 70;
-/// Ended by Ctrl-C.
+/// ChildOutcome by Ctrl-C.
 pub const EXIT_INTERRUPTED: u8 = 130;
 
 /// Umbra grades renderers: it builds students' renderer plugins, runs them in isolation on every

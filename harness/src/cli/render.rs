@@ -14,7 +14,7 @@ use crate::imaging::pictures::clamped;
 use crate::intake::HandInConfig;
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, AdapterKind, CameraValue, Job, Matter, Outcome, Request, SceneRef, as_given,
+    Adapter, AdapterKind, CameraValue, Fault, Job, Outcome, Request, SceneRef, as_given,
     draw_in_process,
 };
 
@@ -306,7 +306,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
             };
             let as_given = |said: &str| as_given(said, &arguments.scene, &plugin_as_given);
             eprint!("{}", as_given(&printed));
-            if outcome.and_then(Outcome::matter) == Some(Matter::Machine) {
+            if outcome.and_then(Outcome::fault) == Some(Fault::Environment) {
                 return Err(super::MachineLacks(as_given(&said)).into());
             }
             bail!("{}", as_given(&said))

@@ -13,7 +13,7 @@ use crate::process::{self, exit_now};
 
 /// Locks this process, then answers the question in `dir`. Does not return when it could.
 pub fn child_main(dir: &Path) -> ExitCode {
-    if let Err(error) = process::lock_self().and_then(|()| answer(dir)) {
+    if let Err(error) = process::confine_self().and_then(|()| answer(dir)) {
         eprintln!("umbra: the decoder cannot work: {error}");
         return ExitCode::from(process::EXIT_NOT_LOCKED);
     }

@@ -3,7 +3,7 @@
 //! the one file or folder in question, what it may write is its answer.
 //!
 //! The parent reads an answer when the child is gone, and believes neither names nor sizes in it.
-//! A child that dies is the hand-in's matter: whatever it could not decode is refused.
+//! A child that dies is the hand-in's fault: whatever it could not decode is refused.
 
 mod child;
 mod wire;
@@ -22,7 +22,7 @@ use serde::Serialize;
 pub use child::child_main;
 
 use crate::intake::{self, Finding, HandIn, IntakeError, Refusal, TreeSpec, Validation};
-use crate::process::{self, Ended, Exit, Limits, Lock, signal_name};
+use crate::process::{self, ChildOutcome, Confinement, Exit, Limits, signal_name};
 use crate::sandbox::{Bind, Kind, Policy, policy::JOB};
 use crate::worker::Supervisor;
 // Public for its fuzz target: a child may write anything.
@@ -262,7 +262,7 @@ impl<'a> Decoder<'a> {
         if cfg!(windows) {
             command.envs(std::env::var_os("SystemRoot").map(|root| ("SystemRoot", root)));
         }
-        let lock = Lock::new(self.limits, policy);
+        let lock = Confinement::new(self.limits, policy);
         let ended = process::run(command, &lock, KEEP_OUTPUT, self.cancel, &mut |_| {
             ControlFlow::Continue(())
         })?;
@@ -305,7 +305,7 @@ fn died(how: &str) -> NoAnswer {
 }
 
 /// How the child died, if it did.
-fn death(ended: &Ended) -> Result<(), NoAnswer> {
+fn death(ended: &ChildOutcome) -> Result<(), NoAnswer> {
     let how = match ended.exit {
         Exit::Code(0) => return Ok(()),
         Exit::Cancelled => return Err(io::Error::from(io::ErrorKind::Interrupted).into()),

@@ -45,7 +45,7 @@ pub enum Class {
     Nothing,
     /// No image of the assignment shows it, probes do.
     Hidden,
-    /// Worth a remark, no points.
+    /// PartScore a remark, no points.
     Finding,
 }
 

@@ -7,9 +7,9 @@ use super::fit::{
     Accuracy, Fitted, Subject, explain, explain_pass, explain_shadows, explain_vertex,
 };
 use super::loops;
-use super::nearest::{Exhibit, Guess, Nearest, is_black, nearest};
+use super::nearest::{Comparison, Hypothesis, Nearest, is_black, nearest};
 use super::stored::{Material, Stored};
-use super::view::{Kind, Sightings, View};
+use super::view::{Kind, Observations, View};
 use crate::evidence::{CheckId, Evidence, Picture, Verdict};
 use crate::imaging::ratio::ratio_name;
 
@@ -37,13 +37,13 @@ pub struct Diagnosis {
 const EXACT: f64 = 0.05;
 
 /// All that a diagnosis is made from. Nothing of it comes from scenes that are held back.
-pub struct Facts<'a> {
+pub struct Input<'a> {
     /// What was found out.
     pub evidence: &'a Evidence,
     /// The parts that lost points.
     pub failing: &'a [String],
     /// What the renderer answered.
-    pub sightings: &'a Sightings,
+    pub observations: &'a Observations,
     /// What known mistakes answer.
     pub stored: &'a Stored,
     /// What they are.
@@ -91,7 +91,7 @@ const QUESTIONS: [Question; 9] = {
     ]
 };
 
-impl Facts<'_> {
+impl Input<'_> {
     /// What every failing part looks like; nothing of those that look like nothing known.
     pub fn diagnose(&self) -> Vec<Diagnosis> {
         let mut found = self.by_findings();
@@ -136,7 +136,7 @@ impl Facts<'_> {
         let part = question.part;
         let own = |mistake: &KnownMistake| mistake.parts.iter().any(|own| own == part);
         let [isolated, image] = [question.isolated, &[question.image]]
-            .map(|kinds| self.exhibits(kinds, question.material));
+            .map(|kinds| self.comparisons(kinds, question.material));
         // Shadows where none should be: images of the bonus tell nothing of how it draws them.
         if part == "2.5" && self.verdict_of(CheckId::BonusDefault, Verdict::Fail) {
             return None;
@@ -164,7 +164,7 @@ impl Facts<'_> {
 
     /// What the answers of a part say by themselves.
     fn fitted(&self, part: &str) -> Option<Diagnosis> {
-        let (seen, bsdf) = (self.sightings, Accuracy { relative: 1e-3, stray: 2e-3 });
+        let (seen, bsdf) = (self.observations, Accuracy { relative: 1e-3, stray: 2e-3 });
         let shaded = |subject, accuracy| explain(seen.shaded.get(part)?, subject, accuracy);
         let Fitted { deviations, unexplained } = match part {
             "1.1" | "1.2" => shaded(Subject::Bsdf, bsdf),
@@ -191,7 +191,7 @@ impl Facts<'_> {
     }
 
     /// Part 1.3 is radiance along rays, and the loop that makes an image of it.
-    fn direct_light(&self, lit: &[Exhibit], image: &[Exhibit]) -> Option<Diagnosis> {
+    fn direct_light(&self, lit: &[Comparison], image: &[Comparison]) -> Option<Diagnosis> {
         let own = |mistake: &KnownMistake| mistake.parts.iter().any(|part| part == "1.3");
         let looping =
             |mistake: &KnownMistake| matches!(&*mistake.family, "loop" | "film" | "camera");
@@ -206,13 +206,14 @@ impl Facts<'_> {
             // Scenes that nothing is stored of are held back.
             let public =
                 |scene: &&String| self.stored.views.contains_key(&View::new(Kind::Offline, scene));
-            let scenes = self.sightings.loops.iter().filter(|(scene, _)| public(scene));
+            let scenes = self.observations.loops.iter().filter(|(scene, _)| public(scene));
             let made = loops::explain(scenes.map(|(_, seen)| seen));
             made.map(|(name, left)| self.known(&[name], left, 1.0))
                 .or_else(|| self.among(image, |mistake| own(mistake) && looping(mistake)))
         };
-        let film =
-            || self.among(&self.exhibits(&[Kind::Film], None), |mistake| mistake.family == "loop");
+        let film = || {
+            self.among(&self.comparisons(&[Kind::Film], None), |mistake| mistake.family == "loop")
+        };
         let found = match (rays_fail, loop_fails) {
             (true, true) => match (radiance(), by_loop()) {
                 (Some(a), Some(b)) => Some(a.and(b)),
@@ -227,35 +228,35 @@ impl Facts<'_> {
     }
 
     /// What the renderer answered to questions of these kinds, beside what the store knows.
-    fn exhibits(&self, kinds: &[Kind], material: Option<Material>) -> Vec<Exhibit<'_>> {
-        let seen = self.sightings.tiles.iter().filter(|(view, _)| kinds.contains(&view.kind));
-        let exhibits = seen.filter_map(|(view, tile)| {
+    fn comparisons(&self, kinds: &[Kind], material: Option<Material>) -> Vec<Comparison<'_>> {
+        let seen = self.observations.tiles.iter().filter(|(view, _)| kinds.contains(&view.kind));
+        let comparisons = seen.filter_map(|(view, tile)| {
             let stored = self.stored.views.get(view)?;
             let everything = material.is_none() || matches!(view.kind, Kind::Diffuse | Kind::Phong);
             let counts = |shown: &Material| match everything {
                 true => *shown != Material::Ignored,
                 false => Some(*shown) == material,
             };
-            Some(Exhibit {
+            Some(Comparison {
                 seen: tile,
                 right: &stored.right,
                 mistakes: &stored.mistakes,
                 counts: stored.materials.iter().map(counts).collect(),
             })
         });
-        let exhibits: Vec<Exhibit> = exhibits.collect();
+        let comparisons: Vec<Comparison> = comparisons.collect();
         // Darkness is an answer to whether a point is lit, and elsewhere has any reason.
         let lightless = |kind: &Kind| matches!(kind, Kind::Shadow | Kind::Bonus);
-        if !kinds.iter().all(lightless) && is_black(&exhibits) {
+        if !kinds.iter().all(lightless) && is_black(&comparisons) {
             return Vec::new();
         }
-        exhibits
+        comparisons
     }
 
     /// What some views look like, among some of the known mistakes.
     fn among(
         &self,
-        exhibits: &[Exhibit],
+        comparisons: &[Comparison],
         wanted: impl Fn(&KnownMistake) -> bool,
     ) -> Option<Diagnosis> {
         let mut names: Vec<&str> = Vec::new();
@@ -264,15 +265,17 @@ impl Facts<'_> {
                 names.push(&mistake.name);
             }
         }
-        let Nearest { guess, distance, runner_up } = nearest(exhibits, &names)?;
+        let Nearest { guess, distance, runner_up } = nearest(comparisons, &names)?;
         let family = |name: &str| self.catalogue.named(name).map(|known| &known.family);
         Some(match guess {
             // What two of a kind explain together is rather a third.
-            Guess::Two(a, b) if family(&a) == family(&b) => return None,
-            Guess::One(name) => self.known(&[&name], distance, runner_up),
-            Guess::Two(a, b) => self.known(&[&a, &b], distance, runner_up),
-            Guess::Factor(factor) => self.known(&[], distance, runner_up).times(factor),
-            Guess::Scaled(name, factor) => self.known(&[&name], distance, runner_up).times(factor),
+            Hypothesis::Two(a, b) if family(&a) == family(&b) => return None,
+            Hypothesis::One(name) => self.known(&[&name], distance, runner_up),
+            Hypothesis::Two(a, b) => self.known(&[&a, &b], distance, runner_up),
+            Hypothesis::Factor(factor) => self.known(&[], distance, runner_up).times(factor),
+            Hypothesis::Scaled(name, factor) => {
+                self.known(&[&name], distance, runner_up).times(factor)
+            }
         })
     }
 

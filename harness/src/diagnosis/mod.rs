@@ -7,11 +7,11 @@ pub mod fit;
 mod loops;
 mod nearest;
 mod stored;
-mod tile;
+mod thumbnail;
 mod view;
 
 pub use catalogue::{Catalogue, CatalogueError, Class, KnownMistake, RightVariant};
-pub use diagnose::{Diagnosis, Facts};
+pub use diagnose::{Diagnosis, Input};
 pub use stored::{Material, Stored, StoredError, StoredView};
-pub use tile::{LENGTH, Tile};
-pub use view::{Kind, LoopSeen, Sightings, View};
+pub use thumbnail::{LENGTH, Thumbnail};
+pub use view::{Kind, LoopSeen, Observations, View};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use basecode::Vec3;
 
-use super::tile::Tile;
+use super::thumbnail::Thumbnail;
 
 /// Values that differ by less than this fraction of their sum are the same: 16-bit floats in the
 /// store and f32 arithmetic in any order.
@@ -29,20 +29,20 @@ const CLEARLY: f64 = 0.5;
 const PAIR_VIEWS: usize = 4;
 
 /// One view of the renderer in question, beside what the store knows of it.
-pub struct Exhibit<'a> {
+pub struct Comparison<'a> {
     /// What it answered.
-    pub seen: &'a Tile,
+    pub seen: &'a Thumbnail,
     /// What is right.
-    pub right: &'a Tile,
+    pub right: &'a Thumbnail,
     /// What known mistakes answer; one that is not here answers what is right.
-    pub mistakes: &'a BTreeMap<String, Tile>,
+    pub mistakes: &'a BTreeMap<String, Thumbnail>,
     /// Which values count.
     pub counts: Vec<bool>,
 }
 
 /// What answers look like.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Guess {
+pub enum Hypothesis {
     /// This mistake.
     One(String),
     /// What is right, times a constant.
@@ -57,7 +57,7 @@ pub enum Guess {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nearest {
     /// What it is.
-    pub guess: Guess,
+    pub guess: Hypothesis,
     /// Its distance, as a fraction of the distance from what is right.
     pub distance: f64,
     /// The distance of the next best guess of the same sort; 1 is that of what is right.
@@ -65,30 +65,30 @@ pub struct Nearest {
 }
 
 /// What the answers look like, among mistakes of these names; no two of them may look the same.
-pub fn nearest(exhibits: &[Exhibit], names: &[&str]) -> Option<Nearest> {
-    if from_right(exhibits) < NOTHING {
+pub fn nearest(comparisons: &[Comparison], names: &[&str]) -> Option<Nearest> {
+    if from_right(comparisons) < NOTHING {
         return None;
     }
-    let shown: Vec<(&Exhibit, f32)> =
-        exhibits.iter().map(|exhibit| (exhibit, scale(exhibit))).collect();
-    let distance = |shown: &[(&Exhibit, f32)], guess: &dyn Fn(&Exhibit) -> Tile| {
+    let shown: Vec<(&Comparison, f32)> =
+        comparisons.iter().map(|exhibit| (exhibit, scale(exhibit))).collect();
+    let distance = |shown: &[(&Comparison, f32)], guess: &dyn Fn(&Comparison) -> Thumbnail| {
         let from_right = total(shown, |exhibit| exhibit.right.clone());
         total(shown, guess).sum / from_right.sum.max(f64::MIN_POSITIVE)
     };
     let single: Vec<f64> =
         names.iter().map(|name| distance(&shown, &|exhibit| exhibit.tile(name).clone())).collect();
     let singles = single.iter().zip(names);
-    let singles = singles.map(|(&distance, &name)| (distance, Guess::One(name.to_owned())));
+    let singles = singles.map(|(&distance, &name)| (distance, Hypothesis::One(name.to_owned())));
     if let Some(found) = clearest(singles.collect(), SINGLE) {
         return Some(found);
     }
     let factor = common_factor(&shown, |exhibit| exhibit.right.clone());
     let left = distance(&shown, &|exhibit| exhibit.right.map(|value| factor * value));
     if left < FACTOR && (factor - 1.0).abs() > NO_FACTOR {
-        return Some(Nearest { guess: Guess::Factor(factor), distance: left, runner_up: 1.0 });
+        return Some(Nearest { guess: Hypothesis::Factor(factor), distance: left, runner_up: 1.0 });
     }
     let mut most = shown;
-    let apart = |(exhibit, scale): &(&Exhibit, f32)| {
+    let apart = |(exhibit, scale): &(&Comparison, f32)| {
         total(&[(*exhibit, *scale)], |exhibit| exhibit.right.clone()).sum
     };
     most.sort_by(|a, b| apart(b).total_cmp(&apart(a)));
@@ -98,13 +98,13 @@ pub fn nearest(exhibits: &[Exhibit], names: &[&str]) -> Option<Nearest> {
         let factor = common_factor(&most, |exhibit| exhibit.tile(first).clone());
         let left = distance(&most, &|exhibit| exhibit.tile(first).map(|value| factor * value));
         if left < CLEARLY * single[i] && (factor - 1.0).abs() > NO_FACTOR {
-            pairs.push((left, Guess::Scaled((*first).to_owned(), factor)));
+            pairs.push((left, Hypothesis::Scaled((*first).to_owned(), factor)));
         }
         for (j, second) in names.iter().enumerate().skip(i + 1) {
             let left = distance(&most, &|exhibit| exhibit.both(first, second));
             // A second mistake that explains nothing more is none.
             if left < CLEARLY * single[i].min(single[j]) {
-                pairs.push((left, Guess::Two((*first).to_owned(), (*second).to_owned())));
+                pairs.push((left, Hypothesis::Two((*first).to_owned(), (*second).to_owned())));
             }
         }
     }
@@ -112,8 +112,8 @@ pub fn nearest(exhibits: &[Exhibit], names: &[&str]) -> Option<Nearest> {
 }
 
 /// The mean difference of all answers from what is right: 0 is the same, 1 nothing alike.
-pub fn from_right(exhibits: &[Exhibit]) -> f64 {
-    let shown: Vec<_> = exhibits.iter().map(|exhibit| (exhibit, scale(exhibit))).collect();
+pub fn from_right(comparisons: &[Comparison]) -> f64 {
+    let shown: Vec<_> = comparisons.iter().map(|exhibit| (exhibit, scale(exhibit))).collect();
     total(&shown, |exhibit| exhibit.right.clone()).mean()
 }
 
@@ -121,9 +121,9 @@ pub fn from_right(exhibits: &[Exhibit]) -> f64 {
 const BLACK: f64 = 0.98;
 
 /// Whether nearly everything is black that should shine: it may be so for any reason.
-pub fn is_black(exhibits: &[Exhibit]) -> bool {
+pub fn is_black(comparisons: &[Comparison]) -> bool {
     let (mut shining, mut dark) = (0usize, 0usize);
-    for exhibit in exhibits {
+    for exhibit in comparisons {
         let values = exhibit.seen.values().iter().zip(exhibit.right.values());
         for ((seen, right), _) in values.zip(&exhibit.counts).filter(|(_, counts)| **counts) {
             if right.element_sum() > 0.0 && !seen.is_nan() {
@@ -135,14 +135,14 @@ pub fn is_black(exhibits: &[Exhibit]) -> bool {
     shining > 0 && dark as f64 >= BLACK * shining as f64
 }
 
-impl Exhibit<'_> {
-    fn tile(&self, name: &str) -> &Tile {
+impl Comparison<'_> {
+    fn tile(&self, name: &str) -> &Thumbnail {
         self.mistakes.get(name).unwrap_or(self.right)
     }
 
     /// Two mistakes together, from each alone: what either does to what is right, it does to the
     /// other too.
-    fn both(&self, first: &str, second: &str) -> Tile {
+    fn both(&self, first: &str, second: &str) -> Thumbnail {
         let compose = |right: f32, a: f32, b: f32| if right == 0.0 { a + b } else { a * b / right };
         self.right.combine(self.tile(first), self.tile(second), |right, a, b| {
             Vec3::from_array(std::array::from_fn(|c| compose(right[c], a[c], b[c])))
@@ -151,7 +151,7 @@ impl Exhibit<'_> {
 }
 
 /// The nearest guess, if it leaves less than `limit` and clearly less than the next one.
-fn clearest(mut guesses: Vec<(f64, Guess)>, limit: f64) -> Option<Nearest> {
+fn clearest(mut guesses: Vec<(f64, Hypothesis)>, limit: f64) -> Option<Nearest> {
     guesses.sort_by(|a, b| a.0.total_cmp(&b.0));
     let runner_up = guesses.get(1).map_or(1.0, |(distance, _)| distance.min(1.0));
     let (distance, guess) = guesses.into_iter().next()?;
@@ -176,7 +176,7 @@ impl Total {
 }
 
 /// How far the answers are from a guess, over all views.
-fn total(shown: &[(&Exhibit, f32)], guess: impl Fn(&Exhibit) -> Tile) -> Total {
+fn total(shown: &[(&Comparison, f32)], guess: impl Fn(&Comparison) -> Thumbnail) -> Total {
     let mut total = Total::default();
     for (exhibit, scale) in shown {
         let guess = guess(exhibit);
@@ -208,7 +208,7 @@ fn difference(a: Vec3, b: Vec3, scale: f32) -> Option<f32> {
 }
 
 /// The mean of what is right.
-fn scale(exhibit: &Exhibit) -> f32 {
+fn scale(exhibit: &Comparison) -> f32 {
     let (mut sum, mut count) = (0.0f64, 0);
     for value in exhibit.right.values().iter().filter(|value| value.is_finite()) {
         sum += f64::from(value.abs().element_sum());
@@ -218,7 +218,7 @@ fn scale(exhibit: &Exhibit) -> f32 {
 }
 
 /// The median of answers over a guess, where the guess is not dark.
-fn common_factor(shown: &[(&Exhibit, f32)], guess: impl Fn(&Exhibit) -> Tile) -> f32 {
+fn common_factor(shown: &[(&Comparison, f32)], guess: impl Fn(&Comparison) -> Thumbnail) -> f32 {
     let mut ratios = Vec::new();
     for (exhibit, scale) in shown {
         let guess = guess(exhibit);

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use basecode::exr_io::{ExrLayers, ImageError, Precision, read_exr_layers, write_exr_layers};
 use basecode::{Image, Vec3};
 
-use super::nearest::{Exhibit, from_right};
-use super::tile::{COLUMNS, LENGTH, Tile};
+use super::nearest::{Comparison, from_right};
+use super::thumbnail::{COLUMNS, LENGTH, Thumbnail};
 use super::view::View;
 use crate::imaging::reference::RegionMask;
 
@@ -46,8 +46,10 @@ impl Material {
             };
             (index, [f32::from(material as u8); 3])
         };
-        let tile =
-            Tile::of_pixels((mask.width, mask.height), mask.pixels.iter().enumerate().map(code));
+        let tile = Thumbnail::of_pixels(
+            (mask.width, mask.height),
+            mask.pixels.iter().enumerate().map(code),
+        );
         tile.values().iter().map(|value| Self::ALL[value.x as usize % Self::ALL.len()]).collect()
     }
 
@@ -58,11 +60,11 @@ impl Material {
 #[derive(Clone, Debug)]
 pub struct StoredView {
     /// What is right.
-    pub right: Tile,
+    pub right: Thumbnail,
     /// What each value shows.
     pub materials: Vec<Material>,
     /// What mistakes answer; those that answer what is right are not here.
-    pub mistakes: BTreeMap<String, Tile>,
+    pub mistakes: BTreeMap<String, Thumbnail>,
     /// SHA-256 of the scene; empty when there is none.
     pub digest: String,
 }
@@ -154,11 +156,11 @@ impl Stored {
 
 impl StoredView {
     /// The mean difference of an answer from what is right: 0 is the same, 1 nothing alike.
-    pub fn differs(&self, tile: &Tile) -> f64 {
+    pub fn differs(&self, tile: &Thumbnail) -> f64 {
         let (right, mistakes) = (&self.right, &self.mistakes);
         let counts = |shown: &Material| *shown != Material::Ignored;
         let counts = self.materials.iter().map(counts).collect();
-        from_right(&[Exhibit { seen: tile, right, mistakes, counts }])
+        from_right(&[Comparison { seen: tile, right, mistakes, counts }])
     }
 
     fn layers(&self) -> ExrLayers {
@@ -205,7 +207,7 @@ impl StoredView {
             ));
         }
         let mut tiles =
-            image.pixels.chunks_exact(LENGTH).map(|values| Tile::of_stored(values.to_vec()));
+            image.pixels.chunks_exact(LENGTH).map(|values| Thumbnail::of_stored(values.to_vec()));
         let mut next = || tiles.next().flatten().ok_or("a tile is missing");
         let right = next()?;
         let materials = next()?;
@@ -228,8 +230,8 @@ mod tests {
     use super::*;
 
     fn view() -> StoredView {
-        let tile = |f: f32| Tile::of_list(&[[f, f + 1.0, f32::NAN]; 3]).map(|v| v);
-        let right = Tile::of_list(&[[0.25, 0.5, 1.0]; LENGTH]);
+        let tile = |f: f32| Thumbnail::of_list(&[[f, f + 1.0, f32::NAN]; 3]).map(|v| v);
+        let right = Thumbnail::of_list(&[[0.25, 0.5, 1.0]; LENGTH]);
         let dark = right.map(|value| 0.5 * value);
         StoredView {
             mistakes: [("dark".to_owned(), dark), ("broken".to_owned(), tile(1.0))].into(),
@@ -253,7 +255,7 @@ mod tests {
         let (found, expected) = (&stored.views[&View::new(Kind::Lit, "cbox")], view());
         assert_eq!(found.materials, expected.materials);
         assert_eq!(found.digest, "abc");
-        let bits = |tile: &Tile| format!("{:?}", tile.values());
+        let bits = |tile: &Thumbnail| format!("{:?}", tile.values());
         assert_eq!(bits(&found.right), bits(&expected.right));
         assert_eq!(found.mistakes.len(), 2);
         for (name, tile) in &expected.mistakes {

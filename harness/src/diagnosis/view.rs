@@ -6,7 +6,7 @@ use std::fmt;
 use basecode::Image;
 
 use super::fit::{Bound, Sample, ShadowRay, VertexSeen};
-use super::tile::Tile;
+use super::thumbnail::Thumbnail;
 
 /// What was asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -100,9 +100,9 @@ impl fmt::Display for View {
 
 /// What one renderer answered.
 #[derive(Clone, Debug, Default)]
-pub struct Sightings {
+pub struct Observations {
     /// The tiles of its answers.
-    pub tiles: BTreeMap<View, Tile>,
+    pub tiles: BTreeMap<View, Thumbnail>,
     /// By scene: radiance along the centres of all pixels, and the image that its own loop made of it.
     pub loops: BTreeMap<String, LoopSeen>,
     /// By part: points that were shaded, and the answers.
@@ -124,9 +124,9 @@ pub struct LoopSeen {
     pub image: Image,
 }
 
-impl Sightings {
+impl Observations {
     /// Keeps an answer. Answers to the same question fill each other's gaps.
-    pub fn see(&mut self, view: View, tile: Tile) {
+    pub fn record(&mut self, view: View, tile: Thumbnail) {
         if tile.is_empty() {
             return;
         }

@@ -7,4 +7,4 @@ mod surface;
 pub use regions::regions;
 pub(crate) use store::scene_digest;
 pub use store::{Blessing, Expected, Store, load_scene};
-pub use surface::{FARTHEST_START, Sight, SurfaceBuffer, SurfacePoint};
+pub use surface::{FARTHEST_START, SurfaceBuffer, SurfacePoint, Visibility};

@@ -2,7 +2,7 @@
 
 use basecode::{Frame, MaterialModel, Result, Scene, Vec3};
 
-use super::surface::{Lattice, Sight, SurfacePoint};
+use super::surface::{Lattice, SurfacePoint, Visibility};
 use crate::imaging::reference::{Region, RegionMask};
 
 /// A pixel whose specular lobe exceeds this fraction of its peak belongs to the highlight.
@@ -83,12 +83,13 @@ impl Seen {
         };
         let material = scene.shapes()[point.shape].material;
         let emitter = scene.materials()[material].is_emitter();
-        let blocked = shadows && point.sight == Sight::Blocked;
+        let blocked = shadows && point.visibility == Visibility::Blocked;
         // Offline, which has shadows, a mirror is black; realtime draws it as a diffuse colour.
         let black = shadows && scene.materials()[material].model == MaterialModel::Mirror;
         let lit = point.faces_both() && !blocked && !emitter && !black;
         let grazes = |w: Vec3| Frame::cos_theta(w).abs() < GRAZING;
-        let hangs_on_epsilon = shadows && point.sight == Sight::Unsure && point.faces_both();
+        let hangs_on_epsilon =
+            shadows && point.visibility == Visibility::Unsure && point.faces_both();
         let flag = if emitter { RegionMask::EMITTER } else { 0 };
         Self {
             value: flag | (1 + 2 * material + usize::from(!lit)) as u16,

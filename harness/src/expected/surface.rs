@@ -22,12 +22,12 @@ pub struct SurfacePoint {
     /// Distance to the light, scene units.
     pub distance: f32,
     /// What lies between the point and the light.
-    pub sight: Sight,
+    pub visibility: Visibility,
 }
 
 /// Whether a surface point and the light see each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sight {
+pub enum Visibility {
     /// Nothing lies between, with a margin.
     Clear,
     /// Something lies between, with a margin.
@@ -62,7 +62,7 @@ impl SurfacePoint {
             wo: hit.wo,
             wi: hit.frame_ns.to_local(direction),
             distance,
-            sight: sight(scene, &hit, direction, distance),
+            visibility: visibility(scene, &hit, direction, distance),
         })
     }
 }
@@ -81,7 +81,12 @@ const TERMINATOR: f32 = 0.02;
 /// How far from its end a shadow ray may stop, relative to its length.
 const END_MARGIN: f32 = 5e-3;
 
-fn sight(scene: &Scene, hit: &SurfaceInteraction, direction: Vec3, distance: f32) -> Sight {
+fn visibility(
+    scene: &Scene,
+    hit: &SurfaceInteraction,
+    direction: Vec3,
+    distance: f32,
+) -> Visibility {
     let from =
         |origin, start: f32, end: f32| scene.occluded(&Ray::segment(origin, direction, start, end));
     let unit = distance.max(UNIT * hit.epsilon);
@@ -91,7 +96,7 @@ fn sight(scene: &Scene, hit: &SurfaceInteraction, direction: Vec3, distance: f32
     if outside.dot(direction) < TERMINATOR
         && Frame::cos_theta(hit.frame_ns.to_local(direction)) > 0.0
     {
-        return Sight::Unsure;
+        return Visibility::Unsure;
     }
     // Some students lift the origin along the normal instead of starting later on the ray.
     let lifted = hit.p + far * outside;
@@ -102,9 +107,9 @@ fn sight(scene: &Scene, hit: &SurfaceInteraction, direction: Vec3, distance: f32
         from(lifted, near, short),
     ];
     match answers {
-        [true, true, true] => Sight::Blocked,
-        [false, false, false] => Sight::Clear,
-        _ => Sight::Unsure,
+        [true, true, true] => Visibility::Blocked,
+        [false, false, false] => Visibility::Clear,
+        _ => Visibility::Unsure,
     }
 }
 

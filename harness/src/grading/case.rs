@@ -77,7 +77,7 @@ impl Sampled {
         let rays = film.offsets.iter().enumerate().map(|(index, [jx, jy])| {
             let pixel = index as u32 / RAYS;
             let (x, y) = ((pixel % film.width) as f32, (pixel / film.width) as f32);
-            super::ask::ray(&camera.ray(x + jx, y + jy))
+            super::session::ray(&camera.ray(x + jx, y + jy))
         });
         Ok(Self { rays: rays.collect(), film })
     }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::kept::Kept;
-use super::pipeline::{Folders, Grading, Purpose};
+use super::cache::RecordCache;
+use super::pipeline::{Folders, Grading, Mode};
 use super::record::Record;
 use crate::evidence::{Check, CheckId, Evidence, Verdict};
 use crate::panics::{self, Bug};
@@ -24,7 +24,7 @@ impl Grading<'_> {
         out: &Folders,
         say: &dyn Fn(&str),
     ) -> anyhow::Result<Record> {
-        let grade = || self.hand_in(source, slug, out, Purpose::Grade, say);
+        let grade = || self.hand_in(source, slug, out, Mode::Grade, say);
         contained(self.kept.as_ref(), source, out, grade).unwrap_or_else(|bug| {
             let summary = "Umbra itself failed, and nothing was found out";
             let check = Check::new(INTERNAL_ERROR, "", Verdict::Fail, summary);
@@ -37,7 +37,7 @@ impl Grading<'_> {
 
 /// Runs `grade`, unless it is known to meet a bug.
 fn contained<T>(
-    kept: Option<&Kept>,
+    kept: Option<&RecordCache>,
     source: &Path,
     out: &Folders,
     grade: impl FnOnce() -> T,
@@ -68,21 +68,21 @@ mod tests {
         let source = at("submission.zip");
         std::fs::write(&source, "one").unwrap();
         let calls = Cell::new(0);
-        let grade = |kept: &Kept, good: bool| {
+        let grade = |kept: &RecordCache, good: bool| {
             contained(Some(kept), &source, &out, || {
                 calls.set(calls.get() + 1);
                 assert!(good, "a pixel of -0.0");
                 7
             })
         };
-        let kept = Kept::with([1; 32]);
+        let kept = RecordCache::with([1; 32]);
         let bug = grade(&kept, false).unwrap_err();
         assert!(bug.message == "a pixel of -0.0" && bug.place.contains("contain.rs"), "{bug}");
         let again = grade(&kept, true).unwrap_err();
         assert_eq!(again.message, "not tried again: a pixel of -0.0");
         assert_eq!((again.place, calls.get()), (bug.place, 1));
         // Another program tries again, and so does this one with another submission.
-        assert_eq!(grade(&Kept::with([2; 32]), true), Ok(7));
+        assert_eq!(grade(&RecordCache::with([2; 32]), true), Ok(7));
         std::fs::write(&source, "another").unwrap();
         assert_eq!(grade(&kept, true), Ok(7));
         assert_eq!(calls.get(), 3);

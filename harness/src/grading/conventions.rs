@@ -6,10 +6,10 @@ use std::path::Path;
 use basecode::{MaterialModel, Sampler, Vec2, Vec3};
 use renderer_api as api;
 
-use super::ask::{self, Asker};
 use super::case::Case;
-use super::seen;
-use crate::diagnosis::{self, Tile, View};
+use super::observe;
+use super::session::{self, Session};
+use crate::diagnosis::{self, Thumbnail, View};
 use crate::evidence::bsdf::{self, BsdfKind, BsdfProbe};
 use crate::evidence::convention::{self, Convention, Conventional, Party};
 use crate::evidence::loops::Edges;
@@ -58,11 +58,11 @@ struct WitnessAnswer {
 impl<'a> Answers<'a> {
     /// Probes both BSDFs: given by value, as a textured scene hands them out, and as any held-back
     /// one does, whose materials nobody has seen. Answers what hangs on no convention.
-    pub fn probe_bsdfs(&mut self, asker: &Asker, plugin: &Path, cases: &[Case]) -> Vec<Check> {
+    pub fn probe_bsdfs(&mut self, session: &Session, plugin: &Path, cases: &[Case]) -> Vec<Check> {
         let Some(case) = cases.first() else { return Vec::new() };
         let request = |scene: &Path, queries: &mut dyn Iterator<Item = &api::BsdfQuery>| {
-            let queries = queries.map(ask::query).collect();
-            Request::EvalBsdf { scene: asker.scene(scene), queries }
+            let queries = queries.map(session::query).collect();
+            Request::EvalBsdf { scene: session.scene(scene), queries }
         };
         let kinds = [BsdfKind::Diffuse, BsdfKind::Phong];
         let mut asked = Vec::new();
@@ -91,11 +91,11 @@ impl<'a> Answers<'a> {
         requests.extend(long.iter().map(|(_, probes)| {
             request(&case.offline, &mut probes.iter().map(|probe| &probe.query))
         }));
-        let outcomes = asker.ask(Some(plugin), requests);
+        let outcomes = session.run(Some(plugin), requests);
         let (own, rest) = outcomes.split_at(asked.len().min(outcomes.len()));
         let (of_physical, of_long) = rest.split_at(physical.len().min(rest.len()));
         for ((kind, scene, _, probes), outcome) in asked.into_iter().zip(own) {
-            self.push_bsdf(asker, kind, scene, probes, outcome);
+            self.push_bsdf(session, kind, scene, probes, outcome);
         }
         for ((kind, probes), outcome) in long.into_iter().zip(of_long) {
             let by_value =
@@ -104,20 +104,20 @@ impl<'a> Answers<'a> {
             // Whoever does not answer them leaves no such convention.
             let (Some(known), Some(answer)) = (known, outcome.answer()) else { continue };
             if let Ok(values) = &mut known.values {
-                values.extend(ask::colours(&answer.values));
+                values.extend(session::colours(&answer.values));
                 known.probes.extend(probes);
             }
         }
         let physical = physical.iter().zip(of_physical);
         let judge = |((kind, probes), outcome): (&(BsdfKind, Probes), &Outcome)| {
-            probes.judge(*kind, ask::colours(&outcome.answer()?.values))
+            probes.judge(*kind, session::colours(&outcome.answer()?.values))
         };
         physical.filter_map(judge).collect()
     }
 
     fn push_bsdf(
         &mut self,
-        asker: &Asker,
+        session: &Session,
         kind: BsdfKind,
         scene: String,
         probes: Vec<BsdfProbe>,
@@ -129,14 +129,14 @@ impl<'a> Answers<'a> {
         };
         let values = match outcome {
             Outcome::Done(answer) => {
-                let values = ask::colours(&answer.values);
-                asker.see(View::new(view, &scene), Tile::of_list(values));
+                let values = session::colours(&answer.values);
+                session.record(View::new(view, &scene), Thumbnail::of_list(values));
                 if scene.is_empty() {
-                    seen::bsdf(asker, kind, &probes, values);
+                    observe::bsdf(session, kind, &probes, values);
                 }
                 Ok(values.to_vec())
             }
-            other => Err(ask::unanswered(id, &scene, &[part], other)),
+            other => Err(session::unanswered(id, &scene, &[part], other)),
         };
         self.bsdfs.push(BsdfAnswer { kind, scene, probes, values });
     }
@@ -149,12 +149,12 @@ impl<'a> Answers<'a> {
             if own { points.map(|point| shaded_point(case, point)).collect() } else { Vec::new() };
         let values = asked.iter().map(|(outcome, witness, name)| match outcome {
             Outcome::Done(answer) => {
-                let values = ask::colours(&answer.values).to_vec();
+                let values = session::colours(&answer.values).to_vec();
                 Ok(WitnessAnswer { witness: *witness, name, values })
             }
             other => {
                 let unanswered =
-                    ask::unanswered(CheckId::RadianceLit, &case.entry.name, &["1.3"], other);
+                    session::unanswered(CheckId::RadianceLit, &case.entry.name, &["1.3"], other);
                 Err(Box::new(unanswered))
             }
         });

@@ -11,7 +11,7 @@ use super::pipeline::Grading;
 use super::stages::Stages;
 use crate::files::hex;
 use crate::process::Limits;
-use crate::worker::{Job, Patience, Reference, Request};
+use crate::worker::{Job, Reference, Request, RetryBudget};
 
 /// CPU seconds of the reference renderer, as far as they were needed.
 #[derive(Default)]
@@ -49,16 +49,16 @@ impl Grading<'_> {
     /// CPU seconds of all that the reference is asked on a path, if it can be asked.
     fn measure_path(&self, offline: bool) -> Option<f64> {
         let reference = self.reference.as_deref()?;
-        let mut asker = self.asker("");
-        asker.patience = Patience::none();
-        asker.reference = None;
+        let mut session = self.session("");
+        session.retries = RetryBudget::none();
+        session.reference = None;
         let (mut checks, mut drawn) = (Vec::new(), Vec::new());
         let done = if offline {
-            self.offline(&asker, reference, 0, &mut checks, &mut drawn)
+            self.offline(&session, reference, 0, &mut checks, &mut drawn)
         } else {
-            self.realtime(&asker, reference, &Stages::default(), &mut checks, &mut drawn)
+            self.realtime(&session, reference, &Stages::default(), &mut checks, &mut drawn)
         };
-        done.ok().map(|()| asker.end_path()).filter(|cpu_s| *cpu_s > 0.0)
+        done.ok().map(|()| session.end_path()).filter(|cpu_s| *cpu_s > 0.0)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::ask::Asker;
 use super::case::Case;
+use super::session::Session;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
 use crate::worker::{CameraValue, Matrices, Outcome, Request, Stage};
 
@@ -51,26 +51,26 @@ pub fn named(texts: [String; 3]) -> Vec<Stage> {
 
 /// Draws once what workers draw again and again, so that their shaders are compiled: with a trusted
 /// renderer, or by Umbra's neutral pass with these stages. Why it fails is told when it counts.
-pub fn compile_shaders(asker: &Asker, renderer: Option<&Path>, mut frames: Vec<Frame>) {
+pub fn compile_shaders(session: &Session, renderer: Option<&Path>, mut frames: Vec<Frame>) {
     frames.iter_mut().for_each(|frame| frame.size = (16, 16));
-    draw_each(asker, renderer, &frames);
+    draw_each(session, renderer, &frames);
 }
 
 /// Draws one frame in a worker of its own.
-pub fn draw(asker: &Asker, plugin: Option<&Path>, frame: &Frame) -> Outcome {
-    draw_each(asker, plugin, std::slice::from_ref(frame)).pop().unwrap_or_else(|| {
+pub fn draw(session: &Session, plugin: Option<&Path>, frame: &Frame) -> Outcome {
+    draw_each(session, plugin, std::slice::from_ref(frame)).pop().unwrap_or_else(|| {
         Outcome::NoAdapter("the worker gave no outcome: a bug of Umbra's".into())
     })
 }
 
 /// Draws frames, all in one worker while it lives.
-pub fn draw_each(asker: &Asker, plugin: Option<&Path>, frames: &[Frame]) -> Vec<Outcome> {
-    let adapter = match &asker.adapter {
+pub fn draw_each(session: &Session, plugin: Option<&Path>, frames: &[Frame]) -> Vec<Outcome> {
+    let adapter = match &session.adapter {
         Ok(adapter) => adapter,
         Err(reason) => return vec![Outcome::NoAdapter(reason.clone()); frames.len()],
     };
     let request = |frame: &Frame| Request::RenderRealtime {
-        scene: asker.scene(frame.toml),
+        scene: session.scene(frame.toml),
         width: frame.size.0,
         height: frame.size.1,
         shadow_map: frame.shadow_map,
@@ -83,7 +83,7 @@ pub fn draw_each(asker: &Asker, plugin: Option<&Path>, frames: &[Frame]) -> Vec<
             false => vec![frame.case.camera; frame.times],
         },
     };
-    let mut outcomes = asker.ask(plugin, frames.iter().map(request).collect());
+    let mut outcomes = session.run(plugin, frames.iter().map(request).collect());
     for (outcome, frame) in outcomes.iter_mut().zip(frames) {
         if let Outcome::Done(answer) = outcome {
             let floats = answer.values.len() / frame.times;
@@ -97,18 +97,18 @@ pub fn draw_each(asker: &Asker, plugin: Option<&Path>, frames: &[Frame]) -> Vec<
 /// drawing costs less. `is_right` says of a scene's outcomes, by its index, that they need no
 /// second look.
 pub fn draw_scenes(
-    asker: &Asker,
+    session: &Session,
     plugin: &Path,
     scenes: &[Vec<Frame>],
     is_right: &dyn Fn(usize, &[Outcome]) -> bool,
 ) -> Vec<Vec<Outcome>> {
-    let mut outcomes = draw_each(asker, Some(plugin), &scenes.concat()).into_iter();
+    let mut outcomes = draw_each(session, Some(plugin), &scenes.concat()).into_iter();
     let of_scene = |frames: &Vec<Frame>| outcomes.by_ref().take(frames.len()).collect();
     let mut drawn: Vec<Vec<Outcome>> = scenes.iter().map(of_scene).collect();
     // A renderer may rely on a process of its own for each scene, as a command line gives it. So
     // what is wrong must be wrong alone. Where that is so for the last, nothing was left behind.
     let wrong: Vec<usize> = (0..scenes.len()).filter(|&i| !is_right(i, &drawn[i])).collect();
-    let alone = |index: usize| draw_each(asker, Some(plugin), &scenes[index]);
+    let alone = |index: usize| draw_each(session, Some(plugin), &scenes[index]);
     if let Some((&last, others)) = wrong.split_last().filter(|(last, _)| **last > 0) {
         let own = alone(last);
         if !drawn[last].iter().zip(&own).all(|(shared, own)| same(shared, own)) {
@@ -121,7 +121,7 @@ pub fn draw_scenes(
 
 /// Draws the plain image of every scene: those that only probe share a worker.
 pub fn draw_plain(
-    asker: &Asker,
+    session: &Session,
     plugin: &Path,
     cases: &[Case],
     is_right: &dyn Fn(&Case, &Outcome) -> bool,
@@ -131,10 +131,10 @@ pub fn draw_plain(
     let all_right = |index: usize, outcomes: &[Outcome]| {
         outcomes.iter().all(|outcome| is_right(probes[index], outcome))
     };
-    let mut shared = draw_scenes(asker, plugin, &frames, &all_right).into_iter().flatten();
+    let mut shared = draw_scenes(session, plugin, &frames, &all_right).into_iter().flatten();
     let drawn = cases.iter().map(|case| {
         let shared = if case.is_probe() { shared.next() } else { None };
-        shared.unwrap_or_else(|| draw(asker, Some(plugin), &Frame::plain(case)))
+        shared.unwrap_or_else(|| draw(session, Some(plugin), &Frame::plain(case)))
     });
     drawn.collect()
 }
@@ -154,9 +154,9 @@ fn same(a: &Outcome, b: &Outcome) -> bool {
 ///
 /// # Errors
 /// Why not, in words.
-pub fn probe_adapter(asker: &Asker, case: &Case) -> Result<(), String> {
+pub fn probe_adapter(session: &Session, case: &Case) -> Result<(), String> {
     let stages = named([VERTEX, SHOW_NORMAL, SHOW_NORMAL].map(str::to_owned));
-    match draw(asker, None, &Frame { size: (16, 16), ..Frame::small(case, stages) }) {
+    match draw(session, None, &Frame { size: (16, 16), ..Frame::small(case, stages) }) {
         Outcome::Done(_) => Ok(()),
         Outcome::NoAdapter(message) | Outcome::Failed(message) => Err(message),
         other => Err(format!("{other:?}")),

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use basecode::Image;
 
-use super::ask::{self, Asker};
 use super::case::Case;
 use super::offline::Drawn;
+use super::session::{self, Session};
 use super::shared::ImageDigest;
 use crate::decode::{Decoder, image_finding};
 use crate::evidence::handed_in::{
@@ -161,7 +161,7 @@ pub fn judge(
 /// Whether offline images have the noise that the student's number predicts: what the reference draws with
 /// that seed, in the order of the base code. Asked only where images are all there is.
 pub fn judge_seeds(
-    asker: &Asker,
+    session: &Session,
     reference: &Path,
     handed_in: &[HandedIn],
     seed: u64,
@@ -174,17 +174,17 @@ pub fn judge_seeds(
         let (Some(noisy), true) = (noisy, has_own_noise(noise)) else { continue };
         let (width, height) = case.film();
         let request = Request::RenderOffline {
-            scene: asker.scene(&case.offline),
+            scene: session.scene(&case.offline),
             width,
             height,
             spp: *spp,
             seed,
-            threads: asker.limits.threads,
+            threads: session.limits.threads,
             shadows: true,
         };
-        let outcomes = asker.ask(Some(reference), vec![request]);
+        let outcomes = session.run(Some(reference), vec![request]);
         let drawn = outcomes.first().and_then(|outcome| outcome.answer());
-        let drawn = drawn.map(|answer| ask::image(&answer.values, width, height));
+        let drawn = drawn.map(|answer| session::image(&answer.values, width, height));
         let alike = drawn.and_then(|drawn| noisy.correlation(image, &drawn));
         checks.push(judge_seed(&case.entry.name, path, alike));
     }

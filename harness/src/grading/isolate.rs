@@ -6,12 +6,12 @@ use std::path::Path;
 
 use basecode::{Image, Vec3};
 
-use super::ask::{self, Asker, headline};
 use super::case::Case;
 use super::draw::{Frame, STAGES, draw_each, draw_scenes, named};
-use super::seen;
+use super::observe;
+use super::session::{self, Session, headline};
 use super::stages::Stages;
-use crate::diagnosis::{Kind, Tile, View};
+use crate::diagnosis::{Kind, Thumbnail, View};
 use crate::evidence::premultiplied::Premultiplied;
 use crate::evidence::stages::{BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass};
 use crate::evidence::vertex::{VertexFilm, judge_vertex};
@@ -38,7 +38,7 @@ pub fn bound_values_shown() -> [Vec<Stage>; BoundValue::ALL.len()] {
 /// those of the latter. `fails` says whether there are scenes that the student's own frame of gets
 /// no answer: then a stage that does not compile is to blame, otherwise no frame needs it.
 pub fn isolate(
-    asker: &Asker,
+    session: &Session,
     plugin: &Path,
     cases: &[&Case],
     stages: &Stages,
@@ -49,20 +49,20 @@ pub fn isolate(
     let (swaps, sets) = swaps(stages);
     let is_right =
         |index, frames: &[Outcome]| pass_check(cases[index], frames).verdict == Verdict::Pass;
-    let passes = draw_scenes(asker, plugin, &under(cases, &bound_values_shown), &is_right);
+    let passes = draw_scenes(session, plugin, &under(cases, &bound_values_shown), &is_right);
     let mut frames = under(cases, &sets).concat();
     for frame in &mut frames {
         let own = |stage: &Stage| stage.name == STAGES[0] && stage.text != VERTEX;
         frame.each_matrices = frame.stages.iter().any(own);
     }
-    let mut swapped = draw_each(asker, None, &frames).into_iter();
+    let mut swapped = draw_each(session, None, &frames).into_iter();
     let mut shown = Shown::default();
     let mut checks = Vec::new();
     for (&case, pass) in cases.iter().zip(passes) {
         let swapped: Vec<Outcome> = swapped.by_ref().take(sets.len()).collect();
         let pass = match bound_values(case, &pass) {
             Ok(frames) => {
-                seen::pass(asker, case, &frames);
+                observe::pass(session, case, &frames);
                 let check = judge_bound(case, &frames);
                 shown.passes.push((case, frames));
                 check
@@ -93,16 +93,16 @@ pub fn isolate(
             };
             let images = match images(case, outcomes) {
                 Ok(images) => images,
-                Err(outcome) => return swap_failed(asker, id, case, fails, outcome),
+                Err(outcome) => return swap_failed(session, id, case, fails, outcome),
             };
             match images.as_slice() {
                 [p0, p1, p2, n0, n1, n2] => {
-                    seen::vertex(asker, case, p0, n0);
+                    observe::vertex(session, case, p0, n0);
                     vertex(case, [[p0, n0], [p1, n1], [p2, n2]])
                 }
                 [image] => {
-                    see_fragment(asker, case, image, index == 2);
-                    seen::fragment(asker, case, image, index == 2);
+                    record_fragment(session, case, image, index == 2);
+                    observe::fragment(session, case, image, index == 2);
                     shown.fragments.push((case, index, image.clone()));
                     fragment(id, case, image, index == 2, tolerances)
                 }
@@ -216,7 +216,8 @@ fn images<'a>(case: &Case, outcomes: &'a [Outcome]) -> Result<Vec<Image>, &'a Ou
     let mut images = Vec::new();
     for outcome in outcomes {
         let Outcome::Done(answer) = outcome else { return Err(outcome) };
-        images.extend(answer.values.chunks(floats).map(|frame| ask::image(frame, width, height)));
+        images
+            .extend(answer.values.chunks(floats).map(|frame| session::image(frame, width, height)));
     }
     Ok(images)
 }
@@ -235,7 +236,7 @@ fn bound_values(case: &Case, outcomes: &[Outcome]) -> Result<Vec<(BoundValue, Im
         Ok(images) => images,
         // Its own frame decides: a pass with a layout of its own takes no stages of ours.
         Err(Outcome::Failed(message)) => return Err(Box::new(not_possible(id, case, message))),
-        Err(outcome) => return Err(Box::new(ask::unanswered(id, name, &["2.1"], outcome))),
+        Err(outcome) => return Err(Box::new(session::unanswered(id, name, &["2.1"], outcome))),
     };
     // Each frame shows another value. A pass with pipelines of its own takes no stages of ours.
     let is_same = |image: &Image| image.pixels == images[0].pixels;
@@ -281,31 +282,37 @@ fn fragment(
 }
 
 /// Keeps for the diagnosis what one of the two fragment stages draws.
-fn see_fragment(asker: &Asker, case: &Case, image: &Image, phong: bool) {
+fn record_fragment(session: &Session, case: &Case, image: &Image, phong: bool) {
     let mask = &case.small.unshadowed_mask;
     let pixels = image.pixels.iter().zip(&mask.pixels).enumerate();
     let own = pixels.filter(|(_, (_, value))| {
         **value & RegionMask::INDEX != 0 && (mask.region(**value).exponent > 0.0) == phong
     });
     let own = own.map(|(index, (pixel, _))| (index, (*pixel).into()));
-    let tile = Tile::of_pixels((image.width, image.height), own);
-    asker.see(View::new(Kind::Fragment, &case.entry.name), tile);
+    let tile = Thumbnail::of_pixels((image.width, image.height), own);
+    session.record(View::new(Kind::Fragment, &case.entry.name), tile);
 }
 
 /// The check for a stage that draws nothing under our pass. One that is no WGSL is at fault where a
 /// frame fails; whether another only has a layout of its own shows in the student's own frame.
-fn swap_failed(asker: &Asker, id: CheckId, case: &Case, fails: bool, outcome: &Outcome) -> Check {
+fn swap_failed(
+    session: &Session,
+    id: CheckId,
+    case: &Case,
+    fails: bool,
+    outcome: &Outcome,
+) -> Check {
     match outcome {
         Outcome::StageRefused(message) if !fails => {
             let summary = format!("no frame needs it, but {}", headline(message));
             Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
         }
         Outcome::StageRefused(message) => {
-            asker.quote(case, message);
-            ask::unanswered(id, &case.entry.name, &[], outcome)
+            session.quote(case, message);
+            session::unanswered(id, &case.entry.name, &[], outcome)
         }
         Outcome::Failed(message) => not_possible(id, case, message),
-        other => ask::unanswered(id, &case.entry.name, &[], other),
+        other => session::unanswered(id, &case.entry.name, &[], other),
     }
 }
 

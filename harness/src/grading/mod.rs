@@ -1,34 +1,34 @@
 //! The way of one hand-in through all stages, and of many.
 
-mod ask;
+mod attribution;
+mod cache;
 mod case;
 mod contain;
-mod control;
 mod conventions;
 mod costs;
+mod diagnose;
 mod draw;
 pub mod handed_in;
 mod isolate;
-mod kept;
-mod look;
 pub mod mend;
+mod observe;
 mod offline;
 mod pictures;
 mod pipeline;
 mod realtime;
 mod record;
 mod sampler;
-mod seen;
+mod session;
 mod shared;
 mod stages;
 mod uploads;
 
+pub use cache::{Earlier, RecordCache};
 pub use case::{Case, Small};
 pub use contain::INTERNAL_ERROR;
 pub use costs::Cost;
-pub use kept::{Earlier, Kept};
 pub use offline::Drawn;
-pub use pipeline::{Folders, Grading, Purpose, RenderPath, TREE};
+pub use pipeline::{Folders, Grading, Mode, RenderPath, TREE};
 pub use record::{Conditions, Record, StageCost, Student};
 pub use sampler::{CORRELATED, row_correlation};
 pub use shared::{ImageDigest, judge_shared};

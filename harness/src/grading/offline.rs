@@ -4,11 +4,11 @@ use std::path::Path;
 
 use basecode::{Image, MaterialModel, Ray, Scene, Texture};
 
-use super::ask::{self, Asker};
 use super::case::Case;
 use super::conventions::{Answers, shaded_point, value};
-use super::seen;
-use crate::diagnosis::{self, LoopSeen, Tile, View};
+use super::observe;
+use super::session::{self, Session};
+use crate::diagnosis::{self, LoopSeen, Thumbnail, View};
 use crate::evidence::images::{self, Kind};
 use crate::evidence::shading::{ShadedPoint, Shading};
 use crate::evidence::{Check, CheckId, Verdict};
@@ -41,7 +41,7 @@ pub struct Drawn {
 
 /// Judges integrator, shadows, loop and image on one scene.
 pub fn judge_scene<'a>(
-    asker: &Asker,
+    session: &Session,
     plugin: &Path,
     case: &'a Case,
     (seed, threads): (u64, u32),
@@ -50,8 +50,8 @@ pub fn judge_scene<'a>(
 ) -> (Vec<Check>, Option<Drawn>) {
     let name = &case.entry.name;
     let small = &case.small;
-    let scene = asker.scene(&case.offline);
-    let chosen: Vec<_> = small.batch.rays.iter().map(ask::ray).collect();
+    let scene = session.scene(&case.offline);
+    let chosen: Vec<_> = small.batch.rays.iter().map(session::ray).collect();
     let radiance = |rays: &[_], witness, shadows| Request::Radiance {
         scene: scene.clone(),
         rays: rays.to_vec(),
@@ -68,7 +68,8 @@ pub fn judge_scene<'a>(
         threads,
         shadows: true,
     };
-    let centres: Vec<_> = small.surface.pixels.iter().map(|(centre, _)| ask::ray(centre)).collect();
+    let centres: Vec<_> =
+        small.surface.pixels.iter().map(|(centre, _)| session::ray(centre)).collect();
     let mut requests: Vec<Request> =
         WITNESSES.iter().map(|(witness, _)| radiance(&chosen, *witness, false)).collect();
     requests.push(radiance(&chosen, FLAT, false));
@@ -86,7 +87,7 @@ pub fn judge_scene<'a>(
         requests.push(radiance(&film.rays, Witness::True, true));
         requests.push(render(film.film.width, film.film.height, loops::SAMPLES, seed, 1));
     }
-    let outcomes = asker.ask(Some(plugin), requests);
+    let outcomes = session.run(Some(plugin), requests);
     let [
         w0,
         w1,
@@ -129,44 +130,47 @@ pub fn judge_scene<'a>(
         let flat = |point: &SurfacePoint| value(FLAT, point.wi, point.wo);
         let shadows = judge_shadows(case, &flat, (flat_on, flat_off), (true_on, true_off));
         for ((witness, _), outcome) in WITNESSES.iter().zip(witnessed) {
-            if let Some(values) = seen::colours(outcome) {
-                seen::radiance(asker, case, *witness, values);
+            if let Some(values) = observe::colours(outcome) {
+                observe::radiance(session, case, *witness, values);
             }
         }
-        let both = seen::colours(flat_on).zip(seen::colours(flat_off));
+        let both = observe::colours(flat_on).zip(observe::colours(flat_off));
         if let (Verdict::Fail, Some((with, without))) = (shadows.verdict, both) {
-            seen::shadows(asker, case, with, without);
+            observe::shadows(session, case, with, without);
         }
         checks.push(shadows);
         if let (Outcome::Done(own), Outcome::Done(radiance)) = (own, true_off) {
             let rays = plain.iter().map(|(ray, _)| *ray);
-            let own: Vec<_> = rays.zip(ask::colours(&own.values).iter().copied()).collect();
-            let radiance = ask::colours(&radiance.values);
+            let own: Vec<_> = rays.zip(session::colours(&own.values).iter().copied()).collect();
+            let radiance = session::colours(&radiance.values);
             checks.push(rays::judge_material(&small.batch, &own, radiance));
         }
-        see_rays(asker, case, w1, (flat_on, flat_off));
+        record_rays(session, case, w1, (flat_on, flat_off));
     }
     checks.push(match (one_spp, at_centres) {
         (Outcome::Done(image), Outcome::Done(along)) => {
-            see_loop(asker, case, (&image.values, &along.values));
-            let (image, along) = (ask::colours(&image.values), ask::colours(&along.values));
+            record_loop(session, case, (&image.values, &along.values));
+            let (image, along) = (session::colours(&image.values), session::colours(&along.values));
             loops::judge_agreement(name, &small.mask, image, along)
         }
         (Outcome::Done(_), missing) => Check {
             verdict: Verdict::NotJudged,
-            ..ask::unanswered(CheckId::LoopAgreement, name, &[], missing)
+            ..session::unanswered(CheckId::LoopAgreement, name, &[], missing)
         },
         // Where the rays fail in the same way, it is not the loop's fault.
-        (missing, Outcome::Done(_)) => ask::unanswered(CheckId::LoopAgreement, name, &[], missing),
+        (missing, Outcome::Done(_)) => {
+            session::unanswered(CheckId::LoopAgreement, name, &[], missing)
+        }
         (missing, _) => Check {
             verdict: Verdict::NotJudged,
-            ..ask::unanswered(CheckId::LoopAgreement, name, &[], missing)
+            ..session::unanswered(CheckId::LoopAgreement, name, &[], missing)
         },
     });
     if let ([along, image], Some(sampled)) = (sampled, &small.sampled) {
         checks.push(match (along, image) {
             (Outcome::Done(along), Outcome::Done(image)) => {
-                let (image, along) = (ask::colours(&image.values), ask::colours(&along.values));
+                let (image, along) =
+                    (session::colours(&image.values), session::colours(&along.values));
                 let (check, edges) = loops::judge_samples(name, &sampled.film, image, along);
                 // Where the samples are wrong already, edges are too.
                 if check.verdict == Verdict::Pass {
@@ -175,18 +179,18 @@ pub fn judge_scene<'a>(
                 check
             }
             (Outcome::Done(_), missing) => {
-                ask::unanswered(CheckId::LoopSamples, name, &[], missing)
+                session::unanswered(CheckId::LoopSamples, name, &[], missing)
             }
             // Where the rays fail in the same way, it is not the loop's fault.
             (missing, _) => Check {
                 verdict: Verdict::NotJudged,
-                ..ask::unanswered(CheckId::LoopSamples, name, &[], missing)
+                ..session::unanswered(CheckId::LoopSamples, name, &[], missing)
             },
         });
     }
     match full {
         Outcome::Done(answer) => {
-            let image = ask::image(&answer.values, width, height);
+            let image = session::image(&answer.values, width, height);
             let kind = Kind::Offline { spp: case.spp };
             let (id, expected) = (CheckId::ImageOffline, &case.expected);
             checks.push(images::judge(id, name, kind, &image, expected, &|_| true, tolerances));
@@ -194,7 +198,7 @@ pub fn judge_scene<'a>(
         }
         other => {
             let parts = ["1.1", "1.2", "1.3", "1.4"];
-            checks.push(ask::unanswered(CheckId::ImageOffline, name, &parts, other));
+            checks.push(session::unanswered(CheckId::ImageOffline, name, &parts, other));
             (checks, None)
         }
     }
@@ -226,34 +230,43 @@ fn plain_surfaces(case: &Case) -> Vec<(usize, BsdfQuery)> {
 }
 
 /// Keeps for the diagnosis what witnesses say of light and visibility.
-fn see_rays(asker: &Asker, case: &Case, lit: &Outcome, (with, without): (&Outcome, &Outcome)) {
+fn record_rays(
+    session: &Session,
+    case: &Case,
+    lit: &Outcome,
+    (with, without): (&Outcome, &Outcome),
+) {
     let (name, small) = (&case.entry.name, &case.small);
     let size = (small.width as usize, small.height as usize);
     if let Outcome::Done(lit) = lit {
-        let values = ask::colours(&lit.values).iter().copied();
-        let tile = Tile::of_pixels(size, small.batch.met().copied().zip(values));
-        asker.see(View::new(diagnosis::Kind::Lit, name), tile);
+        let values = session::colours(&lit.values).iter().copied();
+        let tile = Thumbnail::of_pixels(size, small.batch.met().copied().zip(values));
+        session.record(View::new(diagnosis::Kind::Lit, name), tile);
     }
     if let (Outcome::Done(with), Outcome::Done(without)) = (with, without) {
-        let pairs = ask::colours(&with.values).iter().zip(ask::colours(&without.values));
+        let pairs = session::colours(&with.values).iter().zip(session::colours(&without.values));
         let sums = pairs.map(|(a, b)| (a.iter().sum::<f32>(), b.iter().sum::<f32>()));
         // What is black without shadows tells nothing.
         let told = small.batch.met().zip(sums).filter(|(_, (_, without))| *without != 0.0);
         let visibility = told.map(|(&pixel, (with, without))| (pixel, [with / without; 3]));
-        asker.see(View::new(diagnosis::Kind::Shadow, name), Tile::of_pixels(size, visibility));
+        session.record(
+            View::new(diagnosis::Kind::Shadow, name),
+            Thumbnail::of_pixels(size, visibility),
+        );
     }
 }
 
 /// Keeps for the diagnosis what the loop makes of the radiance along the centres of all pixels.
-fn see_loop(asker: &Asker, case: &Case, (image, along): (&[f32], &[f32])) {
+fn record_loop(session: &Session, case: &Case, (image, along): (&[f32], &[f32])) {
     if case.held_back {
         return;
     }
     let (name, small) = (&case.entry.name, &case.small);
-    let [image, rays] = [image, along].map(|values| ask::image(values, small.width, small.height));
-    asker.see(View::new(diagnosis::Kind::Offline, name), Tile::of_image(&image));
-    if let Ok(mut sightings) = asker.sightings.lock() {
-        sightings.loops.insert(name.clone(), LoopSeen { rays, image });
+    let [image, rays] =
+        [image, along].map(|values| session::image(values, small.width, small.height));
+    session.record(View::new(diagnosis::Kind::Offline, name), Thumbnail::of_image(&image));
+    if let Ok(mut observations) = session.observations.lock() {
+        observations.loops.insert(name.clone(), LoopSeen { rays, image });
     }
 }
 
@@ -266,11 +279,12 @@ fn judge_shadows(
     let (id, name) = (CheckId::ShadowRays, &case.entry.name);
     match (with, without) {
         (Outcome::Done(with), Outcome::Done(without)) => {
-            let (with, without) = (ask::colours(&with.values), ask::colours(&without.values));
+            let (with, without) =
+                (session::colours(&with.values), session::colours(&without.values));
             // Where there is no BSDF yet, nothing is told of what it would shade.
             let shaded = match shaded {
                 (Outcome::Done(on), Outcome::Done(off)) => {
-                    (ask::colours(&on.values), ask::colours(&off.values))
+                    (session::colours(&on.values), session::colours(&off.values))
                 }
                 _ => (without, without),
             };
@@ -282,9 +296,9 @@ fn judge_shadows(
             rays::judge_shadows(&case.small.batch, bsdf, (with, without), shaded, &occluders)
         }
         (Outcome::Done(_), missing) => {
-            Check { verdict: Verdict::NotJudged, ..ask::unanswered(id, name, &[], missing) }
+            Check { verdict: Verdict::NotJudged, ..session::unanswered(id, name, &[], missing) }
         }
-        (missing, _) => ask::unanswered(id, name, &["1.4"], missing),
+        (missing, _) => session::unanswered(id, name, &["1.4"], missing),
     }
 }
 

@@ -8,14 +8,14 @@ use std::time::Instant;
 use anyhow::Context;
 use tempfile::TempDir;
 
-use super::ask::Asker;
+use super::cache::RecordCache;
 use super::case::Case;
 use super::conventions::Answers;
 use super::costs::ReferenceCosts;
 use super::draw::Frame;
-use super::kept::Kept;
 use super::offline::{self, Drawn};
 use super::record::{Conditions, Record, StageCost, Student};
+use super::session::Session;
 use super::stages::Stages;
 use super::{draw, handed_in, isolate, mend, pictures, realtime, sampler, uploads};
 use crate::assignment::Assignment;
@@ -27,7 +27,7 @@ use crate::expected::Store;
 use crate::held_back::{self, HeldBack};
 use crate::intake::{self, HandIn, IntakeError, TreeSpec, Validation};
 use crate::rubric::BUILD;
-use crate::worker::{Adapter, Budget, Patience, Reference, Supervisor};
+use crate::worker::{Adapter, Budget, Reference, RetryBudget, Supervisor};
 
 /// The check that says whether the hand-in follows the tree.
 pub const TREE: CheckId = CheckId::SubmissionTree;
@@ -69,7 +69,7 @@ pub struct Grading<'a> {
     /// Whether submitted images are compared with what the code draws.
     pub compares_submitted: bool,
     /// Records made before and to be made, if they are kept.
-    pub kept: Option<Kept>,
+    pub kept: Option<RecordCache>,
     /// What a submission may use on each path, if that is limited.
     pub budget: Option<Budget>,
     /// What the reference renderer takes, as far as it was needed.
@@ -88,7 +88,7 @@ pub struct Folders {
 
 /// How a hand-in is to be looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
+pub enum Mode {
     /// To be graded: its tree counts.
     Grade,
     /// A working folder, before handing in: its tree is only remarked on.
@@ -158,7 +158,7 @@ impl<'a> Grading<'a> {
             stored: OnceLock::new(),
         };
         if let Some(case) = grading.cases.first()
-            && let Err(why) = draw::probe_adapter(&grading.asker(""), case)
+            && let Err(why) = draw::probe_adapter(&grading.session(""), case)
         {
             grading.adapter = Err(why);
         }
@@ -176,43 +176,47 @@ impl<'a> Grading<'a> {
         let mut frames = vec![plain.clone(), Frame { toml, shadow_map: true, ..plain }];
         let shown = isolate::bound_values_shown();
         frames.extend(shown.map(|stages| Frame::small(case, stages)));
-        let folder = self.shaders_of(&mut self.asker(""), Some(reference), frames)?;
+        let folder = self.shaders_of(&mut self.session(""), Some(reference), frames)?;
         self.supervisor.shaders.push(folder.path().to_owned());
         self.compiled = Some(folder);
         Ok(())
     }
 
     /// The same for the stages of a submission, by Umbra's own pass: no foreign code runs there. They are
-    /// given to the workers of `asker` while the answer lives.
-    fn compile_own(&self, asker: &mut Asker, stages: &Stages) -> anyhow::Result<Option<TempDir>> {
+    /// given to the workers of `session` while the answer lives.
+    fn compile_own(
+        &self,
+        session: &mut Session,
+        stages: &Stages,
+    ) -> anyhow::Result<Option<TempDir>> {
         let (Some(own), Some(case)) = (stages.all_own(), self.cases.first()) else {
             return Ok(None);
         };
-        let folder = self.shaders_of(asker, None, vec![Frame::small(case, own)])?;
-        asker.supervisor.shaders.push(folder.path().to_owned());
+        let folder = self.shaders_of(session, None, vec![Frame::small(case, own)])?;
+        session.supervisor.shaders.push(folder.path().to_owned());
         Ok(Some(folder))
     }
 
     /// The shaders that some frames need, compiled.
     fn shaders_of(
         &self,
-        asker: &mut Asker,
+        session: &mut Session,
         renderer: Option<&Path>,
         frames: Vec<Frame>,
     ) -> anyhow::Result<TempDir> {
         let builder =
             tempfile::Builder::new().prefix("shaders-").tempdir_in(&self.supervisor.scratch);
         let folder = builder?;
-        asker.supervisor.leaves_shaders = Some(folder.path().to_owned());
-        draw::compile_shaders(asker, renderer, frames);
-        asker.supervisor.leaves_shaders = None;
+        session.supervisor.leaves_shaders = Some(folder.path().to_owned());
+        draw::compile_shaders(session, renderer, frames);
+        session.supervisor.leaves_shaders = None;
         Ok(folder)
     }
 
-    pub(super) fn asker(&self, options: &str) -> Asker<'_> {
+    pub(super) fn session(&self, options: &str) -> Session<'_> {
         let mut limits = self.assignment.limits.run.clone();
         limits.threads = self.threads;
-        Asker {
+        Session {
             supervisor: self.supervisor.clone(),
             limits,
             cancel: self.cancel,
@@ -220,12 +224,12 @@ impl<'a> Grading<'a> {
             options: options.to_owned(),
             cpu_s: Mutex::new(0.0),
             printed: Mutex::new(0),
-            patience: Patience::with(
+            retries: RetryBudget::with(
                 self.reference.is_some().then_some(self as &dyn Reference),
                 self.budget.clone(),
             ),
             reference: self.reference.as_deref(),
-            sightings: Mutex::default(),
+            observations: Mutex::default(),
             quotes: Mutex::default(),
         }
     }
@@ -239,10 +243,10 @@ impl<'a> Grading<'a> {
         source: &Path,
         slug: &str,
         out: &Folders,
-        purpose: Purpose,
+        purpose: Mode,
         say: &dyn Fn(&str),
     ) -> anyhow::Result<Record> {
-        let mut asker = self.asker("");
+        let mut session = self.session("");
         let decoder = Decoder::new(&self.supervisor, &self.assignment.limits.decode, self.cancel);
         let mut costs = Costs { since: Instant::now(), stages: Vec::new() };
         let scratch =
@@ -287,20 +291,20 @@ impl<'a> Grading<'a> {
         let asks = |path| self.paths.contains(&path);
         if let Some((plugin, _)) = built.as_ref().filter(|_| asks(RenderPath::Offline)) {
             say("rendering offline");
-            self.offline(&asker, plugin, seed, &mut checks, &mut drawn)?;
-            checks.extend(asker.used_up());
-            costs.end("offline", asker.end_path());
+            self.offline(&session, plugin, seed, &mut checks, &mut drawn)?;
+            checks.extend(session.used_up());
+            costs.end("offline", session.end_path());
         }
         if let Some((plugin, built)) = built.as_ref().filter(|_| asks(RenderPath::Realtime)) {
             say("drawing realtime");
             let stages = Stages::read(&built.src, &self.assignment.template());
             record.findings.extend(stages.findings());
-            let _compiled = self.compile_own(&mut asker, &stages)?;
-            self.realtime(&asker, plugin, &stages, &mut checks, &mut drawn)?;
-            checks.extend(asker.used_up());
-            checks.extend(asker.printed_much());
-            costs.end("realtime", asker.end_path());
-            let said = [std::mem::take(&mut record.diagnostics), asker.quoted()];
+            let _compiled = self.compile_own(&mut session, &stages)?;
+            self.realtime(&session, plugin, &stages, &mut checks, &mut drawn)?;
+            checks.extend(session.used_up());
+            checks.extend(session.printed_much());
+            costs.end("realtime", session.end_path());
+            let said = [std::mem::take(&mut record.diagnostics), session.quoted()];
             record.diagnostics =
                 said.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("\n");
         }
@@ -320,16 +324,16 @@ impl<'a> Grading<'a> {
         if let (None, Some(reference), Some(seed)) =
             (&built, &self.reference, config.sampler_seed())
         {
-            checks.extend(handed_in::judge_seeds(&asker, reference, &handed_in, seed));
+            checks.extend(handed_in::judge_seeds(&session, reference, &handed_in, seed));
         }
-        costs.end("images", decoder.take_cpu_s() + asker.end_path());
+        costs.end("images", decoder.take_cpu_s() + session.end_path());
         if let Some((_, built)) = &built {
             built.explain(&self.assignment.rules, &mut checks, &mut record.findings);
         }
         pictures::draw(&mut checks, &self.cases, &drawn, &handed_in, out)?;
         costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
-        record.diagnoses = self.diagnose(&asker, &record.evidence, &drawn, Some(&out.student))?;
+        record.diagnoses = self.diagnose(&session, &record.evidence, &drawn, Some(&out.student))?;
         record.stages = costs.end("diagnosis", 0.0);
         match (&self.kept, key) {
             (Some(kept), Some(key)) => kept.keep(&key, self.failing(&record.evidence), record, out),
@@ -374,18 +378,18 @@ impl<'a> Grading<'a> {
         stages: &Stages,
         paths: &[RenderPath],
     ) -> anyhow::Result<(Evidence, Vec<Diagnosis>)> {
-        let mut asker = self.asker(options);
+        let mut session = self.session(options);
         let (mut checks, mut drawn) = (Vec::new(), Vec::new());
         if paths.contains(&RenderPath::Offline) {
-            self.offline(&asker, library, seed, &mut checks, &mut drawn)?;
-            asker.patience.renew();
+            self.offline(&session, library, seed, &mut checks, &mut drawn)?;
+            session.retries.renew();
         }
         if paths.contains(&RenderPath::Realtime) {
-            let _compiled = self.compile_own(&mut asker, stages)?;
-            self.realtime(&asker, library, stages, &mut checks, &mut drawn)?;
+            let _compiled = self.compile_own(&mut session, stages)?;
+            self.realtime(&session, library, stages, &mut checks, &mut drawn)?;
         }
         let evidence = Evidence { checks };
-        let diagnoses = self.diagnose(&asker, &evidence, &drawn, None)?;
+        let diagnoses = self.diagnose(&session, &evidence, &drawn, None)?;
         Ok((evidence, diagnoses))
     }
 
@@ -444,7 +448,7 @@ impl<'a> Grading<'a> {
 
     pub(super) fn offline(
         &self,
-        asker: &Asker,
+        session: &Session,
         plugin: &Path,
         seed: u64,
         checks: &mut Vec<Check>,
@@ -453,11 +457,11 @@ impl<'a> Grading<'a> {
         // Cheap questions first: what a slow submission is not asked any more is what costs most.
         let probed = self.groups().map(|cases| {
             let mut answers = Answers::default();
-            let checks = answers.probe_bsdfs(asker, plugin, cases);
+            let checks = answers.probe_bsdfs(session, plugin, cases);
             (answers, checks)
         });
         let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
-        let findings = sampler::judge(asker, plugin, &scene)?;
+        let findings = sampler::judge(session, plugin, &scene)?;
         let mut tolerances = self.assignment.tolerances.clone();
         if findings
             .iter()
@@ -475,7 +479,7 @@ impl<'a> Grading<'a> {
                 self.stop_if_interrupted()?;
                 let run = (seed, self.threads);
                 let (found, image) =
-                    offline::judge_scene(asker, plugin, case, run, &tolerances, &mut answers);
+                    offline::judge_scene(session, plugin, case, run, &tolerances, &mut answers);
                 checks.extend(found);
                 drawn.extend(image);
             }
@@ -500,7 +504,7 @@ impl<'a> Grading<'a> {
 
     pub(super) fn realtime(
         &self,
-        asker: &Asker,
+        session: &Session,
         plugin: &Path,
         stages: &Stages,
         checks: &mut Vec<Check>,
@@ -509,10 +513,10 @@ impl<'a> Grading<'a> {
         let tolerances = &self.assignment.tolerances;
         for cases in self.groups() {
             let begin = checks.len();
-            let judged = realtime::judge_images(asker, plugin, cases, tolerances);
+            let judged = realtime::judge_images(session, plugin, cases, tolerances);
             let fails = judged.iter().any(|judged| judged.fails);
             let footprints: Vec<_> = judged.iter().map(|judged| judged.footprint).collect();
-            let uploaded = uploads::judge(asker, plugin, cases, &footprints);
+            let uploaded = uploads::judge(session, plugin, cases, &footprints);
             let nothing_draws = stages.nothing_draws().or(uploaded.nothing_draws);
             checks.extend(uploaded.checks);
             let mut wrong = Vec::new();
@@ -534,7 +538,7 @@ impl<'a> Grading<'a> {
             self.stop_if_interrupted()?;
             // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
             if !wrong.is_empty() {
-                checks.extend(isolate::isolate(asker, plugin, &wrong, stages, fails, tolerances));
+                checks.extend(isolate::isolate(session, plugin, &wrong, stages, fails, tolerances));
             }
             price::agree(&mut checks[begin..]);
             mark(&mut checks[begin..], cases);
@@ -626,12 +630,7 @@ fn refused_checks(validation: &Validation) -> Vec<Check> {
     ]
 }
 
-fn tree_check(
-    validation: &Validation,
-    hand_in: &HandIn,
-    tree: &TreeSpec,
-    purpose: Purpose,
-) -> Check {
+fn tree_check(validation: &Validation, hand_in: &HandIn, tree: &TreeSpec, purpose: Mode) -> Check {
     if validation.follows_tree() {
         let summary = "the submission follows the tree of the handout";
         return Check::new(TREE, "", Verdict::Pass, summary);
@@ -639,12 +638,12 @@ fn tree_check(
     let error = validation.findings.iter().find(|f| f.severity == intake::Severity::Error);
     let error = error.map(ToString::to_string).unwrap_or_default();
     match purpose {
-        Purpose::Check => {
+        Mode::Check => {
             let summary = format!("not ready to hand in: {error}");
             Check::new(TREE, "", Verdict::NotJudged, summary)
                 .with_hint("umbra validate shows the whole tree")
         }
-        Purpose::Grade => {
+        Mode::Grade => {
             let hint = match intake::mends(hand_in, tree) {
                 Some(mends) => format!("umbra validate --fix mends it: {mends}"),
                 None => format!("umbra validate shows the whole tree; {error}"),

@@ -5,10 +5,10 @@ use std::path::Path;
 use basecode::Image;
 use basecode::gpu::{Footprint, UNDRAWN_MAPS};
 
-use super::ask::{self, Asker};
 use super::case::Case;
 use super::draw::{Frame, STAGES, draw, draw_plain};
 use super::offline::Drawn;
+use super::session::{self, Session};
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels;
 use crate::evidence::shadow_map::Shadows;
@@ -17,7 +17,7 @@ use crate::evidence::{Check, CheckId, Verdict};
 use crate::expected::Expected;
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::{Region, RegionMask};
-use crate::worker::{Matter, Outcome, Stage};
+use crate::worker::{Fault, Outcome, Stage};
 
 type View = (CheckId, &'static dyn Fn(&Region) -> bool);
 
@@ -48,7 +48,7 @@ const LEAST_SHADING: f64 = 0.2;
 
 /// Draws every scene with the plugin and judges the images, those of the bonus too.
 pub fn judge_images(
-    asker: &Asker,
+    session: &Session,
     plugin: &Path,
     cases: &[Case],
     tolerances: &Tolerances,
@@ -56,21 +56,22 @@ pub fn judge_images(
     let is_right = |case: &Case, outcome: &Outcome| {
         let Outcome::Done(answer) = outcome else { return false };
         let (width, height) = case.film();
-        let image = ask::image(&answer.values, width, height);
+        let image = session::image(&answer.values, width, height);
         judge(case, Kind::Realtime, &image, VIEWS[0], tolerances).verdict == Verdict::Pass
     };
-    let plain = draw_plain(asker, plugin, cases, &is_right);
+    let plain = draw_plain(session, plugin, cases, &is_right);
     let judged = cases.iter().zip(plain).map(|(case, plain)| {
         let footprint = plain.answer().and_then(|answer| answer.footprint);
-        let fails = plain.matter() == Some(Matter::Submission);
-        let (mut checks, plain) = judge_plain(asker, case, &plain, tolerances);
+        let fails = plain.fault() == Some(Fault::Submission);
+        let (mut checks, plain) = judge_plain(session, case, &plain, tolerances);
         let mut drawn = Vec::from_iter(plain);
         if let Some(toml) = &case.bonus {
             // A worker of its own: the bonus may crash without a trace on the others.
             let frame = Frame { toml, shadow_map: true, ..Frame::plain(case) };
-            let outcome = draw(asker, Some(plugin), &frame);
+            let outcome = draw(session, Some(plugin), &frame);
             let plain = drawn.first().map(|drawn| &drawn.image);
-            let (mut check, bonus) = judge_bonus(asker, plugin, case, &outcome, plain, tolerances);
+            let (mut check, bonus) =
+                judge_bonus(session, plugin, case, &outcome, plain, tolerances);
             let required = case.entry.bonus_required;
             let id = if required { CheckId::BonusProbe } else { CheckId::BonusImage };
             // How shadows come about is the same on all scenes.
@@ -79,7 +80,7 @@ pub fn judge_images(
                 let with = bonus.as_ref().map(|drawn| &drawn.image);
                 if let (Some(footprint), Some(with)) = (footprint, with)
                     && shows_its_shadows(case, with, plain, tolerances)
-                    && let Some(why) = no_shadow_map(asker, plugin, &frame, &footprint, with)
+                    && let Some(why) = no_shadow_map(session, plugin, &frame, &footprint, with)
                 {
                     check = Check { error: 1.0, verdict: Verdict::Fail, summary: why, ..check };
                 }
@@ -115,7 +116,7 @@ fn judge(
 
 /// An outcome as an image, or else the check that says why there is none.
 fn drawn(
-    asker: &Asker,
+    session: &Session,
     case: &Case,
     kind: Kind,
     id: CheckId,
@@ -125,22 +126,22 @@ fn drawn(
     let scene = &case.entry.name;
     let Outcome::Done(answer) = outcome else {
         if let Outcome::Failed(said) = outcome {
-            asker.quote(case, said);
+            session.quote(case, said);
         }
-        return Err(Box::new(ask::unanswered(id, scene, &parts, outcome)));
+        return Err(Box::new(session::unanswered(id, scene, &parts, outcome)));
     };
     let (width, height) = case.film();
-    let image = ask::image(&answer.values, width, height);
+    let image = session::image(&answer.values, width, height);
     Ok(Drawn { scene: scene.clone(), kind, image })
 }
 
 fn judge_plain(
-    asker: &Asker,
+    session: &Session,
     case: &Case,
     outcome: &Outcome,
     tolerances: &Tolerances,
 ) -> (Vec<Check>, Option<Drawn>) {
-    let drawn = match drawn(asker, case, Kind::Realtime, VIEWS[0].0, outcome) {
+    let drawn = match drawn(session, case, Kind::Realtime, VIEWS[0].0, outcome) {
         Ok(drawn) => drawn,
         // Where a part cannot be judged alone either, a frame that is not there decides.
         Err(check) => {
@@ -170,7 +171,7 @@ fn judge_plain(
 
 /// Judges the image with shadows; `plain` is the student's own without.
 fn judge_bonus(
-    asker: &Asker,
+    session: &Session,
     plugin: &Path,
     case: &Case,
     outcome: &Outcome,
@@ -178,13 +179,13 @@ fn judge_bonus(
     tolerances: &Tolerances,
 ) -> (Check, Option<Drawn>) {
     let (kind, id) = (Kind::RealtimeShadows, CheckId::BonusImage);
-    let drawn = match drawn(asker, case, kind, id, outcome) {
+    let drawn = match drawn(session, case, kind, id, outcome) {
         Ok(drawn) => drawn,
         Err(check) => return (*check, None),
     };
     let mut check = judge(case, kind, &drawn.image, (id, &|_| true), tolerances);
     if check.verdict == Verdict::Fail {
-        check = judge_visibility(asker, plugin, case, (&drawn.image, plain), check, tolerances);
+        check = judge_visibility(session, plugin, case, (&drawn.image, plain), check, tolerances);
     }
     (check, Some(drawn))
 }
@@ -211,7 +212,7 @@ const LEAST_CHANGED: f64 = 0.2;
 /// frame is drawn once more while what pipelines draw beside the picture leaves no trace. A map that
 /// is drawn by pipelines for pictures cannot be told from one: nothing is claimed then.
 fn no_shadow_map(
-    asker: &Asker,
+    session: &Session,
     plugin: &Path,
     frame: &Frame,
     footprint: &Footprint,
@@ -229,8 +230,8 @@ fn no_shadow_map(
         return None;
     }
     let stage = Stage { name: UNDRAWN_MAPS.to_owned(), text: UNDRAWN_MAPS.to_owned() };
-    let outcome = draw(asker, Some(plugin), &Frame { stages: vec![stage], ..frame.clone() });
-    let without = ask::image(&outcome.answer()?.values, frame.size.0, frame.size.1);
+    let outcome = draw(session, Some(plugin), &Frame { stages: vec![stage], ..frame.clone() });
+    let without = session::image(&outcome.answer()?.values, frame.size.0, frame.size.1);
     let mask = &frame.case.expected.offline.mask;
     let inside = |value: u16| {
         value & (RegionMask::EDGE | RegionMask::EMITTER) == 0 && value & RegionMask::INDEX != 0
@@ -289,7 +290,7 @@ fn plain_but_for_shadows(
 /// frames: what the first lacks is the render pass' matter. `check` is the verdict on the image, which
 /// stands when none tells.
 fn judge_visibility(
-    asker: &Asker,
+    session: &Session,
     plugin: &Path,
     case: &Case,
     (with, without): (&Image, Option<&Image>),
@@ -306,9 +307,9 @@ fn judge_visibility(
     let drawn = |toml: &Path, shadow_map, times, stages: &[Stage]| {
         let stages = stages.to_vec();
         let frame = Frame { toml, shadow_map, times, stages, ..Frame::plain(case) };
-        let outcome = draw(asker, Some(plugin), &frame);
+        let outcome = draw(session, Some(plugin), &frame);
         let (width, height) = frame.size;
-        outcome.answer().map(|answer| ask::image(&answer.values, width, height))
+        outcome.answer().map(|answer| session::image(&answer.values, width, height))
     };
     let vertex = Stage { name: STAGES[0].to_owned(), text: VERTEX.to_owned() };
     let bonus = case.bonus.as_deref();

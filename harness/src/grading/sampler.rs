@@ -4,7 +4,7 @@ use std::path::Path;
 
 use basecode::scene::SceneConfig;
 
-use super::ask::Asker;
+use super::session::Session;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::worker::{Outcome, Request};
 
@@ -14,11 +14,11 @@ pub const CORRELATED: f64 = 0.5;
 
 /// Renders the scene of vertical stripes with one and several threads, one seed and two, and looks
 /// at what may differ and what may not.
-pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<Check>> {
+pub fn judge(session: &Session, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<Check>> {
     let config = SceneConfig::load(scene)?;
     let (width, height) = (config.width as u32, config.height as u32);
     let render = |seed, threads| Request::RenderOffline {
-        scene: asker.scene(scene),
+        scene: session.scene(scene),
         width,
         height,
         spp: 4,
@@ -26,8 +26,8 @@ pub fn judge(asker: &Asker, plugin: &Path, scene: &Path) -> anyhow::Result<Vec<C
         threads,
         shadows: true,
     };
-    let outcomes = asker
-        .ask(Some(plugin), vec![render(7, 1), render(7, 4), render(7, 4), render(1_000_007, 1)]);
+    let outcomes = session
+        .run(Some(plugin), vec![render(7, 1), render(7, 4), render(7, 4), render(1_000_007, 1)]);
     let images: Vec<&[f32]> = outcomes
         .iter()
         .filter_map(Outcome::answer)

@@ -11,9 +11,9 @@ use std::path::Path;
 use basecode::gpu::{EVERY_FRAGMENT, Footprint, OUTLINES};
 use basecode::{Image, Vec3};
 
-use super::ask::{self, Asker};
 use super::case::Case;
 use super::draw::{Frame, draw};
+use super::session::{self, Session};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::imaging::reference::RegionMask;
 use crate::worker::Stage;
@@ -56,7 +56,7 @@ pub struct Uploaded {
 
 /// Judges the frames of some scenes by what each took, where that is known.
 pub fn judge(
-    asker: &Asker,
+    session: &Session,
     plugin: &Path,
     cases: &[Case],
     footprints: &[Option<Footprint>],
@@ -76,7 +76,7 @@ pub fn judge(
              data, as if no shader drew them"
         );
         found.checks.push(Check::new(CheckId::SubmissionUploads, "", Verdict::Fail, summary));
-        found.nothing_draws = nothing_draws(asker, plugin, cases);
+        found.nothing_draws = nothing_draws(session, plugin, cases);
     }
     found
 }
@@ -96,15 +96,15 @@ fn triangles(case: &Case) -> usize {
 }
 
 /// Why what is drawn with uploaded pixels is not the scene, if it is not.
-fn nothing_draws(asker: &Asker, plugin: &Path, cases: &[Case]) -> Option<&'static str> {
+fn nothing_draws(session: &Session, plugin: &Path, cases: &[Case]) -> Option<&'static str> {
     let drawn = |case: &Case, outlines: bool| {
         let mut stages = vec![Stage { name: EVERY_FRAGMENT.to_owned(), text: SHOW.to_owned() }];
         stages.extend(
             outlines.then(|| Stage { name: OUTLINES.to_owned(), text: "outlines".to_owned() }),
         );
         let frame = Frame::small(case, stages);
-        let outcome = draw(asker, Some(plugin), &frame);
-        outcome.answer().map(|answer| ask::image(&answer.values, frame.size.0, frame.size.1))
+        let outcome = draw(session, Some(plugin), &frame);
+        outcome.answer().map(|answer| session::image(&answer.values, frame.size.0, frame.size.1))
     };
     let mask = |case: &&Case| clear(&case.small.unshadowed_mask, true).count();
     let case = cases.iter().max_by_key(mask)?;

@@ -7,7 +7,7 @@
 
 mod draw;
 mod files;
-mod look;
+mod preview;
 #[cfg(test)]
 mod tests;
 
@@ -23,7 +23,7 @@ use crate::expected::load_scene;
 use crate::files::{hex, write_whole};
 use draw::Draw;
 use files::File;
-use look::Look;
+use preview::ScenePreview;
 
 /// So many draws are looked at before a scene is given up. Over 200 seeds about every fourth draw is
 /// accepted, and none needed half of these.
@@ -101,11 +101,11 @@ pub fn make(assignment: &Assignment, seed: u64) -> anyhow::Result<(HeldBack, Vec
 /// The files of the first draw of a scene that is worth something.
 fn scene_files(root: &Path, entry: &SceneEntry, seed: u64) -> anyhow::Result<Vec<File>> {
     let scene = load_scene(&root.join(&entry.offline))?;
-    let original = Look::new(&scene, &Draw::original(&scene))?;
+    let original = ScenePreview::new(&scene, &Draw::original(&scene))?;
     let mut why = "";
     for attempt in 0..TRIES {
         let draw = Draw::new(&scene, sub_seed(seed, &entry.name, attempt));
-        match Look::new(&scene, &draw)?.problem(&original, entry.bonus.is_some()) {
+        match ScenePreview::new(&scene, &draw)?.problem(&original, entry.bonus.is_some()) {
             None => return files::changed(root, entry, &scene, &draw),
             Some(problem) => why = problem,
         }

@@ -48,15 +48,15 @@ fn the_same_seed_gives_the_same_bytes_and_another_gives_others() {
 #[test]
 fn the_required_bonus_takes_no_wider_frustum_than_the_scenes_to_choose_from() {
     let assignment = assignment();
-    let look = |entry: &SceneEntry| {
+    let preview = |entry: &SceneEntry| {
         let scene = load_scene(&assignment.root.join(&entry.offline)).unwrap();
-        Look::new(&scene, &Draw::original(&scene)).unwrap()
+        ScenePreview::new(&scene, &Draw::original(&scene)).unwrap()
     };
     let with_bonus = assignment.scenes.iter().filter(|scene| scene.bonus.is_some());
     let (required, free): (Vec<_>, Vec<_>) = with_bonus.partition(|scene| scene.bonus_required);
     assert!(!required.is_empty() && free.len() >= 2);
-    for own in required.iter().map(|entry| look(entry)) {
-        for other in free.iter().map(|entry| look(entry)) {
+    for own in required.iter().map(|entry| preview(entry)) {
+        for other in free.iter().map(|entry| preview(entry)) {
             assert!(own.shadow_cone <= other.shadow_cone, "{own:?} {other:?}");
             assert!(own.facing_cone <= other.facing_cone, "{own:?} {other:?}");
         }
@@ -100,23 +100,27 @@ fn files_say_what_was_drawn() {
 #[test]
 fn two_hundred_seeds_give_scenes_that_show_light_shadow_and_highlight() {
     for (entry, scene) in originals() {
-        let original = Look::new(&scene, &Draw::original(&scene)).unwrap();
+        let original = ScenePreview::new(&scene, &Draw::original(&scene)).unwrap();
         (0..200u64).into_par_iter().for_each(|seed| {
             let attempts = (0..TRIES / 2).map(|attempt| {
-                Look::new(&scene, &Draw::new(&scene, sub_seed(seed, &entry.name, attempt))).unwrap()
+                ScenePreview::new(&scene, &Draw::new(&scene, sub_seed(seed, &entry.name, attempt)))
+                    .unwrap()
             });
             let bonus = entry.bonus.is_some();
-            let found = attempts.map(|look| (look, look.problem(&original, bonus)));
-            let (look, _) = found
+            let found = attempts.map(|preview| (preview, preview.problem(&original, bonus)));
+            let (preview, _) = found
                 .into_iter()
                 .find(|(_, problem)| problem.is_none())
                 .unwrap_or_else(|| panic!("{}: seed {seed} takes half of the tries", entry.name));
-            assert!(look.lit > 0.1 && look.shadowed > 5e-3 && look.highlight > 5e-4, "{look:?}");
+            assert!(
+                preview.lit > 0.1 && preview.shadowed > 5e-3 && preview.highlight > 5e-4,
+                "{preview:?}"
+            );
         });
     }
 }
 
-/// By the masks that images are judged with, which know nothing of the look.
+/// By the masks that images are judged with, which know nothing of the preview.
 #[test]
 fn accepted_scenes_have_enough_pixels_away_from_edges() {
     let root = assignment().root;
@@ -149,11 +153,11 @@ fn what_shows_too_little_is_drawn_again() {
     let (_, scene) =
         originals().into_iter().find(|(entry, _)| entry.name == "sphere_phong").unwrap();
     let original = Draw::original(&scene);
-    let first = Look::new(&scene, &original).unwrap();
+    let first = ScenePreview::new(&scene, &original).unwrap();
     let problem = |change: &dyn Fn(&mut Draw)| {
         let mut draw = Draw { film: [96, 96], ..original.clone() };
         change(&mut draw);
-        Look::new(&scene, &draw).unwrap().problem(&first, true)
+        ScenePreview::new(&scene, &draw).unwrap().problem(&first, true)
     };
     let centre = Vec3::new(0.0, 0.995, 0.0);
     assert_eq!(problem(&|_| ()), None);

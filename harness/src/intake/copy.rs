@@ -17,14 +17,14 @@ use super::unpack::{Format, HandIn, HandInFile, IntakeError, Refusal, archive_ma
 use crate::files::hex;
 
 /// Why reading stops before the end.
-pub(super) enum Halt {
+pub(super) enum Stop {
     /// The hand-in is refused; the findings say why.
     Refused,
     /// The destination or the source cannot be used; no matter of the hand-in.
     Io(IntakeError),
 }
 
-impl From<IntakeError> for Halt {
+impl From<IntakeError> for Stop {
     fn from(error: IntakeError) -> Self {
         Self::Io(error)
     }
@@ -38,7 +38,7 @@ pub(super) enum Kind {
 
 /// What becomes of an entry.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Admitted {
+pub(super) enum EntryAction {
     /// To be written at this path.
     File(String),
     /// Nothing to write; folders are made when a file needs them.
@@ -95,13 +95,13 @@ impl<'a> PrivateCopy<'a> {
     }
 
     /// Records an error about the entry of that raw name.
-    pub(super) fn refuse(&mut self, finding: Finding) -> Halt {
+    pub(super) fn refuse(&mut self, finding: Finding) -> Stop {
         self.findings.push(finding);
-        Halt::Refused
+        Stop::Refused
     }
 
     /// Counts one entry, its name unread (links, extended headers and the like count too).
-    pub(super) fn count_entry(&mut self) -> Result<(), Halt> {
+    pub(super) fn count_entry(&mut self) -> Result<(), Stop> {
         self.entries += 1;
         if self.entries > self.limits.max_entries {
             let message = format!("more than {} entries", self.limits.max_entries);
@@ -122,25 +122,25 @@ impl<'a> PrivateCopy<'a> {
     }
 
     /// Checks the name of an entry that was counted, and its place beside the others.
-    pub(super) fn admit(&mut self, raw: &[u8], kind: Kind) -> Admitted {
+    pub(super) fn accept(&mut self, raw: &[u8], kind: Kind) -> EntryAction {
         let safe = match safe_path(raw, self.limits) {
             Ok(safe) => safe,
             Err(finding) => {
                 self.findings.push(finding);
-                return Admitted::Refused;
+                return EntryAction::Refused;
             }
         };
         let path = safe.path;
         if path.is_empty() {
             if kind == Kind::Folder {
-                return Admitted::Folder;
+                return EntryAction::Folder;
             }
             self.findings.push(Finding::error("name_empty", "a file without a name"));
-            return Admitted::Refused;
+            return EntryAction::Refused;
         }
         if let Some(pattern) = self.tree.ignored_by(&path) {
             *self.ignored.entry(printable(pattern)).or_default() += 1;
-            return Admitted::Ignored;
+            return EntryAction::Ignored;
         }
         if safe.replaced {
             self.findings.push(
@@ -163,7 +163,7 @@ impl<'a> PrivateCopy<'a> {
             self.findings.push(
                 Finding::error("file_and_folder", "the same path is a file and a folder").at(path),
             );
-            return Admitted::Refused;
+            return EntryAction::Refused;
         }
         if kind == Kind::File && self.files.contains_key(&path) {
             self.findings.push(
@@ -174,17 +174,17 @@ impl<'a> PrivateCopy<'a> {
                 .at(path)
                 .hint("make a new archive instead of adding to an old one"),
             );
-            return Admitted::Refused;
+            return EntryAction::Refused;
         }
         self.folders.extend(parents.into_iter().map(str::to_owned));
         match kind {
             Kind::Folder => {
                 self.folders.insert(path);
-                Admitted::Folder
+                EntryAction::Folder
             }
             Kind::File => {
                 self.files.insert(path.clone(), None);
-                Admitted::File(path)
+                EntryAction::File(path)
             }
         }
     }
@@ -214,7 +214,7 @@ impl<'a> PrivateCopy<'a> {
     }
 
     /// Counts `n` more bytes of content towards the total.
-    pub(super) fn count_bytes(&mut self, n: u64, path: &str) -> Result<(), Halt> {
+    pub(super) fn count_bytes(&mut self, n: u64, path: &str) -> Result<(), Stop> {
         self.total_bytes += n;
         if self.total_bytes > mib(self.limits.max_total_mib) {
             let message =
@@ -239,7 +239,7 @@ impl<'a> PrivateCopy<'a> {
         path: &str,
         reader: &mut dyn Read,
         packed_bytes: Option<u64>,
-    ) -> Result<io::Result<Written>, Halt> {
+    ) -> Result<io::Result<Written>, Stop> {
         let mut out = if self.findings.has_errors() { None } else { self.create(path)? };
         let mut sha256 = Sha256::new();
         let mut crc = Crc::new();
@@ -291,7 +291,7 @@ impl<'a> PrivateCopy<'a> {
     }
 
     /// Creates a new file; `None` where its name is taken (a file system that ignores case).
-    fn create(&mut self, path: &str) -> Result<Option<File>, Halt> {
+    fn create(&mut self, path: &str) -> Result<Option<File>, Stop> {
         let full = self.dest.join(path);
         if let Some(parent) = full.parent() {
             fs::create_dir_all(parent).map_err(|e| IntakeError::io("create folder", parent, e))?;
@@ -317,9 +317,9 @@ impl<'a> PrivateCopy<'a> {
         mut self,
         name: &str,
         format: Format,
-        result: Result<(), Halt>,
+        result: Result<(), Stop>,
     ) -> Result<HandIn, IntakeError> {
-        if let Err(Halt::Io(error)) = result {
+        if let Err(Stop::Io(error)) = result {
             clear(self.dest)?;
             return Err(error);
         }

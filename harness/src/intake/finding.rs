@@ -41,7 +41,7 @@ pub struct Finding {
     /// Line in that file, from 1.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub line: Option<u32>,
-    /// What is the matter: expected and found.
+    /// What is the fault: expected and found.
     pub message: String,
     /// What to do about it.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -125,7 +125,7 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// Kept per severity.
+    /// RecordCache per severity.
     pub(super) const KEPT: usize = 50;
 
     pub(super) fn push(&mut self, finding: Finding) {

@@ -9,7 +9,7 @@ mod open;
 use std::io;
 use std::path::Path;
 
-use super::copy::{Admitted, Halt, Kind, PrivateCopy};
+use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::{Finding, printable_bytes};
 use super::unpack::IntakeError;
 use open::Folder;
@@ -32,7 +32,7 @@ pub(super) fn read(
     source: &Path,
     is_wanted: &dyn Fn(&str, Kind) -> bool,
     copy: &mut PrivateCopy<'_>,
-) -> Result<(), Halt> {
+) -> Result<(), Stop> {
     let folder = match Folder::open(source) {
         Ok(folder) => folder,
         Err(error) if is_gone(&error) => return Err(copy.refuse(changed(b"."))),
@@ -55,7 +55,7 @@ struct Walk<'a, 'b> {
 impl Walk<'_, '_> {
     /// Copies from an open folder, whose path ends with a slash. Folders that are deeper than allowed are not
     /// admitted, so that neither the stack nor open folders pile up.
-    fn folder(&mut self, mut folder: Folder, path: &[u8]) -> Result<(), Halt> {
+    fn folder(&mut self, mut folder: Folder, path: &[u8]) -> Result<(), Stop> {
         let most = usize::try_from(self.copy.limits.max_entries).unwrap_or(usize::MAX);
         let names = folder.names(most.saturating_add(1));
         let mut names = self.known("list", path, names)?;
@@ -72,14 +72,14 @@ impl Walk<'_, '_> {
             }
             match look {
                 Look::Folder(id) => {
-                    if self.copy.admit(&raw, Kind::Folder) == Admitted::Folder {
+                    if self.copy.accept(&raw, Kind::Folder) == EntryAction::Folder {
                         let inner = self.known("list", &raw, folder.folder(&name))?;
                         self.is_same(&raw, inner.id(), id)?;
                         self.folder(inner, &[raw.as_slice(), b"/"].concat())?;
                     }
                 }
                 Look::File(id) => {
-                    if let Admitted::File(admitted) = self.copy.admit(&raw, Kind::File) {
+                    if let EntryAction::File(admitted) = self.copy.accept(&raw, Kind::File) {
                         let opened = self.known("read", &raw, folder.file(&name))?;
                         let Some((mut file, opened)) = opened else {
                             return Err(self.copy.refuse(changed(&raw)));
@@ -105,7 +105,7 @@ impl Walk<'_, '_> {
         doing: &'static str,
         raw: &[u8],
         answer: io::Result<T>,
-    ) -> Result<T, Halt> {
+    ) -> Result<T, Stop> {
         answer.map_err(|error| {
             if is_gone(&error) {
                 return self.copy.refuse(changed(raw));
@@ -116,7 +116,7 @@ impl Walk<'_, '_> {
     }
 
     /// What was opened must be what was looked at.
-    fn is_same(&mut self, raw: &[u8], opened: io::Result<Id>, looked_at: Id) -> Result<(), Halt> {
+    fn is_same(&mut self, raw: &[u8], opened: io::Result<Id>, looked_at: Id) -> Result<(), Stop> {
         let opened = self.known("read", raw, opened)?;
         if opened == looked_at { Ok(()) } else { Err(self.copy.refuse(changed(raw))) }
     }

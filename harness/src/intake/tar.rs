@@ -8,7 +8,7 @@ use std::io::{self, Read};
 use flate2::bufread::GzDecoder;
 use tar::{EntryType, Header};
 
-use super::copy::{Admitted, Halt, Kind, PrivateCopy};
+use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::{Finding, printable, printable_bytes};
 use super::limits::{Limits, mib};
 
@@ -41,7 +41,7 @@ fn is_header(block: &[u8]) -> bool {
 }
 
 /// Reads a gzipped tar.
-pub(super) fn read_gz(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Halt> {
+pub(super) fn read_gz(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop> {
     let mut gz = Gz {
         packed: bytes.len(),
         member: GzDecoder::new(bytes),
@@ -157,7 +157,7 @@ struct Extended {
 }
 
 /// Reads a tar from `reader` into the copy.
-pub(super) fn read(mut reader: impl Read, copy: &mut PrivateCopy<'_>) -> Result<(), Halt> {
+pub(super) fn read(mut reader: impl Read, copy: &mut PrivateCopy<'_>) -> Result<(), Stop> {
     let mut extended: Option<Extended> = None;
     let mut first = true;
     loop {
@@ -228,7 +228,7 @@ fn next_block(
     reader: &mut impl Read,
     first: bool,
     copy: &mut PrivateCopy<'_>,
-) -> Result<Option<[u8; BLOCK]>, Halt> {
+) -> Result<Option<[u8; BLOCK]>, Stop> {
     let mut block = [0; BLOCK];
     let mut filled = 0;
     while filled < BLOCK {
@@ -253,7 +253,7 @@ fn truncated(message: &str) -> Finding {
 }
 
 /// After the first zero block only zeros may follow.
-fn check_padding(reader: &mut impl Read, copy: &mut PrivateCopy<'_>) -> Result<(), Halt> {
+fn check_padding(reader: &mut impl Read, copy: &mut PrivateCopy<'_>) -> Result<(), Stop> {
     let mut buffer = [0; 8 * BLOCK];
     let mut padding = 0u64;
     loop {
@@ -277,7 +277,7 @@ fn read_extended(
     reader: &mut impl Read,
     size: u64,
     copy: &mut PrivateCopy<'_>,
-) -> Result<Vec<u8>, Halt> {
+) -> Result<Vec<u8>, Stop> {
     if size > MAX_EXTENDED {
         let message =
             format!("an extended header of {size} bytes, over the limit of {MAX_EXTENDED}");
@@ -303,7 +303,7 @@ fn take_extended(
     mut data: Vec<u8>,
     extended: &mut Extended,
     copy: &mut PrivateCopy<'_>,
-) -> Result<(), Halt> {
+) -> Result<(), Stop> {
     match entry_type {
         EntryType::GNULongName => {
             // One NUL ends the name; more would hide something.
@@ -363,7 +363,7 @@ fn read_entry(
     size: u64,
     extended: Extended,
     copy: &mut PrivateCopy<'_>,
-) -> Result<(), Halt> {
+) -> Result<(), Stop> {
     let name = entry_name(header_name, size, extended, copy)?;
     // Old tars mark a folder by its name alone.
     let kind = match entry_type {
@@ -377,8 +377,8 @@ fn read_entry(
             return skip(reader, padded(size), &name, copy);
         }
     };
-    match copy.admit(&name, kind) {
-        Admitted::File(path) => {
+    match copy.accept(&name, kind) {
+        EntryAction::File(path) => {
             let mut data = reader.by_ref().take(size);
             match copy.write(&path, &mut data, None)? {
                 Ok(written) if written.bytes == size => {}
@@ -390,7 +390,7 @@ fn read_entry(
             }
             skip(reader, padded(size) - size, &name, copy)
         }
-        Admitted::Folder if size > 0 => {
+        EntryAction::Folder if size > 0 => {
             let message = format!("a folder that holds {size} bytes");
             Err(copy.refuse(
                 Finding::error("tar_header", message).at(printable_bytes(&name)).hint(AGAIN),
@@ -406,7 +406,7 @@ fn entry_name(
     size: u64,
     extended: Extended,
     copy: &mut PrivateCopy<'_>,
-) -> Result<Vec<u8>, Halt> {
+) -> Result<Vec<u8>, Stop> {
     let mut name = extended.long_name.unwrap_or_else(|| header_name.to_owned());
     let mut paths = 0;
     for (key, value) in extended.pax {
@@ -459,7 +459,7 @@ fn skip(
     size: u64,
     name: &[u8],
     copy: &mut PrivateCopy<'_>,
-) -> Result<(), Halt> {
+) -> Result<(), Stop> {
     let mut data = reader.take(size);
     let mut buffer = [0; 8 * BLOCK];
     let mut skipped = 0;

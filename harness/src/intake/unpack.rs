@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::copy::{Admitted, Halt, Kind, PrivateCopy};
+use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::{Finding, printable};
 use super::limits::{Limits, mib};
 use super::tree::TreeSpec;
@@ -89,7 +89,7 @@ pub enum IntakeError {
         /// The system's answer.
         source: io::Error,
     },
-    /// The caller's matter: the copy must be alone in its folder.
+    /// The caller's fault: the copy must be alone in its folder.
     #[error("destination '{path}' is not empty")]
     DestinationNotEmpty {
         /// The destination.
@@ -174,7 +174,7 @@ fn write_unpacked(
     unpacked: &HandIn,
     mut contents: &[u8],
     copy: &mut PrivateCopy<'_>,
-) -> Result<(), Halt> {
+) -> Result<(), Stop> {
     let contradiction = |path: &str| {
         let message = "what was unpacked contradicts itself: a bug of Umbra's";
         Finding::error("decoder_answer", message).at(printable(path))
@@ -189,8 +189,8 @@ fn write_unpacked(
             return Err(copy.refuse(contradiction(&path)));
         };
         contents = rest;
-        match copy.admit(path.as_bytes(), Kind::File) {
-            Admitted::File(admitted) if admitted == path => {
+        match copy.accept(path.as_bytes(), Kind::File) {
+            EntryAction::File(admitted) if admitted == path => {
                 copy.write(&path, &mut content, None)?
                     .map_err(|e| IntakeError::io("copy", Path::new(&path), e))?;
             }
@@ -244,7 +244,7 @@ pub fn unpack_bytes(
         Format::Zip => zip::read(bytes, &mut copy),
         Format::Tar => tar::read(bytes, &mut copy),
         Format::TarGz => tar::read_gz(bytes, &mut copy),
-        Format::Folder => Err(Halt::Refused),
+        Format::Folder => Err(Stop::Refused),
     };
     copy.finish(name, format, result)
 }

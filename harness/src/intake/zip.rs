@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use flate2::read::DeflateDecoder;
 
-use super::copy::{Admitted, Halt, Kind, PrivateCopy};
+use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::{Finding, printable_bytes};
 use super::zip_headers::{
     CENTRAL, Central, Entry, LOCAL, ZIP64, check_entry, u16_at, u32_at, u64_at,
@@ -42,7 +42,7 @@ fn last_end_record(bytes: &[u8]) -> Option<usize> {
 }
 
 /// Reads a zip archive into the copy. Nothing is written before all headers are checked.
-pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Halt> {
+pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop> {
     let directory = find_directory(bytes, copy.limits.max_entries).map_err(|f| copy.refuse(f))?;
     let mut entries = read_directory(bytes, &directory, copy)?;
     check_ranges(bytes, &entries, &directory, copy);
@@ -50,17 +50,17 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Halt>
     let mut files = Vec::new();
     for entry in &entries {
         let kind = if entry.is_folder() { Kind::Folder } else { Kind::File };
-        match copy.admit(&entry.name, kind) {
-            Admitted::File(path) => files.push((entry, path)),
-            Admitted::Folder if entry.unpacked_bytes > 0 => {
+        match copy.accept(&entry.name, kind) {
+            EntryAction::File(path) => files.push((entry, path)),
+            EntryAction::Folder if entry.unpacked_bytes > 0 => {
                 let message = format!("a folder that holds {} bytes", entry.unpacked_bytes);
                 copy.findings.push(Finding::error("zip_folder_data", message).at(entry.shown()));
             }
-            Admitted::Folder | Admitted::Ignored | Admitted::Refused => {}
+            EntryAction::Folder | EntryAction::Ignored | EntryAction::Refused => {}
         }
     }
     if copy.findings.has_errors() {
-        return Err(Halt::Refused);
+        return Err(Stop::Refused);
     }
     for (entry, path) in files {
         extract(entry, &path, copy)?;
@@ -204,7 +204,7 @@ fn read_directory<'a>(
     bytes: &'a [u8],
     directory: &Directory,
     copy: &mut PrivateCopy<'_>,
-) -> Result<Vec<Entry<'a>>, Halt> {
+) -> Result<Vec<Entry<'a>>, Stop> {
     let mut entries = Vec::new();
     let mut at = directory.start;
     let mut count = 0;
@@ -301,7 +301,7 @@ fn check_ranges(
 }
 
 /// Unpacks one entry and checks that its data keep what the headers promise.
-fn extract(entry: &Entry<'_>, path: &str, copy: &mut PrivateCopy<'_>) -> Result<(), Halt> {
+fn extract(entry: &Entry<'_>, path: &str, copy: &mut PrivateCopy<'_>) -> Result<(), Stop> {
     let packed = entry.data.len() as u64;
     // One byte more than promised is enough to see a lie.
     let promised = entry.unpacked_bytes.saturating_add(1);

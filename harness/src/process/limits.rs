@@ -50,15 +50,15 @@ impl Default for Limits {
 
 /// What a child does to itself before anything else.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Lock {
+pub struct Confinement {
     /// What it may use.
     pub limits: Limits,
     /// What it may see: the sandbox locks it. None where there is no isolation at all: then it gets
-    /// a session and limits only, by [`crate::process::lock_self`].
+    /// a session and limits only, by [`crate::process::confine_self`].
     pub sandbox: Option<Policy>,
 }
 
-impl Lock {
+impl Confinement {
     /// A lock that isolates by `policy`, or by limits alone when the policy has no layer.
     /// The policy's limits and quota are replaced by these.
     pub fn new(limits: &Limits, mut policy: Policy) -> Self {

@@ -3,7 +3,7 @@
 //!
 //! Everything of Umbra that runs foreign code (the compiler, the worker) goes through [`run`].
 //! [`start`] is the one place where a process is made; what the child does to itself first is
-//! [`lock_self`].
+//! [`confine_self`].
 
 mod capture;
 mod limits;
@@ -13,12 +13,12 @@ mod start;
 #[cfg(unix)]
 mod watch;
 #[cfg(not(unix))]
-#[path = "watch_plain.rs"]
+#[path = "watch_fallback.rs"]
 mod watch;
 
 pub use capture::Captured;
-pub use limits::{Limits, Lock};
-pub use start::{EXIT_NOT_LOCKED, command, exec_main, exit_now, lock_self, start};
+pub use limits::{Confinement, Limits};
+pub use start::{EXIT_NOT_LOCKED, command, confine_self, exec_main, exit_now, start};
 pub use watch::run;
 
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,7 @@ pub enum Exit {
 
 /// What is known about a child that is gone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Ended {
+pub struct ChildOutcome {
     /// How it ended.
     pub exit: Exit,
     /// What its process id was, and its group's.
@@ -76,7 +76,7 @@ pub struct Ended {
     pub left_process: bool,
 }
 
-impl Ended {
+impl ChildOutcome {
     /// Bytes that it printed, kept or not.
     pub fn printed(&self) -> u64 {
         self.stdout.bytes + self.stderr.bytes

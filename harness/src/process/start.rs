@@ -1,15 +1,15 @@
 //! The start of a child, on both sides. A sandbox belongs here: what the parent must do goes into
-//! [`start`], what the child does to itself into [`lock_self`].
+//! [`start`], what the child does to itself into [`confine_self`].
 
 use std::ffi::{OsStr, OsString};
 use std::io;
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
 
-use super::{Limits, Lock};
+use super::{Confinement, Limits};
 use crate::sandbox;
 
-/// Carries the [`Lock`] to the child, which removes it.
+/// Carries the [`Confinement`] to the child, which removes it.
 const LOCK_VARIABLE: &str = "UMBRA_LOCK";
 /// Carries the parent's process id to the child.
 const PARENT_VARIABLE: &str = "UMBRA_PARENT";
@@ -19,20 +19,20 @@ pub const EXIT_NOT_LOCKED: u8 = 70;
 
 /// A command that locks itself by `lock`, then executes `program`, a path as the child sees it.
 /// `umbra` is this program. The environment is empty but for what the caller adds.
-pub fn command(umbra: &Path, lock: &Lock, program: &Path) -> Command {
+pub fn command(umbra: &Path, lock: &Confinement, program: &Path) -> Command {
     let hidden = if lock.sandbox.is_some() { sandbox::LAUNCH_COMMAND } else { "__exec" };
     let mut command = Command::new(umbra);
     command.arg(hidden).arg(program).env_clear();
     command
 }
 
-/// Starts `command`, which must be Umbra itself with a hidden command that calls [`lock_self`]
+/// Starts `command`, which must be Umbra itself with a hidden command that calls [`confine_self`]
 /// before anything hostile is touched. Its standard input is taken. The child must be waited for on the thread that calls this:
 /// it is killed when that thread ends.
 ///
 /// # Errors
 /// When the process cannot be made.
-pub fn start(mut command: Command, lock: &Lock) -> io::Result<Child> {
+pub fn start(mut command: Command, lock: &Confinement) -> io::Result<Child> {
     command.stdin(Stdio::null());
     #[cfg(target_os = "linux")]
     if let Some(policy) = &lock.sandbox {
@@ -55,10 +55,10 @@ pub fn start(mut command: Command, lock: &Lock) -> io::Result<Child> {
 ///
 /// # Errors
 /// When there is no lock, or any part of it cannot be applied: then nothing hostile may be touched.
-pub fn lock_self() -> io::Result<()> {
+pub fn confine_self() -> io::Result<()> {
     #[cfg(target_os = "linux")]
     if std::env::var_os(LOCK_VARIABLE).is_none() {
-        return sandbox::lock_self().map(drop).map_err(io::Error::other);
+        return sandbox::confine_self().map(drop).map_err(io::Error::other);
     }
     lock_plainly()
 }
@@ -66,7 +66,7 @@ pub fn lock_self() -> io::Result<()> {
 fn lock_plainly() -> io::Result<()> {
     let lock = std::env::var(LOCK_VARIABLE)
         .map_err(|_| io::Error::other("this command is for Umbra's own use"))?;
-    let lock: Lock = serde_json::from_str(&lock)?;
+    let lock: Confinement = serde_json::from_str(&lock)?;
     let parent = std::env::var(PARENT_VARIABLE).ok().and_then(|id| id.parse::<i32>().ok());
     // SAFETY: the caller promises that this process has no other thread yet.
     unsafe {

@@ -18,7 +18,7 @@ use nix::unistd::Pid;
 
 use super::capture::Capture;
 use super::standstill::{self, Standstill};
-use super::{Ended, Exit, Lock, Watcher, start};
+use super::{ChildOutcome, Confinement, Exit, Watcher, start};
 use crate::sandbox::{InForce, Policy, SandboxError, read_report};
 
 /// How often time, the user's wish to stop and the memory in use are looked at.
@@ -41,11 +41,11 @@ const DRAIN: Duration = Duration::from_millis(200);
 /// When the child cannot be started, locked or watched.
 pub fn run(
     mut command: Command,
-    lock: &Lock,
+    lock: &Confinement,
     keep: usize,
     cancel: &AtomicBool,
     watcher: &mut Watcher,
-) -> io::Result<Ended> {
+) -> io::Result<ChildOutcome> {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let begin = Instant::now();
     let mut child = start(command, lock)?;
@@ -122,7 +122,7 @@ pub fn run(
         None => None,
     };
     let mut captured = pipes.into_iter().map(|pipe| pipe.capture.finish());
-    Ok(Ended {
+    Ok(ChildOutcome {
         exit,
         pid: pid.as_raw() as u32,
         stdout: captured.next().unwrap_or_default(),

@@ -1,7 +1,7 @@
 //! `grades.csv`: one row a hand-in, for a grade book.
 
 use super::number::{is_range, of_part, points};
-use super::{Entry, ReportError, Sheet, harmless};
+use super::{BatchReport, Entry, ReportError, harmless};
 
 /// The grades as CSV (UTF-8, comma, `\n`). The columns are student id, last and first name, name of
 /// the hand-in, the parts, total, what it is out of, lowest and highest, unconfirmed, remarks.
@@ -13,7 +13,7 @@ use super::{Entry, ReportError, Sheet, harmless};
 ///
 /// # Errors
 /// When there is no hand-in.
-pub fn grades(sheet: &Sheet) -> Result<String, ReportError> {
+pub fn grades(sheet: &BatchReport) -> Result<String, ReportError> {
     if sheet.entries.is_empty() {
         return Err(ReportError::Empty);
     }
@@ -32,7 +32,7 @@ pub fn grades(sheet: &Sheet) -> Result<String, ReportError> {
     String::from_utf8(bytes).map_err(|error| format(error.to_string()))
 }
 
-fn row(sheet: &Sheet, Entry { record, grade }: &Entry) -> Vec<String> {
+fn row(sheet: &BatchReport, Entry { record, grade }: &Entry) -> Vec<String> {
     let student = &record.student;
     let mut row = vec![
         student.id.clone(),
@@ -130,7 +130,7 @@ student_id,last_name,first_name,hand_in,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,low
 
     #[test]
     fn an_empty_batch_is_an_error() {
-        let sheet = Sheet { entries: Vec::new(), ..sample::sheet() };
+        let sheet = BatchReport { entries: Vec::new(), ..sample::sheet() };
         assert!(matches!(grades(&sheet), Err(ReportError::Empty)));
     }
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::ser::{CharEscape, Formatter, PrettyFormatter};
 
 use super::number::significant;
-use super::{Entry, ReportError, Sheet, harmless};
+use super::{BatchReport, Entry, ReportError, harmless};
 use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, CheckInfo};
 use crate::grading::{Conditions, StageCost, Student};
@@ -75,7 +75,7 @@ struct HandIn<'a> {
 ///
 /// # Errors
 /// When there is no hand-in.
-pub fn report(sheet: &Sheet) -> Result<String, ReportError> {
+pub fn report(sheet: &BatchReport) -> Result<String, ReportError> {
     if sheet.entries.is_empty() {
         return Err(ReportError::Empty);
     }
@@ -225,7 +225,7 @@ mod tests {
     use super::super::sample;
     use super::*;
 
-    fn parsed(sheet: &Sheet) -> Value {
+    fn parsed(sheet: &BatchReport) -> Value {
         serde_json::from_str(&report(sheet).unwrap()).unwrap()
     }
 
@@ -301,7 +301,7 @@ mod tests {
 
     #[test]
     fn an_empty_batch_is_an_error() {
-        let sheet = Sheet { entries: Vec::new(), ..sample::sheet() };
+        let sheet = BatchReport { entries: Vec::new(), ..sample::sheet() };
         assert!(matches!(report(&sheet), Err(ReportError::Empty)));
     }
 }

@@ -60,7 +60,7 @@ pub struct Entry {
 
 /// Everything that a report of a batch is made from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Sheet {
+pub struct BatchReport {
     /// The assignment's short name: `a2`.
     pub assignment: String,
     /// The assignment's title.
@@ -137,7 +137,7 @@ pub enum ReportError {
     },
 }
 
-impl Sheet {
+impl BatchReport {
     /// A sheet for hand-ins of an assignment.
     pub fn new(assignment: &Assignment, held_back: Option<HeldBack>, entries: Vec<Entry>) -> Self {
         Self {
@@ -183,7 +183,7 @@ impl Sheet {
 ///
 /// # Errors
 /// When there is no hand-in, a slug is no plain unique name, or a file cannot be written.
-pub fn write(out: &Path, sheet: &Sheet) -> Result<(), ReportError> {
+pub fn write(out: &Path, sheet: &BatchReport) -> Result<(), ReportError> {
     sheet.check()?;
     for entry in &sheet.entries {
         let slug = &entry.record.slug;

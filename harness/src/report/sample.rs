@@ -1,7 +1,7 @@
 //! A made-up batch for the tests: one perfect hand-in, one that multiplies by the cosine twice and
 //! whose bonus could not be judged, one that does not build.
 
-use super::{Entry, Sheet};
+use super::{BatchReport, Entry};
 use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, CheckId, Evidence, Measure, Picture, Verdict};
 use crate::grading::{Conditions, Record, StageCost, Student};
@@ -10,8 +10,8 @@ use crate::intake::Finding;
 use crate::rubric::{Grade, PartGrade, Rules};
 
 /// The batch.
-pub(crate) fn sheet() -> Sheet {
-    Sheet {
+pub(crate) fn sheet() -> BatchReport {
+    BatchReport {
         assignment: "a2".into(),
         title: "Assignment 2: Point Lights & Shadows".into(),
         course: "ECSE 446/546: Realistic/Advanced Image Synthesis".into(),

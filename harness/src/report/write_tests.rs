@@ -42,7 +42,7 @@ fn every_file_is_there_and_no_temporary_one() {
 #[test]
 fn an_empty_batch_writes_nothing() {
     let out = tempfile::tempdir().unwrap();
-    let sheet = Sheet { entries: Vec::new(), ..sample::sheet() };
+    let sheet = BatchReport { entries: Vec::new(), ..sample::sheet() };
     assert!(matches!(write(out.path(), &sheet), Err(ReportError::Empty)));
     assert_eq!(fs::read_dir(out.path()).unwrap().count(), 0);
 }

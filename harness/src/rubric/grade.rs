@@ -53,7 +53,7 @@ pub struct PartGrade {
 }
 
 /// What one part is worth, as fractions of its points.
-struct Worth {
+struct PartScore {
     least: f64,
     most: f64,
     unconfirmed: f64,
@@ -179,7 +179,7 @@ fn sum(parts: Vec<PartGrade>, out_of: f64, remarks: Vec<String>) -> Grade {
 /// Grades by all of the evidence, the worst scene counting wherever it is from.
 fn grade_together(rules: &Rules, evidence: &Evidence) -> Grade {
     let built = evidence.named(BUILD).all(|check| check.verdict == Verdict::Pass);
-    let mut worths: Vec<Worth> =
+    let mut worths: Vec<PartScore> =
         rules
             .parts
             .iter()
@@ -192,7 +192,7 @@ fn grade_together(rules: &Rules, evidence: &Evidence) -> Grade {
             })
             .collect();
     if built {
-        blame_the_unexplained(rules, evidence, &mut worths);
+        charge_unexplained(rules, evidence, &mut worths);
     }
     let mut remarks = Vec::new();
     let mut ceiling = 1.0f64;
@@ -246,7 +246,7 @@ fn round(points: f64) -> f64 {
 }
 
 /// A part of a hand-in that builds.
-fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
+fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> PartScore {
     if let Some(path) = rules.paths.get(&part.path) {
         let mut proof = evidence.named(path.proof).peekable();
         if proof.peek().is_some() && proof.all(|check| check.verdict == Verdict::Pass) {
@@ -256,7 +256,7 @@ fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
             if let Some(worth) = unseen.filter(|worth| worth.least < 1.0) {
                 return worth;
             }
-            return Worth {
+            return PartScore {
                 least: 1.0,
                 most: 1.0,
                 unconfirmed: 0.0,
@@ -271,8 +271,8 @@ fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
 }
 
 /// A part of a hand-in without code to judge: nothing, until the instructor confirms what the images show.
-fn by_images(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
-    let nothing = |reason: String, evidence| Worth {
+fn by_images(rules: &Rules, evidence: &Evidence, part: &Part) -> PartScore {
+    let nothing = |reason: String, evidence| PartScore {
         least: 0.0,
         most: 0.0,
         unconfirmed: 0.0,
@@ -308,14 +308,14 @@ fn by_images(rules: &Rules, evidence: &Evidence, part: &Part) -> Worth {
             shown.reason
         )
     };
-    Worth { unconfirmed, ..nothing(reason, shown.evidence) }
+    PartScore { unconfirmed, ..nothing(reason, shown.evidence) }
 }
 
 /// Why there is no code to judge, and what is worth something all the same.
 fn without_code(
     rules: &Rules,
     evidence: &Evidence,
-    worths: &[Worth],
+    worths: &[PartScore],
     ceiling: f64,
 ) -> Option<String> {
     let failed = |check: &&Check| check.verdict != Verdict::Pass;
@@ -337,7 +337,7 @@ fn by_checks(
     evidence: &Evidence,
     ids: &[CheckId],
     any_scene: bool,
-) -> Option<Worth> {
+) -> Option<PartScore> {
     let judging = |check: &&Check| {
         matches!(check.verdict, Verdict::Pass | Verdict::Fail | Verdict::NotImplemented)
     };
@@ -367,16 +367,16 @@ fn by_checks(
     evidence.sort();
     evidence.dedup();
     let reason = deciding.said().into_owned();
-    Some(Worth { least, most: least, unconfirmed: 0.0, reason, evidence })
+    Some(PartScore { least, most: least, unconfirmed: 0.0, reason, evidence })
 }
 
-fn unjudged(evidence: &Evidence, part: &Part) -> Worth {
+fn unjudged(evidence: &Evidence, part: &Part) -> PartScore {
     let ids = part.evidence.iter().chain(&part.fallback);
     let checks: Vec<&Check> = ids.flat_map(|id| evidence.named(*id)).collect();
     let silent = checks.iter().map(|check| check.said()).min();
     // Only what the machine could not ask is a range: the rest is the submission's own.
     let open = checks.is_empty() || checks.iter().any(|check| check.verdict == Verdict::NotRun);
-    Worth {
+    PartScore {
         least: 0.0,
         most: if open { 1.0 } else { 0.0 },
         unconfirmed: 0.0,
@@ -389,7 +389,7 @@ fn unjudged(evidence: &Evidence, part: &Part) -> Worth {
 }
 
 /// Rule 5: a wrong image that no part explains is paid by the path's `blame` part.
-fn blame_the_unexplained(rules: &Rules, evidence: &Evidence, worths: &mut [Worth]) {
+fn charge_unexplained(rules: &Rules, evidence: &Evidence, worths: &mut [PartScore]) {
     for (name, path) in &rules.paths {
         let failed = evidence.named(path.proof).filter(|check| check.verdict == Verdict::Fail);
         let worst = failed.min_by(|a, b| {

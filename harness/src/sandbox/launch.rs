@@ -1,4 +1,4 @@
-//! Both ends of a start: the caller's [`command`], and the child's [`lock_self`].
+//! Both ends of a start: the caller's [`command`], and the child's [`confine_self`].
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -12,7 +12,7 @@ use nix::libc;
 use nix::sys::memfd::{MFdFlags, memfd_create};
 use serde::{Deserialize, Serialize};
 
-use super::family::{self, Ready};
+use super::process_tree::{self, Ready};
 use super::{EXIT_NOT_LOCKED, InForce, LAUNCH_COMMAND, Policy, SandboxError};
 
 /// What the child reads from its standard input.
@@ -58,7 +58,7 @@ where
 /// The hidden command `__launch PROGRAM ARGS...`: locks this process, then becomes the program.
 /// Returns only when that failed.
 pub fn launch_main(program: &OsStr, args: &[OsString]) -> ExitCode {
-    let error = match receive().and_then(|policy| family::lock(&policy)) {
+    let error = match receive().and_then(|policy| process_tree::lock(&policy)) {
         Ok(ready) => {
             // The standard library's `exec` also undoes what the Rust runtime did to SIGPIPE.
             let cause = Command::new(program).args(args).exec();
@@ -79,8 +79,8 @@ pub fn launch_main(program: &OsStr, args: &[OsString]) -> ExitCode {
 /// # Errors
 /// When there are no orders, this process has threads, or any layer that was asked for cannot be
 /// had. Then nothing foreign may be touched.
-pub fn lock_self() -> Result<InForce, SandboxError> {
-    receive().and_then(|policy| family::lock(&policy)).map(Ready::go)
+pub fn confine_self() -> Result<InForce, SandboxError> {
+    receive().and_then(|policy| process_tree::lock(&policy)).map(Ready::go)
 }
 
 /// Reads the orders and puts `/dev/null` in their place.
@@ -94,7 +94,7 @@ fn receive() -> Result<Policy, SandboxError> {
     let orders: Orders = serde_json::from_str(&text).map_err(|cause| error(cause.to_string()))?;
     let null = File::open("/dev/null").map_err(|cause| error(cause.to_string()))?;
     nix::unistd::dup2_stdin(&null).map_err(|cause| error(cause.to_string()))?;
-    family::follow(orders.parent)?;
+    process_tree::follow(orders.parent)?;
     Ok(orders.policy)
 }
 

@@ -1,7 +1,7 @@
 //! Isolation of whatever touches hostile bytes: the compiler, the worker, the decoders.
 //!
 //! Every such child is Umbra itself, started by [`command`] with its orders on standard input. Before
-//! it has any thread and before it touches a hostile byte it locks itself ([`lock_self`]): namespaces
+//! it has any thread and before it touches a hostile byte it locks itself ([`confine_self`]): namespaces
 //! with a new root that holds the policy's binds at fixed paths, no privileges, Landlock, a system
 //! call filter, limits. A worker then goes on in the same process; a compiler is executed
 //! ([`launch_main`]). A layer that is asked for and cannot be had is an error, never a silence.
@@ -17,25 +17,25 @@ pub mod policy;
 #[cfg(target_os = "linux")]
 mod cgroup;
 #[cfg(target_os = "linux")]
-pub mod doctor;
+mod confine;
 #[cfg(target_os = "linux")]
-mod family;
+pub mod doctor;
 #[cfg(target_os = "linux")]
 mod filter;
 #[cfg(target_os = "linux")]
-mod landlocked;
+mod landlock;
 #[cfg(target_os = "linux")]
 mod launch;
 #[cfg(target_os = "linux")]
-mod locked;
-#[cfg(target_os = "linux")]
 mod privileges;
+#[cfg(target_os = "linux")]
+mod process_tree;
 #[cfg(target_os = "linux")]
 mod root;
 
 pub use gpu::Gpu;
 #[cfg(target_os = "linux")]
-pub use launch::{command, kill_inside, launch_main, lock_self, locked_pid, orders};
+pub use launch::{command, confine_self, kill_inside, launch_main, locked_pid, orders};
 pub use policy::{
     Bind, InForce, Isolation, Kind, Layers, Limits, Policy, SandboxError, Scratch, read_report,
 };

@@ -7,10 +7,10 @@ use std::time::Instant;
 use basecode::gpu::Footprint;
 use renderer_api as api;
 
-use super::arena::{Input, Output, Table};
 use super::job::{Request, SceneRef};
 use super::neutral_pass::Neutral;
 use super::shaders;
+use super::shared_memory::{Input, Output, Table};
 use super::table::{Record, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE};
 use super::wire::{Folder, WireJob, WireRequest, queries, rays, words};
 use crate::plugin::{
@@ -21,7 +21,7 @@ use crate::process::{self, exit_now};
 
 /// Locks this process, then answers the job in `dir`. Does not return when it worked.
 pub fn child_main(dir: &Path) -> ExitCode {
-    if let Err(error) = process::lock_self().and_then(|()| work(dir)) {
+    if let Err(error) = process::confine_self().and_then(|()| work(dir)) {
         eprintln!("umbra: the worker cannot work: {error}");
         return ExitCode::from(process::EXIT_NOT_LOCKED);
     }

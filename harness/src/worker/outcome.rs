@@ -5,17 +5,17 @@ use std::fmt;
 use basecode::gpu::Footprint;
 use serde::{Deserialize, Serialize};
 
-use crate::process::Ended;
+use crate::process::ChildOutcome;
 
-/// Whose matter an outcome is.
+/// Whose fault an outcome is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Matter {
+pub enum Fault {
     /// The submission's: it costs points.
     Submission,
-    /// The machine's, to be believed only when the reference fails likewise in a fresh worker.
-    Machine,
-    /// Ours: a bug, to be said so. A plugin can forge it, so it too needs the reference's word.
-    Ours,
+    /// The environment's, to be believed only when the reference fails likewise in a fresh worker.
+    Environment,
+    /// A bug of Umbra's, to be said so. A plugin can forge it, so it too needs the reference's word.
+    Internal,
 }
 
 /// What became of one request.
@@ -53,7 +53,7 @@ pub enum Outcome {
         /// Why.
         reason: String,
         /// Whose matter that is.
-        matter: Matter,
+        fault: Fault,
     },
 }
 
@@ -74,20 +74,20 @@ impl fmt::Display for Outcome {
             Self::OutOfMemory => f.write_str("the renderer ran out of memory"),
             Self::FileTooLarge => f.write_str("the renderer wrote a larger file than is allowed"),
             Self::NoAdapter(message) => write!(f, "not run here: {message}"),
-            Self::NotRun { reason, matter: Matter::Submission } => f.write_str(reason),
+            Self::NotRun { reason, fault: Fault::Submission } => f.write_str(reason),
             Self::NotRun { reason, .. } => write!(f, "not run here: {reason}"),
         }
     }
 }
 
 impl Outcome {
-    /// Whose matter this is, unless it is an answer.
-    pub fn matter(&self) -> Option<Matter> {
+    /// Whose fault this is, unless it is an answer.
+    pub fn fault(&self) -> Option<Fault> {
         match self {
             Self::Done(_) => None,
-            Self::NoAdapter(_) => Some(Matter::Machine),
-            Self::NotRun { matter, .. } => Some(*matter),
-            _ => Some(Matter::Submission),
+            Self::NoAdapter(_) => Some(Fault::Environment),
+            Self::NotRun { fault, .. } => Some(*fault),
+            _ => Some(Fault::Submission),
         }
     }
 
@@ -167,7 +167,7 @@ pub struct WorkerRun {
     /// Indices of the requests that it was given.
     pub requests: Vec<usize>,
     /// Its end, output and timings.
-    pub ended: Ended,
+    pub ended: ChildOutcome,
 }
 
 /// Floats as base64 of their little-endian bytes: exact, and it keeps what JSON cannot (NaN).

@@ -10,15 +10,15 @@ use std::time::{Duration, Instant};
 
 use renderer_api as api;
 
-use super::cage::Cage;
 use super::command::{Program, command, program_beside, software_driver};
 use super::job::{Job, Request};
-use super::outcome::{Answer, JobReport, Late, Matter, Outcome, WitnessUse, WorkerRun};
-use super::patience::{Allowed, CANNOT_RUN, Patience};
-use super::table::{Noted, RECORD, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE};
+use super::mounts::Mounts;
+use super::outcome::{Answer, Fault, JobReport, Late, Outcome, WitnessUse, WorkerRun};
+use super::retry_budget::{Allowed, CANNOT_RUN, RetryBudget};
+use super::table::{SLOT_BYTES, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE, SlotState};
 use super::wire::{Folder, Place, WireJob, WireRequest, take_input};
 use crate::plugin::Witness;
-use crate::process::{self, Ended, Exit, Limits, Lock, signal_name};
+use crate::process::{self, ChildOutcome, Confinement, Exit, Limits, signal_name};
 use crate::sandbox::{self, Bind, Layers};
 
 /// Bytes of a worker's output that are kept, besides a tail.
@@ -92,7 +92,7 @@ impl Supervisor {
     }
 
     /// Does something beside others, and where it ran out of time once more, alone on the machine:
-    /// a busy machine is nobody's fault. For what is asked but once; jobs have a [`Patience`].
+    /// a busy machine is nobody's fault. For what is asked but once; jobs have a [`RetryBudget`].
     pub fn confirming_timeouts<T>(
         &self,
         once: impl Fn() -> T,
@@ -120,15 +120,15 @@ impl Supervisor {
         cancel: &AtomicBool,
         progress: &mut dyn FnMut(Progress),
     ) -> JobReport {
-        self.run_job_patiently(job, limits, &Patience::none(), cancel, progress)
+        self.run_job_patiently(job, limits, &RetryBudget::none(), cancel, progress)
     }
 
-    /// The same for one job of a hand-in's path: timeouts are confirmed as `patience` says.
+    /// The same for one job of a hand-in's path: timeouts are confirmed as `retries` says.
     pub fn run_job_patiently(
         &self,
         job: &Job,
         limits: &Limits,
-        patience: &Patience,
+        retries: &RetryBudget,
         cancel: &AtomicBool,
         progress: &mut dyn FnMut(Progress),
     ) -> JobReport {
@@ -136,12 +136,12 @@ impl Supervisor {
         let mut outcomes: Vec<Option<Outcome>> = vec![None; count];
         let mut report = JobReport { outcomes: Vec::new(), renderer: None, runs: Vec::new() };
         let mut pending: Vec<usize> = (0..count).collect();
-        let used_up = || job.plugin.is_some() && patience.used_up().is_some();
+        let used_up = || job.plugin.is_some() && retries.used_up().is_some();
         loop {
             // Each worker settles one request at least, so this ends.
             pending.retain(|&index| outcomes[index].is_none());
             for &index in &pending {
-                outcomes[index] = patience.is_over(job, &job.requests[index]);
+                outcomes[index] = retries.is_over(job, &job.requests[index]);
             }
             pending.retain(|&index| outcomes[index].is_none());
             if pending.is_empty() {
@@ -151,7 +151,7 @@ impl Supervisor {
             let mut worker_progress = |in_worker, rows| {
                 progress(Progress { answered: answered + in_worker, requests: count, rows });
             };
-            let allowed = patience.allowed(job, &pending, limits);
+            let allowed = retries.allowed(job, &pending, limits);
             let beside = self.beside_others();
             let run = self.run_worker(job, &pending, &allowed, cancel, &mut worker_progress);
             drop(beside);
@@ -165,7 +165,7 @@ impl Supervisor {
             for (&index, outcome) in pending.iter().zip(run.outcomes) {
                 outcomes[index] = outcome;
             }
-            patience.spent(job, &run.ended);
+            retries.spent(job, &run.ended);
             report.renderer = report.renderer.or(run.renderer);
             let exit = run.ended.exit;
             report.runs.push(WorkerRun { requests: pending.clone(), ended: run.ended });
@@ -184,23 +184,23 @@ impl Supervisor {
             if used_up() {
                 continue;
             }
-            if let Some(allowed) = patience.again(job, first, limits) {
+            if let Some(allowed) = retries.again(job, first, limits) {
                 let alone = self.machine.write().unwrap_or_else(PoisonError::into_inner);
                 let run = self.run_worker(job, &[first], &allowed, cancel, &mut |_, _| ());
                 drop(alone);
                 outcomes[first] = match run {
                     Ok(run) => {
-                        patience.spent(job, &run.ended);
+                        retries.spent(job, &run.ended);
                         let late = out_of_time(run.ended.exit);
                         report.runs.push(WorkerRun { requests: vec![first], ended: run.ended });
                         let outcome = run.outcomes.into_iter().next().flatten();
                         match (late, outcome) {
                             (true, _) if used_up() => None,
                             (true, Some(Outcome::TimedOut(late))) => {
-                                Some(patience.timed_out(job, first, Some(late), true))
+                                Some(retries.timed_out(job, first, Some(late), true))
                             }
                             (true, None | Some(Outcome::NotRun { .. })) => {
-                                Some(patience.timed_out(job, first, None, true))
+                                Some(retries.timed_out(job, first, None, true))
                             }
                             (_, outcome) => outcome,
                         }
@@ -212,7 +212,7 @@ impl Supervisor {
                     Outcome::TimedOut(late) => Some(late),
                     _ => None,
                 };
-                outcomes[first] = Some(patience.timed_out(job, first, late, false));
+                outcomes[first] = Some(retries.timed_out(job, first, late, false));
             }
         }
         report.outcomes = outcomes.into_iter().flatten().collect();
@@ -231,17 +231,17 @@ impl Supervisor {
         let private = tempfile::Builder::new().prefix("umbra-worker-").tempdir_in(&self.scratch)?;
         let requests: Vec<_> = pending.iter().map(|&index| &job.requests[index]).collect();
         fs::create_dir(Folder(private.path()).scratch())?;
-        let mut cage = Cage::new(private.path(), job, &requests, self.isolation)?;
-        cage.shaders(&requests, &self.shaders, self.leaves_shaders.as_deref());
-        let mut files = Files::prepare(private.path(), &cage, &requests)?;
+        let mut mounts = Mounts::new(private.path(), job, &requests, self.isolation)?;
+        mounts.shaders(&requests, &self.shaders, self.leaves_shaders.as_deref());
+        let mut files = Files::prepare(private.path(), &mounts, &requests)?;
         let program = Program::open(&program_beside(&self.umbra))?;
         let driver = software_driver();
         let elsewhere = |driver: &PathBuf| !driver.starts_with("/usr/share/vulkan");
         let command =
-            command(&program, private.path(), &cage, &requests, limits, driver.as_deref());
-        let mut policy = cage.policy;
+            command(&program, private.path(), &mounts, &requests, limits, driver.as_deref());
+        let mut policy = mounts.policy;
         policy.read_only.extend(driver.filter(elsewhere).map(Bind::same));
-        let lock = Lock::new(limits, policy);
+        let lock = Confinement::new(limits, policy);
         let mut last = Instant::now();
         // The question that is being worked at, and the CPU time at its beginning. Both are the worker's
         // word; the kernel limits them all together.
@@ -269,12 +269,12 @@ impl Supervisor {
         let mut run = Run { outcomes: vec![None; requests.len()], renderer: None, ended };
         let all = |outcome: Outcome| vec![Some(outcome); requests.len()];
         match &records[0] {
-            Noted::NotStarted => run.outcomes = all(not_started(&run.ended)),
-            Noted::Started { .. } => run.outcomes = all(death(&run.ended, allowed, current)),
-            Noted::Answered { status: api::STATUS_OK, message, .. } => {
+            SlotState::NotStarted => run.outcomes = all(not_started(&run.ended)),
+            SlotState::Started { .. } => run.outcomes = all(death(&run.ended, allowed, current)),
+            SlotState::Answered { status: api::STATUS_OK, message, .. } => {
                 run.renderer = job.plugin.is_some().then(|| message.clone());
                 for (index, (request, noted)) in requests.iter().zip(&records[1..]).enumerate() {
-                    if matches!(noted, Noted::Answered { .. }) {
+                    if matches!(noted, SlotState::Answered { .. }) {
                         run.outcomes[index] = Some(files.outcome(index, request, noted)?);
                         continue;
                     }
@@ -286,7 +286,7 @@ impl Supervisor {
                     break;
                 }
             }
-            Noted::Answered { message, .. } => {
+            SlotState::Answered { message, .. } => {
                 run.outcomes = all(Outcome::Rejected(message.clone()));
             }
         }
@@ -301,14 +301,14 @@ impl Supervisor {
 
 fn cannot_run(error: &io::Error) -> Outcome {
     let reason = format!("{CANNOT_RUN}: {error}");
-    Outcome::NotRun { reason, matter: Matter::Machine }
+    Outcome::NotRun { reason, fault: Fault::Environment }
 }
 
 /// One worker's result: an outcome for each request up to the one that it died at.
 struct Run {
     outcomes: Vec<Option<Outcome>>,
     renderer: Option<String>,
-    ended: Ended,
+    ended: ChildOutcome,
 }
 
 /// The files of a worker, as the parent holds them: opened before it began, read only by plain
@@ -320,13 +320,13 @@ struct Files {
 }
 
 impl Files {
-    fn prepare(dir: &Path, cage: &Cage, requests: &[&Request]) -> io::Result<Self> {
+    fn prepare(dir: &Path, mounts: &Mounts, requests: &[&Request]) -> io::Result<Self> {
         let folder = Folder(dir);
         let new = |path| File::options().create_new(true).read(true).write(true).open(path);
         let (mut input, mut output) = (new(folder.input())?, new(folder.output())?);
         let (mut input_end, mut output_end) = (0, 0);
         let mut wired = Vec::new();
-        for (request, scene) in requests.iter().zip(&cage.scenes) {
+        for (request, scene) in requests.iter().zip(&mounts.scenes) {
             let (mut rest, words) = take_input(request);
             rest.scene_mut().path.clone_from(scene);
             let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_ne_bytes()).collect();
@@ -342,9 +342,9 @@ impl Files {
             output_end += place.size;
         }
         let mut table = new(folder.table())?;
-        table.write_all(&vec![0; RECORD * (1 + requests.len())])?;
+        table.write_all(&vec![0; SLOT_BYTES * (1 + requests.len())])?;
         let places = wired.iter().map(|request| request.output).collect();
-        let wired = WireJob { plugin: cage.plugin.clone(), requests: wired };
+        let wired = WireJob { plugin: mounts.plugin.clone(), requests: wired };
         fs::write(folder.job(), serde_json::to_vec(&wired)?)?;
         // As root, the worker is another user; the folder above lets nobody else in.
         #[cfg(unix)]
@@ -356,16 +356,21 @@ impl Files {
     }
 
     /// All records; what is missing at the end of the file was not started.
-    fn records(&mut self) -> io::Result<Vec<Noted>> {
-        let size = RECORD * (1 + self.places.len());
+    fn records(&mut self) -> io::Result<Vec<SlotState>> {
+        let size = SLOT_BYTES * (1 + self.places.len());
         let mut bytes = read_at(&mut self.table, 0, size)?;
         bytes.resize(size, 0);
-        let (records, _) = bytes.as_chunks::<RECORD>();
-        Ok(records.iter().map(Noted::parse).collect())
+        let (records, _) = bytes.as_chunks::<SLOT_BYTES>();
+        Ok(records.iter().map(SlotState::parse).collect())
     }
 
-    fn outcome(&mut self, index: usize, request: &Request, noted: &Noted) -> io::Result<Outcome> {
-        let Noted::Answered { status, message, seconds, calls, worst_norm_error, footprint } =
+    fn outcome(
+        &mut self,
+        index: usize,
+        request: &Request,
+        noted: &SlotState,
+    ) -> io::Result<Outcome> {
+        let SlotState::Answered { status, message, seconds, calls, worst_norm_error, footprint } =
             noted
         else {
             return Err(io::Error::other("only an answer becomes an outcome"));
@@ -399,7 +404,7 @@ impl Files {
             api::STATUS_NO_ADAPTER => Outcome::NoAdapter(message),
             STATUS_REJECTED => Outcome::Rejected(message),
             STATUS_STAGE => Outcome::StageRefused(message),
-            STATUS_OURS => Outcome::NotRun { reason: message, matter: Matter::Ours },
+            STATUS_OURS => Outcome::NotRun { reason: message, fault: Fault::Internal },
             unknown => Outcome::Failed(format!("unknown status {unknown}: {message}")),
         })
     }
@@ -427,31 +432,31 @@ fn values(region: &[u8], place: Place) -> Option<Vec<f32>> {
 }
 
 /// Number of answers, and the rows of the request that is being worked at.
-fn how_far(records: &[Noted]) -> (usize, (u32, u32)) {
+fn how_far(records: &[SlotState]) -> (usize, (u32, u32)) {
     let mut rows = (0, 0);
     let mut answered = 0;
     for record in records.iter().skip(1) {
         match record {
-            Noted::Answered { .. } => answered += 1,
-            Noted::Started { rows: now } => rows = *now,
-            Noted::NotStarted => {}
+            SlotState::Answered { .. } => answered += 1,
+            SlotState::Started { rows: now } => rows = *now,
+            SlotState::NotStarted => {}
         }
     }
     (answered, rows)
 }
 
 /// What it means that the worker did not even come to loading its plugin.
-fn not_started(ended: &Ended) -> Outcome {
-    let (reason, matter) = match ended.exit {
-        Exit::Cancelled => ("cancelled".to_owned(), Matter::Machine),
+fn not_started(ended: &ChildOutcome) -> Outcome {
+    let (reason, fault) = match ended.exit {
+        Exit::Cancelled => ("cancelled".to_owned(), Fault::Environment),
         Exit::OutOfCpu | Exit::TimedOut | Exit::Starved => {
-            ("the worker had no time to begin".to_owned(), Matter::Machine)
+            ("the worker had no time to begin".to_owned(), Fault::Environment)
         }
         exit => {
-            (format!("the worker did not begin ({exit:?}): {}", ended.stderr.head), Matter::Ours)
+            (format!("the worker did not begin ({exit:?}): {}", ended.stderr.head), Fault::Internal)
         }
     };
-    Outcome::NotRun { reason, matter }
+    Outcome::NotRun { reason, fault }
 }
 
 /// Whether a worker ended because its time was over, its own or the machine's.
@@ -461,11 +466,11 @@ fn out_of_time(exit: Exit) -> bool {
 
 fn starved() -> Outcome {
     let reason = process::starved("the worker").to_string();
-    Outcome::NotRun { reason, matter: Matter::Machine }
+    Outcome::NotRun { reason, fault: Fault::Environment }
 }
 
 /// The outcome of the request at which a worker ended, the one with this index among its own.
-fn death(ended: &Ended, allowed: &Allowed, index: usize) -> Outcome {
+fn death(ended: &ChildOutcome, allowed: &Allowed, index: usize) -> Outcome {
     let limits = &allowed.limits;
     let late =
         |computing, limit_s| Outcome::TimedOut(Late { computing, limit_s, reference_s: None });
@@ -478,7 +483,7 @@ fn death(ended: &Ended, allowed: &Allowed, index: usize) -> Outcome {
         Exit::Starved => starved(),
         Exit::FileTooLarge => Outcome::FileTooLarge,
         Exit::Cancelled => {
-            Outcome::NotRun { reason: "cancelled".to_owned(), matter: Matter::Machine }
+            Outcome::NotRun { reason: "cancelled".to_owned(), fault: Fault::Environment }
         }
         Exit::Code(code) => Outcome::ExitedEarly(code),
         Exit::Signal(_) if out_of_memory(ended, limits) => Outcome::OutOfMemory,
@@ -497,7 +502,7 @@ fn death(ended: &Ended, allowed: &Allowed, index: usize) -> Outcome {
 
 /// Whether a crash looks like one at the memory limit: Rust or C++ said so, or the process was
 /// seen within a tenth of its limit.
-fn out_of_memory(ended: &Ended, limits: &Limits) -> bool {
+fn out_of_memory(ended: &ChildOutcome, limits: &Limits) -> bool {
     let near = limits.memory_mib - limits.memory_mib / 10;
     ended.peak_address_mib >= near
         || ended.peak_resident_mib >= near

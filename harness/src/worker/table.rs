@@ -9,8 +9,8 @@ use basecode::gpu::Footprint;
 use crate::plugin::{MESSAGE_BYTES, WitnessState};
 
 /// Size of a record in bytes.
-pub const RECORD: usize = 4096;
-const MESSAGE_AT: usize = RECORD - MESSAGE_BYTES;
+pub const SLOT_BYTES: usize = 4096;
+const MESSAGE_AT: usize = SLOT_BYTES - MESSAGE_BYTES;
 
 /// Besides `renderer_api`'s statuses: the plugin was refused.
 pub const STATUS_REJECTED: i32 = -1;
@@ -43,7 +43,7 @@ pub struct Record {
     message: [AtomicU8; MESSAGE_BYTES],
 }
 
-const _: () = assert!(size_of::<Record>() == RECORD && align_of::<Record>() == 8);
+const _: () = assert!(size_of::<Record>() == SLOT_BYTES && align_of::<Record>() == 8);
 
 impl Record {
     /// Notes that the work begins.
@@ -88,7 +88,7 @@ impl Record {
 
 /// A record as the parent reads it.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Noted {
+pub enum SlotState {
     /// The work did not begin.
     NotStarted,
     /// It began and did not end.
@@ -113,9 +113,9 @@ pub enum Noted {
     },
 }
 
-impl Noted {
+impl SlotState {
     /// Reads a record. Any bytes are possible here: nothing in them is believed beyond its type.
-    pub fn parse(record: &[u8; RECORD]) -> Self {
+    pub fn parse(record: &[u8; SLOT_BYTES]) -> Self {
         let u32_at = |at: usize| {
             let bytes = record[at..].first_chunk().copied();
             u32::from_ne_bytes(bytes.unwrap_or_default())
@@ -155,9 +155,9 @@ mod tests {
     use super::*;
 
     /// A record's bytes, as the file would hold them.
-    fn bytes(record: &Record) -> [u8; RECORD] {
+    fn bytes(record: &Record) -> [u8; SLOT_BYTES] {
         // SAFETY: a record is 4096 bytes of atomics without padding, and nobody else writes it.
-        unsafe { std::ptr::from_ref(record).cast::<[u8; RECORD]>().read() }
+        unsafe { std::ptr::from_ref(record).cast::<[u8; SLOT_BYTES]>().read() }
     }
 
     fn zero() -> Record {
@@ -168,13 +168,13 @@ mod tests {
     #[test]
     fn what_is_written_is_read() {
         let record = zero();
-        assert_eq!(Noted::parse(&bytes(&record)), Noted::NotStarted);
+        assert_eq!(SlotState::parse(&bytes(&record)), SlotState::NotStarted);
         record.start();
         record.progress(3, 9);
-        assert_eq!(Noted::parse(&bytes(&record)), Noted::Started { rows: (3, 9) });
+        assert_eq!(SlotState::parse(&bytes(&record)), SlotState::Started { rows: (3, 9) });
         record.answer(2, "task 1.2", 0.25);
-        let Noted::Answered { status, message, seconds, calls, worst_norm_error, footprint } =
-            Noted::parse(&bytes(&record))
+        let SlotState::Answered { status, message, seconds, calls, worst_norm_error, footprint } =
+            SlotState::parse(&bytes(&record))
         else {
             panic!("answered");
         };
@@ -182,22 +182,22 @@ mod tests {
         assert_eq!((calls, worst_norm_error, footprint), (0, 0.0, None));
         let own = Footprint { uploaded: 0, targets: 7, fed: 8, unfed: 9, maps: 10 };
         record.footprint(&own);
-        let noted = Noted::parse(&bytes(&record));
-        assert!(matches!(noted, Noted::Answered { footprint, .. } if footprint == Some(own)));
+        let noted = SlotState::parse(&bytes(&record));
+        assert!(matches!(noted, SlotState::Answered { footprint, .. } if footprint == Some(own)));
     }
 
     #[test]
     fn long_messages_are_cut_and_nonsense_is_harmless() {
         let record = zero();
         record.answer(1, &"x".repeat(9000), f64::NAN);
-        let Noted::Answered { message, seconds, .. } = Noted::parse(&bytes(&record)) else {
+        let SlotState::Answered { message, seconds, .. } = SlotState::parse(&bytes(&record)) else {
             panic!("answered");
         };
         assert_eq!((message.len(), seconds), (MESSAGE_BYTES, 0.0));
-        let mut nonsense = [0xFF; RECORD];
-        assert_eq!(Noted::parse(&nonsense), Noted::NotStarted);
+        let mut nonsense = [0xFF; SLOT_BYTES];
+        assert_eq!(SlotState::parse(&nonsense), SlotState::NotStarted);
         nonsense[..4].copy_from_slice(&ANSWERED.to_ne_bytes());
-        let Noted::Answered { status, message, .. } = Noted::parse(&nonsense) else {
+        let SlotState::Answered { status, message, .. } = SlotState::parse(&nonsense) else {
             panic!("answered");
         };
         assert_eq!((status, message.chars().count()), (-1, MESSAGE_BYTES));

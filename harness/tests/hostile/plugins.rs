@@ -1,7 +1,7 @@
 //! Hostile plugins: what each does, and exactly what must come of it.
 
 use umbra::sandbox::Layers;
-use umbra::worker::{Matter, Outcome};
+use umbra::worker::{Fault, Outcome};
 
 use crate::ground::{Asked, Ground};
 
@@ -121,7 +121,7 @@ impl Expect {
             | (Self::NotImplemented(text), Outcome::NotImplemented(said))
             | (Self::Panicked(text), Outcome::Panicked(said)) => said.starts_with(text),
             (Self::Rejected(text), Outcome::Rejected(said)) => said.contains(text),
-            (Self::Ours, Outcome::NotRun { matter, .. }) => *matter == Matter::Ours,
+            (Self::Ours, Outcome::NotRun { fault, .. }) => *fault == Fault::Internal,
             _ => false,
         }
     }

@@ -8,7 +8,7 @@ use umbra::assignment::Assignment;
 use umbra::evidence::{Evidence, Verdict};
 use umbra::expected::Store;
 use umbra::grading::{Conditions, Grading, Record, RenderPath, Stages, Student};
-use umbra::report::{self, Entry, Look, Sheet};
+use umbra::report::{self, BatchReport, Entry, Look};
 use umbra::rubric::{self, PartGrade};
 use umbra::worker::{Adapter, AdapterKind};
 
@@ -62,7 +62,11 @@ pub fn all(ground: &Ground) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> 
                 }
                 if plugin.name == "injections" {
                     let record = record(plugin.name, evidence);
-                    check_reports(&Sheet::new(&assignment, None, vec![Entry { record, grade }]))?;
+                    check_reports(&BatchReport::new(
+                        &assignment,
+                        None,
+                        vec![Entry { record, grade }],
+                    ))?;
                 }
                 if let Ok(mut earned) = earned.lock() {
                     earned.push((plugin.name, points));
@@ -127,7 +131,7 @@ fn record(name: &str, evidence: Evidence) -> Record {
 
 /// Writes all reports and looks for what a terminal, a browser, a spreadsheet or a parser would
 /// act on.
-fn check_reports(sheet: &Sheet) -> anyhow::Result<()> {
+fn check_reports(sheet: &BatchReport) -> anyhow::Result<()> {
     let folder = tempfile::tempdir()?;
     report::write(folder.path(), sheet)?;
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name));

@@ -13,7 +13,7 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use umbra::sandbox::{
-    Bind, EXIT_NOT_LOCKED, InForce, Kind, Layers, Policy, SandboxError, lock_self, orders,
+    Bind, EXIT_NOT_LOCKED, InForce, Kind, Layers, Policy, SandboxError, confine_self, orders,
     read_report,
 };
 
@@ -256,7 +256,7 @@ extern "C" fn worker_child() {
     let Ok(words) = std::env::var(ATTACK) else { return };
     let words: Vec<_> =
         words.lines().map(|word| std::ffi::CString::new(word).expect("no zero byte")).collect();
-    if let Err(error) = lock_self() {
+    if let Err(error) = confine_self() {
         eprintln!("umbra: {error}");
         std::process::exit(EXIT_NOT_LOCKED.into());
     }

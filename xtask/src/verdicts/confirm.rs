@@ -47,7 +47,7 @@ pub fn figure(bench: &Bench, store: &Store, few: bool, jobs: usize) -> Result<Fi
         grading.cases.iter_mut().for_each(|case| case.held_back = false);
         let library = bench.library.clone();
         let plain = Vec::new();
-        // That a mistake costs what it should is the matrix' matter: three scenes do not show all.
+        // That a mistake costs what it should is the matrix' fault: three scenes do not show all.
         let mut bench =
             Bench { grading, library, plain, assignment: &assignment, all_shown: false, ..*bench };
         println!("held-back scenes of seed {seed}");

@@ -1,22 +1,22 @@
 use proptest::prelude::*;
 
-use super::super::tile::LENGTH;
+use super::super::thumbnail::LENGTH;
 use super::*;
 
 /// Right answers, and three mistakes: a factor on one half, another on the other, a slope.
 struct World {
-    right: Tile,
-    mistakes: BTreeMap<String, Tile>,
+    right: Thumbnail,
+    mistakes: BTreeMap<String, Thumbnail>,
 }
 
 impl World {
     fn new() -> Self {
         let right: Vec<[f32; 3]> = (0..LENGTH).map(|i| [1.0 + (i % 7) as f32, 0.5, 2.0]).collect();
-        let right = Tile::of_list(&right);
+        let right = Thumbnail::of_list(&right);
         let spoilt = |f: &dyn Fn(usize) -> f32| {
             let values = right.values().iter().enumerate();
             let values: Vec<[f32; 3]> = values.map(|(i, v)| (f(i) * *v).into()).collect();
-            Tile::of_list(&values)
+            Thumbnail::of_list(&values)
         };
         let mistakes = [
             ("top", spoilt(&|i| if i < LENGTH / 2 { 3.0 } else { 1.0 })),
@@ -26,13 +26,13 @@ impl World {
         Self { right, mistakes: mistakes.map(|(name, tile)| (name.to_owned(), tile)).into() }
     }
 
-    fn guess(&self, seen: &Tile, names: &[&str]) -> Option<Nearest> {
+    fn guess(&self, seen: &Thumbnail, names: &[&str]) -> Option<Nearest> {
         nearest(&[self.exhibit(seen)], names)
     }
 
-    fn exhibit<'a>(&'a self, seen: &'a Tile) -> Exhibit<'a> {
+    fn exhibit<'a>(&'a self, seen: &'a Thumbnail) -> Comparison<'a> {
         let counts = vec![true; LENGTH];
-        Exhibit { seen, right: &self.right, mistakes: &self.mistakes, counts }
+        Comparison { seen, right: &self.right, mistakes: &self.mistakes, counts }
     }
 }
 
@@ -43,7 +43,7 @@ fn each_mistake_is_itself_and_right_is_nothing() {
     let world = World::new();
     for name in NAMES {
         let found = world.guess(&world.mistakes[name], &NAMES).unwrap();
-        assert_eq!(found.guess, Guess::One(name.to_owned()));
+        assert_eq!(found.guess, Hypothesis::One(name.to_owned()));
         assert_eq!(found.distance, 0.0);
         assert!(found.runner_up > 0.3, "{found:?}");
     }
@@ -75,17 +75,17 @@ fn factors_and_pairs_are_found() {
     let brighter = world.right.map(|value| std::f32::consts::PI * value);
     let found = world.guess(&brighter, &NAMES).unwrap();
     assert!(
-        matches!(found.guess, Guess::Factor(f) if (f - std::f32::consts::PI).abs() < 1e-3),
+        matches!(found.guess, Hypothesis::Factor(f) if (f - std::f32::consts::PI).abs() < 1e-3),
         "{found:?}"
     );
     let [top, bottom] = [&world.mistakes["top"], &world.mistakes["bottom"]];
     let both = world.right.combine(top, bottom, |right, a, b| a * b / right);
     let found = world.guess(&both, &NAMES).unwrap();
-    assert_eq!(found.guess, Guess::Two("top".into(), "bottom".into()));
+    assert_eq!(found.guess, Hypothesis::Two("top".into(), "bottom".into()));
     let scaled = world.mistakes["slope"].map(|value| 0.1 * value);
     let found = world.guess(&scaled, &NAMES).unwrap();
     assert!(
-        matches!(&found.guess, Guess::Scaled(name, f) if name == "slope" && (f - 0.1).abs() < 1e-3),
+        matches!(&found.guess, Hypothesis::Scaled(name, f) if name == "slope" && (f - 0.1).abs() < 1e-3),
         "{found:?}"
     );
 }
@@ -95,16 +95,16 @@ fn values_that_do_not_count_or_were_not_asked_change_nothing() {
     let world = World::new();
     let seen = &world.mistakes["top"];
     let holes =
-        Tile::of_list(&seen.values().iter().map(|v| (*v).into()).collect::<Vec<_>>()[..500]);
-    assert_eq!(world.guess(&holes, &NAMES).unwrap().guess, Guess::One("top".into()));
-    let mut exhibit = Exhibit {
+        Thumbnail::of_list(&seen.values().iter().map(|v| (*v).into()).collect::<Vec<_>>()[..500]);
+    assert_eq!(world.guess(&holes, &NAMES).unwrap().guess, Hypothesis::One("top".into()));
+    let mut exhibit = Comparison {
         seen,
         right: &world.right,
         mistakes: &world.mistakes,
         counts: (0..LENGTH).map(|i| i >= LENGTH / 2).collect(),
     };
     assert_eq!(nearest(&[exhibit], &NAMES), None, "the half that counts is right");
-    exhibit = Exhibit {
+    exhibit = Comparison {
         seen,
         right: &world.right,
         mistakes: &world.mistakes,
@@ -121,7 +121,7 @@ fn what_is_not_finite_is_only_like_itself() {
     assert_eq!(world.guess(&broken, &NAMES), None);
     world.mistakes.insert("broken".into(), broken.clone());
     let names = ["broken", "top", "bottom", "slope"];
-    assert_eq!(world.guess(&broken, &names).unwrap().guess, Guess::One("broken".into()));
+    assert_eq!(world.guess(&broken, &names).unwrap().guess, Hypothesis::One("broken".into()));
 }
 
 proptest! {
@@ -155,7 +155,7 @@ proptest! {
         // that is right, which is like no mistake.
         let (shown, darker) = (&world.mistakes[name], &scaled.mistakes[name]);
         let both = || [world.exhibit(shown), scaled.exhibit(darker)];
-        let [one, other] = [both(), both()].map(|exhibits| nearest(&exhibits, &names));
+        let [one, other] = [both(), both()].map(|comparisons| nearest(&comparisons, &names));
         let mut turned = both();
         turned.reverse();
         let turned = nearest(&turned, &NAMES);

@@ -2,7 +2,7 @@
 //!
 //! Under a witness a right integrator answers exactly V I / r^2 w, so that a fault in a BSDF is
 //! not paid twice. Only rays that hang on nothing are asked: away from every edge, both directions
-//! well above the surface, the light in sight (or out of it) whatever the shadow ray's epsilon.
+//! well above the surface, the light in visibility (or out of it) whatever the shadow ray's epsilon.
 
 mod material;
 mod shadows;
@@ -12,7 +12,7 @@ use basecode::{Frame, MaterialModel, Ray, Scene, Vec3};
 
 use super::Check;
 use super::shading::{Directions, Shading, power};
-use crate::expected::{FARTHEST_START, Sight, SurfaceBuffer, SurfacePoint};
+use crate::expected::{FARTHEST_START, SurfaceBuffer, SurfacePoint, Visibility};
 use crate::imaging::reference::RegionMask;
 
 pub use material::judge_material;
@@ -110,7 +110,7 @@ impl RayBatch {
         let times = fine.width / width;
         let blocked = |x: usize, y: usize| {
             let (ray, point) = &fine.pixels[y * fine.width + x];
-            let point = point.as_ref().filter(|point| point.sight == Sight::Blocked)?;
+            let point = point.as_ref().filter(|point| point.visibility == Visibility::Blocked)?;
             let material = scene.material_of(point.shape);
             let above = |w| Frame::cos_theta(w) > MIN_COSINE;
             let judged =

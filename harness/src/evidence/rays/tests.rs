@@ -4,7 +4,7 @@ use super::shadows::judge_shadows;
 use super::*;
 use crate::evidence::convention::Convention;
 use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict, price};
-use crate::expected::Sight;
+use crate::expected::Visibility;
 
 /// Forty lit and twenty dark rays at various distances and angles.
 fn batch() -> RayBatch {
@@ -20,7 +20,7 @@ fn batch() -> RayBatch {
             wo: Vec3::Z,
             wi,
             distance: 1.0 + (index as f32 * 0.71).fract(),
-            sight: if index < 40 { Sight::Clear } else { Sight::Blocked },
+            visibility: if index < 40 { Visibility::Clear } else { Visibility::Blocked },
         }
     };
     let points: Vec<SurfacePoint> = (0..60).map(point).collect();

@@ -1,7 +1,7 @@
 //! The page of the batch.
 
 use super::super::number::{count, due, is_range, of_part, points, range};
-use super::super::{Entry, HTML_FILE, INSTRUCTOR, ReportError, Sheet};
+use super::super::{BatchReport, Entry, HTML_FILE, INSTRUCTOR, ReportError};
 use super::markup::Html;
 use super::{SORT, begin, class, end, part_class};
 use crate::evidence::CheckId;
@@ -12,7 +12,7 @@ use crate::intake::Severity;
 ///
 /// # Errors
 /// When there is no hand-in.
-pub fn batch(sheet: &Sheet) -> Result<String, ReportError> {
+pub fn batch(sheet: &BatchReport) -> Result<String, ReportError> {
     if sheet.entries.is_empty() {
         return Err(ReportError::Empty);
     }
@@ -35,7 +35,7 @@ pub fn batch(sheet: &Sheet) -> Result<String, ReportError> {
     Ok(end(html, sheet))
 }
 
-fn table(html: &mut Html, sheet: &Sheet) {
+fn table(html: &mut Html, sheet: &BatchReport) {
     html.raw("<div class=\"scroll\" role=\"region\" aria-label=\"Grades\" tabindex=\"0\">\n");
     html.raw(
         "<table class=\"grades sortable\">\n<thead><tr><th scope=\"col\">Student, submission</th>",
@@ -57,7 +57,7 @@ fn table(html: &mut Html, sheet: &Sheet) {
     html.raw("</tbody>\n</table>\n</div>\n");
 }
 
-fn row(html: &mut Html, sheet: &Sheet, entry: &Entry) {
+fn row(html: &mut Html, sheet: &BatchReport, entry: &Entry) {
     let Entry { record, grade } = entry;
     let student = &record.student;
     let name = student.full_name();
@@ -97,7 +97,7 @@ fn row(html: &mut Html, sheet: &Sheet, entry: &Entry) {
     html.raw("</td><td class=\"remarks\">").text(&grade.remarks.join("; ")).raw("</td></tr>\n");
 }
 
-fn parts(html: &mut Html, sheet: &Sheet) {
+fn parts(html: &mut Html, sheet: &BatchReport) {
     html.raw("<details>\n<summary>The parts and what decides them</summary>\n");
     html.raw(
         "<div class=\"scroll\" role=\"region\" aria-label=\"Parts\" tabindex=\"0\">\n<table>\n",
@@ -118,7 +118,7 @@ fn parts(html: &mut Html, sheet: &Sheet) {
     html.raw("</details>\n");
 }
 
-fn conditions(html: &mut Html, sheet: &Sheet) {
+fn conditions(html: &mut Html, sheet: &BatchReport) {
     let mut seen: Vec<(&Conditions, usize)> = Vec::new();
     for Entry { record, .. } in &sheet.entries {
         match seen.iter_mut().find(|(other, _)| **other == record.conditions) {

@@ -2,7 +2,7 @@
 
 use super::super::harmless::harmless_lines;
 use super::super::number::{hints, is_range, looks_like, of_part, points, range, seconds};
-use super::super::{Entry, HTML_FILE, Sheet};
+use super::super::{BatchReport, Entry, HTML_FILE};
 use super::markup::Html;
 use super::{Reader, begin, checks, class, end, part_class};
 use crate::evidence::{Check, Verdict};
@@ -15,7 +15,7 @@ const DIAGNOSTIC_LINES: usize = 400;
 
 /// The page of one hand-in: its parts with points and reasons, what failed with pictures, what
 /// could not be judged, what passed, findings, conditions and costs.
-pub fn hand_in(sheet: &Sheet, entry: &Entry, reader: Reader) -> String {
+pub fn hand_in(sheet: &BatchReport, entry: &Entry, reader: Reader) -> String {
     let known;
     // A student has the page's folder and nothing above it.
     let root = "../..";

@@ -16,7 +16,7 @@ pub use batch::batch;
 pub use hand_in::hand_in;
 
 use self::markup::Html;
-use super::Sheet;
+use super::BatchReport;
 use crate::rubric::PartGrade;
 
 const STYLE: &str = include_str!("style.css");
@@ -49,7 +49,7 @@ fn begin(title: &str) -> Html {
 }
 
 /// Everything after the page's content.
-fn end(mut html: Html, sheet: &Sheet) -> String {
+fn end(mut html: Html, sheet: &BatchReport) -> String {
     html.raw("<footer>").text(&sheet.course).raw(" · ").text(&sheet.title).raw(" · due ");
     html.raw("<time>")
         .text(&super::number::due(&sheet.due))

@@ -139,7 +139,7 @@ fn pages_load_nothing_from_elsewhere() {
 
 #[test]
 fn an_empty_batch_is_an_error() {
-    let sheet = Sheet { entries: Vec::new(), ..sample::sheet() };
+    let sheet = BatchReport { entries: Vec::new(), ..sample::sheet() };
     assert!(matches!(batch(&sheet), Err(ReportError::Empty)));
 }
 

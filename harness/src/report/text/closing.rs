@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::super::number::{plain, points, range};
-use super::super::{Entry, Sheet};
+use super::super::{BatchReport, Entry};
 use super::page::{Look, Page, Style};
 use crate::evidence::{Check, Verdict};
 use crate::intake::Severity;
@@ -27,7 +27,7 @@ pub struct Closing<'a> {
 
 /// The last lines: where the page is, what changed since the last time, how many points there are, and
 /// what is next to do.
-pub fn closing(sheet: &Sheet, entry: &Entry, closing: &Closing, look: Look) -> String {
+pub fn closing(sheet: &BatchReport, entry: &Entry, closing: &Closing, look: Look) -> String {
     let grade = &entry.grade;
     let mut page = Page::new(look.width, look.colours);
     page.gap();
@@ -73,7 +73,7 @@ fn is_whole(part: &PartGrade) -> bool {
 }
 
 /// What is next to do: what hinders most, then the parts in the handout's order, then handing in.
-fn next(sheet: &Sheet, entry: &Entry, closing: &Closing) -> String {
+fn next(sheet: &BatchReport, entry: &Entry, closing: &Closing) -> String {
     let Closing { folder, umbra, .. } = closing;
     let checks = &entry.record.evidence.checks;
     let failed = |check: &&Check| check.verdict == Verdict::Fail;
@@ -124,7 +124,7 @@ mod tests {
     use super::super::super::sample;
     use super::*;
 
-    fn closed(sheet: &Sheet, index: usize, asked: &str, last: &[(&str, f64)]) -> Vec<String> {
+    fn closed(sheet: &BatchReport, index: usize, asked: &str, last: &[(&str, f64)]) -> Vec<String> {
         let files = BTreeMap::from([("1.3".to_owned(), "src/integrators/simple.rs".to_owned())]);
         let last = last.iter().map(|&(id, points)| (id.to_owned(), (points, points))).collect();
         let made_of = Closing {

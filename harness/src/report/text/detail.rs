@@ -4,7 +4,7 @@ use super::super::harmless::harmless_lines;
 use super::super::number::{
     self, count, hints, is_failure, is_range, looks_like, of_part, plain, points, seconds, total,
 };
-use super::super::{Entry, Sheet};
+use super::super::{BatchReport, Entry};
 use super::page::{Look, Page, Style, columns, left};
 use crate::evidence::{Check, CheckId, Measure, Verdict};
 use crate::intake::{Finding, Severity};
@@ -18,7 +18,7 @@ const VERDICT_WIDTH: usize = 17;
 /// One submission: parts with points, and of those that lost some the reason and a hint; what is to be
 /// noticed besides; findings; what the compiler said. With `verbose`, every check with value, bound
 /// and verdict too, and under which conditions they were made.
-pub fn detail(sheet: &Sheet, entry: &Entry, look: Look, verbose: bool) -> String {
+pub fn detail(sheet: &BatchReport, entry: &Entry, look: Look, verbose: bool) -> String {
     let Entry { record, grade } = entry;
     let mut page = Page::new(look.width, look.colours);
     page.wrapped(&[], Style::Heading, &sheet.title);
@@ -105,7 +105,7 @@ fn parts(page: &mut Page, Entry { record, grade }: &Entry, verbose: bool) {
 }
 
 /// What failed without being the matter of a part: it costs nothing, but somebody should look.
-fn noticed(page: &mut Page, sheet: &Sheet, Entry { record, .. }: &Entry) {
+fn noticed(page: &mut Page, sheet: &BatchReport, Entry { record, .. }: &Entry) {
     let rules = &sheet.rules;
     let of_part = |check: &Check| {
         let named = rules.parts.iter().flat_map(|part| part.evidence.iter().chain(&part.fallback));

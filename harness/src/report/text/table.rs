@@ -1,7 +1,7 @@
 //! The table of many hand-ins.
 
 use super::super::number::{count, due, is_range, of_part, points, total};
-use super::super::{Entry, ReportError, Sheet, harmless};
+use super::super::{BatchReport, Entry, ReportError, harmless};
 use super::page::{Page, Style, columns, left, right};
 use crate::grading::Record;
 use crate::rubric::Grade;
@@ -17,7 +17,7 @@ const NAME_MIN: usize = 8;
 ///
 /// # Errors
 /// When there is no hand-in.
-pub fn table(sheet: &Sheet, width: usize, colours: bool) -> Result<String, ReportError> {
+pub fn table(sheet: &BatchReport, width: usize, colours: bool) -> Result<String, ReportError> {
     if sheet.entries.is_empty() {
         return Err(ReportError::Empty);
     }
@@ -62,7 +62,7 @@ pub fn in_a_line(record: &Record, grade: &Grade) -> String {
 }
 
 /// Every remark, once.
-fn remarks(sheet: &Sheet) -> Vec<&str> {
+fn remarks(sheet: &BatchReport) -> Vec<&str> {
     let mut remarks: Vec<&str> = Vec::new();
     for remark in sheet.entries.iter().flat_map(|entry| &entry.grade.remarks) {
         if !remarks.contains(&remark.as_str()) {
@@ -90,7 +90,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn new(sheet: &Sheet, remarks: &[&str], width: usize) -> Self {
+    fn new(sheet: &BatchReport, remarks: &[&str], width: usize) -> Self {
         let widest = |head: &str, text: &dyn Fn(&Entry) -> String| {
             let texts = sheet.entries.iter().map(|entry| columns(&text(entry)));
             texts.max().unwrap_or(0).max(columns(head))
@@ -119,7 +119,7 @@ impl Layout {
         Self { name, student, parts: fits.then_some(parts), total, remarks: noted }
     }
 
-    fn head(&self, page: &mut Page, sheet: &Sheet) {
+    fn head(&self, page: &mut Page, sheet: &BatchReport) {
         let mut head =
             format!("{}{GAP}{}", left("submission", self.name), left("student", self.student));
         let mut best = right("out of", columns(&head));
@@ -139,7 +139,7 @@ impl Layout {
         }
     }
 
-    fn row(&self, page: &mut Page, sheet: &Sheet, entry: &Entry, remarks: &[&str]) {
+    fn row(&self, page: &mut Page, sheet: &BatchReport, entry: &Entry, remarks: &[&str]) {
         let Entry { record, grade } = entry;
         let names = format!(
             "{}{GAP}{}",
@@ -247,7 +247,7 @@ remarks
 
     #[test]
     fn an_empty_batch_is_an_error() {
-        let sheet = Sheet { entries: Vec::new(), ..sample::sheet() };
+        let sheet = BatchReport { entries: Vec::new(), ..sample::sheet() };
         let error = table(&sheet, 80, false).unwrap_err();
         assert!(error.to_string().starts_with("no submission to report: expected at least one"));
     }

@@ -289,7 +289,7 @@ fn the_convention_that_is_worth_most_holds_for_all_parts_of_a_path() {
     let other = under("the integrator multiplies by pi", 0.0, 0.1);
     let both = [vec![wrong.clone()], own.clone(), other.clone()].concat();
     assert_eq!(points(&both)[..2], [10.0, 15.0]);
-    // Worth no more: the handout's own.
+    // PartScore no more: the handout's own.
     let worse = under("another", 0.1, 0.1);
     let settled = settle(&rules(), &Evidence { checks: [own.clone(), worse].concat() });
     assert_eq!(settled.checks, own);

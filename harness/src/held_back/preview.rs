@@ -5,7 +5,7 @@ use renderer_api as api;
 
 use super::draw::Draw;
 use crate::evidence::bsdf;
-use crate::expected::{Sight, SurfacePoint};
+use crate::expected::{SurfacePoint, Visibility};
 
 /// Width in pixels of the film that is looked at.
 const WIDTH: usize = 64;
@@ -32,7 +32,7 @@ const OTHER_SHAPE: f32 = 0.08;
 
 /// What is seen, away from edges.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Look {
+pub struct ScenePreview {
     /// Fraction of the film that is in the light.
     pub lit: f64,
     /// Fraction that faces light and viewer but lies in shadow.
@@ -54,7 +54,7 @@ pub struct Look {
     pub aspect: f32,
 }
 
-impl Look {
+impl ScenePreview {
     /// Looks at `scene` as `draw` changes it.
     ///
     /// # Errors
@@ -68,36 +68,36 @@ impl Look {
             Seen::of(scene, draw, SurfacePoint::cast_under(scene, draw.light, ray)?)
         });
         let seen: Vec<Option<Seen>> = seen.collect();
-        let mut look = Self { aspect: width as f32 / height as f32, ..Self::default() };
+        let mut preview = Self { aspect: width as f32 / height as f32, ..Self::default() };
         let pixel = 1.0 / (WIDTH * rows) as f64;
         let (mut radiance, mut facing, mut dark) = (Vec::new(), Vec::new(), Vec::new());
         for (index, own) in seen.iter().enumerate() {
             let Some(own) = own else { continue };
             facing.push(own.from_light);
-            if own.sight == Sight::Blocked {
+            if own.visibility == Visibility::Blocked {
                 dark.push(own.from_light);
             }
             if !is_interior(&seen, index, rows) {
                 continue;
             }
-            match own.sight {
-                Sight::Unsure => continue,
-                Sight::Blocked => look.shadowed += pixel,
-                Sight::Clear => {
-                    look.lit += pixel;
-                    look.of_model[usize::from(own.phong)] += pixel;
-                    look.highlight += if own.highlight { pixel } else { 0.0 };
+            match own.visibility {
+                Visibility::Unsure => continue,
+                Visibility::Blocked => preview.shadowed += pixel,
+                Visibility::Clear => {
+                    preview.lit += pixel;
+                    preview.of_model[usize::from(own.phong)] += pixel;
+                    preview.highlight += if own.highlight { pixel } else { 0.0 };
                     radiance.push(own.radiance);
                 }
             }
         }
         radiance.sort_by(f32::total_cmp);
-        look.median = radiance.get(radiance.len() / 2).copied().unwrap_or(0.0);
-        look.shadow_cone = half_angle(&dark);
-        look.facing_cone = half_angle(&facing);
-        look.clearance = [draw.light, draw.camera.eye]
+        preview.median = radiance.get(radiance.len() / 2).copied().unwrap_or(0.0);
+        preview.shadow_cone = half_angle(&dark);
+        preview.facing_cone = half_angle(&facing);
+        preview.clearance = [draw.light, draw.camera.eye]
             .map(|point| clearance(scene, point) / point.distance(draw.camera.at));
-        Ok(look)
+        Ok(preview)
     }
 
     /// Why this is not worth asking a renderer about, if so; `original` is the unchanged scene.
@@ -132,18 +132,18 @@ impl Look {
 /// What one pixel shows, where it faces light and viewer.
 struct Seen {
     shape: usize,
-    sight: Sight,
+    visibility: Visibility,
     phong: bool,
     highlight: bool,
     /// Unit direction from the light.
     from_light: Vec3,
-    /// Radiance when the light is in sight, the channels' mean [W m^-2 sr^-1].
+    /// Radiance when the light is in visibility, the channels' mean [W m^-2 sr^-1].
     radiance: f32,
 }
 
 impl Seen {
     fn of(scene: &Scene, draw: &Draw, point: SurfacePoint) -> Option<Self> {
-        let SurfacePoint { shape, wo, wi, distance, sight, .. } = point;
+        let SurfacePoint { shape, wo, wi, distance, visibility, .. } = point;
         let material = scene.material_of(shape);
         let grazes = |w| Frame::cos_theta(w) < MIN_COSINE;
         if material.is_emitter() || grazes(wo) || grazes(wi) {
@@ -163,7 +163,7 @@ impl Seen {
         let lobe = wi.dot(mirrored).max(0.0).powf(surface.exponent);
         Some(Self {
             shape,
-            sight,
+            visibility,
             phong,
             highlight: phong && lobe > HIGHLIGHT,
             from_light: (point.position - draw.light).normalize_or_zero(),
@@ -175,7 +175,7 @@ impl Seen {
 /// Whether the pixels on all four sides show the same shape in the same light.
 fn is_interior(seen: &[Option<Seen>], index: usize, rows: usize) -> bool {
     let (x, y) = (index % WIDTH, index / WIDTH);
-    let state = |index: usize| seen[index].as_ref().map(|seen| (seen.shape, seen.sight));
+    let state = |index: usize| seen[index].as_ref().map(|seen| (seen.shape, seen.visibility));
     x > 0
         && y > 0
         && x + 1 < WIDTH

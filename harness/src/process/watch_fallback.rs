@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::capture::Capture;
-use super::{Captured, Ended, Exit, Lock, Watcher, start};
+use super::{Captured, ChildOutcome, Confinement, Exit, Watcher, start};
 
 /// Runs `command` to its end; see the Unix version for the contract.
 ///
@@ -15,11 +15,11 @@ use super::{Captured, Ended, Exit, Lock, Watcher, start};
 /// When the child cannot be started or watched.
 pub fn run(
     mut command: Command,
-    lock: &Lock,
+    lock: &Confinement,
     keep: usize,
     cancel: &AtomicBool,
     watcher: &mut Watcher,
-) -> io::Result<Ended> {
+) -> io::Result<ChildOutcome> {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let begin = Instant::now();
     let mut child = start(command, lock)?;
@@ -46,7 +46,7 @@ pub fn run(
     let wall_s = begin.elapsed().as_secs_f64();
     let (stdout, out_held) = stdout.map(Stream::finish).unwrap_or_default();
     let (stderr, err_held) = stderr.map(Stream::finish).unwrap_or_default();
-    Ok(Ended {
+    Ok(ChildOutcome {
         exit,
         pid: child.id(),
         stdout,

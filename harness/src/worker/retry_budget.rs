@@ -4,8 +4,8 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::job::{Job, Request};
-use super::outcome::{Late, Matter, Outcome};
-use crate::process::{Ended, Limits};
+use super::outcome::{Fault, Late, Outcome};
+use crate::process::{ChildOutcome, Limits};
 
 /// So many requests of a kind may be asked again: each may cost its time limit.
 const MAX_RETRIES: usize = 2;
@@ -45,13 +45,13 @@ pub struct Budget {
     pub still_s: f64,
 }
 
-/// Patience with one path of one submission, over all its jobs.
+/// RetryBudget with one path of one submission, over all its jobs.
 ///
 /// A timeout counts when the same request runs out of time once more, alone on the machine. One
 /// that is confirmed so speaks for all of its kind: others have a short limit and count as they are. One
 /// that nobody can confirm any more counts for nothing, and what it asked stays ungraded.
 #[derive(Default)]
-pub struct Patience<'a> {
+pub struct RetryBudget<'a> {
     reference: Option<&'a dyn Reference>,
     budget: Option<Budget>,
     /// Whether questions have limits of their own, or only the job's.
@@ -107,7 +107,7 @@ fn samples(request: &Request) -> f64 {
     }
 }
 
-impl<'a> Patience<'a> {
+impl<'a> RetryBudget<'a> {
     /// With a submission of a batch: each question has the time that fits it, all of a path's together
     /// the budget, if there is one.
     pub fn with(reference: Option<&'a dyn Reference>, budget: Option<Budget>) -> Self {
@@ -116,9 +116,9 @@ impl<'a> Patience<'a> {
 
     /// None at all: every timeout counts at once.
     pub fn none() -> Self {
-        let patience = Self::default();
-        patience.state().kinds.iter_mut().for_each(|kind| kind.hangs = true);
-        patience
+        let retries = Self::default();
+        retries.state().kinds.iter_mut().for_each(|kind| kind.hangs = true);
+        retries
     }
 
     /// Begins anew, for another path.
@@ -127,7 +127,7 @@ impl<'a> Patience<'a> {
     }
 
     /// Takes one retry, if any is left.
-    pub fn another_try(&self) -> bool {
+    pub fn try_take(&self) -> bool {
         let mut state = self.state();
         let left = state.retries < MAX_RETRIES;
         state.retries += usize::from(left);
@@ -223,7 +223,7 @@ impl<'a> Patience<'a> {
     }
 
     /// Counts what a worker used.
-    pub(super) fn spent(&self, job: &Job, ended: &Ended) {
+    pub(super) fn spent(&self, job: &Job, ended: &ChildOutcome) {
         let (Some(budget), Some(request)) = (&self.budget, job.requests.first()) else { return };
         if job.plugin.is_none() {
             return;
@@ -277,17 +277,17 @@ impl<'a> Patience<'a> {
         }
     }
 
-    /// The outcome of a request that is not asked any more, when patience is at its end.
+    /// The outcome of a request that is not asked any more, when retries is at its end.
     pub fn is_over(&self, job: &Job, request: &Request) -> Option<Outcome> {
         let state = self.state();
         if let (Some(over), Some(_)) = (&state.over, &job.plugin) {
             let reason = format!("not asked: the submission used {over}");
-            return Some(Outcome::NotRun { reason, matter: Matter::Submission });
+            return Some(Outcome::NotRun { reason, fault: Fault::Submission });
         }
         let of_kind = state.kinds[kind(job, request)];
-        let matter = if of_kind.hangs { Matter::Submission } else { Matter::Machine };
+        let fault = if of_kind.hangs { Fault::Submission } else { Fault::Environment };
         let reason = "not asked: the renderer ran out of time before".to_owned();
-        (of_kind.timeouts >= MAX_TIMEOUTS).then_some(Outcome::NotRun { reason, matter })
+        (of_kind.timeouts >= MAX_TIMEOUTS).then_some(Outcome::NotRun { reason, fault })
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -302,7 +302,7 @@ fn first(request: &Request) -> f64 {
 
 fn unconfirmed() -> Outcome {
     let reason = "ran out of time beside other work, and was asked often enough".to_owned();
-    Outcome::NotRun { reason, matter: Matter::Machine }
+    Outcome::NotRun { reason, fault: Fault::Environment }
 }
 
 /// Whether an outcome may be a fault of the machine by the word of someone who could lie: it is
@@ -310,7 +310,7 @@ fn unconfirmed() -> Outcome {
 pub fn blames_the_machine(outcome: &Outcome) -> bool {
     match outcome {
         Outcome::NoAdapter(_) => true,
-        Outcome::NotRun { matter: Matter::Submission, .. } => false,
+        Outcome::NotRun { fault: Fault::Submission, .. } => false,
         // Time, and what this process itself cannot do, is our own word.
         Outcome::NotRun { reason, .. } => {
             *outcome != unconfirmed() && !reason.starts_with(CANNOT_RUN)
@@ -325,5 +325,5 @@ pub fn blames_the_machine(outcome: &Outcome) -> bool {
 }
 
 #[cfg(test)]
-#[path = "patience_tests.rs"]
+#[path = "retry_budget_tests.rs"]
 mod tests;

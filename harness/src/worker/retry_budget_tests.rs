@@ -43,8 +43,8 @@ impl Reference for Slow {
     }
 }
 
-fn ended(cpu_s: f64, still_s: f64) -> Ended {
-    Ended {
+fn ended(cpu_s: f64, still_s: f64) -> ChildOutcome {
+    ChildOutcome {
         exit: Exit::Code(0),
         pid: 1,
         stdout: Captured::default(),
@@ -61,80 +61,80 @@ fn ended(cpu_s: f64, still_s: f64) -> Ended {
 
 #[test]
 fn one_confirmed_timeout_speaks_for_all_of_its_kind() {
-    let (patience, job) = (Patience::default(), job());
-    let over = |index: usize| patience.is_over(&job, &job.requests[index]);
-    assert!(patience.again(&job, 0, &limits()).is_some());
-    assert!(matches!(patience.timed_out(&job, 0, LATE, true), Outcome::TimedOut(_)));
+    let (retries, job) = (RetryBudget::default(), job());
+    let over = |index: usize| retries.is_over(&job, &job.requests[index]);
+    assert!(retries.again(&job, 0, &limits()).is_some());
+    assert!(matches!(retries.timed_out(&job, 0, LATE, true), Outcome::TimedOut(_)));
     assert_eq!(over(0), None);
-    assert!(patience.again(&job, 0, &limits()).is_none(), "hanging renderers do not stall a batch");
-    assert!(matches!(patience.timed_out(&job, 0, LATE, false), Outcome::TimedOut(_)));
-    assert_eq!(over(0).and_then(|o| o.matter()), Some(Matter::Submission));
+    assert!(retries.again(&job, 0, &limits()).is_none(), "hanging renderers do not stall a batch");
+    assert!(matches!(retries.timed_out(&job, 0, LATE, false), Outcome::TimedOut(_)));
+    assert_eq!(over(0).and_then(|o| o.fault()), Some(Fault::Submission));
     // Another kind of question is another matter, and so are images without shadows.
     assert_eq!(over(1), None);
     let mut plain = job.clone();
     if let Request::RenderOffline { shadows, .. } = &mut plain.requests[0] {
         *shadows = false;
     }
-    assert_eq!(patience.is_over(&plain, &plain.requests[0]), None);
-    assert!(patience.again(&job, 1, &limits()).is_some());
-    patience.renew();
+    assert_eq!(retries.is_over(&plain, &plain.requests[0]), None);
+    assert!(retries.again(&job, 1, &limits()).is_some());
+    retries.renew();
     assert_eq!(over(0), None);
-    assert!(patience.again(&job, 0, &limits()).is_some());
+    assert!(retries.again(&job, 0, &limits()).is_some());
 }
 
 #[test]
 fn what_nobody_confirms_costs_nothing() {
-    let (patience, job) = (Patience::default(), job());
+    let (retries, job) = (RetryBudget::default(), job());
     for _ in 0..MAX_RETRIES {
         // Asked again, it answered.
-        assert!(patience.again(&job, 0, &limits()).is_some());
+        assert!(retries.again(&job, 0, &limits()).is_some());
     }
-    assert!(patience.again(&job, 0, &limits()).is_none());
-    let late = || patience.timed_out(&job, 0, LATE, false);
-    assert_eq!(late().matter(), Some(Matter::Machine));
-    assert_eq!(late().matter(), Some(Matter::Machine));
-    let over = patience.is_over(&job, &job.requests[0]);
-    assert_eq!(over.and_then(|o| o.matter()), Some(Matter::Machine));
+    assert!(retries.again(&job, 0, &limits()).is_none());
+    let late = || retries.timed_out(&job, 0, LATE, false);
+    assert_eq!(late().fault(), Some(Fault::Environment));
+    assert_eq!(late().fault(), Some(Fault::Environment));
+    let over = retries.is_over(&job, &job.requests[0]);
+    assert_eq!(over.and_then(|o| o.fault()), Some(Fault::Environment));
     assert!(!blames_the_machine(&late()));
 }
 
 #[test]
 fn a_machine_that_is_too_busy_costs_nothing_even_alone() {
-    let (patience, job) = (Patience::default(), job());
-    assert!(patience.again(&job, 0, &limits()).is_some());
-    assert_eq!(patience.timed_out(&job, 0, None, true).matter(), Some(Matter::Machine));
+    let (retries, job) = (RetryBudget::default(), job());
+    assert!(retries.again(&job, 0, &limits()).is_some());
+    assert_eq!(retries.timed_out(&job, 0, None, true).fault(), Some(Fault::Environment));
 }
 
 #[test]
 fn without_patience_every_timeout_counts() {
-    let (patience, job) = (Patience::none(), job());
-    assert!(patience.again(&job, 0, &limits()).is_none());
-    assert!(matches!(patience.timed_out(&job, 0, LATE, false), Outcome::TimedOut(_)));
-    let allowed = patience.allowed(&job, &[0, 1], &limits());
+    let (retries, job) = (RetryBudget::none(), job());
+    assert!(retries.again(&job, 0, &limits()).is_none());
+    assert!(matches!(retries.timed_out(&job, 0, LATE, false), Outcome::TimedOut(_)));
+    let allowed = retries.allowed(&job, &[0, 1], &limits());
     assert_eq!(allowed.limits, limits());
 }
 
 #[test]
 fn a_question_has_what_fits_it_and_ten_times_the_reference_when_it_counts() {
     let slow = Slow(2.0);
-    let patience = Patience::with(Some(&slow), None);
+    let retries = RetryBudget::with(Some(&slow), None);
     let mut job = job();
     job.requests.push(render(1000, 16));
-    let allowed = patience.allowed(&job, &[0, 1, 2], &limits());
+    let allowed = retries.allowed(&job, &[0, 1, 2], &limits());
     let first =
         [FIRST_S + 4096.0 * FIRST_S_PER_SAMPLE, FIRST_S, FIRST_S + 16e6 * FIRST_S_PER_SAMPLE];
     assert_eq!(allowed.each_cpu_s, first);
     assert_eq!(allowed.limits.cpu_s, first.iter().sum::<f64>().ceil() as u64 + 1);
-    let again = patience.again(&job, 0, &limits()).unwrap();
+    let again = retries.again(&job, 0, &limits()).unwrap();
     assert_eq!(again.each_cpu_s, [20.0]);
-    let said = patience.timed_out(&job, 0, LATE, true);
+    let said = retries.timed_out(&job, 0, LATE, true);
     assert_eq!(said, Outcome::TimedOut(Late { reference_s: Some(2.0), ..LATE.unwrap() }));
     // From now on renders have three times what the reference takes.
-    let short = patience.allowed(&job, &[0], &limits());
+    let short = retries.allowed(&job, &[0], &limits());
     assert_eq!((short.each_cpu_s, short.limits.wall_s), (vec![6.0], 2.0));
-    assert_eq!(patience.allowed(&job, &[1], &limits()).each_cpu_s, [FIRST_S]);
+    assert_eq!(retries.allowed(&job, &[1], &limits()).each_cpu_s, [FIRST_S]);
     // Without a reference, as in a student's kit.
-    let own = Patience::with(None, None);
+    let own = RetryBudget::with(None, None);
     let again = |index| own.again(&job, index, &limits()).unwrap().each_cpu_s[0];
     assert_eq!((again(1), again(2)), (6.0, first[2].max(20.0)));
 }
@@ -145,42 +145,45 @@ fn a_budget_ends_a_path_by_cpu_time_of_the_reference_or_by_standing_still() {
     let budget = || Some(Budget { times_reference: 10.0, cpu_s: 30.0, still_s: 20.0 });
     let job = job();
     let neutral = Job { plugin: None, ..job.clone() };
-    let patience = Patience::with(Some(&slow), budget());
-    let over = || patience.is_over(&job, &job.requests[0]);
-    patience.spent(&job, &ended(31.0, 1.0));
-    patience.spent(&neutral, &ended(1000.0, 1000.0));
+    let retries = RetryBudget::with(Some(&slow), budget());
+    let over = || retries.is_over(&job, &job.requests[0]);
+    retries.spent(&job, &ended(31.0, 1.0));
+    retries.spent(&neutral, &ended(1000.0, 1000.0));
     // Ten times the reference's five seconds.
     assert_eq!(over(), None);
-    patience.spent(&job, &ended(18.0, 1.0));
-    assert_eq!(patience.allowed(&job, &[0], &limits()).limits.cpu_s, 2);
-    patience.spent(&job, &ended(1.5, 0.0));
-    let said = patience.used_up().unwrap();
+    retries.spent(&job, &ended(18.0, 1.0));
+    assert_eq!(retries.allowed(&job, &[0], &limits()).limits.cpu_s, 2);
+    retries.spent(&job, &ended(1.5, 0.0));
+    let said = retries.used_up().unwrap();
     assert!(said.starts_with("50 s of CPU time, where 50 s are allowed, 10 times"), "{said}");
-    assert_eq!(over().and_then(|o| o.matter()), Some(Matter::Submission));
-    assert_eq!(patience.is_over(&neutral, &neutral.requests[0]), None);
-    patience.renew();
+    assert_eq!(over().and_then(|o| o.fault()), Some(Fault::Submission));
+    assert_eq!(retries.is_over(&neutral, &neutral.requests[0]), None);
+    retries.renew();
     assert_eq!(over(), None);
 
-    patience.spent(&job, &ended(1.0, 19.5));
-    assert!((patience.allowed(&job, &[0], &limits()).limits.wall_s - 0.6).abs() < 1e-9);
-    patience.spent(&job, &ended(1.0, 0.6));
-    assert!(patience.used_up().unwrap().starts_with("20 s of doing nothing"));
+    retries.spent(&job, &ended(1.0, 19.5));
+    assert!((retries.allowed(&job, &[0], &limits()).limits.wall_s - 0.6).abs() < 1e-9);
+    retries.spent(&job, &ended(1.0, 0.6));
+    assert!(retries.used_up().unwrap().starts_with("20 s of doing nothing"));
     // Nobody has less than the seconds that everybody has, and without a budget nothing ends.
-    let none = Patience::with(Some(&slow), None);
+    let none = RetryBudget::with(Some(&slow), None);
     none.spent(&job, &ended(1e6, 1e6));
     assert_eq!(none.is_over(&job, &job.requests[0]), None);
 }
 
 #[test]
 fn blame_is_recognised() {
-    let machine = |matter| Outcome::NotRun { reason: "x".into(), matter };
+    let machine = |fault| Outcome::NotRun { reason: "x".into(), fault };
     for (outcome, blames) in [
         (Outcome::NoAdapter(String::new()), true),
-        (machine(Matter::Machine), true),
-        (machine(Matter::Ours), true),
-        (machine(Matter::Submission), false),
+        (machine(Fault::Environment), true),
+        (machine(Fault::Internal), true),
+        (machine(Fault::Submission), false),
         (
-            Outcome::NotRun { reason: format!("{CANNOT_RUN}: no space"), matter: Matter::Machine },
+            Outcome::NotRun {
+                reason: format!("{CANNOT_RUN}: no space"),
+                fault: Fault::Environment,
+            },
             false,
         ),
         (Outcome::Failed("Parent device is lost".into()), true),

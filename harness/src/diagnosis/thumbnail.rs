@@ -12,9 +12,9 @@ pub const LENGTH: usize = COLUMNS * ROWS;
 /// 32x24 values of a long answer. A value that is NaN was not asked for; what the renderer answered
 /// as NaN or infinity is infinite in all three channels.
 #[derive(Clone, Debug)]
-pub struct Tile(Vec<Vec3>);
+pub struct Thumbnail(Vec<Vec3>);
 
-impl Tile {
+impl Thumbnail {
     /// A tile of exactly [`LENGTH`] values, as they were stored.
     pub fn of_stored(values: Vec<Vec3>) -> Option<Self> {
         (values.len() == LENGTH).then(|| Self(values.into_iter().map(kept).collect()))
@@ -33,7 +33,7 @@ impl Tile {
         Self::sampled(image.width, image.height, &answered)
     }
 
-    /// As [`Tile::of_image`], where only some pixels were asked for: (index, value) of each.
+    /// As [`Thumbnail::of_image`], where only some pixels were asked for: (index, value) of each.
     pub fn of_pixels(
         (width, height): (usize, usize),
         pixels: impl Iterator<Item = (usize, [f32; 3])>,
@@ -156,9 +156,10 @@ mod tests {
     #[test]
     fn a_mirrored_image_gives_the_mirrored_tile() {
         for (width, height) in [(96, 72), (128, 96), (800, 600), (33, 25)] {
-            let plain = Tile::of_image(&image(width, height, |x, y| (x + 1000 * y) as f32 / 64.0));
+            let plain =
+                Thumbnail::of_image(&image(width, height, |x, y| (x + 1000 * y) as f32 / 64.0));
             let mirrored = image(width, height, |x, y| (width - 1 - x + 1000 * y) as f32 / 64.0);
-            let mirrored = Tile::of_image(&mirrored);
+            let mirrored = Thumbnail::of_image(&mirrored);
             for (a, b) in plain.0.chunks(COLUMNS).zip(mirrored.0.chunks(COLUMNS)) {
                 let back: Vec<Vec3> = b.iter().rev().copied().collect();
                 assert_eq!(a, back);
@@ -168,17 +169,17 @@ mod tests {
 
     #[test]
     fn what_was_not_asked_is_told_from_what_is_not_finite() {
-        let tile = Tile::of_list(&[[1.0; 3], [f32::NAN; 3], [1e9, 0.0, 0.0]]);
+        let tile = Thumbnail::of_list(&[[1.0; 3], [f32::NAN; 3], [1e9, 0.0, 0.0]]);
         assert_eq!(tile.0[0], Vec3::ONE);
         assert_eq!(tile.0[1], Vec3::INFINITY);
         assert_eq!(tile.0[2], Vec3::INFINITY);
         assert!(tile.0[3].is_nan());
         let long: Vec<[f32; 3]> = (0..4 * LENGTH).map(|i| [i as f32; 3]).collect();
-        let tile = Tile::of_list(&long);
+        let tile = Thumbnail::of_list(&long);
         assert_eq!((tile.0[0].x, tile.0[1].x, tile.0[LENGTH - 1].x), (0.0, 4.0, 3068.0));
-        let holes = Tile::of_pixels((96, 72), [(0, [1.0; 3])].into_iter());
+        let holes = Thumbnail::of_pixels((96, 72), [(0, [1.0; 3])].into_iter());
         assert!(holes.is_empty(), "pixel 0 is no place of the grid");
-        let large = Tile::of_list(&long).enlarged(3);
+        let large = Thumbnail::of_list(&long).enlarged(3);
         assert_eq!((large.width, large.height), (3 * COLUMNS, 3 * ROWS));
         assert_eq!((large.at(2, 2).x, large.at(3, 2).x), (0.0, 4.0));
         assert_eq!(large.at(0, 3).x, 4.0 * COLUMNS as f32);
@@ -189,12 +190,16 @@ mod tests {
         let half = |x: usize, w: usize| if 2 * x < w { 1.0 } else { 0.25 };
         let tile = |w, h| {
             let with = image(w, h, |x, y| (y + 1) as f32 * half(x, w));
-            Tile::of_ratio(&with, &image(w, h, |_, y| (y + 1) as f32))
+            Thumbnail::of_ratio(&with, &image(w, h, |_, y| (y + 1) as f32))
         };
         let (small, large) = (tile(128, 96), tile(768, 576));
         assert_eq!(small.0, large.0);
         assert_eq!((small.0[0].x, small.0[COLUMNS - 1].x), (1.0, 0.25));
-        assert!(Tile::of_ratio(&image(128, 96, |_, _| 1.0), &image(64, 96, |_, _| 1.0)).is_empty());
-        assert!(Tile::of_ratio(&image(64, 48, |_, _| 1.0), &image(64, 48, |_, _| 0.0)).is_empty());
+        assert!(
+            Thumbnail::of_ratio(&image(128, 96, |_, _| 1.0), &image(64, 96, |_, _| 1.0)).is_empty()
+        );
+        assert!(
+            Thumbnail::of_ratio(&image(64, 48, |_, _| 1.0), &image(64, 48, |_, _| 0.0)).is_empty()
+        );
     }
 }

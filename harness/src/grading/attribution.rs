@@ -1,40 +1,40 @@
 //! The machine's word against a hand-in's: who blames the machine (no adapter, a lost device, a full
 //! disk, a worker that could not begin) is believed when a renderer of ours fails on the same case.
 
-use super::ask::Asker;
 use super::draw;
+use super::session::Session;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, AdapterKind, CameraValue, Job, Matrices, Matter, Outcome, Request, blames_the_machine,
+    Adapter, AdapterKind, CameraValue, Fault, Job, Matrices, Outcome, Request, blames_the_machine,
 };
 
 /// Settles the outcomes of `job` that blame the machine: what a renderer of ours does is the
-/// hand-in's own failure; otherwise they are asked again while there is patience, and stay ungraded.
-pub fn question_the_machine(asker: &Asker, job: &Job, outcomes: &mut [Outcome]) {
+/// hand-in's own failure; otherwise they are asked again while there is retries, and stay ungraded.
+pub fn attribute_failures(session: &Session, job: &Job, outcomes: &mut [Outcome]) {
     loop {
         let blaming = |&index: &usize| blames_the_machine(&outcomes[index]);
         let blaming: Vec<usize> = (0..outcomes.len()).filter(blaming).collect();
         let Some(&first) = blaming.first() else { return };
-        if asker.is_cancelled() {
+        if session.is_cancelled() {
             return;
         }
-        if let Some(witness) = works_here(asker, job, &job.requests[first]) {
+        if let Some(witness) = control_run(session, job, &job.requests[first]) {
             for index in blaming {
                 outcomes[index] =
                     Outcome::Failed(format!("{} ({witness})", said(&outcomes[index])));
             }
             return;
         }
-        if !asker.patience.another_try() {
+        if !session.retries.try_take() {
             for index in blaming {
-                let (reason, matter) = (said(&outcomes[index]).to_owned(), Matter::Machine);
-                outcomes[index] = Outcome::NotRun { reason, matter };
+                let (reason, fault) = (said(&outcomes[index]).to_owned(), Fault::Environment);
+                outcomes[index] = Outcome::NotRun { reason, fault };
             }
             return;
         }
         let requests = blaming.iter().map(|&index| job.requests[index].clone()).collect();
-        let again = asker.run(&Job { plugin: job.plugin.clone(), requests });
+        let again = session.run_job(&Job { plugin: job.plugin.clone(), requests });
         for (index, outcome) in blaming.into_iter().zip(again) {
             outcomes[index] = outcome;
         }
@@ -52,17 +52,17 @@ fn said(outcome: &Outcome) -> &str {
 
 /// Asks a renderer of ours the same in a fresh worker: the reference, or Umbra's own pass for stages
 /// and where there is no reference. Says who could do it; nothing when it fails as well.
-fn works_here(asker: &Asker, job: &Job, request: &Request) -> Option<&'static str> {
+fn control_run(session: &Session, job: &Job, request: &Request) -> Option<&'static str> {
     let mut request = request.clone();
     request.scene_mut().options.clear();
-    let reference = asker.reference.filter(|_| job.plugin.is_some());
+    let reference = session.reference.filter(|_| job.plugin.is_some());
     if reference.is_none() {
         request = own_pass(&request);
     }
     let control = Job { plugin: reference.map(Into::into), requests: vec![request] };
     // What a hand-in may use is no measure of ours.
-    let limits = Limits { threads: asker.limits.threads, ..Limits::default() };
-    let report = asker.supervisor.run_job(&control, &limits, asker.cancel, &mut |_| ());
+    let limits = Limits { threads: session.limits.threads, ..Limits::default() };
+    let report = session.supervisor.run_job(&control, &limits, session.cancel, &mut |_| ());
     let outcome = report.outcomes.first()?;
     let offline = !matches!(job.requests.first(), Some(Request::RenderRealtime { .. }));
     match reference {

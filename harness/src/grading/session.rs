@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use basecode::{Image, Ray, Vec3};
 use renderer_api as api;
 
+use super::attribution;
 use super::case::Case;
-use super::control;
-use crate::diagnosis::{Sightings, Tile, View};
+use crate::diagnosis::{Observations, Thumbnail, View};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, BsdfQuery, BsdfSource, Job, JobReport, Matter, Outcome, Patience, RayQuery, Request,
+    Adapter, BsdfQuery, BsdfSource, Fault, Job, JobReport, Outcome, RayQuery, Request, RetryBudget,
     SceneRef, Supervisor,
 };
 
@@ -26,7 +26,7 @@ const OUTPUT: CheckId = CheckId::SubmissionOutput;
 const NOT_ASKED: f64 = 0.9999;
 
 /// What it takes to run one hand-in.
-pub struct Asker<'a> {
+pub struct Session<'a> {
     /// Starts workers.
     pub supervisor: Supervisor,
     /// What each may use.
@@ -42,34 +42,34 @@ pub struct Asker<'a> {
     /// The most that one worker printed so far, in bytes.
     pub printed: Mutex<u64>,
     /// What is left of it for this path.
-    pub patience: Patience<'a>,
+    pub retries: RetryBudget<'a>,
     /// The reference renderer's library, absent in a student's kit: what it can draw, the machine
     /// is not to blame for.
     pub reference: Option<&'a Path>,
     /// What was answered, for the diagnosis.
-    pub sightings: Mutex<Sightings>,
+    pub observations: Mutex<Observations>,
     /// What compilers said in several lines, each text once: to be shown line by line.
     pub quotes: Mutex<Vec<String>>,
 }
 
-impl Asker<'_> {
+impl Session<'_> {
     /// Asks a plugin, or Umbra's neutral pass when there is none.
-    pub fn ask(&self, plugin: Option<&Path>, requests: Vec<Request>) -> Vec<Outcome> {
+    pub fn run(&self, plugin: Option<&Path>, requests: Vec<Request>) -> Vec<Outcome> {
         if requests.is_empty() {
             return Vec::new();
         }
         let job = Job { plugin: plugin.map(Path::to_owned), requests };
-        let mut outcomes = self.run(&job);
-        control::question_the_machine(self, &job, &mut outcomes);
+        let mut outcomes = self.run_job(&job);
+        attribution::attribute_failures(self, &job, &mut outcomes);
         outcomes
     }
 
-    /// Runs a job while there is patience.
-    pub fn run(&self, job: &Job) -> Vec<Outcome> {
+    /// Runs a job while there is retries.
+    pub fn run_job(&self, job: &Job) -> Vec<Outcome> {
         let JobReport { outcomes, runs, .. } = self.supervisor.run_job_patiently(
             job,
             &self.limits,
-            &self.patience,
+            &self.retries,
             self.cancel,
             &mut |_| (),
         );
@@ -84,7 +84,7 @@ impl Asker<'_> {
 
     /// That the submission used up its time on this path, if it did.
     pub fn used_up(&self) -> Option<Check> {
-        let used = self.patience.used_up()?;
+        let used = self.retries.used_up()?;
         let said = format!("the submission used {used}; what was not asked earns nothing");
         let hint = "an instructor grades it fully with --only STUDENT --budget none";
         Some(Check::new(BUDGET, "", Verdict::Fail, said).with_hint(hint))
@@ -102,9 +102,9 @@ impl Asker<'_> {
     }
 
     /// Keeps what was answered, for the diagnosis.
-    pub fn see(&self, view: View, tile: Tile) {
-        if let Ok(mut sightings) = self.sightings.lock() {
-            sightings.see(view, tile);
+    pub fn record(&self, view: View, tile: Thumbnail) {
+        if let Ok(mut observations) = self.observations.lock() {
+            observations.record(view, tile);
         }
     }
 
@@ -135,9 +135,9 @@ impl Asker<'_> {
         self.cancel.load(Ordering::Relaxed)
     }
 
-    /// Ends a path: answers the CPU seconds of its workers; patience begins anew.
+    /// Ends a path: answers the CPU seconds of its workers; retries begins anew.
     pub fn end_path(&self) -> f64 {
-        self.patience.renew();
+        self.retries.renew();
         self.cpu_s.lock().map_or(0.0, |mut cpu_s| std::mem::take(&mut *cpu_s))
     }
 }
@@ -186,7 +186,7 @@ pub fn headline(said: &str) -> &str {
 }
 
 /// The check for a question without an answer. `parts` are the parts whose lack is this check's
-/// own matter: what is not implemented elsewhere only hides the answer.
+/// own fault: what is not implemented elsewhere only hides the answer.
 pub fn unanswered(id: CheckId, scene: &str, parts: &[&str], outcome: &Outcome) -> Check {
     let check = |verdict, summary: String| Check::new(id, scene, verdict, summary);
     match outcome {
@@ -234,7 +234,7 @@ pub fn unanswered(id: CheckId, scene: &str, parts: &[&str], outcome: &Outcome) -
         }
         Outcome::NoAdapter(message) => check(Verdict::NotRun, format!("not run here: {message}")),
         // What was not asked is said only where nothing that was asked failed as badly.
-        Outcome::NotRun { reason, matter: Matter::Submission } => {
+        Outcome::NotRun { reason, fault: Fault::Submission } => {
             Check { error: NOT_ASKED, ..check(Verdict::Fail, reason.clone()) }
         }
         Outcome::NotRun { reason, .. } => check(Verdict::NotRun, format!("not run here: {reason}")),
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn what_was_not_asked_costs_the_part_and_is_not_its_first_reason() {
-        let not_asked = Outcome::NotRun { reason: "not asked".into(), matter: Matter::Submission };
+        let not_asked = Outcome::NotRun { reason: "not asked".into(), fault: Fault::Submission };
         let not_asked = unanswered(CheckId::RadianceLit, "s", &["1.3"], &not_asked);
         let late = Late { computing: true, limit_s: 3.0, reference_s: None };
         let hangs = unanswered(CheckId::RadianceLit, "s", &["1.3"], &Outcome::TimedOut(late));

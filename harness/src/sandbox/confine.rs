@@ -10,7 +10,7 @@ use nix::sys::stat::{Mode, umask};
 use nix::unistd::{AccessFlags, access, chdir, setsid};
 
 use super::privileges::{self, Identity};
-use super::{InForce, Limits, Policy, SandboxError, filter, landlocked};
+use super::{InForce, Limits, Policy, SandboxError, filter, landlock};
 
 /// Locks this process, a child of init. The last step but the report: the system call filter.
 pub fn lock(policy: &Policy, identity: &Identity) -> Result<InForce, SandboxError> {
@@ -27,7 +27,7 @@ pub fn lock(policy: &Policy, identity: &Identity) -> Result<InForce, SandboxErro
     if policy.layers.rlimits {
         limit(&policy.limits)?;
     }
-    let landlock_abi = if policy.layers.landlock { landlocked::restrict(policy)? } else { 0 };
+    let landlock_abi = if policy.layers.landlock { landlock::restrict(policy)? } else { 0 };
     if policy.layers.drop_privileges && !privileges::powerless()? {
         let cause = "some are still there";
         return Err(SandboxError::new("drop_privileges", "drop all capabilities", cause));

@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use rayon::prelude::*;
 
-use super::ask::{self, Asker};
 use super::conventions::Answers;
 use super::draw::{Frame, draw_each};
 use super::offline::{self, Drawn};
 use super::pipeline::Grading;
 use super::realtime;
+use super::session::{self, Session};
 use crate::diagnosis::{
-    Catalogue, Diagnosis, Facts, Kind, KnownMistake, LENGTH, Material, Sightings, Stored,
-    StoredView, Tile, View,
+    Catalogue, Diagnosis, Input, Kind, KnownMistake, LENGTH, Material, Observations, Stored,
+    StoredView, Thumbnail, View,
 };
 use crate::evidence::{self, Evidence, Picture};
 use crate::expected::scene_digest;
@@ -41,7 +41,7 @@ impl Grading<'_> {
     /// When the stored answers or the catalogue cannot be used, or a picture cannot be written.
     pub(super) fn diagnose(
         &self,
-        asker: &Asker,
+        session: &Session,
         evidence: &Evidence,
         drawn: &[Drawn],
         out: Option<&Path>,
@@ -57,23 +57,23 @@ impl Grading<'_> {
                 self.stored.get_or_init(|| stored)
             }
         };
-        self.see_drawn(asker, drawn);
-        let sightings = match asker.sightings.lock() {
-            Ok(mut sightings) => std::mem::take(&mut *sightings),
-            Err(_) => Sightings::default(),
+        self.record_drawn(session, drawn);
+        let observations = match session.observations.lock() {
+            Ok(mut observations) => std::mem::take(&mut *observations),
+            Err(_) => Observations::default(),
         };
         let catalogue = Catalogue::known()?;
-        let facts = Facts {
+        let input = Input {
             evidence: &evidence,
             failing: &failing,
-            sightings: &sightings,
+            observations: &observations,
             stored,
             catalogue: &catalogue,
         };
-        let mut diagnoses = facts.diagnose();
+        let mut diagnoses = input.diagnose();
         for diagnosis in &mut diagnoses {
             if let Some(out) = out {
-                diagnosis.pictures = pictures(diagnosis, &facts, out)?;
+                diagnosis.pictures = pictures(diagnosis, &input, out)?;
             }
         }
         Ok(diagnoses)
@@ -103,7 +103,7 @@ impl Grading<'_> {
 
     /// Keeps the images that were drawn. Films of hand-ins may be large ones or small ones: what
     /// they show is told by probes, but for the bonus.
-    fn see_drawn(&self, asker: &Asker, drawn: &[Drawn]) {
+    fn record_drawn(&self, session: &Session, drawn: &[Drawn]) {
         for case in &self.cases {
             let name = &case.entry.name;
             let of = |kind| {
@@ -113,7 +113,7 @@ impl Grading<'_> {
             let plain = of(evidence::images::Kind::Realtime);
             let shadows = of(evidence::images::Kind::RealtimeShadows);
             if let (Some(with), Some(without)) = (shadows, plain) {
-                asker.see(View::new(Kind::Bonus, name), Tile::of_ratio(with, without));
+                session.record(View::new(Kind::Bonus, name), Thumbnail::of_ratio(with, without));
             }
             if case.is_probe() {
                 // At one sample the film tells nothing that the rays do not.
@@ -121,7 +121,7 @@ impl Grading<'_> {
                 let film = film.filter(|_| case.spp > 1);
                 for (kind, image) in [(Kind::Realtime, plain), (Kind::Film, film)] {
                     if let Some(image) = image {
-                        asker.see(View::new(kind, name), Tile::of_image(image));
+                        session.record(View::new(kind, name), Thumbnail::of_image(image));
                     }
                 }
             }
@@ -174,9 +174,13 @@ impl Grading<'_> {
     }
 
     /// All answers of the reference renderer, with a mistake or without.
-    fn look(&self, reference: &Path, mistake: Option<&KnownMistake>) -> anyhow::Result<Sightings> {
-        let asker = self
-            .asker(&mistake.map_or(String::new(), |mistake| format!("mistake={}", mistake.name)));
+    fn look(
+        &self,
+        reference: &Path,
+        mistake: Option<&KnownMistake>,
+    ) -> anyhow::Result<Observations> {
+        let session = self
+            .session(&mistake.map_or(String::new(), |mistake| format!("mistake={}", mistake.name)));
         let tolerances = &self.assignment.tolerances;
         let belongs = |path: &str| {
             mistake.is_none_or(|known| known.parts.iter().any(|part| part.starts_with(path)))
@@ -184,34 +188,37 @@ impl Grading<'_> {
         let mut drawn = Vec::new();
         if belongs("1.") {
             let mut answers = Answers::default();
-            answers.probe_bsdfs(&asker, reference, &self.cases);
+            answers.probe_bsdfs(&session, reference, &self.cases);
             for case in &self.cases {
                 let run = (1, self.threads);
                 let judged =
-                    offline::judge_scene(&asker, reference, case, run, tolerances, &mut answers);
+                    offline::judge_scene(&session, reference, case, run, tolerances, &mut answers);
                 drawn.extend(judged.1);
             }
         }
         if belongs("2.") {
-            let judged = realtime::judge_images(&asker, reference, &self.cases, tolerances);
+            let judged = realtime::judge_images(&session, reference, &self.cases, tolerances);
             drawn.extend(judged.into_iter().flat_map(|judged| judged.drawn));
             // Under the reference's own vertex stage, which is right where a fragment stage is not.
             let frames: Vec<Frame> =
                 self.cases.iter().map(|case| Frame::small(case, Vec::new())).collect();
-            let outcomes = draw_each(&asker, Some(reference), &frames);
+            let outcomes = draw_each(&session, Some(reference), &frames);
             for (case, outcome) in self.cases.iter().zip(outcomes) {
                 if let Some(answer) = outcome.answer() {
                     let (width, height) = (case.small.width, case.small.height);
-                    let image = ask::image(&answer.values, width, height);
-                    asker.see(View::new(Kind::Fragment, &case.entry.name), Tile::of_image(&image));
+                    let image = session::image(&answer.values, width, height);
+                    session.record(
+                        View::new(Kind::Fragment, &case.entry.name),
+                        Thumbnail::of_image(&image),
+                    );
                 }
             }
         }
-        self.see_drawn(&asker, &drawn);
-        let sightings = asker.sightings.lock().map(|mut seen| std::mem::take(&mut *seen));
-        let sightings = sightings.unwrap_or_default();
-        anyhow::ensure!(!sightings.tiles.is_empty(), "the reference renderer answers nothing");
-        Ok(sightings)
+        self.record_drawn(&session, &drawn);
+        let observations = session.observations.lock().map(|mut seen| std::mem::take(&mut *seen));
+        let observations = observations.unwrap_or_default();
+        anyhow::ensure!(!observations.tiles.is_empty(), "the reference renderer answers nothing");
+        Ok(observations)
     }
 }
 
@@ -220,13 +227,13 @@ const ENLARGED: usize = 5;
 
 /// Draws what was drawn, what is right and what the known mistake draws, where it shows best;
 /// nothing of several mistakes together.
-fn pictures(diagnosis: &Diagnosis, facts: &Facts, out: &Path) -> anyhow::Result<Vec<Picture>> {
+fn pictures(diagnosis: &Diagnosis, input: &Input, out: &Path) -> anyhow::Result<Vec<Picture>> {
     let [alike] = diagnosis.mistakes.as_slice() else { return Ok(Vec::new()) };
     let kind = if diagnosis.part.starts_with('1') { Kind::Offline } else { Kind::Realtime };
-    let views = facts.stored.views.iter().filter(|(view, _)| view.kind == kind);
+    let views = input.stored.views.iter().filter(|(view, _)| view.kind == kind);
     let shown = views.filter_map(|(view, stored)| {
         let known = stored.mistakes.get(alike.first()?)?;
-        Some((stored.differs(known), view, facts.sightings.tiles.get(view)?, stored, known))
+        Some((stored.differs(known), view, input.observations.tiles.get(view)?, stored, known))
     });
     let best = shown.max_by(|a, b| a.0.total_cmp(&b.0));
     let Some((_, view, seen, stored, known)) = best else { return Ok(Vec::new()) };

@@ -20,7 +20,7 @@ use nix::unistd::{ForkResult, Pid, fork, getppid, pipe2};
 use super::cgroup::Group;
 use super::policy::SCRATCH;
 use super::privileges::{self, Identity};
-use super::{Bind, EXIT_NOT_LOCKED, InForce, Policy, SandboxError, locked, root};
+use super::{Bind, EXIT_NOT_LOCKED, InForce, Policy, SandboxError, confine, root};
 
 /// Ends this process with the thread that started it.
 ///
@@ -132,7 +132,7 @@ fn begin(policy: &Policy) -> Result<Side, SandboxError> {
                 }
                 Ok(None) => {
                     drop(status_in);
-                    match locked::lock(policy, &identity) {
+                    match confine::lock(policy, &identity) {
                         Ok(in_force) => {
                             report.send(&Ok(in_force.clone()));
                             Ok(Side::Locked(Ready { in_force, report }))

@@ -3,8 +3,8 @@
 
 use basecode::{Image, MaterialModel, Ray, Scene, Vec3};
 
-use super::ask::{self, Asker};
 use super::case::Case;
+use super::session::{self, Session};
 use crate::diagnosis::fit::{Bound, Reflector, Sample, ShadowRay, VertexSeen};
 use crate::evidence::bsdf::{BsdfKind, BsdfProbe};
 use crate::evidence::stages::BoundValue;
@@ -25,7 +25,7 @@ const START: f32 = 1e-4;
 const SAME: f64 = 0.9;
 
 /// Answers to the probes of a BSDF given by value.
-pub fn bsdf(asker: &Asker, kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) {
+pub fn bsdf(session: &Session, kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) {
     let samples = probes.iter().zip(values).map(|(probe, value)| {
         let material = &probe.query.material;
         Sample {
@@ -43,23 +43,23 @@ pub fn bsdf(asker: &Asker, kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32;
             found: value.map(f64::from),
         }
     });
-    keep(asker, if kind == BsdfKind::Phong { "1.2" } else { "1.1" }, samples);
+    keep(session, if kind == BsdfKind::Phong { "1.2" } else { "1.1" }, samples);
 }
 
 /// Unshadowed radiance along lit rays under a witness.
-pub fn radiance(asker: &Asker, case: &Case, witness: Witness, values: &[[f32; 3]]) {
+pub fn radiance(session: &Session, case: &Case, witness: Witness, values: &[[f32; 3]]) {
     let batch = &case.small.batch;
     let lit = batch.points[..batch.lit].iter().zip(values);
     let samples = few(lit, batch.lit).map(|(point, value)| {
         sample(Reflector::Witness(witness), point, batch.intensity, value.map(f64::from))
     });
     if !case.held_back {
-        keep(asker, "1.3", samples);
+        keep(session, "1.3", samples);
     }
 }
 
 /// Radiance with and without shadows under a witness.
-pub fn shadows(asker: &Asker, case: &Case, with: &[[f32; 3]], without: &[[f32; 3]]) {
+pub fn shadows(session: &Session, case: &Case, with: &[[f32; 3]], without: &[[f32; 3]]) {
     let (batch, scene) = (&case.small.batch, &case.expected.scene);
     if case.held_back {
         return;
@@ -77,8 +77,8 @@ pub fn shadows(asker: &Asker, case: &Case, with: &[[f32; 3]], without: &[[f32; 3
             found,
         })
     });
-    if let Ok(mut sightings) = asker.sightings.lock() {
-        sightings.shadow_rays.extend(rays);
+    if let Ok(mut observations) = session.observations.lock() {
+        observations.shadow_rays.extend(rays);
     }
 }
 
@@ -100,7 +100,7 @@ fn occluders(scene: &Scene, point: &SurfacePoint) -> Vec<f64> {
 }
 
 /// What one of the two fragment stages draws under a pass and a vertex stage of ours.
-pub fn fragment(asker: &Asker, case: &Case, image: &Image, phong: bool) {
+pub fn fragment(session: &Session, case: &Case, image: &Image, phong: bool) {
     let (small, scene) = (&case.small, &case.expected.scene);
     if case.held_back {
         return;
@@ -125,11 +125,11 @@ pub fn fragment(asker: &Asker, case: &Case, image: &Image, phong: bool) {
         };
         sample(reflector, point, small.batch.intensity, pixel.to_array().map(f64::from))
     });
-    keep(asker, if phong { "2.4" } else { "2.3" }, samples);
+    keep(session, if phong { "2.4" } else { "2.3" }, samples);
 }
 
 /// The values that a student's pass bound, each shown by a frame.
-pub fn pass(asker: &Asker, case: &Case, frames: &[(BoundValue, Image)]) {
+pub fn pass(session: &Session, case: &Case, frames: &[(BoundValue, Image)]) {
     let (small, scene) = (&case.small, &case.expected.scene);
     let Ok(camera) = scene.camera(small.surface.width, small.surface.height) else { return };
     let mut seen = Vec::new();
@@ -153,13 +153,13 @@ pub fn pass(asker: &Asker, case: &Case, frames: &[(BoundValue, Image)]) {
             });
         }
     }
-    if let (Ok(mut sightings), false) = (asker.sightings.lock(), case.held_back) {
-        sightings.bound.extend(seen);
+    if let (Ok(mut observations), false) = (session.observations.lock(), case.held_back) {
+        observations.bound.extend(seen);
     }
 }
 
 /// What a student's vertex stage forwards.
-pub fn vertex(asker: &Asker, case: &Case, positions: &Image, normals: &Image) {
+pub fn vertex(session: &Session, case: &Case, positions: &Image, normals: &Image) {
     let surface = &case.small.surface;
     let (width, height) = (surface.width, surface.height);
     let Ok(camera) = case.expected.scene.camera(width, height) else { return };
@@ -183,8 +183,8 @@ pub fn vertex(asker: &Asker, case: &Case, positions: &Image, normals: &Image) {
             projection,
         })
     });
-    if let (Ok(mut sightings), false) = (asker.sightings.lock(), case.held_back) {
-        sightings.vertices.extend(seen);
+    if let (Ok(mut observations), false) = (session.observations.lock(), case.held_back) {
+        observations.vertices.extend(seen);
     }
 }
 
@@ -215,13 +215,13 @@ fn few<T>(all: impl Iterator<Item = T>, count: usize) -> impl Iterator<Item = T>
     all.step_by(count.div_ceil(KEPT).max(1))
 }
 
-fn keep(asker: &Asker, part: &'static str, samples: impl Iterator<Item = Sample>) {
-    if let Ok(mut sightings) = asker.sightings.lock() {
-        sightings.shaded.entry(part).or_default().extend(samples);
+fn keep(session: &Session, part: &'static str, samples: impl Iterator<Item = Sample>) {
+    if let Ok(mut observations) = session.observations.lock() {
+        observations.shaded.entry(part).or_default().extend(samples);
     }
 }
 
 /// Answers under a witness as colours, where there are any.
 pub fn colours(outcome: &crate::worker::Outcome) -> Option<&[[f32; 3]]> {
-    outcome.answer().map(|answer| ask::colours(&answer.values))
+    outcome.answer().map(|answer| session::colours(&answer.values))
 }

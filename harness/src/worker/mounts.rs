@@ -14,7 +14,7 @@ use crate::sandbox::policy::{JOB, PLUGIN, SCENE};
 use crate::sandbox::{Bind, Gpu, Kind, Layers, Policy};
 
 /// A policy, and the names by which the worker is told of things.
-pub struct Cage {
+pub struct Mounts {
     /// What it sees.
     pub policy: Policy,
     /// The plugin, when there is one.
@@ -25,7 +25,7 @@ pub struct Cage {
     pub job: PathBuf,
 }
 
-impl Cage {
+impl Mounts {
     /// For a worker with the private folder `dir`.
     ///
     /// # Errors
@@ -67,7 +67,7 @@ impl Cage {
     }
 }
 
-impl Cage {
+impl Mounts {
     /// Gives it compiled shaders where it draws, and lets it leave its own in `leaves`.
     pub fn shaders(&mut self, requests: &[&Request], given: &[PathBuf], leaves: Option<&Path>) {
         // Without a mount namespace there is no place for them.
@@ -210,8 +210,8 @@ mod tests {
         let scene = SceneRef { path: toml.to_owned(), options: String::new() };
         let request = Request::EvalBsdf { scene, queries: Vec::new() };
         let job = Job { plugin: None, requests: vec![request.clone()] };
-        let cage = Cage::new(dir, &job, &[&request], Layers::full()).unwrap();
-        let scene = cage.policy.read_only.iter().filter(|bind| bind.inside.starts_with(SCENE));
+        let mounts = Mounts::new(dir, &job, &[&request], Layers::full()).unwrap();
+        let scene = mounts.policy.read_only.iter().filter(|bind| bind.inside.starts_with(SCENE));
         let mut names = Vec::new();
         for bind in scene.clone().filter(|bind| bind.host.is_dir()) {
             for file in bind.host.read_dir().unwrap() {
@@ -219,7 +219,7 @@ mod tests {
             }
         }
         names.sort();
-        (cage.scenes, scene.map(|bind| bind.inside.clone()).collect(), names)
+        (mounts.scenes, scene.map(|bind| bind.inside.clone()).collect(), names)
     }
 
     #[test]

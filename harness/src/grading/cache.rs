@@ -10,9 +10,9 @@ use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::ask::BUDGET;
 use super::pipeline::{Folders, Grading};
 use super::record::{Record, Student};
+use super::session::BUDGET;
 use crate::evidence::{Check, Evidence, Picture, Verdict};
 use crate::expected::scene_digest;
 use crate::files::{files_below, hex, write_whole};
@@ -26,7 +26,7 @@ const BUG: &str = "internal-error.json";
 const REPLACED: &str = "record.replaced.json";
 
 /// Keeps records and finds them again.
-pub struct Kept {
+pub struct RecordCache {
     /// SHA-256 over all that a record depends on, but for the hand-in.
     batch: [u8; 32],
     /// Whether everything is found out anew.
@@ -65,7 +65,7 @@ struct File<R> {
     record: R,
 }
 
-impl Kept {
+impl RecordCache {
     /// For the records that `grading` makes; `force` finds none again.
     ///
     /// # Errors
@@ -281,7 +281,7 @@ fn pictures<'a>(record: &'a Record, out: &'a Folders) -> impl Iterator<Item = Pa
 }
 
 #[cfg(test)]
-impl Kept {
+impl RecordCache {
     /// For the records of a made-up batch.
     pub(super) fn with(batch: [u8; 32]) -> Self {
         Self { batch, force: false, settled: Mutex::default() }
@@ -299,7 +299,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let at = |name: &str| place.path().join(name);
         let out = Folders { student: at("student"), instructor: at("instructor") };
-        let kept = Kept::with([1; 32]);
+        let kept = RecordCache::with([1; 32]);
         let mut record = sample::sheet().entries.remove(1).record;
         record.evidence.checks.retain(|check| check.verdict != Verdict::NotRun);
         record.evidence.checks[0].error = f64::NAN;
@@ -338,7 +338,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let out = || place.path().to_owned();
         let out = Folders { student: out(), instructor: out() };
-        let kept = Kept::with([1; 32]);
+        let kept = RecordCache::with([1; 32]);
         let mut record = sample::sheet().entries.remove(0).record;
         let not_run = Check::new(CheckId::BonusImage, "", Verdict::NotRun, "no adapter");
         record.evidence.checks.push(not_run);
@@ -350,7 +350,7 @@ mod tests {
     fn another_hand_in_batch_or_word_of_intake_has_another_key() {
         let record = sample::sheet().entries.remove(0).record;
         let key = |batch: u8, record: &Record, checks: &[Check]| {
-            Kept::with([batch; 32]).key(record, checks).unwrap()
+            RecordCache::with([batch; 32]).key(record, checks).unwrap()
         };
         let own = key(1, &record, &[]);
         assert_eq!(own, key(1, &record.clone(), &[]));

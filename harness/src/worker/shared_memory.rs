@@ -6,7 +6,7 @@ use std::path::Path;
 
 use memmap2::{Mmap, MmapMut, MmapOptions};
 
-use super::table::{RECORD, Record};
+use super::table::{Record, SLOT_BYTES};
 use super::wire::Place;
 
 /// The inputs of all requests.
@@ -43,7 +43,7 @@ impl Table {
     /// When it cannot be mapped or has another size.
     pub fn open(path: &Path, requests: usize) -> io::Result<Self> {
         let file = File::options().read(true).write(true).open(path)?;
-        let size = RECORD * (1 + requests);
+        let size = SLOT_BYTES * (1 + requests);
         if file.metadata()?.len() != size as u64 {
             return Err(io::Error::other(format!("the table is not {size} bytes long")));
         }
@@ -62,10 +62,10 @@ impl Table {
     }
 
     fn record(&self, index: usize) -> &Record {
-        assert!((index + 1) * RECORD <= self.0.len(), "record {index} lies outside the table");
+        assert!((index + 1) * SLOT_BYTES <= self.0.len(), "record {index} lies outside the table");
         // SAFETY: inside the mapping, which starts on a page; a record is all atomics, so that
         // any bytes are valid and others may write at the same time.
-        unsafe { &*self.0.as_ptr().add(index * RECORD).cast::<Record>() }
+        unsafe { &*self.0.as_ptr().add(index * SLOT_BYTES).cast::<Record>() }
     }
 }
 
