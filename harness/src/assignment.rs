@@ -22,6 +22,9 @@ pub struct Assignment {
     pub course: String,
     /// When it is due, RFC 3339 with offset.
     pub due: String,
+    /// What a late submission costs; nothing when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub late: Option<crate::class::Policy>,
     /// The scenes, the hand-in's own first.
     pub scenes: Vec<SceneEntry>,
     /// The offline TOML file of a scene that does not vary over rows, for findings on samplers.
@@ -191,6 +194,9 @@ impl Assignment {
 
     fn problem(&self) -> Option<String> {
         if let Some(problem) = self.rules.problem() {
+            return Some(problem);
+        }
+        if let Some(problem) = self.late.as_ref().and_then(crate::class::Policy::problem) {
             return Some(problem);
         }
         for (index, scene) in self.scenes.iter().enumerate() {

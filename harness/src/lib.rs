@@ -4,6 +4,7 @@
 
 pub mod assignment;
 pub mod build;
+pub mod class;
 pub mod cli;
 pub mod decode;
 pub mod diagnosis;

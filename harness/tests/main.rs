@@ -12,6 +12,7 @@ mod compare;
 mod compare_command;
 mod decode;
 mod diagnosis;
+mod downloads;
 mod expected;
 mod full_disk;
 mod fuzz_corpus;

@@ -82,6 +82,7 @@ fn student(root: &Path, kit: &Path, programs: &[PathBuf]) -> Result<()> {
         let to = if path == "xtask/kit" { kit.to_owned() } else { kit.join(path) };
         copy(&root.join(path), &to)?;
     }
+    leave_out_extensions(&kit.join("config.json"))?;
     copy(&root.join(TEMPLATE), &kit.join(TEMPLATE))?;
     let own = ["umbra", "umbra-worker"].map(|name| built(root, &format!("{name}{EXE_SUFFIX}")));
     let own = own.into_iter().collect::<Result<Vec<_>>>()?;
@@ -104,6 +105,16 @@ fn student(root: &Path, kit: &Path, programs: &[PathBuf]) -> Result<()> {
     fs::write(guide, text)?;
     prune_lock(kit)?;
     add_expected(root, kit)
+}
+
+/// Who has an extension is nobody else's matter.
+fn leave_out_extensions(config: &Path) -> Result<()> {
+    let mut assignment: serde_json::Value = serde_json::from_slice(&fs::read(config)?)?;
+    let late = assignment.get_mut("late").and_then(serde_json::Value::as_object_mut);
+    if late.and_then(|late| late.remove("extensions")).is_some() {
+        fs::write(config, serde_json::to_vec_pretty(&assignment)?)?;
+    }
+    Ok(())
 }
 
 /// A text, line by line, without those that `of` drops.
@@ -200,4 +211,26 @@ fn write_zip(folder: &Path, out: &Path) -> Result<()> {
     zip.finish()?;
     fs::rename(draft, out)?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kit_does_not_say_who_has_an_extension() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let config = folder.path().join("config.json");
+        let late =
+            r#"{"name": "a2", "late": {"penalty": 1, "extensions": [{"student": "260000001"}]}}"#;
+        fs::write(&config, late).expect("written");
+        leave_out_extensions(&config).expect("left out");
+        let text = fs::read_to_string(&config).expect("read");
+        assert!(text.contains("penalty") && !text.contains("260000001"), "{text}");
+        // What has none stays as it is written.
+        let plain = r#"{"name":   "a2"}"#;
+        fs::write(&config, plain).expect("written");
+        leave_out_extensions(&config).expect("left out");
+        assert_eq!(fs::read_to_string(&config).expect("read"), plain);
+    }
 }

@@ -1,5 +1,6 @@
 //! Submissions through all stages, and their report: what `umbra check` and `umbra grade` share.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -10,15 +11,17 @@ use anyhow::{Context as _, ensure};
 use super::MachineLacks;
 use super::check::Asked;
 use super::class::{self, Source};
-use super::collect::{self, Collected, collect};
 use super::context::{Context, INTERRUPTED, cores};
 use super::grade::{BudgetChoice, IsolationChoice, Perturb};
 use super::render::AdapterChoice;
+use crate::class::{
+    Attempt, Claim, Class, Collected, Deciding, Kind, Label, Standing, Wanted, collect, settle,
+};
 use crate::files::write_whole;
 use crate::grading::{Folders, Grading, Mode, Record, RecordCache, judge_shared};
 use crate::held_back::recorded_seed;
 use crate::report::{self, BatchReport, Entry};
-use crate::rubric;
+use crate::rubric::{self, Grade};
 use crate::sandbox::Isolation;
 
 /// The file with the seed of a batch's held-back scenes, in the instructor's folder.
@@ -53,6 +56,12 @@ pub struct Batch<'a> {
     pub asked: Option<&'a Asked>,
     /// Whose submissions alone are graded, unless it is empty.
     pub only: &'a [String],
+    /// Where they come from; recognised where it is not said.
+    pub from: Option<Kind>,
+    /// The class list; that of an earlier run where none is named.
+    pub list: Option<&'a Path>,
+    /// Which attempt of a student counts.
+    pub attempt: Attempt,
     /// Whether what was found out before is found out anew.
     pub force: bool,
     /// Whether to print what each stage cost.
@@ -60,19 +69,28 @@ pub struct Batch<'a> {
 }
 
 impl Batch<'_> {
-    /// Grades all and writes the reports; nothing when Ctrl-C came in between. Answers what was skipped, too.
-    pub fn run(
-        &self,
-        root: Option<&Path>,
-    ) -> anyhow::Result<Option<(BatchReport, Option<String>)>> {
+    /// Grades all and writes the reports; nothing when Ctrl-C came in between. Answers what was found, too.
+    pub fn run(&self, root: Option<&Path>) -> anyhow::Result<Option<(BatchReport, Collected)>> {
         for path in &self.paths {
             ensure!(path.exists(), "{} does not exist", path.display());
         }
         let mut context = Context::new(root)?;
+        // What a zip of many holds, until the end of the batch.
+        let scratch = tempfile::tempdir_in(&context.supervisor.scratch)?;
         let collected = match self.purpose {
-            Mode::Grade => collect(&self.paths, self.output, &context.assignment.tree)?,
+            Mode::Grade => {
+                let wanted = Wanted {
+                    tree: &context.assignment.tree,
+                    limits: &context.assignment.limits.archive,
+                    from: self.from,
+                    output: Some(self.output),
+                    scratch: scratch.path(),
+                };
+                collect(&self.paths, &wanted)?
+            }
             Mode::Check => {
-                let sources = self.paths.iter().map(|path| collect::Source::given(path)).collect();
+                let given = |path: &PathBuf| crate::class::Source::given(path);
+                let sources = self.paths.iter().map(given).collect();
                 Collected { sources, ..Collected::default() }
             }
         };
@@ -103,7 +121,28 @@ impl Batch<'_> {
             None => Some(recorded_seed(&self.output.join(report::INSTRUCTOR).join(SEED_FILE))?),
         };
         let all = class::sources(&collected.sources, self.output);
-        let chosen = class::only(context, self.output, &all, self.only)?;
+        let (roster, matches) = match self.purpose {
+            Mode::Grade => {
+                (class::roster(self.list, self.output)?, class::matches(self.output)?)
+            }
+            Mode::Check => Default::default(),
+        };
+        let deciding = Deciding {
+            roster: roster.as_ref(),
+            matches: &matches,
+            policy: context.assignment.late.as_ref(),
+            due: &context.assignment.due,
+            attempt: self.attempt,
+        };
+        let told = |source: &Source| !matches.mention(&source.claim());
+        let labels: Vec<Option<&Label>> =
+            all.iter().map(|source| source.label.as_ref().filter(|_| told(source))).collect();
+        let aside: HashSet<String> = crate::class::set_aside(&labels, &deciding)
+            .into_iter()
+            .map(|at| all[at].slug.clone())
+            .collect();
+        let mut chosen = class::only(context, self.output, &all, self.only)?;
+        chosen.retain(|source| !aside.contains(&source.slug));
         let result = context.with_store(|store| {
             let adapter = self.adapter.adapter();
             let mut grading = Grading::prepare(store, adapter, seed, &INTERRUPTED)?;
@@ -150,13 +189,14 @@ impl Batch<'_> {
                     chosen.len()
                 );
             }
-            incomparable = class::join(&kept, self.output, &all, &mut records);
+            incomparable = class::join(&kept, self.output, &all, &aside, &mut records);
         }
         // In an order that does not hang on who was graded when.
         records.sort_by_key(|record| record.slug.to_lowercase());
         judge_shared(&mut records);
         let rules = &context.assignment.rules;
-        let entries = records.into_iter().map(|mut record| {
+        let mut entries = Vec::new();
+        for mut record in records {
             // Graded by all of the evidence: what is settled leaves no second choice of a convention.
             let mut grade = rubric::grade(rules, &record.evidence);
             record.evidence = rubric::settle(rules, &record.evidence);
@@ -166,14 +206,64 @@ impl Batch<'_> {
             if incomparable.contains(&record.slug) {
                 grade.remarks.push(OTHER_CONDITIONS.to_owned());
             }
-            Entry { record, grade }
-        });
-        let sheet = BatchReport::new(&context.assignment, held_back, entries.collect());
+            entries.push(Entry { record, grade, standing: Standing::default() });
+        }
+        let class = match self.purpose {
+            Mode::Grade => Some(self.settle(&mut entries, &collected, &aside, &all, &deciding)?),
+            Mode::Check => None,
+        };
+        let sheet =
+            BatchReport { class, ..BatchReport::new(&context.assignment, held_back, entries) };
         report::write(self.output, &sheet)?;
         if self.timings {
             print_timings(&sheet);
         }
-        Ok(Some((sheet, collected.skipped())))
+        Ok(Some((sheet, collected)))
+    }
+
+    /// Settles whose the graded submissions are and which of them count; the others leave `entries`.
+    fn settle(
+        &self,
+        entries: &mut Vec<Entry>,
+        collected: &Collected,
+        aside: &HashSet<String>,
+        all: &[Source],
+        deciding: &Deciding,
+    ) -> anyhow::Result<Class> {
+        let claim = |entry: &Entry| {
+            let record = &entry.record;
+            Claim {
+                name: record.name.clone(),
+                slug: record.slug.clone(),
+                label: class::label(self.output, &record.slug),
+                number: record.student.id.clone(),
+                full_name: record.student.full_name(),
+            }
+        };
+        let claims: Vec<Claim> = entries.iter().map(claim).collect();
+        let mut grades: Vec<Grade> = entries.iter().map(|entry| entry.grade.clone()).collect();
+        let mut absent: Vec<(Label, String)> =
+            collected.empty.iter().map(|empty| (empty.label.clone(), empty.reason())).collect();
+        let is_graded = |source: &Source| claims.iter().any(|claim| claim.slug == source.slug);
+        let open = all.iter().filter(|source| !is_graded(source) && !aside.contains(&source.slug));
+        absent.extend(open.filter_map(|s| Some((s.label.clone()?, "not graded yet".to_owned()))));
+        let (standings, class) = settle(&claims, &mut grades, &absent, collected.kind, deciding)?;
+        class::ask(&class, self.output)?;
+        let mut counting = Vec::new();
+        for (at, mut standing) in standings {
+            // Attempts that were not graded are told, too.
+            let own = standing.label.as_ref().map(Label::person);
+            let others = all.iter().filter(|source| aside.contains(&source.slug));
+            let others = others.filter(|source| source.label.as_ref().map(Label::person) == own);
+            let others = others.map(|source| source.name.clone());
+            let known: Vec<String> =
+                others.filter(|name| !standing.set_aside.contains(name)).collect();
+            standing.set_aside.extend(known);
+            let grade = grades[at].clone();
+            counting.push(Entry { record: entries[at].record.clone(), grade, standing });
+        }
+        *entries = counting;
+        Ok(class)
     }
 
     /// Takes submissions through all stages, in their order; none is begun after Ctrl-C. To be graded, one
@@ -194,7 +284,8 @@ impl Batch<'_> {
         let work = || {
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(Source { path, name, slug }) = sources.get(index) else { return };
+                let Some(source) = sources.get(index) else { return };
+                let Source { path, name, slug, .. } = source;
                 let say = |stage: &str| {
                     if batch {
                         context.progress.at(&format!("{slug}: {stage}"));
@@ -208,7 +299,7 @@ impl Batch<'_> {
                 };
                 let begun = Instant::now();
                 let result = match self.purpose {
-                    Mode::Grade => class::note_source(&out, path)
+                    Mode::Grade => class::note_source(&out, source)
                         .and_then(|()| grading.one_of_batch(path, slug, &out, &say)),
                     Mode::Check => grading.hand_in(path, slug, &out, self.purpose, &say),
                 };

@@ -12,8 +12,9 @@ use super::batch::Batch;
 use super::context::Context;
 use super::grade::{BudgetChoice, IsolationChoice, Perturb};
 use super::render::AdapterChoice;
-use super::{class, collect, terminal};
+use super::{class, terminal};
 use crate::assignment::Assignment;
+use crate::class::{Attempt, Source};
 use crate::files::{files_below, write_whole};
 use crate::grading::{Mode, RenderPath};
 use crate::report::{self, Closing, Look};
@@ -156,7 +157,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let named = || folder.canonicalize().ok();
     let source = Some(folder.clone()).filter(|folder| folder.file_name().is_some());
     let source = source.or_else(named).unwrap_or_else(|| folder.clone());
-    let given = [collect::Source::given(&source)];
+    let given = [Source::given(&source)];
     let slug = class::sources(&given, &arguments.output).remove(0).slug;
     let last_file = arguments.output.join(&slug).join(LAST);
     let last = fs::read(&last_file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
@@ -174,6 +175,9 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         budget: BudgetChoice::Config,
         asked: Some(&asked),
         only: &[],
+        from: None,
+        list: None,
+        attempt: Attempt::Latest,
         force: false,
         timings: arguments.timings,
     };

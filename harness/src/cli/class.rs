@@ -7,14 +7,20 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 
-use super::collect;
 use super::context::Context;
+use crate::class::{self, Claim, Label, Matches, Roster};
 use crate::files::write_whole;
 use crate::grading::{Earlier, Folders, Record, RecordCache, Student};
 use crate::report;
 
 /// The file that says where a submission lay, in its instructor's folder.
 const SOURCE: &str = "source.txt";
+/// The file with what a platform's names say of a submission, in its instructor's folder.
+const LABEL: &str = "label.json";
+/// The class list of a report, in the instructor's folder.
+const LIST: &str = "class.csv";
+/// The instructor's decisions on whose submissions are, in the report's folder.
+pub const MATCHES: &str = "matches.toml";
 /// So many names stand in a message.
 const NAMES: usize = 5;
 
@@ -26,11 +32,68 @@ pub struct Source {
     pub name: String,
     /// What its folders in the report are called.
     pub slug: String,
+    /// Where it was found, the same from run to run.
+    pub place: PathBuf,
+    /// What a platform's names say of it.
+    pub label: Option<Label>,
+}
+
+impl Source {
+    /// What it says of whose it is before anything was looked at.
+    pub fn claim(&self) -> Claim {
+        Claim {
+            name: self.name.clone(),
+            slug: self.slug.clone(),
+            label: self.label.clone(),
+            ..Claim::default()
+        }
+    }
+}
+
+/// The class list of a report: the one that is given, which is kept from now on, else the one that was kept.
+///
+/// # Errors
+/// When it cannot be read, is no class list, or cannot be kept.
+pub fn roster(given: Option<&Path>, output: &Path) -> anyhow::Result<Option<Roster>> {
+    let kept = output.join(report::INSTRUCTOR).join(LIST);
+    match given {
+        Some(given) => {
+            let roster = Roster::read(given)?;
+            let bytes =
+                fs::read(given).with_context(|| format!("cannot read {}", given.display()))?;
+            write_whole(&kept, &bytes)
+                .with_context(|| format!("cannot keep the class list as {}", kept.display()))?;
+            Ok(Some(roster))
+        }
+        None if kept.is_file() => Roster::read(&kept).map(Some),
+        None => Ok(None),
+    }
+}
+
+/// The instructor's decisions in a report's folder.
+///
+/// # Errors
+/// When they cannot be read.
+pub fn matches(output: &Path) -> anyhow::Result<Matches> {
+    Matches::read(&output.join(MATCHES))
+}
+
+/// Writes the questions that are open, to be answered, unless the instructor has begun to.
+///
+/// # Errors
+/// When they cannot be written.
+pub fn ask(class: &class::Class, output: &Path) -> anyhow::Result<()> {
+    let file = output.join(MATCHES);
+    if class.undecided.is_empty() || file.exists() {
+        return Ok(());
+    }
+    write_whole(&file, class.questions().as_bytes())
+        .with_context(|| format!("cannot write {}", file.display()))
 }
 
 /// Submissions with the folders that they have in the report at `output`: those that they had before,
 /// else what their names allow, made unique.
-pub fn sources(given: &[collect::Source], output: &Path) -> Vec<Source> {
+pub fn sources(given: &[class::Source], output: &Path) -> Vec<Source> {
     let mut taken = HashSet::from([report::INSTRUCTOR.to_owned()]);
     let mut known: HashMap<String, VecDeque<String>> = HashMap::new();
     for slug in folders(output) {
@@ -40,10 +103,11 @@ pub fn sources(given: &[collect::Source], output: &Path) -> Vec<Source> {
             known.entry(place).or_default().push_back(slug);
         }
     }
-    let source = |collect::Source { path, name }: &collect::Source| {
-        let before = known.get_mut(&place(path)).and_then(VecDeque::pop_front);
-        let slug = before.unwrap_or_else(|| new_slug(name, &mut taken));
-        Source { path: path.clone(), name: name.clone(), slug }
+    let source = |given: &class::Source| {
+        let class::Source { path, name, place: at, label } = given.clone();
+        let before = known.get_mut(&place(&at)).and_then(VecDeque::pop_front);
+        let slug = before.unwrap_or_else(|| new_slug(&name, &mut taken));
+        Source { path, name, slug, place: at, label }
     };
     given.iter().map(source).collect()
 }
@@ -71,20 +135,35 @@ fn stem(name: &str) -> &str {
 
 /// Where a submission lies, as it is noted.
 fn place(path: &Path) -> String {
-    let whole = path.canonicalize().or_else(|_| std::path::absolute(path));
-    whole.unwrap_or_else(|_| path.to_owned()).to_string_lossy().into_owned()
+    // What was in a zip has a place below the zip's.
+    let canonical = path.ancestors().find_map(|above| {
+        let inside = path.strip_prefix(above).ok()?;
+        let above = above.canonicalize().ok()?;
+        Some(if inside.as_os_str().is_empty() { above } else { above.join(inside) })
+    });
+    canonical.unwrap_or_else(|| path.to_owned()).to_string_lossy().into_owned()
 }
 
-/// Notes where a submission lies, beside what is found out about it.
+/// Notes where a submission lies and what the platform says of it, beside what is found out about it.
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn note_source(out: &Folders, path: &Path) -> anyhow::Result<()> {
-    let (file, place) = (out.instructor.join(SOURCE), place(path));
-    if fs::read_to_string(&file).is_ok_and(|noted| noted == place) {
-        return Ok(());
+pub fn note_source(out: &Folders, source: &Source) -> anyhow::Result<()> {
+    let label = serde_json::to_vec_pretty(&source.label)?;
+    for (name, bytes) in [(SOURCE, place(&source.place).into_bytes()), (LABEL, label)] {
+        let file = out.instructor.join(name);
+        if fs::read(&file).is_ok_and(|noted| noted == bytes) {
+            continue;
+        }
+        write_whole(&file, &bytes).with_context(|| format!("cannot write {}", file.display()))?;
     }
-    write_whole(&file, place.as_bytes()).with_context(|| format!("cannot write {}", file.display()))
+    Ok(())
+}
+
+/// What the platform said of a submission that an earlier run graded.
+pub fn label(output: &Path, slug: &str) -> Option<Label> {
+    let file = output.join(report::INSTRUCTOR).join(slug).join(LABEL);
+    serde_json::from_slice(&fs::read(file).ok()?).ok()?
 }
 
 /// The instructor's folders of a report's submissions, sorted.
@@ -98,17 +177,19 @@ fn folders(output: &Path) -> Vec<String> {
 }
 
 /// Adds to `records`, made of some of the submissions `all`, what earlier runs into the same report
-/// found out about others, and says so. Answers whose were found out under other conditions.
+/// found out about others, and says so; `aside` are attempts that do not count. Answers whose were found out under
+/// other conditions.
 pub fn join(
     kept: &RecordCache,
     output: &Path,
     all: &[Source],
+    aside: &HashSet<String>,
     records: &mut Vec<Record>,
 ) -> Vec<String> {
     let graded: HashSet<String> = records.iter().map(|record| record.slug.clone()).collect();
     let (mut incomparable, mut gone) = (Vec::new(), Vec::new());
     let mut missing: HashSet<&str> = all.iter().map(|source| source.slug.as_str()).collect();
-    missing.retain(|slug| !graded.contains(*slug));
+    missing.retain(|slug| !graded.contains(*slug) && !aside.contains(*slug));
     for slug in folders(output) {
         let instructor = output.join(report::INSTRUCTOR).join(&slug);
         if graded.contains(&slug) {
@@ -122,7 +203,7 @@ pub fn join(
                 continue;
             }
         };
-        let is_given = missing.remove(slug.as_str());
+        let is_given = missing.remove(slug.as_str()) || aside.contains(&slug);
         if !is_given && let Some(new) = records.iter().find(|new| is_newer(new, &record)) {
             match kept.replace(&instructor) {
                 Ok(()) => eprintln!(
@@ -267,7 +348,13 @@ mod tests {
     use crate::report::sample;
 
     fn source(path: &str, slug: &str) -> Source {
-        Source { path: path.into(), name: path.into(), slug: slug.into() }
+        Source {
+            path: path.into(),
+            name: path.into(),
+            slug: slug.into(),
+            place: path.into(),
+            label: None,
+        }
     }
 
     #[test]
@@ -281,14 +368,14 @@ mod tests {
             path
         };
         let note = |sources: &[Source]| {
-            for Source { path, slug, .. } in sources {
-                let at = |name: &str| output.join(name).join(slug);
+            for source in sources {
+                let at = |name: &str| output.join(name).join(&source.slug);
                 let out = Folders { student: at("."), instructor: at(report::INSTRUCTOR) };
-                note_source(&out, path).unwrap();
+                note_source(&out, source).unwrap();
             }
         };
         let sources = |paths: &[PathBuf], output: &Path| {
-            let given: Vec<_> = paths.iter().map(|path| collect::Source::given(path)).collect();
+            let given: Vec<_> = paths.iter().map(|path| class::Source::given(path)).collect();
             super::sources(&given, output)
         };
         let slugs = |sources: &[Source]| -> Vec<String> {

@@ -7,6 +7,7 @@ use super::batch::Batch;
 use super::context::cores;
 use super::render::AdapterChoice;
 use super::terminal;
+use crate::class::{Attempt, Kind};
 use crate::evidence::Verdict;
 use crate::grading::{INTERNAL_ERROR, Mode};
 use crate::report::{self, BatchReport};
@@ -14,9 +15,20 @@ use crate::report::{self, BatchReport};
 /// Options of `umbra grade`.
 #[derive(clap::Args)]
 pub struct GradeArguments {
-    /// Archives, submission folders, or folders that hold them at any depth, as a learning platform lays them out
+    /// Archives, submission folders, or what holds many: a folder at any depth, or the zip that Brightspace, Canvas,
+    /// Moodle or Gradescope gave
     #[arg(required = true)]
-    hand_ins: Vec<PathBuf>,
+    submissions: Vec<PathBuf>,
+    /// Where the submissions come from [default: recognised by their names]
+    #[arg(long, value_enum, value_name = "KIND")]
+    from: Option<Kind>,
+    /// The class list: a CSV file as a learning platform exports it. Tells whose each submission is, and who is
+    /// missing; kept in --output for later runs
+    #[arg(long, value_name = "LIST.csv")]
+    class: Option<PathBuf>,
+    /// Which of a student's attempts counts
+    #[arg(long, value_enum, default_value_t = Attempt::Latest)]
+    attempt: Attempt,
     /// Where to write report.html, report.json, grades.csv and each submission's own report. Results
     /// are kept there too: the same command resumes an interrupted batch and grades what is new or has
     /// changed; other submissions join the class that is there
@@ -90,7 +102,7 @@ pub enum IsolationChoice {
 /// Grades submissions and prints the table; exit 0 when all could be graded, whatever their points.
 pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let batch = Batch {
-        paths: arguments.hand_ins.clone(),
+        paths: arguments.submissions.clone(),
         output: &arguments.output,
         adapter: arguments.adapter,
         jobs: arguments.jobs.unwrap_or(cores() as usize).max(1),
@@ -100,13 +112,20 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         budget: arguments.budget,
         asked: None,
         only: &arguments.only,
+        from: arguments.from,
+        list: arguments.class.as_deref(),
+        attempt: arguments.attempt,
         force: arguments.force,
         timings: arguments.timings,
     };
-    let Some((sheet, skipped)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    let Some((sheet, collected)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
     print!("{}", report::text_table(&sheet, terminal::width(), terminal::colours())?);
-    if let Some(skipped) = skipped {
+    if let Some(skipped) = collected.skipped() {
         println!("skipped, not submissions: {skipped}");
+    }
+    if sheet.class.as_ref().is_some_and(|class| !class.undecided.is_empty()) {
+        let file = arguments.output.join(super::class::MATCHES);
+        println!("decide in {}, and run the same command again", file.display());
     }
     println!("report: {}", arguments.output.join(report::HTML_FILE).display());
     if let Some(held_back) = &sheet.held_back {

@@ -4,7 +4,6 @@ mod batch;
 mod bless;
 mod check;
 mod class;
-mod collect;
 mod compare;
 mod context;
 #[cfg(target_os = "linux")]
@@ -67,9 +66,9 @@ enum Command {
     /// Check your own working folder before you submit: builds src/, renders every public scene and
     /// says what is wrong, where, and what it looks like
     Check(check::CheckArguments),
-    /// Grade submissions: archives (.zip, .tar, .tar.gz), folders, or folders full of them
+    /// Grade submissions: archives (.zip, .tar, .tar.gz), folders, or what holds many of them
     Grade(grade::GradeArguments),
-    /// Check an archive's tree against the handout's; exits with 0 when it conforms, 1 when not
+    /// Check the tree of submissions against the handout's; exits with 0 when all conform, 1 when not
     Validate(tree::ValidateArguments),
     /// Pack a working folder into an archive that conforms to the handout
     Pack(tree::PackArguments),

@@ -2,16 +2,28 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use std::sync::atomic::Ordering;
 
-use super::context::Context;
-use crate::intake::{self, IntakeError, Severity};
+use anyhow::{bail, ensure};
+use unicode_width::UnicodeWidthStr as _;
+
+use super::context::{Context, INTERRUPTED};
+use crate::class::{Collected, Kind, Wanted, collect};
+use crate::intake::{self, HandIn, IntakeError, Severity, Validation};
+use crate::report::harmless;
 
 /// Options of `umbra validate`.
 #[derive(clap::Args)]
 pub struct ValidateArguments {
-    /// The archive or folder
-    archive: PathBuf,
+    /// Archives or folders of submissions, or what holds many, as `umbra grade` takes it
+    #[arg(required = true)]
+    submissions: Vec<PathBuf>,
+    /// Where the submissions come from [default: recognised by their names]
+    #[arg(long, value_enum, value_name = "KIND")]
+    from: Option<Kind>,
+    /// Print what was found as JSON: a list with one entry for each submission
+    #[arg(long, conflicts_with = "fix")]
+    json: bool,
     /// Repack a nearly conforming submission (wrong level, other names, junk) into a conforming archive
     #[arg(long, value_name = "OUT.zip")]
     fix: Option<PathBuf>,
@@ -27,25 +39,50 @@ pub struct PackArguments {
     output: Option<PathBuf>,
 }
 
-/// Prints the expected tree beside the found one; exit 0 when it conforms, 1 when not.
+/// Prints the expected tree beside the found one, or a table of many submissions; exit 0 when all conform, 1 when not.
 pub fn validate(arguments: &ValidateArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
+    for path in &arguments.submissions {
+        // A link that leads nowhere is there, and refused.
+        ensure!(path.symlink_metadata().is_ok(), "{} does not exist", path.display());
+    }
+    let scratch = tempfile::tempdir_in(&context.supervisor.scratch)?;
+    let found = match &arguments.submissions[..] {
+        // A folder that holds none is one itself, of which much is missing; a link is refused.
+        [only] if only.is_symlink() => None,
+        paths => {
+            let wanted = Wanted {
+                tree: &context.assignment.tree,
+                limits: &context.assignment.limits.archive,
+                from: arguments.from,
+                output: None,
+                scratch: scratch.path(),
+            };
+            match collect(paths, &wanted) {
+                Ok(found) => Some(found),
+                Err(error) if paths.len() > 1 || arguments.from.is_some() => return Err(error),
+                Err(_) => None,
+            }
+        }
+    };
+    let Some(found) = found else { return one(arguments, &arguments.submissions[0], &context) };
+    match &found.sources[..] {
+        [only] if !arguments.json && only.path == arguments.submissions[0] => {
+            one(arguments, &only.path, &context)
+        }
+        _ => many(arguments, &found, &context),
+    }
+}
+
+/// Of one submission, its tree.
+fn one(arguments: &ValidateArguments, archive: &Path, context: &Context) -> anyhow::Result<u8> {
     let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
     let private = tempfile::tempdir_in(&context.supervisor.scratch)?;
-    let copy = private.path().join("copy");
-    std::fs::create_dir(&copy)?;
-    let decoder = context.decoder();
-    let received = decoder.receive(&arguments.archive, &copy, tree, limits);
-    let (validation, hand_in) = match received {
-        Ok(received) => {
-            let images = decoder.image_findings(&received.hand_in, tree)?;
-            (received.validation.with(images), Ok(received.hand_in))
-        }
-        Err(IntakeError::Refused(refusal)) => {
-            (intake::validate_refusal(&refusal), Err(IntakeError::Refused(refusal)))
-        }
-        Err(error) => bail!(error),
-    };
+    let (validation, hand_in) = look(archive, &private.path().join("copy"), context)?;
+    if arguments.json {
+        println!("{}", serde_json::to_string_pretty(&[&validation])?);
+        return Ok(if validation.conforms { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER });
+    }
     print!("{}", validation.to_text());
     if let Some(out) = &arguments.fix {
         let packed = intake::fix(&hand_in?, out, tree, limits)?;
@@ -55,6 +92,92 @@ pub fn validate(arguments: &ValidateArguments, root: Option<&Path>) -> anyhow::R
         println!("repacked as {}", packed.archive.display());
     }
     Ok(if validation.conforms { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
+}
+
+/// Of many submissions, a line each.
+fn many(arguments: &ValidateArguments, found: &Collected, context: &Context) -> anyhow::Result<u8> {
+    ensure!(
+        arguments.fix.is_none(),
+        "--fix repacks one submission, found {}; hint: name one of them",
+        found.sources.len()
+    );
+    let mut validations = Vec::new();
+    for source in &found.sources {
+        context.say(&format!("reading {}", source.name));
+        let private = tempfile::tempdir_in(&context.supervisor.scratch)?;
+        let (validation, _) = look(&source.path, &private.path().join("copy"), context)?;
+        validations.push(Validation { name: source.name.clone(), ..validation });
+        if INTERRUPTED.load(Ordering::Relaxed) {
+            return Ok(super::EXIT_INTERRUPTED);
+        }
+    }
+    context.progress.end();
+    let wrong = validations.iter().filter(|validation| !validation.conforms).count();
+    if arguments.json {
+        println!("{}", serde_json::to_string_pretty(&validations)?);
+    } else {
+        let name = |validation: &Validation| harmless(&validation.name);
+        let wide = validations.iter().map(|own| name(own).width()).max().unwrap_or_default();
+        for validation in &validations {
+            let name = name(validation);
+            let gap = " ".repeat(wide - name.width());
+            println!("{name}{gap}  {}", harmless(&in_a_line(validation)));
+        }
+        println!();
+        if found.kind != Kind::Plain {
+            println!("recognised as a download of {}", found.kind.title());
+        }
+        let all = validations.len();
+        println!("{all} submissions, {} conform, {wrong} do not", all - wrong);
+        for empty in &found.empty {
+            println!("{}: {}", harmless(&empty.label.who()), harmless(&empty.reason()));
+        }
+        if let Some(skipped) = found.skipped() {
+            println!("skipped, not submissions: {skipped}");
+        }
+    }
+    let in_order = wrong == 0 && found.empty.is_empty();
+    Ok(if in_order { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
+}
+
+/// `conforms, 2 warnings`, or the first error.
+fn in_a_line(validation: &Validation) -> String {
+    let of =
+        |severity| validation.findings.iter().filter(move |finding| finding.severity == severity);
+    let plural = |count: usize, what: &str| match count {
+        0 => String::new(),
+        1 => format!(", 1 {what}"),
+        more => format!(", {more} {what}s"),
+    };
+    let warnings = plural(of(Severity::Warning).count(), "warning");
+    match of(Severity::Error).next() {
+        None => format!("conforms{warnings}"),
+        Some(first) => {
+            let more = plural(of(Severity::Error).count() - 1, "more error");
+            format!("{first}{more}{warnings}")
+        }
+    }
+}
+
+/// What there is to say of a submission, and its copy in the new folder `copy` unless it is refused.
+fn look(
+    archive: &Path,
+    copy: &Path,
+    context: &Context,
+) -> anyhow::Result<(Validation, Result<HandIn, IntakeError>)> {
+    let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
+    std::fs::create_dir(copy)?;
+    let decoder = context.decoder();
+    match decoder.receive(archive, copy, tree, limits) {
+        Ok(received) => {
+            let images = decoder.image_findings(&received.hand_in, tree)?;
+            Ok((received.validation.with(images), Ok(received.hand_in)))
+        }
+        Err(IntakeError::Refused(refusal)) => {
+            Ok((intake::validate_refusal(&refusal), Err(IntakeError::Refused(refusal))))
+        }
+        Err(error) => bail!(error),
+    }
 }
 
 /// Writes a conforming archive; exit 1 when the folder lacks something.

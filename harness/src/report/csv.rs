@@ -1,13 +1,14 @@
 //! `grades.csv`: one row a hand-in, for a grade book.
 
-use super::number::{is_range, of_part, points};
+use super::number::{is_range, of_part, points, range};
 use super::{BatchReport, Entry, ReportError, harmless};
 
 /// The grades as CSV (UTF-8, comma, `\n`). The columns are student id, last and first name, name of
-/// the hand-in, the parts, total, what it is out of, lowest and highest, unconfirmed, remarks.
+/// the hand-in, the parts, total, what it is out of, lowest and highest, unconfirmed, time, total before lateness, remarks.
 ///
 /// `total` is empty where the hand-in could not be judged wholly, so that nobody imports a number
-/// that is not decided; `lowest` and `highest` are filled only there. `unconfirmed` is what images
+/// that is not decided; `submitted` and `before_late` tell of late submissions: when, and what was earned before
+/// the penalty. `lowest` and `highest` are filled only there. `unconfirmed` is what images
 /// alone are worth once the instructor confirms them, and empty where that is nothing. A part that is a range reads
 /// `0..20`.
 ///
@@ -21,7 +22,8 @@ pub fn grades(sheet: &BatchReport) -> Result<String, ReportError> {
     let mut writer = ::csv::Writer::from_writer(Vec::new());
     let mut head = vec!["student_id", "last_name", "first_name", "hand_in"];
     head.extend(sheet.rules.parts.iter().map(|part| part.id.as_str()));
-    head.extend(["total", "out_of", "lowest", "highest", "unconfirmed", "remarks"]);
+    head.extend(["total", "out_of", "lowest", "highest", "unconfirmed"]);
+    head.extend(["submitted", "before_late", "remarks"]);
     let head = head.into_iter().map(cell);
     writer.write_record(head).map_err(|error| format(error.to_string()))?;
     for entry in &sheet.entries {
@@ -32,7 +34,7 @@ pub fn grades(sheet: &BatchReport) -> Result<String, ReportError> {
     String::from_utf8(bytes).map_err(|error| format(error.to_string()))
 }
 
-fn row(sheet: &BatchReport, Entry { record, grade }: &Entry) -> Vec<String> {
+fn row(sheet: &BatchReport, Entry { record, grade, standing }: &Entry) -> Vec<String> {
     let student = &record.student;
     let mut row = vec![
         student.id.clone(),
@@ -51,6 +53,10 @@ fn row(sheet: &BatchReport, Entry { record, grade }: &Entry) -> Vec<String> {
     row.push(only(open, grade.points));
     row.push(only(open, grade.points_max));
     row.push(only(grade.unconfirmed > 0.0, grade.unconfirmed));
+    let late = standing.late.as_ref();
+    row.push(late.map(|late| late.submitted.clone()).unwrap_or_default());
+    let charged = late.filter(|late| late.before != late.after);
+    row.push(charged.map(|late| range(late.before[0], late.before[1])).unwrap_or_default());
     row.push(grade.remarks.join("; "));
     row
 }
@@ -82,10 +88,10 @@ mod tests {
         assert_eq!(
             grades(&sample::sheet()).unwrap(),
             "\
-student_id,last_name,first_name,hand_in,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,lowest,highest,unconfirmed,remarks
-260000001,Lampglow,Ada,a2_ada.zip,5,10,20,15,25,20,95,75,,,,
-0260000002,Müller,Jörg,two_cosines.tar.gz,5,10,9.85,15,25,0..20,,75,64.85,84.85,,
-260000003,山田,花子,山田_花子.zip,0,0,0,0,0,0,0,75,,,11.44,the source does not build; the images alone earn 11.44 points once the instructor confirms
+student_id,last_name,first_name,hand_in,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,lowest,highest,unconfirmed,submitted,before_late,remarks
+260000001,Lampglow,Ada,a2_ada.zip,5,10,20,15,25,20,95,75,,,,,,
+0260000002,Müller,Jörg,two_cosines.tar.gz,5,10,9.85,15,25,0..20,,75,64.85,84.85,,,,
+260000003,山田,花子,山田_花子.zip,0,0,0,0,0,0,0,75,,,11.44,,,the source does not build; the images alone earn 11.44 points once the instructor confirms
 "
         );
     }

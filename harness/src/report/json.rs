@@ -8,6 +8,7 @@ use serde_json::ser::{CharEscape, Formatter, PrettyFormatter};
 
 use super::number::significant;
 use super::{BatchReport, Entry, ReportError, harmless};
+use crate::class::{Class, Standing};
 use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, CheckInfo};
 use crate::grading::{Conditions, StageCost, Student};
@@ -34,6 +35,8 @@ struct Report<'a> {
     /// Seed and scenes; `null` when nothing was held back.
     held_back: Option<&'a HeldBack>,
     hand_ins: Vec<HandIn<'a>>,
+    /// Who is missing, and what the instructor must decide; `null` where one submission was checked.
+    class: Option<&'a Class>,
     /// By slug. Last, and the only thing that two runs over the same hand-ins do not share.
     timings: BTreeMap<&'a str, &'a [StageCost]>,
 }
@@ -55,6 +58,8 @@ struct HandIn<'a> {
     slug: &'a str,
     digest: &'a str,
     student: &'a Student,
+    /// Whose it is by the class list, and when it came.
+    standing: &'a Standing,
     conditions: usize,
     points: f64,
     points_max: f64,
@@ -107,6 +112,7 @@ pub fn report(sheet: &BatchReport) -> Result<String, ReportError> {
         conditions,
         held_back: sheet.held_back.as_ref(),
         hand_ins,
+        class: sheet.class.as_ref(),
         timings,
     };
     let format = |reason: String| ReportError::Format { file: super::JSON_FILE, reason };
@@ -118,12 +124,16 @@ pub fn report(sheet: &BatchReport) -> Result<String, ReportError> {
     String::from_utf8(bytes).map_err(|error| format(error.to_string()))
 }
 
-fn hand_in<'a>(Entry { record, grade }: &'a Entry, conditions: &[&Conditions]) -> HandIn<'a> {
+fn hand_in<'a>(
+    Entry { record, grade, standing }: &'a Entry,
+    conditions: &[&Conditions],
+) -> HandIn<'a> {
     HandIn {
         name: &record.name,
         slug: &record.slug,
         digest: &record.digest,
         student: &record.student,
+        standing,
         conditions: conditions.iter().position(|&c| *c == record.conditions).unwrap_or_default(),
         points: grade.points,
         points_max: grade.points_max,
@@ -250,8 +260,9 @@ mod tests {
     #[test]
     fn keys_keep_their_order() {
         let text = report(&sample::sheet()).unwrap();
-        let places = ["schema", "version", "assignment", "conditions", "hand_ins", "timings"]
-            .map(|key| text.find(&format!("\n  \"{key}\":")).unwrap());
+        let places =
+            ["schema", "version", "assignment", "conditions", "hand_ins", "class", "timings"]
+                .map(|key| text.find(&format!("\n  \"{key}\":")).unwrap());
         assert!(places.is_sorted(), "{places:?}");
     }
 

@@ -34,6 +34,7 @@ pub use self::text::{
 };
 
 use crate::assignment::Assignment;
+use crate::class::{Class, Standing};
 use crate::evidence::Check;
 use crate::files::write_whole;
 use crate::grading::Record;
@@ -54,8 +55,11 @@ pub const INSTRUCTOR: &str = "instructor";
 pub struct Entry {
     /// What was found out.
     pub record: Record,
-    /// What it is worth.
+    /// What it is worth, after what lateness costs.
     pub grade: Grade,
+    /// Whose it is, and when it came.
+    #[serde(default)]
+    pub standing: Standing,
 }
 
 /// Everything that a report of a batch is made from.
@@ -75,6 +79,9 @@ pub struct BatchReport {
     pub held_back: Option<HeldBack>,
     /// The hand-ins, in the order to be shown.
     pub entries: Vec<Entry>,
+    /// What is known of the class as a whole; nothing where one submission is checked.
+    #[serde(default)]
+    pub class: Option<Class>,
 }
 
 impl Entry {
@@ -148,6 +155,7 @@ impl BatchReport {
             rules: assignment.rules.clone(),
             held_back,
             entries,
+            class: None,
         }
     }
 

@@ -2,6 +2,7 @@
 //! whose bonus could not be judged, one that does not build.
 
 use super::{BatchReport, Entry};
+use crate::class::Standing;
 use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, CheckId, Evidence, Measure, Picture, Verdict};
 use crate::grading::{Conditions, Record, StageCost, Student};
@@ -22,6 +23,7 @@ pub(crate) fn sheet() -> BatchReport {
             scenes: vec![("held-back-1".into(), "cbox".into())],
         }),
         entries: vec![perfect(), two_cosines(), does_not_build()],
+        class: None,
     }
 }
 
@@ -74,7 +76,7 @@ fn entry(name: &str, slug: &str, student: [&str; 3], conditions: Conditions) -> 
         out_of: 75.0,
         remarks: Vec::new(),
     };
-    Entry { record, grade }
+    Entry { record, grade, standing: Standing::default() }
 }
 
 fn conditions(adapter: &str) -> Conditions {

@@ -4,6 +4,7 @@ use super::super::number::{count, due, is_range, of_part, points, range};
 use super::super::{BatchReport, Entry, HTML_FILE, INSTRUCTOR, ReportError};
 use super::markup::Html;
 use super::{SORT, begin, class, end, part_class};
+use crate::class::Class;
 use crate::evidence::CheckId;
 use crate::grading::Conditions;
 use crate::intake::Severity;
@@ -29,6 +30,9 @@ pub fn batch(sheet: &BatchReport) -> Result<String, ReportError> {
     }
     html.raw("; due <time>").text(&due(&sheet.due)).raw("</time></p>\n</header>\n<main>\n");
     table(&mut html, sheet);
+    if let Some(class) = &sheet.class {
+        about(&mut html, sheet, class);
+    }
     parts(&mut html, sheet);
     conditions(&mut html, sheet);
     html.raw("</main>\n<script>").raw(SORT).raw("</script>\n");
@@ -58,7 +62,7 @@ fn table(html: &mut Html, sheet: &BatchReport) {
 }
 
 fn row(html: &mut Html, sheet: &BatchReport, entry: &Entry) {
-    let Entry { record, grade } = entry;
+    let Entry { record, grade, .. } = entry;
     let student = &record.student;
     let name = student.full_name();
     let shown = if name.is_empty() { "(no name)" } else { &name };
@@ -95,6 +99,46 @@ fn row(html: &mut Html, sheet: &BatchReport, entry: &Entry) {
         }
     }
     html.raw("</td><td class=\"remarks\">").text(&grade.remarks.join("; ")).raw("</td></tr>\n");
+}
+
+/// Where the class comes from, who is missing, and what the instructor must decide.
+fn about(html: &mut Html, sheet: &BatchReport, class: &Class) {
+    let aside: Vec<&Entry> =
+        sheet.entries.iter().filter(|entry| !entry.standing.set_aside.is_empty()).collect();
+    if class.is_quiet() && aside.is_empty() {
+        return;
+    }
+    html.raw("<section>\n<h2>The class</h2>\n");
+    if !class.undecided.is_empty() {
+        html.raw("<p class=\"notice\">To be decided in <code>matches.toml</code>:</p>\n<ul>\n");
+        for own in &class.undecided {
+            html.raw("<li>").text(&own.submission).raw(": ").text(&own.reason).raw("</li>\n");
+        }
+        html.raw("</ul>\n");
+    }
+    if !class.missing.is_empty() {
+        html.raw("<p>").text(&count(class.missing.len(), "student")).raw(" of ");
+        html.text(&class.list).raw(" without a submission:</p>\n<ul>\n");
+        for missing in &class.missing {
+            html.raw("<li>").text(&missing.student.who());
+            html.raw(if missing.reason.is_empty() { "" } else { ": " }).text(&missing.reason);
+            html.raw("</li>\n");
+        }
+        html.raw("</ul>\n");
+    }
+    if !aside.is_empty() {
+        html.raw("<p>Attempts that count:</p>\n<ul>\n");
+        for Entry { record, standing, .. } in aside {
+            html.raw("<li>").text(&record.name).raw(", not ");
+            html.text(&standing.set_aside.join(", ")).raw("</li>\n");
+        }
+        html.raw("</ul>\n");
+    }
+    if !class.not_counted.is_empty() {
+        html.raw("<p>Not counted, as <code>matches.toml</code> says: ");
+        html.text(&class.not_counted.join(", ")).raw("</p>\n");
+    }
+    html.raw("</section>\n");
 }
 
 fn parts(html: &mut Html, sheet: &BatchReport) {

@@ -26,7 +26,7 @@ pub fn hand_in(sheet: &BatchReport, entry: &Entry, reader: Reader) -> String {
             &known
         }
     };
-    let Entry { record, grade } = entry;
+    let Entry { record, grade, standing } = entry;
     let name = record.student.full_name();
     let name = if name.is_empty() { &record.name } else { &name };
     let mut html = begin(&format!("{name} - {}", sheet.title));
@@ -57,6 +57,10 @@ pub fn hand_in(sheet: &BatchReport, entry: &Entry, reader: Reader) -> String {
             "<p class=\"notice\">A range: not everything could be judged. The part says why.</p>\n",
         );
     }
+    if !standing.set_aside.is_empty() {
+        html.raw("<p class=\"notice\">Other attempts, which do not count: ");
+        html.text(&standing.set_aside.join(", ")).raw("</p>\n");
+    }
     for remark in &grade.remarks {
         html.raw("<p class=\"notice\">").text(remark).raw("</p>\n");
     }
@@ -86,7 +90,7 @@ pub fn hand_in(sheet: &BatchReport, entry: &Entry, reader: Reader) -> String {
     end(html, sheet)
 }
 
-fn parts(html: &mut Html, Entry { record, grade }: &Entry, public_pictures: &str) {
+fn parts(html: &mut Html, Entry { record, grade, .. }: &Entry, public_pictures: &str) {
     html.raw("<section>\n<h2>Parts</h2>\n<table class=\"parts\">\n<thead><tr>");
     html.raw("<th scope=\"col\">Part</th><th scope=\"col\">Points</th></tr></thead>\n<tbody>\n");
     for part in &grade.parts {

@@ -19,7 +19,7 @@ const VERDICT_WIDTH: usize = 17;
 /// noticed besides; findings; what the compiler said. With `verbose`, every check with value, bound
 /// and verdict too, and under which conditions they were made.
 pub fn detail(sheet: &BatchReport, entry: &Entry, look: Look, verbose: bool) -> String {
-    let Entry { record, grade } = entry;
+    let Entry { record, grade, .. } = entry;
     let mut page = Page::new(look.width, look.colours);
     page.wrapped(&[], Style::Heading, &sheet.title);
     page.wrapped(&[(Style::Plain, "checked  ")], Style::Plain, &record.name);
@@ -57,7 +57,7 @@ fn heading(page: &mut Page, text: &str) {
     page.line(&[(Style::Heading, text)]);
 }
 
-fn parts(page: &mut Page, Entry { record, grade }: &Entry, verbose: bool) {
+fn parts(page: &mut Page, Entry { record, grade, .. }: &Entry, verbose: bool) {
     heading(page, "parts");
     let worth = |part| format!("{}/{}", of_part(part), points(part.out_of));
     let ids = grade.parts.iter().map(|part| columns(&part.id)).max().unwrap_or(0);

@@ -1,5 +1,6 @@
 //! What the console shows: a table for many submissions, the parts of one with what is next to do.
 
+mod class;
 mod closing;
 mod detail;
 mod explain;

@@ -51,6 +51,9 @@ pub fn table(sheet: &BatchReport, width: usize, colours: bool) -> Result<String,
         open => summary.push_str(&format!(", {open} not wholly judged (a range of points)")),
     }
     page.wrapped(&[], Style::Plain, &summary);
+    if let Some(class) = &sheet.class {
+        super::class::class(&mut page, sheet, class);
+    }
     Ok(page.finish())
 }
 
@@ -140,7 +143,7 @@ impl Layout {
     }
 
     fn row(&self, page: &mut Page, sheet: &BatchReport, entry: &Entry, remarks: &[&str]) {
-        let Entry { record, grade } = entry;
+        let Entry { record, grade, .. } = entry;
         let names = format!(
             "{}{GAP}{}",
             left(&record.name, self.name),

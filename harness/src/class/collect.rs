@@ -1,0 +1,524 @@
+//! Which submissions a command line means: archives and folders, found wherever they lie below a folder or in a
+//! zip of many, as learning platforms lay them out (`class/Ann_1_assignsubmission_file/a2.zip`).
+
+use std::collections::{BTreeMap, HashMap};
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, bail};
+
+use super::download::{self, GRADESCOPE_METADATA};
+use super::layout::{self, Kind, Label, gradescope_metadata, is_labelled, label_of};
+use crate::intake::{Limits, TreeSpec, format_of_bytes, printable};
+
+/// So many folders below the one that is given.
+const MAX_DEPTH: usize = 8;
+/// What stands in place of the files of an empty folder.
+const NOTHING: &str = " (nothing in it)";
+/// So many skipped files are named.
+const NAMED: usize = 12;
+/// Largest metadata of a platform that is read [bytes].
+const MAX_METADATA: u64 = 64 << 20;
+/// Ends of names of archives, also of those that are refused with a reason.
+const ARCHIVES: [&str; 11] =
+    ["zip", "tar", "gz", "tgz", "rar", "7z", "bz2", "tbz", "xz", "txz", "zst"];
+/// Ends of names of files that are zips by content and hold something else.
+const DOCUMENTS: [&str; 10] =
+    ["docx", "xlsx", "pptx", "odt", "ods", "odp", "pages", "key", "jar", "epub"];
+/// Ends of names of files that make a folder a submission, whatever its tree.
+const PARTS: [&str; 8] = ["rs", "wgsl", "exr", "cpp", "hpp", "cc", "h", "py"];
+
+/// A submission to be graded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// The archive or folder.
+    pub path: PathBuf,
+    /// What reports call it: its path from the folder that was given.
+    pub name: String,
+    /// Where it was found, the same from run to run: of one that was in a zip, the zip's path and its own in it.
+    pub place: PathBuf,
+    /// What a platform's names say of it.
+    pub label: Option<Label>,
+}
+
+impl Source {
+    /// A submission that was named itself.
+    pub fn given(path: &Path) -> Self {
+        let name = file_name(path);
+        Self { path: path.to_owned(), name, place: path.to_owned(), label: None }
+    }
+}
+
+/// A student whose submission holds nothing to grade.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Empty {
+    /// Who.
+    pub label: Label,
+    /// What there is.
+    pub files: Vec<String>,
+}
+
+impl Empty {
+    /// Why there is nothing to grade.
+    pub fn reason(&self) -> String {
+        match &self.files[..] {
+            [] => "an empty submission: it holds no file".to_owned(),
+            files => format!("an empty submission: it holds only {}", files.join(", ")),
+        }
+    }
+}
+
+/// What was found.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Collected {
+    /// Where it comes from.
+    pub kind: Kind,
+    /// The submissions, in the order of their names below each given path.
+    pub sources: Vec<Source>,
+    /// What is none.
+    pub skipped: Vec<String>,
+    /// Those of whom a platform has something, but nothing to grade.
+    pub empty: Vec<Empty>,
+}
+
+impl Collected {
+    /// What was skipped, in words; nothing when nothing was.
+    pub fn skipped(&self) -> Option<String> {
+        skipped(&self.skipped)
+    }
+}
+
+fn skipped(names: &[String]) -> Option<String> {
+    let named = names.iter().take(NAMED).map(|name| printable(name));
+    let named = named.collect::<Vec<_>>().join(", ");
+    let more = names.len().saturating_sub(NAMED);
+    match (names.is_empty(), more) {
+        (true, _) => None,
+        (_, 0) => Some(named),
+        (_, more) => Some(format!("{named} and {more} more")),
+    }
+}
+
+/// What is asked for.
+pub struct Wanted<'a> {
+    /// The tree of a submission.
+    pub tree: &'a TreeSpec,
+    /// The size of a submission.
+    pub limits: &'a Limits,
+    /// What the instructor says the download is; else it is recognised.
+    pub from: Option<Kind>,
+    /// A folder that is no submission, should it lie there.
+    pub output: Option<&'a Path>,
+    /// An empty folder for what zips of many hold.
+    pub scratch: &'a Path,
+}
+
+/// Finds the submissions at and below `paths`, and what the platform's names say of them.
+///
+/// # Errors
+/// When a path leads nowhere or to no submission, or a zip of many cannot be unpacked.
+pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> {
+    let output = wanted.output.and_then(|output| output.canonicalize().ok());
+    let mut search = Search { wanted, output, unpacked: 0, found: Found::default() };
+    for path in paths {
+        let before = search.found.sources.len();
+        let said = search.found.skipped.len();
+        if path.is_dir() && !is_submission(path, wanted.tree)? {
+            search.descend(path, path, "", 0)?;
+        } else if !search.download(path, path, "", wanted.from)? {
+            search.found.sources.push(Source::given(path));
+        }
+        if search.found.sources.len() == before {
+            let found = &search.found.skipped[said..];
+            let other =
+                skipped(found).map_or("it is empty".into(), |names| format!("it holds {names}"));
+            let platform = wanted.from.filter(|kind| *kind != Kind::Plain);
+            let platform = platform.map_or(String::new(), |kind| {
+                format!(", in {} named like {}", kind.title(), kind.pattern())
+            });
+            bail!(
+                "{}: there is no submission: expected archives (.zip, .tar, .tar.gz) or folders with src/ or \
+                 config.json, at most {MAX_DEPTH} folders deep{platform}; {other}",
+                path.display()
+            );
+        }
+    }
+    Ok(search.found.labelled(wanted.from))
+}
+
+/// What a search has found so far.
+#[derive(Default)]
+struct Found {
+    sources: Vec<Source>,
+    skipped: Vec<String>,
+    /// Of clones: their names below the given path.
+    clones: Vec<String>,
+    /// What Gradescope says of its folders.
+    metadata: Vec<Label>,
+}
+
+impl Found {
+    /// Recognises the kind and reads all names by it.
+    fn labelled(mut self, from: Option<Kind>) -> Collected {
+        // The path that was given may itself be a student's folder.
+        let full = |source: &Source| match source.place.to_string_lossy() {
+            place if place.ends_with(&source.name) => {
+                let above = place[..place.len() - source.name.len()].trim_end_matches('/');
+                let above = above.rsplit('/').next().unwrap_or_default();
+                format!("{above}/{}", source.name)
+            }
+            _ => source.name.clone(),
+        };
+        let names: Vec<String> = self.sources.iter().map(full).collect();
+        let last = |name: &str| name.rsplit('/').next().unwrap_or_default().to_owned();
+        let clones: Vec<String> = self.clones.iter().map(|name| last(name)).collect();
+        let prefix =
+            layout::prefix_of_clones(&clones.iter().map(String::as_str).collect::<Vec<_>>());
+        let metadata: HashMap<String, Label> =
+            self.metadata.drain(..).map(|label| (label.submission.clone(), label)).collect();
+        let label = |kind: Kind, name: &str| match kind {
+            Kind::Github => self
+                .clones
+                .iter()
+                .find(|clone| name.split('/').any(|part| part == last(clone)))
+                .map(|clone| layout::clone(&last(clone), &prefix)),
+            // Canvas names files alone.
+            Kind::Canvas => label_of(kind, &last(name)),
+            Kind::Gradescope => name
+                .split('/')
+                .find_map(|part| label_of(kind, part))
+                .map(|label| metadata.get(&label.submission).cloned().unwrap_or(label)),
+            kind => name.split('/').find_map(|part| label_of(kind, part)),
+        };
+        let votes = |kind: &Kind| names.iter().filter(|name| label(*kind, name).is_some()).count();
+        let recognised = || {
+            // The first of those with most.
+            let best = Kind::PLATFORMS.into_iter().rev().max_by_key(votes);
+            let most_are = |kind: &Kind| votes(kind) > 0 && 2 * votes(kind) >= names.len();
+            best.filter(most_are).unwrap_or_default()
+        };
+        let kind = from.unwrap_or_else(recognised);
+        let labels: Vec<Option<Label>> = names.iter().map(|name| label(kind, name)).collect();
+        let mut empty: BTreeMap<String, Empty> = BTreeMap::new();
+        let is_known =
+            |own: &Label| labels.iter().flatten().any(|label| label.submission == own.submission);
+        for name in &self.skipped {
+            if let Some(label) = label(kind, name).filter(|label| !is_known(label)) {
+                let entry = empty.entry(label.submission.clone());
+                let files = &mut entry.or_insert(Empty { label, files: Vec::new() }).files;
+                files.extend(Some(last(name)).filter(|file| file != NOTHING));
+            }
+        }
+        let empty = empty.into_values().collect();
+        for (source, label) in self.sources.iter_mut().zip(labels) {
+            source.label = label;
+        }
+        Collected { kind, sources: self.sources, skipped: self.skipped, empty }
+    }
+}
+
+struct Search<'a> {
+    wanted: &'a Wanted<'a>,
+    output: Option<PathBuf>,
+    /// So many zips of many were unpacked.
+    unpacked: usize,
+    found: Found,
+}
+
+impl Search<'_> {
+    /// Searches a folder; it was found at `place`, and names of what is in it begin with `inside`.
+    fn descend(
+        &mut self,
+        folder: &Path,
+        place: &Path,
+        inside: &str,
+        depth: usize,
+    ) -> anyhow::Result<()> {
+        let tree = self.wanted.tree;
+        let downloads = self.downloads(folder, depth)?;
+        for entry in entries(folder)? {
+            let path = entry.path();
+            let file_name = entry.file_name().to_string_lossy().into_owned();
+            let name = format!("{inside}{file_name}");
+            let place = place.join(entry.file_name());
+            let kind =
+                entry.file_type().with_context(|| format!("cannot read {}", path.display()))?;
+            let is_hidden = file_name.starts_with('.') || tree.ignored_by(&file_name).is_some();
+            if is_hidden {
+                self.found.skipped.push(name);
+            } else if kind.is_dir() {
+                let is_output = |output: &PathBuf| path.canonicalize().is_ok_and(|p| p == *output);
+                if self.output.as_ref().is_some_and(is_output) {
+                    continue;
+                }
+                if path.join(".git").exists() {
+                    self.found.clones.push(name.clone());
+                }
+                if is_submission(&path, tree)? {
+                    self.found.sources.push(Source { path, name, place, label: None });
+                    continue;
+                }
+                let before = (self.found.sources.len(), self.found.skipped.len());
+                if depth < MAX_DEPTH {
+                    self.descend(&path, &place, &format!("{name}/"), depth + 1)?;
+                }
+                if before == (self.found.sources.len(), self.found.skipped.len()) {
+                    self.found.skipped.push(format!("{name}/{NOTHING}"));
+                }
+            } else if downloads && self.download(&path, &place, &format!("{name}/"), None)? {
+                // Its submissions are found.
+            } else if kind.is_symlink() || (kind.is_file() && is_archive(&path)) {
+                // A link is refused as a submission, so that somebody looks at it.
+                self.found.sources.push(Source { path, name, place, label: None });
+            } else {
+                if file_name == GRADESCOPE_METADATA {
+                    self.read_metadata(&path)?;
+                }
+                self.found.skipped.push(name);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether all archives in a folder that was given are zips of many. One among others may be a student's
+    /// that is made to look like one.
+    fn downloads(&self, folder: &Path, depth: usize) -> anyhow::Result<bool> {
+        if depth > 0 {
+            return Ok(false);
+        }
+        let mut several = false;
+        for entry in entries(folder)? {
+            let path = entry.path();
+            if has_end_of_archive(&path.to_string_lossy()) && path.is_file() {
+                let is_one = download::may_be(&path)
+                    && !is_labelled(&file_name(&path))
+                    && download::names(&path)
+                        .is_some_and(|names| download::is_download(&names, self.wanted.tree, None));
+                if !is_one {
+                    return Ok(false);
+                }
+                several = true;
+            }
+        }
+        Ok(several)
+    }
+
+    /// Unpacks a zip of many and searches it; false where it is none.
+    fn download(
+        &mut self,
+        path: &Path,
+        place: &Path,
+        inside: &str,
+        from: Option<Kind>,
+    ) -> anyhow::Result<bool> {
+        let is_one = path.is_file()
+            && !path.is_symlink()
+            && download::may_be(path)
+            && !is_labelled(&file_name(path))
+            && download::names(path)
+                .is_some_and(|names| download::is_download(&names, self.wanted.tree, from));
+        if !is_one {
+            return Ok(false);
+        }
+        self.unpacked += 1;
+        let into = self.wanted.scratch.join(self.unpacked.to_string());
+        fs::create_dir_all(&into).with_context(|| format!("cannot make {}", into.display()))?;
+        let skipped = download::unpack(path, &into, self.wanted.limits)?;
+        self.found.skipped.extend(skipped.into_iter().map(|name| format!("{inside}{name}")));
+        // A zip in it is a submission, even where it looks like another zip of many.
+        self.descend(&into, place, inside, 1)?;
+        Ok(true)
+    }
+
+    fn read_metadata(&mut self, path: &Path) -> anyhow::Result<()> {
+        let cannot = || format!("cannot read {}", path.display());
+        let file = fs::File::open(path).with_context(cannot)?;
+        let mut bytes = Vec::new();
+        file.take(MAX_METADATA).read_to_end(&mut bytes).with_context(cannot)?;
+        self.found.metadata.extend(gradescope_metadata(&String::from_utf8_lossy(&bytes)));
+        Ok(())
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+fn entries(folder: &Path) -> anyhow::Result<Vec<fs::DirEntry>> {
+    let read = || folder.read_dir()?.collect::<std::io::Result<Vec<_>>>();
+    let mut entries = read().with_context(|| format!("cannot read {}", folder.display()))?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    Ok(entries)
+}
+
+/// Whether a folder is a submission itself: it holds a folder of the tree; or `config.json` or parts of one,
+/// and no archive, which then is the submission.
+fn is_submission(folder: &Path, tree: &TreeSpec) -> anyhow::Result<bool> {
+    let (mut is_part, mut holds_archive, mut has_top) = (false, false, false);
+    for entry in entries(folder)? {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        // A folder of many students' is none, whatever else lies there.
+        if is_labelled(&name) {
+            return Ok(false);
+        }
+        let kind =
+            entry.file_type().with_context(|| format!("cannot read {}", folder.display()))?;
+        has_top |= kind.is_dir() && tree.is_top_folder(&name);
+        if kind.is_file() {
+            let is_expected = tree.files.iter().any(|file| file.path.eq_ignore_ascii_case(&name));
+            is_part |= is_expected || PARTS.contains(&end_of(&name).as_str());
+            holds_archive |= is_archive(&entry.path());
+        }
+    }
+    Ok(has_top || (is_part && !holds_archive))
+}
+
+/// What follows the last dot of a name, in lower case.
+pub(super) fn end_of(name: &str) -> String {
+    name.rsplit_once('.').map(|(_, end)| end.to_lowercase()).unwrap_or_default()
+}
+
+/// Whether a file is named like an archive.
+pub(super) fn has_end_of_archive(name: &str) -> bool {
+    ARCHIVES.contains(&end_of(name).as_str())
+}
+
+/// Whether a file is an archive by its name or, when that says nothing, by its content.
+fn is_archive(path: &Path) -> bool {
+    let end = end_of(&path.to_string_lossy());
+    if ARCHIVES.contains(&end.as_str()) {
+        return true;
+    }
+    if DOCUMENTS.contains(&end.as_str()) || PARTS.contains(&end.as_str()) {
+        return false;
+    }
+    let mut head = Vec::new();
+    let read = fs::File::open(path).and_then(|file| file.take(1 << 10).read_to_end(&mut head));
+    // Nothing but zeros would be an empty tar.
+    read.is_ok() && head.iter().any(|byte| *byte != 0) && format_of_bytes(&head).is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn class(files: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = folder.path().join(file);
+            if file.ends_with('/') {
+                fs::create_dir_all(path).unwrap();
+                continue;
+            }
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "x").unwrap();
+        }
+        folder
+    }
+
+    fn find(paths: &[PathBuf], output: &Path) -> anyhow::Result<Collected> {
+        let scratch = tempfile::tempdir().unwrap();
+        let (tree, limits) = (TreeSpec::default(), Limits::default());
+        let (from, output) = (None, Some(output));
+        collect(
+            paths,
+            &Wanted { tree: &tree, limits: &limits, from, output, scratch: scratch.path() },
+        )
+    }
+
+    fn found(folder: &tempfile::TempDir) -> (Vec<String>, Vec<String>) {
+        let paths = [folder.path().to_owned()];
+        let found = find(&paths, &folder.path().join("out")).unwrap();
+        (found.sources.into_iter().map(|source| source.name).collect(), found.skipped)
+    }
+
+    #[test]
+    fn submissions_are_found_however_deep_and_junk_is_named() {
+        let class = class(&[
+            "Ann_1_assignsubmission_file/a2.zip",
+            "Bob_2_assignsubmission_file/a2/src/lib.rs",
+            "Bob_2_assignsubmission_onlinetext/onlinetext.html",
+            "Cem_3/config.json",
+            "Dan_4/config.json",
+            "Dan_4/a2_dan.tar.gz",
+            "Eve_5/",
+            "Fay_6/code/lib.rs",
+            "group/of/Gil_7.rar",
+            "Hal_8/Src/lib.rs",
+            "Hal_8/old.zip",
+            "__MACOSX/a2.zip",
+            "out/Ann/report.html",
+            ".DS_Store",
+            "index.html",
+            "notes.txt",
+            "rules.docx",
+        ]);
+        fs::write(class.path().join("no-extension"), [b"\x1f\x8b".as_slice(), &[0; 9]].concat())
+            .unwrap();
+        let (sources, skipped) = found(&class);
+        let expected = [
+            "Ann_1_assignsubmission_file/a2.zip",
+            "Bob_2_assignsubmission_file/a2",
+            "Cem_3",
+            "Dan_4/a2_dan.tar.gz",
+            "Fay_6/code",
+            "Hal_8",
+            "group/of/Gil_7.rar",
+            "no-extension",
+        ];
+        assert_eq!(sources, expected);
+        let expected = [
+            ".DS_Store",
+            "Bob_2_assignsubmission_onlinetext/onlinetext.html",
+            "Dan_4/config.json",
+            "Eve_5/ (nothing in it)",
+            "__MACOSX",
+            "index.html",
+            "notes.txt",
+            "rules.docx",
+        ];
+        assert_eq!(skipped, expected);
+    }
+
+    #[test]
+    fn what_is_named_itself_is_a_submission_whatever_it_is() {
+        let class = class(&["notes.txt", "a/config.json"]);
+        let paths = ["notes.txt", "a"].map(|name| class.path().join(name));
+        let found = find(&paths, Path::new("out")).unwrap();
+        assert_eq!(found.sources, paths.map(|path| Source::given(&path)));
+    }
+
+    #[test]
+    fn a_folder_without_any_says_what_was_looked_for() {
+        for (files, said) in
+            [(&["a.txt", "b/"][..], "it holds a.txt, b/ (nothing in it)"), (&[][..], "it is empty")]
+        {
+            let class = class(files);
+            let paths = [class.path().to_owned()];
+            let error = find(&paths, Path::new("out")).unwrap_err().to_string();
+            assert!(error.contains("there is no submission: expected archives (.zip"), "{error}");
+            assert!(error.ends_with(said), "{error}");
+        }
+    }
+
+    #[test]
+    fn many_skipped_files_are_counted() {
+        let skipped = (0..20).map(|i| format!("{i}.txt")).collect();
+        let collected = Collected { skipped, ..Collected::default() };
+        assert!(collected.skipped().unwrap().ends_with("11.txt and 8 more"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_among_submissions_is_one_and_a_link_to_a_class_is_followed() {
+        let class = class(&["class/ann.zip", "secret/src/lib.rs"]);
+        std::os::unix::fs::symlink(class.path().join("secret"), class.path().join("class/eve"))
+            .unwrap();
+        std::os::unix::fs::symlink(class.path().join("class"), class.path().join("link")).unwrap();
+        let paths = [class.path().join("link")];
+        let found = find(&paths, Path::new("out")).unwrap();
+        let names: Vec<&str> = found.sources.iter().map(|source| source.name.as_str()).collect();
+        assert_eq!(names, ["ann.zip", "eve"]);
+    }
+}

@@ -1,0 +1,188 @@
+//! The zip that a learning platform gave, with many submissions in it.
+//!
+//! The platform made the zip, but students named what is in it. Names are checked before anything is written, and
+//! what students uploaded is only copied: archives among it are opened later, in locked children.
+
+use std::collections::HashSet;
+use std::fs::{self, File};
+use std::io::{self, BufReader, Read};
+use std::path::{Component, Path, PathBuf};
+
+use anyhow::Context as _;
+use zip::ZipArchive;
+
+use super::collect::{end_of, has_end_of_archive};
+use super::layout::{Kind, label_of};
+use crate::intake::{Limits, TreeSpec, printable};
+
+/// The file that tells a Gradescope export.
+pub const GRADESCOPE_METADATA: &str = "submission_metadata.yml";
+/// More entries than a download of a large class has.
+const MAX_ENTRIES: usize = 200_000;
+
+/// The names in a zip; none where it is no zip that can be read.
+pub fn names(path: &Path) -> Option<Vec<String>> {
+    let mut zip = open(path)?;
+    let mut names: Vec<String> = (0..zip.len())
+        .map(|index| Some(name_of(&zip.by_index_raw(index).ok()?)))
+        .collect::<Option<_>>()?;
+    mend_backslashes(&mut names);
+    Some(names)
+}
+
+fn open(path: &Path) -> Option<ZipArchive<BufReader<File>>> {
+    let zip = ZipArchive::new(BufReader::new(File::open(path).ok()?)).ok()?;
+    (zip.len() <= MAX_ENTRIES).then_some(zip)
+}
+
+/// As UTF-8 where it is, flagged or not; else by the code page of zips.
+fn name_of(file: &zip::read::ZipFile<'_, BufReader<File>>) -> String {
+    match std::str::from_utf8(file.name_raw()) {
+        Ok(name) => name.to_owned(),
+        Err(_) => file.name().map(|name| name.into_owned()).unwrap_or_default(),
+    }
+}
+
+fn mend_backslashes(names: &mut [String]) {
+    if !names.iter().any(|name| name.contains('/')) {
+        for name in names {
+            *name = name.replace('\\', "/");
+        }
+    }
+}
+
+/// Whether a zip with these names is a download of many submissions, not a submission. `from` is what the
+/// instructor says that it is.
+pub fn is_download(names: &[String], tree: &TreeSpec, from: Option<Kind>) -> bool {
+    let tops = |depth: usize| names.iter().filter_map(move |name| name.split('/').nth(depth));
+    let labelled = |kind: Kind| {
+        let of = |depth| tops(depth).filter_map(|top| label_of(kind, top));
+        of(0).chain(of(1)).map(|label| label.submission).collect::<HashSet<String>>().len()
+    };
+    if labelled(Kind::Brightspace) + labelled(Kind::Moodle) > 0 {
+        return true;
+    }
+    if names.iter().any(|name| name.ends_with(GRADESCOPE_METADATA))
+        || labelled(Kind::Gradescope) > 1
+    {
+        return true;
+    }
+    // The rest tells less: what looks like one submission is one.
+    let is_part = |name: &String| {
+        let components: Vec<&str> = name.split('/').collect();
+        let folders = &components[..components.len() - 1];
+        folders.iter().any(|folder| tree.is_top_folder(folder))
+            || components.last().is_some_and(|file| *file == "config.json")
+    };
+    let archives: Vec<&String> = names.iter().filter(|name| has_end_of_archive(name)).collect();
+    if archives.is_empty() || names.iter().any(is_part) {
+        return false;
+    }
+    let file = |name: &&&String| {
+        name.rsplit('/').next().is_some_and(|f| label_of(Kind::Canvas, f).is_some())
+    };
+    let canvas = archives.iter().filter(file).count();
+    canvas == archives.len() || archives.len() > 1 || from.is_some()
+}
+
+/// Unpacks a download into the empty folder `into`. Answers the names that were left out, with the reason.
+///
+/// # Errors
+/// When the zip cannot be read, or a file not be written.
+pub fn unpack(path: &Path, into: &Path, limits: &Limits) -> anyhow::Result<Vec<String>> {
+    let cannot = || format!("cannot unpack {}", path.display());
+    let mut zip = ZipArchive::new(BufReader::new(File::open(path).with_context(cannot)?))
+        .with_context(cannot)?;
+    let names = names(path).with_context(cannot)?;
+    // What is larger than a submission may be is refused by intake, which only needs to see that it is.
+    let most = (limits.max_total_mib << 20) + 1;
+    let mut skipped = Vec::new();
+    for (index, name) in names.iter().enumerate() {
+        let mut file = zip.by_index(index).with_context(cannot)?;
+        let mut skip = |why: &str| skipped.push(format!("{} ({why})", printable(name)));
+        let Some(inside) = safe(name) else {
+            skip("its name leaves the download");
+            continue;
+        };
+        if file.is_symlink() {
+            skip("a link");
+            continue;
+        }
+        let to = into.join(&inside);
+        if name.ends_with('/') || file.is_dir() {
+            fs::create_dir_all(&to).with_context(|| format!("cannot make {}", to.display()))?;
+            continue;
+        }
+        let folder = to.parent().unwrap_or(into);
+        fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        let mut out = match File::create_new(&to) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                skip("its name is there twice");
+                continue;
+            }
+            out => out.with_context(|| format!("cannot write {}", to.display()))?,
+        };
+        let mut content = Vec::new();
+        match file.by_ref().take(most).read_to_end(&mut content) {
+            Ok(_) => io::Write::write_all(&mut out, &content)
+                .with_context(|| format!("cannot write {}", to.display()))?,
+            Err(error) => {
+                drop(out);
+                fs::remove_file(&to).with_context(|| format!("cannot remove {}", to.display()))?;
+                skip(&format!("cannot be unpacked: {error}"));
+            }
+        }
+    }
+    Ok(skipped)
+}
+
+/// A path that stays below the folder that it is joined to.
+fn safe(name: &str) -> Option<PathBuf> {
+    let path = Path::new(name);
+    let is_plain = |part: Component| matches!(part, Component::Normal(_));
+    let has_signs = name.chars().any(char::is_control);
+    (!name.is_empty() && !has_signs && path.components().all(is_plain)).then(|| path.to_owned())
+}
+
+/// Whether a file may be a download by its name.
+pub fn may_be(path: &Path) -> bool {
+    end_of(&path.to_string_lossy()) == "zip"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn is(names: &[&str]) -> bool {
+        let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+        is_download(&names, &TreeSpec::default(), None)
+    }
+
+    #[test]
+    fn downloads_are_told_from_submissions() {
+        assert!(is(&["index.html", "1-2 - Ann Lee - Oct 5, 2019 1159 PM/a2.zip"]));
+        assert!(is(&["Lab/1-2 - Ann Lee - Oct 5, 2019 1159 PM/"]));
+        assert!(is(&["Ann Lee_1_assignsubmission_file/src/lib.rs"]));
+        assert!(is(&["export/submission_1/config.json", "export/submission_metadata.yml"]));
+        assert!(is(&["leeann_1_2_a2.zip"]));
+        assert!(is(&["a2_ann.zip", "a2_bob.tar.gz"]));
+        for own in [
+            &["config.json", "src/lib.rs"][..],
+            &["a2_ann_lee/config.json", "a2_ann_lee/old.zip", "a2_ann_lee/older.zip"],
+            &["a2_ann_lee.zip"],
+            &["submission_2/src/lib.rs"],
+            &["notes.txt"],
+            &[],
+        ] {
+            assert!(!is(own), "{own:?}");
+        }
+    }
+
+    #[test]
+    fn names_that_leave_the_download_are_not_written() {
+        for name in ["../x", "/x", "a/../../x", "", "a\0b", "a\u{1b}b"] {
+            assert_eq!(safe(name), None, "{name:?}");
+        }
+        assert_eq!(safe("Zoë - Oct 5/a2.zip"), Some(PathBuf::from("Zoë - Oct 5/a2.zip")));
+    }
+}

@@ -1,0 +1,384 @@
+//! What a late submission costs, by the policy in `config.json` and the submission's own time stamp.
+
+use jiff::tz::TimeZone;
+use jiff::{SignedDuration, Timestamp};
+use serde::{Deserialize, Serialize};
+
+use super::stamps;
+use crate::rubric::Grade;
+
+/// The policy.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Policy {
+    /// Minutes after the due date that cost nothing. What is later is late from the due date on.
+    #[serde(default)]
+    pub grace_min: u32,
+    /// What each started day or hour costs, in `unit`.
+    pub penalty: f64,
+    /// Points or percent.
+    pub unit: Unit,
+    /// What percent are of; must be there for percent, and only there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<Of>,
+    /// What is counted.
+    pub per: Per,
+    /// From when on a submission is worth nothing, RFC 3339 with offset. An extension that ends later moves it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut_off: Option<String>,
+    /// Days, each of 24 hours, that every student may be late without a penalty.
+    #[serde(default)]
+    pub late_days: u32,
+    /// Where time stamps without an offset are local to: `America/Toronto` or `-05:00`; the due date's offset when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_zone: Option<String>,
+    /// Students with another due date or other late days.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub extensions: Vec<Extension>,
+}
+
+/// What a penalty is counted in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Unit {
+    /// Points of the assignment.
+    Points,
+    /// Percent.
+    Percent,
+}
+
+/// What percent are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Of {
+    /// The points of all parts that are no bonus.
+    Maximum,
+    /// The points that the submission earned, bonus included.
+    Earned,
+}
+
+/// What is counted, each begun one whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Per {
+    /// 24 hours.
+    Day,
+    /// 60 minutes.
+    Hour,
+}
+
+/// What holds for one student.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Extension {
+    /// Student number.
+    pub student: String,
+    /// Due date, RFC 3339 with offset; everybody's when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub due: Option<String>,
+    /// Late days; everybody's when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub late_days: Option<u32>,
+}
+
+/// How late a submission is, and what that costs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Late {
+    /// When it was submitted, RFC 3339.
+    pub submitted: String,
+    /// When it was due for this student, RFC 3339.
+    pub due: String,
+    /// Seconds after the due date; 0 within the grace, or before.
+    pub late_s: i64,
+    /// Started days or hours that are charged, without those that late days cover.
+    pub charged: i64,
+    /// Late days that it takes.
+    pub late_days: u32,
+    /// Whether it came after the cut-off.
+    pub cut_off: bool,
+    /// Points before the penalty, least and most.
+    pub before: [f64; 2],
+    /// Points after it, least and most.
+    pub after: [f64; 2],
+    /// All that in a sentence; empty when it was in time.
+    pub words: String,
+}
+
+impl Policy {
+    /// What is wrong with the policy itself, if anything.
+    pub fn problem(&self) -> Option<String> {
+        if !(self.penalty.is_finite() && self.penalty >= 0.0) {
+            return Some(format!("late.penalty is {} but must be 0 or more", self.penalty));
+        }
+        match (self.unit, self.of) {
+            (Unit::Percent, None) => {
+                return Some(
+                    "late: percent of what? expected \"of\": \"maximum\" or \"earned\"".into(),
+                );
+            }
+            (Unit::Points, Some(_)) => {
+                return Some("late.of is only for percent; expected none beside points".into());
+            }
+            _ => {}
+        }
+        let zone = self.time_zone.iter().filter_map(|zone| stamps::zone(zone).err());
+        let instants = [("late.cut_off", &self.cut_off)].into_iter();
+        let instants =
+            instants.chain(self.extensions.iter().map(|own| ("late.extensions: due", &own.due)));
+        let instants = instants.filter_map(|(key, text)| {
+            let error = text.as_ref()?.parse::<Timestamp>().err()?;
+            Some(format!("{key}: {error}"))
+        });
+        zone.map(|error| format!("late.time_zone: {error}")).chain(instants).next()
+    }
+
+    /// How late a submission of the stamp `submitted` is, for a student whom the numbers `own` name. The time zone is the
+    /// policy's, else the offset of `due`. None where the stamp or the due date says nothing.
+    pub fn judge(&self, due: &str, submitted: &str, own: impl Fn(&str) -> bool) -> Option<Late> {
+        let zone = self.zone(due)?;
+        let extension = self.extensions.iter().find(|extension| own(&extension.student));
+        let class_due: Timestamp = due.parse().ok()?;
+        let due = match extension.and_then(|extension| extension.due.as_ref()) {
+            Some(due) => due.parse().ok()?,
+            None => class_due,
+        };
+        let when = stamps::instant(submitted, &zone)?;
+        let behind = when.duration_since(due);
+        let grace = SignedDuration::from_mins(i64::from(self.grace_min));
+        let late_s = if behind <= grace {
+            0
+        } else {
+            behind.as_secs() + i64::from(behind.subsec_nanos() > 0)
+        };
+        let unit_s = match self.per {
+            Per::Day => 86_400,
+            Per::Hour => 3_600,
+        };
+        let started = (late_s + unit_s - 1) / unit_s;
+        let days = extension.and_then(|extension| extension.late_days).unwrap_or(self.late_days);
+        let covered = (i64::from(days) * 86_400 / unit_s).min(started);
+        let charged = started - covered;
+        let late_days = u32::try_from((covered * unit_s + 86_399) / 86_400).unwrap_or(u32::MAX);
+        let cut_off = self.cut_off.as_ref().and_then(|text| text.parse::<Timestamp>().ok());
+        let cut_off = late_s > 0 && cut_off.is_some_and(|cut_off| when > cut_off.max(due));
+        let shown =
+            |at: Timestamp| at.to_zoned(zone.clone()).strftime("%Y-%m-%d %H:%M %:z").to_string();
+        let unit = match (self.per, started) {
+            (Per::Day, 1) => "started day",
+            (Per::Day, _) => "started days",
+            (Per::Hour, 1) => "started hour",
+            (Per::Hour, _) => "started hours",
+        };
+        let mut words = String::new();
+        if late_s > 0 {
+            words = format!(
+                "submitted {}, {} after it was due ({}): {started} {unit}",
+                shown(when),
+                span(late_s),
+                shown(due)
+            );
+            if covered > 0 {
+                let plural = if late_days == 1 { "day" } else { "days" };
+                words += &format!(", {covered} of them covered by {late_days} late {plural}");
+            }
+        }
+        let [submitted, due] = [when, due].map(|at| at.to_string());
+        let (before, after) = ([0.0; 2], [0.0; 2]);
+        Some(Late { submitted, due, late_s, charged, late_days, cut_off, before, after, words })
+    }
+
+    /// Takes the penalty from a grade and notes it before and after.
+    pub fn charge(&self, late: &mut Late, grade: &mut Grade) {
+        let loss = |points: f64| {
+            let each = match (self.unit, self.of) {
+                (Unit::Points, _) => self.penalty,
+                (Unit::Percent, Some(Of::Earned)) => self.penalty / 100.0 * points,
+                (Unit::Percent, _) => self.penalty / 100.0 * grade.out_of,
+            };
+            each * late.charged as f64
+        };
+        let after = |points: f64| {
+            let rest = if late.cut_off { 0.0 } else { (points - loss(points)).max(0.0) };
+            (rest.min(points) * 100.0).round() / 100.0
+        };
+        late.before = [grade.points, grade.points_max];
+        late.after = late.before.map(after);
+        [grade.points, grade.points_max] = late.after;
+        if late.late_s == 0 {
+            return;
+        }
+        let range = |[least, most]: [f64; 2]| {
+            if least == most { format!("{least}") } else { format!("{least}..{most}") }
+        };
+        let why = if late.cut_off {
+            "; after the cut-off it is worth nothing".to_owned()
+        } else if late.charged == 0 {
+            late.words += "; that costs nothing";
+            grade.remarks.push(late.words.clone());
+            return;
+        } else {
+            let what = match (self.unit, self.of) {
+                (Unit::Points, _) => "points",
+                (Unit::Percent, Some(Of::Earned)) => "% of what was earned",
+                (Unit::Percent, _) => "% of the maximum",
+            };
+            format!("; {} x {} {what}", late.charged, self.penalty)
+        };
+        late.words +=
+            &format!("{why}: {} instead of {} points", range(late.after), range(late.before));
+        grade.remarks.push(late.words.clone());
+    }
+
+    fn zone(&self, due: &str) -> Option<TimeZone> {
+        match &self.time_zone {
+            Some(zone) => stamps::zone(zone).ok(),
+            None => {
+                // `...T23:59:00-04:00`
+                let sign = due.rfind(['+', '-']).filter(|at| *at > 10);
+                sign.and_then(|at| stamps::zone(&due[at..]).ok()).or(Some(TimeZone::UTC))
+            }
+        }
+    }
+}
+
+/// `1 d 2 h 3 min`, its first two units.
+fn span(seconds: i64) -> String {
+    let minutes = (seconds + 59) / 60;
+    let parts = [(minutes / 1440, "d"), (minutes / 60 % 24, "h"), (minutes % 60, "min")];
+    let parts = parts.into_iter().skip_while(|(value, _)| *value == 0).take(2);
+    let parts =
+        parts.filter(|(value, _)| *value > 0).map(|(value, unit)| format!("{value} {unit}"));
+    parts.collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DUE: &str = "2019-10-06T23:59:00-04:00";
+
+    fn policy(text: &str) -> Policy {
+        let policy: Policy = serde_json::from_str(text).unwrap();
+        assert_eq!(policy.problem(), None);
+        policy
+    }
+
+    fn grade(points: f64, points_max: f64) -> Grade {
+        Grade {
+            parts: Vec::new(),
+            points,
+            points_max,
+            out_of: 100.0,
+            unconfirmed: 0.0,
+            remarks: Vec::new(),
+        }
+    }
+
+    /// Points after the penalty of one who earned 90, and the remark.
+    fn judged(policy: &Policy, submitted: &str) -> (f64, String) {
+        let mut grade = grade(90.0, 90.0);
+        let mut late = policy.judge(DUE, submitted, |own| own == "1").unwrap();
+        policy.charge(&mut late, &mut grade);
+        assert_eq!((late.before, late.after), ([90.0; 2], [grade.points; 2]));
+        (grade.points, grade.remarks.concat())
+    }
+
+    #[test]
+    fn penalties_by_started_day_and_hour() {
+        let percent = policy(
+            r#"{"penalty": 10, "unit": "percent", "of": "maximum", "per": "day", "grace_min": 15}"#,
+        );
+        let earned = policy(r#"{"penalty": 10, "unit": "percent", "of": "earned", "per": "day"}"#);
+        let points = policy(r#"{"penalty": 0.5, "unit": "points", "per": "hour"}"#);
+        for (submitted, by_percent, by_earned, by_points) in [
+            ("2019-10-06T23:58:00", 90.0, 90.0, 90.0),
+            ("2019-10-06T23:59:00", 90.0, 90.0, 90.0),
+            // Within the grace; after it, all counts from the due date.
+            ("2019-10-07T00:14:00", 90.0, 81.0, 89.5),
+            ("2019-10-07T00:14:01", 80.0, 81.0, 89.5),
+            ("2019-10-07T23:59:00", 80.0, 81.0, 78.0),
+            ("2019-10-07T23:59:01", 70.0, 72.0, 77.5),
+            // With an offset of its own.
+            ("2019-10-07T03:59:01Z", 90.0, 81.0, 89.5),
+            ("2019-12-24T00:00:00", 0.0, 0.0, 0.0),
+        ] {
+            for (policy, expected) in
+                [(&percent, by_percent), (&earned, by_earned), (&points, by_points)]
+            {
+                assert_eq!(judged(policy, submitted).0, expected, "{submitted} {policy:?}");
+            }
+        }
+        assert_eq!(
+            judged(&percent, "2019-10-08T01:10:00").1,
+            "submitted 2019-10-08 01:10 -04:00, 1 d 1 h after it was due (2019-10-06 23:59 -04:00): 2 started days; \
+             2 x 10 % of the maximum: 70 instead of 90 points"
+        );
+    }
+
+    #[test]
+    fn cut_off_late_days_and_extensions() {
+        let text = r#"{"penalty": 10, "unit": "percent", "of": "maximum", "per": "day", "late_days": 1,
+            "cut_off": "2019-10-09T23:59:00-04:00", "time_zone": "America/Toronto", "extensions": [EXT]}"#;
+        let plain = policy(&text.replace("EXT", ""));
+        assert_eq!(judged(&plain, "2019-10-07T12:00:00").0, 90.0);
+        assert!(
+            judged(&plain, "2019-10-07T12:00:00")
+                .1
+                .contains("covered by 1 late day; that costs nothing")
+        );
+        assert_eq!(judged(&plain, "2019-10-08T12:00:00").0, 80.0);
+        let (points, words) = judged(&plain, "2019-10-10T12:00:00");
+        assert!(points == 0.0 && words.contains("after the cut-off"), "{words}");
+        // An extension moves the cut-off, and is one student's.
+        let due = r#"{"student": "1", "due": "2019-10-11T23:59:00-04:00", "late_days": 0}"#;
+        let own = policy(&text.replace("EXT", due));
+        assert_eq!(judged(&own, "2019-10-11T12:00:00").0, 90.0);
+        assert_eq!(judged(&own, "2019-10-12T12:00:00").0, 0.0);
+        assert_eq!(
+            judged(
+                &policy(&text.replace("EXT", &due.replace("\"1\"", "\"2\""))),
+                "2019-10-11T12:00:00"
+            )
+            .0,
+            0.0
+        );
+    }
+
+    #[test]
+    fn a_range_keeps_both_ends_and_winter_time_counts() {
+        let policy = policy(
+            r#"{"penalty": 10, "unit": "percent", "of": "earned", "per": "day", "time_zone": "America/Toronto"}"#,
+        );
+        let mut own = grade(50.0, 100.0);
+        let mut late =
+            policy.judge("2019-11-02T23:59:00-04:00", "2019-11-03T23:00:00", |_| false).unwrap();
+        // 25 hours long, that day: 24 h 1 min later is the second day.
+        assert_eq!(late.charged, 2);
+        policy.charge(&mut late, &mut own);
+        assert_eq!((own.points, own.points_max), (40.0, 80.0));
+        assert!(policy.judge("2019-11-02T23:59:00-04:00", "", |_| false).is_none());
+    }
+
+    #[test]
+    fn a_policy_that_says_too_little_is_refused() {
+        for (text, expected) in [
+            (r#"{"penalty": 10, "unit": "percent", "per": "day"}"#, "percent of what?"),
+            (
+                r#"{"penalty": 1, "unit": "points", "of": "earned", "per": "day"}"#,
+                "only for percent",
+            ),
+            (r#"{"penalty": -1, "unit": "points", "per": "day"}"#, "must be 0 or more"),
+            (
+                r#"{"penalty": 1, "unit": "points", "per": "day", "time_zone": "Montreal"}"#,
+                "late.time_zone",
+            ),
+            (
+                r#"{"penalty": 1, "unit": "points", "per": "day", "cut_off": "2019-10-09"}"#,
+                "late.cut_off",
+            ),
+        ] {
+            let policy: Policy = serde_json::from_str(text).unwrap();
+            assert!(policy.problem().unwrap().contains(expected), "{text}");
+        }
+    }
+}

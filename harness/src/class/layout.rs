@@ -1,0 +1,393 @@
+//! How learning platforms name what students submitted: from the path of a submission in a download to who
+//! submitted it, and when.
+
+use serde::{Deserialize, Serialize};
+
+use super::{names, stamps};
+
+/// Where a download comes from.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Brightspace (D2L): `12345-67890 - First Last - Oct 5, 2019 1159 PM/`
+    Brightspace,
+    /// Canvas: `lastfirst_123_456_name.zip`
+    Canvas,
+    /// Moodle: `First Last_123_assignsubmission_file/`
+    Moodle,
+    /// Gradescope: `submission_123/` and `submission_metadata.yml`
+    Gradescope,
+    /// Clones that GitHub Classroom made: `assignment-username/`
+    Github,
+    /// Archives and folders whose names say nothing
+    #[default]
+    Plain,
+}
+
+impl Kind {
+    /// Those with names that say something.
+    pub const PLATFORMS: [Self; 5] =
+        [Self::Brightspace, Self::Canvas, Self::Moodle, Self::Gradescope, Self::Github];
+
+    /// What it is called in a sentence.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Brightspace => "Brightspace",
+            Self::Canvas => "Canvas",
+            Self::Moodle => "Moodle",
+            Self::Gradescope => "Gradescope",
+            Self::Github => "GitHub Classroom",
+            Self::Plain => "plain files",
+        }
+    }
+
+    /// What submissions of it are called, for a message.
+    pub fn pattern(self) -> &'static str {
+        match self {
+            Self::Brightspace => "\"12345-67890 - First Last - Oct 5, 2019 1159 PM/\"",
+            Self::Canvas => "\"lastfirst_123_456_name.zip\"",
+            Self::Moodle => "\"First Last_123_assignsubmission_file/\"",
+            Self::Gradescope => "\"submission_123/\"",
+            Self::Github => "clones, \"assignment-username/\" with .git/",
+            Self::Plain => "archives (.zip, .tar, .tar.gz) or folders with src/ or config.json",
+        }
+    }
+}
+
+/// What a platform says of one submission. A text is empty where it does not say it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Label {
+    /// The platform.
+    pub kind: Kind,
+    /// What it calls the submission: a folder, or the beginning of a file's name.
+    pub submission: String,
+    /// The student's name. Canvas runs last and first name together.
+    pub name: String,
+    /// The platform's own number of the student. Brightspace's are its own, and on no class list.
+    pub id: String,
+    /// The student number.
+    pub number: String,
+    /// Name of the account.
+    pub username: String,
+    /// Address.
+    pub email: String,
+    /// When it was submitted, as [`stamps::parse`] writes it.
+    pub submitted: String,
+    /// Whether the platform marks it as late.
+    pub marked_late: bool,
+    /// Others who submitted it too.
+    pub others: Vec<String>,
+}
+
+impl Label {
+    /// Whose it is, as far as the platform tells people apart.
+    pub fn person(&self) -> String {
+        let own = match self.kind {
+            Kind::Brightspace => format!("{} {}", self.id, names::words(&self.name)),
+            Kind::Canvas | Kind::Moodle => self.id.clone(),
+            Kind::Github => self.username.to_lowercase(),
+            Kind::Gradescope if !self.number.is_empty() => names::number(&self.number),
+            Kind::Gradescope if !self.email.is_empty() => self.email.to_lowercase(),
+            Kind::Gradescope | Kind::Plain => self.submission.clone(),
+        };
+        format!("{} {own}", self.kind.title())
+    }
+
+    /// The person in words, for a message.
+    pub fn who(&self) -> String {
+        let named = [&self.name, &self.username, &self.email, &self.id, &self.submission];
+        named.into_iter().find(|text| !text.is_empty()).cloned().unwrap_or_default()
+    }
+}
+
+/// What one component of a path says, as a platform of this kind names folders and files; none of GitHub's clones,
+/// which only their `.git/` tells.
+pub fn label_of(kind: Kind, component: &str) -> Option<Label> {
+    match kind {
+        Kind::Brightspace => brightspace(component),
+        Kind::Canvas => canvas(component),
+        Kind::Moodle => moodle(component),
+        Kind::Gradescope => gradescope(component),
+        Kind::Github | Kind::Plain => None,
+    }
+}
+
+/// Whether a component is named as some platform names a student's folder or file.
+pub fn is_labelled(component: &str) -> bool {
+    Kind::PLATFORMS.into_iter().any(|kind| label_of(kind, component).is_some())
+}
+
+/// A clone: `a2-ada`, where `prefix` is `a2-`.
+pub fn clone(component: &str, prefix: &str) -> Label {
+    let username = component.strip_prefix(prefix).filter(|rest| !rest.is_empty());
+    Label {
+        kind: Kind::Github,
+        submission: component.to_owned(),
+        username: username.unwrap_or(component).to_owned(),
+        ..Label::default()
+    }
+}
+
+/// What the names of clones begin with: the longest common beginning that ends with `-`; of one alone, all
+/// before its last `-`.
+pub fn prefix_of_clones(names: &[&str]) -> String {
+    let Some(first) = names.first() else { return String::new() };
+    let common = match names {
+        [only] => only.len().saturating_sub(1),
+        _ => first
+            .char_indices()
+            .find(|(at, c)| names.iter().any(|name| !name[*at..].starts_with(*c)))
+            .map_or(first.len(), |(at, _)| at),
+    };
+    first[..common].rfind('-').map_or(String::new(), |at| first[..=at].to_owned())
+}
+
+/// `12345-67890 - First Last - Oct 5, 2019 1159 PM`, and more after it where files lie flat.
+fn brightspace(component: &str) -> Option<Label> {
+    let (id, rest) = digits(component)?;
+    let (_, rest) = digits(rest.strip_prefix('-')?)?;
+    let rest = rest.trim_start().strip_prefix('-')?;
+    // A name may hold hyphens: the stamp says where it ends.
+    for (at, _) in rest.match_indices('-') {
+        let Some((when, after)) = stamps::leading(rest[at + 1..].trim_start()) else { continue };
+        let after = after.trim_start();
+        if !after.is_empty() && !after.starts_with(['-', '.']) {
+            continue;
+        }
+        let name = rest[..at].trim();
+        let end = component.len() - after.len();
+        return (!name.is_empty()).then(|| Label {
+            kind: Kind::Brightspace,
+            submission: component[..end].trim_end().to_owned(),
+            name: name.to_owned(),
+            id: id.to_owned(),
+            submitted: when.to_string(),
+            ..Label::default()
+        });
+    }
+    None
+}
+
+/// `doejane_LATE_123_456_a2.zip`, `anon_x7Yz_456_a2.zip`.
+fn canvas(component: &str) -> Option<Label> {
+    let tokens: Vec<&str> = component.split('_').collect();
+    let is_number = |token: &&str| !token.is_empty() && token.bytes().all(|b| b.is_ascii_digit());
+    let label = |name: String, id: &str, used: usize, late: bool| Label {
+        kind: Kind::Canvas,
+        submission: tokens[..used].join("_"),
+        name,
+        id: id.to_owned(),
+        marked_late: late,
+        ..Label::default()
+    };
+    let late = usize::from(tokens[0] == "LATE");
+    if tokens.get(late) == Some(&"anon") {
+        let id = tokens.get(late + 1).filter(|id| id.chars().all(|c| c.is_ascii_alphanumeric()))?;
+        tokens.get(late + 2).filter(|token| is_number(token))?;
+        tokens.get(late + 3)?;
+        return Some(label(String::new(), id, late + 2, late == 1));
+    }
+    let at = (1..tokens.len().checked_sub(2)?)
+        .find(|at| is_number(&tokens[*at]) && is_number(&tokens[at + 1]))?;
+    let late = at > 1 && tokens[at - 1] == "LATE";
+    let name = tokens[..at - usize::from(late)].join("_");
+    (!name.is_empty()).then(|| label(name, tokens[at], at + 1, late))
+}
+
+/// `First Last_123_assignsubmission_file`, and more after it where files lie flat.
+fn moodle(component: &str) -> Option<Label> {
+    let at = component.rfind("_assignsubmission_")?;
+    let (name, id) = component[..at].rsplit_once('_')?;
+    let is_number = !id.is_empty() && id.bytes().all(|b| b.is_ascii_digit());
+    // A blind download says no names.
+    let name = if names::plain(name) == "participant" { "" } else { name };
+    is_number.then(|| Label {
+        kind: Kind::Moodle,
+        submission: component[..at].to_owned(),
+        name: name.replace('_', " ").trim().to_owned(),
+        id: id.to_owned(),
+        ..Label::default()
+    })
+}
+
+/// `submission_123`
+fn gradescope(component: &str) -> Option<Label> {
+    let id = component.strip_prefix("submission_")?;
+    let is_number = !id.is_empty() && id.bytes().all(|b| b.is_ascii_digit());
+    is_number.then(|| Label {
+        kind: Kind::Gradescope,
+        submission: component.to_owned(),
+        ..Label::default()
+    })
+}
+
+fn digits(text: &str) -> Option<(&str, &str)> {
+    let end = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
+    (end > 0).then(|| text.split_at(end))
+}
+
+/// What `submission_metadata.yml` of a Gradescope export says, by its folders: who submitted, and when. Only the
+/// few keys that are needed are read, as Ruby writes them; anything else is passed over.
+pub fn gradescope_metadata(text: &str) -> Vec<Label> {
+    let mut labels: Vec<Label> = Vec::new();
+    let mut people = 0;
+    let mut section = String::new();
+    for line in text.lines() {
+        let indent = line.len() - line.trim_start().len();
+        let (is_item, entry) = match line.trim().strip_prefix("- ") {
+            Some(entry) => (true, entry),
+            None => (false, line.trim()),
+        };
+        let Some((key, value)) = entry.split_once(':').map(|(key, value)| match key {
+            // Ruby's symbols begin with a colon.
+            "" => value.split_once(':').unwrap_or((value, "")),
+            key => (key, value),
+        }) else {
+            continue;
+        };
+        let value = scalar(value.trim());
+        if indent == 0 && !is_item {
+            labels.extend(gradescope(key.trim_matches(['"', '\''])));
+            (people, section) = (0, String::new());
+            continue;
+        }
+        let Some(label) = labels.last_mut() else { continue };
+        if indent == 2 && !is_item {
+            section = key.to_owned();
+            if key == "created_at" {
+                label.submitted = stamps::parse(&value).unwrap_or_default();
+            }
+            continue;
+        }
+        if section != "submitters" {
+            continue;
+        }
+        people += usize::from(is_item);
+        match (people, key) {
+            (1, "name") => label.name = value,
+            (1, "sid") => label.number = value,
+            (1, "email") => label.email = value,
+            (2.., "name") => label.others.push(value),
+            _ => {}
+        }
+    }
+    labels
+}
+
+/// A plain or quoted value of YAML.
+fn scalar(text: &str) -> String {
+    if let Some(inner) = text.strip_prefix('\'').and_then(|rest| rest.strip_suffix('\'')) {
+        return inner.replace("''", "'");
+    }
+    if text.starts_with('"')
+        && let Ok(inner) = serde_json::from_str(text)
+    {
+        return inner;
+    }
+    if ["null", "~"].contains(&text) { String::new() } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(kind: Kind, component: &str) -> Option<[String; 4]> {
+        let label = label_of(kind, component)?;
+        Some([label.submission, label.name, label.id, label.submitted])
+    }
+
+    fn of(parts: [&str; 4]) -> Option<[String; 4]> {
+        Some(parts.map(str::to_owned))
+    }
+
+    #[test]
+    fn brightspace_folders_and_flat_files() {
+        let own = |component: &str| said(Kind::Brightspace, component);
+        let folder = "12345-67890 - Ann Lee - Oct 5, 2019 1159 PM";
+        assert_eq!(own(folder), of([folder, "Ann Lee", "12345", "2019-10-05T23:59:00"]));
+        for flat in [" - a2_ann_lee.zip", "- a2.zip"] {
+            assert_eq!(own(&format!("{folder}{flat}")), own(folder), "{flat}");
+        }
+        let name = |component: &str| own(component).map(|said| said[1].clone());
+        for (component, expected) in [
+            ("1-2 - Zoë Smith-O'Neil - May 14, 2020 11:29 AM", "Zoë Smith-O'Neil"),
+            ("1-2- Lee, Ann - oct. 5, 2019 905 AM", "Lee, Ann"),
+            ("1-2 - Ann - Marie Lee - 5 octobre 2019 23 h 59", "Ann - Marie Lee"),
+            ("1-2 - 花子 山田 - Oct 5, 2019 1159 PM.zip", "花子 山田"),
+        ] {
+            assert_eq!(name(component).as_deref(), Some(expected), "{component}");
+        }
+        for other in
+            ["Lab 01 Download May 14, 2020 1129 PM", "12345-67890 - Ann Lee", "a2.zip", "1-2"]
+        {
+            assert_eq!(own(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn canvas_files() {
+        let own = |component: &str| said(Kind::Canvas, component);
+        assert_eq!(own("leeann_101_2001_a2.zip"), of(["leeann_101", "leeann", "101", ""]));
+        let late = label_of(Kind::Canvas, "müllerjörg_LATE_102_2002_a2_1_2.zip").unwrap();
+        assert_eq!(
+            (late.name.as_str(), late.id.as_str(), late.marked_late),
+            ("müllerjörg", "102", true)
+        );
+        // A name of a file with numbers, a name of a person with an underscore.
+        assert_eq!(own("doe_x_103_2003_7_8_a2-1.zip").unwrap()[2], "103");
+        let anonymous = label_of(Kind::Canvas, "LATE_anon_x7Yz_2004_a2.zip").unwrap();
+        assert_eq!((anonymous.id.as_str(), anonymous.marked_late), ("x7Yz", true));
+        assert_eq!(own("anon_x7Yz_2004_a2.zip").unwrap()[1], "");
+        for other in ["a2_ann_lee.zip", "_101_2001_a2.zip", "101_2001_a2.zip", "ann_101_a2.zip"] {
+            assert_eq!(own(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn moodle_folders_and_flat_files() {
+        let own = |component: &str| said(Kind::Moodle, component);
+        for component in [
+            "Ann Lee_7_assignsubmission_file",
+            "Ann Lee_7_assignsubmission_file_",
+            "Ann Lee_7_assignsubmission_file_a2.zip",
+            "Ann Lee_7_assignsubmission_onlinetext",
+        ] {
+            assert_eq!(own(component), of(["Ann Lee_7", "Ann Lee", "7", ""]), "{component}");
+        }
+        assert_eq!(own("Participant_7_assignsubmission_file").unwrap()[1], "");
+        for other in ["Ann Lee_7", "assignsubmission_file", "Ann_x_assignsubmission_file"] {
+            assert_eq!(own(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn gradescope_with_its_metadata() {
+        assert_eq!(said(Kind::Gradescope, "submission_12").unwrap()[0], "submission_12");
+        assert_eq!(said(Kind::Gradescope, "submission_metadata.yml"), None);
+        let text = "---\nsubmission_12:\n  :submitters:\n  - :name: Zoë O'Neil\n    :sid: '0260000001'\n    \
+                    :email: z@example.org\n  :created_at: 2019-10-06 03:59:01.123 Z\n  :score: 3.0\n  :results:\n    \
+                    tests:\n    - name: x\n      sid: 9\n  :history:\n  - :id: 9\n    :created_at: 2019-01-01 00:00:00 Z\n\
+                    submission_13:\n  :submitters:\n  - :name: 'Lee, Ann'\n    :sid:\n    :email: a@example.org\n  \
+                    - :name: Bo\n    :email: b@example.org\n  :created_at: 2019-10-07 00:00:00 -0400\n";
+        let [first, second] = &gradescope_metadata(text)[..] else { panic!("expected two") };
+        assert_eq!((first.name.as_str(), first.number.as_str()), ("Zoë O'Neil", "0260000001"));
+        assert_eq!(first.submitted, "2019-10-06T03:59:01.123Z");
+        assert_eq!((second.name.as_str(), second.number.as_str()), ("Lee, Ann", ""));
+        assert_eq!(second.others, ["Bo"]);
+        assert_eq!(second.submitted, "2019-10-07T04:00:00Z");
+    }
+
+    #[test]
+    fn clones_share_a_beginning() {
+        assert_eq!(
+            prefix_of_clones(&["a2-lights-ada", "a2-lights-ann", "a2-lights-bob-x"]),
+            "a2-lights-"
+        );
+        assert_eq!(prefix_of_clones(&["a2-ada"]), "a2-");
+        assert_eq!(prefix_of_clones(&["ada", "bob"]), "");
+        assert_eq!(clone("a2-ada-l", "a2-").username, "ada-l");
+    }
+}

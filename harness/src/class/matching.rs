@@ -1,0 +1,373 @@
+//! Whose submission it is, by the class list. What is not certain is the instructor's to decide, in `matches.toml`.
+
+use std::path::Path;
+
+use anyhow::{Context as _, bail};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::layout::{Kind, Label};
+use super::roster::{Roster, Student};
+use super::{names, stamps};
+
+/// What `matches.toml` calls a submission that is nobody's and does not count.
+const NOBODY: &str = "none";
+
+/// What a submission says of whose it is.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Claim {
+    /// What reports call it.
+    pub name: String,
+    /// Its folder in the report.
+    pub slug: String,
+    /// What the platform says.
+    pub label: Option<Label>,
+    /// The student number in its `config.json`.
+    pub number: String,
+    /// The name in its `config.json`.
+    pub full_name: String,
+}
+
+/// Whose a submission is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Match {
+    /// A student of the list, by index, and what told so.
+    Student(usize, &'static str),
+    /// The instructor says that it does not count.
+    Nobody,
+    /// The instructor must decide: why, and between whom.
+    Undecided(String, Vec<usize>),
+}
+
+/// The instructor's decisions.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Matches(Vec<Decision>);
+
+/// What the instructor decided on one submission.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Decision {
+    submission: String,
+    student: Option<String>,
+    submitted: Option<String>,
+    place: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default, rename = "match")]
+    matches: Vec<Spanned<Entry>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    submission: String,
+    student: Option<String>,
+    submitted: Option<String>,
+}
+
+impl Matches {
+    /// Reads a file of decisions; none where there is no file.
+    ///
+    /// # Errors
+    /// When it cannot be read, or says what means nothing; names the file and line.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        match std::fs::read_to_string(path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Self::default()),
+            text => {
+                Self::parse(&text.with_context(|| format!("cannot read {}", path.display()))?, path)
+            }
+        }
+    }
+
+    fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
+        let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
+        let file: File = toml::from_str(text).map_err(|error| {
+            anyhow::anyhow!(
+                "{}: {}",
+                place(error.span().map_or(0, |span| span.start)),
+                error.message()
+            )
+        })?;
+        let mut decisions = Vec::new();
+        for entry in file.matches {
+            let place = place(entry.span().start);
+            let Entry { submission, student, submitted } = entry.into_inner();
+            let submitted = submitted
+                .map(|text| {
+                    stamps::parse(&text).with_context(|| {
+                        format!("{place}: expected a time such as 2019-10-06T23:59:00-04:00, found {text}")
+                    })
+                })
+                .transpose()?;
+            if student.is_none() && submitted.is_none() {
+                bail!(
+                    "{place}: expected student = \"NUMBER\" or \"{NOBODY}\", or submitted = \"TIME\""
+                );
+            }
+            decisions.push(Decision { submission, student, submitted, place });
+        }
+        Ok(Self(decisions))
+    }
+
+    fn of<'a>(&'a self, claim: &'a Claim) -> impl Iterator<Item = &'a Decision> {
+        let own = move |decision: &&Decision| {
+            let label = claim.label.as_ref().map_or("", |label| &label.submission);
+            [claim.name.as_str(), &claim.slug, label].contains(&decision.submission.as_str())
+        };
+        self.0.iter().filter(own)
+    }
+
+    /// Whether the instructor decided anything on a submission.
+    pub fn mention(&self, claim: &Claim) -> bool {
+        self.of(claim).next().is_some()
+    }
+
+    /// When the instructor says that a submission was submitted.
+    pub fn submitted<'a>(&'a self, claim: &'a Claim) -> Option<&'a str> {
+        self.of(claim).find_map(|decision| decision.submitted.as_deref())
+    }
+
+    /// Whether the instructor says that a submission does not count.
+    pub fn is_nobody(&self, claim: &Claim) -> bool {
+        self.of(claim).any(|decision| decision.student.as_deref() == Some(NOBODY))
+    }
+
+    /// The student that the instructor names, by index.
+    ///
+    /// # Errors
+    /// When nobody of the list is called so.
+    fn student(&self, claim: &Claim, roster: &Roster) -> anyhow::Result<Option<usize>> {
+        let named =
+            self.of(claim).find_map(|decision| Some((decision.student.as_ref()?, decision)));
+        let Some((word, decision)) = named.filter(|(word, _)| *word != NOBODY) else {
+            return Ok(None);
+        };
+        let at = roster.students.iter().position(|student| student.is_called(word));
+        at.map(Some).with_context(|| {
+            format!(
+                "{}: nobody on {} has the number or account \"{word}\"; expected one of the list, or \"{NOBODY}\"",
+                decision.place,
+                roster.path.display()
+            )
+        })
+    }
+}
+
+/// The line of a place in a text, from 1.
+pub(super) fn line_of(text: &str, at: usize) -> usize {
+    1 + text.bytes().take(at).filter(|byte| *byte == b'\n').count()
+}
+
+/// Whose a submission is: as the instructor decided, else by student number, the platform's number or account, and
+/// name, as long as these do not contradict each other.
+///
+/// # Errors
+/// When the instructor decided for somebody who is not on the list.
+pub fn find(claim: &Claim, roster: &Roster, matches: &Matches) -> anyhow::Result<Match> {
+    if matches.is_nobody(claim) {
+        return Ok(Match::Nobody);
+    }
+    if let Some(student) = matches.student(claim, roster)? {
+        return Ok(Match::Student(student, "matches.toml"));
+    }
+    let label = claim.label.clone().unwrap_or_default();
+    if !label.others.is_empty() {
+        let who = [std::slice::from_ref(&label.name), &label.others].concat().join(", ");
+        return Ok(Match::Undecided(format!("it is a group's: {who}"), Vec::new()));
+    }
+    let of = |wanted: &dyn Fn(&Student) -> bool| -> Vec<usize> {
+        let all = roster.students.iter().enumerate();
+        all.filter(|(_, student)| wanted(student)).map(|(index, _)| index).collect()
+    };
+    let same = |a: &str, b: &str| !a.is_empty() && a.eq_ignore_ascii_case(b);
+    let evidence = [
+        ("the platform's student number", by_number(roster, &label.number)),
+        ("student number", by_number(roster, &claim.number)),
+        // Brightspace's numbers are on no list.
+        (
+            "the platform's own number",
+            of(&|student| {
+                label.kind != Kind::Brightspace
+                    && roster.kind == label.kind
+                    && same(&label.id, &student.id)
+            }),
+        ),
+        (
+            "account",
+            of(&|student| {
+                same(&label.username, &student.username) || same(&label.email, &student.email)
+            }),
+        ),
+        ("the platform's name", of(&|student| is_named(&label.name, student))),
+        ("name", of(&|student| is_named(&claim.full_name, student))),
+    ];
+    let said: Vec<&(&str, Vec<usize>)> =
+        evidence.iter().filter(|(_, found)| !found.is_empty()).collect();
+    let Some((_, first)) = said.first() else {
+        let known = [label.who(), claim.full_name.clone(), claim.number.clone()];
+        let known: Vec<String> = known.into_iter().filter(|text| !text.is_empty()).collect();
+        let said = if known.is_empty() {
+            "it says neither name nor number".to_owned()
+        } else {
+            format!("nobody on the list is {}", known.join(", "))
+        };
+        return Ok(Match::Undecided(said, Vec::new()));
+    };
+    // Those that all agree on.
+    let agreed = |index: &usize| said.iter().all(|(_, found)| found.contains(index));
+    let candidates: Vec<usize> = first.iter().copied().filter(agreed).collect();
+    if let [only] = candidates[..] {
+        let single = said.iter().find(|(_, found)| found.len() == 1);
+        return Ok(Match::Student(
+            only,
+            single.map_or("number and name together", |(what, _)| what),
+        ));
+    }
+    let mut all: Vec<usize> = said.iter().flat_map(|(_, found)| found.clone()).collect();
+    all.sort_unstable();
+    all.dedup();
+    let reason = if candidates.is_empty() {
+        let each = said.iter().map(|(what, found)| {
+            let names: Vec<String> = found.iter().map(|at| roster.students[*at].who()).collect();
+            format!("{what} says {}", names.join(" or "))
+        });
+        each.collect::<Vec<_>>().join(", ")
+    } else {
+        all = candidates;
+        let names: Vec<String> = all.iter().map(|at| roster.students[*at].who()).collect();
+        format!("{} students fit: {}", all.len(), names.join(", "))
+    };
+    Ok(Match::Undecided(reason, all))
+}
+
+/// Those with a student number. Zeros that a spreadsheet took from the front are missed only where nobody has the
+/// number as it is.
+fn by_number(roster: &Roster, number: &str) -> Vec<usize> {
+    let number = names::number(number);
+    let of = |wanted: &dyn Fn(&str) -> bool| -> Vec<usize> {
+        let all = roster.students.iter().enumerate();
+        let own = all.filter(|(_, student)| wanted(&names::number(&student.number)));
+        own.map(|(index, _)| index).collect()
+    };
+    if number.is_empty() {
+        return Vec::new();
+    }
+    let exact = of(&|own| own == number);
+    if !exact.is_empty() {
+        return exact;
+    }
+    let bare = number.trim_start_matches('0');
+    of(&|own| !bare.is_empty() && own.trim_start_matches('0') == bare)
+}
+
+fn is_named(name: &str, student: &Student) -> bool {
+    let wanted = names::words(name);
+    if wanted.is_empty() {
+        return false;
+    }
+    let (first, last) = (&student.first_name, &student.last_name);
+    wanted == names::words(&format!("{first} {last}"))
+        // As Canvas runs them together.
+        || names::letters(name) == names::letters(&format!("{last}{first}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn roster() -> Roster {
+        let text = "OrgDefinedId,Username,Last Name,First Name,Email,End-of-Line Indicator\n\
+                    #0260000001,#zo,O'Neil,Zoë,z@x,#\n#260000002,#al,Lee,Ann,a@x,#\n#260000003,#al2,Lee,Ann,b@x,#\n\
+                    #260000004,#jm,\"Müller, Dr\",Jörg,j@x,#\n#00123,#x,X,Y,y@x,#\n#123,#v,V,W,w@x,#\n";
+        Roster::parse(text.as_bytes(), Path::new("list.csv")).unwrap()
+    }
+
+    fn claim(platform: &str, number: &str, full_name: &str) -> Claim {
+        let label = Label {
+            kind: Kind::Brightspace,
+            id: "9".into(),
+            name: platform.into(),
+            ..Label::default()
+        };
+        Claim {
+            name: "x/a2.zip".into(),
+            slug: "a2".into(),
+            label: (!platform.is_empty()).then_some(label),
+            number: number.into(),
+            full_name: full_name.into(),
+        }
+    }
+
+    fn found(claim: &Claim) -> Match {
+        find(claim, &roster(), &Matches::default()).unwrap()
+    }
+
+    #[test]
+    fn numbers_come_first_then_names_without_accents() {
+        for (claim, index) in [
+            (claim("", "0260000001", ""), 0),
+            // A spreadsheet took the zero away.
+            (claim("", "260000001", ""), 0),
+            (claim("", "00123", ""), 4),
+            (claim("", "123", ""), 5),
+            (claim("ZOE O NEIL", "", ""), 0),
+            (claim("", "", "dr jorg muller"), 3),
+            // Two of one name, and the number tells.
+            (claim("Ann Lee", "260000003", "Ann Lee"), 2),
+            // A nickname contradicts nobody.
+            (claim("", "260000003", "Annie"), 2),
+        ] {
+            assert!(matches!(found(&claim), Match::Student(at, _) if at == index), "{claim:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_guessed() {
+        let undecided = |claim: &Claim| match found(claim) {
+            Match::Undecided(reason, candidates) => (reason, candidates),
+            other => panic!("{other:?}"),
+        };
+        let (reason, candidates) = undecided(&claim("Ann Lee", "", ""));
+        assert_eq!(candidates, [1, 2]);
+        assert_eq!(reason, "2 students fit: Ann Lee (260000002), Ann Lee (260000003)");
+        let (reason, candidates) = undecided(&claim("Zoë O'Neil", "260000002", ""));
+        assert_eq!(candidates, [0, 1]);
+        assert!(
+            reason.starts_with("student number says Ann Lee (260000002), the platform's name"),
+            "{reason}"
+        );
+        let (reason, _) = undecided(&claim("Max Other", "999", "M Other"));
+        assert_eq!(reason, "nobody on the list is Max Other, M Other, 999");
+        assert_eq!(undecided(&claim("", "", "")).0, "it says neither name nor number");
+    }
+
+    #[test]
+    fn the_instructor_decides() {
+        let path = Path::new("matches.toml");
+        let read = |text: &str| Matches::parse(text, path);
+        let own = claim("Ann Lee", "", "");
+        let text = "# mine\n[[match]]\nsubmission = \"x/a2.zip\"\nstudent = \"#260000003\"\nsubmitted = \"2019-10-07 10:00\"\n";
+        let matches = read(text).unwrap();
+        let found = find(&own, &roster(), &matches).unwrap();
+        assert_eq!(found, Match::Student(2, "matches.toml"));
+        assert_eq!(matches.submitted(&own), Some("2019-10-07T10:00:00"));
+        let none = read(&text.replace("#260000003", "none")).unwrap();
+        assert_eq!(find(&own, &roster(), &none).unwrap(), Match::Nobody);
+        let wrong = read(&text.replace("#260000003", "9")).unwrap();
+        let error = find(&own, &roster(), &wrong).unwrap_err().to_string();
+        assert!(error.starts_with("matches.toml:2: nobody on list.csv has the number"), "{error}");
+        for (text, expected) in [
+            ("[[match]]\nsubmission = \"a\"\nstudnt = \"1\"", "matches.toml:3: unknown field"),
+            ("\n[[match]]\nsubmission = \"a\"", "matches.toml:2: expected student"),
+            (
+                "[[match]]\nsubmission = \"a\"\nsubmitted = \"noon\"",
+                "matches.toml:1: expected a time",
+            ),
+        ] {
+            let error = read(text).unwrap_err().to_string();
+            assert!(error.starts_with(expected), "{error}");
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! A class, as a learning platform gives it: which submissions there are, whose each is, which attempt counts, and
+//! what a late one costs.
+//!
+//! ```text
+//! paths --collect--> Source with Label --grading--> Claim and Grade --settle--> Standing, Class
+//! ```
+//!
+//! Nothing here is guessed: what the names, the class list and the instructor's decisions do not settle is listed for
+//! the instructor.
+
+pub mod collect;
+mod download;
+pub mod late;
+pub mod layout;
+pub mod matching;
+pub mod names;
+pub mod roster;
+pub mod settle;
+pub mod stamps;
+
+pub use collect::{Collected, Empty, Source, Wanted, collect};
+pub use late::{Late, Policy};
+pub use layout::{Kind, Label};
+pub use matching::{Claim, Matches};
+pub use roster::{Roster, Student};
+pub use settle::{Attempt, Class, Deciding, Missing, Standing, Undecided, set_aside, settle};

@@ -1,0 +1,517 @@
+//! From graded submissions to the standing of students: whose each is, which attempt counts, what lateness costs, who
+//! is missing.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use super::late::{Late, Policy};
+use super::layout::{Kind, Label};
+use super::matching::{Claim, Match, Matches, find};
+use super::roster::{Roster, Student};
+use super::{names, stamps};
+use crate::rubric::Grade;
+
+/// Which of a student's attempts counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Attempt {
+    /// The last one
+    #[default]
+    Latest,
+    /// The one with most points, after what lateness costs
+    Best,
+    /// The first one
+    First,
+}
+
+/// By what the standing of students is settled.
+pub struct Deciding<'a> {
+    /// The class list, if there is one.
+    pub roster: Option<&'a Roster>,
+    /// The instructor's decisions.
+    pub matches: &'a Matches,
+    /// What lateness costs, if anything.
+    pub policy: Option<&'a Policy>,
+    /// When it was due, RFC 3339 with offset.
+    pub due: &'a str,
+    /// Which attempt counts.
+    pub attempt: Attempt,
+}
+
+/// What is known of a submission beside what is in it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Standing {
+    /// What the platform says.
+    pub label: Option<Label>,
+    /// Whose it is, by the class list.
+    pub student: Option<Student>,
+    /// What told so.
+    pub matched_by: String,
+    /// The student's other attempts, which do not count.
+    pub set_aside: Vec<String>,
+    /// How late it is; nothing where there is no policy, or no time stamp.
+    pub late: Option<Late>,
+}
+
+/// What is known of the class as a whole.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Class {
+    /// Where the submissions come from.
+    pub kind: Kind,
+    /// File name of the class list; empty without one.
+    pub list: String,
+    /// Students of the list without a submission that counts.
+    pub missing: Vec<Missing>,
+    /// What the instructor must decide.
+    pub undecided: Vec<Undecided>,
+    /// Submissions that the instructor decided not to count.
+    pub not_counted: Vec<String>,
+}
+
+/// A student without a submission that counts.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Missing {
+    /// Who.
+    pub student: Student,
+    /// What is known of it; mostly nothing.
+    pub reason: String,
+}
+
+/// A submission that the instructor must decide on, in `matches.toml`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Undecided {
+    /// What reports call it.
+    pub submission: String,
+    /// Why it is not certain.
+    pub reason: String,
+    /// Between whom.
+    pub candidates: Vec<Student>,
+}
+
+/// Which attempts of a student need not be graded, by index: those that the platform's names alone tell do not
+/// count. The best attempt is known only when all are graded.
+pub fn set_aside(labels: &[Option<&Label>], deciding: &Deciding) -> BTreeSet<usize> {
+    let mut people: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (index, label) in labels.iter().enumerate() {
+        if let Some(label) = label {
+            people.entry(label.person()).or_default().push(index);
+        }
+    }
+    let mut aside = BTreeSet::new();
+    for attempts in people.into_values() {
+        let stamps: Vec<&str> = attempts
+            .iter()
+            .map(|&at| labels[at].map_or("", |label| label.submitted.as_str()))
+            .collect();
+        if let (false, Some(counts)) =
+            (deciding.attempt == Attempt::Best, by_time(&stamps, deciding.attempt))
+        {
+            aside.extend(
+                attempts.iter().enumerate().filter(|(at, _)| *at != counts).map(|(_, own)| *own),
+            );
+        }
+    }
+    aside
+}
+
+/// The first or last of some time stamps; nothing where that is not certain.
+fn by_time(stamps: &[&str], attempt: Attempt) -> Option<usize> {
+    let zone = jiff::tz::TimeZone::UTC;
+    let mut times = stamps
+        .iter()
+        .enumerate()
+        .map(|(at, stamp)| Some((stamps::instant(stamp, &zone)?, at)))
+        .collect::<Option<Vec<_>>>()?;
+    times.sort();
+    if attempt != Attempt::First {
+        times.reverse();
+    }
+    match times[..] {
+        [(_, only)] => Some(only),
+        [(first, at), (second, _), ..] if first != second => Some(at),
+        _ => None,
+    }
+}
+
+/// Settles the standing of graded submissions, charges late ones, and answers which count, by index in order, with
+/// what is known of the class. `absent` are those of whom the platform has something that is not graded, with the
+/// reason.
+///
+/// # Errors
+/// When the instructor decided for somebody who is not on the list.
+pub fn settle(
+    claims: &[Claim],
+    grades: &mut [Grade],
+    absent: &[(Label, String)],
+    kind: Kind,
+    deciding: &Deciding,
+) -> anyhow::Result<(Vec<(usize, Standing)>, Class)> {
+    let list = deciding.roster.and_then(|roster| roster.path.file_name());
+    let list = list.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut class = Class { kind, list, ..Class::default() };
+    let mut standings = Vec::new();
+    let persons = self::people(claims);
+    let mut people: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    let mut expected: BTreeMap<usize, String> = BTreeMap::new();
+    for (index, (claim, grade)) in claims.iter().zip(grades.iter_mut()).enumerate() {
+        let mut standing = Standing { label: claim.label.clone(), ..Standing::default() };
+        let mut person = persons[index].clone();
+        if deciding.matches.is_nobody(claim) {
+            class.not_counted.push(claim.name.clone());
+            standings.push(standing);
+            continue;
+        }
+        if let Some(roster) = deciding.roster {
+            match find(claim, roster, deciding.matches)? {
+                Match::Student(at, by) => {
+                    standing.student = Some(roster.students[at].clone());
+                    by.clone_into(&mut standing.matched_by);
+                    person = format!("on the list {at}");
+                    expected.insert(at, String::new());
+                }
+                Match::Undecided(reason, candidates) => {
+                    for at in &candidates {
+                        expected.entry(*at).or_insert_with(|| {
+                            format!("perhaps {}: decide in matches.toml", claim.name)
+                        });
+                    }
+                    let candidates =
+                        candidates.into_iter().map(|at| roster.students[at].clone()).collect();
+                    let submission = claim.name.clone();
+                    class.undecided.push(Undecided { submission, reason, candidates });
+                    person = format!("undecided {index}");
+                }
+                Match::Nobody => {}
+            }
+        }
+        standing.late = charge(claim, &standing, grade, deciding);
+        people.entry(person).or_default().push(index);
+        standings.push(standing);
+    }
+    let mut counts: Vec<usize> = Vec::new();
+    for attempts in people.into_values() {
+        match choose(&attempts, claims, &standings, grades, deciding) {
+            Some(own) => {
+                let others = attempts.iter().filter(|at| **at != own);
+                standings[own].set_aside = others.map(|at| claims[*at].name.clone()).collect();
+                counts.push(own);
+            }
+            None => {
+                for &own in &attempts {
+                    let others: Vec<&str> = attempts
+                        .iter()
+                        .filter(|at| **at != own)
+                        .map(|at| claims[*at].name.as_str())
+                        .collect();
+                    class.undecided.push(Undecided {
+                        submission: claims[own].name.clone(),
+                        reason: format!(
+                            "which of the attempts counts is not certain, there is also {}",
+                            others.join(", ")
+                        ),
+                        candidates: standings[own].student.clone().into_iter().collect(),
+                    });
+                }
+                counts.extend(attempts);
+            }
+        }
+    }
+    if let Some(roster) = deciding.roster {
+        for (label, reason) in absent {
+            let claim = Claim { label: Some(label.clone()), ..Claim::default() };
+            if let Match::Student(at, _) = find(&claim, roster, deciding.matches)? {
+                expected.entry(at).or_insert_with(|| reason.clone());
+            }
+        }
+        for (at, student) in roster.students.iter().enumerate() {
+            let reason = expected.get(&at).cloned();
+            if reason.as_deref() != Some("") {
+                let reason = reason.unwrap_or_default();
+                class.missing.push(Missing { student: student.clone(), reason });
+            }
+        }
+    }
+    counts.sort_unstable();
+    let standings = standings.into_iter().enumerate().filter(|(at, _)| counts.contains(at));
+    Ok((standings.collect(), class))
+}
+
+/// Whom submissions are told apart by where there is no class list, in their order.
+fn people(claims: &[Claim]) -> Vec<String> {
+    let own = |claim: &Claim| match &claim.label {
+        Some(label) => label.person(),
+        None => format!("submission {}", claim.slug),
+    };
+    let mut people: Vec<String> = claims.iter().map(own).collect();
+    // Brightspace's numbers may be those of attempts: one name and one student number are one person.
+    let mut known: BTreeMap<(String, String), String> = BTreeMap::new();
+    for (at, claim) in claims.iter().enumerate() {
+        let number = names::number(&claim.number);
+        let label = claim.label.as_ref().filter(|label| label.kind == Kind::Brightspace);
+        let Some(label) = label.filter(|_| !number.is_empty()) else { continue };
+        let person = people[at].clone();
+        let first = known.entry((names::words(&label.name), number)).or_insert(person.clone());
+        people.iter_mut().filter(|own| **own == person).for_each(|own| own.clone_from(first));
+    }
+    people
+}
+
+/// The attempt that counts; nothing where that is not certain.
+fn choose(
+    attempts: &[usize],
+    claims: &[Claim],
+    standings: &[Standing],
+    grades: &[Grade],
+    deciding: &Deciding,
+) -> Option<usize> {
+    if let [only] = attempts {
+        return Some(*only);
+    }
+    if deciding.attempt == Attempt::Best {
+        let most = |at: &&usize| grades[**at].points_max;
+        return attempts.iter().rev().max_by(|a, b| most(a).total_cmp(&most(b))).copied();
+    }
+    let stamps: Vec<&str> =
+        attempts.iter().map(|at| stamp(&claims[*at], &standings[*at], deciding)).collect();
+    by_time(&stamps, deciding.attempt).map(|at| attempts[at])
+}
+
+/// When a submission was submitted: as the instructor says, else the platform's names, else the class list.
+fn stamp<'a>(claim: &'a Claim, standing: &'a Standing, deciding: &'a Deciding) -> &'a str {
+    let label = claim.label.as_ref().map(|label| label.submitted.as_str());
+    let listed = standing.student.as_ref().map(|student| student.submitted.as_str());
+    let said = deciding.matches.submitted(claim).into_iter().chain(label).chain(listed);
+    said.into_iter().find(|stamp| !stamp.is_empty()).unwrap_or_default()
+}
+
+/// Charges a submission for being late, or notes that nobody knows.
+fn charge(
+    claim: &Claim,
+    standing: &Standing,
+    grade: &mut Grade,
+    deciding: &Deciding,
+) -> Option<Late> {
+    let policy = deciding.policy?;
+    let number = standing.student.as_ref().map_or(&claim.number, |student| &student.number);
+    let own = |word: &str| !number.is_empty() && names::number(word) == names::number(number);
+    let stamp = stamp(claim, standing, deciding);
+    if let Some(mut late) = policy.judge(deciding.due, stamp, own) {
+        policy.charge(&mut late, grade);
+        return Some(late);
+    }
+    match &claim.label {
+        Some(label) if label.marked_late => grade.remarks.push(format!(
+            "late, says {}, but not by how much: no points are taken until the time is known",
+            label.kind.title()
+        )),
+        // Canvas marks those that are late.
+        Some(label) if label.kind == Kind::Canvas => {}
+        _ => grade
+            .remarks
+            .push("when it was submitted is not known: no points are taken for lateness".into()),
+    }
+    None
+}
+
+impl Class {
+    /// Whether there is anything to say.
+    pub fn is_quiet(&self) -> bool {
+        self.missing.is_empty() && self.undecided.is_empty() && self.not_counted.is_empty()
+    }
+
+    /// What `matches.toml` may begin with: all that is undecided, to be filled in.
+    pub fn questions(&self) -> String {
+        let mut text = String::from(
+            "# Whose submissions are, where the class list and the submissions do not tell. Umbra reads this file on\n\
+             # every run and never changes it. `student` is a student number, or \"none\" for a submission that does\n\
+             # not count; `submitted` is a time stamp.\n",
+        );
+        for Undecided { submission, reason, candidates } in &self.undecided {
+            let quoted = toml::Value::String(submission.clone());
+            text += &format!("\n# {}\n# [[match]]\n# submission = {quoted}\n", one_line(reason));
+            let who = candidates.first().map_or("none", |student| student.number.as_str());
+            text += &format!("# student = {}\n", toml::Value::String(who.to_owned()));
+        }
+        text
+    }
+}
+
+fn one_line(text: &str) -> String {
+    crate::intake::printable(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::class::layout::label_of;
+
+    fn grade(points: f64) -> Grade {
+        Grade {
+            parts: Vec::new(),
+            points,
+            points_max: points,
+            out_of: 100.0,
+            unconfirmed: 0.0,
+            remarks: Vec::new(),
+        }
+    }
+
+    fn claim(folder: &str, number: &str) -> Claim {
+        Claim {
+            name: format!("{folder}/a2.zip"),
+            slug: folder.to_owned(),
+            label: Kind::PLATFORMS.into_iter().find_map(|kind| label_of(kind, folder)),
+            number: number.to_owned(),
+            full_name: String::new(),
+        }
+    }
+
+    fn roster() -> Roster {
+        let text =
+            "OrgDefinedId,Last Name,First Name\n#1,Lee,Ann\n#2,Lee,Ann\n#3,Ode,Bo\n#4,Poe,Cy\n";
+        Roster::parse(text.as_bytes(), Path::new("class/list.csv")).unwrap()
+    }
+
+    struct Settled {
+        names: Vec<String>,
+        standings: Vec<Standing>,
+        class: Class,
+        grades: Vec<Grade>,
+    }
+
+    fn run(
+        claims: &[Claim],
+        points: &[f64],
+        with_list: bool,
+        attempt: Attempt,
+        matches: &str,
+    ) -> Settled {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), matches).unwrap();
+        let (roster, matches) = (roster(), Matches::read(file.path()).unwrap());
+        let policy: Policy =
+            serde_json::from_str(r#"{"penalty": 10, "unit": "points", "per": "day"}"#).unwrap();
+        let deciding = Deciding {
+            roster: with_list.then_some(&roster),
+            matches: &matches,
+            policy: Some(&policy),
+            due: "2019-10-05T23:59:00-04:00",
+            attempt,
+        };
+        let mut grades: Vec<Grade> = points.iter().map(|points| grade(*points)).collect();
+        let (standings, class) =
+            settle(claims, &mut grades, &[], Kind::Brightspace, &deciding).unwrap();
+        let names = standings.iter().map(|(at, _)| claims[*at].slug.clone()).collect();
+        Settled {
+            names,
+            standings: standings.into_iter().map(|(_, own)| own).collect(),
+            class,
+            grades,
+        }
+    }
+
+    const FIRST: &str = "11-9 - Bo Ode - Oct 5, 2019 1000 PM";
+    const SECOND: &str = "11-9 - Bo Ode - Oct 6, 2019 1000 PM";
+
+    #[test]
+    fn one_attempt_counts_by_the_policy() {
+        let claims = [claim(FIRST, "3"), claim(SECOND, "3")];
+        for (attempt, points, counts, after) in [
+            (Attempt::Latest, [90.0, 50.0], SECOND, 40.0),
+            (Attempt::First, [90.0, 50.0], FIRST, 90.0),
+            // The second one is better before what lateness costs.
+            (Attempt::Best, [90.0, 95.0], FIRST, 90.0),
+            (Attempt::Best, [80.0, 95.0], SECOND, 85.0),
+        ] {
+            for with_list in [false, true] {
+                let settled = run(&claims, &points, with_list, attempt, "");
+                assert_eq!(settled.names, [counts], "{attempt:?}");
+                assert_eq!(settled.standings[0].set_aside.len(), 1);
+                let own = claims.iter().position(|claim| claim.slug == counts).unwrap();
+                assert_eq!(settled.grades[own].points, after);
+                assert_eq!(settled.class.undecided, []);
+            }
+        }
+        // Attempts with numbers of their own, and one configuration that says nothing.
+        let third = claim("12-9 - Bo Ode - Oct 4, 2019 1000 PM", "3");
+        let several = [claim(FIRST, ""), claims[1].clone(), third];
+        assert_eq!(run(&several, &[1.0; 3], false, Attempt::Latest, "").names, [SECOND]);
+        let labels: Vec<Option<&Label>> = claims.iter().map(|claim| claim.label.as_ref()).collect();
+        let matches = Matches::default();
+        let deciding =
+            |attempt| Deciding { roster: None, matches: &matches, policy: None, due: "", attempt };
+        let aside =
+            |attempt| set_aside(&labels, &deciding(attempt)).into_iter().collect::<Vec<_>>();
+        assert_eq!(aside(Attempt::Latest), [0]);
+        assert_eq!(aside(Attempt::First), [1]);
+        assert_eq!(aside(Attempt::Best), [0usize; 0]);
+    }
+
+    #[test]
+    fn two_students_of_one_name_are_two() {
+        let at = |number: &str| format!("{number}-9 - Ann Lee - Oct 5, 2019 1000 PM");
+        let claims = [claim(&at("11"), "1"), claim(&at("12"), "2")];
+        for with_list in [false, true] {
+            let settled = run(&claims, &[1.0, 2.0], with_list, Attempt::Latest, "");
+            assert_eq!(settled.names.len(), 2);
+            assert_eq!(settled.class.undecided, []);
+        }
+        // Without numbers nobody knows whose they are, and both may be missing.
+        let claims = [claim(&at("11"), ""), claim(&at("12"), "")];
+        let settled = run(&claims, &[1.0, 2.0], true, Attempt::Latest, "");
+        assert_eq!((settled.names.len(), settled.class.undecided.len()), (2, 2));
+        assert_eq!(settled.class.missing.len(), 4);
+        assert!(
+            settled.class.missing[0].reason.starts_with("perhaps 11-9 - Ann Lee"),
+            "{:?}",
+            settled.class
+        );
+        // The instructor decides.
+        let decided = format!(
+            "[[match]]\nsubmission = \"{}\"\nstudent = \"2\"\n[[match]]\nsubmission = \"{}\"\nstudent = \"none\"\n",
+            at("11"),
+            at("12")
+        );
+        let settled = run(&claims, &[1.0, 2.0], true, Attempt::Latest, &decided);
+        assert_eq!(settled.names, [at("11")]);
+        assert_eq!(settled.standings[0].student.as_ref().unwrap().number, "2");
+        assert_eq!(settled.class.not_counted, [format!("{}/a2.zip", at("12"))]);
+        let missing: Vec<&str> =
+            settled.class.missing.iter().map(|missing| missing.student.number.as_str()).collect();
+        assert_eq!(missing, ["1", "3", "4"]);
+    }
+
+    #[test]
+    fn attempts_that_no_time_tells_apart_are_the_instructors() {
+        let claims = [
+            claim("Bo Ode_7_assignsubmission_file", "3"),
+            claim("Bo Ode_7_assignsubmission_file_x", "3"),
+        ];
+        let settled = run(&claims, &[1.0, 2.0], true, Attempt::Latest, "");
+        assert_eq!(settled.names.len(), 2);
+        assert!(settled.class.undecided[0].reason.starts_with("which of the attempts counts"));
+        assert!(settled.grades[0].remarks[0].starts_with("when it was submitted is not known"));
+        let text = settled.class.questions();
+        assert!(
+            text.contains(
+                "# submission = \"Bo Ode_7_assignsubmission_file/a2.zip\"\n# student = \"3\"\n"
+            ),
+            "{text}"
+        );
+        // As a comment it is empty, and without the signs it is read.
+        let open: String = text
+            .lines()
+            .filter_map(|line| line.strip_prefix("# "))
+            .filter(|line| line.starts_with("[[") || line.contains(" = \""))
+            .map(|line| format!("{line}\n"))
+            .collect();
+        for text in [&text, &open] {
+            run(&claims, &[1.0, 2.0], true, Attempt::Latest, text);
+        }
+    }
+}

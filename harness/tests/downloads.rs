@@ -1,0 +1,486 @@
+//! What learning platforms give: bulk downloads as they name them, class lists, attempts and lateness, through the
+//! real binary, which grades none of the sources: they do not compile.
+
+#![cfg(unix)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+use similar_asserts::assert_eq;
+
+use crate::support::zip_bytes::{Entry, Zip};
+
+/// A submission of somebody: a zip that follows the tree, but for its images, and does not compile.
+fn submission(config: &str) -> Vec<u8> {
+    let images = ["cbox_simple_offline", "teapot_simple_offline"]
+        .map(|name| format!("offline/{name}.exr"))
+        .into_iter()
+        .chain(
+            ["cbox_simple_realtime", "teapot_simple_realtime"]
+                .map(|name| format!("realtime/{name}.exr")),
+        );
+    let mut files = vec![
+        ("config.json".to_owned(), config.as_bytes()),
+        ("src/lib.rs".to_owned(), b"fn main() { not_rust }".as_slice()),
+    ];
+    files.extend(images.map(|path| (path, b"x".as_slice())));
+    zip(&files)
+}
+
+fn zip(files: &[(String, &[u8])]) -> Vec<u8> {
+    Zip::of(files.iter().map(|(path, bytes)| Entry::deflated(path, bytes))).bytes()
+}
+
+fn config(first: &str, last: &str, number: &str) -> String {
+    format!(
+        r#"{{"firstName": "{first}", "lastName": "{last}", "studentID": "{number}", "renders": []}}"#
+    )
+}
+
+/// A place with a download, an assignment with a late policy, and a report.
+struct Place {
+    folder: tempfile::TempDir,
+}
+
+impl Place {
+    fn new() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn put(&self, name: &str, bytes: &[u8]) {
+        let path = self.at(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+
+    /// The repository's assignment with a late policy: its files are links.
+    fn assignment(&self, late: &str) -> PathBuf {
+        let root = self.at("assignment");
+        fs::create_dir_all(&root).unwrap();
+        let own = root_of_repository().canonicalize().unwrap();
+        for entry in own.read_dir().unwrap() {
+            let name = entry.unwrap().file_name();
+            if name != "config.json" && !root.join(&name).exists() {
+                std::os::unix::fs::symlink(own.join(&name), root.join(&name)).unwrap();
+            }
+        }
+        let text = fs::read_to_string(own.join("config.json")).unwrap();
+        let due = r#""due": "2019-10-06T23:59:00-04:00","#;
+        assert!(text.contains(due));
+        let text = text.replacen(due, &format!("{due} \"late\": {late},"), 1);
+        fs::write(root.join("config.json"), text).unwrap();
+        root
+    }
+
+    fn run(&self, arguments: &[&str]) -> (Option<i32>, String, String) {
+        let output = Command::new(env!("CARGO_BIN_EXE_umbra"))
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .env("COLUMNS", "400")
+            .output()
+            .unwrap();
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (output.status.code(), text(&output.stdout), text(&output.stderr))
+    }
+
+    /// Grades into `out`, and answers what is said and `report.json`.
+    fn grade(&self, root: &Path, arguments: &[&str]) -> (String, Value) {
+        let fixed = ["--perturb", "off", "--isolation", "reduced", "--output", "out", "--root"];
+        let mut all = vec!["grade"];
+        all.extend(fixed);
+        let root = root.to_str().unwrap();
+        all.push(root);
+        all.extend(arguments);
+        let (code, said, errors) = self.run(&all);
+        assert_eq!(code, Some(0), "{said}{errors}");
+        let report = fs::read(self.at("out/report.json")).unwrap();
+        (said + &errors, serde_json::from_slice(&report).unwrap())
+    }
+
+    fn validate(&self, arguments: &[&str]) -> (Option<i32>, String) {
+        let root = root_of_repository();
+        let mut all = vec!["validate", "--root", root.to_str().unwrap()];
+        all.extend(arguments);
+        let (code, said, errors) = self.run(&all);
+        (code, said + &errors)
+    }
+}
+
+fn root_of_repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().unwrap_or_default()
+}
+
+/// Of each submission in a report: its name, whose it is by the class list, and its remarks.
+fn rows(report: &Value) -> Vec<(String, String, String)> {
+    let rows = report["hand_ins"].as_array().unwrap().iter();
+    let row = |row: &Value| {
+        let remarks = row["remarks"].as_array().unwrap().iter().map(text).collect::<Vec<_>>();
+        (
+            text(&row["name"]).to_owned(),
+            text(&row["standing"]["student"]["number"]).to_owned(),
+            remarks.join("\n"),
+        )
+    };
+    rows.map(row).collect()
+}
+
+/// The download of a class on Brightspace, as the platform names it.
+fn brightspace() -> Vec<(String, Vec<u8>)> {
+    let folder = |id: u32, name: &str, when: &str| format!("{id}-5150 - {name} - Oct {when}");
+    vec![
+        ("index.html".to_owned(), b"<html>".to_vec()),
+        // A number with a zero in front, a name with accents, an apostrophe and a comma on the list.
+        (
+            folder(101, "Zoë O'Neil", "6, 2019 1158 PM/a2_zoë_o'neil.zip"),
+            submission(&config("Zoe", "ONeil", "0260000001")),
+        ),
+        // Two attempts, the second one late; `firstlast` in the configuration.
+        (folder(102, "Bo Ode", "6, 2019 1000 PM/a2.zip"), submission("{}")),
+        (
+            folder(102, "Bo Ode", "8, 2019 110 AM/a2.zip"),
+            submission(r#"{"firstlast": "Bo Ode", "studentID": 260000002, "renders": []}"#),
+        ),
+        // Two students of one name: the number tells.
+        (
+            folder(103, "Ann Lee", "6, 2019 800 PM/a2.zip"),
+            submission(&config("Ann", "Lee", "260000004")),
+        ),
+        (
+            folder(104, "Ann Lee", "6, 2019 900 PM/a2.zip"),
+            submission(&config("Ann", "Lee", "260000003")),
+        ),
+        // Nothing in it but a note; nothing at all.
+        (folder(105, "Cy Poe", "6, 2019 700 PM/notes.txt"), b"sorry".to_vec()),
+        (folder(106, "Di Rue", "6, 2019 700 PM/"), Vec::new()),
+        // Of another course, by somebody who is not in this one.
+        (
+            folder(107, "Max Other", "6, 2019 600 PM/cs101_hw3.zip"),
+            zip(&[("main.py".to_owned(), b"print()".as_slice())]),
+        ),
+        // An archive without a byte.
+        (folder(108, "Eve Sol", "6, 2019 500 PM/a2.zip"), Vec::new()),
+    ]
+}
+
+const LIST: &str = "\u{feff}OrgDefinedId,Username,Last Name,First Name,Email,End-of-Line Indicator\r\n\
+    #0260000001,#zoneil,\"O'Neil, \",Zoë,z@example.org,#\r\n#260000002,#bode,Ode,Bo,b@example.org,#\r\n\
+    #260000003,#alee,Lee,Ann,a@example.org,#\r\n#260000004,#alee2,Lee,Ann,a2@example.org,#\r\n\
+    #260000005,#cpoe,Poe,Cy,c@example.org,#\r\n#260000006,#drue,Rue,Di,d@example.org,#\r\n\
+    #260000007,#gtam,Tam,Gil,g@example.org,#\r\n#260000008,#esol,Sol,Eve,e@example.org,#\r\n";
+
+const LATE: &str =
+    r#"{"penalty": 10, "unit": "percent", "of": "maximum", "per": "day", "grace_min": 5}"#;
+
+#[test]
+fn a_class_of_brightspace_zipped_and_unpacked() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    let files = brightspace();
+    let entries: Vec<(String, &[u8])> =
+        files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+    let name = "Lab 02 Download Oct 9, 2019 905 AM";
+    place.put(&format!("{name}.zip"), &zip(&entries));
+    for (file, bytes) in &files {
+        if file.ends_with('/') {
+            fs::create_dir_all(place.at(&format!("{name}/{file}"))).unwrap();
+        } else {
+            place.put(&format!("{name}/{file}"), bytes);
+        }
+    }
+    place.put("list.csv", LIST.as_bytes());
+    let mut reports = Vec::new();
+    for given in [format!("{name}.zip"), name.to_owned()] {
+        let _ = fs::remove_dir_all(place.at("out"));
+        let (said, report) = place.grade(&root, &[&given, "--class", "list.csv"]);
+        assert!(said.contains("recognised as a download of Brightspace"), "{said}");
+        assert!(said.contains("skipped, not submissions: 105-5150 - Cy Poe"), "{said}");
+        assert!(said.contains("index.html"), "{said}");
+        let rows = rows(&report);
+        let of = |who: &str| rows.iter().find(|(name, ..)| name.contains(who)).unwrap().clone();
+        let numbers: Vec<(String, String)> =
+            rows.iter().map(|(name, number, _)| (name[..3].to_owned(), number.clone())).collect();
+        let expected = [
+            ("101", "0260000001"),
+            ("102", "260000002"),
+            ("103", "260000004"),
+            ("104", "260000003"),
+            ("107", ""),
+            ("108", "260000008"),
+        ];
+        assert_eq!(numbers, expected.map(|(id, number)| (id.to_owned(), number.to_owned())));
+        let (name, _, remarks) = of("Bo Ode");
+        assert!(name.contains("Oct 8, 2019 110 AM"), "{name}");
+        assert!(
+            remarks.contains(
+                "1 d 1 h after it was due (2019-10-06 23:59 -04:00): 2 started days; 2 x 10 %"
+            ),
+            "{remarks}"
+        );
+        assert!(!of("Zoë").2.contains("due"), "{}", of("Zoë").2);
+        let bo = report["hand_ins"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|row| row["slug"] == "102-5150---Bo-Ode---Oct-8--2019-110-AM-a2")
+            .unwrap();
+        assert_eq!(
+            bo["standing"]["set_aside"][0],
+            "102-5150 - Bo Ode - Oct 6, 2019 1000 PM/a2.zip"
+        );
+        let missing: Vec<(&str, &str)> = report["class"]["missing"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|own| (text(&own["student"]["number"]), text(&own["reason"])))
+            .collect();
+        let expected = [
+            ("260000005", "an empty submission: it holds only notes.txt"),
+            ("260000006", "an empty submission: it holds no file"),
+            ("260000007", ""),
+        ];
+        assert_eq!(missing, expected);
+        let undecided = report["class"]["undecided"].as_array().unwrap();
+        assert_eq!(undecided.len(), 1);
+        assert_eq!(text(&undecided[0]["reason"]), "nobody on the list is Max Other");
+        assert!(said.contains("decide in out/matches.toml"), "{said}");
+        reports.push(text(&report["hand_ins"].to_string().into()).to_owned());
+    }
+    assert_eq!(reports[0], reports[1]);
+
+    // The instructor decides; the class list was kept, and nothing is graded again.
+    let questions = fs::read_to_string(place.at("out/matches.toml")).unwrap();
+    let own = "submission = \"107-5150 - Max Other - Oct 6, 2019 600 PM/cs101_hw3.zip\"";
+    assert!(questions.contains(&format!("# {own}\n# student = \"none\"")), "{questions}");
+    place
+        .put("out/matches.toml", format!("[[match]]\n{own}\nstudent = \"260000007\"\n").as_bytes());
+    let (said, report) = place.grade(&root, &[name]);
+    assert!(said.contains("5 of 6 submissions keep their earlier grades"), "{said}"); // An empty archive costs nothing to look at again.
+    assert_eq!(report["class"]["undecided"].as_array().unwrap().len(), 0);
+    assert!(
+        rows(&report)
+            .iter()
+            .any(|(name, number, _)| name.starts_with("107") && number == "260000007")
+    );
+    // What students get names no other and no platform's number.
+    let page =
+        fs::read_to_string(place.at("out/104-5150---Ann-Lee---Oct-6--2019-900-PM-a2/report.html"))
+            .unwrap();
+    assert!(!page.contains("260000004") && !page.contains("Bo Ode"), "{page}");
+}
+
+#[test]
+fn the_best_and_the_first_attempt() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    for (file, bytes) in brightspace().iter().filter(|(name, _)| name.contains("Bo Ode")) {
+        place.put(&format!("class/{file}"), bytes);
+    }
+    for (attempt, day) in [("first", "Oct 6"), ("best", "Oct 6"), ("latest", "Oct 8")] {
+        let (said, report) = place.grade(&root, &["class", "--attempt", attempt]);
+        let rows = rows(&report);
+        assert_eq!(rows.len(), 1, "{said}");
+        assert!(rows[0].0.contains(day), "{attempt}: {said}");
+    }
+}
+
+#[test]
+fn downloads_of_other_platforms() {
+    let zoe = submission(&config("Zoë", "O'Neil", "0260000001"));
+    let ann = submission(&config("Ann", "Lee", "260000003"));
+    let metadata = "---\nsubmission_11:\n  :submitters:\n  - :name: Zoë O'Neil\n    :sid: '0260000001'\n    \
+                    :email: z@example.org\n  :created_at: 2019-10-07 03:00:00.5 Z\nsubmission_12:\n  :submitters:\n  \
+                    - :name: Ann Lee\n    :sid: '260000003'\n  :created_at: 2019-10-08 03:59:30 Z\n";
+    let unpacked = |folder: &str, number: &str| {
+        vec![
+            (format!("{folder}/config.json"), config("X", "Y", number).into_bytes()),
+            (format!("{folder}/src/lib.rs"), b"fn main() { not_rust }".to_vec()),
+        ]
+    };
+    let gradescope = [
+        unpacked("assignment_9_export/submission_11", ""),
+        unpacked("assignment_9_export/submission_12", ""),
+        vec![(
+            "assignment_9_export/submission_metadata.yml".to_owned(),
+            metadata.as_bytes().to_vec(),
+        )],
+    ];
+    let moodle = "Identifier,Full name,ID number,Grade,Maximum Grade,Last modified (submission),Last modified (grade)\n\
+                  Participant 7,Zoë O'Neil,0260000001,,100,\"Sunday, 6 October 2019, 11:58 PM\",-\n\
+                  Participant 8,Ann Lee,260000003,,100,\"Tuesday, 8 October 2019, 12:30 AM\",-\n\
+                  Participant 9,Gil Tam,260000007,,100,-,-\n";
+    let canvas = "Student,ID,SIS User ID,SIS Login ID,Section,A2 (77)\n    Points Possible,,,,,100\n\
+                  \"O'Neil, Zoë\",501,0260000001,zo,1,\n\"Lee, Ann\",502,260000003,al,1,\n\"Tam, Gil\",503,260000007,gt,1,\n";
+    let github = "identifier,github_username,github_id,name\n0260000001,zo,1,\n260000003,ann-l,2,\n260000007,gt,3,\n";
+    let git = |folder: &str, number: &str| {
+        let mut files = unpacked(folder, number);
+        files.push((format!("{folder}/.git/HEAD"), b"ref: refs/heads/main\n".to_vec()));
+        files
+    };
+    let unknown = "when it was submitted is not known";
+    for (title, files, zipped, list, late) in [
+        (
+            "Moodle",
+            vec![
+                ("Zoë O'Neil_7_assignsubmission_file/a2.zip".to_owned(), zoe.clone()),
+                ("Ann Lee_8_assignsubmission_file/a2.zip".to_owned(), ann.clone()),
+                (
+                    "Ann Lee_8_assignsubmission_onlinetext/onlinetext.html".to_owned(),
+                    b"hi".to_vec(),
+                ),
+            ],
+            true,
+            moodle,
+            "2 started days",
+        ),
+        (
+            "Canvas",
+            vec![
+                ("oneilzoë_501_9001_a2.zip".to_owned(), submission("{}")),
+                ("leeann_LATE_502_9002_a2_7_8-1.zip".to_owned(), submission("{}")),
+            ],
+            true,
+            canvas,
+            "late, says Canvas, but not by how much",
+        ),
+        ("Gradescope", gradescope.concat(), true, LIST, "2 started days"),
+        (
+            "GitHub Classroom",
+            [git("a2-submissions/a2-zo", ""), git("a2-submissions/a2-ann-l", "")].concat(),
+            false,
+            github,
+            unknown,
+        ),
+    ] {
+        let place = Place::new();
+        let root = place.assignment(LATE);
+        place.put("list.csv", list.as_bytes());
+        let entries: Vec<(String, &[u8])> =
+            files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+        place.put("download.zip", &zip(&entries));
+        files.iter().for_each(|(name, bytes)| place.put(&format!("download/{name}"), bytes));
+        for given in ["download", "download.zip"].into_iter().take(1 + usize::from(zipped)) {
+            let (said, report) = place.grade(&root, &[given, "--class", "list.csv"]);
+            assert!(said.contains(&format!("recognised as a download of {title}")), "{said}");
+            let mut rows = rows(&report);
+            rows.sort_by_key(|(_, number, _)| number.clone());
+            let numbers: Vec<&str> = rows.iter().map(|(_, number, _)| number.as_str()).collect();
+            assert_eq!(numbers, ["0260000001", "260000003"], "{title} {given}: {said}");
+            assert!(rows[1].2.contains(late), "{title} {given}: {}", rows[1].2);
+            assert_eq!(rows[0].2.contains(unknown), late == unknown, "{title}: {}", rows[0].2);
+            let missing = report["class"]["missing"].as_array().unwrap();
+            assert!(missing.iter().any(|own| own["student"]["number"] == "260000007"), "{title}");
+            fs::remove_dir_all(place.at("out")).unwrap();
+        }
+    }
+}
+
+#[test]
+fn one_who_dresses_up_an_archive_as_a_download_is_one_student() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    let own = submission(&config("Ann", "Lee", "260000003"));
+    place.put("class/a2_ann.zip", &own);
+    let name = "1-2 - Bo Ode - Oct 5, 2019 1159 PM/a2.zip".to_owned();
+    place.put("class/a2_eve.zip", &zip(&[(name.clone(), &own)]));
+    let folder = "7-5150 - Eve Sol - Oct 5, 2019 1159 PM";
+    let (said, report) = place.grade(&root, &["class"]);
+    let names: Vec<String> = rows(&report).into_iter().map(|(name, ..)| name).collect();
+    assert_eq!(names, ["a2_ann.zip", "a2_eve.zip"], "{said}");
+    fs::remove_dir_all(place.at("out")).unwrap();
+    place.put("download.zip", &zip(&[(format!("{folder}/a2.zip"), &zip(&[(name, &own)]))]));
+    let (said, report) = place.grade(&root, &["download.zip"]);
+    assert_eq!(rows(&report).len(), 1, "{said}");
+    assert_eq!(rows(&report)[0].0, format!("{folder}/a2.zip"));
+}
+
+#[test]
+fn what_holds_no_submission_is_said_and_nothing_is_written() {
+    let place = Place::new();
+    place.put("class/notes.txt", b"x");
+    place.put("class.zip", &zip(&[("index.html".to_owned(), b"".as_slice())]));
+    let root = root_of_repository();
+    for (given, said) in [
+        (&["class"][..], "it holds notes.txt"),
+        (
+            &["class", "--from", "moodle"],
+            "in Moodle named like \"First Last_123_assignsubmission_file/\"",
+        ),
+        (&["nowhere"], "nowhere does not exist"),
+    ] {
+        let mut all = vec!["grade", "--output", "out", "--root", root.to_str().unwrap()];
+        all.extend(given);
+        let (code, _, errors) = place.run(&all);
+        assert_eq!(code, Some(2), "{errors}");
+        assert!(errors.contains(said), "{errors}");
+        assert!(!place.at("out").exists());
+    }
+    // A list that is none, a policy that says too little: the user's own file and line.
+    place.put("list.csv", b"a,b\n1,2\n");
+    place.put("class/a2.zip", &submission("{}"));
+    let mut all = vec!["grade", "class", "--class", "list.csv", "--root", root.to_str().unwrap()];
+    all.extend(["--isolation", "reduced", "--perturb", "off", "--output", "out"]);
+    let (code, _, errors) = place.run(&all);
+    assert_eq!(code, Some(2), "{errors}");
+    assert!(
+        errors.contains("list.csv:1: expected a header with a column of student numbers"),
+        "{errors}"
+    );
+    let late = place.assignment(r#"{"penalty": 10, "unit": "percent", "per": "day"}"#);
+    let (code, _, errors) = place.run(&["grade", "class", "--root", late.to_str().unwrap()]);
+    assert_eq!(code, Some(2), "{errors}");
+    assert!(errors.contains("config.json: late: percent of what?"), "{errors}");
+}
+
+#[test]
+fn validate_takes_what_grade_takes() {
+    let place = Place::new();
+    let files = brightspace();
+    let entries: Vec<(String, &[u8])> =
+        files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+    place.put("download.zip", &zip(&entries));
+    let (code, said) = place.validate(&["download.zip"]);
+    assert_eq!(code, Some(1), "{said}");
+    let line = |who: &str| said.lines().find(|line| line.contains(who)).unwrap();
+    assert!(line("101-5150 - Zoë").contains("a2_zoë_o'neil.zip"), "{said}");
+    assert!(line("107-5150").contains("error: "), "{said}");
+    assert!(line("108-5150").contains("error: "), "{said}");
+    assert!(said.contains("recognised as a download of Brightspace\n7 submissions, "), "{said}");
+    assert!(said.contains("Cy Poe: an empty submission: it holds only notes.txt"), "{said}");
+    let (code, json) = place.validate(&["download.zip", "--json"]);
+    assert_eq!(code, Some(1));
+    let json: Value = serde_json::from_str(&json[..=json.rfind(']').unwrap()]).unwrap();
+    assert_eq!(json.as_array().unwrap().len(), 7);
+
+    // Several that are named, all in order but for their images, which are warnings.
+    let renders = [
+        "offline/cbox_simple_offline",
+        "offline/teapot_simple_offline",
+        "realtime/cbox_simple_realtime",
+        "realtime/teapot_simple_realtime",
+    ]
+    .map(|path| format!(r#"{{"scene": "", "render": "{path}.exr"}}"#));
+    let good = config("Ann", "Lee", "260000003").replace("[]", &format!("[{}]", renders.join(",")));
+    place.put("a2_ann_lee.zip", &submission(&good));
+    place.put("b/a2_ann_lee.zip", &submission(&good));
+    let (code, said) = place.validate(&["a2_ann_lee.zip", "b/a2_ann_lee.zip"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("a2_ann_lee.zip  conforms, 4 warnings\n"), "{said}");
+    assert!(said.contains("2 submissions, 2 conform, 0 do not"), "{said}");
+    let (code, said) = place.validate(&["a2_ann_lee.zip", "b", "--fix", "out.zip"]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("--fix repacks one submission, found 2"), "{said}");
+    // One alone shows its tree as before.
+    let (code, said) = place.validate(&["a2_ann_lee.zip"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.starts_with("a2_ann_lee.zip: conforms (0 errors, 4 warnings)"), "{said}");
+}
