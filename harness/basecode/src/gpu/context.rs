@@ -1,5 +1,7 @@
 //! The graphics device: which adapter, and what went wrong.
 
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -190,12 +192,16 @@ impl Gpu {
     /// # Errors
     /// The body's own error, or else [`Error::NoAdapter`] when the device was lost, or else
     /// [`Error::Gpu`] with the library's message: for a shader it holds the line of WGSL.
+    ///
+    /// # Panics
+    /// When the body does, unless it is the library that panics, over the debris of an error that it found
+    /// before: then that error is told.
     pub fn checked<T>(&self, body: &mut dyn FnMut() -> Result<T>) -> Result<T> {
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
         self.unfinished.fetch_add(1, Ordering::Relaxed);
-        let answer = body();
+        let answer = catch_unwind(AssertUnwindSafe(&mut *body));
         // An error that poll itself finds is a lost device, which the callback reports.
         let _ = self.device.poll(wgpu::PollType::Poll);
         // Scopes end in reverse order. The first error is the cause: what follows uses its debris.
@@ -206,14 +212,19 @@ impl Gpu {
             Ok(mut trouble) => (trouble.lost.clone(), trouble.uncaught.take()),
             Err(_) => (Some("an error handler panicked".to_owned()), None),
         };
-        let value = answer?;
+        let found = memory.or(internal).or(validation).or(uncaught);
+        let value = match answer {
+            Ok(answer) => Ok(answer?),
+            Err(panic) if found.is_none() || !is_of_wgpu(&*panic) => resume_unwind(panic),
+            Err(_) => Err(Error::Gpu(String::new())),
+        };
         if let Some(why) = lost {
             return Err(self.lost(&why));
         }
-        match memory.or(internal).or(validation).or(uncaught) {
+        match found {
             None => {
                 self.unfinished.fetch_sub(1, Ordering::Relaxed);
-                Ok(value)
+                value
             }
             Some(wgpu::Error::OutOfMemory { .. }) => Err(Error::Gpu(format!(
                 "the graphics device {:?} is out of memory",
@@ -227,6 +238,11 @@ impl Gpu {
     pub(super) fn lost(&self, why: &str) -> Error {
         Error::NoAdapter(format!("the graphics device {:?} was lost: {why}", self.adapter.name))
     }
+}
+
+/// Whether a panic is the library's own: what it makes of an error in a render bundle.
+fn is_of_wgpu(panic: &(dyn Any + Send)) -> bool {
+    panic.downcast_ref::<String>().is_some_and(|said| said.starts_with("Error in "))
 }
 
 /// Adapters in the order of preference.
@@ -297,6 +313,23 @@ mod tests {
         let panics = || gpu.checked::<()>(&mut || panic!("not written"));
         assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(panics)).is_err());
         assert!(!is_kept(gpu), "a check did not end");
+        // The library panics where a bundle is made of what it refused: the first error is told.
+        let gpu = reopen();
+        let bundled = gpu.checked(&mut || {
+            let pipeline = gpu.pipeline(NONSENSE, NONSENSE);
+            let mut bundle = gpu.device.create_render_bundle_encoder(
+                &wgpu::RenderBundleEncoderDescriptor {
+                    color_formats: &[Some(wgpu::TextureFormat::Rgba32Float)],
+                    sample_count: 1,
+                    ..Default::default()
+                },
+            );
+            bundle.set_pipeline(&pipeline);
+            bundle.draw(0..3, 0..1);
+            bundle.finish(&wgpu::RenderBundleDescriptor::default());
+            Ok(())
+        });
+        assert!(bundled.is_err_and(|error| error.to_string().contains("no WGSL")));
         let gpu = reopen();
         gpu.device.destroy();
         assert!(!is_kept(gpu), "the device was lost");
