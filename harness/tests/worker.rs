@@ -57,6 +57,9 @@ fov = 40
 const LIGHT: [f32; 3] = [0.0, 2.0, 0.0];
 const INTENSITY: [f32; 3] = [10.0, 20.0, 30.0];
 
+/// A plugin that misbehaves.
+const FAULT: &str = "tests/c_plugin/fault.c";
+
 struct House {
     dir: tempfile::TempDir,
     supervisor: Supervisor,
@@ -104,16 +107,17 @@ impl House {
         report
     }
 
-    /// Compiles a plugin in C with flags for the preprocessor.
+    /// Compiles a plugin in C, by its path below `harness`, with flags for the preprocessor.
     fn compile(&self, source: &str, flags: &[&str]) -> PathBuf {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let library = self.dir.path().join(format!("{source}{}.so", flags.concat()));
+        let name = format!("{}{}.so", source.replace('/', "_"), flags.concat());
+        let library = self.dir.path().join(name);
         let output = Command::new("cc")
             .args(["-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-O1"])
             .args(["-std=c11", "-D_GNU_SOURCE", "-Wno-infinite-recursion", "-I"])
             .arg(root.join("api/include"))
             .args(flags)
-            .arg(root.join("tests/c_plugin").join(source))
+            .arg(root.join(source))
             .arg("-o")
             .arg(&library)
             .output()
@@ -213,7 +217,7 @@ fn bsdf_probes_of_the_reference_and_of_plain_c_match_the_closed_form() {
     let mirror = (0.2 * inv_pi + 0.4 * 5.0 * 0.5 * inv_pi) * 0.8;
     assert_close(values(&report.outcomes[1]), &[mirror; 3], "reference, phong");
 
-    let c = house.compile("renderer.c", &[]);
+    let c = house.compile("api/examples/renderer.c", &[]);
     let report = house.run(&c, vec![diffuse, phong, house.offline("", 1, 1)]);
     assert_eq!(report.renderer.as_deref(), Some("plain C 1.0"));
     assert_close(values(&report.outcomes[0]), &expected, "plain C, diffuse");
@@ -286,7 +290,7 @@ fn tables_that_do_not_fit_are_refused_with_both_values_named() {
         ("-DWRONG_SIZE", ["expected ".into(), "found 64".into()]),
         ("-DNULL_ENTRY", ["`radiance`".into(), "null".into()]),
     ] {
-        let library = house.compile("renderer.c", &[flag]);
+        let library = house.compile(FAULT, &[flag]);
         let report = house.run(&library, vec![house.offline("", 1, 1), house.offline("", 2, 1)]);
         assert_eq!(report.runs.len(), 1, "asked once");
         for outcome in &report.outcomes {
@@ -313,7 +317,7 @@ fn each_fault_has_its_outcome_and_the_requests_around_it_are_answered() {
     house.limits.wall_s = 1.0;
     house.limits.cpu_s = 1;
     house.limits.memory_mib = 400;
-    let plugin = house.compile("fault.c", &[]);
+    let plugin = house.compile(FAULT, &[]);
     let full = house.supervisor.isolation;
     let crashed = |name: &str| Outcome::CrashedBySignal(name.to_owned());
     let before_start = "the plugin wrote before the start of its output buffer, or cut the file \
@@ -365,7 +369,7 @@ fn each_fault_has_its_outcome_and_the_requests_around_it_are_answered() {
 #[test]
 fn a_request_is_blamed_only_for_what_it_does_first_in_a_worker() {
     let house = House::new();
-    let plugin = house.compile("fault.c", &[]);
+    let plugin = house.compile(FAULT, &[]);
     let requests = ["first", "first", "abort", "first"].map(|mode| house.offline(mode, 1, 1));
     let report = house.run(&plugin, requests.to_vec());
     for index in [0, 1, 3] {
@@ -379,7 +383,7 @@ fn a_request_is_blamed_only_for_what_it_does_first_in_a_worker() {
 #[test]
 fn files_cut_short_by_a_plugin_are_its_own_loss() {
     let house = House::new();
-    let plugin = house.compile("fault.c", &[]);
+    let plugin = house.compile(FAULT, &[]);
     let report = house.run(&plugin, vec![house.offline("truncate", 1, 1)]);
     assert!(matches!(&report.outcomes[0], Outcome::Rejected(_)), "{:?}", report.outcomes);
 }
@@ -387,7 +391,7 @@ fn files_cut_short_by_a_plugin_are_its_own_loss() {
 #[test]
 fn a_plugin_that_ends_the_worker_while_it_is_loaded_is_asked_once() {
     let house = House::new();
-    let plugin = house.compile("fault.c", &["-DFAULT_AT_LOAD"]);
+    let plugin = house.compile(FAULT, &["-DFAULT_AT_LOAD"]);
     let report = house.run(&plugin, vec![house.offline("", 1, 1), house.offline("", 2, 1)]);
     assert_eq!(report.outcomes, [Outcome::ExitedEarly(3), Outcome::ExitedEarly(3)]);
     assert_eq!((report.runs.len(), report.renderer), (1, None));
@@ -398,7 +402,7 @@ fn cpu_time_is_limited_apart_from_wall_clock_time() {
     let mut house = House::new();
     house.limits.wall_s = 20.0;
     house.limits.cpu_s = 1;
-    let plugin = house.compile("fault.c", &[]);
+    let plugin = house.compile(FAULT, &[]);
     let report = house.run(&plugin, vec![house.offline("loop", 1, 1)]);
     assert_eq!(report.outcomes, [late(true, 1.0)]);
 }
@@ -408,7 +412,7 @@ fn a_busy_machine_makes_nobody_late() {
     let mut house = House::new();
     // Far less than a starved render takes by the clock.
     house.limits.wall_s = 0.3;
-    let plugin = house.compile("fault.c", &[]);
+    let plugin = house.compile(FAULT, &[]);
     let cores = std::thread::available_parallelism().map_or(2, |cores| cores.get());
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -430,7 +434,7 @@ fn a_busy_machine_makes_nobody_late() {
 #[test]
 fn questions_of_one_worker_have_limits_of_their_own() {
     let house = House::new();
-    let plugin = house.compile("fault.c", &[]);
+    let plugin = house.compile(FAULT, &[]);
     let ask = |modes: &[&str]| {
         let requests = modes.iter().map(|mode| house.offline(mode, 1, 1)).collect();
         let job = Job { plugin: Some(plugin.clone()), requests };
@@ -464,7 +468,7 @@ fn a_timeout_counts_when_it_is_confirmed_alone_on_the_machine() {
     house.limits.wall_s = 1.0;
     // What a worker did before is known to the next only without isolation.
     house.supervisor.isolation = Layers::NONE;
-    let plugin = house.compile("fault.c", &[]);
+    let plugin = house.compile(FAULT, &[]);
     let ask = |modes: &[&str], patience: &RetryBudget| {
         let requests = modes.iter().map(|mode| house.offline(mode, 1, 1)).collect();
         let job = Job { plugin: Some(plugin.clone()), requests };
@@ -508,7 +512,7 @@ fn a_timeout_counts_when_it_is_confirmed_alone_on_the_machine() {
 #[test]
 fn a_cancelled_job_ends_at_once_and_says_so() {
     let house = House::new();
-    let plugin = house.compile("fault.c", &[]);
+    let plugin = house.compile(FAULT, &[]);
     let cancel = AtomicBool::new(false);
     let requests = ["", "sleep", ""].map(|mode| house.offline(mode, 1, 1)).to_vec();
     let job = Job { plugin: Some(plugin), requests };

@@ -2,7 +2,8 @@
  * without options it draws zeros. FAULT_AT_LOAD makes a constructor that ends the worker.
  * With ATTACKS it is linked with hostile/attack.c, and options of several words are an attack;
  * ATTACK_AT_LOAD is one for the constructor. With DEEDS it is linked with hostile/deeds.c, which
- * knows more. Tables that do not fit are renderer.c's. */
+ * knows more. WRONG_MAGIC, WRONG_VERSION, WRONG_SIZE and NULL_ENTRY make tables that a host must
+ * refuse. */
 #include "umbra_renderer.h"
 
 #include <fcntl.h>
@@ -15,6 +16,27 @@
 #define TEXT(s) {(const uint8_t *)(s), sizeof(s) - 1}
 
 #define LONGEST 4096
+
+#ifdef WRONG_MAGIC
+#define TABLE_MAGIC 0x1122334455667788u
+#else
+#define TABLE_MAGIC UMBRA_MAGIC
+#endif
+#ifdef WRONG_VERSION
+#define TABLE_VERSION 77
+#else
+#define TABLE_VERSION UMBRA_INTERFACE_VERSION
+#endif
+#ifdef WRONG_SIZE
+#define TABLE_SIZE 64
+#else
+#define TABLE_SIZE sizeof(UmbraPlugin)
+#endif
+#ifdef NULL_ENTRY
+#define RADIANCE NULL
+#else
+#define RADIANCE radiance
+#endif
 
 typedef struct {
     char mode[LONGEST];
@@ -186,12 +208,14 @@ static UmbraStatus eval_bsdf(UmbraScene s, const UmbraBsdfQuery *q, size_t n, fl
     (void)q;
     return act(s, v, 3 * n, m);
 }
+#ifndef NULL_ENTRY
 static UmbraStatus radiance(UmbraScene s, const UmbraRadianceSettings *t, const UmbraRayQuery *r,
                             size_t n, float *v, UmbraMessage *m)
 {
     (void)t, (void)r;
     return act(s, v, 3 * n, m);
 }
+#endif
 /* A pass is its scene. */
 static UmbraStatus open_realtime(UmbraScene s, const UmbraRealtimeSettings *t, UmbraPass *p,
                                  UmbraMessage *m)
@@ -224,16 +248,16 @@ static void close_realtime(UmbraPass p)
 }
 
 const UmbraPlugin umbra_renderer_plugin = {
-    .magic = UMBRA_MAGIC,
-    .interface_version = UMBRA_INTERFACE_VERSION,
-    .struct_size = sizeof(UmbraPlugin),
+    .magic = TABLE_MAGIC,
+    .interface_version = TABLE_VERSION,
+    .struct_size = TABLE_SIZE,
     .name = TEXT("fault"),
     .version = TEXT("1.0"),
     .load_scene = load_scene,
     .unload_scene = unload_scene,
     .set_witness = set_witness,
     .eval_bsdf = eval_bsdf,
-    .radiance = radiance,
+    .radiance = RADIANCE,
     .render_offline = render_offline,
     .open_realtime = open_realtime,
     .draw_frame = draw_frame,

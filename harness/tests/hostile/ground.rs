@@ -56,10 +56,10 @@ pub fn set_up(stage: &Path, layers: Layers) -> Result<(), String> {
         ("fault.so", vec![], &attack[..]),
         ("exit_at_load.so", vec!["-DFAULT_AT_LOAD"], &attack),
         ("exec_at_load.so", vec![exec], &attack),
-        ("WRONG_SIZE.so", vec!["-DWRONG_SIZE"], &["renderer.c"]),
-        ("WRONG_VERSION.so", vec!["-DWRONG_VERSION"], &["renderer.c"]),
-        ("WRONG_MAGIC.so", vec!["-DWRONG_MAGIC"], &["renderer.c"]),
-        ("NULL_ENTRY.so", vec!["-DNULL_ENTRY"], &["renderer.c"]),
+        ("WRONG_SIZE.so", vec!["-DWRONG_SIZE"], &attack),
+        ("WRONG_VERSION.so", vec!["-DWRONG_VERSION"], &attack),
+        ("WRONG_MAGIC.so", vec!["-DWRONG_MAGIC"], &attack),
+        ("NULL_ENTRY.so", vec!["-DNULL_ENTRY"], &attack),
     ] {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let mut cc = Command::new("cc");

@@ -1,34 +1,16 @@
-/* A renderer written by hand in plain C: proof that the interface is small.
+/* A whole renderer in plain C.
  *
- * Images and radiance are a constant colour; BSDF probes of diffuse materials given by value are
- * right; everything else is not implemented. WRONG_MAGIC, WRONG_VERSION, WRONG_SIZE and NULL_ENTRY
- * make tables that a host must refuse. */
+ * Images and radiance are a constant color; BSDF queries about diffuse materials given by value are
+ * right; all else is answered with "not implemented". To build it and draw a scene with it:
+ *
+ *     cc -shared -fPIC -std=c11 -I harness/api/include harness/api/examples/renderer.c -o constant.so
+ *     umbra render SCENE.toml --plugin constant.so --output constant.exr
+ */
 #include "umbra_renderer.h"
 
 #include <string.h>
 
 #define TEXT(s) {(const uint8_t *)(s), sizeof(s) - 1}
-
-#ifdef WRONG_MAGIC
-#define TABLE_MAGIC 0x1122334455667788u
-#else
-#define TABLE_MAGIC UMBRA_MAGIC
-#endif
-#ifdef WRONG_VERSION
-#define TABLE_VERSION 77
-#else
-#define TABLE_VERSION UMBRA_INTERFACE_VERSION
-#endif
-#ifdef WRONG_SIZE
-#define TABLE_SIZE 64
-#else
-#define TABLE_SIZE sizeof(UmbraPlugin)
-#endif
-#ifdef NULL_ENTRY
-#define RADIANCE NULL
-#else
-#define RADIANCE radiance
-#endif
 
 /* There is nothing to remember of a scene, but its handle must not be null. */
 static int the_scene;
@@ -93,7 +75,6 @@ static UmbraStatus eval_bsdf(UmbraScene scene, const UmbraBsdfQuery *queries, si
     return UMBRA_STATUS_OK;
 }
 
-#ifndef NULL_ENTRY
 static UmbraStatus radiance(UmbraScene scene, const UmbraRadianceSettings *settings,
                             const UmbraRayQuery *rays, size_t count, float *values,
                             UmbraMessage *message)
@@ -102,7 +83,6 @@ static UmbraStatus radiance(UmbraScene scene, const UmbraRadianceSettings *setti
     constant(values, count);
     return UMBRA_STATUS_OK;
 }
-#endif
 
 static UmbraStatus render_offline(UmbraScene scene, const UmbraOfflineSettings *settings,
                                   float *pixels, size_t float_count, UmbraMessage *message)
@@ -144,16 +124,16 @@ static void close_realtime(UmbraPass pass)
 }
 
 const UmbraPlugin umbra_renderer_plugin = {
-    .magic = TABLE_MAGIC,
-    .interface_version = TABLE_VERSION,
-    .struct_size = TABLE_SIZE,
+    .magic = UMBRA_MAGIC,
+    .interface_version = UMBRA_INTERFACE_VERSION,
+    .struct_size = sizeof(UmbraPlugin),
     .name = TEXT("plain C"),
     .version = TEXT("1.0"),
     .load_scene = load_scene,
     .unload_scene = unload_scene,
     .set_witness = set_witness,
     .eval_bsdf = eval_bsdf,
-    .radiance = RADIANCE,
+    .radiance = radiance,
     .render_offline = render_offline,
     .open_realtime = open_realtime,
     .draw_frame = draw_frame,
