@@ -15,11 +15,9 @@
 //! 10. Of the conventions that a path was judged under, the one that is worth most counts.
 
 mod curve;
-mod deletion;
 mod grade;
 mod rules;
 
 pub use curve::Curve;
-pub use deletion::EvidenceRule;
 pub use grade::{BUILD, Grade, PartGrade, grade, settle};
 pub use rules::{Gate, Part, PathRule, Rules, Trust};
