@@ -11,6 +11,7 @@ use umbra::diagnosis::{
 };
 use umbra::evidence::{Check, CheckId, Evidence, Verdict};
 use umbra::expected::Store;
+use umbra::files::library_name;
 use umbra::grading::Grading;
 use umbra::worker::{Adapter, AdapterKind, Supervisor};
 
@@ -174,10 +175,7 @@ fn stored_answers_agree_with_fresh_ones() {
     let mut assignment = Assignment::load(&root).unwrap();
     assignment.scenes.retain(|scene| ["scale", "coloured"].contains(&scene.name.as_str()));
     let release = root.join("target/release");
-    let name = |name: &str| {
-        format!("{}{name}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX)
-    };
-    let reference = release.join(name("reference_impl"));
+    let reference = release.join(library_name("reference_impl"));
     assert!(reference.is_file(), "run `cargo build --release --workspace` first");
     let scratch = tempfile::tempdir().unwrap();
     let supervisor =

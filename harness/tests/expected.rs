@@ -9,6 +9,7 @@ use umbra::assignment::{Assignment, SceneEntry};
 use umbra::evidence::images::{Kind, judge};
 use umbra::evidence::{Check, CheckId, Evidence, Verdict};
 use umbra::expected::{Expected, Store};
+use umbra::files::library_name;
 use umbra::process::Limits;
 use umbra::rubric::grade;
 use umbra::worker::{Job, Outcome, Request, SceneRef, Supervisor};
@@ -21,12 +22,7 @@ const SEED: u64 = 20_191_006;
 fn stored_images_agree_with_a_render_of_another_seed_and_a_small_gain_costs_points() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let assignment = Assignment::load(root).unwrap();
-    let reference = format!(
-        "target/release/{}reference_impl{}",
-        std::env::consts::DLL_PREFIX,
-        std::env::consts::DLL_SUFFIX
-    );
-    let reference = root.join(reference);
+    let reference = root.join("target/release").join(library_name("reference_impl"));
     assert!(reference.is_file(), "run `cargo build --release --workspace` first");
     let scratch = tempfile::tempdir().unwrap();
     let supervisor =

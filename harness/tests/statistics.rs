@@ -12,6 +12,7 @@ use umbra::assignment::{Assignment, SceneEntry};
 use umbra::evidence::CheckId;
 use umbra::evidence::loops::judge_agreement;
 use umbra::expected::{Expected, Store, SurfaceBuffer};
+use umbra::files::library_name;
 use umbra::grading::{CORRELATED, row_correlation};
 use umbra::imaging::compare::compare_offline;
 use umbra::imaging::reference::ReferenceImage;
@@ -56,8 +57,7 @@ impl Used {
 fn two_thousand_seeds_stay_under_half_of_every_threshold() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let assignment = Assignment::load(root).unwrap();
-    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
-    let reference = root.join(format!("target/release/{prefix}reference_impl{suffix}"));
+    let reference = root.join("target/release").join(library_name("reference_impl"));
     assert!(reference.is_file(), "run `cargo build --release --workspace` first");
     let scratch = tempfile::tempdir().unwrap();
     let supervisor =

@@ -4,7 +4,7 @@
 //! Umbra goes in as a program: its source holds closed forms of the BSDFs, a render pass and a vertex
 //! stage, which are right answers to tasks.
 
-use std::env::consts::{DLL_PREFIX, DLL_SUFFIX, EXE_SUFFIX};
+use std::env::consts::EXE_SUFFIX;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,7 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 use umbra::assignment::Assignment;
 use umbra::expected::Store;
+use umbra::files::library_name;
 use umbra::grading::Case;
 use umbra::worker::Supervisor;
 
@@ -145,7 +146,7 @@ fn prune_lock(kit: &Path) -> Result<()> {
 fn add_expected(root: &Path, kit: &Path) -> Result<()> {
     let assignment = Assignment::load(root)?;
     let umbra = built(root, &format!("umbra{EXE_SUFFIX}"))?;
-    let reference = built(root, &format!("{DLL_PREFIX}reference_impl{DLL_SUFFIX}"))?;
+    let reference = built(root, &library_name("reference_impl"))?;
     let scratch = assignment.scratch()?;
     let supervisor = Supervisor::available(umbra, scratch.path().to_owned());
     let store = Store {

@@ -24,9 +24,10 @@ use umbra::cli::AdapterChoice;
 use umbra::diagnosis::Catalogue;
 use umbra::evidence::Check;
 use umbra::expected::Store;
+use umbra::files::library_name;
 use umbra::grading::{Grading, RenderPath, Stages};
 use umbra::rubric;
-use umbra::worker::Supervisor;
+use umbra::worker::{STAGES, Supervisor};
 
 use choice::{Subject, pairs, singles, variants};
 use figures::{Figure, Matrix};
@@ -34,8 +35,6 @@ use row::Row;
 
 use crate::parallel;
 
-/// The stages of a renderer, in the order of [`Stages`].
-const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
 /// The film of the scenes that a hand-in holds images of, unless `--full`.
 const SMALL_FILM: [u32; 2] = [128, 96];
 
@@ -86,8 +85,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
     }
     let release = |file: String| root.join("target/release").join(file);
     let umbra = release(format!("umbra{}", std::env::consts::EXE_SUFFIX));
-    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
-    let library = release(format!("{prefix}reference_impl{suffix}"));
+    let library = release(library_name("reference_impl"));
     for file in [&umbra, &library] {
         ensure!(
             file.is_file(),

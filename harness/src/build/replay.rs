@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::diagnostics::parse;
 use super::record::externs;
 use super::{Diagnostic, Recording, TEMPLATE};
+use crate::files::library_name;
 use crate::process::{self, Confinement, Exit, Limits, signal_name};
 use crate::sandbox::policy::{CLOSURE, SCRATCH, SRC, TOOLCHAIN};
 use crate::sandbox::{Bind, Kind, Policy};
@@ -104,8 +105,7 @@ fn compile_once(
 ) -> io::Result<BuildReport> {
     let (src, out) = (std::path::absolute(src)?, std::path::absolute(out)?);
     let scratch = tempfile::Builder::new().prefix("rustc-").tempdir_in(&out)?;
-    let file =
-        format!("{}{TEMPLATE}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let file = library_name(TEMPLATE);
     let library = out.join(&file);
     let report = tempfile::NamedTempFile::new_in(&out)?;
     let mut policy = Policy::new(Kind::Build);

@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use super::terminal::Progress;
 use crate::assignment::Assignment;
 use crate::decode::Decoder;
-use crate::expected::Store;
+use crate::expected::{Store, reference_library};
 use crate::files::Scratch;
 use crate::worker::Supervisor;
 
@@ -57,11 +57,7 @@ impl Context {
 
     /// Where the reference renderer's library should be, if it is there.
     pub fn reference(&self) -> Option<PathBuf> {
-        let name = library_name("reference_impl");
-        let beside = |folder: &Path| Some(folder.join(&name)).filter(|path| path.is_file());
-        let program = std::env::current_exe().ok();
-        beside(&self.assignment.root.join("target/release"))
-            .or_else(|| program.as_deref().and_then(Path::parent).and_then(beside))
+        reference_library(&self.assignment.root, &self.supervisor.umbra)
     }
 
     /// Runs `body` with the store of expected images, showing what it does.
@@ -91,11 +87,6 @@ impl Context {
 /// The number of cores to use.
 pub fn cores() -> u32 {
     std::thread::available_parallelism().map_or(1, |cores| cores.get() as u32)
-}
-
-/// What this system calls the dynamic library of a crate.
-pub fn library_name(crate_name: &str) -> String {
-    format!("{}{crate_name}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX)
 }
 
 /// A second Ctrl-C ends the program at once.

@@ -10,6 +10,7 @@ use basecode::scene::{MeshFile, SceneConfig};
 use basecode::{Camera, Image, Vec3};
 
 use super::context::{Context, INTERRUPTED, cores};
+use crate::files::library_name;
 use crate::imaging::pictures::clamped;
 use crate::intake::HandInConfig;
 use crate::process::Limits;
@@ -202,10 +203,9 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
         .with_context(|| format!("plugin {}", plugin_as_given.display()))?;
     if plugin.is_dir() {
         bail!(
-            "plugin {}: it is a folder, expected a library such as {}plugin{}",
+            "plugin {}: it is a folder, expected a library such as {}",
             plugin_as_given.display(),
-            std::env::consts::DLL_PREFIX,
-            std::env::consts::DLL_SUFFIX
+            library_name("plugin")
         );
     }
     let Size(width, height) =

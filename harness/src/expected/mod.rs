@@ -6,5 +6,5 @@ mod surface;
 
 pub use regions::regions;
 pub(crate) use store::scene_digest;
-pub use store::{Blessing, Expected, Store, load_scene};
+pub use store::{Blessing, Expected, Store, load_scene, reference_library};
 pub use surface::{FARTHEST_START, SurfaceBuffer, SurfacePoint, Visibility};

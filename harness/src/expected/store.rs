@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use super::regions::regions;
 use crate::assignment::{Assignment, SceneEntry};
-use crate::files::hex;
+use crate::files::{hex, library_name};
 use crate::imaging::reference::{ReferenceImage, RegionMask};
 use crate::process::Limits;
 use crate::worker::{
@@ -42,6 +42,14 @@ pub struct Expected {
     /// As `unshadowed`, by stages that do not renormalise the interpolated normal: as good. Absent
     /// where it was neither kept nor can be drawn.
     pub raw_normals: Option<Image>,
+}
+
+/// The reference renderer's library: where cargo builds it below the assignment's root, else beside the
+/// program `umbra`. A student's kit has none.
+pub fn reference_library(root: &Path, umbra: &Path) -> Option<PathBuf> {
+    let name = library_name("reference_impl");
+    let built = root.join("target/release").join(&name);
+    [built, umbra.with_file_name(&name)].into_iter().find(|library| library.is_file())
 }
 
 /// Finds, makes and keeps expected images.

@@ -5,10 +5,7 @@ use std::path::Path;
 use super::case::Case;
 use super::session::Session;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
-use crate::worker::{CameraValue, Matrices, Outcome, Request, Stage};
-
-/// The names of the stages, in order.
-pub const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
+use crate::worker::{CameraValue, Matrices, Outcome, Request, STAGES, Stage};
 
 /// A frame to be drawn.
 #[derive(Clone)]

@@ -7,7 +7,7 @@ use std::path::Path;
 use basecode::{Image, Vec3};
 
 use super::case::Case;
-use super::draw::{Frame, STAGES, draw_each, draw_scenes, named};
+use super::draw::{Frame, draw_each, draw_scenes, named};
 use super::observe;
 use super::session::{self, Session, headline};
 use super::stages::Stages;
@@ -19,7 +19,7 @@ use crate::evidence::{Check, CheckId, Verdict};
 use crate::evidence::{images, pixels};
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::{Region, RegionMask};
-use crate::worker::{Outcome, Stage};
+use crate::worker::{Outcome, STAGES, Stage};
 
 /// The checks of the three stages, and the tasks that they belong to.
 const CHECKS: [(CheckId, &str); 3] = [

@@ -6,7 +6,7 @@ use basecode::Image;
 use basecode::gpu::{Footprint, UNDRAWN_MAPS};
 
 use super::case::Case;
-use super::draw::{Frame, STAGES, draw, draw_plain};
+use super::draw::{Frame, draw, draw_plain};
 use super::offline::Drawn;
 use super::session::{self, Session};
 use crate::evidence::images::{self, Kind};
@@ -17,7 +17,7 @@ use crate::evidence::{Check, CheckId, Verdict};
 use crate::expected::Expected;
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::{Region, RegionMask};
-use crate::worker::{Fault, Outcome, Stage};
+use crate::worker::{Fault, Outcome, STAGES, Stage};
 
 type View = (CheckId, &'static dyn Fn(&Region) -> bool);
 

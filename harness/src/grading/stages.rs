@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::draw::{STAGES, named};
+use super::draw::named;
 use crate::evidence::stages::{bare, is_template};
 use crate::files::files_below;
 use crate::intake::Finding;
-use crate::worker::Stage;
+use crate::worker::{STAGES, Stage};
 
 /// The stage texts of a submission, and of the template.
 pub struct Stages {

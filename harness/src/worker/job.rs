@@ -157,6 +157,9 @@ pub enum AdapterKind {
     Hardware,
 }
 
+/// The names of a realtime renderer's shader stages, in order.
+pub const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
+
 /// The text of one shader stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stage {

@@ -23,7 +23,7 @@ mod wire;
 pub use child::{child_main, draw_in_process};
 pub use job::{
     Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, Matrices, RayQuery, Request,
-    SceneRef, Stage,
+    STAGES, SceneRef, Stage,
 };
 pub use mounts::as_given;
 pub use outcome::{Answer, Fault, JobReport, Late, Outcome, WitnessUse, WorkerRun};

@@ -11,12 +11,9 @@ use basecode::gpu::{
 };
 use basecode::{Camera, CameraConfig, Error, Mat4, MaterialModel, Scene, wgpu};
 
-use super::job::{Adapter, AdapterKind, Matrices, Request};
+use super::job::{Adapter, AdapterKind, Matrices, Request, STAGES};
 use crate::expected::load_scene;
 use crate::plugin::{CallError, CallErrorKind};
-
-/// The stages that a request must bring.
-const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
 
 /// The pass, with what one request leaves for the next: most of what a small frame costs is
 /// opening the device and compiling stages.
