@@ -23,6 +23,7 @@ mod isolation;
 mod labelled;
 mod metrics;
 mod original_scene;
+mod program;
 mod race;
 mod real_archives;
 mod render_command;

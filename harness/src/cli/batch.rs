@@ -15,11 +15,12 @@ use super::context::{Context, INTERRUPTED, cores};
 use super::grade::{BudgetChoice, IsolationChoice, Perturb};
 use super::render::AdapterChoice;
 use crate::class::{
-    Attempt, Claim, Class, Collected, Deciding, Kind, Label, Standing, Wanted, collect, settle,
+    Attempt, Claim, Class, Collected, Deciding, Kind, Label, Wanted, collect, settle,
 };
 use crate::files::write_whole;
 use crate::grading::{Folders, Grading, Mode, Record, RecordCache, judge_shared};
 use crate::held_back::recorded_seed;
+use crate::program::graded;
 use crate::report::{self, BatchReport, Entry};
 use crate::rubric::{self, Grade};
 use crate::sandbox::Isolation;
@@ -196,17 +197,15 @@ impl Batch<'_> {
         judge_shared(&mut records);
         let rules = &context.assignment.rules;
         let mut entries = Vec::new();
-        for mut record in records {
-            // Graded by all of the evidence: what is settled leaves no second choice of a convention.
-            let mut grade = rubric::grade(rules, &record.evidence);
-            record.evidence = rubric::settle(rules, &record.evidence);
+        for record in records {
+            let mut entry = graded(record, rules);
             if let Some(asked) = self.asked {
-                asked.only_of(&mut grade);
+                asked.only_of(&mut entry.grade);
             }
-            if incomparable.contains(&record.slug) {
-                grade.remarks.push(OTHER_CONDITIONS.to_owned());
+            if incomparable.contains(&entry.record.slug) {
+                entry.grade.remarks.push(OTHER_CONDITIONS.to_owned());
             }
-            entries.push(Entry { record, grade, standing: Standing::default() });
+            entries.push(entry);
         }
         let class = match self.purpose {
             Mode::Grade => Some(self.settle(&mut entries, &collected, &aside, &all, &deciding)?),
