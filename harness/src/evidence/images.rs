@@ -6,6 +6,7 @@ use super::price::Price;
 use super::{Check, CheckId, Measure, RuleId, Verdict, loops};
 use crate::expected::Expected;
 use crate::imaging::compare::{compare_offline, compare_realtime_linear, compare_srgb8};
+use crate::imaging::correlation::Moments;
 use crate::imaging::evidence::{CompareError, ImageEvidence, Tolerances};
 use crate::imaging::origin::{same_draws, same_levels};
 use crate::imaging::ratio::{RegionRatio, region_ratios};
@@ -162,24 +163,19 @@ pub fn judge_shaded(
 /// from edges: 1 at best. Nothing when what is expected hardly varies there.
 pub fn shading_correlation(actual: &Image, expected: &Image, mask: &RegionMask) -> Option<f64> {
     let brightness = |pixel: basecode::Vec3| f64::from(pixel.element_sum()).max(0.0).cbrt();
-    // Of each region: count, sums of a, b, aa, bb, ab.
-    let mut sums = vec![[0.0f64; 6]; mask.regions.len()];
+    let mut regions = vec![Moments::default(); mask.regions.len()];
     for (index, &value) in mask.pixels.iter().enumerate() {
         if !mask.is_lit_interior(value) || !actual.pixels[index].is_finite() {
             continue;
         }
         let (a, b) = (brightness(actual.pixels[index]), brightness(expected.pixels[index]));
-        let sums = &mut sums[usize::from(value & RegionMask::INDEX)];
-        for (sum, term) in sums.iter_mut().zip([1.0, a, b, a * a, b * b, a * b]) {
-            *sum += term;
-        }
+        regions[usize::from(value & RegionMask::INDEX)].add(1.0, a, b);
     }
     let (mut aa, mut bb, mut ab, mut level) = (0.0, 0.0, 0.0, 0.0);
-    for [n, a, b, a2, b2, product] in sums.into_iter().filter(|sums| sums[0] > 0.0) {
-        aa += a2 - a * a / n;
-        bb += b2 - b * b / n;
-        ab += product - a * b / n;
-        level += b2;
+    for region in regions {
+        let own = region.about_means();
+        (aa, bb, ab) = (aa + own[0], bb + own[1], ab + own[2]);
+        level += region.square_of_b();
     }
     // 3 % of the brightness: flat surfaces tell nothing.
     let varies = bb > 1e-3 * level;

@@ -4,6 +4,7 @@
 use super::price::{self, Class, Price};
 use super::rays::{RELATIVE, STRAY_FRACTION};
 use super::{Check, CheckId, Measure, RuleId, Verdict};
+use crate::imaging::correlation::Moments;
 use crate::imaging::reference::RegionMask;
 use crate::imaging::srgb;
 
@@ -251,7 +252,8 @@ pub fn film_price(
     let film = Film { width, height, pixels: right, edge: &edge };
     let step = image.len().div_ceil(PRICED).max(1);
     let pairs = image.iter().flatten().zip(right.iter().flatten()).step_by(step);
-    let likeness = price::correlation(pairs.map(|(a, b)| (f64::from(*a), f64::from(*b))));
+    let pairs = pairs.map(|(a, b)| (f64::from(*a), f64::from(*b)));
+    let likeness = Moments::of(pairs).correlation();
     let start = match likeness >= price::LIKE {
         true => Price::of_raw(raw).or(price::UNKNOWN, Class::Unknown, 0.0),
         false => Price::of_raw(raw),

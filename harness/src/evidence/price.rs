@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 
 use super::shading::{Angle, Clamp, Directions, Shading};
 use super::{Check, CheckId, Measure, Verdict};
+use crate::imaging::correlation::Moments;
 use crate::imaging::srgb;
 
 /// What a mistake is to a teacher.
@@ -266,7 +267,7 @@ impl Answers<'_> {
             let found = self.found[index];
             (0..3).map(move |c| (f64::from(found[c]) / unit, expected[c] / unit))
         });
-        correlation(pairs)
+        Moments::of(pairs).correlation()
     }
 
     /// Sum of differences from what `shading` answers over the sum of that, in the worst group.
@@ -407,18 +408,6 @@ pub fn partly(price: Price, lit_wrong: f64, dark_wrong: f64) -> Price {
         true => price.or("some shadows are missing", Class::Slip, 0.025 * dark_wrong),
         false => price,
     }
-}
-
-/// Pearson's correlation of pairs; those that are no numbers are left out. 0 where either does not
-/// vary.
-pub fn correlation(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let [mut n, mut a, mut b, mut aa, mut bb, mut ab] = [0.0f64; 6];
-    for (x, y) in pairs.filter(|(x, y)| x.is_finite() && y.is_finite()) {
-        (n, a, b) = (n + 1.0, a + x, b + y);
-        (aa, bb, ab) = (aa + x * x, bb + y * y, ab + x * y);
-    }
-    let (aa, bb, ab) = (aa - a * a / n, bb - b * b / n, ab - a * b / n);
-    if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
 }
 
 /// What can be wrong in a diffuse BSDF.
@@ -638,12 +627,5 @@ mod tests {
         let of = |lit, dark| partly(Price::of_raw(lit + dark), lit, dark).error;
         assert!((of(0.5, 0.0) - 0.0275).abs() < 1e-9 && (of(0.0, 0.5) - 0.0325).abs() < 1e-9);
         assert_eq!((of(1.0, 0.0), of(0.0, 1.0), of(0.3, 0.3)), (1.0, 1.0, 0.6));
-    }
-
-    #[test]
-    fn correlation_tells_what_follows() {
-        let of = |f: fn(f64) -> f64| correlation((0..50).map(|i| (f(f64::from(i)), f64::from(i))));
-        assert!((of(|x| 3.0 * x - 1.0) - 1.0).abs() < 1e-9 && (of(|x| -x) + 1.0).abs() < 1e-9);
-        assert_eq!((of(|_| 2.0), of(|_| f64::NAN)), (0.0, 0.0));
     }
 }

@@ -6,6 +6,7 @@ use basecode::scene::SceneConfig;
 
 use super::session::Session;
 use crate::evidence::{Check, CheckId, Verdict};
+use crate::imaging::correlation::Moments;
 use crate::worker::{Outcome, Request};
 
 /// Rows whose noise is correlated by this much or more share their seeds: 1 when they do, 0 but for
@@ -75,14 +76,8 @@ pub fn judge(session: &Session, plugin: &Path, scene: &Path) -> anyhow::Result<V
 /// The difference of two images of other seeds is noise alone.
 pub fn row_correlation(one: &[f32], other: &[f32], row_floats: usize) -> f64 {
     let noise: Vec<f64> = one.iter().zip(other).map(|(a, b)| f64::from(a - b)).collect();
-    let rows = || noise.chunks_exact(row_floats);
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let (mut shared, mut own) = (0.0, 0.0);
-    for (row, next) in rows().zip(rows().skip(1)) {
-        shared += product(row, next);
-        own += 0.5 * (product(row, row) + product(next, next));
-    }
-    if own > 0.0 { shared / own } else { 0.0 }
+    let next = noise.iter().skip(row_floats);
+    Moments::of(noise.iter().copied().zip(next.copied())).cosine().unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use basecode::image::Image;
 
+use super::correlation::Moments;
 use super::reference::RegionMask;
 
 /// How much of a picture's structure is a scene's: the largest over the picture as it is and
@@ -32,7 +33,12 @@ pub fn likeness(picture: &Image, right: &[&Image], mask: &RegionMask) -> Likenes
                 let x = if columns { width - 1 - x } else { x };
                 if rows { (height - 1 - y) * width + x } else { y * width + x }
             };
-            let like = |a: &[f32], b: &[f32]| correlation(|i| a[mirrored(i)], b, mask);
+            let compared = |i: &usize| mask.pixels[*i] & RegionMask::EMITTER == 0;
+            let like = |a: &[f32], b: &[f32]| {
+                let pixels = (0..mask.pixels.len()).filter(compared);
+                let pairs = pixels.map(|i| (f64::from(a[mirrored(i)]), f64::from(b[i])));
+                Moments::of(pairs).correlation()
+            };
             best.brightness = best.brightness.max(like(&bright, &right_bright));
             best.edges = best.edges.max(like(&steep, &right_steep));
         }
@@ -49,21 +55,6 @@ fn brightness(image: &Image, width: usize, height: usize) -> Vec<f32> {
         if value.is_finite() { value.max(0.0).cbrt() } else { 0.0 }
     };
     (0..width * height).map(at).collect()
-}
-
-/// Pearson's correlation; 0 where one of them is constant.
-fn correlation(a: impl Fn(usize) -> f32, b: &[f32], mask: &RegionMask) -> f64 {
-    let mut sums = [0.0f64; 6];
-    let compared = |i: &usize| mask.pixels[*i] & RegionMask::EMITTER == 0;
-    for i in (0..mask.pixels.len()).filter(compared) {
-        let (a, b) = (f64::from(a(i)), f64::from(b[i]));
-        for (sum, term) in sums.iter_mut().zip([1.0, a, b, a * a, b * b, a * b]) {
-            *sum += term;
-        }
-    }
-    let [n, a, b, aa, bb, ab] = sums;
-    let spread = (aa - a * a / n).max(0.0).sqrt() * (bb - b * b / n).max(0.0).sqrt();
-    if spread > 1e-9 * n { (ab - a * b / n) / spread } else { 0.0 }
 }
 
 /// How steep brightness is around each pixel: the largest step between neighbours in its 3x3.

@@ -5,6 +5,7 @@
 
 pub mod blob;
 pub mod compare;
+pub mod correlation;
 pub mod evidence;
 pub mod flip;
 pub mod likeness;

@@ -6,6 +6,7 @@
 
 use basecode::image::Image;
 
+use super::correlation::Moments;
 use super::reference::{ReferenceImage, RegionMask};
 use super::srgb;
 
@@ -117,7 +118,7 @@ impl<'a> NoisyPixels<'a> {
             return None;
         }
         let wrong: Vec<bool> = (0..mean.pixels.len()).map(|i| self.is_wrong(image, i)).collect();
-        let (mut both, mut first, mut second, mut pixels) = (0.0, 0.0, 0.0, 0);
+        let (mut moments, mut pixels) = (Moments::default(), 0);
         for &(index, weight) in &self.pixels {
             let [a, b] = [image, other].map(|image| image.pixels[index]);
             let near_wrong = around(index, size.0, size.1, NEAR).any(|i| wrong[i]);
@@ -125,13 +126,10 @@ impl<'a> NoisyPixels<'a> {
                 continue;
             }
             let [a, b] = [a, b].map(|pixel| (pixel - mean.pixels[index]).as_dvec3());
-            both += weight * a.dot(b);
-            first += weight * a.length_squared();
-            second += weight * b.length_squared();
+            (0..3).for_each(|channel| moments.add(weight, a[channel], b[channel]));
             pixels += 1;
         }
-        let scale = (first * second).sqrt();
-        (pixels >= FEWEST && scale > 0.0).then_some(both / scale)
+        moments.cosine().filter(|_| pixels >= FEWEST)
     }
 
     /// Whether two images hold one and the same draw, whatever rounding to half precision or to

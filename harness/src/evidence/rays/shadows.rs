@@ -6,6 +6,7 @@ use super::{RELATIVE, RayBatch, STRAY_FRACTION};
 use crate::evidence::price::{self, Class, Price};
 use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::expected::SurfacePoint;
+use crate::imaging::correlation::Moments;
 
 /// Nothing is in shadow, or nothing lit, where more of the rays than this are wrong.
 const NEARLY_ALL: f64 = 0.99;
@@ -259,7 +260,7 @@ fn price(batch: &RayBatch, known: &[(usize, f64)], raw: f64, occluders: &Occlude
     };
     let right = |index: usize| f64::from(u8::from(index < batch.lit));
     let pairs = known.iter().map(|(index, visibility)| (*visibility, right(*index)));
-    let start = match price::correlation(pairs) {
+    let start = match Moments::of(pairs).correlation() {
         likeness if likeness >= price::LIKE => {
             Price::of_raw(raw).or(price::UNKNOWN, Class::Unknown, 0.0)
         }
