@@ -34,6 +34,7 @@ pub mod build;
 pub mod class;
 #[doc(hidden)]
 pub mod cli;
+mod columns;
 #[doc(hidden)]
 pub mod decode;
 #[doc(hidden)]

@@ -9,6 +9,7 @@ use anyhow::{Context as _, ensure};
 
 use super::context::Context;
 use crate::class::{self, Claim, Label, Matches, Roster};
+use crate::columns::count;
 use crate::files::write_whole;
 use crate::grading::{Earlier, Folders, Record, RecordCache, Student};
 use crate::report;
@@ -226,9 +227,10 @@ pub fn join(
         records.push(record);
     }
     if !gone.is_empty() {
+        let stay = if gone.len() == 1 { "stays" } else { "stay" };
         eprintln!(
-            "umbra: {} in {} from earlier runs: {}; to remove one, delete its folder in {}",
-            plural(gone.len(), "submission stays", "submissions stay"),
+            "umbra: {} {stay} in {} from earlier runs: {}; to remove one, delete its folder in {}",
+            count(gone.len(), "submission"),
             output.display(),
             some(&gone),
             output.join(report::INSTRUCTOR).display()
@@ -237,9 +239,10 @@ pub fn join(
     if !missing.is_empty() {
         let mut missing: Vec<String> = missing.into_iter().map(str::to_owned).collect();
         missing.sort();
+        let are = if missing.len() == 1 { "is" } else { "are" };
         eprintln!(
-            "umbra: {} not graded yet, and not in the report: {}",
-            plural(missing.len(), "submission is", "submissions are"),
+            "umbra: {} {are} not graded yet, and not in the report: {}",
+            count(missing.len(), "submission"),
             some(&missing)
         );
     }
@@ -260,10 +263,6 @@ fn is_newer(new: &Record, old: &Record) -> bool {
 fn who(student: &Student) -> String {
     let name = student.full_name();
     if name.is_empty() { student.id.clone() } else { name }
-}
-
-fn plural(count: usize, one: &str, many: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// The first of several names.
@@ -309,7 +308,7 @@ pub fn only<'a>(
             found,
             "--only: nobody of {} is \"{wanted}\"; expected a student number, a first and last name or a \
              file name, such as \"{}\"",
-            plural(all.len(), "submission", "submissions"),
+            count(all.len(), "submission"),
             like.unwrap_or_default()
         );
     }

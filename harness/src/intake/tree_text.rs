@@ -2,9 +2,12 @@
 
 use std::fmt::Write;
 
+use unicode_width::UnicodeWidthStr;
+
 use super::finding::{Finding, Severity};
 use super::tree_match::{Mark, TreeLine};
 use super::validate::Validation;
+use crate::columns::{count, left};
 
 /// Lines of the tree that are printed; a wrong folder may hold thousands.
 const SHOWN: usize = 60;
@@ -14,15 +17,15 @@ impl Validation {
     pub fn to_text(&self) -> String {
         let mut out = String::new();
         let verdict = if self.conforms { "conforms" } else { "does not conform" };
-        let count = |severity| self.findings.iter().filter(|f| f.severity == severity).count();
-        let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
+        let of = |severity| self.findings.iter().filter(|f| f.severity == severity).count();
+        let (errors, warnings) = (of(Severity::Error), of(Severity::Warning));
         // Writing to a String cannot fail.
         let _ = writeln!(
             out,
             "{}: {verdict} ({}, {})",
             self.name,
-            plural(errors, "error"),
-            plural(warnings, "warning")
+            count(errors, "error"),
+            count(warnings, "warning")
         );
         if !self.tree.is_empty() {
             write_tree(&mut out, &self.tree);
@@ -36,20 +39,16 @@ impl Validation {
     }
 }
 
-fn plural(n: usize, what: &str) -> String {
-    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
-}
-
 fn write_tree(out: &mut String, lines: &[TreeLine]) {
     let rows: Vec<[String; 3]> = lines.iter().take(SHOWN).map(row).collect();
     let header = ["expected", "found", ""].map(str::to_owned);
     let width = |column: usize| {
-        rows.iter().chain([&header]).map(|row| row[column].chars().count()).max().unwrap_or(0)
+        rows.iter().chain([&header]).map(|row| row[column].width()).max().unwrap_or(0)
     };
-    let (left, middle) = (width(0), width(1));
+    let (first, second) = (width(0), width(1));
     let _ = writeln!(out);
     for [expected, found, mark] in std::iter::once(&header).chain(&rows) {
-        let line = format!("  {expected:<left$}  {found:<middle$}  {mark}");
+        let line = format!("  {}  {}  {mark}", left(expected, first), left(found, second));
         let _ = writeln!(out, "{}", line.trim_end());
     }
     if lines.len() > SHOWN {
@@ -79,5 +78,26 @@ fn write_finding(out: &mut String, finding: &Finding) {
     let _ = writeln!(out, "\n{}: {place}{}", finding.severity, finding.message);
     if let Some(hint) = &finding.hint {
         let _ = writeln!(out, "  hint: {hint}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_stand_below_each_other_in_every_script() {
+        let lines = ["山田.exr", "e\u{301}tude.exr", "a.exr"].map(|found| TreeLine {
+            expected: None,
+            found: Some(found.to_owned()),
+            mark: Mark::Unexpected,
+            advice: String::new(),
+        });
+        let mut out = String::new();
+        write_tree(&mut out, &lines);
+        let places: Vec<_> =
+            out.split("unexpected\n").map(|line| line.lines().last().map(str::width)).collect();
+        assert_eq!(places[..3], [places[0]; 3], "{out}");
+        assert!(places[0] > Some(8), "{out}");
     }
 }

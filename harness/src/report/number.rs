@@ -124,11 +124,6 @@ pub(super) fn plain(text: &str) -> String {
     PLAIN.iter().fold(text.to_owned(), |text, (own, plain)| text.replace(own, plain))
 }
 
-/// `1 hand-in`, `2 hand-ins`.
-pub(super) fn count(number: usize, noun: &str) -> String {
-    if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
-}
-
 /// A date as `2006-01-02 15:04 -07:00`; anything but RFC 3339 stays as it is.
 pub(super) fn due(text: &str) -> String {
     let digits = |range: std::ops::Range<usize>| text.get(range).unwrap_or_default();

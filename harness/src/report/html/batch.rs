@@ -1,10 +1,11 @@
 //! The page of the batch.
 
-use super::super::number::{count, due, is_range, of_part, points, range};
+use super::super::number::{due, is_range, of_part, points, range};
 use super::super::{BatchReport, Entry, HTML_FILE, INSTRUCTOR, ReportError};
 use super::markup::Html;
 use super::{SORT, begin, class, end, part_class};
 use crate::class::Class;
+use crate::columns::count;
 use crate::evidence::CheckId;
 use crate::grading::Conditions;
 use crate::intake::Severity;

@@ -2,6 +2,7 @@
 
 use super::super::number::{self, is_failure, value};
 use super::markup::Html;
+use crate::columns::count;
 use crate::evidence::{Check, Measure, Picture, Verdict};
 
 /// All checks, those that cost points first. `public_pictures` leads from the page to the folder of
@@ -36,7 +37,7 @@ fn folded(
         return;
     }
     html.raw(if open { "<details open>" } else { "<details>" }).raw("\n<summary>");
-    html.text(&number::count(checks.len(), "check")).raw(" ").text(what).raw("</summary>\n");
+    html.text(&count(checks.len(), "check")).raw(" ").text(what).raw("</summary>\n");
     for (place, check) in checks {
         article(html, *place, check, public_pictures);
     }

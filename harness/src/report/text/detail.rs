@@ -2,10 +2,11 @@
 
 use super::super::harmless::harmless_lines;
 use super::super::number::{
-    self, count, hints, is_failure, is_range, looks_like, of_part, plain, points, seconds, total,
+    self, hints, is_failure, is_range, looks_like, of_part, plain, points, seconds, total,
 };
 use super::super::{BatchReport, Entry};
 use super::page::{Look, Page, Style, columns, left};
+use crate::columns::count;
 use crate::evidence::{Check, CheckId, Measure, Verdict};
 use crate::intake::{Finding, Severity};
 use crate::rubric::{BUILD, PartGrade};

@@ -1,8 +1,9 @@
 //! Lines of text that keep within the terminal's width, whatever is in them.
 
-use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+use unicode_width::UnicodeWidthStr;
 
 use super::super::harmless;
+use crate::columns::{cut, wrap};
 
 /// How a piece of text is shown; without colours all look the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,61 +139,9 @@ pub(super) fn columns(text: &str) -> usize {
     harmless(text).width()
 }
 
-/// The text in exactly `width` columns, cut or filled at its end.
+/// The text, once it is harmless, in exactly `width` columns, cut or filled at its end.
 pub(super) fn left(text: &str, width: usize) -> String {
-    let mut shown = cut(&harmless(text), width);
-    shown.push_str(&" ".repeat(width - shown.width()));
-    shown
-}
-
-/// The text in at least `width` columns, filled at its beginning.
-pub(super) fn right(text: &str, width: usize) -> String {
-    format!("{}{text}", " ".repeat(width.saturating_sub(text.width())))
-}
-
-/// The text, or its beginning and `…` when it is wider than `width`.
-fn cut(text: &str, width: usize) -> String {
-    if text.width() <= width {
-        return text.to_owned();
-    }
-    let mut shown = String::new();
-    for c in text.chars() {
-        shown.push(c);
-        // The width of a sequence may differ from the sum of its characters'.
-        if shown.width() + 1 > width {
-            shown.pop();
-            break;
-        }
-    }
-    if width > 0 {
-        shown.push('…');
-    }
-    shown
-}
-
-/// The text in lines of at most `width` columns, broken at spaces, and inside a word only where the
-/// word is longer than a line. Spaces at the beginning are kept.
-pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
-    let width = width.max(1);
-    let mut lines = Vec::new();
-    let mut line = String::new();
-    for (index, word) in text.split(' ').enumerate() {
-        if index > 0 {
-            if !line.trim().is_empty() && line.width() + 1 + word.width() > width {
-                lines.push(std::mem::take(&mut line));
-            } else {
-                line.push(' ');
-            }
-        }
-        for c in word.chars() {
-            if line.width() + c.width().unwrap_or(0) > width && !line.is_empty() {
-                lines.push(std::mem::take(&mut line));
-            }
-            line.push(c);
-        }
-    }
-    lines.push(line);
-    lines
+    crate::columns::left(&harmless(text), width)
 }
 
 #[cfg(test)]
@@ -200,39 +149,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cuts_and_fills_by_display_width() {
-        assert_eq!(left("abc", 5), "abc  ");
-        assert_eq!(left("abcdef", 5), "abcd…");
-        assert_eq!(left("山田花子", 5), "山田…");
-        assert_eq!(left("山田花子", 6), "山田… ");
-        assert_eq!(left("e\u{301}tude", 4), "e\u{301}tu…");
-        assert_eq!(left("\u{1b}", 9), "\\u{1b}   ");
-        assert_eq!(left("abc", 0), "");
-        assert_eq!(right("7", 3), "  7");
-    }
-
-    #[test]
-    fn wraps_at_spaces_and_inside_long_words() {
-        assert_eq!(wrap("one two three", 7), ["one two", "three"]);
-        assert_eq!(wrap("abcdefghij k", 4), ["abcd", "efgh", "ij k"]);
-        assert_eq!(wrap("", 4), [""]);
-        assert_eq!(wrap("   | x", 8), ["   | x"]);
-        for width in 1..40 {
-            for line in
-                wrap("unshadowed 山田 radiance is wrong along 12345678901234567890 rays", width)
-            {
-                assert!(line.width() <= width.max(2), "{line:?}");
-            }
-        }
-    }
-
-    #[test]
     fn every_way_into_a_page_is_harmless() {
         let mut page = Page::new(80, false);
         page.line(&[(Style::Plain, "a\u{1b}[2J\nb")]);
         page.wrapped(&[(Style::Plain, "\0")], Style::Plain, "c\u{202e}");
         assert_eq!(page.finish(), "a\\u{1b}[2J\\nb\n\\u{0}c\\u{202e}\n");
-        assert_eq!(columns("\0"), 5);
+        assert_eq!((columns("\0"), left("\u{1b}", 9).as_str()), (5, "\\u{1b}   "));
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! The table of many hand-ins.
 
-use super::super::number::{count, due, is_range, of_part, points, total};
+use super::super::number::{due, is_range, of_part, points, total};
 use super::super::{BatchReport, Entry, ReportError, harmless};
-use super::page::{Page, Style, columns, left, right};
+use super::page::{Page, Style, columns, left};
+use crate::columns::{count, right};
 use crate::grading::Record;
 use crate::rubric::Grade;
 
