@@ -1,6 +1,8 @@
 //! What must hold of every reader of foreign bytes, whatever it is given. Each function is a fuzz
-//! target; `harness/tests/fuzz_corpus.rs` calls them with the corpus and what is near it.
+//! target; `corpus.rs` calls them with the corpus and what is near it.
 
+#[cfg(test)]
+mod corpus;
 mod judge;
 
 use std::fs;

@@ -15,7 +15,6 @@ mod diagnosis;
 mod downloads;
 mod expected;
 mod full_disk;
-mod fuzz_corpus;
 mod handed_in;
 mod intake;
 mod intake_properties;

@@ -1,15 +1,12 @@
 //! The fuzz targets on their corpus and on what is near it, without a fuzzer: nothing panics, and
 //! nothing takes memory out of proportion to what it was given.
 
-#![allow(clippy::expect_used, clippy::unwrap_used)] // what is included serves tests too
-
-#[path = "../../fuzz/src/lib.rs"]
-mod targets;
-
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+use basecode::Sampler;
 
 /// Inputs made from each file of the corpus.
 const MUTATIONS: u64 = 60;
@@ -44,16 +41,12 @@ static ALLOCATOR: Counting = Counting;
 /// Memory is counted for one at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// The same sequence in every run (SplitMix64).
-struct Random(u64);
+/// The same sequence in every run.
+struct Random(Sampler);
 
 impl Random {
     fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % n.max(1) as u64) as usize
+        (f64::from(self.0.next_1d()) * n as f64) as usize
     }
 }
 
@@ -88,14 +81,14 @@ fn mutated(bytes: &[u8], other: &[u8], random: &mut Random) -> Vec<u8> {
 
 fn replay(name: &str, target: fn(&[u8])) {
     let _alone = ALONE.lock();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(name);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(name);
     let files = folder.read_dir().unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let mut corpus: Vec<_> = files.map(|file| file.unwrap().path()).collect();
     corpus.sort();
     assert!(corpus.len() >= 3, "{} holds {} files", folder.display(), corpus.len());
     let corpus: Vec<_> =
         corpus.into_iter().map(|path| (std::fs::read(&path).unwrap(), path)).collect();
-    let mut random = Random(1);
+    let mut random = Random(Sampler::new(1));
     for (bytes, path) in &corpus {
         for mutation in 0..MUTATIONS {
             let other = &corpus[random.below(corpus.len())].0;
@@ -118,40 +111,40 @@ fn replay(name: &str, target: fn(&[u8])) {
 
 #[test]
 fn archives() {
-    replay("archive", targets::archive);
+    replay("archive", crate::archive);
 }
 
 #[test]
 fn configs() {
-    replay("config", targets::config);
+    replay("config", crate::config);
 }
 
 #[test]
 fn images() {
-    replay("exr", targets::exr);
+    replay("exr", crate::exr);
 }
 
 #[test]
 fn submitted_images() {
-    replay("judge", targets::judge);
+    replay("judge", crate::judge);
 }
 
 #[test]
 fn scene_files() {
-    replay("toml", targets::toml);
+    replay("toml", crate::toml);
 }
 
 #[test]
 fn meshes() {
-    replay("obj", targets::obj);
+    replay("obj", crate::obj);
 }
 
 #[test]
 fn materials() {
-    replay("mtl", targets::mtl);
+    replay("mtl", crate::mtl);
 }
 
 #[test]
 fn answers_of_workers() {
-    replay("worker", targets::worker);
+    replay("worker", crate::worker);
 }
