@@ -88,93 +88,66 @@ pub struct Limits {
     pub tasks: u64,
 }
 
-/// One switch per layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Layers {
+/// Defines [`Layers`] from one list: bit flags would make each of their many uses longer.
+macro_rules! layers {
+    ($($(#[$doc:meta])+ $layer:ident,)+) => {
+        /// One switch per layer.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        pub struct Layers {
+            $($(#[$doc])+ pub $layer: bool,)+
+        }
+
+        impl Layers {
+            /// Nothing.
+            pub const NONE: Self = Self { $($layer: false),+ };
+
+            /// Every layer that full isolation needs. The cgroup layer is an extra.
+            pub const fn full() -> Self {
+                Self { cgroup: false, ..Self { $($layer: true),+ } }
+            }
+
+            /// The layers by name, in the order in which they are described.
+            pub fn named(&self) -> [(&'static str, bool); 9] {
+                [$((stringify!($layer), self.$layer)),+]
+            }
+
+            /// The switch of a layer, by the name that [`Self::named`] gives it.
+            pub fn switch(&mut self, name: &str) -> Option<&mut bool> {
+                match name {
+                    $(stringify!($layer) => Some(&mut self.$layer),)+
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+layers! {
     /// User namespace. Without root all other namespaces need it; as root it makes the count of
     /// processes the child's own.
-    pub user_ns: bool,
+    user_ns,
     /// Mount namespace with a root of its own that holds the binds and nothing else.
-    pub mount_ns: bool,
+    mount_ns,
     /// Process namespace: sees and signals only its own, ends all at once.
-    pub pid_ns: bool,
+    pid_ns,
     /// Network, IPC and host name namespaces: no interface, no shared memory of others.
-    pub net_ns: bool,
+    net_ns,
     /// Root becomes user 65534; capabilities are dropped.
-    pub drop_privileges: bool,
+    drop_privileges,
     /// Landlock: files, TCP, and (new kernels) signals, abstract and path-name sockets.
-    pub landlock: bool,
+    landlock,
     /// System call filter.
-    pub seccomp: bool,
+    seccomp,
     /// Limits per process.
-    pub rlimits: bool,
+    rlimits,
     /// Limits for all processes together; optional.
-    pub cgroup: bool,
+    cgroup,
 }
 
 impl Layers {
-    /// Nothing.
-    pub const NONE: Self = Self {
-        user_ns: false,
-        mount_ns: false,
-        pid_ns: false,
-        net_ns: false,
-        drop_privileges: false,
-        landlock: false,
-        seccomp: false,
-        rlimits: false,
-        cgroup: false,
-    };
-
-    /// Every layer that full isolation needs. The cgroup layer is an extra.
-    pub fn full() -> Self {
-        Self {
-            user_ns: true,
-            mount_ns: true,
-            pid_ns: true,
-            net_ns: true,
-            drop_privileges: true,
-            landlock: true,
-            seccomp: true,
-            rlimits: true,
-            cgroup: false,
-        }
-    }
-
     /// [`Self::full`] where there is a sandbox, nothing elsewhere.
     pub fn of_this_system() -> Self {
         if cfg!(target_os = "linux") { Self::full() } else { Self::NONE }
-    }
-
-    /// The layers by name, in the order in which they are described.
-    pub fn named(&self) -> [(&'static str, bool); 9] {
-        [
-            ("user_ns", self.user_ns),
-            ("mount_ns", self.mount_ns),
-            ("pid_ns", self.pid_ns),
-            ("net_ns", self.net_ns),
-            ("drop_privileges", self.drop_privileges),
-            ("landlock", self.landlock),
-            ("seccomp", self.seccomp),
-            ("rlimits", self.rlimits),
-            ("cgroup", self.cgroup),
-        ]
-    }
-
-    /// The switch of a layer, by the name that [`Self::named`] gives it.
-    pub fn switch(&mut self, name: &str) -> Option<&mut bool> {
-        Some(match name {
-            "user_ns" => &mut self.user_ns,
-            "mount_ns" => &mut self.mount_ns,
-            "pid_ns" => &mut self.pid_ns,
-            "net_ns" => &mut self.net_ns,
-            "drop_privileges" => &mut self.drop_privileges,
-            "landlock" => &mut self.landlock,
-            "seccomp" => &mut self.seccomp,
-            "rlimits" => &mut self.rlimits,
-            "cgroup" => &mut self.cgroup,
-            _ => return None,
-        })
     }
 
     /// What these layers amount to.
