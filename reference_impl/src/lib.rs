@@ -13,6 +13,8 @@ use basecode::{
 };
 
 use mistakes::Mistakes;
+#[doc(hidden)]
+pub use mistakes::stages;
 
 /// Point lights and shadows, offline and realtime.
 #[derive(Default)]

@@ -15,7 +15,7 @@ mod phong;
 mod render;
 mod samples;
 mod shadow;
-mod stages;
+pub mod stages;
 
 use std::borrow::Cow;
 

@@ -1,9 +1,6 @@
 //! The proof of the grader: right renderers lose nothing, known mistakes cost the parts that they
 //! belong to and no other. The renderer is the reference with a switch on.
 
-#[path = "../../reference_impl/src/mistakes/stages/mod.rs"]
-mod stages;
-
 mod choice;
 mod confirm;
 mod deletion;
@@ -19,6 +16,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
+use reference_impl::stages;
 use umbra::assignment::Assignment;
 use umbra::cli::AdapterChoice;
 use umbra::diagnosis::Catalogue;

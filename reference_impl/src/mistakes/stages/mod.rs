@@ -1,5 +1,4 @@
-//! Mistakes of the shaders: texts that read otherwise. Depends on nothing, so that `xtask verdicts`
-//! can hand in the mistaken texts: nothing can link this crate.
+//! Mistakes of the shaders: texts that read otherwise. `xtask verdicts` submits the mistaken texts.
 
 mod diffuse;
 mod harmless;
