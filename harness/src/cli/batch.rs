@@ -123,9 +123,7 @@ impl Batch<'_> {
         };
         let all = class::sources(&collected.sources, self.output);
         let (roster, matches) = match self.purpose {
-            Mode::Grade => {
-                (class::roster(self.list, self.output)?, class::matches(self.output)?)
-            }
+            Mode::Grade => (class::roster(self.list, self.output)?, class::matches(self.output)?),
             Mode::Check => Default::default(),
         };
         let deciding = Deciding {

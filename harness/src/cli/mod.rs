@@ -218,6 +218,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn known_help() {
+        let mut umbra = Arguments::command().term_width(100);
+        umbra.build();
+        let mut all = umbra.render_help().to_string();
+        for command in umbra.get_subcommands_mut().filter(|command| command.get_name() != "help") {
+            let help = command.render_long_help();
+            all.push_str(&format!("\n---- {}\n{help}", command.get_name()));
+        }
+        // Where there is no sandbox there is no `doctor`.
+        if cfg!(target_os = "linux") {
+            insta::assert_snapshot!("help", all);
+        }
+    }
+
+    #[test]
     fn what_the_machine_lacks_is_told_from_what_the_user_said() {
         use anyhow::Context as _;
         let of =

@@ -240,30 +240,8 @@ mod tests {
     }
 
     #[test]
-    fn holds_what_a_program_asks_for() {
-        let json = parsed(&sample::sheet());
-        assert_eq!(json["schema"], "umbra.report");
-        assert_eq!(json["version"], 1);
-        assert_eq!(json["assignment"]["due"], "2019-10-06T23:59:00-04:00");
-        assert_eq!(json["conditions"].as_array().unwrap().len(), 2);
-        let second = &json["hand_ins"][1];
-        assert_eq!(second["student"]["id"], "0260000002");
-        assert_eq!((&second["points"], &second["points_max"]), (&64.85.into(), &84.85.into()));
-        assert_eq!(second["parts"][2]["points"], 9.85);
-        assert_eq!(second["checks"][2]["verdict"], "fail");
-        assert_eq!(second["checks"][2]["pictures"][0]["file"], "radiance_lit_cbox_actual.png");
-        assert_eq!(second["conditions"], 0);
-        assert_eq!(json["hand_ins"][2]["conditions"], 1);
-        assert_eq!(json["timings"]["two_cosines"][1]["name"], "build");
-    }
-
-    #[test]
-    fn keys_keep_their_order() {
-        let text = report(&sample::sheet()).unwrap();
-        let places =
-            ["schema", "version", "assignment", "conditions", "hand_ins", "class", "timings"]
-                .map(|key| text.find(&format!("\n  \"{key}\":")).unwrap());
-        assert!(places.is_sorted(), "{places:?}");
+    fn known_answer() {
+        insta::assert_snapshot!("report_json", report(&sample::sheet()).unwrap());
     }
 
     #[test]

@@ -317,13 +317,12 @@ mod tests {
         let gpu = reopen();
         let bundled = gpu.checked(&mut || {
             let pipeline = gpu.pipeline(NONSENSE, NONSENSE);
-            let mut bundle = gpu.device.create_render_bundle_encoder(
-                &wgpu::RenderBundleEncoderDescriptor {
+            let mut bundle =
+                gpu.device.create_render_bundle_encoder(&wgpu::RenderBundleEncoderDescriptor {
                     color_formats: &[Some(wgpu::TextureFormat::Rgba32Float)],
                     sample_count: 1,
                     ..Default::default()
-                },
-            );
+                });
             bundle.set_pipeline(&pipeline);
             bundle.draw(0..3, 0..1);
             bundle.finish(&wgpu::RenderBundleDescriptor::default());

@@ -299,9 +299,8 @@ mod tests {
     fn known_answer() {
         let sheet = sample::sheet();
         let look = Look { width: 100, colours: false };
-        assert_eq!(detail(&sheet, &sheet.entries[1], look, true), include_str!("detail_100.txt"));
-        let plain = detail(&sheet, &sheet.entries[1], look, false);
-        assert_eq!(plain, include_str!("detail_plain_100.txt"));
+        insta::assert_snapshot!("detail", detail(&sheet, &sheet.entries[1], look, true));
+        insta::assert_snapshot!("detail_plain", detail(&sheet, &sheet.entries[1], look, false));
     }
 
     #[test]
