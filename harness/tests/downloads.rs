@@ -227,6 +227,9 @@ fn a_class_of_brightspace_zipped_and_unpacked() {
             "{remarks}"
         );
         assert!(!of("Zoë").2.contains("due"), "{}", of("Zoë").2);
+        // Names and numbers of the grade book are the class list's, whatever config.json says.
+        let book = fs::read_to_string(place.at("out/grades.csv")).unwrap();
+        assert!(book.contains("\n260000002,Ode,Bo,"), "{book}");
         let bo = report["hand_ins"]
             .as_array()
             .unwrap()

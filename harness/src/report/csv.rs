@@ -34,14 +34,10 @@ pub fn grades(sheet: &BatchReport) -> Result<String, ReportError> {
     String::from_utf8(bytes).map_err(|error| format(error.to_string()))
 }
 
-fn row(sheet: &BatchReport, Entry { record, grade, standing }: &Entry) -> Vec<String> {
-    let student = &record.student;
-    let mut row = vec![
-        student.id.clone(),
-        student.last_name.clone(),
-        student.first_name.clone(),
-        record.name.clone(),
-    ];
+fn row(sheet: &BatchReport, entry: &Entry) -> Vec<String> {
+    let Entry { record, grade, standing } = entry;
+    let student = entry.student();
+    let mut row = vec![student.id, student.last_name, student.first_name, record.name.clone()];
     for part in &sheet.rules.parts {
         let own = grade.parts.iter().find(|own| own.id == part.id);
         row.push(own.map(of_part).unwrap_or_default());

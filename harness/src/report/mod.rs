@@ -37,7 +37,7 @@ use crate::assignment::Assignment;
 use crate::class::{Class, Standing};
 use crate::evidence::Check;
 use crate::files::write_whole;
-use crate::grading::Record;
+use crate::grading::{Record, Student};
 use crate::held_back::HeldBack;
 use crate::rubric::{Grade, Rules};
 
@@ -60,6 +60,21 @@ pub struct Entry {
     /// Whose it is, and when it came.
     #[serde(default)]
     pub standing: Standing,
+}
+
+impl Entry {
+    /// Whose it is: as the class list says where it tells, else as the submission itself does.
+    pub fn student(&self) -> Student {
+        let own = &self.record.student;
+        self.standing.student.as_ref().map_or_else(
+            || own.clone(),
+            |listed| Student {
+                first_name: listed.first_name.clone(),
+                last_name: listed.last_name.clone(),
+                id: if listed.number.is_empty() { &own.id } else { &listed.number }.clone(),
+            },
+        )
+    }
 }
 
 /// Everything that a report of a batch is made from.

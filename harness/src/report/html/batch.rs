@@ -64,7 +64,7 @@ fn table(html: &mut Html, sheet: &BatchReport) {
 
 fn row(html: &mut Html, sheet: &BatchReport, entry: &Entry) {
     let Entry { record, grade, .. } = entry;
-    let student = &record.student;
+    let student = entry.student();
     let name = student.full_name();
     let shown = if name.is_empty() { "(no name)" } else { &name };
     let key = format!("{} {}", student.last_name, student.first_name);

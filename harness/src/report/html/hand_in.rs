@@ -27,7 +27,8 @@ pub fn hand_in(sheet: &BatchReport, entry: &Entry, reader: Reader) -> String {
         }
     };
     let Entry { record, grade, standing } = entry;
-    let name = record.student.full_name();
+    let student = entry.student();
+    let name = student.full_name();
     let name = if name.is_empty() { &record.name } else { &name };
     let mut html = begin(&format!("{name} - {}", sheet.title));
     html.raw("<header class=\"top\">\n");
@@ -40,8 +41,8 @@ pub fn hand_in(sheet: &BatchReport, entry: &Entry, reader: Reader) -> String {
     }
     html.raw("<p class=\"course\">").text(&sheet.title);
     html.raw("</p>\n<h1>").text(name).raw("</h1>\n<p class=\"who\">");
-    if !record.student.id.is_empty() {
-        html.text(&record.student.id).raw(" · ");
+    if !student.id.is_empty() {
+        html.text(&student.id).raw(" · ");
     }
     html.text(&record.name);
     if let Some(digest) = record.digest.get(..12) {

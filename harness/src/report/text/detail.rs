@@ -24,7 +24,8 @@ pub fn detail(sheet: &BatchReport, entry: &Entry, look: Look, verbose: bool) -> 
     let mut page = Page::new(look.width, look.colours);
     page.wrapped(&[], Style::Heading, &sheet.title);
     page.wrapped(&[(Style::Plain, "checked  ")], Style::Plain, &record.name);
-    let student = [record.student.full_name(), record.student.id.clone()];
+    let student = entry.student();
+    let student = [student.full_name(), student.id];
     let student: Vec<String> = student.into_iter().filter(|text| !text.is_empty()).collect();
     let student = if student.is_empty() { "not said".to_owned() } else { student.join(", ") };
     page.wrapped(&[(Style::Plain, "student  ")], Style::Plain, &student);

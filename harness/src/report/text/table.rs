@@ -112,7 +112,7 @@ impl Layout {
             })
             .collect();
         let name = widest("submission", &|entry| entry.record.name.clone());
-        let student = widest("student", &|entry| entry.record.student.full_name());
+        let student = widest("student", &|entry| entry.student().full_name());
         let fixed = GAP.len() * 2 + total + if noted > 0 { noted + GAP.len() } else { 0 };
         let with_parts = fixed + parts.iter().map(|part| part + GAP.len()).sum::<usize>();
         let fits = with_parts + 2 * NAME_MIN <= width;
@@ -148,7 +148,7 @@ impl Layout {
         let names = format!(
             "{}{GAP}{}",
             left(&record.name, self.name),
-            left(&record.student.full_name(), self.student)
+            left(&entry.student().full_name(), self.student)
         );
         let mut cells = vec![(Style::Plain, names)];
         if let Some(parts) = &self.parts {
