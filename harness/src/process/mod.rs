@@ -2,7 +2,7 @@
 //! run, ended with all their descendants in reach and reaped on every path.
 //!
 //! Everything of Umbra that runs foreign code (the compiler, the worker) goes through [`run`].
-//! [`start`] is the one place where a process is made; what the child does to itself first is
+//! `start` is the one place where a process is made; what the child does to itself first is
 //! [`confine_self`].
 
 mod capture;

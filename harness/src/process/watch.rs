@@ -30,7 +30,7 @@ const MOUTHFUL: usize = 1 << 20;
 /// How long the output of a process that is gone may still be held open by another.
 const DRAIN: Duration = Duration::from_millis(200);
 
-/// Runs `command` (see [`start`]) to its end and reaps it. Of each output
+/// Runs `command` (see `start`) to its end and reaps it. Of each output
 /// stream the first `keep` bytes and a short tail are kept, the rest is read and forgotten. `watcher`
 /// is told now and then how many CPU seconds it has had; when it breaks off, the child is
 /// [`Exit::OutOfCpu`].

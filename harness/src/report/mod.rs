@@ -4,7 +4,7 @@
 //! whether they are right and how wrong, it names no other submission and leads nowhere else. All else is the instructor's: the files of the batch, and
 //! `instructor/<slug>/` with all that was found out.
 //!
-//! It decides nothing. Every format lets a hand-in's words through one gate, [`harmless`], and adds
+//! It decides nothing. Every format lets a hand-in's words through one gate, `harmless`, and adds
 //! the escaping that the format itself needs.
 
 mod csv;
