@@ -14,6 +14,7 @@ pub mod late;
 pub mod layout;
 pub mod matching;
 pub mod names;
+pub mod overrides;
 pub mod roster;
 pub mod settle;
 pub mod stamps;

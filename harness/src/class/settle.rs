@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::late::{Late, Policy};
 use super::layout::{Kind, Label};
 use super::matching::{Claim, Match, Matches, find};
+use super::overrides::Applied;
 use super::roster::{Roster, Student};
 use super::{names, stamps};
 use crate::rubric::Grade;
@@ -51,6 +52,10 @@ pub struct Standing {
     pub matched_by: String,
     /// The student's other attempts, which do not count.
     pub set_aside: Vec<String>,
+    /// What the instructor decided on its points.
+    pub decisions: Vec<Applied>,
+    /// Whether there is a policy on lateness, and no time stamp to judge by.
+    pub time_unknown: bool,
     /// How late it is; nothing where there is no policy, or no time stamp.
     pub late: Option<Late>,
 }
@@ -69,6 +74,10 @@ pub struct Class {
     pub undecided: Vec<Undecided>,
     /// Submissions that the instructor decided not to count.
     pub not_counted: Vec<String>,
+    /// Decisions on points whose evidence has changed since.
+    pub stale: Vec<String>,
+    /// Decisions on points that are on nothing that is there.
+    pub unused: Vec<String>,
 }
 
 /// A student without a submission that counts.
@@ -188,6 +197,9 @@ pub fn settle(
             }
         }
         standing.late = charge(claim, &standing, grade, deciding);
+        standing.time_unknown = standing.late.is_none()
+            && deciding.policy.is_some()
+            && claim.label.as_ref().is_none_or(|own| own.marked_late || own.kind != Kind::Canvas);
         people.entry(person).or_default().push(index);
         standings.push(standing);
     }
@@ -319,7 +331,10 @@ fn charge(
 impl Class {
     /// Whether there is anything to say.
     pub fn is_quiet(&self) -> bool {
-        self.missing.is_empty() && self.undecided.is_empty() && self.not_counted.is_empty()
+        let decisions = [&self.not_counted, &self.stale, &self.unused];
+        self.missing.is_empty()
+            && self.undecided.is_empty()
+            && decisions.iter().all(|lines| lines.is_empty())
     }
 
     /// What `matches.toml` may begin with: all that is undecided, to be filled in.

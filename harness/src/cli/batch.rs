@@ -14,6 +14,7 @@ use super::class::{self, Source};
 use super::context::{Context, INTERRUPTED, cores};
 use super::grade::{BudgetChoice, IsolationChoice, Perturb};
 use super::render::AdapterChoice;
+use crate::class::overrides::{Applied, OVERRIDES, Overrides, Subject};
 use crate::class::{
     Attempt, Claim, Class, Collected, Deciding, Kind, Label, Wanted, collect, settle,
 };
@@ -227,24 +228,37 @@ impl Batch<'_> {
         all: &[Source],
         deciding: &Deciding,
     ) -> anyhow::Result<Class> {
-        let claim = |entry: &Entry| {
-            let record = &entry.record;
-            Claim {
-                name: record.name.clone(),
-                slug: record.slug.clone(),
-                label: class::label(self.output, &record.slug),
-                number: record.student.id.clone(),
-                full_name: record.student.full_name(),
-            }
-        };
-        let claims: Vec<Claim> = entries.iter().map(claim).collect();
+        let claims: Vec<Claim> =
+            entries.iter().map(|entry| class::claim(self.output, &entry.record)).collect();
         let mut grades: Vec<Grade> = entries.iter().map(|entry| entry.grade.clone()).collect();
+        let overrides = Overrides::read(&self.output.join(OVERRIDES))?;
+        let subjects: Vec<Subject> = entries
+            .iter()
+            .zip(&claims)
+            .map(|(Entry { record, .. }, claim)| Subject {
+                slug: &record.slug,
+                numbers: super::decide::numbers(claim, deciding.roster, deciding.matches),
+                digest: &record.digest,
+                evidence: &record.evidence,
+            })
+            .collect();
+        let decisions: Vec<Vec<Applied>> = subjects
+            .iter()
+            .zip(&mut grades)
+            .map(|(subject, grade)| overrides.apply(subject, grade))
+            .collect();
+        let parts = grades.first().map(|grade| grade.parts.iter().map(|part| part.id.clone()));
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+        let unused = overrides.unused(&subjects, &parts);
         let mut absent: Vec<(Label, String)> =
             collected.empty.iter().map(|empty| (empty.label.clone(), empty.reason())).collect();
         let is_graded = |source: &Source| claims.iter().any(|claim| claim.slug == source.slug);
         let open = all.iter().filter(|source| !is_graded(source) && !aside.contains(&source.slug));
         absent.extend(open.filter_map(|s| Some((s.label.clone()?, "not graded yet".to_owned()))));
-        let (standings, class) = settle(&claims, &mut grades, &absent, collected.kind, deciding)?;
+        let (standings, mut class) =
+            settle(&claims, &mut grades, &absent, collected.kind, deciding)?;
+        class.unused = unused;
         class::ask(&class, self.output)?;
         let mut counting = Vec::new();
         for (at, mut standing) in standings {
@@ -256,6 +270,9 @@ impl Batch<'_> {
             let known: Vec<String> =
                 others.filter(|name| !standing.set_aside.contains(name)).collect();
             standing.set_aside.extend(known);
+            let stale = decisions[at].iter().filter(|own| own.stale);
+            class.stale.extend(stale.map(|own| format!("{}: {}", claims[at].name, own.words())));
+            standing.decisions.clone_from(&decisions[at]);
             let grade = grades[at].clone();
             counting.push(Entry { record: entries[at].record.clone(), grade, standing });
         }

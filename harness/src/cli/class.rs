@@ -161,14 +161,25 @@ pub fn note_source(out: &Folders, source: &Source) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What a graded submission says of whose it is.
+pub fn claim(output: &Path, record: &Record) -> Claim {
+    Claim {
+        name: record.name.clone(),
+        slug: record.slug.clone(),
+        label: label(output, &record.slug),
+        number: record.student.id.clone(),
+        full_name: record.student.full_name(),
+    }
+}
+
 /// What the platform said of a submission that an earlier run graded.
-pub fn label(output: &Path, slug: &str) -> Option<Label> {
+fn label(output: &Path, slug: &str) -> Option<Label> {
     let file = output.join(report::INSTRUCTOR).join(slug).join(LABEL);
     serde_json::from_slice(&fs::read(file).ok()?).ok()?
 }
 
 /// The instructor's folders of a report's submissions, sorted.
-fn folders(output: &Path) -> Vec<String> {
+pub fn folders(output: &Path) -> Vec<String> {
     let entries = output.join(report::INSTRUCTOR).read_dir().into_iter().flatten().flatten();
     let folders = entries.filter(|entry| entry.path().is_dir());
     let mut names: Vec<String> =

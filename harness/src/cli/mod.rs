@@ -6,6 +6,7 @@ mod check;
 mod class;
 mod compare;
 mod context;
+mod decide;
 #[cfg(target_os = "linux")]
 mod doctor;
 mod explain;
@@ -68,6 +69,12 @@ enum Command {
     Check(check::CheckArguments),
     /// Grade submissions: archives (.zip, .tar, .tar.gz), folders, or what holds many of them
     Grade(grade::GradeArguments),
+    /// Set the points of a part by hand, with a reason that both reports show
+    Override(decide::OverrideArguments),
+    /// Confirm what a report leaves to the instructor, such as images without code
+    Confirm(decide::ConfirmArguments),
+    /// List what a report still leaves to the instructor; exits with 0 when nothing waits, 1 when something does
+    Status(decide::StatusArguments),
     /// Check the tree of submissions against the handout's; exits with 0 when all conform, 1 when not
     Validate(tree::ValidateArguments),
     /// Pack a working folder into an archive that conforms to the handout
@@ -191,6 +198,9 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
     match command {
         Command::Check(arguments) => check::check(&arguments, root),
         Command::Grade(arguments) => grade::grade(&arguments, root),
+        Command::Override(arguments) => decide::override_part(&arguments, root),
+        Command::Confirm(arguments) => decide::confirm(&arguments, root),
+        Command::Status(arguments) => decide::status(&arguments),
         Command::Validate(arguments) => tree::validate(&arguments, root),
         Command::Pack(arguments) => tree::pack(&arguments, root),
         Command::Render(arguments) => render::run(&arguments, root),

@@ -174,15 +174,32 @@ impl RecordCache {
     /// # Errors
     /// When it cannot be read.
     pub fn earlier(&self, instructor: &Path) -> anyhow::Result<Option<Earlier>> {
+        let file = Self::file(instructor)?;
+        let earlier = |file: File<Record>| Earlier {
+            comparable: file.batch == hex(&self.batch),
+            record: file.record,
+        };
+        Ok(file.map(earlier))
+    }
+
+    /// The record that an earlier run kept in an instructor's folder, whatever it was made under.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn record(instructor: &Path) -> anyhow::Result<Option<Record>> {
+        Ok(Self::file(instructor)?.map(|file| file.record))
+    }
+
+    fn file(instructor: &Path) -> anyhow::Result<Option<File<Record>>> {
         let path = instructor.join(FILE);
         let bytes = match fs::read(&path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             bytes => bytes.with_context(|| format!("cannot read {}", path.display()))?,
         };
-        let file: File<Record> = serde_json::from_slice(&bytes).with_context(|| {
+        let file = serde_json::from_slice(&bytes).with_context(|| {
             format!("{}: not a record of this version of Umbra", path.display())
         })?;
-        Ok(Some(Earlier { comparable: file.batch == hex(&self.batch), record: file.record }))
+        Ok(Some(file))
     }
 
     /// Whose record an earlier run kept in an instructor's folder.

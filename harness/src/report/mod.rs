@@ -119,7 +119,7 @@ impl Entry {
 }
 
 /// Whether a remark is the reason of a gate that only instructors read.
-fn is_private(remark: &str, rules: &Rules) -> bool {
+pub(crate) fn is_private(remark: &str, rules: &Rules) -> bool {
     rules.gates.iter().any(|gate| gate.private && gate.reason == remark)
 }
 

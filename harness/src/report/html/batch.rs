@@ -117,6 +117,11 @@ fn about(html: &mut Html, sheet: &BatchReport, class: &Class) {
         }
         html.raw("</ul>\n");
     }
+    for line in class.stale.iter().chain(&class.unused) {
+        html.raw("<p class=\"notice\">A decision on points to look at again: ")
+            .text(line)
+            .raw("</p>\n");
+    }
     if !class.missing.is_empty() {
         html.raw("<p>").text(&count(class.missing.len(), "student")).raw(" of ");
         html.text(&class.list).raw(" without a submission:</p>\n<ul>\n");

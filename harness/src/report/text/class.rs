@@ -26,6 +26,8 @@ pub(super) fn class(page: &mut Page, sheet: &BatchReport, class: &Class) {
         ("attempts that count".to_owned(), Style::Plain, aside.collect::<Vec<_>>()),
         ("not counted, as matches.toml says".to_owned(), Style::Plain, class.not_counted.clone()),
         (format!("without a submission{list}"), Style::Open, missing.collect()),
+        ("decisions whose evidence has changed".to_owned(), Style::Bad, class.stale.clone()),
+        ("decisions on nothing that is there".to_owned(), Style::Bad, class.unused.clone()),
         ("to be decided in matches.toml".to_owned(), Style::Bad, undecided.collect()),
     ] {
         if lines.is_empty() {

@@ -1,0 +1,367 @@
+//! What the instructor decides on points: parts set by hand, and what was left to confirm. Kept in `overrides.toml`,
+//! which the commands only add to: the last decision on something counts.
+
+use std::path::Path;
+
+use anyhow::{Context as _, bail};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+use toml::Spanned;
+
+use super::matching::line_of;
+use super::names;
+use crate::evidence::Evidence;
+use crate::files::hex;
+use crate::rubric::{Grade, PartGrade};
+
+/// The file of decisions, in the report's folder.
+pub const OVERRIDES: &str = "overrides.toml";
+
+/// One decision.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Decision {
+    /// Student number, or the submission's folder in the report.
+    pub student: String,
+    /// The part that is set; none where what was left to the instructor is confirmed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<String>,
+    /// Points of the part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<f64>,
+    /// Why; the student reads it.
+    pub reason: String,
+    /// Who decided.
+    #[serde(default)]
+    pub by: String,
+    /// When, RFC 3339.
+    #[serde(default)]
+    pub when: String,
+    /// What the evidence was then, as [`fingerprint`] says; empty where that does not matter.
+    #[serde(default)]
+    pub evidence: String,
+}
+
+/// All decisions, in the order in which they were made.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overrides(Vec<(Decision, usize)>);
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default, rename = "override")]
+    overrides: Vec<Spanned<Decision>>,
+    #[serde(default, rename = "confirm")]
+    confirmed: Vec<Spanned<Decision>>,
+}
+
+/// A decision as it was applied.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Applied {
+    /// The decision.
+    pub decision: Decision,
+    /// Points before it, least and most: of the part, or of the whole.
+    pub before: [f64; 2],
+    /// Points after it.
+    pub after: [f64; 2],
+    /// Whether the evidence has changed since it was made.
+    pub stale: bool,
+}
+
+/// A submission, as far as decisions name one.
+pub struct Subject<'a> {
+    /// Its folder in the report.
+    pub slug: &'a str,
+    /// The student numbers that it is known by.
+    pub numbers: Vec<String>,
+    /// Digest of what was submitted.
+    pub digest: &'a str,
+    /// What was found out.
+    pub evidence: &'a Evidence,
+}
+
+impl Overrides {
+    /// Reads a file of decisions; none where there is no file.
+    ///
+    /// # Errors
+    /// When it cannot be read, or says what means nothing; names the file and line.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        match std::fs::read_to_string(path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Self::default()),
+            text => {
+                Self::parse(&text.with_context(|| format!("cannot read {}", path.display()))?, path)
+            }
+        }
+    }
+
+    fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
+        let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
+        let file: File = toml::from_str(text).map_err(|error| {
+            let place = place(error.span().map_or(0, |span| span.start));
+            anyhow::anyhow!("{place}: {}", error.message())
+        })?;
+        let mut decisions = Vec::new();
+        for (entry, sets) in file
+            .overrides
+            .into_iter()
+            .map(|entry| (entry, true))
+            .chain(file.confirmed.into_iter().map(|entry| (entry, false)))
+        {
+            let at = entry.span().start;
+            let decision = entry.into_inner();
+            let place = place(at);
+            let points = decision.points;
+            if sets && (decision.part.is_none() || points.is_none()) {
+                bail!("{place}: an override needs part = \"1.3\" and points = 15");
+            }
+            if !sets && (decision.part.is_some() || points.is_some()) {
+                bail!("{place}: a confirmation has neither part nor points; use [[override]]");
+            }
+            if points.is_some_and(|points| !(points.is_finite() && points >= 0.0)) {
+                bail!("{place}: expected points of 0 or more");
+            }
+            if decision.reason.trim().is_empty() {
+                bail!("{place}: expected a reason");
+            }
+            decisions.push((decision, line_of(text, at)));
+        }
+        decisions.sort_by_key(|(_, line)| *line);
+        Ok(Self(decisions))
+    }
+
+    /// Decisions on submissions that are not there, or on parts that the assignment does not have, with their lines.
+    pub fn unused(&self, subjects: &[Subject], parts: &[&str]) -> Vec<String> {
+        let unused = self.0.iter().filter_map(|(decision, line)| {
+            let place = format!("{OVERRIDES}:{line}");
+            if !subjects.iter().any(|subject| subject.is(decision)) {
+                return Some(format!(
+                    "{place}: there is no submission of \"{}\"",
+                    decision.student
+                ));
+            }
+            let part = decision.part.as_deref().filter(|part| !parts.contains(part))?;
+            Some(format!("{place}: there is no part {part}; it has {}", parts.join(", ")))
+        });
+        unused.collect()
+    }
+
+    /// Applies to a grade what was decided on its submission, and notes it in the remarks.
+    pub fn apply(&self, subject: &Subject, grade: &mut Grade) -> Vec<Applied> {
+        let own: Vec<&Decision> =
+            self.0.iter().map(|(decision, _)| decision).filter(|own| subject.is(own)).collect();
+        let last = own
+            .iter()
+            .enumerate()
+            .filter(|(at, decision)| own[at + 1..].iter().all(|later| later.part != decision.part));
+        let original = grade.parts.clone();
+        let mut applied = Vec::new();
+        for (_, &decision) in last {
+            let (before, after, now) = match (&decision.part, decision.points) {
+                (Some(id), Some(points)) => {
+                    let Some(at) = original.iter().position(|part| part.id == *id) else {
+                        continue;
+                    };
+                    let now = fingerprint(subject, &original[at..=at]);
+                    (set(&mut grade.parts[at], points, decision), [points; 2], now)
+                }
+                _ => {
+                    let before = totals(&grade.parts);
+                    for part in &mut grade.parts {
+                        part.points += part.unconfirmed;
+                        part.points_max += part.unconfirmed;
+                        part.unconfirmed = 0.0;
+                    }
+                    (before, totals(&grade.parts), fingerprint(subject, &original))
+                }
+            };
+            let stale = !decision.evidence.is_empty() && decision.evidence != now;
+            applied.push(Applied { decision: decision.clone(), before, after, stale });
+        }
+        if !applied.is_empty() {
+            [grade.points, grade.points_max] = totals(&grade.parts);
+            grade.unconfirmed = rounded(grade.parts.iter().map(|part| part.unconfirmed).sum());
+            grade.remarks.extend(applied.iter().map(Applied::words));
+        }
+        applied
+    }
+}
+
+fn rounded(points: f64) -> f64 {
+    (points * 100.0).round() / 100.0
+}
+
+/// The least and the most that parts are worth together.
+fn totals(parts: &[PartGrade]) -> [f64; 2] {
+    let sum = |of: fn(&PartGrade) -> f64| rounded(parts.iter().map(of).sum());
+    [sum(|part| part.points), sum(|part| part.points_max)]
+}
+
+/// Sets a part by hand; answers what it was.
+fn set(part: &mut PartGrade, points: f64, decision: &Decision) -> [f64; 2] {
+    let before = [part.points, part.points_max];
+    [part.points, part.points_max] = [points; 2];
+    part.unconfirmed = 0.0;
+    part.reason =
+        format!("set by the instructor: {}; before that: {}", decision.reason, part.reason);
+    before
+}
+
+impl Subject<'_> {
+    /// Whether a decision is on this submission.
+    pub fn is(&self, decision: &Decision) -> bool {
+        let word = decision.student.trim();
+        let number = names::number(word);
+        word == self.slug
+            || self.numbers.iter().any(|own| !number.is_empty() && names::number(own) == number)
+    }
+}
+
+impl Applied {
+    /// The decision in a sentence, for both reports.
+    pub fn words(&self) -> String {
+        let Decision { part, reason, by, when, .. } = &self.decision;
+        let day = when.get(..10).unwrap_or_default();
+        let who = [by.as_str(), day].into_iter().filter(|text| !text.is_empty());
+        let who = who.collect::<Vec<_>>().join(", ");
+        let who = if who.is_empty() { who } else { format!(" ({who})") };
+        let range = |[least, most]: [f64; 2]| {
+            if least == most { format!("{least}") } else { format!("{least}..{most}") }
+        };
+        match part {
+            Some(part) => format!(
+                "part {part} was set by the instructor to {} points instead of {}: {reason}{who}",
+                range(self.after),
+                range(self.before)
+            ),
+            None if self.after == self.before => {
+                format!("the instructor looked at it and confirms the points: {reason}{who}")
+            }
+            None => format!(
+                "the instructor confirms what the images show, {} points instead of {}: {reason}{who}",
+                range(self.after),
+                range(self.before)
+            ),
+        }
+    }
+}
+
+/// What a decision on some parts hangs on: what was submitted, and what was found out about these parts.
+pub fn fingerprint(subject: &Subject, parts: &[PartGrade]) -> String {
+    let mut hash = Sha256::new();
+    hash.update(subject.digest);
+    for part in parts {
+        hash.update(format!(
+            "\n{} {} {} {}",
+            part.id, part.points, part.points_max, part.unconfirmed
+        ));
+        let decides = |name: &str| part.evidence.iter().any(|own| own == name);
+        let checks = subject.evidence.checks.iter();
+        let mut lines: Vec<String> = checks
+            .filter(|check| decides(&check.name()))
+            // With the digits that are published: the last bits of a sum do not matter.
+            .map(|check| {
+                format!(
+                    "{} {} {:?} {:.5e}",
+                    check.name(),
+                    check.held_back,
+                    check.verdict,
+                    check.error
+                )
+            })
+            .collect();
+        lines.sort();
+        hash.update(lines.join("\n"));
+    }
+    hex(&hash.finalize())[..16].to_owned()
+}
+
+/// A decision as the lines that are added to the file.
+///
+/// # Errors
+/// When a text cannot be written as TOML.
+pub fn entry(decision: &Decision) -> anyhow::Result<String> {
+    let name = if decision.part.is_some() { "override" } else { "confirm" };
+    Ok(format!("\n[[{name}]]\n{}", toml::to_string(decision)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    fn of(text: &str) -> Overrides {
+        Overrides::parse(text, Path::new(OVERRIDES)).unwrap()
+    }
+
+    const SET: &str = "[[override]]\nstudent = \"#0260000002\"\npart = \"1.3\"\npoints = 15\nreason = \"typo\"\n\
+                       by = \"Eve\"\nwhen = \"2019-10-20T10:00:00Z\"\n";
+
+    #[test]
+    fn a_part_is_set_and_images_are_confirmed() {
+        let sheet = sample::sheet();
+        let run = |index: usize, text: &str| {
+            let entry = &sheet.entries[index];
+            let mut grade = entry.grade.clone();
+            let subject = Subject {
+                slug: &entry.record.slug,
+                numbers: vec![entry.record.student.id.clone()],
+                digest: &entry.record.digest,
+                evidence: &entry.record.evidence,
+            };
+            let applied = of(text).apply(&subject, &mut grade);
+            (grade, applied, fingerprint(&subject, &entry.grade.parts[2..3]))
+        };
+        // It was 9.85 of 64.85..84.85.
+        let (grade, applied, now) = run(1, SET);
+        assert_eq!((grade.points, grade.points_max), (70.0, 90.0));
+        assert_eq!(
+            grade.remarks.last().unwrap(),
+            "part 1.3 was set by the instructor to 15 points instead of 9.85: typo (Eve, 2019-10-20)"
+        );
+        assert!(grade.parts[2].reason.starts_with("set by the instructor: typo; before that: "));
+        assert!(!applied[0].stale);
+        // Evidence that has changed since.
+        let with = |evidence: &str| format!("{SET}evidence = \"{evidence}\"\n");
+        assert!(run(1, &with("0123456789abcdef")).1[0].stale);
+        assert!(!run(1, &with(&now)).1[0].stale);
+        // The last one counts; another student's is nobody else's.
+        let (grade, applied, _) = run(1, &format!("{SET}{}", SET.replace("15", "0")));
+        assert_eq!((grade.points, applied.len()), (55.0, 1));
+        assert_eq!(run(0, SET).1, []);
+        // 11.44 wait for the instructor, whoever it is by folder or number.
+        let slug = &sheet.entries[2].record.slug;
+        let confirm = format!("[[confirm]]\nstudent = \"{slug}\"\nreason = \"his noise\"\n");
+        let (grade, applied, _) = run(2, &confirm);
+        assert_eq!((grade.points, grade.points_max, grade.unconfirmed), (11.44, 11.44, 0.0));
+        assert!(
+            applied[0].words().contains("confirms what the images show, 11.44 points instead of 0")
+        );
+        let (grade, applied, _) = run(0, &confirm.replace(slug.as_str(), "260000001"));
+        assert_eq!(grade.points, sheet.entries[0].grade.points);
+        assert!(applied[0].words().starts_with("the instructor looked at it"));
+        let subjects = [];
+        assert_eq!(
+            of(SET).unused(&subjects, &["1.3"]),
+            ["overrides.toml:1: there is no submission of \"#0260000002\""]
+        );
+    }
+
+    #[test]
+    fn what_is_written_is_read_again_and_slips_have_a_line() {
+        let decision = of(SET).0.remove(0).0;
+        assert_eq!(of(&entry(&decision).unwrap()).0[0].0, decision);
+        for (text, expected) in [
+            (
+                "[[override]]\nstudent = \"1\"\nreason = \"x\"\n",
+                "overrides.toml:1: an override needs part",
+            ),
+            (&SET.replace("15", "-1"), "overrides.toml:1: expected points of 0 or more"),
+            (&SET.replace("typo", " "), "overrides.toml:1: expected a reason"),
+            (&SET.replace("override", "confirm"), "overrides.toml:1: a confirmation has neither"),
+            (&SET.replace("points", "pionts"), "overrides.toml:4: unknown field"),
+        ] {
+            let error = Overrides::parse(text, Path::new(OVERRIDES)).unwrap_err().to_string();
+            assert!(error.starts_with(expected), "{error}");
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! `umbra override`, `umbra confirm` and `umbra status`: what a report leaves to the instructor.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, bail, ensure};
+use serde::Deserialize;
+
+use super::class;
+use super::context::Context;
+use crate::class::matching::{Match, find};
+use crate::class::overrides::{Decision, OVERRIDES, Overrides, Subject, entry, fingerprint};
+use crate::class::{Claim, Class, Matches, Roster, Standing, names};
+use crate::files::write_whole;
+use crate::grading::{Record, RecordCache};
+use crate::report::{self, harmless};
+use crate::rubric::{self, Grade};
+
+/// Options of `umbra override`.
+#[derive(clap::Args)]
+pub struct OverrideArguments {
+    /// Whose: a student number, a name, or the submission's folder in the report
+    student: String,
+    /// The part, such as 1.3
+    part: String,
+    /// Its points from now on
+    points: f64,
+    #[command(flatten)]
+    decision: DecisionArguments,
+}
+
+/// Options of `umbra confirm`.
+#[derive(clap::Args)]
+pub struct ConfirmArguments {
+    /// Whose: a student number, a name, or the submission's folder in the report
+    student: String,
+    #[command(flatten)]
+    decision: DecisionArguments,
+}
+
+/// What both say.
+#[derive(clap::Args)]
+struct DecisionArguments {
+    /// Why; both reports show it
+    #[arg(long, value_name = "TEXT")]
+    reason: String,
+    /// Who decides [default: the name of this account]
+    #[arg(long, value_name = "NAME")]
+    by: Option<String>,
+    /// The report's folder
+    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    output: PathBuf,
+}
+
+/// Options of `umbra status`.
+#[derive(clap::Args)]
+pub struct StatusArguments {
+    /// The report's folder
+    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    output: PathBuf,
+}
+
+/// A submission of a report, as it was kept.
+struct Graded {
+    record: Record,
+    grade: Grade,
+    numbers: Vec<String>,
+}
+
+impl Graded {
+    fn subject(&self) -> Subject<'_> {
+        Subject {
+            slug: &self.record.slug,
+            numbers: self.numbers.clone(),
+            digest: &self.record.digest,
+            evidence: &self.record.evidence,
+        }
+    }
+}
+
+/// The numbers that a submission is known by: its own, the platform's, the class list's.
+pub fn numbers(claim: &Claim, roster: Option<&Roster>, matches: &Matches) -> Vec<String> {
+    let listed = roster.and_then(|roster| match find(claim, roster, matches) {
+        Ok(Match::Student(at, _)) => Some(roster.students[at].number.clone()),
+        _ => None,
+    });
+    let label = claim.label.as_ref().map(|label| label.number.clone());
+    let all = [Some(claim.number.clone()), label, listed].into_iter().flatten();
+    all.filter(|number| !number.is_empty()).collect()
+}
+
+/// Sets the points of a part.
+pub fn override_part(arguments: &OverrideArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+    let assignment = Context::assignment(root)?;
+    let OverrideArguments { student, part, points, decision } = arguments;
+    let known = assignment.rules.parts.iter().find(|own| own.id == *part).with_context(|| {
+        let parts: Vec<&str> = assignment.rules.parts.iter().map(|own| own.id.as_str()).collect();
+        format!("there is no part {part}; expected one of {}", parts.join(", "))
+    })?;
+    ensure!(
+        (0.0..=known.points).contains(points),
+        "part {part} is worth 0 to {} points, found {points}",
+        known.points
+    );
+    let graded = one(student, &decision.output, &assignment.rules)?;
+    let own = graded.grade.parts.iter().position(|own| own.id == *part);
+    let own = own.map(|at| &graded.grade.parts[at..=at]).unwrap_or_default();
+    let evidence = fingerprint(&graded.subject(), own);
+    let before = own.first().map(|own| own.points).unwrap_or_default();
+    decision.add(&graded, Some((part, *points)), evidence)?;
+    println!(
+        "{}: part {part} has {points} points from now on, the evidence says {before}",
+        harmless(&who(&graded.record))
+    );
+    again(&decision.output)
+}
+
+/// Confirms what was left to the instructor.
+pub fn confirm(arguments: &ConfirmArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+    let assignment = Context::assignment(root)?;
+    let ConfirmArguments { student, decision } = arguments;
+    let graded = one(student, &decision.output, &assignment.rules)?;
+    let evidence = fingerprint(&graded.subject(), &graded.grade.parts);
+    decision.add(&graded, None, evidence)?;
+    let name = harmless(&who(&graded.record));
+    match graded.grade.unconfirmed {
+        0.0 => println!("{name}: confirmed, no points hang on it"),
+        points => println!("{name}: {points} points for the images are confirmed"),
+    }
+    again(&decision.output)
+}
+
+fn again(output: &Path) -> anyhow::Result<u8> {
+    println!(
+        "kept in {}; `umbra grade` with the same --output shows it in the reports and renders nothing",
+        output.join(OVERRIDES).display()
+    );
+    Ok(super::EXIT_OK)
+}
+
+fn who(record: &Record) -> String {
+    let name = record.student.full_name();
+    if name.is_empty() { record.slug.clone() } else { format!("{name} ({})", record.slug) }
+}
+
+impl DecisionArguments {
+    /// Adds a decision to the file.
+    fn add(
+        &self,
+        graded: &Graded,
+        part: Option<(&String, f64)>,
+        evidence: String,
+    ) -> anyhow::Result<()> {
+        ensure!(!self.reason.trim().is_empty(), "--reason: expected a reason, found nothing");
+        let account = || std::env::var("USER").or_else(|_| std::env::var("USERNAME")).ok();
+        let number = graded.numbers.first().cloned();
+        let decision = Decision {
+            student: number.unwrap_or_else(|| graded.record.slug.clone()),
+            part: part.map(|(part, _)| part.clone()),
+            points: part.map(|(_, points)| points),
+            reason: self.reason.trim().to_owned(),
+            by: self.by.clone().or_else(account).unwrap_or_default(),
+            when: jiff::Timestamp::now().round(jiff::Unit::Second)?.to_string(),
+            evidence,
+        };
+        let file = self.output.join(OVERRIDES);
+        // What is there must be right before anything is added to it.
+        Overrides::read(&file)?;
+        let mut text = match std::fs::read_to_string(&file) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::from(
+                "# What the instructor decided on points. Commands only add to this file; the last decision on\n\
+                 # something counts. Delete one to take it back.\n",
+            ),
+            text => text.with_context(|| format!("cannot read {}", file.display()))?,
+        };
+        text += &entry(&decision)?;
+        write_whole(&file, text.as_bytes())
+            .with_context(|| format!("cannot write {}", file.display()))
+    }
+}
+
+/// The one submission of a student in a report.
+fn one(wanted: &str, output: &Path, rules: &rubric::Rules) -> anyhow::Result<Graded> {
+    let instructor = output.join(report::INSTRUCTOR);
+    ensure!(
+        instructor.is_dir(),
+        "{} is no report: expected the --output of an earlier `umbra grade`",
+        output.display()
+    );
+    let (roster, matches) = (class::roster(None, output)?, class::matches(output)?);
+    let mut found: Vec<Graded> = Vec::new();
+    let mut names = Vec::new();
+    for slug in class::folders(output) {
+        let Some(mut record) = RecordCache::record(&instructor.join(&slug))? else { continue };
+        let claim = class::claim(output, &record);
+        let numbers = numbers(&claim, roster.as_ref(), &matches);
+        let full_name = record.student.full_name();
+        let is_number = numbers.iter().any(|own| names::number(own) == names::number(wanted));
+        let is_name = !full_name.is_empty() && names::words(&full_name) == names::words(wanted);
+        if slug != wanted && !is_number && !is_name {
+            names.push(slug);
+            continue;
+        }
+        // As a batch does it.
+        let grade = rubric::grade(rules, &record.evidence);
+        record.evidence = rubric::settle(rules, &record.evidence);
+        found.push(Graded { record, grade, numbers });
+    }
+    match found.len() {
+        1 => Ok(found.remove(0)),
+        0 => bail!(
+            "nobody in {} is \"{wanted}\"; expected a student number, a name, or a submission's folder such as {}",
+            output.display(),
+            names.first().map_or("a2_ada_lampglow", String::as_str)
+        ),
+        several => {
+            let slugs: Vec<&str> = found.iter().map(|own| own.record.slug.as_str()).collect();
+            bail!(
+                "{several} submissions are \"{wanted}\"; name the folder of one: {}",
+                slugs.join(", ")
+            )
+        }
+    }
+}
+
+/// The few keys of `report.json` that tell what waits.
+#[derive(Deserialize)]
+struct Report {
+    class: Option<Class>,
+    hand_ins: Vec<Row>,
+    assignment: About,
+}
+
+#[derive(Deserialize)]
+struct About {
+    rules: rubric::Rules,
+}
+
+#[derive(Deserialize)]
+struct Row {
+    name: String,
+    slug: String,
+    points: f64,
+    points_max: f64,
+    unconfirmed: f64,
+    remarks: Vec<String>,
+    standing: Standing,
+}
+
+/// Lists what waits for the instructor; exit 1 where anything does.
+pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
+    let file = arguments.output.join(report::JSON_FILE);
+    let bytes = std::fs::read(&file).with_context(|| {
+        format!("cannot read {}: expected the --output of an earlier `umbra grade`", file.display())
+    })?;
+    let report: Report = serde_json::from_slice(&bytes).with_context(|| {
+        format!("{}: not a report of this version of Umbra; grade again", file.display())
+    })?;
+    let class = report.class.unwrap_or_default();
+    let rules = &report.assignment.rules;
+    let row = |row: &Row, what: &str| format!("{} ({}): {what}", row.name, row.slug);
+    let confirmed = |row: &Row| {
+        row.standing.decisions.iter().any(|own| own.decision.part.is_none() && !own.stale)
+    };
+    let open = || report.hand_ins.iter().filter(|row| !confirmed(row));
+    let images = open().filter(|own| own.unconfirmed > 0.0);
+    let images: Vec<String> =
+        images.map(|own| row(own, &format!("{} points for its images", own.unconfirmed))).collect();
+    let remarks = open().flat_map(|own| {
+        let private = own.remarks.iter().filter(|remark| report::is_private(remark, rules));
+        private.map(move |remark| row(own, remark))
+    });
+    let late = report.hand_ins.iter().filter(|own| own.standing.time_unknown);
+    let late = late.map(|own| row(own, "when it was submitted is not known"));
+    let ranges = report.hand_ins.iter().filter(|own| own.points < own.points_max);
+    let ranges =
+        ranges.map(|own| row(own, &format!("{} to {} points", own.points, own.points_max)));
+    let undecided = class.undecided.iter().map(|own| format!("{}: {}", own.submission, own.reason));
+    let missing = class.missing.iter().map(|own| match own.reason.as_str() {
+        "" => own.student.who(),
+        reason => format!("{}: {reason}", own.student.who()),
+    });
+    let mut waits = false;
+    for (title, lines) in [
+        ("whose they are, to be decided in matches.toml", undecided.collect()),
+        ("images without code, for `umbra confirm` or `umbra override`", images),
+        ("to be looked at, then `umbra confirm` or `umbra override`", remarks.collect::<Vec<_>>()),
+        (
+            "decisions whose evidence has changed: make them again or delete them",
+            class.stale.clone(),
+        ),
+        ("decisions that name nothing", class.unused.clone()),
+        ("lateness unknown: `submitted` in matches.toml says it", late.collect()),
+        ("not wholly judged: grade again", ranges.collect()),
+    ] {
+        waits |= !lines.is_empty();
+        list(title, &lines);
+    }
+    list("without a submission", &missing.collect::<Vec<_>>());
+    if !waits {
+        println!("nothing waits for a decision");
+    }
+    Ok(if waits { super::EXIT_NOT_IN_ORDER } else { super::EXIT_OK })
+}
+
+fn list(title: &str, lines: &[String]) {
+    if lines.is_empty() {
+        return;
+    }
+    println!("{title}: {}", lines.len());
+    for line in lines {
+        println!("  {}", harmless(line));
+    }
+}
