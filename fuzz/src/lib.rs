@@ -70,7 +70,7 @@ pub fn archive(bytes: &[u8]) {
     assert_eq!(around, 1, "something beside the destination");
 }
 
-/// The `config.json` of a hand-in.
+/// The `config.json` of a submission.
 pub fn config(bytes: &[u8]) {
     let (config, findings, _) = HandInConfig::parse(bytes);
     check_findings(&findings, bytes);

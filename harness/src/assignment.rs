@@ -25,24 +25,24 @@ pub struct Assignment {
     /// What a late submission costs; nothing when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub late: Option<crate::class::Policy>,
-    /// The scenes, the hand-in's own first.
+    /// The scenes, the submission's own first.
     pub scenes: Vec<SceneEntry>,
     /// The offline TOML file of a scene that does not vary over rows, for findings on samplers.
     pub sampler_scene: PathBuf,
-    /// The tree that a hand-in must have.
+    /// The tree that a submission must have.
     pub tree: intake::TreeSpec,
     /// How evidence becomes points.
     pub rules: Rules,
     /// Where "different" begins for images.
     pub tolerances: Tolerances,
-    /// What a hand-in may use.
+    /// What a submission may use.
     pub limits: Limits,
     /// The folder that all paths are relative to, absolute; not in the file.
     #[serde(skip)]
     pub root: PathBuf,
 }
 
-/// What a hand-in may use, at each stage.
+/// What a submission may use, at each stage.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
@@ -89,7 +89,7 @@ pub struct SceneEntry {
     /// Whether changed copies of it are held back from students.
     #[serde(default)]
     pub perturb: bool,
-    /// Images that a hand-in holds of it.
+    /// Images that a submission holds of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hand_in: Option<HandInImages>,
 }
@@ -103,7 +103,7 @@ fn is_full_weight(weight: &f64) -> bool {
     *weight == 1.0
 }
 
-/// The images of one scene in a hand-in, as paths in its tree.
+/// The images of one scene in a submission, as paths in its tree.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HandInImages {
@@ -184,7 +184,7 @@ impl Assignment {
     /// As [`Assignment::load`], and when there is none.
     pub fn find(from: &Path) -> Result<Self, AssignmentError> {
         for folder in from.ancestors() {
-            // A hand-in has a config.json too; the assignment's stands beside its scenes.
+            // A submission has a config.json too; the assignment's stands beside its scenes.
             if folder.join("config.json").is_file() && folder.join("scenes").is_dir() {
                 return Self::load(folder);
             }

@@ -1,4 +1,4 @@
-//! Compiling hand-ins by the recorded call.
+//! Compiling submissions by the recorded call.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -132,7 +132,7 @@ fn warnings_are_kept_and_umbras_own_crates_are_out_of_reach() {
         let refused = matches!(&report.outcome, BuildOutcome::CompileError { .. });
         assert!(refused, "{foreign}: {:#?}", report.outcome);
     }
-    // The hand-in's folder besides `src`, and cargo's view of it, are not told.
+    // The submission's folder besides `src`, and cargo's view of it, are not told.
     let report = build_text("const _: &str = env!(\"CARGO_HOME\");\n", &default_limits());
     assert!(matches!(report.outcome, BuildOutcome::CompileError { .. }));
 }

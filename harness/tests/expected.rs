@@ -39,7 +39,7 @@ fn stored_images_agree_with_a_render_of_another_seed_and_a_small_gain_costs_poin
     let mut stored = 0;
     for entry in assignment.scenes.iter().filter(|entry| entry.stored) {
         stored += 1;
-        // On the stored film, whatever film hand-ins are judged on.
+        // On the stored film, whatever film submissions are judged on.
         let entry = SceneEntry { film: None, ..entry.clone() };
         let expected = store.expected(&entry).unwrap();
         let scene = SceneRef { path: root.join(&entry.offline), options: String::new() };
@@ -78,7 +78,7 @@ fn stored_images_agree_with_a_render_of_another_seed_and_a_small_gain_costs_poin
     assert!(stored >= 4, "only {stored} scenes are stored");
 }
 
-/// Whether a hand-in earns everything when this image is like that and all other evidence is right.
+/// Whether a submission earns everything when this image is like that and all other evidence is right.
 fn judged(
     name: &str,
     kind: Kind,

@@ -1,4 +1,4 @@
-//! Images of a hand-in as evidence: their noise, copies of them, pictures of something else. The
+//! Images of a submission as evidence: their noise, copies of them, pictures of something else. The
 //! scene is a small Monte Carlo renderer whose truth is known.
 
 use basecode::Image;

@@ -28,7 +28,7 @@ const CONFIG: &str = r#"{
 }
 "#;
 
-/// The files of a perfect hand-in; the images are no EXRs, which intake does not look at.
+/// The files of a perfect submission; the images are no EXRs, which intake does not look at.
 fn perfect() -> Vec<(String, Vec<u8>)> {
     let image = |path: &str| (path.to_owned(), path.as_bytes().to_vec());
     vec![
@@ -530,7 +530,7 @@ fn pack_in(
     pack(&source, folder, &TreeSpec::default(), &Limits::default())
 }
 
-/// The working folder of a student: everything that does not belong into a hand-in, too.
+/// The working folder of a student: everything that does not belong into a submission, too.
 fn working_folder() -> Vec<(String, Vec<u8>)> {
     let mut files = perfect();
     for extra in [

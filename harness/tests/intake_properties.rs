@@ -8,7 +8,7 @@ use umbra::intake::{
     HandInConfig, IntakeError, TreeSpec, check_config, scan_text, validate_hand_in,
 };
 
-/// Unpacks and checks what must hold of every hand-in; whether it was accepted.
+/// Unpacks and checks what must hold of every submission; whether it was accepted.
 fn survives(bytes: &[u8]) -> Result<bool, TestCaseError> {
     let scratch = Scratch::new();
     let before = scratch.outside();

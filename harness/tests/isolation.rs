@@ -1,4 +1,4 @@
-//! The sandbox as workers and builds use it: what a hand-in must not reach it does not reach, and
+//! The sandbox as workers and builds use it: what a submission must not reach it does not reach, and
 //! what it draws is the same as without. Each attack is run without isolation, too, and succeeds
 //! there: a test that passes without a sandbox proves nothing.
 

@@ -122,7 +122,7 @@ struct Bench<'a> {
 
 impl Bench<'_> {
     /// Renders seeds of one scene; judges each image, and each beside the last of the same spp as
-    /// what was handed in is judged beside what the code draws.
+    /// what was submitted is judged beside what the code draws.
     fn judge_images(
         &self,
         scene: &str,

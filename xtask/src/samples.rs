@@ -1,4 +1,4 @@
-//! The sample hand-ins: real archives, packed from `samples/`, with the images that their own code
+//! The sample submissions: real archives, packed from `samples/`, with the images that their own code
 //! draws. They lie under `target/umbra/samples/`.
 
 mod archive;
@@ -270,7 +270,7 @@ impl Packer {
         Ok(fs::read(file.path())?)
     }
 
-    /// Builds a source and draws the images that a hand-in must contain, seeded by a student's `id`.
+    /// Builds a source and draws the images that a submission must contain, seeded by a student's `id`.
     fn draw(
         &self,
         source: &BTreeMap<PathBuf, Vec<u8>>,
@@ -319,7 +319,7 @@ impl Packer {
                 bail!("only images are asked for");
             };
             let is_offline = matches!(request, Request::RenderOffline { .. });
-            // What does not draw hands in no image.
+            // What does not draw submits no image.
             let Outcome::Done(answer) = outcome else { continue };
             // Realtime images were clamped to [0, 1] by the original course's framebuffer.
             let pixel = |v: &[f32; 3]| {
@@ -366,7 +366,7 @@ impl Packer {
     }
 }
 
-/// The hand-in's own config.json, in the handout's form.
+/// The submission's own config.json, in the handout's form.
 fn config(recipe: &Recipe, renders: &[String]) -> Result<Vec<u8>> {
     let title = |path: &String| {
         let stem = Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();

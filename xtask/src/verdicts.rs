@@ -33,7 +33,7 @@ use row::Row;
 
 use crate::parallel;
 
-/// The film of the scenes that a hand-in holds images of, unless `--full`.
+/// The film of the scenes that a submission holds images of, unless `--full`.
 const SMALL_FILM: [u32; 2] = [128, 96];
 
 /// What `xtask verdicts` is told.
@@ -76,7 +76,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
     let catalogue = Catalogue::known()?;
     let mut assignment = Assignment::load(root)?;
     for scene in &mut assignment.scenes {
-        // The images that a hand-in must contain are no matter here.
+        // The images that a submission must contain are no matter here.
         if scene.hand_in.take().is_some() && !arguments.full {
             scene.film = Some(SMALL_FILM);
         }

@@ -84,7 +84,7 @@ pub struct RenderJob<'a> {
     pub height: usize,
     /// Samples per pixel. At 1, the sample is the pixel's centre.
     pub spp: usize,
-    /// Seed of the samplers: the student id in a hand-in's own images.
+    /// Seed of the samplers: the student id in a submission's own images.
     pub seed: u64,
     /// Number of threads to render with, at least 1.
     pub threads: usize,

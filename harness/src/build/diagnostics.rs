@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A place in the hand-in.
+/// A place in the submission.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
     /// The file, as `src/...`.
@@ -18,7 +18,7 @@ pub struct Diagnostic {
     pub message: String,
     /// Where, when the compiler says so.
     pub place: Option<Place>,
-    /// The whole text with the source lines that it is about. It quotes the hand-in: it may hold
+    /// The whole text with the source lines that it is about. It quotes the submission: it may hold
     /// anything at all.
     pub rendered: String,
 }

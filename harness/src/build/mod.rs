@@ -1,4 +1,4 @@
-//! Compiling a hand-in: one direct compiler call, the template's own as cargo makes it, with
+//! Compiling a submission: one direct compiler call, the template's own as cargo makes it, with
 //! source and output replaced.
 //!
 //! [`Recording::obtain`] records that call once for a state of the base code; [`compile`] replays

@@ -1,4 +1,4 @@
-//! Replaying the recorded compiler call on a hand-in.
+//! Replaying the recorded compiler call on a submission.
 
 use std::fs;
 use std::io;
@@ -73,8 +73,8 @@ pub fn default_limits() -> Limits {
     }
 }
 
-/// Compiles the hand-in whose `src` folder is `src` into a plugin in `out`, an existing folder.
-/// `supervisor` says which program is Umbra and what isolates the compiler. Nothing of the hand-in besides `src` is named to the compiler.
+/// Compiles the submission whose `src` folder is `src` into a plugin in `out`, an existing folder.
+/// `supervisor` says which program is Umbra and what isolates the compiler. Nothing of the submission besides `src` is named to the compiler.
 /// A timeout counts when it comes again, alone on the machine.
 ///
 /// # Errors

@@ -1,9 +1,9 @@
-//! Decoding what hostile bytes may hold: archives, texts and images of a hand-in. Each question is
+//! Decoding what hostile bytes may hold: archives, texts and images of a submission. Each question is
 //! answered by a child of its own, Umbra itself, locked before it touches a byte; what it sees is
 //! the one file or folder in question, what it may write is its answer.
 //!
 //! The parent reads an answer when the child is gone, and believes neither names nor sizes in it.
-//! A child that dies is the hand-in's fault: whatever it could not decode is refused.
+//! A child that dies is the submission's fault: whatever it could not decode is refused.
 
 mod child;
 mod wire;
@@ -44,7 +44,7 @@ pub struct Decoder<'a> {
     cpu_s: Mutex<f64>,
 }
 
-/// A hand-in as it came: the private copy, and what is to be said about it.
+/// A submission as it came: the private copy, and what is to be said about it.
 pub struct Received {
     /// The private copy.
     pub hand_in: HandIn,
@@ -56,7 +56,7 @@ pub struct Received {
 
 /// Why there is no answer.
 enum NoAnswer {
-    /// The bytes ended the child: the hand-in's matter.
+    /// The bytes ended the child: the submission's matter.
     Died {
         /// How.
         how: String,
@@ -79,7 +79,7 @@ impl<'a> Decoder<'a> {
         Self { supervisor, limits, cancel, cpu_s: Mutex::new(0.0) }
     }
 
-    /// Copies the hand-in at `source` (archive or folder) once, without following links, into the
+    /// Copies the submission at `source` (archive or folder) once, without following links, into the
     /// empty folder `dest`, and looks at the copy.
     ///
     /// # Errors

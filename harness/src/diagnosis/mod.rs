@@ -1,5 +1,5 @@
 //! What a wrong picture looks like: the catalogue of known mistakes, what they answer, and which one
-//! a hand-in's answers are nearest to.
+//! a submission's answers are nearest to.
 
 mod catalogue;
 mod diagnose;

@@ -6,14 +6,14 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::registry::{CheckId, RuleId};
 
-/// Everything that was found out about one hand-in. Plain data: the rubric needs nothing else.
+/// Everything that was found out about one submission. Plain data: the rubric needs nothing else.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// The checks, in the order they were made.
     pub checks: Vec<Check>,
 }
 
-/// One question that was put to a hand-in, and its answer.
+/// One question that was put to a submission, and its answer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Check {
     /// Which question.
@@ -61,7 +61,7 @@ pub enum Verdict {
     Fail,
     /// The student has not written this part yet.
     NotImplemented,
-    /// The question does not apply to this hand-in, or something else that is broken hides the
+    /// The question does not apply to this submission, or something else that is broken hides the
     /// answer; the summary says what. Other evidence decides.
     NotJudged,
     /// The machine could not ask (no adapter, disk full). Costs nothing, earns nothing.
@@ -91,7 +91,7 @@ pub struct Measure {
 pub struct Picture {
     /// What it shows: actual, expected, difference...
     pub title: String,
-    /// File name, relative to the folder of the hand-in's report; of a held-back scene, to that of
+    /// File name, relative to the folder of the submission's report; of a held-back scene, to that of
     /// the instructor's.
     pub file: String,
 }
@@ -117,7 +117,7 @@ impl Check {
     }
 
     /// What it says, as far as everybody may know it: of a held-back scene only whether it is right
-    /// and how wrong. The summary may hold places in the scene and words of the hand-in's.
+    /// and how wrong. The summary may hold places in the scene and words of the submission's.
     pub fn said(&self) -> Cow<'_, str> {
         if !self.held_back {
             return Cow::Borrowed(&self.summary);

@@ -1,4 +1,4 @@
-//! The images in a hand-in as evidence of who drew them, and from what.
+//! The images in a submission as evidence of who drew them, and from what.
 
 use basecode::Image;
 

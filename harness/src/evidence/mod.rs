@@ -1,4 +1,4 @@
-//! What is found out about a hand-in: pure functions from values to checks.
+//! What is found out about a submission: pure functions from values to checks.
 //!
 //! Nothing here knows of processes, GPUs or libraries.
 

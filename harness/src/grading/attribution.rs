@@ -1,4 +1,4 @@
-//! The machine's word against a hand-in's: who blames the machine (no adapter, a lost device, a full
+//! The machine's word against a submission's: who blames the machine (no adapter, a lost device, a full
 //! disk, a worker that could not begin) is believed when a renderer of ours fails on the same case.
 
 use super::draw;
@@ -10,7 +10,7 @@ use crate::worker::{
 };
 
 /// Settles the outcomes of `job` that blame the machine: what a renderer of ours does is the
-/// hand-in's own failure; otherwise they are asked again while there is retries, and stay ungraded.
+/// submission's own failure; otherwise they are asked again while there is retries, and stay ungraded.
 pub fn attribute_failures(session: &Session, job: &Job, outcomes: &mut [Outcome]) {
     loop {
         let blaming = |&index: &usize| blames_the_machine(&outcomes[index]);
@@ -60,7 +60,7 @@ fn control_run(session: &Session, job: &Job, request: &Request) -> Option<&'stat
         request = own_pass(&request);
     }
     let control = Job { plugin: reference.map(Into::into), requests: vec![request] };
-    // What a hand-in may use is no measure of ours.
+    // What a submission may use is no measure of ours.
     let limits = Limits { threads: session.limits.threads, ..Limits::default() };
     let report = session.supervisor.run_job(&control, &limits, session.cancel, &mut |_| ());
     let outcome = report.outcomes.first()?;

@@ -18,7 +18,7 @@ use crate::expected::scene_digest;
 use crate::files::{files_below, hex, write_whole};
 use crate::panics::Bug;
 
-/// The record's file, beside the instructor's report on the hand-in.
+/// The record's file, beside the instructor's report on the submission.
 const FILE: &str = "record.json";
 /// The file of a bug of Umbra's that a submission met.
 const BUG: &str = "internal-error.json";
@@ -27,7 +27,7 @@ const REPLACED: &str = "record.replaced.json";
 
 /// Keeps records and finds them again.
 pub struct RecordCache {
-    /// SHA-256 over all that a record depends on, but for the hand-in.
+    /// SHA-256 over all that a record depends on, but for the submission.
     batch: [u8; 32],
     /// Whether everything is found out anew.
     force: bool,
@@ -79,7 +79,7 @@ impl RecordCache {
         ))?);
         let mut files = grading.supervisor.programs().to_vec();
         files.extend(grading.reference.clone());
-        // Stored images, what known mistakes answer, and what a hand-in began from.
+        // Stored images, what known mistakes answer, and what a submission began from.
         let folder = assignment.root.join("expected");
         let below = files_below(&folder);
         files.extend(below.with_context(|| format!("cannot read {}", folder.display()))?);
@@ -232,7 +232,7 @@ impl RecordCache {
         Ok(bytes)
     }
 
-    /// The key of a record that intake has begun: what was handed in, what is to be said of it so
+    /// The key of a record that intake has begun: what was submitted, what is to be said of it so
     /// far, and all that the rest depends on.
     pub(super) fn key(&self, begun: &Record, checks: &[Check]) -> anyhow::Result<String> {
         let mut hash = Sha256::new();

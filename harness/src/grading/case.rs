@@ -17,7 +17,7 @@ const SMALL_WIDTH: u32 = 96;
 /// A film so many times as wide is searched for points close to what shadows them.
 const FINE: usize = 3;
 
-/// A scene made ready for judging. Made once, used for every hand-in.
+/// A scene made ready for judging. Made once, used for every submission.
 pub struct Case {
     /// What the assignment says of it.
     pub entry: SceneEntry,
@@ -161,7 +161,7 @@ impl Case {
         Ok(files)
     }
 
-    /// Whether it only shows what others do not: no hand-in holds an image of it.
+    /// Whether it only shows what others do not: no submission holds an image of it.
     pub fn is_probe(&self) -> bool {
         self.entry.hand_in.is_none() && self.bonus.is_none()
     }

@@ -1,4 +1,4 @@
-//! What the diagnosis is made from: answers kept while a hand-in is judged, and those of the known
+//! What the diagnosis is made from: answers kept while a submission is judged, and those of the known
 //! mistakes, which the reference renderer gives to the same questions.
 
 use std::path::{Path, PathBuf};
@@ -101,7 +101,7 @@ impl Grading<'_> {
         Ok(())
     }
 
-    /// Keeps the images that were drawn. Films of hand-ins may be large ones or small ones: what
+    /// Keeps the images that were drawn. Films of submissions may be large ones or small ones: what
     /// they show is told by probes, but for the bonus.
     fn record_drawn(&self, session: &Session, drawn: &[Drawn]) {
         for case in &self.cases {

@@ -1,4 +1,4 @@
-//! The images in a hand-in: against what is expected, against what its code draws, and as evidence of
+//! The images in a submission: against what is expected, against what its code draws, and as evidence of
 //! who drew them.
 
 use std::path::Path;
@@ -36,10 +36,10 @@ const REALTIME: [View; 3] = [
     (CheckId::SubmittedRealtimePhong, |region| region.exponent > 0.0),
 ];
 
-/// An image in a hand-in.
+/// An image in a submission.
 pub struct HandedIn<'a> {
     case: &'a Case,
-    /// Its path in the hand-in.
+    /// Its path in the submission.
     path: String,
     kind: Kind,
     /// Its pixels, or why there are none.
@@ -73,7 +73,7 @@ fn views(kind: Kind) -> &'static [View] {
     }
 }
 
-/// Decodes all images below the root of a hand-in. The tree says what is missing; here there is
+/// Decodes all images below the root of a submission. The tree says what is missing; here there is
 /// nothing to judge.
 ///
 /// # Errors
@@ -101,7 +101,7 @@ pub fn read<'a>(
     Ok(found)
 }
 
-/// Judges an image. `drawn` holds what the hand-in's code drew, nothing when it does not build.
+/// Judges an image. `drawn` holds what the submission's code drew, nothing when it does not build.
 /// Answers its digest when it has noise of its own.
 pub fn judge(
     handed_in: &HandedIn,
@@ -191,7 +191,7 @@ pub fn judge_seeds(
     checks
 }
 
-/// Whether an image that was handed in is what the code draws. A finding: it costs nothing.
+/// Whether an image that was submitted is what the code draws. A finding: it costs nothing.
 fn judge_origin(
     path: &str,
     case: &Case,

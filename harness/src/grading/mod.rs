@@ -1,4 +1,4 @@
-//! The way of one hand-in through all stages, and of many.
+//! The way of one submission through all stages, and of many.
 
 mod attribution;
 mod cache;

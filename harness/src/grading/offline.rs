@@ -29,7 +29,7 @@ const WITNESSES: [(Witness, &str); 4] = [
 /// The witness that visibility is judged under: a wrong frame must not look like a shadow.
 const FLAT: Witness = Witness::Flat([0.3, 0.2, 0.1]);
 
-/// An image that was drawn, kept for pictures and for the comparison with what was handed in.
+/// An image that was drawn, kept for pictures and for the comparison with what was submitted.
 pub struct Drawn {
     /// Name of the scene.
     pub scene: String,

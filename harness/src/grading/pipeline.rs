@@ -1,4 +1,4 @@
-//! One hand-in through all stages: intake, build, offline, realtime, images.
+//! One submission through all stages: intake, build, offline, realtime, images.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,7 +29,7 @@ use crate::intake::{self, HandIn, IntakeError, TreeSpec, Validation};
 use crate::rubric::BUILD;
 use crate::worker::{Adapter, Budget, Reference, RetryBudget, Supervisor};
 
-/// The check that says whether the hand-in follows the tree.
+/// The check that says whether the submission follows the tree.
 pub const TREE: CheckId = CheckId::SubmissionTree;
 
 /// The check that says whether `config.json` is as it should be; it costs nothing.
@@ -42,7 +42,7 @@ const JUDGED: CheckId = CheckId::SubmissionJudged;
 /// root of its height in pixels; the highlights that are judged apart are about 9 pixels high.
 const DEPENDENT_PIXELS: f64 = 3.0;
 
-/// Everything that is the same for all hand-ins of a batch.
+/// Everything that is the same for all submissions of a batch.
 pub struct Grading<'a> {
     /// The assignment.
     pub assignment: &'a Assignment,
@@ -60,7 +60,7 @@ pub struct Grading<'a> {
     pub adapter: Result<Adapter, String>,
     /// The reference renderer's library; absent in a student's kit.
     pub reference: Option<PathBuf>,
-    /// Threads for each hand-in.
+    /// Threads for each submission.
     pub threads: u32,
     /// Ctrl-C.
     pub cancel: &'a AtomicBool,
@@ -78,7 +78,7 @@ pub struct Grading<'a> {
     pub(super) stored: OnceLock<Stored>,
 }
 
-/// Where the pictures of one hand-in go; the folders are made when there is something to show.
+/// Where the pictures of one submission go; the folders are made when there is something to show.
 pub struct Folders {
     /// Those of public scenes.
     pub student: PathBuf,
@@ -86,12 +86,12 @@ pub struct Folders {
     pub instructor: PathBuf,
 }
 
-/// How a hand-in is to be looked at.
+/// How a submission is to be looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// To be graded: its tree counts.
     Grade,
-    /// A working folder, before handing in: its tree is only remarked on.
+    /// A working folder, before submitting: its tree is only remarked on.
     Check,
 }
 
@@ -234,10 +234,10 @@ impl<'a> Grading<'a> {
         }
     }
 
-    /// Grades one hand-in; pictures of what is wrong go to `out`. `say` is told each stage.
+    /// Grades one submission; pictures of what is wrong go to `out`. `say` is told each stage.
     ///
     /// # Errors
-    /// The machine's matters and Ctrl-C; what is wrong with the hand-in is in the record.
+    /// The machine's matters and Ctrl-C; what is wrong with the submission is in the record.
     pub fn hand_in(
         &self,
         source: &Path,
@@ -341,7 +341,7 @@ impl<'a> Grading<'a> {
         }
     }
 
-    /// The record of a hand-in that the machine failed on: nothing is found out, no point lost.
+    /// The record of a submission that the machine failed on: nothing is found out, no point lost.
     pub fn unjudged(&self, source: &Path, slug: &str) -> Record {
         let summary = "the machine failed, and nothing was found out";
         let checks = vec![Check::new(JUDGED, "", Verdict::NotRun, summary)];
@@ -364,7 +364,7 @@ impl<'a> Grading<'a> {
         }
     }
 
-    /// What is found out on some paths about a library that is there already, without a hand-in
+    /// What is found out on some paths about a library that is there already, without a submission
     /// around it, and what it looks like. `options` are told to it with every scene, `seed` to its
     /// samplers; `stages` are its texts.
     ///

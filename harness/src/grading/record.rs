@@ -1,4 +1,4 @@
-//! What is kept of one graded hand-in: everything that its report and its grade are made from.
+//! What is kept of one graded submission: everything that its report and its grade are made from.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,13 +7,13 @@ use crate::diagnosis::Diagnosis;
 use crate::evidence::Evidence;
 use crate::intake::{Field, Finding, HandInConfig};
 
-/// One hand-in, after all evidence was collected. Rubric, dates and class list stay outside, so
+/// One submission, after all evidence was collected. Rubric, dates and class list stay outside, so
 /// that grades can be derived from it again without rendering.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// Name of the archive or folder as it was handed in.
+    /// Name of the archive or folder as it was submitted.
     pub name: String,
-    /// Unique among the hand-ins of a batch and safe as a folder name; its report's files lie there.
+    /// Unique among the submissions of a batch and safe as a folder name; its report's files lie there.
     pub slug: String,
     /// SHA-256 over the paths and contents of the private copy; empty when it was refused.
     pub digest: String,
@@ -28,7 +28,7 @@ pub struct Record {
     /// What failing parts look like.
     #[serde(default)]
     pub diagnoses: Vec<Diagnosis>,
-    /// The images handed in whose noise tells them from anybody else's.
+    /// The images submitted whose noise tells them from anybody else's.
     #[serde(default)]
     pub images: Vec<ImageDigest>,
     /// What each stage cost, in order.
@@ -37,7 +37,7 @@ pub struct Record {
     pub conditions: Conditions,
 }
 
-/// Credentials, as the hand-in states them.
+/// Credentials, as the submission states them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Student {
     /// First name; empty when it is not said.
@@ -59,7 +59,7 @@ pub struct StageCost {
     pub cpu_s: f64,
 }
 
-/// Under which conditions a hand-in was graded: records made under others are not comparable.
+/// Under which conditions a submission was graded: records made under others are not comparable.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Conditions {
     /// Version of Umbra.

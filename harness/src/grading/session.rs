@@ -1,4 +1,4 @@
-//! Questions to a hand-in's plugin, and what becomes of those that get no answer.
+//! Questions to a submission's plugin, and what becomes of those that get no answer.
 
 use std::path::Path;
 use std::sync::Mutex;
@@ -25,7 +25,7 @@ const OUTPUT: CheckId = CheckId::SubmissionOutput;
 /// The error of a question that was not asked any more: it leaves no point that could be seen.
 const NOT_ASKED: f64 = 0.9999;
 
-/// What it takes to run one hand-in.
+/// What it takes to run one submission.
 pub struct Session<'a> {
     /// Starts workers.
     pub supervisor: Supervisor,
@@ -35,7 +35,7 @@ pub struct Session<'a> {
     pub cancel: &'a AtomicBool,
     /// What realtime is drawn with, or why nothing can be.
     pub adapter: Result<Adapter, String>,
-    /// What scenes are loaded with: empty for every hand-in; the reference knows some.
+    /// What scenes are loaded with: empty for every submission; the reference knows some.
     pub options: String,
     /// CPU seconds of all workers so far.
     pub cpu_s: Mutex<f64>,

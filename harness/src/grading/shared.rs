@@ -16,12 +16,12 @@ const SHARED: CheckId = CheckId::SubmittedShared;
 /// The check of student numbers.
 const NUMBER: CheckId = CheckId::SubmissionNumber;
 
-/// What is kept of an image that was handed in, to find it again in another hand-in.
+/// What is kept of an image that was submitted, to find it again in another submission.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ImageDigest {
     /// The scene.
     pub scene: String,
-    /// Its path in the hand-in.
+    /// Its path in the submission.
     pub path: String,
     /// SHA-256 over size and 8-bit sRGB levels, in hexadecimal: no rounding to half precision or to
     /// levels changes it.
@@ -51,7 +51,7 @@ fn to_half(value: f32) -> f32 {
     f32::from_bits((bits + 0x0fff + ((bits >> 13) & 1)) & !0x1fff)
 }
 
-/// Adds to every record which of its images another person of the batch handed in too, and whether its
+/// Adds to every record which of its images another person of the batch submitted too, and whether its
 /// student number is another person's. Depends on nothing but the set of the records; doing it again
 /// changes nothing. Names of other submissions are private.
 ///
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::evidence::Evidence;
 
-    /// A hand-in of one image, whose content is a letter.
+    /// A submission of one image, whose content is a letter.
     fn record(slug: &str, id: &str, content: &str) -> Record {
         let image = ImageDigest {
             scene: "teapot".into(),
@@ -217,7 +217,7 @@ mod tests {
         assert!(found["bob"].ends_with("in ada, ada-again"), "{found:?}");
         assert!(found["ada"].ends_with("in bob") && found["ada-again"].ends_with("in bob"));
         assert_eq!(found["eve"], "");
-        // Without a number or a name, two hand-ins are two persons.
+        // Without a number or a name, two submissions are two persons.
         assert!(found["nobody"].ends_with("in noone"), "{found:?}");
         for turn in 1..batch.len() {
             let mut other = batch.to_vec();

@@ -106,7 +106,7 @@ pub fn compare_realtime_linear(
     Ok(walk.judge(mask, ComparedWith::Centre, &scale, tolerances))
 }
 
-/// Judges a realtime image that was handed in as EXR: both images clamped to [0, 1] and rounded to 8-bit sRGB levels,
+/// Judges a realtime image that was submitted as EXR: both images clamped to [0, 1] and rounded to 8-bit sRGB levels,
 /// as the original course stored them; an unclamped linear image is as good.
 ///
 /// Biases are those of the clamped images.

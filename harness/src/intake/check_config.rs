@@ -1,4 +1,4 @@
-//! The `config.json` of a hand-in against its files.
+//! The `config.json` of a submission against its files.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use super::limits::Limits;
 use super::name::safe_path;
 use super::tree::{CONFIG_FILE, TreeSpec};
 
-/// Checks what `config.json` says against the hand-in. Every finding has a line and a hint; what is
+/// Checks what `config.json` says against the submission. Every finding has a line and a hint; what is
 /// missing altogether is put on line 1. A slip is a warning; only a student number that cannot be read is an
 /// error.
 ///

@@ -18,9 +18,9 @@ use crate::files::hex;
 
 /// Why reading stops before the end.
 pub(super) enum Stop {
-    /// The hand-in is refused; the findings say why.
+    /// The submission is refused; the findings say why.
     Refused,
-    /// The destination or the source cannot be used; no matter of the hand-in.
+    /// The destination or the source cannot be used; no matter of the submission.
     Io(IntakeError),
 }
 
@@ -45,7 +45,7 @@ pub(super) enum EntryAction {
     Folder,
     /// Junk that is left out.
     Ignored,
-    /// A finding was recorded; the hand-in as a whole will be refused.
+    /// A finding was recorded; the submission as a whole will be refused.
     Refused,
 }
 
@@ -230,7 +230,7 @@ impl<'a> PrivateCopy<'a> {
 
     /// Writes one admitted file from `reader` up to its end, and counts what comes.
     ///
-    /// `packed_bytes` is the size of what `reader` unpacks, for the ratio. Once the hand-in is
+    /// `packed_bytes` is the size of what `reader` unpacks, for the ratio. Once the submission is
     /// refused the bytes are read and counted, but not kept.
     ///
     /// The inner error is `reader`'s.

@@ -1,4 +1,4 @@
-//! A finding: one thing to say about a hand-in, with its place and what to do about it.
+//! A finding: one thing to say about a submission, with its place and what to do about it.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// The hand-in is refused, or does not conform.
+    /// The submission is refused, or does not conform.
     Error,
     /// Somebody should look, but nothing is refused.
     Warning,
@@ -26,7 +26,7 @@ impl fmt::Display for Severity {
     }
 }
 
-/// One thing to say about a hand-in.
+/// One thing to say about a submission.
 ///
 /// Text in `path`, `message` and `hint` holds no control and no bidirectional override characters.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,7 +60,7 @@ impl Finding {
         }
     }
 
-    /// A finding that refuses the hand-in or keeps it from conforming.
+    /// A finding that refuses the submission or keeps it from conforming.
     pub fn error(code: &str, message: impl Into<String>) -> Self {
         Self::new(Severity::Error, code, message)
     }

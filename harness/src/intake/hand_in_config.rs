@@ -1,4 +1,4 @@
-//! The `config.json` of a hand-in: credentials and the list of renders, read tolerantly.
+//! The `config.json` of a submission: credentials and the list of renders, read tolerantly.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,7 @@ use super::finding::{Finding, printable};
 use super::json_lines::{Node, Read, Value, parse};
 use super::tree::CONFIG_FILE;
 
-/// What the hand-in's `config.json` says; absent where it does not say it.
+/// What the submission's `config.json` says; absent where it does not say it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct HandInConfig {
     /// First name.
@@ -79,7 +79,7 @@ impl HandInConfig {
         (config, findings, !stopped)
     }
 
-    /// The seed of every sampler that draws the hand-in's own images.
+    /// The seed of every sampler that draws the submission's own images.
     pub fn sampler_seed(&self) -> Option<u64> {
         self.student_id.as_ref()?.text.parse().ok()
     }

@@ -1,10 +1,10 @@
-//! How much a hand-in may hold.
+//! How much a submission may hold.
 
 use serde::{Deserialize, Serialize};
 
-/// Limits on a hand-in, counted on real bytes while they stream; headers are never believed.
+/// Limits on a submission, counted on real bytes while they stream; headers are never believed.
 ///
-/// The defaults leave a tenfold margin over the largest hand-in of the original course (six
+/// The defaults leave a tenfold margin over the largest submission of the original course (six
 /// EXRs of 3 MB and a few dozen source files).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

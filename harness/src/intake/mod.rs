@@ -1,4 +1,4 @@
-//! Intake: from what a student hands in to a safe private copy, and what is to be said about it.
+//! Intake: from what a student submits to a safe private copy, and what is to be said about it.
 //!
 //! ```text
 //! archive or folder --unpack--> HandIn (a copy, listed and hashed) --validate--> Validation
@@ -10,7 +10,7 @@
 //! decodes an archive: it writes below an empty destination folder that the caller made, and touches
 //! nothing else. Hand-ins come in by [`crate::decode`], which calls it in a locked child.
 //!
-//! Conventions: paths of a hand-in are relative, UTF-8, with `/` between components and neither
+//! Conventions: paths of a submission are relative, UTF-8, with `/` between components and neither
 //! `.` nor `..`; sizes are bytes; hashes are lower-case hexadecimal SHA-256.
 
 mod check_config;

@@ -1,4 +1,4 @@
-//! Writing conforming archives: `pack` from a working folder, `fix` from a nearly right hand-in.
+//! Writing conforming archives: `pack` from a working folder, `fix` from a nearly right submission.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,4 @@
-//! What the source of a hand-in contains that an instructor should look at. None of it is an
+//! What the source of a submission contains that an instructor should look at. None of it is an
 //! error: the sandbox is what protects; these findings save reading time.
 
 use std::collections::HashMap;
@@ -46,7 +46,7 @@ pub fn scan_source(hand_in: &HandIn) -> Result<Vec<Finding>, IntakeError> {
     Ok(findings.into_vec())
 }
 
-/// Scans one Rust file; `path` is its path in the hand-in.
+/// Scans one Rust file; `path` is its path in the submission.
 pub fn scan_text(path: &str, source: &str) -> Vec<Finding> {
     let tokens = tokens(source);
     let mut found: Vec<(u32, &'static str, String)> = Vec::new();

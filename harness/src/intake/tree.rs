@@ -1,10 +1,10 @@
-//! The tree that a hand-in must have, as data.
+//! The tree that a submission must have, as data.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-/// The expected tree of a hand-in.
+/// The expected tree of a submission.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TreeSpec {
@@ -23,16 +23,16 @@ pub struct TreeSpec {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TreeFile {
-    /// Path from the root of the hand-in.
+    /// Path from the root of the submission.
     pub path: String,
-    /// Whether the hand-in must hold it.
+    /// Whether the submission must hold it.
     pub required: bool,
     /// Other paths at which it is accepted.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aliases: Vec<String>,
 }
 
-/// The configuration file of a hand-in.
+/// The configuration file of a submission.
 pub(crate) const CONFIG_FILE: &str = "config.json";
 
 /// The tree of the handout *Point Lights & Shadows*. The aliases of the bonus images are the three

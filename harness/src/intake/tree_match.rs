@@ -13,9 +13,9 @@ use super::tree::{TreeFile, TreeSpec};
 pub enum Mark {
     /// Where it must be.
     Ok,
-    /// Optional and not handed in.
+    /// Optional and not submitted.
     Absent,
-    /// Required and not handed in.
+    /// Required and not submitted.
     Missing,
     /// Handed in under another path.
     WrongPlace,

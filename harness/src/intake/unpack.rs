@@ -11,7 +11,7 @@ use super::limits::{Limits, mib};
 use super::tree::TreeSpec;
 use super::{folder, tar, zip};
 
-/// What a hand-in is, by its content.
+/// What a submission is, by its content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Format {
@@ -28,7 +28,7 @@ pub enum Format {
 /// One file of the private copy.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct HandInFile {
-    /// Path from the root of the hand-in.
+    /// Path from the root of the submission.
     pub path: String,
     /// Size in bytes.
     pub bytes: u64,
@@ -36,10 +36,10 @@ pub struct HandInFile {
     pub sha256: String,
 }
 
-/// The private copy of a hand-in.
+/// The private copy of a submission.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct HandIn {
-    /// Name of the archive or folder as it was handed in.
+    /// Name of the archive or folder as it was submitted.
     pub name: String,
     /// What it was.
     pub format: Format,
@@ -62,10 +62,10 @@ impl HandIn {
     }
 }
 
-/// A hand-in that was refused as a whole; nothing of it was kept.
+/// A submission that was refused as a whole; nothing of it was kept.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
-    /// Name of the archive or folder as it was handed in.
+    /// Name of the archive or folder as it was submitted.
     pub name: String,
     /// What it was, where that was told apart.
     pub format: Option<Format>,
@@ -103,7 +103,7 @@ impl IntakeError {
     }
 }
 
-/// Copies the hand-in at `source` (archive or folder) once, without following links, into the
+/// Copies the submission at `source` (archive or folder) once, without following links, into the
 /// empty folder `dest`.
 ///
 /// # Errors
@@ -124,7 +124,7 @@ pub fn unpack(
 /// The bytes of the archive at `source`, one more than is allowed at most; none of a folder.
 ///
 /// # Errors
-/// [`IntakeError::Refused`] when it is neither, a link among them: whoever hands in may choose where it leads.
+/// [`IntakeError::Refused`] when it is neither, a link among them: whoever submits may choose where it leads.
 /// And when it cannot be read.
 pub(crate) fn read_archive(source: &Path, limits: &Limits) -> Result<Option<Vec<u8>>, IntakeError> {
     // Without a slash at the end, which would follow a link.

@@ -1,4 +1,4 @@
-//! Whether a hand-in conforms to the expected tree, and what to do where it does not.
+//! Whether a submission conforms to the expected tree, and what to do where it does not.
 
 use std::fs;
 
@@ -20,7 +20,7 @@ pub struct Validation {
     pub format: Option<Format>,
     /// Whether there is no error among the findings: neither the tree nor the student number.
     pub conforms: bool,
-    /// The expected tree beside the found one; empty for a hand-in that was refused.
+    /// The expected tree beside the found one; empty for a submission that was refused.
     pub tree: Vec<TreeLine>,
     /// What `config.json` says, where there is one.
     pub config: Option<HandInConfig>,
@@ -112,7 +112,7 @@ fn places(lines: &[TreeLine]) -> (Vec<&str>, Vec<&str>) {
     (present, missing)
 }
 
-/// The validation of a hand-in that was refused.
+/// The validation of a submission that was refused.
 pub fn validate_refusal(refusal: &Refusal) -> Validation {
     Validation {
         name: refusal.name.clone(),

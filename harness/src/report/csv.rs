@@ -1,19 +1,19 @@
-//! `grades.csv`: one row a hand-in, for a grade book.
+//! `grades.csv`: one row a submission, for a grade book.
 
 use super::number::{is_range, of_part, points, range};
 use super::{BatchReport, Entry, ReportError, harmless};
 
 /// The grades as CSV (UTF-8, comma, `\n`). The columns are student id, last and first name, name of
-/// the hand-in, the parts, total, what it is out of, lowest and highest, unconfirmed, time, total before lateness, remarks.
+/// the submission, the parts, total, what it is out of, lowest and highest, unconfirmed, time, total before lateness, remarks.
 ///
-/// `total` is empty where the hand-in could not be judged wholly, so that nobody imports a number
+/// `total` is empty where the submission could not be judged wholly, so that nobody imports a number
 /// that is not decided; `submitted` and `before_late` tell of late submissions: when, and what was earned before
 /// the penalty. `lowest` and `highest` are filled only there. `unconfirmed` is what images
 /// alone are worth once the instructor confirms them, and empty where that is nothing. A part that is a range reads
 /// `0..20`.
 ///
 /// # Errors
-/// When there is no hand-in.
+/// When there is no submission.
 pub fn grades(sheet: &BatchReport) -> Result<String, ReportError> {
     if sheet.entries.is_empty() {
         return Err(ReportError::Empty);

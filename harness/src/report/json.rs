@@ -30,14 +30,14 @@ struct Report<'a> {
     schema: &'static str,
     version: u32,
     assignment: About<'a>,
-    /// Every set of conditions that occurs; a hand-in names its own by index.
+    /// Every set of conditions that occurs; a submission names its own by index.
     conditions: Vec<&'a Conditions>,
     /// Seed and scenes; `null` when nothing was held back.
     held_back: Option<&'a HeldBack>,
     hand_ins: Vec<HandIn<'a>>,
     /// Who is missing, and what the instructor must decide; `null` where one submission was checked.
     class: Option<&'a Class>,
-    /// By slug. Last, and the only thing that two runs over the same hand-ins do not share.
+    /// By slug. Last, and the only thing that two runs over the same submissions do not share.
     timings: BTreeMap<&'a str, &'a [StageCost]>,
 }
 
@@ -79,7 +79,7 @@ struct HandIn<'a> {
 /// finite is `null`.
 ///
 /// # Errors
-/// When there is no hand-in.
+/// When there is no submission.
 pub fn report(sheet: &BatchReport) -> Result<String, ReportError> {
     if sheet.entries.is_empty() {
         return Err(ReportError::Empty);

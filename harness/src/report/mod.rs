@@ -4,7 +4,7 @@
 //! whether they are right and how wrong, it names no other submission and leads nowhere else. All else is the instructor's: the files of the batch, and
 //! `instructor/<slug>/` with all that was found out.
 //!
-//! It decides nothing. Every format lets a hand-in's words through one gate, `harmless`, and adds
+//! It decides nothing. Every format lets a submission's words through one gate, `harmless`, and adds
 //! the escaping that the format itself needs.
 
 mod csv;
@@ -45,12 +45,12 @@ use crate::rubric::{Grade, Rules};
 pub const JSON_FILE: &str = "report.json";
 /// The file for the grade book, in the batch's folder.
 pub const CSV_FILE: &str = "grades.csv";
-/// The page for readers, in the batch's folder and in the folder of each hand-in.
+/// The page for readers, in the batch's folder and in the folder of each submission.
 pub const HTML_FILE: &str = "report.html";
 /// The folder in the batch's folder that holds what students must not see.
 pub const INSTRUCTOR: &str = "instructor";
 
-/// One hand-in with its points.
+/// One submission with its points.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// What was found out.
@@ -92,7 +92,7 @@ pub struct BatchReport {
     pub rules: Rules,
     /// What was held back from students, if anything.
     pub held_back: Option<HeldBack>,
-    /// The hand-ins, in the order to be shown.
+    /// The submissions, in the order to be shown.
     pub entries: Vec<Entry>,
     /// What is known of the class as a whole; nothing where one submission is checked.
     #[serde(default)]
@@ -131,12 +131,12 @@ pub enum ReportError {
         "no submission to report: expected at least one (hint: name an archive, a folder, or a folder of them)"
     )]
     Empty,
-    /// The folder of a hand-in's page has no usable name.
+    /// The folder of a submission's page has no usable name.
     #[error(
         "submission {name:?}: expected a plain and unique folder name for its report, found {slug:?}"
     )]
     Slug {
-        /// The hand-in.
+        /// The submission.
         name: String,
         /// The name.
         slug: String,
@@ -160,7 +160,7 @@ pub enum ReportError {
 }
 
 impl BatchReport {
-    /// A sheet for hand-ins of an assignment.
+    /// A sheet for submissions of an assignment.
     pub fn new(assignment: &Assignment, held_back: Option<HeldBack>, entries: Vec<Entry>) -> Self {
         Self {
             assignment: assignment.name.clone(),
@@ -196,16 +196,16 @@ impl BatchReport {
     }
 }
 
-/// Writes `report.json`, `grades.csv`, `report.html`, and `<slug>/report.html` for each hand-in,
+/// Writes `report.json`, `grades.csv`, `report.html`, and `<slug>/report.html` for each submission,
 /// into the folder `out`, which is made when missing, and `instructor/<slug>/report.html` where
 /// there is more to know than the student may. The pictures are expected to lie in `<slug>/`, those of held-back scenes
 /// in `instructor/<slug>/` already.
 ///
-/// Each file appears whole or not at all; the pages of the hand-ins come first, so that
+/// Each file appears whole or not at all; the pages of the submissions come first, so that
 /// `report.html` never leads nowhere.
 ///
 /// # Errors
-/// When there is no hand-in, a slug is no plain unique name, or a file cannot be written.
+/// When there is no submission, a slug is no plain unique name, or a file cannot be written.
 pub fn write(out: &Path, sheet: &BatchReport) -> Result<(), ReportError> {
     sheet.check()?;
     for entry in &sheet.entries {

@@ -1,4 +1,4 @@
-//! A made-up batch for the tests: one perfect hand-in, one that multiplies by the cosine twice and
+//! A made-up batch for the tests: one perfect submission, one that multiplies by the cosine twice and
 //! whose bonus could not be judged, one that does not build.
 
 use super::{BatchReport, Entry};

@@ -10,12 +10,12 @@ use crate::evidence::{Check, CheckId, Evidence, Verdict};
 /// The check that says whether the source was built; images alone count when it failed.
 pub const BUILD: CheckId = CheckId::SubmissionBuild;
 
-/// The points of one hand-in.
+/// The points of one submission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grade {
     /// The parts, in the handout's order.
     pub parts: Vec<PartGrade>,
-    /// The least that the hand-in is worth, bonus included.
+    /// The least that the submission is worth, bonus included.
     pub points: f64,
     /// The most that it may be worth; equal to `points` when everything could be judged.
     pub points_max: f64,
@@ -148,7 +148,7 @@ fn lower(first: Grade, second: Grade) -> Grade {
         let points = first.points.min(second.points);
         let points_max = first.points_max.min(second.points_max);
         let worth = |part: &PartGrade| (part.points, part.points_max);
-        // No image of a held-back scene is handed in.
+        // No image of a held-back scene is submitted.
         let unconfirmed = first.unconfirmed;
         // A reason that everybody may read comes first.
         let public = first.points_max < first.out_of;
@@ -245,7 +245,7 @@ fn round(points: f64) -> f64 {
     (points * 100.0).round() / 100.0
 }
 
-/// A part of a hand-in that builds.
+/// A part of a submission that builds.
 fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> PartScore {
     if let Some(path) = rules.paths.get(&part.path) {
         let mut proof = evidence.named(path.proof).peekable();
@@ -270,7 +270,7 @@ fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> PartScore {
         .unwrap_or_else(|| unjudged(evidence, part))
 }
 
-/// A part of a hand-in without code to judge: nothing, until the instructor confirms what the images show.
+/// A part of a submission without code to judge: nothing, until the instructor confirms what the images show.
 fn by_images(rules: &Rules, evidence: &Evidence, part: &Part) -> PartScore {
     let nothing = |reason: String, evidence| PartScore {
         least: 0.0,

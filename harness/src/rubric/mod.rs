@@ -1,4 +1,4 @@
-//! From evidence to points: a pure function of the assignment's rules and a hand-in's evidence.
+//! From evidence to points: a pure function of the assignment's rules and a submission's evidence.
 //!
 //! The rules, in order:
 //! 1. A gate that is closed caps the total.

@@ -38,7 +38,7 @@ pub struct Trust {
     pub ceiling: f64,
 }
 
-/// A condition on the whole hand-in.
+/// A condition on the whole submission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gate {
@@ -94,7 +94,7 @@ pub struct Part {
     /// does not build.
     #[serde(default)]
     pub files: Vec<String>,
-    /// The checks on the images handed in, for a hand-in that does not build.
+    /// The checks on the images submitted, for a submission that does not build.
     #[serde(default)]
     pub images_only: Vec<CheckId>,
 }

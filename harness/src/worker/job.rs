@@ -22,7 +22,7 @@ pub struct Job {
 pub struct SceneRef {
     /// Path of the TOML file.
     pub path: PathBuf,
-    /// Empty for every hand-in; see [`api::SceneRequest::options`].
+    /// Empty for every submission; see [`api::SceneRequest::options`].
     #[serde(default)]
     pub options: String,
 }

@@ -123,7 +123,7 @@ impl Supervisor {
         self.run_job_patiently(job, limits, &RetryBudget::none(), cancel, progress)
     }
 
-    /// The same for one job of a hand-in's path: timeouts are confirmed as `retries` says.
+    /// The same for one job of a submission's path: timeouts are confirmed as `retries` says.
     pub fn run_job_patiently(
         &self,
         job: &Job,

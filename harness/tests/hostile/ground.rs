@@ -76,7 +76,7 @@ pub fn set_up(stage: &Path, layers: Layers) -> Result<(), String> {
         }
     }
 
-    // The hand-in in Rust, as any other is built.
+    // The submission in Rust, as any other is built.
     let source = include_str!("renderer.rs");
     std::fs::write(at("hand-in/src/lib.rs"), source).map_err(|e| fail("lib.rs", &e))?;
     let recording = recording()?;

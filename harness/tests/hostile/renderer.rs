@@ -1,4 +1,4 @@
-//! A hand-in whose code misbehaves as only Rust or a graphics device lets it: the scene's options
+//! A submission whose code misbehaves as only Rust or a graphics device lets it: the scene's options
 //! say how. Without options it draws black. Everything is bounded in memory.
 
 use basecode::gpu::{Gpu, RenderPass, Stage, Target};

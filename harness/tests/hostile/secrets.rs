@@ -1,5 +1,5 @@
-//! What must not come out: every place of the host that a hand-in could want to read, and the look
-//! for its bytes in everything that a hand-in can say.
+//! What must not come out: every place of the host that a submission could want to read, and the look
+//! for its bytes in everything that a submission can say.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use umbra::worker::JobReport;
 /// Bytes of a file that a thief takes, from its middle: `LOOT` in deeds.c.
 const LOOT: usize = 32;
 
-/// A file that a hand-in must not read.
+/// A file that a submission must not read.
 pub struct Secret {
     /// Bytes from its middle; empty when the suite's own user cannot read it.
     bytes: Vec<u8>,

@@ -34,7 +34,7 @@ impl Scratch {
         all
     }
 
-    /// In a locked child, as hand-ins are; in this process the same must come out.
+    /// In a locked child, as submissions are; in this process the same must come out.
     pub fn unpack(&self, bytes: &[u8], name: &str, limits: &Limits) -> Result<HandIn, IntakeError> {
         let tree = TreeSpec::default();
         let apart =
@@ -66,7 +66,7 @@ impl Scratch {
     }
 }
 
-/// Calls `body` with what decodes hand-ins, and looks for what its children leave behind.
+/// Calls `body` with what decodes submissions, and looks for what its children leave behind.
 pub fn with_decoder<T>(body: impl FnOnce(&Decoder) -> T) -> T {
     let scratch = tempfile::tempdir().unwrap();
     let supervisor = Supervisor::new(env!("CARGO_BIN_EXE_umbra").into(), scratch.path().into());

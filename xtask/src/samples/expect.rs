@@ -40,7 +40,7 @@ impl Range {
 }
 
 impl Expect {
-    /// What differs in a hand-in's entry of `report.json`; empty when nothing does.
+    /// What differs in a submission's entry of `report.json`; empty when nothing does.
     pub fn complaint(&self, hand_in: &Value, rules: &Rules) -> String {
         if self.total.is_none() && self.parts.is_empty() {
             return "its recipe expects nothing".into();
@@ -91,7 +91,7 @@ fn compare(what: &str, earned: &Value, range: Range) -> Option<String> {
     (!fits).then(|| format!("{what}: expected {min} to {max}, found {least} to {most} ({reason})"))
 }
 
-/// What is wrong with what a hand-in is said to look like, if anything.
+/// What is wrong with what a submission is said to look like, if anything.
 fn compare_diagnoses(expected: &BTreeMap<String, String>, hand_in: &Value) -> Option<String> {
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let found = hand_in["diagnoses"].as_array().map_or(&[][..], Vec::as_slice);

@@ -62,7 +62,7 @@ impl EvidenceRule {
         checks.map(|id| Self::Check(*id)).chain(blames).chain(measures).collect()
     }
 
-    /// Whether only a hand-in can break it: by its tree or its images.
+    /// Whether only a submission can break it: by its tree or its images.
     fn is_of_hand_ins(&self) -> bool {
         match self {
             Self::Check(id) => {
@@ -123,14 +123,14 @@ mod tests {
         Assignment::load(root).unwrap().rules
     }
 
-    /// What a hand-in is worth, and what an instructor is told.
+    /// What a submission is worth, and what an instructor is told.
     fn worth(rules: &Rules, evidence: &Evidence) -> (f64, f64, f64, Vec<String>) {
         let mut grade = grade(rules, evidence);
         grade.remarks.extend(grade.parts.into_iter().map(|part| part.reason));
         (grade.points, grade.points_max, grade.unconfirmed, grade.remarks)
     }
 
-    /// What only a hand-in can break: images without a source, a tree, an image's size, a crash.
+    /// What only a submission can break: images without a source, a tree, an image's size, a crash.
     #[test]
     fn every_rule_of_hand_ins_is_needed() {
         let rules = rules();

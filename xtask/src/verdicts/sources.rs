@@ -1,4 +1,4 @@
-//! Real hand-ins: every sample is packed as a student would, built and graded by the real binary,
+//! Real submissions: every sample is packed as a student would, built and graded by the real binary,
 //! and worth what its recipe says.
 
 use std::path::Path;

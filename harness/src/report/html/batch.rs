@@ -10,10 +10,10 @@ use crate::evidence::CheckId;
 use crate::grading::Conditions;
 use crate::intake::Severity;
 
-/// The page of the batch: one row for each hand-in, which leads to its own page.
+/// The page of the batch: one row for each submission, which leads to its own page.
 ///
 /// # Errors
-/// When there is no hand-in.
+/// When there is no submission.
 pub fn batch(sheet: &BatchReport) -> Result<String, ReportError> {
     if sheet.entries.is_empty() {
         return Err(ReportError::Empty);

@@ -1,4 +1,4 @@
-//! The checks on a hand-in's page: what failed in full and with pictures, the rest folded.
+//! The checks on a submission's page: what failed in full and with pictures, the rest folded.
 
 use super::super::number::{self, is_failure, value};
 use super::markup::Html;

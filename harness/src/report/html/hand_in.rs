@@ -1,4 +1,4 @@
-//! The page of one hand-in.
+//! The page of one submission.
 
 use super::super::harmless::harmless_lines;
 use super::super::number::{hints, is_range, looks_like, of_part, points, range, seconds};
@@ -13,7 +13,7 @@ use crate::rubric::PartGrade;
 /// So many lines of the compiler's are shown.
 const DIAGNOSTIC_LINES: usize = 400;
 
-/// The page of one hand-in: its parts with points and reasons, what failed with pictures, what
+/// The page of one submission: its parts with points and reasons, what failed with pictures, what
 /// could not be judged, what passed, findings, conditions and costs.
 pub fn hand_in(sheet: &BatchReport, entry: &Entry, reader: Reader) -> String {
     let known;

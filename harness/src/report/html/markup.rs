@@ -9,7 +9,7 @@ use super::super::harmless;
 pub(super) struct Html(String);
 
 impl Html {
-    /// Markup. The lifetime keeps out whatever a hand-in says.
+    /// Markup. The lifetime keeps out whatever a submission says.
     pub(super) fn raw(&mut self, markup: &'static str) -> &mut Self {
         self.0.push_str(markup);
         self

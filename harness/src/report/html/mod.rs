@@ -1,4 +1,4 @@
-//! HTML pages: one for the batch, one for each hand-in. They load nothing, need no script to be
+//! HTML pages: one for the batch, one for each submission. They load nothing, need no script to be
 //! read, and forbid the browser to run any but the one that sorts the table.
 
 mod batch;

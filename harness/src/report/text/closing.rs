@@ -72,7 +72,7 @@ fn is_whole(part: &PartGrade) -> bool {
     points(part.points) == points(part.out_of)
 }
 
-/// What is next to do: what hinders most, then the parts in the handout's order, then handing in.
+/// What is next to do: what hinders most, then the parts in the handout's order, then submitting.
 fn next(sheet: &BatchReport, entry: &Entry, closing: &Closing) -> String {
     let Closing { folder, umbra, .. } = closing;
     let checks = &entry.record.evidence.checks;

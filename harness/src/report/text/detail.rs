@@ -1,4 +1,4 @@
-//! Every detail of one hand-in.
+//! Every detail of one submission.
 
 use super::super::harmless::harmless_lines;
 use super::super::number::{
@@ -222,7 +222,7 @@ fn group_of_checks(page: &mut Page, group: &[&Check]) {
 }
 
 /// What intake found. Without `verbose` no notes, and while there is work to do (`busy`) only how much is
-/// to be mended before handing in.
+/// to be mended before submitting.
 fn findings(page: &mut Page, findings: &[Finding], verbose: bool, busy: bool) {
     let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
     if busy && !verbose {

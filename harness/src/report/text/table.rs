@@ -1,4 +1,4 @@
-//! The table of many hand-ins.
+//! The table of many submissions.
 
 use super::super::number::{due, is_range, of_part, points, total};
 use super::super::{BatchReport, Entry, ReportError, harmless};
@@ -12,12 +12,12 @@ const GAP: &str = "  ";
 /// The least that is left for a name before the parts give way.
 const NAME_MIN: usize = 8;
 
-/// A table with one row for each hand-in: name, student, points per part, total, and the numbers
+/// A table with one row for each submission: name, student, points per part, total, and the numbers
 /// of the remarks that stand below it. `width` in terminal columns; no line is wider. `colours`
 /// allows ANSI colours.
 ///
 /// # Errors
-/// When there is no hand-in.
+/// When there is no submission.
 pub fn table(sheet: &BatchReport, width: usize, colours: bool) -> Result<String, ReportError> {
     if sheet.entries.is_empty() {
         return Err(ReportError::Empty);
@@ -76,7 +76,7 @@ fn remarks(sheet: &BatchReport) -> Vec<&str> {
     remarks
 }
 
-/// The numbers of a hand-in's remarks: `1, 3`.
+/// The numbers of a submission's remarks: `1, 3`.
 fn numbers(entry: &Entry, remarks: &[&str]) -> String {
     let number = |remark: &String| remarks.iter().position(|other| other == remark);
     let numbers = entry.grade.remarks.iter().filter_map(number);
