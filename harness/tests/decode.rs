@@ -127,13 +127,16 @@ fn a_decoder_that_dies_refuses_its_file_and_no_other() {
     let (scratch, supervisor) = supervisor();
     let never = AtomicBool::new(false);
     for (limits, how) in [
-        (limits(|limits| limits.memory_mib = 48), "ran out of memory"),
+        (limits(|limits| limits.memory_mib = 48), "out of memory"),
         (limits(|limits| limits.file_size_mib = 1), "wrote too large a file"),
         (limits(|limits| limits.wall_s = 0.0), "ran out of time"),
     ] {
         let decoder = Decoder::new(&supervisor, &limits, &never);
         let said = decoder.image(&large, "offline/large.exr").unwrap().unwrap_err();
-        assert!(said.starts_with("offline/large.exr: cannot be decoded: its decoder "), "{said}");
+        assert!(said.starts_with("offline/large.exr: "), "{said}");
+        // Where memory ends, the decoder may still be able to say so itself.
+        let died = said.starts_with("offline/large.exr: cannot be decoded: its decoder ");
+        assert!(died || limits.memory_mib == 48, "{said}");
         assert!(said.contains(how), "{said}");
         if limits.wall_s > 0.0 {
             assert!(decoder.image(&small, "small.exr").unwrap().is_ok());

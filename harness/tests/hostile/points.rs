@@ -65,7 +65,7 @@ pub fn all(ground: &Ground) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> 
                     check_reports(&BatchReport::new(
                         &assignment,
                         None,
-                        vec![Entry { record, grade }],
+                        vec![Entry { record, grade, standing: Default::default() }],
                     ))?;
                 }
                 if let Ok(mut earned) = earned.lock() {
