@@ -288,6 +288,8 @@ impl<'a> Grading<'a> {
         let built = self.build(&hand_in, scratch.path(), &mut record, &mut checks, &mut costs)?;
         let seed = config.sampler_seed().unwrap_or_default();
         let mut drawn = Vec::new();
+        // Lives as long as the session names it.
+        let mut _compiled = None;
         let asks = |path| self.paths.contains(&path);
         if let Some((plugin, _)) = built.as_ref().filter(|_| asks(RenderPath::Offline)) {
             say("rendering offline");
@@ -299,7 +301,7 @@ impl<'a> Grading<'a> {
             say("drawing realtime");
             let stages = Stages::read(&built.src, &self.assignment.template());
             record.findings.extend(stages.findings());
-            let _compiled = self.compile_own(&mut session, &stages)?;
+            _compiled = self.compile_own(&mut session, &stages)?;
             self.realtime(&session, plugin, &stages, &mut checks, &mut drawn)?;
             checks.extend(session.used_up());
             checks.extend(session.printed_much());
@@ -379,13 +381,14 @@ impl<'a> Grading<'a> {
         paths: &[RenderPath],
     ) -> anyhow::Result<(Evidence, Vec<Diagnosis>)> {
         let mut session = self.session(options);
+        let mut _compiled = None;
         let (mut checks, mut drawn) = (Vec::new(), Vec::new());
         if paths.contains(&RenderPath::Offline) {
             self.offline(&session, library, seed, &mut checks, &mut drawn)?;
             session.retries.renew();
         }
         if paths.contains(&RenderPath::Realtime) {
-            let _compiled = self.compile_own(&mut session, stages)?;
+            _compiled = self.compile_own(&mut session, stages)?;
             self.realtime(&session, library, stages, &mut checks, &mut drawn)?;
         }
         let evidence = Evidence { checks };
