@@ -11,8 +11,8 @@ use umbra::evidence::rays::RayBatch;
 use umbra::evidence::vertex::{VertexFilm, judge_vertex};
 use umbra::evidence::{Check, CheckId};
 use umbra::expected::{Expected, SurfaceBuffer, load_scene, regions};
-use umbra::grading::handed_in::{HandedIn, judge as judge_submitted};
-use umbra::grading::{Case, Drawn, ImageDigest, Small};
+use umbra::grading::submitted::{SubmittedImage, judge as judge_submitted};
+use umbra::grading::{Drawn, ImageDigest, PreparedScene, ProbeFilm};
 use umbra::imaging::evidence::Tolerances;
 use umbra::imaging::metrics::Metrics;
 use umbra::imaging::noise::NoisyPixels;
@@ -46,7 +46,7 @@ fn obj() -> String {
 }
 
 /// A scene of this file's own, made ready.
-static CASE: LazyLock<Case> = LazyLock::new(|| {
+static CASE: LazyLock<PreparedScene> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in [("a.toml", TOML), ("a.obj", &obj()), ("a.mtl", MTL)] {
         fs::write(folder.path().join(name), text).expect("our own folder");
@@ -64,7 +64,7 @@ static CASE: LazyLock<Case> = LazyLock::new(|| {
     NoisyPixels::new(&offline).expect("edges enough to tell noise by");
     let unshadowed = right(&unshadowed_mask);
     let surface = SurfaceBuffer::new(&scene, WIDTH, HEIGHT).expect("a camera");
-    let small = Small {
+    let probe_film = ProbeFilm {
         width: WIDTH as u32,
         height: HEIGHT as u32,
         batch: RayBatch::new("a", &scene, &surface, &shadowed),
@@ -89,7 +89,7 @@ static CASE: LazyLock<Case> = LazyLock::new(|| {
         fov_y_deg: 50.0,
         matrices: Matrices::Usual,
     };
-    Case {
+    PreparedScene {
         entry: SceneEntry {
             name: "a".into(),
             offline: toml.clone(),
@@ -100,7 +100,7 @@ static CASE: LazyLock<Case> = LazyLock::new(|| {
             film: None,
             stored: false,
             perturb: false,
-            hand_in: None,
+            submitted: None,
         },
         held_back: false,
         offline: toml.clone(),
@@ -109,7 +109,7 @@ static CASE: LazyLock<Case> = LazyLock::new(|| {
         spp: 16,
         camera,
         expected,
-        small,
+        probe_film,
     }
 });
 
@@ -128,9 +128,9 @@ pub fn judge(bytes: &[u8]) {
     let image = through_a_file(bits, precision);
     let case = &*CASE;
     let tolerances = Tolerances::default();
-    for kind in [Kind::Offline { spp: case.spp }, Kind::HandedInRealtime, Kind::HandedInShadows] {
+    for kind in [Kind::Offline { spp: case.spp }, Kind::SubmittedRealtime, Kind::SubmittedShadows] {
         for drawn_as in [Kind::Offline { spp: case.spp }, Kind::Realtime, Kind::RealtimeShadows] {
-            let submitted = HandedIn::new(case, "a.exr", kind, Ok(image.clone()));
+            let submitted = SubmittedImage::new(case, "a.exr", kind, Ok(image.clone()));
             let own = Image { pixels: image.pixels.iter().rev().copied().collect(), ..image };
             let drawn = [Drawn { scene: "a".into(), kind: drawn_as, image: own }];
             check(&judge_submitted(&submitted, &drawn, &tolerances).0);
@@ -149,7 +149,7 @@ pub fn judge(bytes: &[u8]) {
             &tolerances,
         )]);
     }
-    let Small { surface, mask, .. } = &case.small;
+    let ProbeFilm { surface, mask, .. } = &case.probe_film;
     let camera = case.expected.scene.camera(WIDTH, HEIGHT).expect("a camera");
     let film = VertexFilm { scene: &case.expected.scene, camera, surface, mask };
     check(&[judge_vertex("a", &film, [[&image, &image]; 3])]);

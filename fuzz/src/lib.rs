@@ -12,8 +12,8 @@ use basecode::exr_io::{MAX_PIXELS, MAX_SIDE, decode_exr};
 use basecode::scene::{Scene, SceneConfig};
 use umbra::decode::read_answer;
 use umbra::intake::{
-    Finding, HandInConfig, IntakeError, Limits, TreeSpec, scan_source, unpack_bytes,
-    validate_hand_in,
+    Finding, IntakeError, Limits, SubmittedConfig, TreeSpec, scan_source, unpack_bytes,
+    validate_submission,
 };
 use umbra::worker::{SLOT_BYTES, SlotState};
 
@@ -45,19 +45,19 @@ pub fn archive(bytes: &[u8]) {
     let (dest, tree) = (place.path().join("dest"), TreeSpec::default());
     fs::create_dir(&dest).expect("a folder");
     match unpack_bytes(bytes, "a.zip", &dest, &tree, &LIMITS) {
-        Ok(hand_in) => {
+        Ok(submission) => {
             let mut total = 0;
-            for file in &hand_in.files {
-                let path = hand_in.root.join(&file.path);
+            for file in &submission.files {
+                let path = submission.root.join(&file.path);
                 assert!(path.starts_with(&dest) && !file.path.contains(".."), "{file:?}");
                 let found = path.symlink_metadata().expect("a listed file is there");
                 assert!(found.is_file() && found.len() == file.bytes, "{file:?}");
                 total += file.bytes;
             }
             assert!(total <= LIMITS.max_total_mib << 20);
-            assert!(hand_in.files.len() as u64 <= LIMITS.max_entries);
-            validate_hand_in(&hand_in, &tree).expect("the copy can be read");
-            scan_source(&hand_in).expect("the copy can be read");
+            assert!(submission.files.len() as u64 <= LIMITS.max_entries);
+            validate_submission(&submission, &tree).expect("the copy can be read");
+            scan_source(&submission).expect("the copy can be read");
         }
         Err(IntakeError::Refused(refusal)) => {
             assert!(!refusal.findings.is_empty());
@@ -72,7 +72,7 @@ pub fn archive(bytes: &[u8]) {
 
 /// The `config.json` of a submission.
 pub fn config(bytes: &[u8]) {
-    let (config, findings, _) = HandInConfig::parse(bytes);
+    let (config, findings, _) = SubmittedConfig::parse(bytes);
     check_findings(&findings, bytes);
     let _ = config.sampler_seed();
 }

@@ -91,7 +91,7 @@ pub struct SceneEntry {
     pub perturb: bool,
     /// Images that a submission holds of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub hand_in: Option<HandInImages>,
+    pub submitted: Option<SubmittedPaths>,
 }
 
 fn full_weight() -> f64 {
@@ -106,7 +106,7 @@ fn is_full_weight(weight: &f64) -> bool {
 /// The images of one scene in a submission, as paths in its tree.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct HandInImages {
+pub struct SubmittedPaths {
     /// The offline image.
     pub offline: String,
     /// The realtime image.

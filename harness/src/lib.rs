@@ -72,5 +72,5 @@ pub mod worker;
 pub use evidence::{Check, Evidence, Verdict};
 pub use grading::Record;
 pub use program::{GradeOptions, grade_submission};
-pub use report::Entry;
+pub use report::SubmissionReport;
 pub use rubric::{Grade, PartGrade};

@@ -9,7 +9,7 @@ use crate::assignment::Assignment;
 use crate::class::Standing;
 use crate::expected::{Store, reference_library};
 use crate::grading::{Folders, Grading, Mode, Record};
-use crate::report::{self, BatchReport, Entry};
+use crate::report::{self, BatchReport, SubmissionReport};
 use crate::rubric::{self, Rules};
 use crate::sandbox::Isolation;
 use crate::worker::{Adapter, AdapterKind, Supervisor};
@@ -40,7 +40,10 @@ pub struct GradeOptions<'a> {
 ///
 /// # Errors
 /// What the machine lacks, or the assignment: a file, a compiler, isolation, space on disk.
-pub fn grade_submission(submission: &Path, options: &GradeOptions) -> anyhow::Result<Entry> {
+pub fn grade_submission(
+    submission: &Path,
+    options: &GradeOptions,
+) -> anyhow::Result<SubmissionReport> {
     ensure!(submission.exists(), "{} does not exist", submission.display());
     let assignment = Assignment::load(options.root)?;
     let scratch = assignment.scratch()?;
@@ -65,18 +68,18 @@ pub fn grade_submission(submission: &Path, options: &GradeOptions) -> anyhow::Re
         student: options.output.join(SLUG),
         instructor: options.output.join(report::INSTRUCTOR).join(SLUG),
     };
-    let record = grading.hand_in(submission, SLUG, &folders, Mode::Grade, &|_| ())?;
+    let record = grading.submission(submission, SLUG, &folders, Mode::Grade, &|_| ())?;
     let held_back = grading.held_back.take();
-    let sheet = BatchReport::new(&assignment, held_back, vec![graded(record, &assignment.rules)]);
-    report::write(options.output, &sheet)?;
-    let [entry] = <[Entry; 1]>::try_from(sheet.entries).expect("one was graded");
+    let report = BatchReport::new(&assignment, held_back, vec![graded(record, &assignment.rules)]);
+    report::write(options.output, &report)?;
+    let [entry] = <[SubmissionReport; 1]>::try_from(report.entries).expect("one was graded");
     Ok(entry)
 }
 
 /// A record with the points that it is worth.
-pub(crate) fn graded(mut record: Record, rules: &Rules) -> Entry {
+pub(crate) fn graded(mut record: Record, rules: &Rules) -> SubmissionReport {
     // Graded by all of the evidence: what is settled leaves no second choice of a convention.
     let grade = rubric::grade(rules, &record.evidence);
     record.evidence = rubric::settle(rules, &record.evidence);
-    Entry { record, grade, standing: Standing::default() }
+    SubmissionReport { record, grade, standing: Standing::default() }
 }

@@ -978,20 +978,21 @@ fn empty_file() {
 #[test]
 fn nested_archive_is_reported() {
     let inner = Zip::of([Entry::stored("x", b"x")]).bytes();
-    let (hand_in, _scratch) = assert_accepted(
+    let (submission, _scratch) = assert_accepted(
         &Zip::of([good(), Entry::stored("src.zip", &inner)]).bytes(),
         "a.zip",
         "nested_archive",
     );
-    assert_eq!(hand_in.findings[0].path.as_deref(), Some("src.zip"));
+    assert_eq!(submission.findings[0].path.as_deref(), Some("src.zip"));
 }
 
 #[test]
 fn case_collisions_are_reported() {
     let entries = [good(), Entry::stored("src/lib.rs", b"a"), Entry::stored("Src/lib.rs", b"b")];
-    let (hand_in, _scratch) = assert_accepted(&Zip::of(entries).bytes(), "a.zip", "case_collision");
-    assert_eq!(hand_in.findings[0].path.as_deref(), Some("Src"));
-    assert_eq!(hand_in.files.len(), 3);
+    let (submission, _scratch) =
+        assert_accepted(&Zip::of(entries).bytes(), "a.zip", "case_collision");
+    assert_eq!(submission.findings[0].path.as_deref(), Some("Src"));
+    assert_eq!(submission.files.len(), 3);
     let entries = [good(), Entry::stored("src/A.rs", b"a"), Entry::stored("src/a.rs", b"b")];
     assert_accepted(&Zip::of(entries).bytes(), "a.zip", "case_collision");
 }
@@ -999,12 +1000,12 @@ fn case_collisions_are_reported() {
 #[test]
 fn names_that_are_not_utf8_are_kept_readable() {
     let entry = Entry::with(b"src/caf\xe9.rs", 0, b"x".to_vec(), b"x");
-    let (hand_in, _scratch) =
+    let (submission, _scratch) =
         assert_accepted(&Zip::of([good(), entry]).bytes(), "a.zip", "name_not_utf8");
-    assert!(hand_in.file("src/caf_xE9.rs").is_some());
+    assert!(submission.file("src/caf_xE9.rs").is_some());
     let bytes = tar(&[Tar::file("config.json", b"{}"), Tar::of(b"src/caf\xe9.rs", b'0', b"x")]);
-    let (hand_in, _scratch) = assert_accepted(&bytes, "a.tar", "name_not_utf8");
-    assert!(hand_in.file("src/caf_xE9.rs").is_some());
+    let (submission, _scratch) = assert_accepted(&bytes, "a.tar", "name_not_utf8");
+    assert!(submission.file("src/caf_xE9.rs").is_some());
 }
 
 #[test]
@@ -1044,8 +1045,8 @@ fn links_where_all_is_ignored_are_no_matter() {
         Tar::link("__MACOSX", b'2', "/etc"),
         Tar::file("__MACOSX/passwd", b"x"),
     ];
-    let (hand_in, _scratch) = assert_accepted(&tar(&entries), "a.tar", "ignored");
-    assert_eq!(hand_in.files.len(), 1);
+    let (submission, _scratch) = assert_accepted(&tar(&entries), "a.tar", "ignored");
+    assert_eq!(submission.files.len(), 1);
 }
 
 #[test]

@@ -87,7 +87,7 @@ fn a_class_as_a_learning_platform_lays_it_out() {
     );
     let report: Value =
         serde_json::from_slice(&fs::read(out.join("report.json")).unwrap()).unwrap();
-    let rows = report["hand_ins"].as_array().unwrap();
+    let rows = report["submissions"].as_array().unwrap();
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let names: Vec<String> = rows.iter().map(|row| text(&row["name"])).collect();
     let expected =

@@ -16,23 +16,23 @@ const WRONG: &str = "fn main() { not_rust }";
 const ENDLESS: &str = "#![allow(long_running_const_eval)]\n\
     pub const N: u64 = { let mut n = 0; while n < u64::MAX { n += 1; } n };\n";
 
-/// Hand-ins and the folder that they are graded into.
+/// Submissions and the folder that they are graded into.
 struct Batch {
     place: tempfile::TempDir,
 }
 
 impl Batch {
-    fn new(hand_ins: &[(&str, &str)]) -> Self {
+    fn new(submissions: &[(&str, &str)]) -> Self {
         let batch = Self { place: tempfile::tempdir().unwrap() };
-        hand_ins.iter().for_each(|(name, lib)| batch.hand_in(name, lib));
+        submissions.iter().for_each(|(name, lib)| batch.submission(name, lib));
         // The seed that other suites use too: their scenes are there already.
         fs::create_dir_all(batch.instructor("")).unwrap();
         fs::write(batch.instructor("held-back-seed.txt"), "20191006\n").unwrap();
         batch
     }
 
-    fn hand_in(&self, name: &str, lib: &str) {
-        let src = self.place.path().join("hand-ins").join(name).join("src");
+    fn submission(&self, name: &str, lib: &str) {
+        let src = self.place.path().join("submissions").join(name).join("src");
         fs::create_dir_all(&src).unwrap();
         fs::write(src.join("lib.rs"), lib).unwrap();
     }
@@ -46,7 +46,7 @@ impl Batch {
     }
 
     fn start(&self) -> Child {
-        self.start_with(&[self.place.path().join("hand-ins")], &[])
+        self.start_with(&[self.place.path().join("submissions")], &[])
     }
 
     fn start_with(&self, paths: &[PathBuf], options: &[&str]) -> Child {
@@ -64,7 +64,7 @@ impl Batch {
 
     /// Grades some submissions, named from the folder of all, with more options.
     fn grade_with(&self, names: &[&str], options: &[&str]) -> (Option<i32>, String) {
-        let path = |name: &&str| self.place.path().join("hand-ins").join(name);
+        let path = |name: &&str| self.place.path().join("submissions").join(name);
         let paths: Vec<PathBuf> = names.iter().map(path).collect();
         said(&self.start_with(&paths, options).wait_with_output().unwrap())
     }
@@ -123,19 +123,19 @@ fn said(output: &Output) -> (Option<i32>, String) {
 
 #[test]
 fn what_was_graded_before_the_end_is_kept_whatever_the_end() {
-    let hand_ins = [("ada", WRONG), ("bob", ENDLESS), ("eve", "what?")];
-    let batch = Batch::new(&hand_ins);
+    let submissions = [("ada", WRONG), ("bob", ENDLESS), ("eve", "what?")];
+    let batch = Batch::new(&submissions);
     let (killed, code, _) = batch.grade_until("ada", Signal::SIGKILL);
     assert_eq!(code, None);
     let kept = fs::read(batch.instructor("ada/record.json")).unwrap();
-    batch.hand_in("abe", WRONG);
+    batch.submission("abe", WRONG);
     let (interrupted, code, said) = batch.grade_until("abe", Signal::SIGINT);
     assert_eq!(code, Some(130), "{said}");
     assert_eq!((scratch_of(killed), scratch_of(interrupted)), (0, 0));
     assert!(said.contains("of 4 submissions are graded; the same command resumes"), "{said}");
     assert!(!batch.out().join("report.json").exists());
 
-    batch.hand_in("bob", WRONG);
+    batch.submission("bob", WRONG);
     let (code, said) = batch.grade();
     assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("2 of 4 submissions keep their earlier grades"), "{said}");
@@ -148,7 +148,7 @@ fn what_was_graded_before_the_end_is_kept_whatever_the_end() {
 }
 
 #[test]
-fn a_hand_in_that_the_machine_fails_on_costs_the_others_nothing() {
+fn a_submission_that_the_machine_fails_on_costs_the_others_nothing() {
     let batch = Batch::new(&[("ada", WRONG), ("bob", WRONG), ("eve", WRONG)]);
     // Bob's record cannot be written.
     fs::create_dir_all(batch.instructor("bob/record.json")).unwrap();
@@ -168,7 +168,7 @@ fn a_hand_in_that_the_machine_fails_on_costs_the_others_nothing() {
     assert!(!csv.contains("ungraded"), "{csv}");
 
     // Another text is graded anew; the same one under other conditions too.
-    batch.hand_in("bob", "fn main() { other }");
+    batch.submission("bob", "fn main() { other }");
     let (_, said) = batch.grade();
     assert!(said.contains("2 of 3 submissions keep their earlier grades"), "{said}");
     assert!(batch.canonical().contains("`other`"));
@@ -197,13 +197,13 @@ fn a_class_grows_and_nobody_falls_out_of_it() {
     assert_eq!(batch.canonical(), fresh.canonical());
 
     // Another one of the same name is somebody else's.
-    batch.hand_in("c/ada", "fn main() { another }");
+    batch.submission("c/ada", "fn main() { another }");
     let (_, said) = batch.grade_with(&["c/ada"], &[]);
     assert_eq!(batch.names(), ["ada", "ada", "bob", "eve"], "{said}");
     assert_eq!(fs::read(batch.instructor("ada/record.json")).unwrap(), first);
 
     // What is gone stays; what was taken out of the report is gone.
-    fs::remove_dir_all(batch.place.path().join("hand-ins/a/bob")).unwrap();
+    fs::remove_dir_all(batch.place.path().join("submissions/a/bob")).unwrap();
     fs::remove_dir_all(batch.instructor("ada-2")).unwrap();
     let (code, said) = batch.grade_with(&["a", "b"], &[]);
     assert_eq!(code, Some(0), "{said}");
@@ -227,7 +227,7 @@ fn one_student_is_graded_alone_or_anew() {
         let config = format!(
             r#"{{"firstName": "F", "lastName": "{last}", "studentID": "{id}", "renders": []}}"#
         );
-        let folder = batch.place.path().join("hand-ins").join(name);
+        let folder = batch.place.path().join("submissions").join(name);
         fs::create_dir_all(&folder).unwrap();
         fs::write(folder.join("config.json"), config).unwrap();
     };
@@ -250,8 +250,8 @@ fn one_student_is_graded_alone_or_anew() {
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("nobody of 3 submissions is \"mallory\"; expected"), "{said}");
 
-    // Handed in again: the same file name, the same student, in another place.
-    batch.hand_in("late/bob", "fn main() { better }");
+    // Submitted again: the same file name, the same student, in another place.
+    batch.submission("late/bob", "fn main() { better }");
     student("late/bob", "Bee", "260000123");
     let (code, said) = batch.grade_with(&["late/bob"], &[]);
     assert_eq!(code, Some(0), "{said}");

@@ -473,7 +473,7 @@ fn realtime_floats_allow_for_the_rasterisers_grid() {
 }
 
 #[test]
-fn levels_of_handed_in_realtime_images() {
+fn levels_of_submitted_realtime_images() {
     let width = 64;
     let mut mask = RegionMask::background(width, width);
     mask.regions.push(lit("wall"));

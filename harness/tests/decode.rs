@@ -11,7 +11,7 @@ use basecode::exr_io::{ExrLayers, Precision, read_exr, write_exr, write_exr_laye
 use basecode::{Image, Vec3};
 use umbra::assignment::Assignment;
 use umbra::decode::Decoder;
-use umbra::intake::{IntakeError, TreeSpec, scan_source, unpack, validate_hand_in};
+use umbra::intake::{IntakeError, TreeSpec, scan_source, unpack, validate_submission};
 use umbra::process::Limits;
 use umbra::sandbox::Isolation;
 use umbra::worker::Supervisor;
@@ -92,7 +92,7 @@ fn images_come_through_bit_by_bit_and_errors_word_by_word() {
 }
 
 #[test]
-fn a_hand_in_is_received_as_it_would_be_read_here() {
+fn a_submission_is_received_as_it_would_be_read_here() {
     let source = "fn f() { unsafe { std::process::abort() } }";
     let archive = Zip::of([
         Entry::deflated("a2/config.json", b"{ \"firstName\": 3, "),
@@ -107,12 +107,12 @@ fn a_hand_in_is_received_as_it_would_be_read_here() {
     let received =
         with_decoder(|decoder| decoder.receive(&file, &place.dest, &tree, &small_limits()));
     let received = received.ok().unwrap();
-    assert_eq!(received.validation, validate_hand_in(&own, &tree).unwrap());
+    assert_eq!(received.validation, validate_submission(&own, &tree).unwrap());
     assert_eq!(received.source, scan_source(&own).unwrap());
     assert!(!received.validation.conforms && !received.source.is_empty());
-    assert_eq!(received.hand_in.files, own.files);
-    assert_eq!(received.hand_in.findings, own.findings);
-    assert_eq!(received.hand_in.root, place.dest.join("a2"));
+    assert_eq!(received.submission.files, own.files);
+    assert_eq!(received.submission.findings, own.findings);
+    assert_eq!(received.submission.root, place.dest.join("a2"));
     assert_eq!(fs::read_to_string(place.dest.join("a2/src/lib.rs")).unwrap(), source);
 }
 

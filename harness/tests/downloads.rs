@@ -122,7 +122,7 @@ fn text(value: &Value) -> &str {
 
 /// Of each submission in a report: its name, whose it is by the class list, and its remarks.
 fn rows(report: &Value) -> Vec<(String, String, String)> {
-    let rows = report["hand_ins"].as_array().unwrap().iter();
+    let rows = report["submissions"].as_array().unwrap().iter();
     let row = |row: &Value| {
         let remarks = row["remarks"].as_array().unwrap().iter().map(text).collect::<Vec<_>>();
         (
@@ -230,7 +230,7 @@ fn a_class_of_brightspace_zipped_and_unpacked() {
         // Names and numbers of the grade book are the class list's, whatever config.json says.
         let book = fs::read_to_string(place.at("out/grades.csv")).unwrap();
         assert!(book.contains("\n260000002,Ode,Bo,"), "{book}");
-        let bo = report["hand_ins"]
+        let bo = report["submissions"]
             .as_array()
             .unwrap()
             .iter()
@@ -256,7 +256,7 @@ fn a_class_of_brightspace_zipped_and_unpacked() {
         assert_eq!(undecided.len(), 1);
         assert_eq!(text(&undecided[0]["reason"]), "nobody on the list is Max Other");
         assert!(said.contains("decide in out/matches.toml"), "{said}");
-        reports.push(text(&report["hand_ins"].to_string().into()).to_owned());
+        reports.push(text(&report["submissions"].to_string().into()).to_owned());
     }
     assert_eq!(reports[0], reports[1]);
 
@@ -496,7 +496,7 @@ fn what_the_instructor_decides_survives_and_is_flagged_when_the_evidence_changes
     place.put(&own("Bo Ode", 1), &submission(&config("Bo", "Ode", "260000002")));
     place.put(&own("Ann Lee", 2), &submission(&config("Ann", "Lee", "0260000003")));
     let (_, report) = place.grade(&root, &["class"]);
-    assert_eq!(report["hand_ins"][0]["points"], 0.0);
+    assert_eq!(report["submissions"][0]["points"], 0.0);
     let run = |arguments: &[&str]| {
         let mut all = arguments.to_vec();
         if arguments[0] != "status" {
@@ -531,10 +531,11 @@ fn what_the_instructor_decides_survives_and_is_flagged_when_the_evidence_changes
         let (said, report) = place.grade(&root, arguments);
         let rows = rows(&report);
         let bo = rows.iter().position(|(name, ..)| name.contains("Bo Ode")).unwrap();
-        assert_eq!(report["hand_ins"][bo]["points"], 15.0, "{said}");
+        assert_eq!(report["submissions"][bo]["points"], 15.0, "{said}");
         assert!(rows[bo].2.contains(words), "{}", rows[bo].2);
         assert!(rows[1 - bo].2.contains("the instructor looked at it"), "{}", rows[1 - bo].2);
-        let page = place.at("out").join(text(&report["hand_ins"][bo]["slug"])).join("report.html");
+        let page =
+            place.at("out").join(text(&report["submissions"][bo]["slug"])).join("report.html");
         assert!(fs::read_to_string(page).unwrap().contains(words));
         assert_eq!(report["class"]["stale"].as_array().unwrap().len(), stale, "{said}");
         let (code, said) = run(&["status"]);

@@ -15,7 +15,8 @@ use umbra::assignment::Assignment;
 use umbra::build::{Recording, compile};
 use umbra::decode::Decoder;
 use umbra::worker::{
-    Adapter, AdapterKind, Fault, Job, Outcome, Request, SceneRef, Supervisor, blames_the_machine,
+    Adapter, AdapterKind, Fault, Job, Outcome, Request, SceneRef, Supervisor,
+    is_environment_failure,
 };
 
 const UMBRA: &str = env!("CARGO_BIN_EXE_umbra");
@@ -106,5 +107,5 @@ fn a_worker_that_cannot_run_for_want_of_space_costs_nothing() {
     let report = supervisor.run_job(&job, &limits, &AtomicBool::new(false), &mut |_| {});
     let outcome = &report.outcomes[0];
     assert_eq!(outcome.fault(), Some(Fault::Environment), "{outcome:?}");
-    assert!(matches!(outcome, Outcome::NotRun { .. }) && !blames_the_machine(outcome));
+    assert!(matches!(outcome, Outcome::NotRun { .. }) && !is_environment_failure(outcome));
 }

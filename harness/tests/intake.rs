@@ -1,4 +1,4 @@
-//! Hand-ins that are right, nearly right and wrong in the usual ways: copies, validation as a
+//! Submissions that are right, nearly right and wrong in the usual ways: copies, validation as a
 //! student reads it, packing and fixing.
 
 use std::fs;
@@ -11,8 +11,8 @@ use crate::support::tar_bytes::{self, gz, tar};
 use crate::support::zip_bytes::{Entry, Zip, crc32, extra};
 use similar_asserts::assert_eq;
 use umbra::intake::{
-    Finding, Format, HandIn, IntakeError, Limits, Severity, TreeSpec, Validation, fix, pack,
-    scan_source, unpack, unpack_bytes, validate_hand_in, validate_refusal,
+    Finding, Format, IntakeError, Limits, Severity, Submission, TreeSpec, Validation, fix, pack,
+    scan_source, unpack, unpack_bytes, validate_refusal, validate_submission,
 };
 
 const CONFIG: &str = r#"{
@@ -116,14 +116,14 @@ fn every_format_gives_the_same_copy() {
         (gz(&tar_of(&wrapped)), "a.tar.gz", Format::TarGz),
     ] {
         let scratch = Scratch::new();
-        let hand_in =
+        let submission =
             unpack_bytes(&bytes, name, &scratch.dest, &TreeSpec::default(), &Limits::default())
                 .unwrap();
-        assert_eq!(hand_in.format, format);
-        assert_eq!(hand_in.files, from_folder.files);
-        assert_eq!(hand_in.digest, from_folder.digest);
+        assert_eq!(submission.format, format);
+        assert_eq!(submission.files, from_folder.files);
+        assert_eq!(submission.digest, from_folder.digest);
         for (path, content) in &files {
-            assert_eq!(&fs::read(hand_in.root.join(path)).unwrap(), content);
+            assert_eq!(&fs::read(submission.root.join(path)).unwrap(), content);
         }
         assert_eq!(listing(&scratch.dest).len(), files.len());
     }
@@ -131,11 +131,11 @@ fn every_format_gives_the_same_copy() {
 
 #[test]
 fn hash_is_sha256_of_the_content() {
-    let (hand_in, _scratch) =
+    let (submission, _scratch) =
         assert_accepted(&Zip::of([Entry::stored("abc", b"abc")]).bytes(), "a.zip", "");
     // FIPS 180-2, appendix B.1.
     assert_eq!(
-        hand_in.files[0].sha256,
+        submission.files[0].sha256,
         "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     );
 }
@@ -161,10 +161,12 @@ fn digest_depends_on_paths_and_contents() {
 #[test]
 fn one_wrapping_folder_is_noted() {
     let wrapped = moved(|path| Some(format!("a2 Ada/{path}")));
-    let (hand_in, _scratch) = assert_accepted(&zip_of(&wrapped), "a.zip", "wrapped");
-    assert_eq!(hand_in.wrapped_in.as_deref(), Some("a2 Ada"));
-    assert!(hand_in.root.ends_with("dest/a2 Ada") && hand_in.root.join("config.json").is_file());
-    assert_eq!(codes(&hand_in.findings), ["wrapped a2 Ada/"]);
+    let (submission, _scratch) = assert_accepted(&zip_of(&wrapped), "a.zip", "wrapped");
+    assert_eq!(submission.wrapped_in.as_deref(), Some("a2 Ada"));
+    assert!(
+        submission.root.ends_with("dest/a2 Ada") && submission.root.join("config.json").is_file()
+    );
+    assert_eq!(codes(&submission.findings), ["wrapped a2 Ada/"]);
 }
 
 #[test]
@@ -221,8 +223,8 @@ fn zip_with_folders_comment_and_unicode_names_is_fine() {
         comment: b"made by hand".to_vec(),
         ..Zip::default()
     };
-    let (hand_in, _scratch) = assert_accepted(&zip.bytes(), "a.zip", "");
-    let paths: Vec<&str> = hand_in.files.iter().map(|f| f.path.as_str()).collect();
+    let (submission, _scratch) = assert_accepted(&zip.bytes(), "a.zip", "");
+    let paths: Vec<&str> = submission.files.iter().map(|f| f.path.as_str()).collect();
     assert_eq!(paths, ["src/été.rs", "été.txt"]);
 }
 
@@ -241,8 +243,8 @@ fn tar_long_names_and_pax_paths_are_fine() {
         Tar::file("truncated", b"y"),
         Tar::file("./config.json", b"{}"),
     ];
-    let (hand_in, _scratch) = assert_accepted(&tar(&entries), "a.tar", "");
-    let paths: Vec<&str> = hand_in.files.iter().map(|f| f.path.as_str()).collect();
+    let (submission, _scratch) = assert_accepted(&tar(&entries), "a.tar", "");
+    let paths: Vec<&str> = submission.files.iter().map(|f| f.path.as_str()).collect();
     assert_eq!(paths, ["config.json", other.as_str(), long.as_str()]);
 }
 
@@ -256,8 +258,8 @@ fn tar_of_the_tar_crate_is_fine() {
         builder.append_data(&mut header, &name, content.as_slice()).unwrap();
     }
     let bytes = builder.into_inner().unwrap();
-    let (hand_in, _scratch) = assert_accepted(&bytes, "a.tar", "");
-    assert_eq!(hand_in.files.len(), perfect().len());
+    let (submission, _scratch) = assert_accepted(&bytes, "a.tar", "");
+    assert_eq!(submission.files.len(), perfect().len());
 }
 
 #[test]
@@ -351,7 +353,7 @@ fn sparse_file_in_a_folder_counts_its_apparent_size() {
 // --- validation as text ---
 
 #[test]
-fn text_of_a_perfect_hand_in() {
+fn text_of_a_perfect_submission() {
     assert_eq!(
         validate_files(&perfect()).to_text(),
         "\
@@ -414,7 +416,7 @@ warning: realtime: differs only in case from 'Realtime'
 warning: Text.txt: not part of the expected tree
   hint: leave it out; it is not looked at
 
-warning: config.json:1: 'renders/teapot_bonus.exr' is handed in, but not listed
+warning: config.json:1: 'renders/teapot_bonus.exr' is submitted, but not listed
   hint: add { \"scene\": ..., \"render\": \"renders/teapot_bonus.exr\" } to \"renders\"
 
 note: 1 ignored: .DS_Store
@@ -608,7 +610,7 @@ fn pack_refuses_what_would_not_conform() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "only the working folder");
 }
 
-fn fix_files(files: &[(String, Vec<u8>)]) -> Result<HandIn, IntakeError> {
+fn fix_files(files: &[(String, Vec<u8>)]) -> Result<Submission, IntakeError> {
     let folder = tempfile::tempdir().unwrap();
     let (source, out) = (folder.path().join("in.zip"), folder.path().join("out.zip"));
     fs::write(&source, zip_of(files)).unwrap();
@@ -618,9 +620,9 @@ fn fix_files(files: &[(String, Vec<u8>)]) -> Result<HandIn, IntakeError> {
     assert_eq!(result.is_ok(), out.exists());
     result?;
     let scratch = Scratch::new();
-    let hand_in = unpack(&out, &scratch.dest, &TreeSpec::default(), &Limits::default())?;
-    assert!(validate_hand_in(&hand_in, &TreeSpec::default())?.follows_tree());
-    Ok(hand_in)
+    let submission = unpack(&out, &scratch.dest, &TreeSpec::default(), &Limits::default())?;
+    assert!(validate_submission(&submission, &TreeSpec::default())?.follows_tree());
+    Ok(submission)
 }
 
 #[test]
@@ -650,14 +652,14 @@ fn fix_mends_levels_folders_aliases_and_junk() {
         ("inside a folder named src", moved(|path| Some(format!("src/{path}")))),
     ] {
         match fix_files(&files) {
-            Ok(hand_in) => assert_eq!(hand_in.digest, digest, "{what}"),
+            Ok(submission) => assert_eq!(submission.digest, digest, "{what}"),
             Err(error) => panic!("{what}: {error}"),
         }
     }
     let mut files = perfect();
     files.push(("renders/cbox_bonus.exr".to_owned(), b"bonus".to_vec()));
-    let hand_in = fix_files(&files).unwrap();
-    assert!(hand_in.file("realtime/cbox_bonus.exr").is_some());
+    let submission = fix_files(&files).unwrap();
+    assert!(submission.file("realtime/cbox_bonus.exr").is_some());
 }
 
 #[test]
@@ -677,8 +679,8 @@ fn fix_refuses_what_moving_cannot_mend() {
 #[test]
 fn what_fixing_would_do_is_said_in_words() {
     let said = |files: &[(String, Vec<u8>)]| {
-        let (hand_in, _scratch) = accepted(files);
-        umbra::intake::mends(&hand_in, &TreeSpec::default())
+        let (submission, _scratch) = accepted(files);
+        umbra::intake::mends(&submission, &TreeSpec::default())
     };
     assert_eq!(said(&perfect()), None);
     let elsewhere = moved(|path| Some(path.replace("src/", "code/")));
@@ -694,7 +696,7 @@ fn what_fixing_would_do_is_said_in_words() {
 }
 
 /// A copy, whatever is to be said of it.
-fn accepted(files: &[(String, Vec<u8>)]) -> (HandIn, Scratch) {
+fn accepted(files: &[(String, Vec<u8>)]) -> (Submission, Scratch) {
     let scratch = Scratch::new();
     let (tree, limits) = (TreeSpec::default(), Limits::default());
     (unpack_bytes(&zip_of(files), "a.zip", &scratch.dest, &tree, &limits).unwrap(), scratch)
@@ -762,24 +764,24 @@ fn source_rules_name_file_and_line() {
         "src/evil.rs".to_owned(),
         b"// unsafe\nfn f() {\n  unsafe { std::process::exit(0) }\n}\n".to_vec(),
     ));
-    let (hand_in, _scratch) = assert_accepted(&zip_of(&files), "a.zip", "");
+    let (submission, _scratch) = assert_accepted(&zip_of(&files), "a.zip", "");
     let found: Vec<String> =
-        scan_source(&hand_in).unwrap().iter().map(ToString::to_string).collect();
+        scan_source(&submission).unwrap().iter().map(ToString::to_string).collect();
     assert_eq!(
         found,
         [
             "warning: src/evil.rs:3: unsafe code",
             "warning: src/evil.rs:3: std::process",
-            "note: src/build.rs: build.rs is handed in, but ours is used",
+            "note: src/build.rs: build.rs is submitted, but ours is used",
         ]
     );
 }
 
 #[test]
-fn hand_in_and_validation_survive_json() {
-    let (hand_in, _scratch) = assert_accepted(&zip_of(&perfect()), "a.zip", "");
-    let text = serde_json::to_string(&hand_in).unwrap();
-    assert_eq!(serde_json::from_str::<HandIn>(&text).unwrap(), hand_in);
+fn submission_and_validation_survive_json() {
+    let (submission, _scratch) = assert_accepted(&zip_of(&perfect()), "a.zip", "");
+    let text = serde_json::to_string(&submission).unwrap();
+    assert_eq!(serde_json::from_str::<Submission>(&text).unwrap(), submission);
     let validation = validate_files(&perfect());
     let text = serde_json::to_string(&validation).unwrap();
     assert_eq!(serde_json::from_str::<Validation>(&text).unwrap(), validation);

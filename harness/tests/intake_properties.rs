@@ -5,7 +5,7 @@ use crate::support::tar_bytes::{self, gz, tar};
 use crate::support::zip_bytes::{Entry, Zip};
 use proptest::prelude::*;
 use umbra::intake::{
-    HandInConfig, IntakeError, TreeSpec, check_config, scan_text, validate_hand_in,
+    IntakeError, SubmittedConfig, TreeSpec, check_config, scan_text, validate_submission,
 };
 
 /// Unpacks and checks what must hold of every submission; whether it was accepted.
@@ -16,11 +16,11 @@ fn survives(bytes: &[u8]) -> Result<bool, TestCaseError> {
     prop_assert_eq!(scratch.outside(), before);
     let written = listing(&scratch.dest);
     match result {
-        Ok(hand_in) => {
-            prop_assert_eq!(written.len(), hand_in.files.len());
+        Ok(submission) => {
+            prop_assert_eq!(written.len(), submission.files.len());
             let total: usize = written.values().map(Vec::len).sum();
             prop_assert!(total <= 4 << 20);
-            let validation = validate_hand_in(&hand_in, &TreeSpec::default());
+            let validation = validate_submission(&submission, &TreeSpec::default());
             prop_assert!(validation.is_ok_and(|v| !v.to_text().is_empty()));
             Ok(true)
         }
@@ -117,7 +117,7 @@ proptest! {
     #[test]
     fn any_config(text in "([{}\\[\\],:\"'\\\\/#*]|render|renders|id|1|-|\n|\u{feff}|é| ){0,60}", bytes in prop::collection::vec(any::<u8>(), 0..100)) {
         for bytes in [text.as_bytes(), &bytes] {
-            let (config, findings, is_whole) = HandInConfig::parse(bytes);
+            let (config, findings, is_whole) = SubmittedConfig::parse(bytes);
             let findings: Vec<_> = findings.into_iter().chain(check_config(&config, is_whole, &["a.exr"], &[], &TreeSpec::default())).collect();
             for finding in findings {
                 prop_assert!(finding.line.is_some_and(|line| line >= 1), "{finding}");
@@ -129,7 +129,7 @@ proptest! {
     #[test]
     fn well_formed_json_is_accepted(first in "[a-zA-Zé \"\\\\/\t]{0,12}", id in any::<u64>()) {
         let text = serde_json::json!({ "firstName": first, "id": id, "x": [1.5, null, { "y": [] }] }).to_string();
-        let (config, findings, _) = HandInConfig::parse(text.as_bytes());
+        let (config, findings, _) = SubmittedConfig::parse(text.as_bytes());
         prop_assert_eq!(findings, []);
         prop_assert_eq!(config.sampler_seed(), Some(id));
         prop_assert_eq!(config.first_name.map(|f| f.text), Some(first.trim().to_owned()));

@@ -35,7 +35,7 @@ fn reference() -> PathBuf {
     path
 }
 
-struct House {
+struct TestEnv {
     dir: tempfile::TempDir,
     supervisor: Supervisor,
     victim: Child,
@@ -44,14 +44,14 @@ struct House {
     _one: MutexGuard<'static, ()>,
 }
 
-impl Drop for House {
+impl Drop for TestEnv {
     fn drop(&mut self) {
         let _ = self.victim.kill();
         let _ = self.victim.wait();
     }
 }
 
-impl House {
+impl TestEnv {
     fn new() -> Self {
         let one = ONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let dir = tempfile::tempdir().unwrap();
@@ -60,7 +60,7 @@ impl House {
         }
         let toml = "[input]\nobjfile = \"s.obj\"\n";
         std::fs::write(dir.path().join("scene/s.toml"), toml).unwrap();
-        std::fs::write(dir.path().join("other/secret"), "another hand-in's").unwrap();
+        std::fs::write(dir.path().join("other/secret"), "another submission's").unwrap();
         let unix = UnixListener::bind(dir.path().join("other/socket")).unwrap();
         let supervisor = Supervisor::new(UMBRA.into(), dir.path().join("scratch"));
         let victim = Command::new("sleep").arg("60").spawn().unwrap();
@@ -144,7 +144,7 @@ fn word(report: &JobReport) -> String {
 
 #[test]
 fn a_plugin_reaches_nothing_of_the_host() {
-    let house = House::new();
+    let house = TestEnv::new();
     let plugin = house.plugin("attack.so", &[]);
     let expected = workspace().join("expected/a2/cbox.exr").display().to_string();
     assert!(Path::new(&expected).is_file());
@@ -199,7 +199,7 @@ fn a_plugin_reaches_nothing_of_the_host() {
 
 #[test]
 fn without_any_one_layer_the_others_still_hold() {
-    let house = House::new();
+    let house = TestEnv::new();
     let plugin = house.plugin("attack.so", &[]);
     let root = nix::unistd::geteuid().is_root();
     let port = house.tcp.local_addr().unwrap().port().to_string();
@@ -256,7 +256,7 @@ fn an_ordinary_user_is_isolated_as_well() {
 
 #[test]
 fn attacks_while_a_plugin_is_loaded_fail_as_well() {
-    let house = House::new();
+    let house = TestEnv::new();
     let secret = format!("-DATTACK_AT_LOAD=\"read {}\"", house.path("other/secret"));
     for (index, flag) in ["-DATTACK_AT_LOAD=\"exec /bin/sh\"", &secret].iter().enumerate() {
         let plugin = house.plugin(&format!("load{index}.so"), &[flag]);
@@ -270,7 +270,7 @@ fn attacks_while_a_plugin_is_loaded_fail_as_well() {
 
 #[test]
 fn nothing_is_left_of_a_worker_that_is_ended() {
-    let house = House::new();
+    let house = TestEnv::new();
     let plugin = house.plugin("attack.so", &[]);
     let job = Job { plugin: Some(plugin), requests: vec![house.offline("sleep 60")] };
     let limits = Limits { wall_s: 0.5, cpu_s: 1, ..Limits::default() };
@@ -291,7 +291,7 @@ fn nothing_is_left_of_a_worker_that_is_ended() {
 
 #[test]
 fn a_layer_that_cannot_be_had_is_the_machines_matter() {
-    let house = House::new();
+    let house = TestEnv::new();
     let plugin = house.plugin("attack.so", &[]);
     // Not this program: it ends well and has locked nothing.
     let liar = Supervisor { umbra: "/bin/true".into(), ..house.supervisor.clone() };
@@ -306,7 +306,7 @@ fn a_layer_that_cannot_be_had_is_the_machines_matter() {
 
 #[test]
 fn messages_name_no_path_of_the_host() {
-    let house = House::new();
+    let house = TestEnv::new();
     let missing = Request::EvalBsdf {
         scene: SceneRef { path: house.path("scene/missing.toml").into(), options: String::new() },
         queries: Vec::new(),
@@ -347,7 +347,7 @@ fn realtime(kind: AdapterKind) -> Request {
 
 #[test]
 fn shaders_of_a_trusted_worker_serve_others_and_nobody_changes_them() {
-    let house = House::new();
+    let house = TestEnv::new();
     let left = house.dir.path().join("shaders");
     std::fs::create_dir(&left).unwrap();
     let contents = || {
@@ -380,7 +380,7 @@ fn shaders_of_a_trusted_worker_serve_others_and_nobody_changes_them() {
 
 #[test]
 fn the_reference_draws_the_same_bits_inside_and_outside() {
-    let house = House::new();
+    let house = TestEnv::new();
     let offline = Request::RenderOffline {
         scene: cornell_box("cbox_simple_offline.toml"),
         width: 40,
@@ -417,7 +417,7 @@ fn the_reference_draws_the_same_bits_inside_and_outside() {
 
 #[test]
 fn a_build_reads_nothing_but_its_own_source() {
-    let house = House::new();
+    let house = TestEnv::new();
     let recording = Recording::obtain(workspace(), Path::new(UMBRA)).unwrap();
     let secret = house.path("other/secret");
     let foreign = workspace().join("reference_impl/src/lib.rs").display().to_string();

@@ -15,7 +15,6 @@ mod diagnosis;
 mod downloads;
 mod expected;
 mod full_disk;
-mod handed_in;
 mod intake;
 mod intake_properties;
 mod isolation;
@@ -29,5 +28,6 @@ mod render_command;
 #[path = "sandbox/main.rs"]
 mod sandbox;
 mod statistics;
+mod submitted;
 mod support;
 mod worker;

@@ -40,15 +40,15 @@ fn every_archive_is_read_as_it_was_meant_and_mended_to_a_plain_one() {
         let said: Vec<&str> = said.filter(|code| *code != "wrapped").collect();
         let expected = SAID.iter().filter(|(file, _)| *file == name).map(|(_, code)| *code);
         assert_eq!(said, expected.collect::<Vec<_>>(), "{name}");
-        assert_eq!(received.hand_in.files.len(), 6, "{name}");
-        digests.push(received.hand_in.digest.clone());
+        assert_eq!(received.submission.files.len(), 6, "{name}");
+        digests.push(received.submission.digest.clone());
 
         let out = scratch.root.path().join("out.zip");
-        fix(&received.hand_in, &out, &tree, &limits).unwrap();
+        fix(&received.submission, &out, &tree, &limits).unwrap();
         let plain = Scratch::new();
         let mended = unpack(&out, &plain.dest, &tree, &limits).unwrap();
         assert_eq!(mended.findings, [], "{name}");
-        assert_eq!(mended.digest, received.hand_in.digest, "{name}");
+        assert_eq!(mended.digest, received.submission.digest, "{name}");
     }
     assert!(digests.iter().all(|digest| *digest == digests[0]), "{digests:?}");
 }
@@ -62,7 +62,7 @@ fn a_submission_of_2019_lacks_nothing_but_the_language() {
     let scratch = Scratch::new();
     let (validation, images) = with_decoder(|decoder| {
         let received = decoder.receive(&path, &scratch.dest, &tree, &limits).unwrap();
-        let images = decoder.image_findings(&received.hand_in, &tree).unwrap();
+        let images = decoder.image_findings(&received.submission, &tree).unwrap();
         (received.validation, images)
     });
     let validation = validation.with(images);

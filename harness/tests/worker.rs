@@ -60,13 +60,13 @@ const INTENSITY: [f32; 3] = [10.0, 20.0, 30.0];
 /// A plugin that misbehaves.
 const FAULT: &str = "tests/c_plugin/fault.c";
 
-struct House {
+struct TestEnv {
     dir: tempfile::TempDir,
     supervisor: Supervisor,
     limits: Limits,
 }
 
-impl House {
+impl TestEnv {
     fn new() -> Self {
         let dir = tempfile::tempdir().unwrap();
         for (name, text) in [("s.toml", TOML), ("s.obj", OBJ), ("s.mtl", MTL)] {
@@ -178,7 +178,7 @@ fn down_to(x: f32, z: f32) -> RayQuery {
 
 #[test]
 fn the_reference_renders_offline_the_same_at_any_thread_count() {
-    let house = House::new();
+    let house = TestEnv::new();
     let requests = [(7, 1), (7, 3), (8, 1)].map(|(seed, n)| house.offline("", seed, n)).to_vec();
     let report = house.run(&reference(), requests);
     assert_eq!(report.renderer.as_deref(), Some("reference 0.1.0"));
@@ -194,7 +194,7 @@ fn the_reference_renders_offline_the_same_at_any_thread_count() {
 
 #[test]
 fn bsdf_probes_of_the_reference_and_of_plain_c_match_the_closed_form() {
-    let house = House::new();
+    let house = TestEnv::new();
     let albedo = [0.9, 0.5, 0.1];
     let (up, tilted, below) = ([0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.6, 0.0, -0.8]);
     let pairs = [(up, up), (up, tilted), (tilted, up), (up, below), (below, up)];
@@ -228,7 +228,7 @@ fn bsdf_probes_of_the_reference_and_of_plain_c_match_the_closed_form() {
 
 #[test]
 fn radiance_under_a_witness_is_intensity_over_r_squared_times_its_value() {
-    let house = House::new();
+    let house = TestEnv::new();
     let points = [(0.0, 0.0), (1.0, 0.0), (-2.0, 1.5), (0.5, -3.0)];
     let rays: Vec<_> = points.iter().map(|&(x, z)| down_to(x, z)).collect();
     let witnesses =
@@ -266,7 +266,7 @@ fn radiance_under_a_witness_is_intensity_over_r_squared_times_its_value() {
 
 #[test]
 fn a_shadow_is_seen_under_the_constant_witness_only_when_asked_for() {
-    let house = House::new();
+    let house = TestEnv::new();
     let request = |shadows| Request::Radiance {
         scene: house.scene(""),
         rays: vec![down_to(3.0, 0.0), down_to(-3.0, 0.0)],
@@ -282,7 +282,7 @@ fn a_shadow_is_seen_under_the_constant_witness_only_when_asked_for() {
 
 #[test]
 fn tables_that_do_not_fit_are_refused_with_both_values_named() {
-    let house = House::new();
+    let house = TestEnv::new();
     let version = renderer_api::INTERFACE_VERSION;
     for (flag, expected) in [
         ("-DWRONG_MAGIC", [format!("{:#018x}", renderer_api::MAGIC), "0x1122334455667788".into()]),
@@ -313,7 +313,7 @@ fn late(computing: bool, limit_s: f64) -> Outcome {
 
 #[test]
 fn each_fault_has_its_outcome_and_the_requests_around_it_are_answered() {
-    let mut house = House::new();
+    let mut house = TestEnv::new();
     house.limits.wall_s = 1.0;
     house.limits.cpu_s = 1;
     house.limits.memory_mib = 400;
@@ -368,7 +368,7 @@ fn each_fault_has_its_outcome_and_the_requests_around_it_are_answered() {
 
 #[test]
 fn a_request_is_blamed_only_for_what_it_does_first_in_a_worker() {
-    let house = House::new();
+    let house = TestEnv::new();
     let plugin = house.compile(FAULT, &[]);
     let requests = ["first", "first", "abort", "first"].map(|mode| house.offline(mode, 1, 1));
     let report = house.run(&plugin, requests.to_vec());
@@ -382,7 +382,7 @@ fn a_request_is_blamed_only_for_what_it_does_first_in_a_worker() {
 
 #[test]
 fn files_cut_short_by_a_plugin_are_its_own_loss() {
-    let house = House::new();
+    let house = TestEnv::new();
     let plugin = house.compile(FAULT, &[]);
     let report = house.run(&plugin, vec![house.offline("truncate", 1, 1)]);
     assert!(matches!(&report.outcomes[0], Outcome::Rejected(_)), "{:?}", report.outcomes);
@@ -390,7 +390,7 @@ fn files_cut_short_by_a_plugin_are_its_own_loss() {
 
 #[test]
 fn a_plugin_that_ends_the_worker_while_it_is_loaded_is_asked_once() {
-    let house = House::new();
+    let house = TestEnv::new();
     let plugin = house.compile(FAULT, &["-DFAULT_AT_LOAD"]);
     let report = house.run(&plugin, vec![house.offline("", 1, 1), house.offline("", 2, 1)]);
     assert_eq!(report.outcomes, [Outcome::ExitedEarly(3), Outcome::ExitedEarly(3)]);
@@ -399,7 +399,7 @@ fn a_plugin_that_ends_the_worker_while_it_is_loaded_is_asked_once() {
 
 #[test]
 fn cpu_time_is_limited_apart_from_wall_clock_time() {
-    let mut house = House::new();
+    let mut house = TestEnv::new();
     house.limits.wall_s = 20.0;
     house.limits.cpu_s = 1;
     let plugin = house.compile(FAULT, &[]);
@@ -409,7 +409,7 @@ fn cpu_time_is_limited_apart_from_wall_clock_time() {
 
 #[test]
 fn a_busy_machine_makes_nobody_late() {
-    let mut house = House::new();
+    let mut house = TestEnv::new();
     // Far less than a starved render takes by the clock.
     house.limits.wall_s = 0.3;
     let plugin = house.compile(FAULT, &[]);
@@ -433,7 +433,7 @@ fn a_busy_machine_makes_nobody_late() {
 
 #[test]
 fn questions_of_one_worker_have_limits_of_their_own() {
-    let house = House::new();
+    let house = TestEnv::new();
     let plugin = house.compile(FAULT, &[]);
     let ask = |modes: &[&str]| {
         let requests = modes.iter().map(|mode| house.offline(mode, 1, 1)).collect();
@@ -464,7 +464,7 @@ fn questions_of_one_worker_have_limits_of_their_own() {
 
 #[test]
 fn a_timeout_counts_when_it_is_confirmed_alone_on_the_machine() {
-    let mut house = House::new();
+    let mut house = TestEnv::new();
     house.limits.wall_s = 1.0;
     // What a worker did before is known to the next only without isolation.
     house.supervisor.isolation = Layers::NONE;
@@ -511,7 +511,7 @@ fn a_timeout_counts_when_it_is_confirmed_alone_on_the_machine() {
 
 #[test]
 fn a_cancelled_job_ends_at_once_and_says_so() {
-    let house = House::new();
+    let house = TestEnv::new();
     let plugin = house.compile(FAULT, &[]);
     let cancel = AtomicBool::new(false);
     let requests = ["", "sleep", ""].map(|mode| house.offline(mode, 1, 1)).to_vec();
@@ -538,7 +538,7 @@ const FRAGMENT: &str = "@fragment fn fs_main() -> @location(0) vec4f {
 
 #[test]
 fn a_stage_that_is_no_wgsl_is_refused_with_its_line_and_others_are_drawn() {
-    let house = House::new();
+    let house = TestEnv::new();
     let with = |vertex: &str, phong: &str| {
         let stage = |(name, text): (&str, &str)| Stage { name: name.into(), text: text.into() };
         let stages = [("simple.vs", vertex), ("diffuse.fs", FRAGMENT), ("phong.fs", phong)];
@@ -595,7 +595,7 @@ fn a_stage_that_is_no_wgsl_is_refused_with_its_line_and_others_are_drawn() {
 
 #[test]
 fn scenes_and_passes_that_fail_say_why() {
-    let house = House::new();
+    let house = TestEnv::new();
     let mut missing = house.scene("");
     missing.path = house.dir.path().join("missing.toml");
     let realtime = |kind| Request::RenderRealtime {

@@ -1,7 +1,7 @@
 //! Quick tests of 1.1 and 1.2: `cargo test --release -p student_template`.
 //!
 //! Each fails with "not yet implemented" until its BSDF is written. They ask for a few values only;
-//! `umbra check` asks for thousands. Write more tests here as you like: this folder is not handed in.
+//! `umbra check` asks for thousands. Write more tests here as you like: this folder is not submitted.
 
 #[path = "../src/bsdfs/mod.rs"]
 mod bsdfs;

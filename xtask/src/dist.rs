@@ -14,7 +14,7 @@ use anyhow::{Context, Result, ensure};
 use umbra::assignment::Assignment;
 use umbra::expected::Store;
 use umbra::files::library_name;
-use umbra::grading::Case;
+use umbra::grading::PreparedScene;
 use umbra::worker::Supervisor;
 
 /// What goes into the kit as it is: files, and folders with all below.
@@ -160,8 +160,8 @@ fn add_expected(root: &Path, kit: &Path) -> Result<()> {
     fs::create_dir_all(&to)?;
     for entry in &assignment.scenes {
         let scene = || format!("scene \"{}\"", entry.name);
-        Case::new(&store, entry).with_context(scene)?;
-        for file in Case::made_files(&store, entry).with_context(scene)? {
+        PreparedScene::new(&store, entry).with_context(scene)?;
+        for file in PreparedScene::made_files(&store, entry).with_context(scene)? {
             // Realtime ones cannot be made without a graphics adapter, and are then done without.
             if file.is_file() {
                 fs::copy(&file, to.join(file.file_name().unwrap_or_default()))?;

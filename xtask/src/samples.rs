@@ -259,7 +259,7 @@ impl Packer {
     /// The published image of the scene whose offline image lies at `path`, as an EXR file.
     fn published(&self, path: &str) -> Result<Vec<u8>> {
         let own = |scene: &&SceneEntry| {
-            scene.hand_in.as_ref().is_some_and(|images| images.offline == path)
+            scene.submitted.as_ref().is_some_and(|images| images.offline == path)
         };
         let scene = self.assignment.scenes.iter().find(own);
         let scene = scene.with_context(|| format!("published: no scene's image is {path}"))?;
@@ -300,7 +300,7 @@ impl Packer {
         let seed = id.parse().context("the student's id seeds the sampler")?;
         let mut asked = Vec::new();
         for scene in &self.assignment.scenes {
-            let Some(images) = &scene.hand_in else { continue };
+            let Some(images) = &scene.submitted else { continue };
             asked.push((images.offline.clone(), self.request(&scene.offline, seed)?));
             asked.push((images.realtime.clone(), self.request(&scene.realtime, seed)?));
             let bonus = recipe.bonus.as_ref().filter(|path| path.contains(&scene.name));

@@ -77,7 +77,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
     let mut assignment = Assignment::load(root)?;
     for scene in &mut assignment.scenes {
         // The images that a submission must contain are no matter here.
-        if scene.hand_in.take().is_some() && !arguments.full {
+        if scene.submitted.take().is_some() && !arguments.full {
             scene.film = Some(SMALL_FILM);
         }
     }

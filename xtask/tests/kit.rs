@@ -9,7 +9,7 @@ use std::process::Command;
 use serde_json::Value;
 use umbra::assignment::Assignment;
 use umbra::expected::Store;
-use umbra::grading::Case;
+use umbra::grading::PreparedScene;
 use umbra::worker::Supervisor;
 
 /// So many lines in a row that the reference has too, most of them not the template's, are no chance.
@@ -133,7 +133,7 @@ fn the_kit_is_whole_and_holds_nothing_of_the_reference() {
         progress: &|_| (),
     });
     for entry in &assignments[0].scenes {
-        let [a, b] = [&here, &there].map(|store| Case::new(store, entry).unwrap());
+        let [a, b] = [&here, &there].map(|store| PreparedScene::new(store, entry).unwrap());
         let name = &entry.name;
         assert!(a.expected.offline.mean == b.expected.offline.mean, "{name}: mean");
         assert!(a.expected.offline.variance == b.expected.offline.variance, "{name}: variance");
@@ -141,8 +141,11 @@ fn the_kit_is_whole_and_holds_nothing_of_the_reference() {
         assert!(a.expected.offline.mask == b.expected.offline.mask, "{name}: mask");
         assert!(a.expected.unshadowed == b.expected.unshadowed, "{name}: unshadowed");
         assert!(a.expected.raw_normals == b.expected.raw_normals, "{name}: raw normals");
-        assert!(a.small.unshadowed == b.small.unshadowed, "{name}: small film");
-        assert!(a.small.raw_normals == b.small.raw_normals, "{name}: small film, raw normals");
+        assert!(a.probe_film.unshadowed == b.probe_film.unshadowed, "{name}: small film");
+        assert!(
+            a.probe_film.raw_normals == b.probe_film.raw_normals,
+            "{name}: small film, raw normals"
+        );
     }
 }
 
@@ -218,7 +221,7 @@ fn parts_that_are_solved_in_place_one_by_one_count_at_once() {
         let found = jargon.iter().find(|word| said.to_lowercase().contains(*word));
         assert!(found.is_none(), "after {part}: {found:?} in\n{said}");
         let lines: Vec<&str> = said.lines().collect();
-        let own = report["hand_ins"][0]["parts"].as_array().unwrap();
+        let own = report["submissions"][0]["parts"].as_array().unwrap();
         if let Some(worth) = own.iter().find(|own| own["id"] == *part) {
             let change = format!("since last time: {part} 0 -> {}", worth["out_of"]);
             let told = lines.iter().any(|line| format!("{line}.0").starts_with(&change));
@@ -232,7 +235,7 @@ fn parts_that_are_solved_in_place_one_by_one_count_at_once() {
         };
         let last = lines.iter().rposition(|line| line.starts_with("next: ")).unwrap();
         assert!(lines[last].starts_with(&next), "{next}: {said}");
-        for own in report["hand_ins"][0]["parts"].as_array().unwrap() {
+        for own in report["submissions"][0]["parts"].as_array().unwrap() {
             let id = own["id"].as_str().unwrap();
             let done = steps[..=index].iter().any(|(part, _)| *part == id);
             let right = if done { &own["out_of"] } else { &Value::from(0.0) };
@@ -276,7 +279,7 @@ fn a_check_in_the_kit_says_what_the_grader_says() {
         grader.args(["grade", archive, "--isolation", "reduced", "--perturb", "off"]);
         grader.arg("--root").arg(root());
         let ours = report(&mut grader, &out);
-        let parts = |report: &Value| report["hand_ins"][0]["parts"].clone();
+        let parts = |report: &Value| report["submissions"][0]["parts"].clone();
         assert_eq!(parts(&theirs), parts(&ours), "{name}");
         assert_eq!(verdicts(&theirs), verdicts(&ours), "{name}");
     }
@@ -306,6 +309,6 @@ fn report_and_words(umbra: &mut Command, out: &Path) -> (Value, String) {
 
 /// Which check said what of which scene, in the order they were made.
 fn verdicts(report: &Value) -> Vec<String> {
-    let checks = report["hand_ins"][0]["checks"].as_array().unwrap().iter();
+    let checks = report["submissions"][0]["checks"].as_array().unwrap().iter();
     checks.map(|check| format!("{} {} {}", check["id"], check["scene"], check["verdict"])).collect()
 }

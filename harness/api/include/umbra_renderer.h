@@ -82,7 +82,7 @@ typedef struct {
      */
     UmbraText path;
     /*
-     Empty for every hand-in. The reference renderer reads `mistake=NAME` here, separated by
+     Empty for every submission. The reference renderer reads `mistake=NAME` here, separated by
      commas, to make known mistakes on purpose; other plugins ignore it.
      */
     UmbraText options;

@@ -78,7 +78,7 @@ pub struct Message {
 pub struct SceneRequest {
     /// Path of the scene's TOML file.
     pub path: Text,
-    /// Empty for every hand-in. The reference renderer reads `mistake=NAME` here, separated by
+    /// Empty for every submission. The reference renderer reads `mistake=NAME` here, separated by
     /// commas, to make known mistakes on purpose; other plugins ignore it.
     pub options: Text,
 }

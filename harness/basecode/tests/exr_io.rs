@@ -1,4 +1,4 @@
-//! EXR files in and out: round trips, and files that are wrong in every way a hand-in can be.
+//! EXR files in and out: round trips, and files that are wrong in every way a submission can be.
 
 #![allow(clippy::unwrap_used)] // its helpers are tests too
 
@@ -46,7 +46,7 @@ unsafe impl GlobalAlloc for Watching {
 static ALLOCATOR: Watching = Watching;
 
 fn decode(bytes: &[u8]) -> Result<ExrLayers, ImageError> {
-    decode_exr(bytes, Path::new("hand-in.exr"))
+    decode_exr(bytes, Path::new("submission.exr"))
 }
 
 fn message(bytes: &[u8]) -> String {
@@ -272,7 +272,7 @@ fn other_channels_are_ignored_with_a_note() {
 fn wrong_kinds_of_file_are_named() {
     assert_eq!(
         message(b""),
-        "hand-in.exr: not an EXR file: it starts with nothing (the file is empty), expected 76 2f 31 01"
+        "submission.exr: not an EXR file: it starts with nothing (the file is empty), expected 76 2f 31 01"
     );
     assert!(message(b"\x89PNG\r\n\x1a\n").contains("it starts with 89 50 4e 47"));
     assert!(
@@ -287,7 +287,7 @@ fn wrong_kinds_of_file_are_named() {
             && missing.to_string().contains("/nonexistent/a.exr")
     );
     let lossy = message(&foreign(&BGR, Compression::B44, LINES, |_| ()));
-    assert_eq!(lossy, "hand-in.exr: b44 compression, expected none, RLE, ZIP or PIZ");
+    assert_eq!(lossy, "submission.exr: b44 compression, expected none, RLE, ZIP or PIZ");
     let mip = BlockDescription::Tiles(TileDescription {
         tile_size: Vec2(2, 2),
         level_mode: LevelMode::MipMap,
@@ -307,11 +307,11 @@ fn wrong_channels_are_named() {
     let half = SampleType::F16;
     assert_eq!(
         file(&[("B", half), ("G", half)]),
-        "hand-in.exr: no channel R; expected R, G and B, found B, G"
+        "submission.exr: no channel R; expected R, G and B, found B, G"
     );
     assert_eq!(
         file(&[("Y", half)]),
-        "hand-in.exr: luminance only (channel Y); expected R, G and B"
+        "submission.exr: luminance only (channel Y); expected R, G and B"
     );
     assert!(file(&[("Z", half)]).contains("no channel R"));
     assert!(

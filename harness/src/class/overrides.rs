@@ -298,9 +298,9 @@ mod tests {
 
     #[test]
     fn a_part_is_set_and_images_are_confirmed() {
-        let sheet = sample::sheet();
+        let report = sample::report();
         let run = |index: usize, text: &str| {
-            let entry = &sheet.entries[index];
+            let entry = &report.entries[index];
             let mut grade = entry.grade.clone();
             let subject = Subject {
                 slug: &entry.record.slug,
@@ -329,7 +329,7 @@ mod tests {
         assert_eq!((grade.points, applied.len()), (55.0, 1));
         assert_eq!(run(0, SET).1, []);
         // 11.44 wait for the instructor, whoever it is by folder or number.
-        let slug = &sheet.entries[2].record.slug;
+        let slug = &report.entries[2].record.slug;
         let confirm = format!("[[confirm]]\nstudent = \"{slug}\"\nreason = \"his noise\"\n");
         let (grade, applied, _) = run(2, &confirm);
         assert_eq!((grade.points, grade.points_max, grade.unconfirmed), (11.44, 11.44, 0.0));
@@ -337,7 +337,7 @@ mod tests {
             applied[0].words().contains("confirms what the images show, 11.44 points instead of 0")
         );
         let (grade, applied, _) = run(0, &confirm.replace(slug.as_str(), "260000001"));
-        assert_eq!(grade.points, sheet.entries[0].grade.points);
+        assert_eq!(grade.points, report.entries[0].grade.points);
         assert!(applied[0].words().starts_with("the instructor looked at it"));
         let subjects = [];
         assert_eq!(

@@ -22,7 +22,7 @@ use crate::files::write_whole;
 use crate::grading::{Folders, Grading, Mode, Record, RecordCache, judge_shared};
 use crate::held_back::recorded_seed;
 use crate::program::graded;
-use crate::report::{self, BatchReport, Entry};
+use crate::report::{self, BatchReport, SubmissionReport};
 use crate::rubric::{self, Grade};
 use crate::sandbox::Isolation;
 
@@ -47,7 +47,7 @@ pub struct Batch<'a> {
     /// So many at the same time.
     pub jobs: usize,
     /// What for.
-    pub purpose: Mode,
+    pub mode: Mode,
     /// What must isolate them.
     pub isolation: IsolationChoice,
     /// Nothing for the seed that is recorded with the batch.
@@ -79,7 +79,7 @@ impl Batch<'_> {
         let mut context = Context::new(root)?;
         // What a zip of many holds, until the end of the batch.
         let scratch = tempfile::tempdir_in(&context.supervisor.scratch)?;
-        let collected = match self.purpose {
+        let collected = match self.mode {
             Mode::Grade => {
                 let wanted = Wanted {
                     tree: &context.assignment.tree,
@@ -97,7 +97,7 @@ impl Batch<'_> {
             }
         };
         super::writable(self.output)?;
-        if self.purpose == Mode::Grade && context.reference().is_none() {
+        if self.mode == Mode::Grade && context.reference().is_none() {
             return Err(MachineLacks(
                 "grades are made with the reference renderer and with scenes that are held back, which \
                  are not here: a student's kit has neither; hint: `umbra check DIR` judges your work \
@@ -123,7 +123,7 @@ impl Batch<'_> {
             None => Some(recorded_seed(&self.output.join(report::INSTRUCTOR).join(SEED_FILE))?),
         };
         let all = class::sources(&collected.sources, self.output);
-        let (roster, matches) = match self.purpose {
+        let (roster, matches) = match self.mode {
             Mode::Grade => (class::roster(self.list, self.output)?, class::matches(self.output)?),
             Mode::Check => Default::default(),
         };
@@ -146,8 +146,8 @@ impl Batch<'_> {
         let result = context.with_store(|store| {
             let adapter = self.adapter.adapter();
             let mut grading = Grading::prepare(store, adapter, seed, &INTERRUPTED)?;
-            if self.purpose == Mode::Grade {
-                grading.kept = Some(RecordCache::of(&grading, self.force)?);
+            if self.mode == Mode::Grade {
+                grading.cache = Some(RecordCache::of(&grading, self.force)?);
             }
             if self.budget == BudgetChoice::None {
                 grading.budget = None;
@@ -158,16 +158,16 @@ impl Batch<'_> {
             grading.threads = (cores() / jobs as u32).max(1);
             let results = self.grade_all(context, &grading, &chosen, jobs);
             let costs = grading.costs_of_reference();
-            if self.purpose == Mode::Grade && !costs.is_empty() {
+            if self.mode == Mode::Grade && !costs.is_empty() {
                 let file = self.output.join(report::INSTRUCTOR).join(COSTS_FILE);
                 write_whole(&file, &serde_json::to_vec_pretty(&costs)?)
                     .with_context(|| format!("cannot write {}", file.display()))?;
             }
-            Ok::<_, anyhow::Error>((results, grading.held_back, grading.kept))
+            Ok::<_, anyhow::Error>((results, grading.held_back, grading.cache))
         });
         context.progress.end();
         if INTERRUPTED.load(Ordering::Relaxed) {
-            let goes_on = match (self.purpose, &result) {
+            let goes_on = match (self.mode, &result) {
                 (Mode::Grade, Ok((results, ..))) => format!(
                     ", {} of {} submissions are graded; the same command resumes there",
                     results.len(),
@@ -178,18 +178,18 @@ impl Batch<'_> {
             eprintln!("umbra: interrupted{goes_on}");
             return Ok(None);
         }
-        let (results, held_back, kept) = result?;
+        let (results, held_back, cache) = result?;
         let mut records = results.into_iter().collect::<anyhow::Result<Vec<Record>>>()?;
         let mut incomparable = Vec::new();
-        if let Some(kept) = kept {
-            if kept.found() > 0 {
+        if let Some(cache) = cache {
+            if cache.found() > 0 {
                 eprintln!(
                     "umbra: {} of {} submissions keep their earlier grades",
-                    kept.found(),
+                    cache.found(),
                     chosen.len()
                 );
             }
-            incomparable = class::join(&kept, self.output, &all, &aside, &mut records);
+            incomparable = class::join(&cache, self.output, &all, &aside, &mut records);
         }
         // In an order that does not hang on who was graded when.
         records.sort_by_key(|record| record.slug.to_lowercase());
@@ -206,23 +206,23 @@ impl Batch<'_> {
             }
             entries.push(entry);
         }
-        let class = match self.purpose {
+        let class = match self.mode {
             Mode::Grade => Some(self.settle(&mut entries, &collected, &aside, &all, &deciding)?),
             Mode::Check => None,
         };
-        let sheet =
+        let report =
             BatchReport { class, ..BatchReport::new(&context.assignment, held_back, entries) };
-        report::write(self.output, &sheet)?;
+        report::write(self.output, &report)?;
         if self.timings {
-            print_timings(&sheet);
+            print_timings(&report);
         }
-        Ok(Some((sheet, collected)))
+        Ok(Some((report, collected)))
     }
 
     /// Settles whose the graded submissions are and which of them count; the others leave `entries`.
     fn settle(
         &self,
-        entries: &mut Vec<Entry>,
+        entries: &mut Vec<SubmissionReport>,
         collected: &Collected,
         aside: &HashSet<String>,
         all: &[Source],
@@ -235,7 +235,7 @@ impl Batch<'_> {
         let subjects: Vec<Subject> = entries
             .iter()
             .zip(&claims)
-            .map(|(Entry { record, .. }, claim)| Subject {
+            .map(|(SubmissionReport { record, .. }, claim)| Subject {
                 slug: &record.slug,
                 numbers: super::decide::numbers(claim, deciding.roster, deciding.matches),
                 digest: &record.digest,
@@ -274,7 +274,7 @@ impl Batch<'_> {
             class.stale.extend(stale.map(|own| format!("{}: {}", claims[at].name, own.words())));
             standing.decisions.clone_from(&decisions[at]);
             let grade = grades[at].clone();
-            counting.push(Entry { record: entries[at].record.clone(), grade, standing });
+            counting.push(SubmissionReport { record: entries[at].record.clone(), grade, standing });
         }
         *entries = counting;
         Ok(class)
@@ -291,7 +291,7 @@ impl Batch<'_> {
     ) -> Vec<anyhow::Result<Record>> {
         let next = AtomicUsize::new(0);
         let results = Mutex::new(Vec::new());
-        let batch = self.purpose == Mode::Grade;
+        let batch = self.mode == Mode::Grade;
         if batch {
             context.progress.count(sources.len());
         }
@@ -312,15 +312,15 @@ impl Batch<'_> {
                     instructor: self.output.join(report::INSTRUCTOR).join(slug),
                 };
                 let begun = Instant::now();
-                let result = match self.purpose {
+                let result = match self.mode {
                     Mode::Grade => class::note_source(&out, source)
                         .and_then(|()| grading.one_of_batch(path, slug, &out, &say)),
-                    Mode::Check => grading.hand_in(path, slug, &out, self.purpose, &say),
+                    Mode::Check => grading.submission(path, slug, &out, self.mode, &say),
                 };
                 if INTERRUPTED.load(Ordering::Relaxed) && result.is_err() {
                     return;
                 }
-                let result = match (result, self.purpose) {
+                let result = match (result, self.mode) {
                     (Err(error), Mode::Grade) => {
                         let message = format!("{}: {}", path.display(), super::told_once(&error));
                         context.progress.note(&message);
@@ -329,12 +329,12 @@ impl Batch<'_> {
                     (result, _) => result.with_context(|| path.display().to_string()),
                 };
                 let result = result.map(|record| Record { name: name.clone(), ..record });
-                if let (Ok(record), Some(kept)) = (&result, &grading.kept) {
-                    if let Err(error) = kept.list(record, &out) {
+                if let (Ok(record), Some(cache)) = (&result, &grading.cache) {
+                    if let Err(error) = cache.list(record, &out) {
                         context.progress.note(&super::told_once(&error));
                     }
                     let grade = rubric::grade(&context.assignment.rules, &record.evidence);
-                    let cost = if kept.was_found(slug) {
+                    let cost = if cache.was_found(slug) {
                         "unchanged".to_owned()
                     } else {
                         format!("{:.1} s", begun.elapsed().as_secs_f64())
@@ -358,8 +358,8 @@ impl Batch<'_> {
     }
 }
 
-fn print_timings(sheet: &BatchReport) {
-    for entry in &sheet.entries {
+fn print_timings(report: &BatchReport) {
+    for entry in &report.entries {
         eprintln!("{}", entry.record.name);
         let (mut wall_s, mut cpu_s) = (0.0, 0.0);
         for stage in &entry.record.stages {

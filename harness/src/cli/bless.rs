@@ -58,7 +58,7 @@ pub fn run(arguments: &BlessArguments, root: Option<&Path>) -> anyhow::Result<u8
 
 /// Looks at every known mistake anew and replaces what is stored of them.
 fn mistakes(context: &mut Context) -> anyhow::Result<u8> {
-    for scene in context.assignment.scenes.iter_mut().filter(|scene| scene.hand_in.is_some()) {
+    for scene in context.assignment.scenes.iter_mut().filter(|scene| scene.submitted.is_some()) {
         scene.film = Some(SMALL_FILM);
     }
     let context = &*context;

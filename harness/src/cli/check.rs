@@ -31,7 +31,7 @@ const READABLE_COLUMNS: usize = 110;
 #[derive(clap::Args)]
 pub struct CheckArguments {
     /// Your working folder (config.json, src/, offline/, realtime/) or an archive
-    hand_in: PathBuf,
+    submission: PathBuf,
     /// Check only this part, such as 2.3; may be repeated
     #[arg(long, value_name = "PART")]
     part: Vec<String>,
@@ -152,7 +152,7 @@ struct LastCheck {
 pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let (parts, scenes) = (arguments.part.clone(), arguments.scene.clone());
     let asked = Asked { parts, scenes };
-    let folder = &arguments.hand_in;
+    let folder = &arguments.submission;
     // `.` has no name of its own.
     let named = || folder.canonicalize().ok();
     let source = Some(folder.clone()).filter(|folder| folder.file_name().is_some());
@@ -169,7 +169,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         output: &arguments.output,
         adapter: arguments.adapter,
         jobs: 1,
-        purpose: Mode::Check,
+        mode: Mode::Check,
         isolation: IsolationChoice::Reduced,
         perturb: Some(Perturb(None)),
         budget: BudgetChoice::Config,
@@ -182,22 +182,22 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         timings: arguments.timings,
     };
     let begun = Instant::now();
-    let Some((sheet, _)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
-    let entry = &sheet.entries[0].for_student(&sheet.rules);
+    let Some((report, _)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    let entry = &report.entries[0].for_student(&report.rules);
     let width = terminal::width().min(READABLE_COLUMNS);
     let look = Look { width, colours: terminal::colours() };
-    print!("{}", report::text_detail(&sheet, entry, look, arguments.verbose));
+    print!("{}", report::text_detail(&report, entry, look, arguments.verbose));
     let page = arguments.output.join(&entry.record.slug).join(report::HTML_FILE);
     let program = std::env::args().next().unwrap_or_else(|| "umbra".to_owned());
     let closing = Closing {
         folder: &folder.display().to_string(),
         umbra: &program,
         page: &page.display().to_string(),
-        files: &task_files(root, &sheet.rules.parts),
+        files: &task_files(root, &report.rules.parts),
         last: &last.parts,
         asked: &what,
     };
-    print!("{}", report::text_closing(&sheet, entry, &closing, look));
+    print!("{}", report::text_closing(&report, entry, &closing, look));
     let points = entry.grade.parts.iter();
     last.parts.extend(points.map(|part| (part.id.clone(), (part.points, part.points_max))));
     last.seconds.insert(what, begun.elapsed().as_secs_f64());

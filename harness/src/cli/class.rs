@@ -192,7 +192,7 @@ pub fn folders(output: &Path) -> Vec<String> {
 /// found out about others, and says so; `aside` are attempts that do not count. Answers whose were found out under
 /// other conditions.
 pub fn join(
-    kept: &RecordCache,
+    cache: &RecordCache,
     output: &Path,
     all: &[Source],
     aside: &HashSet<String>,
@@ -207,7 +207,7 @@ pub fn join(
         if graded.contains(&slug) {
             continue;
         }
-        let Earlier { record, comparable } = match kept.earlier(&instructor) {
+        let Earlier { record, comparable } = match cache.earlier(&instructor) {
             Ok(Some(earlier)) => earlier,
             Ok(None) => continue,
             Err(error) => {
@@ -217,7 +217,7 @@ pub fn join(
         };
         let is_given = missing.remove(slug.as_str()) || aside.contains(&slug);
         if !is_given && let Some(new) = records.iter().find(|new| is_newer(new, &record)) {
-            match kept.replace(&instructor) {
+            match cache.replace(&instructor) {
                 Ok(()) => eprintln!(
                     "umbra: {} of {} is graded again as {}: it replaces the one in {}",
                     record.name,
@@ -286,7 +286,7 @@ fn some(names: &[String]) -> String {
 }
 
 /// The submissions of some students: by number, name, or file name; all when nobody is named. Who
-/// handed in what is known from earlier runs, else from the submissions themselves.
+/// submitted what is known from earlier runs, else from the submissions themselves.
 ///
 /// # Errors
 /// When somebody has none, and when one cannot be looked into.
@@ -427,8 +427,8 @@ mod tests {
     }
 
     #[test]
-    fn the_same_file_of_the_same_student_is_handed_in_again() {
-        let record = sample::sheet().entries.remove(0).record;
+    fn the_same_file_of_the_same_student_is_submitted_again() {
+        let record = sample::report().entries.remove(0).record;
         assert!(is_newer(&record, &record));
         let with = |name: &str, id: &str, last: &str| {
             let mut other = record.clone();

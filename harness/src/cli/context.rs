@@ -73,7 +73,7 @@ impl Context {
         body(&store)
     }
 
-    /// What decodes hand-ins.
+    /// What decodes submissions.
     pub fn decoder(&self) -> Decoder<'_> {
         Decoder::new(&self.supervisor, &self.assignment.limits.decode, &INTERRUPTED)
     }

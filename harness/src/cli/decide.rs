@@ -226,7 +226,7 @@ fn one(wanted: &str, output: &Path, rules: &rubric::Rules) -> anyhow::Result<Gra
 #[derive(Deserialize)]
 struct Report {
     class: Option<Class>,
-    hand_ins: Vec<Row>,
+    submissions: Vec<Row>,
     assignment: About,
 }
 
@@ -261,7 +261,7 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
     let confirmed = |row: &Row| {
         row.standing.decisions.iter().any(|own| own.decision.part.is_none() && !own.stale)
     };
-    let open = || report.hand_ins.iter().filter(|row| !confirmed(row));
+    let open = || report.submissions.iter().filter(|row| !confirmed(row));
     let images = open().filter(|own| own.unconfirmed > 0.0);
     let images: Vec<String> =
         images.map(|own| row(own, &format!("{} points for its images", own.unconfirmed))).collect();
@@ -269,9 +269,9 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
         let private = own.remarks.iter().filter(|remark| report::is_private(remark, rules));
         private.map(move |remark| row(own, remark))
     });
-    let late = report.hand_ins.iter().filter(|own| own.standing.time_unknown);
+    let late = report.submissions.iter().filter(|own| own.standing.time_unknown);
     let late = late.map(|own| row(own, "when it was submitted is not known"));
-    let ranges = report.hand_ins.iter().filter(|own| own.points < own.points_max);
+    let ranges = report.submissions.iter().filter(|own| own.points < own.points_max);
     let ranges =
         ranges.map(|own| row(own, &format!("{} to {} points", own.points, own.points_max)));
     let undecided = class.undecided.iter().map(|own| format!("{}: {}", own.submission, own.reason));

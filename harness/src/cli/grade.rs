@@ -106,7 +106,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         output: &arguments.output,
         adapter: arguments.adapter,
         jobs: arguments.jobs.unwrap_or(cores() as usize).max(1),
-        purpose: Mode::Grade,
+        mode: Mode::Grade,
         isolation: arguments.isolation,
         perturb: arguments.perturb,
         budget: arguments.budget,
@@ -118,28 +118,28 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         force: arguments.force,
         timings: arguments.timings,
     };
-    let Some((sheet, collected)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
-    print!("{}", report::text_table(&sheet, terminal::width(), terminal::colours())?);
+    let Some((report, collected)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    print!("{}", report::text_table(&report, terminal::width(), terminal::colours())?);
     if let Some(skipped) = collected.skipped() {
         println!("skipped, not submissions: {skipped}");
     }
-    if sheet.class.as_ref().is_some_and(|class| !class.undecided.is_empty()) {
+    if report.class.as_ref().is_some_and(|class| !class.undecided.is_empty()) {
         let file = arguments.output.join(super::class::MATCHES);
         println!("decide in {}, and run the same command again", file.display());
     }
     println!("report: {}", arguments.output.join(report::HTML_FILE).display());
-    if let Some(held_back) = &sheet.held_back {
+    if let Some(held_back) = &report.held_back {
         println!("held-back seed {0}; --perturb {0} reproduces this batch", held_back.seed);
     }
-    Ok(exit_code(&sheet))
+    Ok(exit_code(&report))
 }
 
 /// What a batch ends with: a bug of ours counts more than what the machine lacks.
-fn exit_code(sheet: &BatchReport) -> u8 {
-    let mut checks = sheet.entries.iter().flat_map(|entry| &entry.record.evidence.checks);
+fn exit_code(report: &BatchReport) -> u8 {
+    let mut checks = report.entries.iter().flat_map(|entry| &entry.record.evidence.checks);
     if checks.any(|check| check.id == INTERNAL_ERROR && check.verdict == Verdict::Fail) {
         return super::EXIT_BUG;
     }
-    let ungraded = sheet.entries.iter().any(|entry| entry.grade.points < entry.grade.points_max);
+    let ungraded = report.entries.iter().any(|entry| entry.grade.points < entry.grade.points_max);
     if ungraded { super::EXIT_MACHINE } else { super::EXIT_OK }
 }

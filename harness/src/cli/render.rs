@@ -12,7 +12,7 @@ use basecode::{Camera, Image, Vec3};
 use super::context::{Context, INTERRUPTED, cores};
 use crate::files::library_name;
 use crate::imaging::pictures::clamped;
-use crate::intake::HandInConfig;
+use crate::intake::SubmittedConfig;
 use crate::process::Limits;
 use crate::worker::{
     Adapter, AdapterKind, CameraValue, Fault, Job, Outcome, Request, SceneRef, as_given,
@@ -319,7 +319,7 @@ fn own_seed(file: &Path) -> Option<u64> {
     let file = std::path::absolute(file).ok()?;
     let configs = file.ancestors().skip(1).take(2).map(|folder| folder.join("config.json"));
     let mut found = configs.filter_map(|path| std::fs::read(path).ok());
-    found.find_map(|bytes| HandInConfig::parse(&bytes).0.sampler_seed())
+    found.find_map(|bytes| SubmittedConfig::parse(&bytes).0.sampler_seed())
 }
 
 #[cfg(test)]
@@ -327,7 +327,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hand_in_s_images_have_the_seed_of_its_student() {
+    fn a_submission_s_images_have_the_seed_of_its_student() {
         let folder = tempfile::tempdir().unwrap();
         let offline = folder.path().join("offline");
         std::fs::create_dir(&offline).unwrap();

@@ -9,7 +9,7 @@ use unicode_width::UnicodeWidthStr as _;
 
 use super::context::{Context, INTERRUPTED};
 use crate::class::{Collected, Kind, Wanted, collect};
-use crate::intake::{self, HandIn, IntakeError, Severity, Validation};
+use crate::intake::{self, IntakeError, Severity, Submission, Validation};
 use crate::report::harmless;
 
 /// Options of `umbra validate`.
@@ -78,14 +78,14 @@ pub fn validate(arguments: &ValidateArguments, root: Option<&Path>) -> anyhow::R
 fn one(arguments: &ValidateArguments, archive: &Path, context: &Context) -> anyhow::Result<u8> {
     let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
     let private = tempfile::tempdir_in(&context.supervisor.scratch)?;
-    let (validation, hand_in) = look(archive, &private.path().join("copy"), context)?;
+    let (validation, submission) = look(archive, &private.path().join("copy"), context)?;
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&[&validation])?);
         return Ok(if validation.conforms { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER });
     }
     print!("{}", validation.to_text());
     if let Some(out) = &arguments.fix {
-        let packed = intake::fix(&hand_in?, out, tree, limits)?;
+        let packed = intake::fix(&submission?, out, tree, limits)?;
         for (from, to) in packed.files.iter().filter(|(from, to)| from != to) {
             println!("moved {from} to {to}");
         }
@@ -164,14 +164,14 @@ fn look(
     archive: &Path,
     copy: &Path,
     context: &Context,
-) -> anyhow::Result<(Validation, Result<HandIn, IntakeError>)> {
+) -> anyhow::Result<(Validation, Result<Submission, IntakeError>)> {
     let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
     std::fs::create_dir(copy)?;
     let decoder = context.decoder();
     match decoder.receive(archive, copy, tree, limits) {
         Ok(received) => {
-            let images = decoder.image_findings(&received.hand_in, tree)?;
-            Ok((received.validation.with(images), Ok(received.hand_in)))
+            let images = decoder.image_findings(&received.submission, tree)?;
+            Ok((received.validation.with(images), Ok(received.submission)))
         }
         Err(IntakeError::Refused(refusal)) => {
             Ok((intake::validate_refusal(&refusal), Err(IntakeError::Refused(refusal))))
@@ -191,7 +191,7 @@ pub fn pack(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8
             let private = tempfile::tempdir_in(&context.supervisor.scratch)?;
             let decoder = context.decoder();
             let received = decoder.receive(&packed.archive, private.path(), tree, limits)?;
-            let images = decoder.image_findings(&received.hand_in, tree)?;
+            let images = decoder.image_findings(&received.submission, tree)?;
             let validation = received.validation.with(images);
             for finding in validation.findings.iter().filter(|f| f.severity != Severity::Note) {
                 eprintln!("umbra: {finding}");

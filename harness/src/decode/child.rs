@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use basecode::exr_io::read_exr;
 
 use super::wire::{Answer, Folder, Question, write_answer};
-use crate::intake::{self, HandIn, IntakeError};
+use crate::intake::{self, IntakeError, Submission};
 use crate::process::{self, exit_now};
 
 /// Locks this process, then answers the question in `dir`. Does not return when it could.
@@ -39,9 +39,9 @@ fn answer(dir: &Path) -> io::Result<()> {
                 Err(error) => return Err(io::Error::other(error)),
             }
         }
-        Question::Inspect { hand_in, tree } => {
-            let validation = intake::validate_hand_in(&hand_in, &tree);
-            let source = intake::scan_source(&hand_in).map_err(io::Error::other)?;
+        Question::Inspect { submission, tree } => {
+            let validation = intake::validate_submission(&submission, &tree);
+            let source = intake::scan_source(&submission).map_err(io::Error::other)?;
             let validation = validation.map_err(io::Error::other)?;
             plain(&mut out, &Answer::Inspected { validation, source })?;
         }
@@ -51,7 +51,7 @@ fn answer(dir: &Path) -> io::Result<()> {
 }
 
 /// The files of a copy, one after the other.
-fn contents(copy: &HandIn, out: &mut dyn Write) -> io::Result<()> {
+fn contents(copy: &Submission, out: &mut dyn Write) -> io::Result<()> {
     for file in &copy.files {
         io::copy(&mut File::open(copy.root.join(&file.path))?, out)?;
     }

@@ -21,7 +21,7 @@ use serde::Serialize;
 
 pub use child::child_main;
 
-use crate::intake::{self, Finding, HandIn, IntakeError, Refusal, TreeSpec, Validation};
+use crate::intake::{self, Finding, IntakeError, Refusal, Submission, TreeSpec, Validation};
 use crate::process::{self, ChildOutcome, Confinement, Exit, Limits, signal_name};
 use crate::sandbox::{Bind, Kind, Policy, policy::JOB};
 use crate::worker::Supervisor;
@@ -47,7 +47,7 @@ pub struct Decoder<'a> {
 /// A submission as it came: the private copy, and what is to be said about it.
 pub struct Received {
     /// The private copy.
-    pub hand_in: HandIn,
+    pub submission: Submission,
     /// The copy beside the expected tree, and its `config.json`.
     pub validation: Validation,
     /// What its source contains that an instructor should look at.
@@ -91,14 +91,14 @@ impl<'a> Decoder<'a> {
         tree: &TreeSpec,
         limits: &intake::Limits,
     ) -> Result<Received, IntakeError> {
-        let hand_in = match intake::read_archive(source, limits)? {
+        let submission = match intake::read_archive(source, limits)? {
             // Nothing is decoded: files are copied one by one.
             None => intake::unpack(source, dest, tree, limits)?,
             Some(bytes) => {
                 self.unpack_bytes(&bytes, &intake::name_of(source), dest, tree, limits)?
             }
         };
-        self.inspect(hand_in, tree)
+        self.inspect(submission, tree)
     }
 
     /// As [`intake::unpack_bytes`], in a child.
@@ -112,7 +112,7 @@ impl<'a> Decoder<'a> {
         dest: &Path,
         tree: &TreeSpec,
         limits: &intake::Limits,
-    ) -> Result<HandIn, IntakeError> {
+    ) -> Result<Submission, IntakeError> {
         let refused = |finding: Finding| {
             let findings = vec![finding];
             let name = intake::printable(name);
@@ -131,7 +131,7 @@ impl<'a> Decoder<'a> {
             Ok((Answer::Unpacked(unpacked), contents)) => {
                 let copy = intake::copy_unpacked(&unpacked, &contents, dest, tree, limits)?;
                 // What was left out and what was odd is known to whoever saw the archive.
-                Ok(HandIn { findings: unpacked.findings, ..copy })
+                Ok(Submission { findings: unpacked.findings, ..copy })
             }
             Ok((Answer::Refused(refusal), _)) => Err(IntakeError::Refused(Box::new(refusal))),
             Ok(_) => Err(refused(ended("it gave no answer"))),
@@ -143,23 +143,23 @@ impl<'a> Decoder<'a> {
     }
 
     /// Validates a private copy and scans its source, in a child.
-    fn inspect(&self, hand_in: HandIn, tree: &TreeSpec) -> Result<Received, IntakeError> {
+    fn inspect(&self, submission: Submission, tree: &TreeSpec) -> Result<Received, IntakeError> {
         let inside = Folder(Path::new(JOB)).input();
-        let root = std::path::absolute(&hand_in.root)
-            .map_err(|error| IntakeError::io("find", &hand_in.root, error))?;
+        let root = std::path::absolute(&submission.root)
+            .map_err(|error| IntakeError::io("find", &submission.root, error))?;
         let bind = Bind::new(&root, inside);
         let question = Question::Inspect {
-            hand_in: HandIn { root: self.seen(&bind), ..hand_in.clone() },
+            submission: Submission { root: self.seen(&bind), ..submission.clone() },
             tree: tree.clone(),
         };
         let most = 16 << 20;
         match self.ask(&question, &|_| Ok(bind.clone()), most) {
             Ok((Answer::Inspected { validation, source }, _)) => {
-                Ok(Received { hand_in, validation, source })
+                Ok(Received { submission, validation, source })
             }
-            Ok(_) => Err(refused_copy(&hand_in, "it gave no answer")),
-            Err(NoAnswer::Died { how, .. }) => Err(refused_copy(&hand_in, &how)),
-            Err(NoAnswer::Machine(error)) => Err(IntakeError::io("read", &hand_in.root, error)),
+            Ok(_) => Err(refused_copy(&submission, "it gave no answer")),
+            Err(NoAnswer::Died { how, .. }) => Err(refused_copy(&submission, &how)),
+            Err(NoAnswer::Machine(error)) => Err(IntakeError::io("read", &submission.root, error)),
         }
     }
 
@@ -187,12 +187,16 @@ impl<'a> Decoder<'a> {
     ///
     /// # Errors
     /// The machine's matters and Ctrl-C.
-    pub fn image_findings(&self, hand_in: &HandIn, tree: &TreeSpec) -> io::Result<Vec<Finding>> {
+    pub fn image_findings(
+        &self,
+        submission: &Submission,
+        tree: &TreeSpec,
+    ) -> io::Result<Vec<Finding>> {
         let mut findings = Vec::new();
         let images = tree.files.iter().filter(|file| is_image(&file.path));
-        for path in images.filter_map(|file| tree.found_in(&hand_in.root, &file.path)) {
-            let image = self.image(&hand_in.root.join(path), path)?;
-            findings.extend(image_finding(&hand_in.root, path, &image));
+        for path in images.filter_map(|file| tree.found_in(&submission.root, &file.path)) {
+            let image = self.image(&submission.root.join(path), path)?;
+            findings.extend(image_finding(&submission.root, path, &image));
         }
         Ok(findings)
     }
@@ -330,9 +334,9 @@ fn ended(how: &str) -> Finding {
         .hint("make the archive anew; umbra pack makes the right one from your working folder")
 }
 
-fn refused_copy(hand_in: &HandIn, how: &str) -> IntakeError {
+fn refused_copy(submission: &Submission, how: &str) -> IntakeError {
     let finding = Finding::error("decoder_ended", format!("its texts cannot be read: {how}"));
-    let (name, format) = (hand_in.name.clone(), Some(hand_in.format));
+    let (name, format) = (submission.name.clone(), Some(submission.format));
     IntakeError::Refused(Box::new(Refusal { name, format, findings: vec![finding] }))
 }
 

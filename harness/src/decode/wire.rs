@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::intake::{self, Finding, HandIn, Refusal, TreeSpec, Validation};
+use crate::intake::{self, Finding, Refusal, Submission, TreeSpec, Validation};
 
 /// What a child is asked, about one file or folder.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -23,7 +23,7 @@ pub enum Question {
     /// What is to be said of a private copy; its root is the folder in question.
     Inspect {
         /// The copy.
-        hand_in: HandIn,
+        submission: Submission,
         /// The expected tree.
         tree: TreeSpec,
     },
@@ -38,7 +38,7 @@ pub enum Question {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Answer {
     /// The archive's files; their contents follow, in order.
-    Unpacked(HandIn),
+    Unpacked(Submission),
     /// The archive is refused.
     Refused(Refusal),
     /// What is to be said of a copy.

@@ -24,10 +24,10 @@ pub enum Kind {
     Realtime,
     /// Drawn by code: linear floats, with shadows (the bonus).
     RealtimeShadows,
-    /// Handed in as a realtime image: 8-bit levels or linear floats, without shadows.
-    HandedInRealtime,
-    /// Handed in as the bonus: 8-bit levels or linear floats, with shadows.
-    HandedInShadows,
+    /// Submitted as a realtime image: 8-bit levels or linear floats, without shadows.
+    SubmittedRealtime,
+    /// Submitted as the bonus: 8-bit levels or linear floats, with shadows.
+    SubmittedShadows,
 }
 
 /// Judges `actual`; regions for which `wanted` is false are left out.
@@ -41,11 +41,11 @@ pub fn judge(
     tolerances: &Tolerances,
 ) -> Check {
     let (reference, mask) = match kind {
-        Kind::Offline { spp: 1 } | Kind::RealtimeShadows | Kind::HandedInShadows => {
+        Kind::Offline { spp: 1 } | Kind::RealtimeShadows | Kind::SubmittedShadows => {
             (&expected.offline.centre, &expected.offline.mask)
         }
         Kind::Offline { .. } => (&expected.offline.mean, &expected.offline.mask),
-        Kind::Realtime | Kind::HandedInRealtime => {
+        Kind::Realtime | Kind::SubmittedRealtime => {
             (&expected.unshadowed, &expected.unshadowed_mask)
         }
     };
@@ -69,7 +69,7 @@ pub fn judge(
         Kind::RealtimeShadows => {
             return judge_realtime(id, scene, actual, reference, &mask, tolerances);
         }
-        Kind::HandedInRealtime | Kind::HandedInShadows => {
+        Kind::SubmittedRealtime | Kind::SubmittedShadows => {
             compare_srgb8(actual, reference, &mask, tolerances)
         }
     };
@@ -110,8 +110,8 @@ pub fn same_origin(
         Kind::Offline { spp } => {
             return same_draws(a, b, spp, expected.offline.median_lit, tolerances);
         }
-        Kind::Realtime | Kind::HandedInRealtime => &expected.unshadowed_mask,
-        Kind::RealtimeShadows | Kind::HandedInShadows => &expected.offline.mask,
+        Kind::Realtime | Kind::SubmittedRealtime => &expected.unshadowed_mask,
+        Kind::RealtimeShadows | Kind::SubmittedShadows => &expected.offline.mask,
     };
     same_levels(a, b, mask, tolerances)
 }

@@ -5,7 +5,6 @@
 pub mod bsdf;
 mod check;
 pub mod convention;
-pub mod handed_in;
 pub mod images;
 pub mod loops;
 pub mod physical;
@@ -17,6 +16,7 @@ mod registry;
 pub mod shading;
 pub mod shadow_map;
 pub mod stages;
+pub mod submitted;
 pub mod vertex;
 
 pub use check::{Check, Evidence, Measure, Picture, Verdict};

@@ -6,14 +6,15 @@ use super::session::Session;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, AdapterKind, CameraValue, Fault, Job, Matrices, Outcome, Request, blames_the_machine,
+    Adapter, AdapterKind, CameraValue, Fault, Job, Matrices, Outcome, Request,
+    is_environment_failure,
 };
 
 /// Settles the outcomes of `job` that blame the machine: what a renderer of ours does is the
 /// submission's own failure; otherwise they are asked again while there is retries, and stay ungraded.
 pub fn attribute_failures(session: &Session, job: &Job, outcomes: &mut [Outcome]) {
     loop {
-        let blaming = |&index: &usize| blames_the_machine(&outcomes[index]);
+        let blaming = |&index: &usize| is_environment_failure(&outcomes[index]);
         let blaming: Vec<usize> = (0..outcomes.len()).filter(blaming).collect();
         let Some(&first) = blaming.first() else { return };
         if session.is_cancelled() {

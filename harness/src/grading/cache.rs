@@ -316,8 +316,8 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let at = |name: &str| place.path().join(name);
         let out = Folders { student: at("student"), instructor: at("instructor") };
-        let kept = RecordCache::with([1; 32]);
-        let mut record = sample::sheet().entries.remove(1).record;
+        let cache = RecordCache::with([1; 32]);
+        let mut record = sample::report().entries.remove(1).record;
         record.evidence.checks.retain(|check| check.verdict != Verdict::NotRun);
         record.evidence.checks[0].error = f64::NAN;
         record.evidence.checks[1].error = 0.1 + 0.2;
@@ -326,16 +326,16 @@ mod tests {
             fs::write(picture, "").unwrap();
         }
         let failing = |_: &Evidence| vec!["1.3".to_owned()];
-        let found = || kept.find("key", failing, true, &out);
+        let found = || cache.find("key", failing, true, &out);
         assert!(found().is_none());
-        let first = kept.keep("key", failing(&record.evidence), record.clone(), &out).unwrap();
+        let first = cache.keep("key", failing(&record.evidence), record.clone(), &out).unwrap();
         // NaN equals nothing, itself included.
         assert_eq!(format!("{first:?}"), format!("{record:?}"));
         assert_eq!(format!("{:?}", found().unwrap()), format!("{record:?}"));
-        assert_eq!(kept.found(), 1);
+        assert_eq!(cache.found(), 1);
 
-        assert!(kept.find("another key", failing, true, &out).is_none());
-        assert!(kept.find("key", |_| Vec::new(), true, &out).is_none());
+        assert!(cache.find("another key", failing, true, &out).is_none());
+        assert!(cache.find("key", |_| Vec::new(), true, &out).is_none());
         let picture = pictures(&record, &out).next().unwrap();
         fs::remove_file(&picture).unwrap();
         assert!(found().is_none());
@@ -345,9 +345,9 @@ mod tests {
         assert!(found().is_none());
 
         record.evidence.checks.push(Check::new(BUDGET, "", Verdict::Fail, ""));
-        kept.keep("key", failing(&record.evidence), record, &out).unwrap();
+        cache.keep("key", failing(&record.evidence), record, &out).unwrap();
         assert!(found().is_some());
-        assert!(kept.find("key", failing, false, &out).is_none(), "grades it without a budget");
+        assert!(cache.find("key", failing, false, &out).is_none(), "grades it without a budget");
     }
 
     #[test]
@@ -355,17 +355,17 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let out = || place.path().to_owned();
         let out = Folders { student: out(), instructor: out() };
-        let kept = RecordCache::with([1; 32]);
-        let mut record = sample::sheet().entries.remove(0).record;
+        let cache = RecordCache::with([1; 32]);
+        let mut record = sample::report().entries.remove(0).record;
         let not_run = Check::new(CheckId::BonusImage, "", Verdict::NotRun, "no adapter");
         record.evidence.checks.push(not_run);
-        assert_eq!(kept.keep("key", Vec::new(), record.clone(), &out).unwrap(), record);
+        assert_eq!(cache.keep("key", Vec::new(), record.clone(), &out).unwrap(), record);
         assert_eq!(place.path().read_dir().unwrap().count(), 0);
     }
 
     #[test]
-    fn another_hand_in_batch_or_word_of_intake_has_another_key() {
-        let record = sample::sheet().entries.remove(0).record;
+    fn another_submission_batch_or_word_of_intake_has_another_key() {
+        let record = sample::report().entries.remove(0).record;
         let key = |batch: u8, record: &Record, checks: &[Check]| {
             RecordCache::with([batch; 32]).key(record, checks).unwrap()
         };

@@ -12,7 +12,7 @@ use crate::panics::{self, Bug};
 pub const INTERNAL_ERROR: CheckId = CheckId::SubmissionInternalError;
 
 impl Grading<'_> {
-    /// Grades one of a batch, as [`Grading::hand_in`] does. A panic of Umbra's makes a record that says
+    /// Grades one of a batch, as [`Grading::submission`] does. A panic of Umbra's makes a record that says
     /// so, and is not met again with the same submission by the same program.
     ///
     /// # Errors
@@ -24,8 +24,8 @@ impl Grading<'_> {
         out: &Folders,
         say: &dyn Fn(&str),
     ) -> anyhow::Result<Record> {
-        let grade = || self.hand_in(source, slug, out, Mode::Grade, say);
-        contained(self.kept.as_ref(), source, out, grade).unwrap_or_else(|bug| {
+        let grade = || self.submission(source, slug, out, Mode::Grade, say);
+        contained(self.cache.as_ref(), source, out, grade).unwrap_or_else(|bug| {
             let summary = "Umbra itself failed, and nothing was found out";
             let check = Check::new(INTERNAL_ERROR, "", Verdict::Fail, summary);
             // Its text may hold anything.
@@ -37,18 +37,18 @@ impl Grading<'_> {
 
 /// Runs `grade`, unless it is known to meet a bug.
 fn contained<T>(
-    kept: Option<&RecordCache>,
+    cache: Option<&RecordCache>,
     source: &Path,
     out: &Folders,
     grade: impl FnOnce() -> T,
 ) -> Result<T, Bug> {
-    if let Some(bug) = kept.and_then(|kept| kept.bug_of(source, out)) {
+    if let Some(bug) = cache.and_then(|cache| cache.bug_of(source, out)) {
         return Err(Bug { message: format!("not tried again: {}", bug.message), ..bug });
     }
     let result = panics::contain(grade);
-    if let (Err(bug), Some(kept)) = (&result, kept) {
-        // Where it cannot be kept, it is met again, and contained again.
-        let _ = kept.keep_bug(bug, source, out);
+    if let (Err(bug), Some(cache)) = (&result, cache) {
+        // Where it cannot be cache, it is met again, and contained again.
+        let _ = cache.keep_bug(bug, source, out);
     }
     result
 }
@@ -68,23 +68,23 @@ mod tests {
         let source = at("submission.zip");
         std::fs::write(&source, "one").unwrap();
         let calls = Cell::new(0);
-        let grade = |kept: &RecordCache, good: bool| {
-            contained(Some(kept), &source, &out, || {
+        let grade = |cache: &RecordCache, good: bool| {
+            contained(Some(cache), &source, &out, || {
                 calls.set(calls.get() + 1);
                 assert!(good, "a pixel of -0.0");
                 7
             })
         };
-        let kept = RecordCache::with([1; 32]);
-        let bug = grade(&kept, false).unwrap_err();
+        let cache = RecordCache::with([1; 32]);
+        let bug = grade(&cache, false).unwrap_err();
         assert!(bug.message == "a pixel of -0.0" && bug.place.contains("contain.rs"), "{bug}");
-        let again = grade(&kept, true).unwrap_err();
+        let again = grade(&cache, true).unwrap_err();
         assert_eq!(again.message, "not tried again: a pixel of -0.0");
         assert_eq!((again.place, calls.get()), (bug.place, 1));
         // Another program tries again, and so does this one with another submission.
         assert_eq!(grade(&RecordCache::with([2; 32]), true), Ok(7));
         std::fs::write(&source, "another").unwrap();
-        assert_eq!(grade(&kept, true), Ok(7));
+        assert_eq!(grade(&cache, true), Ok(7));
         assert_eq!(calls.get(), 3);
     }
 }

@@ -6,8 +6,8 @@ use std::path::Path;
 use basecode::{MaterialModel, Sampler, Vec2, Vec3};
 use renderer_api as api;
 
-use super::case::Case;
 use super::observe;
+use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use crate::diagnosis::{self, Thumbnail, View};
 use crate::evidence::bsdf::{self, BsdfKind, BsdfProbe};
@@ -41,7 +41,7 @@ struct BsdfAnswer {
 
 /// Radiance along a scene's rays without shadows, or the check that says why there is none.
 struct LightAnswer<'a> {
-    case: &'a Case,
+    case: &'a PreparedScene,
     values: Result<Vec<WitnessAnswer>, Box<Check>>,
     /// What the lit points look like to an integrator that asks the scene for no BSDF; empty for
     /// one that does.
@@ -58,7 +58,12 @@ struct WitnessAnswer {
 impl<'a> Answers<'a> {
     /// Probes both BSDFs: given by value, as a textured scene hands them out, and as any held-back
     /// one does, whose materials nobody has seen. Answers what hangs on no convention.
-    pub fn probe_bsdfs(&mut self, session: &Session, plugin: &Path, cases: &[Case]) -> Vec<Check> {
+    pub fn probe_bsdfs(
+        &mut self,
+        session: &Session,
+        plugin: &Path,
+        cases: &[PreparedScene],
+    ) -> Vec<Check> {
         let Some(case) = cases.first() else { return Vec::new() };
         let request = |scene: &Path, queries: &mut dyn Iterator<Item = &api::BsdfQuery>| {
             let queries = queries.map(session::query).collect();
@@ -142,9 +147,13 @@ impl<'a> Answers<'a> {
     }
 
     /// Keeps the radiance of an integrator along a scene's rays, under each witness.
-    pub fn push_light(&mut self, case: &'a Case, asked: &[(&Outcome, Witness, &'static str)]) {
+    pub fn push_light(
+        &mut self,
+        case: &'a PreparedScene,
+        asked: &[(&Outcome, Witness, &'static str)],
+    ) {
         let own = asked.iter().any(|(_, witness, _)| *witness == Witness::True);
-        let points = case.small.batch.points.iter().take(case.small.batch.lit);
+        let points = case.probe_film.batch.points.iter().take(case.probe_film.batch.lit);
         let own =
             if own { points.map(|point| shaded_point(case, point)).collect() } else { Vec::new() };
         let values = asked.iter().map(|(outcome, witness, name)| match outcome {
@@ -198,9 +207,11 @@ impl LightAnswer<'_> {
     fn of(&self, witness: Witness, index: usize, shading: &Shading) -> [f64; 3] {
         match self.own.get(index) {
             Some(point) => shading.radiance(point),
-            None => {
-                self.case.small.batch.witnessed(index, shading, &|wi, wo| value(witness, wi, wo))
-            }
+            None => self
+                .case
+                .probe_film
+                .batch
+                .witnessed(index, shading, &|wi, wo| value(witness, wi, wo)),
         }
     }
 
@@ -225,7 +236,7 @@ impl LightAnswer<'_> {
     }
 
     fn question(&self) -> Conventional<'_> {
-        let batch = &self.case.small.batch;
+        let batch = &self.case.probe_film.batch;
         Conventional {
             party: Party::Integrator,
             passes: Box::new(move |convention: &Convention| {
@@ -259,7 +270,7 @@ pub fn value(witness: Witness, wi: Vec3, wo: Vec3) -> [f64; 3] {
 }
 
 /// A lit point as its right BSDF sees it. A mirror is black.
-pub fn shaded_point(case: &Case, point: &SurfacePoint) -> ShadedPoint {
+pub fn shaded_point(case: &PreparedScene, point: &SurfacePoint) -> ShadedPoint {
     let scene = &case.expected.scene;
     let material = scene.material_of(point.shape);
     let uv = scene.intersect(&point.ray).map_or(Vec2::ZERO, |hit| hit.uv);
@@ -278,13 +289,13 @@ pub fn shaded_point(case: &Case, point: &SurfacePoint) -> ShadedPoint {
         scale: f64::from(material.energy_scale()),
         wo: point.wo.to_array().map(f64::from),
         wi: point.wi.to_array().map(f64::from),
-        intensity: case.small.batch.intensity.to_array().map(f64::from),
+        intensity: case.probe_film.batch.intensity.to_array().map(f64::from),
         distance: f64::from(point.distance),
     }
 }
 
 /// Directions and texture coordinates for each shape of a kind: of a public scene the textured ones.
-fn shape_probes(kind: BsdfKind, case: &Case) -> Vec<BsdfProbe> {
+fn shape_probes(kind: BsdfKind, case: &PreparedScene) -> Vec<BsdfProbe> {
     let scene = &case.expected.scene;
     let sampler = Sampler::new(0x7E87);
     let mut probes = Vec::new();

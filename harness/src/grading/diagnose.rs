@@ -143,8 +143,8 @@ impl Grading<'_> {
         for (view, tile) in right.tiles {
             let case = self.cases.iter().find(|case| case.entry.name == view.scene);
             let materials = match (view.kind, case) {
-                (Kind::Offline, Some(case)) => Material::of_mask(&case.small.mask),
-                (Kind::Fragment, Some(case)) => Material::of_mask(&case.small.unshadowed_mask),
+                (Kind::Offline, Some(case)) => Material::of_mask(&case.probe_film.mask),
+                (Kind::Fragment, Some(case)) => Material::of_mask(&case.probe_film.unshadowed_mask),
                 (Kind::Film, Some(case)) => Material::of_mask(&case.expected.offline.mask),
                 (Kind::Realtime, Some(case)) => Material::of_mask(&case.expected.unshadowed_mask),
                 _ => vec![Material::None; LENGTH],
@@ -201,11 +201,11 @@ impl Grading<'_> {
             drawn.extend(judged.into_iter().flat_map(|judged| judged.drawn));
             // Under the reference's own vertex stage, which is right where a fragment stage is not.
             let frames: Vec<Frame> =
-                self.cases.iter().map(|case| Frame::small(case, Vec::new())).collect();
+                self.cases.iter().map(|case| Frame::probe(case, Vec::new())).collect();
             let outcomes = draw_each(&session, Some(reference), &frames);
             for (case, outcome) in self.cases.iter().zip(outcomes) {
                 if let Some(answer) = outcome.answer() {
-                    let (width, height) = (case.small.width, case.small.height);
+                    let (width, height) = (case.probe_film.width, case.probe_film.height);
                     let image = session::image(&answer.values, width, height);
                     session.record(
                         View::new(Kind::Fragment, &case.entry.name),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::case::Case;
+use super::prepared_scene::PreparedScene;
 use super::session::Session;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
 use crate::worker::{CameraValue, Matrices, Outcome, Request, STAGES, Stage};
@@ -11,7 +11,7 @@ use crate::worker::{CameraValue, Matrices, Outcome, Request, STAGES, Stage};
 #[derive(Clone)]
 pub struct Frame<'a> {
     /// The scene, whose camera looks.
-    pub case: &'a Case,
+    pub case: &'a PreparedScene,
     /// Which of its TOML files.
     pub toml: &'a Path,
     /// Width and height in pixels.
@@ -28,15 +28,15 @@ pub struct Frame<'a> {
 
 impl<'a> Frame<'a> {
     /// The realtime image of a scene, on the film that it is judged on.
-    pub fn plain(case: &'a Case) -> Self {
+    pub fn plain(case: &'a PreparedScene) -> Self {
         let toml = case.realtime.as_path();
         let (size, stages) = (case.film(), Vec::new());
         Self { case, toml, size, shadow_map: false, times: 1, each_matrices: false, stages }
     }
 
     /// A scene's small film under other stages.
-    pub fn small(case: &'a Case, stages: Vec<Stage>) -> Self {
-        Self { size: (case.small.width, case.small.height), stages, ..Self::plain(case) }
+    pub fn probe(case: &'a PreparedScene, stages: Vec<Stage>) -> Self {
+        Self { size: (case.probe_film.width, case.probe_film.height), stages, ..Self::plain(case) }
     }
 }
 
@@ -120,10 +120,10 @@ pub fn draw_scenes(
 pub fn draw_plain(
     session: &Session,
     plugin: &Path,
-    cases: &[Case],
-    is_right: &dyn Fn(&Case, &Outcome) -> bool,
+    cases: &[PreparedScene],
+    is_right: &dyn Fn(&PreparedScene, &Outcome) -> bool,
 ) -> Vec<Outcome> {
-    let probes: Vec<&Case> = cases.iter().filter(|case| case.is_probe()).collect();
+    let probes: Vec<&PreparedScene> = cases.iter().filter(|case| case.is_probe()).collect();
     let frames: Vec<Vec<Frame>> = probes.iter().map(|case| vec![Frame::plain(case)]).collect();
     let all_right = |index: usize, outcomes: &[Outcome]| {
         outcomes.iter().all(|outcome| is_right(probes[index], outcome))
@@ -151,9 +151,9 @@ fn same(a: &Outcome, b: &Outcome) -> bool {
 ///
 /// # Errors
 /// Why not, in words.
-pub fn probe_adapter(session: &Session, case: &Case) -> Result<(), String> {
+pub fn probe_adapter(session: &Session, case: &PreparedScene) -> Result<(), String> {
     let stages = named([VERTEX, SHOW_NORMAL, SHOW_NORMAL].map(str::to_owned));
-    match draw(session, None, &Frame { size: (16, 16), ..Frame::small(case, stages) }) {
+    match draw(session, None, &Frame { size: (16, 16), ..Frame::probe(case, stages) }) {
         Outcome::Done(_) => Ok(()),
         Outcome::NoAdapter(message) | Outcome::Failed(message) => Err(message),
         other => Err(format!("{other:?}")),

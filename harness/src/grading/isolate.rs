@@ -6,9 +6,9 @@ use std::path::Path;
 
 use basecode::{Image, Vec3};
 
-use super::case::Case;
 use super::draw::{Frame, draw_each, draw_scenes, named};
 use super::observe;
+use super::prepared_scene::PreparedScene;
 use super::session::{self, Session, headline};
 use super::stages::Stages;
 use crate::diagnosis::{Kind, Thumbnail, View};
@@ -40,7 +40,7 @@ pub fn bound_values_shown() -> [Vec<Stage>; BoundValue::ALL.len()] {
 pub fn isolate(
     session: &Session,
     plugin: &Path,
-    cases: &[&Case],
+    cases: &[&PreparedScene],
     stages: &Stages,
     fails: bool,
     tolerances: &Tolerances,
@@ -121,9 +121,9 @@ pub fn isolate(
 /// What pass and fragment stages show of scenes.
 #[derive(Default)]
 struct Shown<'a> {
-    passes: Vec<(&'a Case, Vec<(BoundValue, Image)>)>,
+    passes: Vec<(&'a PreparedScene, Vec<(BoundValue, Image)>)>,
     /// With the stage's index.
-    fragments: Vec<(&'a Case, usize, Image)>,
+    fragments: Vec<(&'a PreparedScene, usize, Image)>,
 }
 
 impl Shown<'_> {
@@ -136,7 +136,7 @@ impl Shown<'_> {
         let mut checks = Vec::new();
         for convention in Premultiplied::all() {
             let pass = self.passes.iter().map(|(case, frames)| {
-                let (scene, surface) = (&case.expected.scene, &case.small.surface);
+                let (scene, surface) = (&case.expected.scene, &case.probe_film.surface);
                 let undone = |(bound, frame): &(BoundValue, Image)| {
                     (*bound, convention.undone_bound(scene, surface, *bound, frame))
                 };
@@ -148,7 +148,7 @@ impl Shown<'_> {
                 .fragments
                 .iter()
                 .map(|(case, index, image)| {
-                    let (scene, surface) = (&case.expected.scene, &case.small.surface);
+                    let (scene, surface) = (&case.expected.scene, &case.probe_film.surface);
                     let image = convention.undone_stage(scene, surface, image);
                     (*index, fragment(CHECKS[*index].0, case, &image, *index == 2, tolerances))
                 })
@@ -172,8 +172,9 @@ impl Shown<'_> {
 }
 
 /// The frames of each scene under all sets of stages.
-fn under<'a>(cases: &[&'a Case], sets: &[Vec<Stage>]) -> Vec<Vec<Frame<'a>>> {
-    let frames = |case: &&'a Case| sets.iter().map(|set| Frame::small(case, set.clone())).collect();
+fn under<'a>(cases: &[&'a PreparedScene], sets: &[Vec<Stage>]) -> Vec<Vec<Frame<'a>>> {
+    let frames =
+        |case: &&'a PreparedScene| sets.iter().map(|set| Frame::probe(case, set.clone())).collect();
     cases.iter().map(frames).collect()
 }
 
@@ -210,8 +211,8 @@ fn swaps(stages: &Stages) -> ([Swap; 3], Vec<Vec<Stage>>) {
 }
 
 /// The images of a scene's frames, or the first outcome that is none.
-fn images<'a>(case: &Case, outcomes: &'a [Outcome]) -> Result<Vec<Image>, &'a Outcome> {
-    let (width, height) = (case.small.width, case.small.height);
+fn images<'a>(case: &PreparedScene, outcomes: &'a [Outcome]) -> Result<Vec<Image>, &'a Outcome> {
+    let (width, height) = (case.probe_film.width, case.probe_film.height);
     let floats = (3 * width * height) as usize;
     let mut images = Vec::new();
     for outcome in outcomes {
@@ -222,7 +223,7 @@ fn images<'a>(case: &Case, outcomes: &'a [Outcome]) -> Result<Vec<Image>, &'a Ou
     Ok(images)
 }
 
-fn pass_check(case: &Case, outcomes: &[Outcome]) -> Check {
+fn pass_check(case: &PreparedScene, outcomes: &[Outcome]) -> Check {
     match bound_values(case, outcomes) {
         Ok(frames) => judge_bound(case, &frames),
         Err(check) => *check,
@@ -230,7 +231,10 @@ fn pass_check(case: &Case, outcomes: &[Outcome]) -> Check {
 }
 
 /// Each bound value with the frame that shows it, or else the check that says why there is none.
-fn bound_values(case: &Case, outcomes: &[Outcome]) -> Result<Vec<(BoundValue, Image)>, Box<Check>> {
+fn bound_values(
+    case: &PreparedScene,
+    outcomes: &[Outcome],
+) -> Result<Vec<(BoundValue, Image)>, Box<Check>> {
     let (id, name) = (CheckId::PassUniforms, &case.entry.name);
     let images = match images(case, outcomes) {
         Ok(images) => images,
@@ -248,13 +252,13 @@ fn bound_values(case: &Case, outcomes: &[Outcome]) -> Result<Vec<(BoundValue, Im
     Ok(BoundValue::ALL.into_iter().zip(images).collect())
 }
 
-fn judge_bound(case: &Case, frames: &[(BoundValue, Image)]) -> Check {
-    let (scene, small) = (&case.expected.scene, &case.small);
+fn judge_bound(case: &PreparedScene, frames: &[(BoundValue, Image)]) -> Check {
+    let (scene, small) = (&case.expected.scene, &case.probe_film);
     judge_pass(&case.entry.name, scene, &small.surface, &small.unshadowed_mask, frames)
 }
 
-fn vertex(case: &Case, frames: [[&Image; 2]; 3]) -> Check {
-    let (name, small) = (&case.entry.name, &case.small);
+fn vertex(case: &PreparedScene, frames: [[&Image; 2]; 3]) -> Check {
+    let (name, small) = (&case.entry.name, &case.probe_film);
     let scene = &case.expected.scene;
     match scene.camera(small.surface.width, small.surface.height) {
         Ok(camera) => {
@@ -267,12 +271,12 @@ fn vertex(case: &Case, frames: [[&Image; 2]; 3]) -> Check {
 
 fn fragment(
     id: CheckId,
-    case: &Case,
+    case: &PreparedScene,
     image: &Image,
     phong: bool,
     tolerances: &Tolerances,
 ) -> Check {
-    let small = &case.small;
+    let small = &case.probe_film;
     let own = |region: &Region| (region.exponent > 0.0) == phong;
     let wanted = images::only(&small.unshadowed_mask, &own);
     let expected = (&small.unshadowed, small.raw_normals.as_ref());
@@ -282,8 +286,8 @@ fn fragment(
 }
 
 /// Keeps for the diagnosis what one of the two fragment stages draws.
-fn record_fragment(session: &Session, case: &Case, image: &Image, phong: bool) {
-    let mask = &case.small.unshadowed_mask;
+fn record_fragment(session: &Session, case: &PreparedScene, image: &Image, phong: bool) {
+    let mask = &case.probe_film.unshadowed_mask;
     let pixels = image.pixels.iter().zip(&mask.pixels).enumerate();
     let own = pixels.filter(|(_, (_, value))| {
         **value & RegionMask::INDEX != 0 && (mask.region(**value).exponent > 0.0) == phong
@@ -298,7 +302,7 @@ fn record_fragment(session: &Session, case: &Case, image: &Image, phong: bool) {
 fn swap_failed(
     session: &Session,
     id: CheckId,
-    case: &Case,
+    case: &PreparedScene,
     fails: bool,
     outcome: &Outcome,
 ) -> Check {
@@ -317,7 +321,7 @@ fn swap_failed(
 }
 
 /// A swap that the graphics library refuses is no fault.
-fn not_possible(id: CheckId, case: &Case, message: &str) -> Check {
+fn not_possible(id: CheckId, case: &PreparedScene, message: &str) -> Check {
     let summary = format!("swap not possible: {}", headline(message));
     Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
 }

@@ -3,7 +3,7 @@
 
 use basecode::{Image, MaterialModel, Ray, Scene, Vec3};
 
-use super::case::Case;
+use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use crate::diagnosis::fit::{Bound, Reflector, Sample, ShadowRay, VertexSeen};
 use crate::evidence::bsdf::{BsdfKind, BsdfProbe};
@@ -47,8 +47,8 @@ pub fn bsdf(session: &Session, kind: BsdfKind, probes: &[BsdfProbe], values: &[[
 }
 
 /// Unshadowed radiance along lit rays under a witness.
-pub fn radiance(session: &Session, case: &Case, witness: Witness, values: &[[f32; 3]]) {
-    let batch = &case.small.batch;
+pub fn radiance(session: &Session, case: &PreparedScene, witness: Witness, values: &[[f32; 3]]) {
+    let batch = &case.probe_film.batch;
     let lit = batch.points[..batch.lit].iter().zip(values);
     let samples = few(lit, batch.lit).map(|(point, value)| {
         sample(Reflector::Witness(witness), point, batch.intensity, value.map(f64::from))
@@ -59,8 +59,8 @@ pub fn radiance(session: &Session, case: &Case, witness: Witness, values: &[[f32
 }
 
 /// Radiance with and without shadows under a witness.
-pub fn shadows(session: &Session, case: &Case, with: &[[f32; 3]], without: &[[f32; 3]]) {
-    let (batch, scene) = (&case.small.batch, &case.expected.scene);
+pub fn shadows(session: &Session, case: &PreparedScene, with: &[[f32; 3]], without: &[[f32; 3]]) {
+    let (batch, scene) = (&case.probe_film.batch, &case.expected.scene);
     if case.held_back {
         return;
     }
@@ -100,8 +100,8 @@ fn occluders(scene: &Scene, point: &SurfacePoint) -> Vec<f64> {
 }
 
 /// What one of the two fragment stages draws under a pass and a vertex stage of ours.
-pub fn fragment(session: &Session, case: &Case, image: &Image, phong: bool) {
-    let (small, scene) = (&case.small, &case.expected.scene);
+pub fn fragment(session: &Session, case: &PreparedScene, image: &Image, phong: bool) {
+    let (small, scene) = (&case.probe_film, &case.expected.scene);
     if case.held_back {
         return;
     }
@@ -129,8 +129,8 @@ pub fn fragment(session: &Session, case: &Case, image: &Image, phong: bool) {
 }
 
 /// The values that a student's pass bound, each shown by a frame.
-pub fn pass(session: &Session, case: &Case, frames: &[(BoundValue, Image)]) {
-    let (small, scene) = (&case.small, &case.expected.scene);
+pub fn pass(session: &Session, case: &PreparedScene, frames: &[(BoundValue, Image)]) {
+    let (small, scene) = (&case.probe_film, &case.expected.scene);
     let Ok(camera) = scene.camera(small.surface.width, small.surface.height) else { return };
     let mut seen = Vec::new();
     for (bound, image) in frames {
@@ -159,12 +159,12 @@ pub fn pass(session: &Session, case: &Case, frames: &[(BoundValue, Image)]) {
 }
 
 /// What a student's vertex stage forwards.
-pub fn vertex(session: &Session, case: &Case, positions: &Image, normals: &Image) {
-    let surface = &case.small.surface;
+pub fn vertex(session: &Session, case: &PreparedScene, positions: &Image, normals: &Image) {
+    let surface = &case.probe_film.surface;
     let (width, height) = (surface.width, surface.height);
     let Ok(camera) = case.expected.scene.camera(width, height) else { return };
     let (view, projection) = (camera.view(), camera.projection());
-    let pixels = surface.pixels.iter().zip(&case.small.unshadowed_mask.pixels).enumerate();
+    let pixels = surface.pixels.iter().zip(&case.probe_film.unshadowed_mask.pixels).enumerate();
     let seen = pixels.filter_map(|(index, ((_, point), value))| {
         if value & (RegionMask::EDGE | RegionMask::EMITTER) != 0 {
             return None;
@@ -189,8 +189,8 @@ pub fn vertex(session: &Session, case: &Case, positions: &Image, normals: &Image
 }
 
 /// Pixels of the small film away from edges and emitters, with what they show.
-fn interior(case: &Case) -> impl Iterator<Item = (usize, &SurfacePoint)> {
-    let small = &case.small;
+fn interior(case: &PreparedScene) -> impl Iterator<Item = (usize, &SurfacePoint)> {
+    let small = &case.probe_film;
     let pixels = small.surface.pixels.iter().zip(&small.unshadowed_mask.pixels).enumerate();
     pixels.filter_map(|(index, ((_, point), value))| {
         let clear = value & (RegionMask::EDGE | RegionMask::EMITTER) == 0;

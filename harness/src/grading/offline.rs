@@ -4,9 +4,9 @@ use std::path::Path;
 
 use basecode::{Image, MaterialModel, Ray, Scene, Texture};
 
-use super::case::Case;
 use super::conventions::{Answers, shaded_point, value};
 use super::observe;
+use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use crate::diagnosis::{self, LoopSeen, Thumbnail, View};
 use crate::evidence::images::{self, Kind};
@@ -43,13 +43,13 @@ pub struct Drawn {
 pub fn judge_scene<'a>(
     session: &Session,
     plugin: &Path,
-    case: &'a Case,
+    case: &'a PreparedScene,
     (seed, threads): (u64, u32),
     tolerances: &Tolerances,
     answers: &mut Answers<'a>,
 ) -> (Vec<Check>, Option<Drawn>) {
     let name = &case.entry.name;
-    let small = &case.small;
+    let small = &case.probe_film;
     let scene = session.scene(&case.offline);
     let chosen: Vec<_> = small.batch.rays.iter().map(session::ray).collect();
     let radiance = |rays: &[_], witness, shadows| Request::Radiance {
@@ -206,16 +206,16 @@ pub fn judge_scene<'a>(
 
 /// What to ask a renderer about its own BSDF where lit rays end: the ray, and the question. Surfaces of
 /// one colour alone: beside a texel's edge a right renderer may take either.
-fn plain_surfaces(case: &Case) -> Vec<(usize, BsdfQuery)> {
+fn plain_surfaces(case: &PreparedScene) -> Vec<(usize, BsdfQuery)> {
     let scene = &case.expected.scene;
-    let batch = &case.small.batch;
+    let batch = &case.probe_film.batch;
     let lit = batch.points.iter().take(batch.lit).enumerate();
     let asked = lit.filter_map(|(ray, point)| {
         let material = scene.material_of(point.shape);
         let bitmap = |texture| matches!(texture, &Texture::Bitmap(_));
         let plain = !bitmap(&material.diffuse) && !bitmap(&material.specular);
-        let handed_in = plain && material.model != MaterialModel::Mirror;
-        handed_in.then(|| {
+        let submitted = plain && material.model != MaterialModel::Mirror;
+        submitted.then(|| {
             let (shape, primitive) = (point.shape as u32, point.primitive as u32);
             let query = BsdfQuery {
                 source: BsdfSource::Shape { shape, primitive },
@@ -232,11 +232,11 @@ fn plain_surfaces(case: &Case) -> Vec<(usize, BsdfQuery)> {
 /// Keeps for the diagnosis what witnesses say of light and visibility.
 fn record_rays(
     session: &Session,
-    case: &Case,
+    case: &PreparedScene,
     lit: &Outcome,
     (with, without): (&Outcome, &Outcome),
 ) {
-    let (name, small) = (&case.entry.name, &case.small);
+    let (name, small) = (&case.entry.name, &case.probe_film);
     let size = (small.width as usize, small.height as usize);
     if let Outcome::Done(lit) = lit {
         let values = session::colours(&lit.values).iter().copied();
@@ -257,11 +257,11 @@ fn record_rays(
 }
 
 /// Keeps for the diagnosis what the loop makes of the radiance along the centres of all pixels.
-fn record_loop(session: &Session, case: &Case, (image, along): (&[f32], &[f32])) {
+fn record_loop(session: &Session, case: &PreparedScene, (image, along): (&[f32], &[f32])) {
     if case.held_back {
         return;
     }
-    let (name, small) = (&case.entry.name, &case.small);
+    let (name, small) = (&case.entry.name, &case.probe_film);
     let [image, rays] =
         [image, along].map(|values| session::image(values, small.width, small.height));
     session.record(View::new(diagnosis::Kind::Offline, name), Thumbnail::of_image(&image));
@@ -271,7 +271,7 @@ fn record_loop(session: &Session, case: &Case, (image, along): (&[f32], &[f32]))
 }
 
 fn judge_shadows(
-    case: &Case,
+    case: &PreparedScene,
     bsdf: &dyn Fn(&SurfacePoint) -> [f64; 3],
     (with, without): (&Outcome, &Outcome),
     shaded: (&Outcome, &Outcome),
@@ -293,7 +293,7 @@ fn judge_shadows(
                 blocker: &|ray| blocker(scene, ray),
                 is_phong: &|shape| scene.material_of(shape).model == MaterialModel::Phong,
             };
-            rays::judge_shadows(&case.small.batch, bsdf, (with, without), shaded, &occluders)
+            rays::judge_shadows(&case.probe_film.batch, bsdf, (with, without), shaded, &occluders)
         }
         (Outcome::Done(_), missing) => {
             Check { verdict: Verdict::NotJudged, ..session::unanswered(id, name, &[], missing) }

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use basecode::Image;
 
-use super::case::Case;
-use super::handed_in::HandedIn;
 use super::offline::Drawn;
 use super::pipeline::Folders;
+use super::prepared_scene::PreparedScene;
+use super::submitted::SubmittedImage;
 use crate::evidence::images::Kind;
 use crate::evidence::{Check, CheckId, Picture, Verdict};
 use crate::imaging::pictures::{signed_error, tone_mapped};
@@ -21,9 +21,9 @@ const FULL_SCALE: f32 = 0.1;
 /// When a file cannot be written.
 pub fn draw(
     checks: &mut [Check],
-    cases: &[Case],
+    cases: &[PreparedScene],
     drawn: &[Drawn],
-    handed_in: &[HandedIn],
+    submitted: &[SubmittedImage],
     out: &Folders,
 ) -> anyhow::Result<()> {
     for check in checks.iter_mut().filter(|check| check.verdict == Verdict::Fail) {
@@ -35,7 +35,7 @@ pub fn draw(
             CheckId::ImageOffline => own(Kind::Offline { spp: case.spp }),
             CheckId::ImageRealtime => own(Kind::Realtime),
             CheckId::BonusImage | CheckId::BonusProbe => own(Kind::RealtimeShadows),
-            _ => handed_in.iter().find_map(|image| image.shown_by(check)),
+            _ => submitted.iter().find_map(|image| image.shown_by(check)),
         };
         if let Some(actual) = actual {
             let out = if check.held_back { &out.instructor } else { &out.student };
@@ -45,7 +45,12 @@ pub fn draw(
     Ok(())
 }
 
-fn triple(id: CheckId, case: &Case, actual: &Image, out: &Path) -> anyhow::Result<Vec<Picture>> {
+fn triple(
+    id: CheckId,
+    case: &PreparedScene,
+    actual: &Image,
+    out: &Path,
+) -> anyhow::Result<Vec<Picture>> {
     let expected = &case.expected;
     let (reference, mask) = match id {
         CheckId::ImageRealtime | CheckId::SubmittedRealtimeAll => {

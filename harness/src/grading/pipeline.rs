@@ -9,15 +9,15 @@ use anyhow::Context;
 use tempfile::TempDir;
 
 use super::cache::RecordCache;
-use super::case::Case;
 use super::conventions::Answers;
 use super::costs::ReferenceCosts;
 use super::draw::Frame;
 use super::offline::{self, Drawn};
+use super::prepared_scene::PreparedScene;
 use super::record::{Conditions, Record, StageCost, Student};
 use super::session::Session;
 use super::stages::Stages;
-use super::{draw, handed_in, isolate, mend, pictures, realtime, sampler, uploads};
+use super::{draw, isolate, mend, pictures, realtime, sampler, submitted, uploads};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
@@ -25,7 +25,7 @@ use crate::diagnosis::{Diagnosis, Stored};
 use crate::evidence::{Check, CheckId, Evidence, Verdict, loops, price, rays, shadow_map};
 use crate::expected::Store;
 use crate::held_back::{self, HeldBack};
-use crate::intake::{self, HandIn, IntakeError, TreeSpec, Validation};
+use crate::intake::{self, IntakeError, Submission, TreeSpec, Validation};
 use crate::rubric::BUILD;
 use crate::worker::{Adapter, Budget, Reference, RetryBudget, Supervisor};
 
@@ -53,7 +53,7 @@ pub struct Grading<'a> {
     /// The template's compiler call.
     pub recording: Recording,
     /// The scenes, ready: the public ones first.
-    pub cases: Vec<Case>,
+    pub cases: Vec<PreparedScene>,
     /// What is held back, if anything.
     pub held_back: Option<HeldBack>,
     /// What realtime is drawn with, or why nothing can be.
@@ -69,7 +69,7 @@ pub struct Grading<'a> {
     /// Whether submitted images are compared with what the code draws.
     pub compares_submitted: bool,
     /// Records made before and to be made, if they are kept.
-    pub kept: Option<RecordCache>,
+    pub cache: Option<RecordCache>,
     /// What a submission may use on each path, if that is limited.
     pub budget: Option<Budget>,
     /// What the reference renderer takes, as far as it was needed.
@@ -135,7 +135,7 @@ impl<'a> Grading<'a> {
         let mut cases = Vec::new();
         for entry in &assignment.scenes {
             (store.progress)(&format!("preparing scene {}", entry.name));
-            let case = Case::new(store, entry);
+            let case = PreparedScene::new(store, entry);
             cases.push(case.with_context(|| format!("scene \"{}\" cannot be used", entry.name))?);
         }
         let held_back = perturb.map(|seed| hold_back(store, seed, &mut cases)).transpose()?;
@@ -152,7 +152,7 @@ impl<'a> Grading<'a> {
             cancel,
             paths: RenderPath::ALL.to_vec(),
             compares_submitted: true,
-            kept: None,
+            cache: None,
             budget: Some(assignment.limits.budget.clone()),
             reference_costs: ReferenceCosts::default(),
             stored: OnceLock::new(),
@@ -175,7 +175,7 @@ impl<'a> Grading<'a> {
         let toml = case.bonus.as_deref().unwrap_or(&case.realtime);
         let mut frames = vec![plain.clone(), Frame { toml, shadow_map: true, ..plain }];
         let shown = isolate::bound_values_shown();
-        frames.extend(shown.map(|stages| Frame::small(case, stages)));
+        frames.extend(shown.map(|stages| Frame::probe(case, stages)));
         let folder = self.shaders_of(&mut self.session(""), Some(reference), frames)?;
         self.supervisor.shaders.push(folder.path().to_owned());
         self.compiled = Some(folder);
@@ -192,7 +192,7 @@ impl<'a> Grading<'a> {
         let (Some(own), Some(case)) = (stages.all_own(), self.cases.first()) else {
             return Ok(None);
         };
-        let folder = self.shaders_of(session, None, vec![Frame::small(case, own)])?;
+        let folder = self.shaders_of(session, None, vec![Frame::probe(case, own)])?;
         session.supervisor.shaders.push(folder.path().to_owned());
         Ok(Some(folder))
     }
@@ -238,25 +238,25 @@ impl<'a> Grading<'a> {
     ///
     /// # Errors
     /// The machine's matters and Ctrl-C; what is wrong with the submission is in the record.
-    pub fn hand_in(
+    pub fn submission(
         &self,
         source: &Path,
         slug: &str,
         out: &Folders,
-        purpose: Mode,
+        mode: Mode,
         say: &dyn Fn(&str),
     ) -> anyhow::Result<Record> {
         let mut session = self.session("");
         let decoder = Decoder::new(&self.supervisor, &self.assignment.limits.decode, self.cancel);
         let mut costs = Costs { since: Instant::now(), stages: Vec::new() };
         let scratch =
-            tempfile::Builder::new().prefix("hand-in-").tempdir_in(&self.supervisor.scratch)?;
+            tempfile::Builder::new().prefix("submission-").tempdir_in(&self.supervisor.scratch)?;
         let mut record = self.begin(source, slug);
         say("copying the files");
         let copy = scratch.path().join("copy");
         std::fs::create_dir(&copy)?;
         let (tree, limits) = (&self.assignment.tree, &self.assignment.limits.archive);
-        let Received { hand_in, validation, source } =
+        let Received { submission, validation, source } =
             match decoder.receive(source, &copy, tree, limits) {
                 Ok(received) => received,
                 Err(IntakeError::Refused(refusal)) => {
@@ -268,24 +268,25 @@ impl<'a> Grading<'a> {
                 }
                 Err(error) => return Err(error.into()),
             };
-        record.digest.clone_from(&hand_in.digest);
+        record.digest.clone_from(&submission.digest);
         let config = validation.config.clone().unwrap_or_default();
         record.student = Student::of(&config);
         record.findings.clone_from(&validation.findings);
         record.findings.extend(source);
-        let mut checks = vec![tree_check(&validation, &hand_in, tree, purpose)];
+        let mut checks = vec![tree_check(&validation, &submission, tree, mode)];
         checks.extend(config_check(&validation));
-        let key = self.kept.as_ref().map(|kept| kept.key(&record, &checks)).transpose()?;
-        if let (Some(kept), Some(key)) = (&self.kept, &key)
+        let key = self.cache.as_ref().map(|cache| cache.key(&record, &checks)).transpose()?;
+        if let (Some(cache), Some(key)) = (&self.cache, &key)
             && let Some(found) =
-                kept.find(key, |evidence| self.failing(evidence), self.budget.is_some(), out)
+                cache.find(key, |evidence| self.failing(evidence), self.budget.is_some(), out)
         {
             return Ok(found);
         }
         costs.end("intake", decoder.take_cpu_s());
 
         say("compiling the source");
-        let built = self.build(&hand_in, scratch.path(), &mut record, &mut checks, &mut costs)?;
+        let built =
+            self.build(&submission, scratch.path(), &mut record, &mut checks, &mut costs)?;
         let seed = config.sampler_seed().unwrap_or_default();
         let mut drawn = Vec::new();
         // Lives as long as the session names it.
@@ -310,35 +311,39 @@ impl<'a> Grading<'a> {
             record.diagnostics =
                 said.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("\n");
         }
-        let compared: &[Case] = if self.compares_submitted { &self.cases } else { &[] };
+        let compared: &[PreparedScene] = if self.compares_submitted { &self.cases } else { &[] };
         if self.compares_submitted {
             say("comparing the submitted images");
         }
-        let handed_in = handed_in::read(&decoder, &hand_in.root, tree, compared)?;
-        record.findings.extend(handed_in.iter().filter_map(|image| image.finding(&hand_in.root)));
+        let submitted = submitted::read(&decoder, &submission.root, tree, compared)?;
+        record
+            .findings
+            .extend(submitted.iter().filter_map(|image| image.finding(&submission.root)));
         record.findings.sort_by_key(|finding| finding.severity);
-        for image in &handed_in {
+        for image in &submitted {
             let tolerances = &self.assignment.tolerances;
-            let (found, digest) = handed_in::judge(image, &drawn, tolerances);
+            let (found, digest) = submitted::judge(image, &drawn, tolerances);
             checks.extend(found);
             record.images.extend(digest);
         }
         if let (None, Some(reference), Some(seed)) =
             (&built, &self.reference, config.sampler_seed())
         {
-            checks.extend(handed_in::judge_seeds(&session, reference, &handed_in, seed));
+            checks.extend(submitted::judge_seeds(&session, reference, &submitted, seed));
         }
         costs.end("images", decoder.take_cpu_s() + session.end_path());
         if let Some((_, built)) = &built {
             built.explain(&self.assignment.rules, &mut checks, &mut record.findings);
         }
-        pictures::draw(&mut checks, &self.cases, &drawn, &handed_in, out)?;
+        pictures::draw(&mut checks, &self.cases, &drawn, &submitted, out)?;
         costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
         record.diagnoses = self.diagnose(&session, &record.evidence, &drawn, Some(&out.student))?;
         record.stages = costs.end("diagnosis", 0.0);
-        match (&self.kept, key) {
-            (Some(kept), Some(key)) => kept.keep(&key, self.failing(&record.evidence), record, out),
+        match (&self.cache, key) {
+            (Some(cache), Some(key)) => {
+                cache.keep(&key, self.failing(&record.evidence), record, out)
+            }
             _ => Ok(record),
         }
     }
@@ -399,13 +404,13 @@ impl<'a> Grading<'a> {
     /// Builds the source, mended where it does not build as it is; answers the library with it.
     fn build(
         &self,
-        hand_in: &HandIn,
+        submission: &Submission,
         scratch: &Path,
         record: &mut Record,
         checks: &mut Vec<Check>,
         costs: &mut Costs,
     ) -> anyhow::Result<Option<(PathBuf, mend::Built)>> {
-        let src = hand_in.root.join("src");
+        let src = submission.root.join("src");
         if !src.join("lib.rs").is_file() {
             checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no src/lib.rs"));
             return Ok(None);
@@ -487,7 +492,7 @@ impl<'a> Grading<'a> {
                 drawn.extend(image);
             }
             checks.extend(answers.judge());
-            if cases.iter().any(|case| case.small.sampled.is_some()) {
+            if cases.iter().any(|case| case.probe_film.sampled.is_some()) {
                 checks.push(loops::judge_edges(&answers.edges));
             }
             rays::set_apart(&mut checks[begin..]);
@@ -500,7 +505,7 @@ impl<'a> Grading<'a> {
     /// The public scenes and the held-back ones. No worker is asked about both, and neither's
     /// verdicts hang on the other's: what a renderer learns of a held-back scene must not show in
     /// an image of a public one.
-    fn groups(&self) -> [&[Case]; 2] {
+    fn groups(&self) -> [&[PreparedScene]; 2] {
         let public = self.cases.iter().take_while(|case| !case.held_back).count();
         self.cases.split_at(public).into()
     }
@@ -568,8 +573,8 @@ impl<'a> Grading<'a> {
 }
 
 /// Scenes by what their images cost: where a submission uses up its time, the most expensive are not asked.
-fn cheap_first(cases: &[Case]) -> Vec<&Case> {
-    let mut order: Vec<&Case> = cases.iter().collect();
+fn cheap_first(cases: &[PreparedScene]) -> Vec<&PreparedScene> {
+    let mut order: Vec<&PreparedScene> = cases.iter().collect();
     order.sort_by_key(|case| {
         let (width, height) = case.film();
         u64::from(width) * u64::from(height) * u64::from(case.spp)
@@ -578,20 +583,20 @@ fn cheap_first(cases: &[Case]) -> Vec<&Case> {
 }
 
 /// Makes the held-back scenes of a batch ready.
-fn hold_back(store: &Store, seed: u64, cases: &mut Vec<Case>) -> anyhow::Result<HeldBack> {
+fn hold_back(store: &Store, seed: u64, cases: &mut Vec<PreparedScene>) -> anyhow::Result<HeldBack> {
     (store.progress)("making the held-back scenes");
     let (held_back, entries) = held_back::make(store.assignment, seed)?;
     for entry in &entries {
         (store.progress)(&format!("preparing scene {}", entry.name));
-        let case = Case::new(store, entry);
+        let case = PreparedScene::new(store, entry);
         let case = case.with_context(|| format!("seed {seed}: {} cannot be used", entry.name))?;
-        cases.push(Case { held_back: true, ..case });
+        cases.push(PreparedScene { held_back: true, ..case });
     }
     Ok(held_back)
 }
 
 /// Notes in the checks on a group of scenes whether these are held back, and what they can cost.
-fn mark(checks: &mut [Check], cases: &[Case]) {
+fn mark(checks: &mut [Check], cases: &[PreparedScene]) {
     let held_back = cases.iter().any(|case| case.held_back);
     for check in checks {
         check.held_back = held_back;
@@ -633,21 +638,26 @@ fn refused_checks(validation: &Validation) -> Vec<Check> {
     ]
 }
 
-fn tree_check(validation: &Validation, hand_in: &HandIn, tree: &TreeSpec, purpose: Mode) -> Check {
+fn tree_check(
+    validation: &Validation,
+    submission: &Submission,
+    tree: &TreeSpec,
+    mode: Mode,
+) -> Check {
     if validation.follows_tree() {
         let summary = "the submission follows the tree of the handout";
         return Check::new(TREE, "", Verdict::Pass, summary);
     }
     let error = validation.findings.iter().find(|f| f.severity == intake::Severity::Error);
     let error = error.map(ToString::to_string).unwrap_or_default();
-    match purpose {
+    match mode {
         Mode::Check => {
-            let summary = format!("not ready to hand in: {error}");
+            let summary = format!("not ready to submit: {error}");
             Check::new(TREE, "", Verdict::NotJudged, summary)
                 .with_hint("umbra validate shows the whole tree")
         }
         Mode::Grade => {
-            let hint = match intake::mends(hand_in, tree) {
+            let hint = match intake::mends(submission, tree) {
                 Some(mends) => format!("umbra validate --fix mends it: {mends}"),
                 None => format!("umbra validate shows the whole tree; {error}"),
             };

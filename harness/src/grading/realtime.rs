@@ -5,9 +5,9 @@ use std::path::Path;
 use basecode::Image;
 use basecode::gpu::{Footprint, UNDRAWN_MAPS};
 
-use super::case::Case;
 use super::draw::{Frame, draw, draw_plain};
 use super::offline::Drawn;
+use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels;
@@ -50,10 +50,10 @@ const LEAST_SHADING: f64 = 0.2;
 pub fn judge_images(
     session: &Session,
     plugin: &Path,
-    cases: &[Case],
+    cases: &[PreparedScene],
     tolerances: &Tolerances,
 ) -> Vec<Judged> {
-    let is_right = |case: &Case, outcome: &Outcome| {
+    let is_right = |case: &PreparedScene, outcome: &Outcome| {
         let Outcome::Done(answer) = outcome else { return false };
         let (width, height) = case.film();
         let image = session::image(&answer.values, width, height);
@@ -105,7 +105,7 @@ pub fn drawn_by_nobody(check: &mut Check, why: &str) {
 }
 
 fn judge(
-    case: &Case,
+    case: &PreparedScene,
     kind: Kind,
     image: &Image,
     (id, wanted): View,
@@ -117,7 +117,7 @@ fn judge(
 /// An outcome as an image, or else the check that says why there is none.
 fn drawn(
     session: &Session,
-    case: &Case,
+    case: &PreparedScene,
     kind: Kind,
     id: CheckId,
     outcome: &Outcome,
@@ -137,7 +137,7 @@ fn drawn(
 
 fn judge_plain(
     session: &Session,
-    case: &Case,
+    case: &PreparedScene,
     outcome: &Outcome,
     tolerances: &Tolerances,
 ) -> (Vec<Check>, Option<Drawn>) {
@@ -173,7 +173,7 @@ fn judge_plain(
 fn judge_bonus(
     session: &Session,
     plugin: &Path,
-    case: &Case,
+    case: &PreparedScene,
     outcome: &Outcome,
     plain: Option<&Image>,
     tolerances: &Tolerances,
@@ -193,7 +193,7 @@ fn judge_bonus(
 /// Whether a frame itself shows shadows that are right: by another stage than the submission's they may be
 /// right where its own frame shows nothing.
 fn shows_its_shadows(
-    case: &Case,
+    case: &PreparedScene,
     with: &Image,
     plain: Option<&Image>,
     tolerances: &Tolerances,
@@ -254,7 +254,7 @@ fn no_shadow_map(
 }
 
 /// The masks that tell where shadows fall.
-fn shadows(case: &Case) -> Shadows<'_> {
+fn shadows(case: &PreparedScene) -> Shadows<'_> {
     let Expected { offline, unshadowed_mask, .. } = &case.expected;
     Shadows { mask: &offline.mask, unshadowed: unshadowed_mask, median_lit: offline.median_lit }
 }
@@ -262,7 +262,7 @@ fn shadows(case: &Case) -> Shadows<'_> {
 /// A default run that is wrong by its shadows alone is the bonus' fault, not that of pass and
 /// stages: the checks that say so, if it is.
 fn plain_but_for_shadows(
-    case: &Case,
+    case: &PreparedScene,
     image: &Image,
     tolerances: &Tolerances,
 ) -> Option<Vec<Check>> {
@@ -292,7 +292,7 @@ fn plain_but_for_shadows(
 fn judge_visibility(
     session: &Session,
     plugin: &Path,
-    case: &Case,
+    case: &PreparedScene,
     (with, without): (&Image, Option<&Image>),
     check: Check,
     tolerances: &Tolerances,
@@ -322,7 +322,7 @@ fn judge_visibility(
 }
 
 /// Where the image shows a surface and where not, and whether light falls on it.
-fn judge_coverage(case: &Case, image: &Image) -> Check {
+fn judge_coverage(case: &PreparedScene, image: &Image) -> Check {
     let mask = &case.expected.unshadowed_mask;
     let (mut counted, mut wrong) = (0usize, 0usize);
     for (pixel, &value) in image.pixels.iter().zip(&mask.pixels) {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::shared::ImageDigest;
 use crate::diagnosis::Diagnosis;
 use crate::evidence::Evidence;
-use crate::intake::{Field, Finding, HandInConfig};
+use crate::intake::{Field, Finding, SubmittedConfig};
 
 /// One submission, after all evidence was collected. Rubric, dates and class list stay outside, so
 /// that grades can be derived from it again without rendering.
@@ -74,7 +74,7 @@ pub struct Conditions {
 
 impl Student {
     /// As a `config.json` states them.
-    pub fn of(config: &HandInConfig) -> Self {
+    pub fn of(config: &SubmittedConfig) -> Self {
         let text = |field: &Option<Field>| field.as_ref().map_or(String::new(), |f| f.text.clone());
         Self {
             first_name: text(&config.first_name),

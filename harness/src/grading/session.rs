@@ -8,7 +8,7 @@ use basecode::{Image, Ray, Vec3};
 use renderer_api as api;
 
 use super::attribution;
-use super::case::Case;
+use super::prepared_scene::PreparedScene;
 use crate::diagnosis::{Observations, Thumbnail, View};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::process::Limits;
@@ -96,7 +96,7 @@ impl Session<'_> {
         (printed > self.limits.output_kib << 10).then(|| {
             let mib = printed as f64 / f64::from(1 << 20);
             let said = format!("the renderer printed {mib:.1} MiB in one go; most of it was cut");
-            let hint = "it costs no points, only time: print less before handing in";
+            let hint = "it costs no points, only time: print less before you submit it";
             Check { error: 0.0, ..Check::new(OUTPUT, "", Verdict::Fail, said).with_hint(hint) }
         })
     }
@@ -109,7 +109,7 @@ impl Session<'_> {
     }
 
     /// Keeps what a compiler said about a public scene, where it is more than its first line.
-    pub fn quote(&self, case: &Case, said: &str) {
+    pub fn quote(&self, case: &PreparedScene, said: &str) {
         if case.held_back || said.lines().nth(1).is_none() {
             return;
         }

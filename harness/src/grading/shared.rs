@@ -77,7 +77,7 @@ pub fn judge_shared(records: &mut [Record]) {
         for ImageDigest { scene, path, sha256 } in &record.images {
             let others = others(&owners[sha256], &person);
             found.push(if others.is_empty() {
-                let summary = format!("nobody else of this batch handed in {path}");
+                let summary = format!("nobody else of this batch submitted {path}");
                 Check::new(SHARED, scene, Verdict::Pass, summary)
             } else {
                 let summary = format!("{path} is the same image as another submission's");

@@ -11,8 +11,8 @@ use std::path::Path;
 use basecode::gpu::{EVERY_FRAGMENT, Footprint, OUTLINES};
 use basecode::{Image, Vec3};
 
-use super::case::Case;
 use super::draw::{Frame, draw};
+use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::imaging::reference::RegionMask;
@@ -58,7 +58,7 @@ pub struct Uploaded {
 pub fn judge(
     session: &Session,
     plugin: &Path,
-    cases: &[Case],
+    cases: &[PreparedScene],
     footprints: &[Option<Footprint>],
 ) -> Uploaded {
     let mut found = Uploaded::default();
@@ -83,7 +83,7 @@ pub fn judge(
 
 /// Bytes for each pixel that a frame took besides what the scene itself explains; nothing where that
 /// is too much to tell.
-fn unexplained(case: &Case, footprint: &Footprint) -> Option<f64> {
+fn unexplained(case: &PreparedScene, footprint: &Footprint) -> Option<f64> {
     let scene = &case.expected.scene;
     let own = ANY + BY_SHAPE * scene.shapes().len() + BY_TRIANGLE * triangles(case);
     let (width, height) = case.film();
@@ -91,29 +91,33 @@ fn unexplained(case: &Case, footprint: &Footprint) -> Option<f64> {
     (by_pixel(own as f64) <= MOST_OWN).then(|| by_pixel(footprint.uploaded as f64 - own as f64))
 }
 
-fn triangles(case: &Case) -> usize {
+fn triangles(case: &PreparedScene) -> usize {
     case.expected.scene.shapes().iter().map(|shape| shape.triangles.len()).sum()
 }
 
 /// Why what is drawn with uploaded pixels is not the scene, if it is not.
-fn nothing_draws(session: &Session, plugin: &Path, cases: &[Case]) -> Option<&'static str> {
-    let drawn = |case: &Case, outlines: bool| {
+fn nothing_draws(
+    session: &Session,
+    plugin: &Path,
+    cases: &[PreparedScene],
+) -> Option<&'static str> {
+    let drawn = |case: &PreparedScene, outlines: bool| {
         let mut stages = vec![Stage { name: EVERY_FRAGMENT.to_owned(), text: SHOW.to_owned() }];
         stages.extend(
             outlines.then(|| Stage { name: OUTLINES.to_owned(), text: "outlines".to_owned() }),
         );
-        let frame = Frame::small(case, stages);
+        let frame = Frame::probe(case, stages);
         let outcome = draw(session, Some(plugin), &frame);
         outcome.answer().map(|answer| session::image(&answer.values, frame.size.0, frame.size.1))
     };
-    let mask = |case: &&Case| clear(&case.small.unshadowed_mask, true).count();
+    let mask = |case: &&PreparedScene| clear(&case.probe_film.unshadowed_mask, true).count();
     let case = cases.iter().max_by_key(mask)?;
-    if covers_background(&drawn(case, false)?, &case.small.unshadowed_mask) {
+    if covers_background(&drawn(case, false)?, &case.probe_film.unshadowed_mask) {
         return Some("the pixels are uploaded, and what is drawn with them is not the scene");
     }
     let case = cases.iter().min_by_key(|case| triangles(case))?;
     if triangles(case) <= FEW_TRIANGLES
-        && covers_surfaces(&drawn(case, true)?, &case.small.unshadowed_mask)
+        && covers_surfaces(&drawn(case, true)?, &case.probe_film.unshadowed_mask)
     {
         return Some("the pixels are uploaded, and drawn one by one");
     }

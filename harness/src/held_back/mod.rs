@@ -91,7 +91,7 @@ pub fn make(assignment: &Assignment, seed: u64) -> anyhow::Result<(HeldBack, Vec
             film: None,
             stored: false,
             perturb: false,
-            hand_in: None,
+            submitted: None,
         });
         held_back.scenes.push((name, original.name.clone()));
     }

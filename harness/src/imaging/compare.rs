@@ -2,7 +2,7 @@
 //!
 //! Rules in this order (DESIGN.md, "Images"): size; non-finite; negative; differing interior pixels; no failing 2x2
 //! block in the interior; differing pixels of the edge mask, as a fraction of the mask; signed bias of every region,
-//! its highlight apart. Pixels that show an emitter never count. One walk over the pixels serves all rules.
+//! its highlight apart. Pixels that show an emitter never count. One pass over the pixels serves all rules.
 
 use basecode::image::Image;
 use glam::Vec3;
@@ -10,7 +10,7 @@ use glam::Vec3;
 use super::evidence::{CompareError, ComparedWith, ImageEvidence, Tolerances};
 use super::reference::{ReferenceImage, RegionMask, check_mask};
 use super::srgb;
-use super::walk::{Scale, walk};
+use super::stats::{Scale, accumulate};
 
 /// Judges an offline render with `spp` jittered samples per pixel, any seed.
 ///
@@ -38,7 +38,7 @@ pub fn compare_offline(
     let width = reference.mean.width;
     let mut tallest = vec![Vec3::ZERO; width];
 
-    let walk = walk(actual, expected, &reference.mask, tolerances, |y, row| {
+    let stats = accumulate(actual, expected, &reference.mask, tolerances, |y, row| {
         if let Some(inverse) = samples {
             let own = &reference.variance.pixels[y * width..][..width];
             for (out, v) in row.variance.iter_mut().zip(own) {
@@ -61,7 +61,7 @@ pub fn compare_offline(
     });
     let scale =
         Scale { median_lit: reference.median_lit, interior_fraction: tolerances.interior_fraction };
-    Ok(walk.judge(&reference.mask, with, &scale, tolerances))
+    Ok(stats.judge(&reference.mask, with, &scale, tolerances))
 }
 
 /// Judges a realtime frame drawn from code, as unclamped linear floats, against the pixel-centre reference.
@@ -88,7 +88,7 @@ pub fn compare_realtime_linear(
         .map(|r| r as f32)
         .collect();
     let snap = tolerances.realtime_snap_px as f32;
-    let walk = walk(actual, centre, mask, tolerances, |y, row| {
+    let stats = accumulate(actual, centre, mask, tolerances, |y, row| {
         let other = |y: usize| &centre.pixels[y * width..][..width];
         let (above, below) = (other(y.saturating_sub(1)), other((y + 1).min(centre.height - 1)));
         for x in 0..width {
@@ -103,7 +103,7 @@ pub fn compare_realtime_linear(
             row.excess2[x] = excess.max_element().powi(2);
         }
     });
-    Ok(walk.judge(mask, ComparedWith::Centre, &scale, tolerances))
+    Ok(stats.judge(mask, ComparedWith::Centre, &scale, tolerances))
 }
 
 /// Judges a realtime image that was submitted as EXR: both images clamped to [0, 1] and rounded to 8-bit sRGB levels,
@@ -122,15 +122,15 @@ pub fn compare_srgb8(
     let (width, scale) = realtime_scale(actual, centre, mask, tolerances.srgb_fraction)?;
     // A pixel fails from `srgb_levels` on, so the allowed difference lies half a level below.
     let allowed = tolerances.srgb_levels as f32 - 0.5;
-    let mut walk = walk(actual, centre, mask, tolerances, |_, row| {
+    let mut stats = accumulate(actual, centre, mask, tolerances, |_, row| {
         for x in 0..width {
             let apart = srgb::levels_apart(row.actual[x], row.expected[x]);
             row.excess2[x] = (apart as f32 / allowed).powi(2);
         }
     });
     // Rounding to levels and clamping move a region's mean; the levels have judged it already.
-    walk.regions.clear();
-    Ok(walk.judge(mask, ComparedWith::CentreSrgb8, &scale, tolerances))
+    stats.regions.clear();
+    Ok(stats.judge(mask, ComparedWith::CentreSrgb8, &scale, tolerances))
 }
 
 fn check_size(actual: &Image, expected: &Image) -> Result<(), CompareError> {

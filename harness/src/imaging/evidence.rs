@@ -19,9 +19,9 @@ pub struct Tolerances {
     /// 16 spp, this module's tests); an image half a pixel off at 1 spp has 16 % of a mask three pixels wide.
     pub edge_fraction: f64,
     /// The part of the standard error that does not shrink with samples, as a fraction of the median lit value:
-    /// the facts sheet's 5e-4, made relative.
+    /// measured on right renderers (5e-4), made relative.
     pub floor_of_median: f64,
-    /// The same as a fraction of the expected value: the facts sheet's 0.002 b.
+    /// The same as a fraction of the expected value: measured on right renderers (0.002 b).
     pub floor_relative: f64,
     /// The largest signed bias of a region, relative to its mean. Measured: correct under 0.03 %, weakest mistake
     /// (n + 1 for n + 2) 1.56 %.

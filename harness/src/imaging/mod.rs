@@ -16,4 +16,4 @@ pub mod pictures;
 pub mod ratio;
 pub mod reference;
 pub mod srgb;
-mod walk;
+mod stats;

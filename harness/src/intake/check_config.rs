@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 
 use super::finding::{Finding, printable};
-use super::hand_in_config::{Field, HandInConfig};
 use super::limits::Limits;
 use super::name::safe_path;
+use super::submitted_config::{Field, SubmittedConfig};
 use super::tree::{CONFIG_FILE, TreeSpec};
 
 /// Checks what `config.json` says against the submission. Every finding has a line and a hint; what is
@@ -16,7 +16,7 @@ use super::tree::{CONFIG_FILE, TreeSpec};
 /// tree whose absence is reported already. `is_whole` is false where reading stopped: then nothing is said of
 /// what is absent, but the number. The findings are in the order of lines.
 pub fn check_config(
-    config: &HandInConfig,
+    config: &SubmittedConfig,
     is_whole: bool,
     present: &[&str],
     missing: &[&str],
@@ -133,7 +133,7 @@ fn check_id(field: &Option<Field>, findings: &mut Vec<Finding>) {
 }
 
 fn check_renders(
-    config: &HandInConfig,
+    config: &SubmittedConfig,
     paths: &[&str],
     missing: &[&str],
     tree: &TreeSpec,
@@ -185,7 +185,7 @@ fn check_renders(
             findings.push(
                 Finding::warning(
                     "config_not_listed",
-                    format!("'{path}' is handed in, but not listed"),
+                    format!("'{path}' is submitted, but not listed"),
                 )
                 .at(CONFIG_FILE)
                 .on_line(1)
@@ -216,7 +216,7 @@ fn not_found(written: &str, name: &str, paths: &[&str], tree: &TreeSpec) -> Find
     } else {
         Finding::warning(
             "config_render_missing",
-            format!("'{written}' is listed, but not handed in"),
+            format!("'{written}' is listed, but not submitted"),
         )
         .hint("add the image or remove the entry")
     }
@@ -231,7 +231,7 @@ fn canonical(path: &str, tree: &TreeSpec) -> String {
 fn resolve(written: &str) -> Result<String, Finding> {
     if written.trim().is_empty() {
         return Err(Finding::warning("config_render_missing", "a render with an empty path")
-            .hint("write the image's path from the root of the hand-in"));
+            .hint("write the image's path from the root of the submission"));
     }
     match safe_path(written.trim().as_bytes(), &Limits::default()) {
         Ok(safe) => Ok(safe.path),
@@ -239,8 +239,8 @@ fn resolve(written: &str) -> Result<String, Finding> {
             Err(Finding::warning("config_backslash", format!("'{}' holds a backslash", printable(written)))
                 .hint(format!("write \"{}\"", printable(&written.replace('\\', "/")))))
         }
-        Err(_) => Err(Finding::warning("config_path_escape", format!("'{}' leaves the hand-in", printable(written)))
-            .hint("write the image's path from the root of the hand-in, such as offline/cbox_simple_offline.exr")),
+        Err(_) => Err(Finding::warning("config_path_escape", format!("'{}' leaves the submission", printable(written)))
+            .hint("write the image's path from the root of the submission, such as offline/cbox_simple_offline.exr")),
     }
 }
 
@@ -257,7 +257,7 @@ mod tests {
     }
 
     fn codes(text: &str, paths: &[&str]) -> Vec<String> {
-        let (config, mut findings, is_whole) = HandInConfig::parse(text.as_bytes());
+        let (config, mut findings, is_whole) = SubmittedConfig::parse(text.as_bytes());
         findings.extend(check_config(&config, is_whole, paths, &[], &TreeSpec::default()));
         for finding in &findings {
             assert!(finding.hint.is_some() && finding.line.is_some(), "{finding}");
@@ -280,9 +280,9 @@ mod tests {
 
     #[test]
     fn any_name_of_the_bonus_is_the_bonus() {
-        for handed_in in ["realtime/teapot_bonus.exr", "realtime/teapot_simple_realtime_bonus.exr"]
+        for submitted in ["realtime/teapot_bonus.exr", "realtime/teapot_simple_realtime_bonus.exr"]
         {
-            assert_eq!(check(r#""renders/teapot_bonus.exr""#, &[handed_in]), [""; 0]);
+            assert_eq!(check(r#""renders/teapot_bonus.exr""#, &[submitted]), [""; 0]);
         }
     }
 

@@ -13,7 +13,7 @@ use super::finding::{Finding, Findings, printable};
 use super::limits::{Limits, mib};
 use super::name::safe_path;
 use super::tree::{CONFIG_FILE, TreeSpec};
-use super::unpack::{Format, HandIn, HandInFile, IntakeError, Refusal, archive_magic};
+use super::unpack::{Format, IntakeError, Refusal, Submission, SubmittedFile, archive_magic};
 use crate::files::hex;
 
 /// Why reading stops before the end.
@@ -60,7 +60,7 @@ pub(super) struct PrivateCopy<'a> {
     tree: &'a TreeSpec,
     pub(super) limits: &'a Limits,
     pub(super) findings: Findings,
-    files: BTreeMap<String, Option<HandInFile>>,
+    files: BTreeMap<String, Option<SubmittedFile>>,
     folders: BTreeSet<String>,
     /// Lower-cased path to the first spelling seen.
     spellings: HashMap<String, String>,
@@ -107,7 +107,7 @@ impl<'a> PrivateCopy<'a> {
             let message = format!("more than {} entries", self.limits.max_entries);
             return Err(self.refuse(
                 Finding::error("limit_entries", message)
-                    .hint("hand in only the files of the tree, no build folder"),
+                    .hint("submit only the files of the tree, no build folder"),
             ));
         }
         Ok(())
@@ -222,7 +222,7 @@ impl<'a> PrivateCopy<'a> {
             return Err(self.refuse(
                 Finding::error("limit_total", message)
                     .at(path)
-                    .hint("hand in only the files of the tree"),
+                    .hint("submit only the files of the tree"),
             ));
         }
         Ok(())
@@ -259,7 +259,7 @@ impl<'a> PrivateCopy<'a> {
                 self.findings.push(
                     Finding::warning(
                         "nested_archive",
-                        format!("an archive ({kind}) inside the hand-in is not opened"),
+                        format!("an archive ({kind}) inside the submission is not opened"),
                     )
                     .at(path)
                     .hint("put its files into the tree themselves"),
@@ -286,7 +286,7 @@ impl<'a> PrivateCopy<'a> {
         }
         let sha256 = hex(&sha256.finalize());
         self.files
-            .insert(path.to_owned(), Some(HandInFile { path: path.to_owned(), bytes, sha256 }));
+            .insert(path.to_owned(), Some(SubmittedFile { path: path.to_owned(), bytes, sha256 }));
         Ok(Ok(Written { bytes, crc32: crc.sum() }))
     }
 
@@ -318,7 +318,7 @@ impl<'a> PrivateCopy<'a> {
         name: &str,
         format: Format,
         result: Result<(), Stop>,
-    ) -> Result<HandIn, IntakeError> {
+    ) -> Result<Submission, IntakeError> {
         if let Err(Stop::Io(error)) = result {
             clear(self.dest)?;
             return Err(error);
@@ -326,10 +326,10 @@ impl<'a> PrivateCopy<'a> {
         for (pattern, count) in std::mem::take(&mut self.ignored) {
             self.findings.push(Finding::note("ignored", format!("{count} ignored: {pattern}")));
         }
-        let mut files: Vec<HandInFile> = self.files.into_values().flatten().collect();
+        let mut files: Vec<SubmittedFile> = self.files.into_values().flatten().collect();
         if files.is_empty() && !self.findings.has_errors() {
             self.findings.push(
-                Finding::error("empty", "the hand-in holds no files")
+                Finding::error("empty", "the submission holds no files")
                     .hint("archive the folder that holds config.json"),
             );
         }
@@ -350,12 +350,15 @@ impl<'a> PrivateCopy<'a> {
                 file.path.drain(..=folder.len());
             }
             self.findings.push(
-                Finding::note("wrapped", "one wrapping folder: taken as the root of the hand-in")
-                    .at(format!("{folder}/")),
+                Finding::note(
+                    "wrapped",
+                    "one wrapping folder: taken as the root of the submission",
+                )
+                .at(format!("{folder}/")),
             );
         }
         files.sort_by(|a, b| a.path.cmp(&b.path));
-        Ok(HandIn {
+        Ok(Submission {
             name: printable(name),
             format,
             root,
@@ -372,7 +375,7 @@ impl<'a> PrivateCopy<'a> {
 fn open_to_readers(
     dest: &Path,
     folders: &BTreeSet<String>,
-    files: &[HandInFile],
+    files: &[SubmittedFile],
 ) -> Result<(), IntakeError> {
     #[cfg(unix)]
     {
@@ -391,7 +394,7 @@ fn open_to_readers(
 }
 
 /// The single folder that holds everything, unless it is one of the tree's own.
-fn wrapping_folder(files: &[HandInFile], tree: &TreeSpec) -> Option<String> {
+fn wrapping_folder(files: &[SubmittedFile], tree: &TreeSpec) -> Option<String> {
     let (top, _) = files.first()?.path.split_once('/')?;
     let inside = |path: &str| path.strip_prefix(top).is_some_and(|rest| rest.starts_with('/'));
     if !files.iter().all(|file| inside(&file.path)) {
@@ -404,7 +407,7 @@ fn wrapping_folder(files: &[HandInFile], tree: &TreeSpec) -> Option<String> {
 
 /// SHA-256 over the sorted files: for each the length of its path (u64, little endian), the path
 /// and the SHA-256 of its content. The same for a zip, a tar and a folder with the same files.
-fn digest(files: &[HandInFile]) -> String {
+fn digest(files: &[SubmittedFile]) -> String {
     let mut sha256 = Sha256::new();
     for file in files {
         sha256.update((file.path.len() as u64).to_le_bytes());

@@ -1,14 +1,14 @@
 //! Intake: from what a student submits to a safe private copy, and what is to be said about it.
 //!
 //! ```text
-//! archive or folder --unpack--> HandIn (a copy, listed and hashed) --validate--> Validation
+//! archive or folder --unpack--> Submission (a copy, listed and hashed) --validate--> Validation
 //! working folder    --pack----> a2_first_last.zip
 //! nearly right one  --fix-----> a conforming zip
 //! ```
 //!
 //! Everything here is library code without processes. [`unpack_bytes`] is the one function that
 //! decodes an archive: it writes below an empty destination folder that the caller made, and touches
-//! nothing else. Hand-ins come in by [`crate::decode`], which calls it in a locked child.
+//! nothing else. Submissions come in by [`crate::decode`], which calls it in a locked child.
 //!
 //! Conventions: paths of a submission are relative, UTF-8, with `/` between components and neither
 //! `.` nor `..`; sizes are bytes; hashes are lower-case hexadecimal SHA-256.
@@ -17,13 +17,13 @@ mod check_config;
 mod copy;
 mod finding;
 mod folder;
-mod hand_in_config;
 mod json_lines;
 mod lexer;
 mod limits;
 mod name;
 mod pack;
 mod source_rules;
+mod submitted_config;
 mod tar;
 mod tree;
 mod tree_match;
@@ -36,15 +36,15 @@ mod zip_headers;
 pub use check_config::check_config;
 pub(crate) use finding::printable;
 pub use finding::{Finding, Severity};
-pub use hand_in_config::{Field, HandInConfig, ListedRender};
 pub use limits::Limits;
 pub use pack::{Packed, archive_name, fix, mends, pack};
 pub use source_rules::{scan_source, scan_text};
+pub use submitted_config::{Field, ListedRender, SubmittedConfig};
 pub(crate) use tree::CONFIG_FILE;
 pub use tree::{TreeFile, TreeSpec};
 pub use tree_match::{Mark, TreeLine};
 pub use unpack::{
-    Format, HandIn, HandInFile, IntakeError, Refusal, format_of_bytes, unpack, unpack_bytes,
+    Format, IntakeError, Refusal, Submission, SubmittedFile, format_of_bytes, unpack, unpack_bytes,
 };
 pub(crate) use unpack::{copy_unpacked, name_of, read_archive};
-pub use validate::{Validation, validate_hand_in, validate_refusal};
+pub use validate::{Validation, validate_refusal, validate_submission};

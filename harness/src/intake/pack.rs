@@ -11,12 +11,12 @@ use serde::{Deserialize, Serialize};
 
 use super::copy::Kind;
 use super::finding::Finding;
-use super::hand_in_config::{Field, HandInConfig};
 use super::limits::Limits;
+use super::submitted_config::{Field, SubmittedConfig};
 use super::tree::TreeSpec;
 use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
-use super::unpack::{HandIn, IntakeError, Refusal, copy_folder, unpack_bytes};
-use super::validate::{Validation, validate_hand_in};
+use super::unpack::{IntakeError, Refusal, Submission, copy_folder, unpack_bytes};
+use super::validate::{Validation, validate_submission};
 
 /// An archive that was written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,8 +56,8 @@ pub fn pack(
             }
     };
     let scratch = scratch_folder()?;
-    let hand_in = copy_folder(dir, &is_wanted, scratch.path(), tree, limits)?;
-    write(&hand_in, out, tree, limits, |validation| validation.conforms)
+    let submission = copy_folder(dir, &is_wanted, scratch.path(), tree, limits)?;
+    write(&submission, out, tree, limits, |validation| validation.conforms)
 }
 
 fn scratch_folder() -> Result<tempfile::TempDir, IntakeError> {
@@ -65,7 +65,7 @@ fn scratch_folder() -> Result<tempfile::TempDir, IntakeError> {
 }
 
 /// `a2_first_last.zip` by the credentials: lower case, other signs than letters and digits as `-`.
-pub fn archive_name(config: &HandInConfig, tree: &TreeSpec) -> String {
+pub fn archive_name(config: &SubmittedConfig, tree: &TreeSpec) -> String {
     let plain = |field: &Option<Field>| {
         let text = field.as_ref().map(|field| field.text.to_lowercase()).unwrap_or_default();
         let parts: Vec<&str> =
@@ -83,17 +83,17 @@ pub fn archive_name(config: &HandInConfig, tree: &TreeSpec) -> String {
 /// [`IntakeError::Refused`] when something is missing that moving files cannot mend; nothing is
 /// then written.
 pub fn fix(
-    hand_in: &HandIn,
+    submission: &Submission,
     out: &Path,
     tree: &TreeSpec,
     limits: &Limits,
 ) -> Result<Packed, IntakeError> {
-    write(hand_in, out, tree, limits, Validation::follows_tree)
+    write(submission, out, tree, limits, Validation::follows_tree)
 }
 
 /// What [`fix`] would do to the tree, in words; nothing where it cannot mend it, or need not.
-pub fn mends(hand_in: &HandIn, tree: &TreeSpec) -> Option<String> {
-    let places = places(hand_in, tree).ok()?;
+pub fn mends(submission: &Submission, tree: &TreeSpec) -> Option<String> {
+    let places = places(submission, tree).ok()?;
     let moved: Vec<_> = places
         .iter()
         .filter(|(to, from)| to != from && !tree.file_at(to).is_some_and(|file| file.accepts(from)))
@@ -107,20 +107,20 @@ pub fn mends(hand_in: &HandIn, tree: &TreeSpec) -> Option<String> {
 
 /// Writes an archive of what belongs to the tree, where its validation is good enough.
 fn write(
-    hand_in: &HandIn,
+    submission: &Submission,
     out: &Path,
     tree: &TreeSpec,
     limits: &Limits,
     is_good: impl Fn(&Validation) -> bool,
 ) -> Result<Packed, IntakeError> {
-    let places = places(hand_in, tree)?;
-    let bytes = zip_bytes(hand_in, &places)?;
+    let places = places(submission, tree)?;
+    let bytes = zip_bytes(submission, &places)?;
     let scratch = scratch_folder()?;
     // The archive as whoever grades it will see it.
     let copy = unpack_bytes(&bytes, "packed.zip", scratch.path(), tree, limits)?;
-    let mut validation = validate_hand_in(&copy, tree)?;
+    let mut validation = validate_submission(&copy, tree)?;
     if !is_good(&validation) {
-        return Err(refused(hand_in, validation.findings));
+        return Err(refused(submission, validation.findings));
     }
     let archive = match &validation.config {
         Some(config) if out.is_dir() => out.join(archive_name(config, tree)),
@@ -138,28 +138,31 @@ fn write(
     })
 }
 
-fn refused(hand_in: &HandIn, mut findings: Vec<Finding>) -> IntakeError {
+fn refused(submission: &Submission, mut findings: Vec<Finding>) -> IntakeError {
     findings.sort_by_key(|finding| finding.severity);
     IntakeError::Refused(Box::new(Refusal {
-        name: hand_in.name.clone(),
-        format: Some(hand_in.format),
+        name: submission.name.clone(),
+        format: Some(submission.format),
         findings,
     }))
 }
 
 /// Path in the archive to path in the copy, for everything that belongs to the tree.
-fn places(hand_in: &HandIn, tree: &TreeSpec) -> Result<BTreeMap<String, String>, IntakeError> {
-    let paths: Vec<&str> = hand_in.files.iter().map(|file| file.path.as_str()).collect();
+fn places(
+    submission: &Submission,
+    tree: &TreeSpec,
+) -> Result<BTreeMap<String, String>, IntakeError> {
+    let paths: Vec<&str> = submission.files.iter().map(|file| file.path.as_str()).collect();
     let lines = match_tree(&paths, tree);
     if lines.iter().any(|line| line.mark == Mark::Missing) {
         let missing = |line: &TreeLine| line.mark == Mark::Missing;
         let missing: Vec<TreeLine> = lines.into_iter().filter(missing).collect();
-        return Err(refused(hand_in, tree_findings(&missing, &paths)));
+        return Err(refused(submission, tree_findings(&missing, &paths)));
     }
     let mut moves: Vec<(String, String)> = Vec::new();
     for line in lines {
         if let (Some(expected), Some(found)) = (line.expected, line.found)
-            && hand_in.file(&found).is_some()
+            && submission.file(&found).is_some()
         {
             moves.push((expected, found));
         }
@@ -177,16 +180,19 @@ fn places(hand_in: &HandIn, tree: &TreeSpec) -> Result<BTreeMap<String, String>,
                 "fix_collision",
                 format!("'{from}' and '{other}' belong to the same place"),
             );
-            return Err(refused(hand_in, vec![finding.at(to).hint("keep one of them")]));
+            return Err(refused(submission, vec![finding.at(to).hint("keep one of them")]));
         }
     }
     Ok(places)
 }
 
 /// A zip with fixed times, order and permissions.
-fn zip_bytes(hand_in: &HandIn, places: &BTreeMap<String, String>) -> Result<Vec<u8>, IntakeError> {
+fn zip_bytes(
+    submission: &Submission,
+    places: &BTreeMap<String, String>,
+) -> Result<Vec<u8>, IntakeError> {
     let failed = |e: ::zip::result::ZipError| {
-        refused(hand_in, vec![Finding::error("pack_failed", format!("cannot be packed: {e}"))])
+        refused(submission, vec![Finding::error("pack_failed", format!("cannot be packed: {e}"))])
     };
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
@@ -195,7 +201,7 @@ fn zip_bytes(hand_in: &HandIn, places: &BTreeMap<String, String>) -> Result<Vec<
         .unix_permissions(0o644);
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
     for (to, from) in places {
-        let path = hand_in.root.join(from);
+        let path = submission.root.join(from);
         let content = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
         writer.start_file(to.as_str(), options).map_err(failed)?;
         writer.write_all(&content).map_err(|e| IntakeError::io("pack", &path, e))?;

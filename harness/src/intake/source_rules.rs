@@ -6,7 +6,7 @@ use std::fs;
 
 use super::finding::{Finding, Findings, printable};
 use super::lexer::{Token, TokenKind, tokens};
-use super::unpack::{HandIn, IntakeError};
+use super::unpack::{IntakeError, Submission};
 
 /// Findings of one kind that are listed per file.
 const SHOWN_PER_FILE: usize = 5;
@@ -18,13 +18,13 @@ const MAX_SCANNED: u64 = 2 << 20;
 ///
 /// # Errors
 /// The copy cannot be read.
-pub fn scan_source(hand_in: &HandIn) -> Result<Vec<Finding>, IntakeError> {
+pub fn scan_source(submission: &Submission) -> Result<Vec<Finding>, IntakeError> {
     let mut findings = Findings::default();
-    for file in &hand_in.files {
+    for file in &submission.files {
         let name = file.path.rsplit('/').next().unwrap_or_default();
         if matches!(name, "build.rs" | "Cargo.toml" | "Cargo.lock") {
             findings.push(
-                Finding::note("source_manifest", format!("{name} is handed in, but ours is used"))
+                Finding::note("source_manifest", format!("{name} is submitted, but ours is used"))
                     .at(file.path.as_str()),
             );
         }
@@ -37,7 +37,7 @@ pub fn scan_source(hand_in: &HandIn) -> Result<Vec<Finding>, IntakeError> {
             findings.push(Finding::warning("source_large", message).at(file.path.as_str()));
             continue;
         }
-        let path = hand_in.root.join(&file.path);
+        let path = submission.root.join(&file.path);
         let bytes = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
         for finding in scan_text(&file.path, &String::from_utf8_lossy(&bytes)) {
             findings.push(finding);

@@ -125,7 +125,7 @@ enum GzLimit {
 
 /// What a reading error means.
 fn unreadable(error: &io::Error, limits: &Limits) -> Finding {
-    const HINT: &str = "hand in only the files of the tree";
+    const HINT: &str = "submit only the files of the tree";
     match error.get_ref().and_then(|inner| inner.downcast_ref()) {
         Some(GzLimit::Ratio) => {
             let message =
@@ -144,7 +144,7 @@ fn unreadable(error: &io::Error, limits: &Limits) -> Finding {
             let message =
                 format!("the compressed data cannot be read: {}", printable(&error.to_string()));
             Finding::error("gz_corrupt", message)
-                .hint("the upload may have been cut off; hand in again")
+                .hint("the upload may have been cut off; submit it again")
         }
     }
 }
@@ -249,7 +249,8 @@ fn not_a_tar() -> Finding {
 }
 
 fn truncated(message: &str) -> Finding {
-    Finding::error("tar_truncated", message).hint("the upload may have been cut off; hand in again")
+    Finding::error("tar_truncated", message)
+        .hint("the upload may have been cut off; submit it again")
 }
 
 /// After the first zero block only zeros may follow.

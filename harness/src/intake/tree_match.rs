@@ -17,7 +17,7 @@ pub enum Mark {
     Absent,
     /// Required and not submitted.
     Missing,
-    /// Handed in under another path.
+    /// Submitted under another path.
     WrongPlace,
     /// Not part of the tree.
     Unexpected,

@@ -27,7 +27,7 @@ pub enum Format {
 
 /// One file of the private copy.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct HandInFile {
+pub struct SubmittedFile {
     /// Path from the root of the submission.
     pub path: String,
     /// Size in bytes.
@@ -38,7 +38,7 @@ pub struct HandInFile {
 
 /// The private copy of a submission.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct HandIn {
+pub struct Submission {
     /// Name of the archive or folder as it was submitted.
     pub name: String,
     /// What it was.
@@ -48,16 +48,16 @@ pub struct HandIn {
     /// The one wrapping folder, already part of `root`.
     pub wrapped_in: Option<String>,
     /// The files, sorted by path.
-    pub files: Vec<HandInFile>,
+    pub files: Vec<SubmittedFile>,
     /// SHA-256 over sorted paths and contents; independent of the format and of wrapping.
     pub digest: String,
     /// What was seen on the way; no errors.
     pub findings: Vec<Finding>,
 }
 
-impl HandIn {
+impl Submission {
     /// The file at `path`.
-    pub fn file(&self, path: &str) -> Option<&HandInFile> {
+    pub fn file(&self, path: &str) -> Option<&SubmittedFile> {
         self.files.iter().find(|file| file.path == path)
     }
 }
@@ -77,7 +77,7 @@ pub struct Refusal {
 #[derive(Debug, thiserror::Error)]
 pub enum IntakeError {
     /// The submission's matter.
-    #[error("hand-in '{}' refused: {}", .0.name, .0.findings.first().map(ToString::to_string).unwrap_or_default())]
+    #[error("submission '{}' refused: {}", .0.name, .0.findings.first().map(ToString::to_string).unwrap_or_default())]
     Refused(Box<Refusal>),
     /// The environment's matter.
     #[error("cannot {doing} '{path}': {source}")]
@@ -114,7 +114,7 @@ pub fn unpack(
     dest: &Path,
     tree: &TreeSpec,
     limits: &Limits,
-) -> Result<HandIn, IntakeError> {
+) -> Result<Submission, IntakeError> {
     match read_archive(source, limits)? {
         Some(bytes) => unpack_bytes(&bytes, &name_of(source), dest, tree, limits),
         None => copy_folder(source, &|_, _| true, dest, tree, limits),
@@ -159,19 +159,19 @@ pub(crate) fn read_archive(source: &Path, limits: &Limits) -> Result<Option<Vec<
 /// # Errors
 /// As [`unpack`]; refused when paths, sizes and contents do not go together.
 pub(crate) fn copy_unpacked(
-    unpacked: &HandIn,
+    unpacked: &Submission,
     contents: &[u8],
     dest: &Path,
     tree: &TreeSpec,
     limits: &Limits,
-) -> Result<HandIn, IntakeError> {
+) -> Result<Submission, IntakeError> {
     let mut copy = PrivateCopy::new(dest, tree, limits)?;
     let result = write_unpacked(unpacked, contents, &mut copy);
     copy.finish(&unpacked.name, unpacked.format, result)
 }
 
 fn write_unpacked(
-    unpacked: &HandIn,
+    unpacked: &Submission,
     mut contents: &[u8],
     copy: &mut PrivateCopy<'_>,
 ) -> Result<(), Stop> {
@@ -207,7 +207,7 @@ pub(super) fn copy_folder(
     dest: &Path,
     tree: &TreeSpec,
     limits: &Limits,
-) -> Result<HandIn, IntakeError> {
+) -> Result<Submission, IntakeError> {
     let mut copy = PrivateCopy::new(dest, tree, limits)?;
     let result = folder::read(source.components().as_path(), is_wanted, &mut copy);
     copy.finish(&name_of(source), Format::Folder, result)
@@ -230,7 +230,7 @@ pub fn unpack_bytes(
     dest: &Path,
     tree: &TreeSpec,
     limits: &Limits,
-) -> Result<HandIn, IntakeError> {
+) -> Result<Submission, IntakeError> {
     let mut copy = PrivateCopy::new(dest, tree, limits)?;
     if bytes.len() as u64 > mib(limits.max_total_mib) {
         let message = format!("the archive exceeds the limit of {} MiB", limits.max_total_mib);
@@ -300,7 +300,7 @@ fn unknown_format(bytes: &[u8]) -> Finding {
         }
         None if bytes.is_empty() => {
             Finding::error("empty", format!("the file is empty (0 bytes); {EXPECTED}"))
-                .hint("the upload may have been cut off; hand in again")
+                .hint("the upload may have been cut off; submit it again")
         }
         None => {
             let start = bytes.get(..16).unwrap_or(bytes).to_ascii_lowercase();

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::check_config::check_config;
 use super::finding::{Finding, Findings, Severity};
-use super::hand_in_config::HandInConfig;
+use super::submitted_config::SubmittedConfig;
 use super::tree::{CONFIG_FILE, TreeSpec};
 use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
-use super::unpack::{Format, HandIn, IntakeError, Refusal};
+use super::unpack::{Format, IntakeError, Refusal, Submission};
 
 /// What `validate` found.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,7 +23,7 @@ pub struct Validation {
     /// The expected tree beside the found one; empty for a submission that was refused.
     pub tree: Vec<TreeLine>,
     /// What `config.json` says, where there is one.
-    pub config: Option<HandInConfig>,
+    pub config: Option<SubmittedConfig>,
     /// Everything to say, errors first.
     pub findings: Vec<Finding>,
 }
@@ -35,16 +35,19 @@ const MAX_CONFIG: u64 = 64 << 10;
 ///
 /// # Errors
 /// The copy cannot be read.
-pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation, IntakeError> {
-    let paths: Vec<&str> = hand_in.files.iter().map(|file| file.path.as_str()).collect();
+pub fn validate_submission(
+    submission: &Submission,
+    tree: &TreeSpec,
+) -> Result<Validation, IntakeError> {
+    let paths: Vec<&str> = submission.files.iter().map(|file| file.path.as_str()).collect();
     let lines = match_tree(&paths, tree);
-    let mut findings = hand_in.findings.clone();
+    let mut findings = submission.findings.clone();
     findings.extend(tree_findings(&lines, &paths));
     let mut config = None;
     // One in the wrong place says whose submission it is all the same.
     let config_line = lines.iter().find(|line| line.expected.as_deref() == Some(CONFIG_FILE));
     let name = config_line.and_then(|line| line.found.as_deref()).unwrap_or(CONFIG_FILE);
-    if let Some(file) = hand_in.file(name) {
+    if let Some(file) = submission.file(name) {
         if file.bytes > MAX_CONFIG {
             findings.push(
                 Finding::error(
@@ -56,9 +59,9 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
                 .hint("start from the template's config.json"),
             );
         } else {
-            let path = hand_in.root.join(name);
+            let path = submission.root.join(name);
             let bytes = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
-            let (parsed, said, is_whole) = HandInConfig::parse(&bytes);
+            let (parsed, said, is_whole) = SubmittedConfig::parse(&bytes);
             let (present, missing) = places(&lines);
             let more = check_config(&parsed, is_whole, &present, &missing, tree);
             findings.extend(said.into_iter().chain(more).map(|finding| finding.at(name)));
@@ -72,8 +75,8 @@ pub fn validate_hand_in(hand_in: &HandIn, tree: &TreeSpec) -> Result<Validation,
     }
     let findings = kept.into_vec();
     Ok(Validation {
-        name: hand_in.name.clone(),
-        format: Some(hand_in.format),
+        name: submission.name.clone(),
+        format: Some(submission.format),
         conforms: findings.iter().all(|finding| finding.severity != Severity::Error),
         tree: lines,
         config,

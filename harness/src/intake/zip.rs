@@ -110,7 +110,7 @@ fn find_directory(bytes: &[u8], max_entries: u64) -> Result<Directory, Finding> 
             "zip_truncated",
             "expected a zip directory at the end, found none",
         )
-        .hint("the upload may have been cut off; hand in again"));
+        .hint("the upload may have been cut off; submit it again"));
     };
     let comment = usize::from(u16_at(bytes, at + 20).unwrap_or(0));
     let (end, records) = end_record(bytes, at)?;
@@ -123,7 +123,7 @@ fn find_directory(bytes: &[u8], max_entries: u64) -> Result<Directory, Finding> 
     if count > max_entries {
         let message = format!("{count} entries, over the limit of {max_entries}");
         return Err(Finding::error("limit_entries", message)
-            .hint("hand in only the files of the tree, no build folder"));
+            .hint("submit only the files of the tree, no build folder"));
     }
     let start = usize::try_from(end.size).ok().and_then(|size| records.checked_sub(size));
     let offset = usize::try_from(end.offset).ok();

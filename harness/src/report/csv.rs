@@ -1,7 +1,7 @@
 //! `grades.csv`: one row a submission, for a grade book.
 
 use super::number::{is_range, of_part, points, range};
-use super::{BatchReport, Entry, ReportError, harmless};
+use super::{BatchReport, ReportError, SubmissionReport, harmless};
 
 /// The grades as CSV (UTF-8, comma, `\n`). The columns are student id, last and first name, name of
 /// the submission, the parts, total, what it is out of, lowest and highest, unconfirmed, time, total before lateness, remarks.
@@ -14,31 +14,31 @@ use super::{BatchReport, Entry, ReportError, harmless};
 ///
 /// # Errors
 /// When there is no submission.
-pub fn grades(sheet: &BatchReport) -> Result<String, ReportError> {
-    if sheet.entries.is_empty() {
+pub fn grades(report: &BatchReport) -> Result<String, ReportError> {
+    if report.entries.is_empty() {
         return Err(ReportError::Empty);
     }
     let format = |reason: String| ReportError::Format { file: super::CSV_FILE, reason };
     let mut writer = ::csv::Writer::from_writer(Vec::new());
-    let mut head = vec!["student_id", "last_name", "first_name", "hand_in"];
-    head.extend(sheet.rules.parts.iter().map(|part| part.id.as_str()));
+    let mut head = vec!["student_id", "last_name", "first_name", "submission"];
+    head.extend(report.rules.parts.iter().map(|part| part.id.as_str()));
     head.extend(["total", "out_of", "lowest", "highest", "unconfirmed"]);
     head.extend(["submitted", "before_late", "remarks"]);
     let head = head.into_iter().map(cell);
     writer.write_record(head).map_err(|error| format(error.to_string()))?;
-    for entry in &sheet.entries {
-        let row = row(sheet, entry).into_iter().map(|text| cell(&text));
+    for entry in &report.entries {
+        let row = row(report, entry).into_iter().map(|text| cell(&text));
         writer.write_record(row).map_err(|error| format(error.to_string()))?;
     }
     let bytes = writer.into_inner().map_err(|error| format(error.to_string()))?;
     String::from_utf8(bytes).map_err(|error| format(error.to_string()))
 }
 
-fn row(sheet: &BatchReport, entry: &Entry) -> Vec<String> {
-    let Entry { record, grade, standing } = entry;
+fn row(report: &BatchReport, entry: &SubmissionReport) -> Vec<String> {
+    let SubmissionReport { record, grade, standing } = entry;
     let student = entry.student();
     let mut row = vec![student.id, student.last_name, student.first_name, record.name.clone()];
-    for part in &sheet.rules.parts {
+    for part in &report.rules.parts {
         let own = grade.parts.iter().find(|own| own.id == part.id);
         row.push(own.map(of_part).unwrap_or_default());
     }
@@ -82,9 +82,9 @@ mod tests {
     #[test]
     fn known_answer() {
         assert_eq!(
-            grades(&sample::sheet()).unwrap(),
+            grades(&sample::report()).unwrap(),
             "\
-student_id,last_name,first_name,hand_in,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,lowest,highest,unconfirmed,submitted,before_late,remarks
+student_id,last_name,first_name,submission,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,lowest,highest,unconfirmed,submitted,before_late,remarks
 260000001,Lampglow,Ada,a2_ada.zip,5,10,20,15,25,20,95,75,,,,,,
 0260000002,Müller,Jörg,two_cosines.tar.gz,5,10,9.85,15,25,0..20,,75,64.85,84.85,,,,
 260000003,山田,花子,山田_花子.zip,0,0,0,0,0,0,0,75,,,11.44,,,the source does not build; the images alone earn 11.44 points once the instructor confirms
@@ -116,12 +116,12 @@ student_id,last_name,first_name,hand_in,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,low
 
     #[test]
     fn hostile_words_stay_in_their_cell() {
-        let mut sheet = sample::sheet();
-        sheet.entries.truncate(1);
-        let record = &mut sheet.entries[0].record;
+        let mut report = sample::report();
+        report.entries.truncate(1);
+        let record = &mut report.entries[0].record;
         record.student.last_name = "=HYPERLINK(\"http://x\",\"y\")".into();
         record.name = "a,b\"c\r\n=2+2,\u{1b}[2J\u{202e}\0".into();
-        let text = grades(&sheet).unwrap();
+        let text = grades(&report).unwrap();
         assert_eq!(text.lines().count(), 2);
         assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
         let mut reader = ::csv::Reader::from_reader(text.as_bytes());
@@ -132,7 +132,7 @@ student_id,last_name,first_name,hand_in,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,low
 
     #[test]
     fn an_empty_batch_is_an_error() {
-        let sheet = BatchReport { entries: Vec::new(), ..sample::sheet() };
-        assert!(matches!(grades(&sheet), Err(ReportError::Empty)));
+        let report = BatchReport { entries: Vec::new(), ..sample::report() };
+        assert!(matches!(grades(&report), Err(ReportError::Empty)));
     }
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::ser::{CharEscape, Formatter, PrettyFormatter};
 
 use super::number::significant;
-use super::{BatchReport, Entry, ReportError, harmless};
+use super::{BatchReport, ReportError, SubmissionReport, harmless};
 use crate::class::{Class, Standing};
 use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, CheckInfo};
@@ -34,7 +34,7 @@ struct Report<'a> {
     conditions: Vec<&'a Conditions>,
     /// Seed and scenes; `null` when nothing was held back.
     held_back: Option<&'a HeldBack>,
-    hand_ins: Vec<HandIn<'a>>,
+    submissions: Vec<Submission<'a>>,
     /// Who is missing, and what the instructor must decide; `null` where one submission was checked.
     class: Option<&'a Class>,
     /// By slug. Last, and the only thing that two runs over the same submissions do not share.
@@ -53,7 +53,7 @@ struct About<'a> {
 }
 
 #[derive(Serialize)]
-struct HandIn<'a> {
+struct Submission<'a> {
     name: &'a str,
     slug: &'a str,
     digest: &'a str,
@@ -80,39 +80,39 @@ struct HandIn<'a> {
 ///
 /// # Errors
 /// When there is no submission.
-pub fn report(sheet: &BatchReport) -> Result<String, ReportError> {
-    if sheet.entries.is_empty() {
+pub fn report_json(report: &BatchReport) -> Result<String, ReportError> {
+    if report.entries.is_empty() {
         return Err(ReportError::Empty);
     }
     let mut conditions: Vec<&Conditions> = Vec::new();
-    for Entry { record, .. } in &sheet.entries {
+    for SubmissionReport { record, .. } in &report.entries {
         if !conditions.contains(&&record.conditions) {
             conditions.push(&record.conditions);
         }
     }
-    let hand_ins = sheet.entries.iter().map(|entry| hand_in(entry, &conditions)).collect();
-    let timings = sheet
+    let submissions = report.entries.iter().map(|entry| submission(entry, &conditions)).collect();
+    let timings = report
         .entries
         .iter()
-        .map(|Entry { record, .. }| (record.slug.as_str(), record.stages.as_slice()))
+        .map(|SubmissionReport { record, .. }| (record.slug.as_str(), record.stages.as_slice()))
         .collect();
-    let checks = sheet.entries.iter().flat_map(|entry| &entry.record.evidence.checks);
+    let checks = report.entries.iter().flat_map(|entry| &entry.record.evidence.checks);
     let checks = checks.map(|check| (check.id.name(), check.id.info())).collect();
     let report = Report {
         schema: SCHEMA,
         version: VERSION,
         assignment: About {
-            name: &sheet.assignment,
-            title: &sheet.title,
-            course: &sheet.course,
-            due: &sheet.due,
-            rules: &sheet.rules,
+            name: &report.assignment,
+            title: &report.title,
+            course: &report.course,
+            due: &report.due,
+            rules: &report.rules,
             checks,
         },
         conditions,
-        held_back: sheet.held_back.as_ref(),
-        hand_ins,
-        class: sheet.class.as_ref(),
+        held_back: report.held_back.as_ref(),
+        submissions,
+        class: report.class.as_ref(),
         timings,
     };
     let format = |reason: String| ReportError::Format { file: super::JSON_FILE, reason };
@@ -124,11 +124,11 @@ pub fn report(sheet: &BatchReport) -> Result<String, ReportError> {
     String::from_utf8(bytes).map_err(|error| format(error.to_string()))
 }
 
-fn hand_in<'a>(
-    Entry { record, grade, standing }: &'a Entry,
+fn submission<'a>(
+    SubmissionReport { record, grade, standing }: &'a SubmissionReport,
     conditions: &[&Conditions],
-) -> HandIn<'a> {
-    HandIn {
+) -> Submission<'a> {
+    Submission {
         name: &record.name,
         slug: &record.slug,
         digest: &record.digest,
@@ -235,18 +235,18 @@ mod tests {
     use super::super::sample;
     use super::*;
 
-    fn parsed(sheet: &BatchReport) -> Value {
-        serde_json::from_str(&report(sheet).unwrap()).unwrap()
+    fn parsed(report: &BatchReport) -> Value {
+        serde_json::from_str(&report_json(report).unwrap()).unwrap()
     }
 
     #[test]
     fn known_answer() {
-        insta::assert_snapshot!("report_json", report(&sample::sheet()).unwrap());
+        insta::assert_snapshot!("report_json", report_json(&sample::report()).unwrap());
     }
 
     #[test]
     fn only_timings_differ_between_two_runs() {
-        let first = sample::sheet();
+        let first = sample::report();
         let mut second = first.clone();
         for entry in &mut second.entries {
             for stage in &mut entry.record.stages {
@@ -254,7 +254,7 @@ mod tests {
                 stage.cpu_s += 0.25;
             }
         }
-        let [first, second] = [first, second].map(|sheet| report(&sheet).unwrap());
+        let [first, second] = [first, second].map(|report| report_json(&report).unwrap());
         assert_ne!(first, second);
         let canonical = |text: &str| text.split("\n  \"timings\":").next().unwrap().to_owned();
         assert_eq!(canonical(&first), canonical(&second));
@@ -262,35 +262,35 @@ mod tests {
 
     #[test]
     fn the_last_bits_do_not_show() {
-        let mut sheet = sample::sheet();
-        let before = report(&sheet).unwrap();
-        for entry in &mut sheet.entries {
+        let mut report = sample::report();
+        let before = report_json(&report).unwrap();
+        for entry in &mut report.entries {
             for check in &mut entry.record.evidence.checks {
                 check.error *= 1.0 + 1e-15;
             }
         }
-        assert_eq!(report(&sheet).unwrap(), before);
+        assert_eq!(report_json(&report).unwrap(), before);
     }
 
     #[test]
     fn hostile_words_are_harmless_in_the_file_and_when_parsed() {
-        let mut sheet = sample::sheet();
-        let record = &mut sheet.entries[0].record;
+        let mut report = sample::report();
+        let record = &mut report.entries[0].record;
         record.name = "a\"b\\c\u{1b}[2J\0\u{8}\u{202e}</script>\r".into();
         record.diagnostics = "line one\nline two\u{9b}1m".into();
         record.evidence.checks[0].error = f64::NAN;
-        let text = report(&sheet).unwrap();
+        let text = report_json(&report).unwrap();
         assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
-        let json = parsed(&sheet);
+        let json = parsed(&report);
         let expected = "a\"b\\c\\u{1b}[2J\\u{0}\\u{8}\\u{202e}</script>\\r";
-        assert_eq!(json["hand_ins"][0]["name"], expected);
-        assert_eq!(json["hand_ins"][0]["diagnostics"], "line one\nline two\\u{9b}1m");
-        assert_eq!(json["hand_ins"][0]["checks"][0]["error"], Value::Null);
+        assert_eq!(json["submissions"][0]["name"], expected);
+        assert_eq!(json["submissions"][0]["diagnostics"], "line one\nline two\\u{9b}1m");
+        assert_eq!(json["submissions"][0]["checks"][0]["error"], Value::Null);
     }
 
     #[test]
     fn an_empty_batch_is_an_error() {
-        let sheet = BatchReport { entries: Vec::new(), ..sample::sheet() };
-        assert!(matches!(report(&sheet), Err(ReportError::Empty)));
+        let report = BatchReport { entries: Vec::new(), ..sample::report() };
+        assert!(matches!(report_json(&report), Err(ReportError::Empty)));
     }
 }

@@ -26,8 +26,8 @@ use thiserror::Error;
 
 pub use self::csv::grades as csv_grades;
 pub use self::harmless::harmless;
-pub use self::html::{Reader, batch as html_batch, hand_in as html_hand_in};
-pub use self::json::{SCHEMA, VERSION, report as json_report};
+pub use self::html::{Reader, batch as html_batch, submission as html_submission};
+pub use self::json::{SCHEMA, VERSION, report_json};
 pub use self::text::{
     Closing, Look, closing as text_closing, detail as text_detail, explain, explain_all, in_a_line,
     table as text_table,
@@ -52,7 +52,7 @@ pub const INSTRUCTOR: &str = "instructor";
 
 /// One submission with its points.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
+pub struct SubmissionReport {
     /// What was found out.
     pub record: Record,
     /// What it is worth, after what lateness costs.
@@ -62,7 +62,7 @@ pub struct Entry {
     pub standing: Standing,
 }
 
-impl Entry {
+impl SubmissionReport {
     /// Whose it is: as the class list says where it tells, else as the submission itself does.
     pub fn student(&self) -> Student {
         let own = &self.record.student;
@@ -93,13 +93,13 @@ pub struct BatchReport {
     /// What was held back from students, if anything.
     pub held_back: Option<HeldBack>,
     /// The submissions, in the order to be shown.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<SubmissionReport>,
     /// What is known of the class as a whole; nothing where one submission is checked.
     #[serde(default)]
     pub class: Option<Class>,
 }
 
-impl Entry {
+impl SubmissionReport {
     /// Whether there is more to know than the student may.
     pub fn has_private(&self, rules: &Rules) -> bool {
         let private = |check: &Check| check.held_back || !check.private.is_empty();
@@ -160,8 +160,12 @@ pub enum ReportError {
 }
 
 impl BatchReport {
-    /// A sheet for submissions of an assignment.
-    pub fn new(assignment: &Assignment, held_back: Option<HeldBack>, entries: Vec<Entry>) -> Self {
+    /// A report for submissions of an assignment.
+    pub fn new(
+        assignment: &Assignment,
+        held_back: Option<HeldBack>,
+        entries: Vec<SubmissionReport>,
+    ) -> Self {
         Self {
             assignment: assignment.name.clone(),
             title: assignment.title.clone(),
@@ -179,7 +183,7 @@ impl BatchReport {
             return Err(ReportError::Empty);
         }
         let mut seen = HashSet::new();
-        for Entry { record, .. } in &self.entries {
+        for SubmissionReport { record, .. } in &self.entries {
             let mut components = Path::new(&record.slug).components();
             let plain = matches!(
                 (components.next(), components.next()),
@@ -206,20 +210,20 @@ impl BatchReport {
 ///
 /// # Errors
 /// When there is no submission, a slug is no plain unique name, or a file cannot be written.
-pub fn write(out: &Path, sheet: &BatchReport) -> Result<(), ReportError> {
-    sheet.check()?;
-    for entry in &sheet.entries {
+pub fn write(out: &Path, report: &BatchReport) -> Result<(), ReportError> {
+    report.check()?;
+    for entry in &report.entries {
         let slug = &entry.record.slug;
-        let page = html_hand_in(sheet, entry, Reader::Student);
+        let page = html_submission(report, entry, Reader::Student);
         put(&out.join(slug), HTML_FILE, page.as_bytes())?;
-        if entry.has_private(&sheet.rules) {
-            let page = html_hand_in(sheet, entry, Reader::Instructor);
+        if entry.has_private(&report.rules) {
+            let page = html_submission(report, entry, Reader::Instructor);
             put(&out.join(INSTRUCTOR).join(slug), HTML_FILE, page.as_bytes())?;
         }
     }
-    put(out, CSV_FILE, csv_grades(sheet)?.as_bytes())?;
-    put(out, JSON_FILE, json_report(sheet)?.as_bytes())?;
-    put(out, HTML_FILE, html_batch(sheet)?.as_bytes())
+    put(out, CSV_FILE, csv_grades(report)?.as_bytes())?;
+    put(out, JSON_FILE, report_json(report)?.as_bytes())?;
+    put(out, HTML_FILE, html_batch(report)?.as_bytes())
 }
 
 /// Writes one file.

@@ -1,7 +1,7 @@
 //! A made-up batch for the tests: one perfect submission, one that multiplies by the cosine twice and
 //! whose bonus could not be judged, one that does not build.
 
-use super::{BatchReport, Entry};
+use super::{BatchReport, SubmissionReport};
 use crate::class::Standing;
 use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, CheckId, Evidence, Measure, Picture, Verdict};
@@ -11,7 +11,7 @@ use crate::intake::Finding;
 use crate::rubric::{Grade, PartGrade, Rules};
 
 /// The batch.
-pub(crate) fn sheet() -> BatchReport {
+pub(crate) fn report() -> BatchReport {
     BatchReport {
         assignment: "a2".into(),
         title: "Assignment 2: Point Lights & Shadows".into(),
@@ -49,7 +49,7 @@ fn rules() -> Rules {
     serde_json::from_str(&text).unwrap()
 }
 
-fn entry(name: &str, slug: &str, student: [&str; 3], conditions: Conditions) -> Entry {
+fn entry(name: &str, slug: &str, student: [&str; 3], conditions: Conditions) -> SubmissionReport {
     let [first_name, last_name, id] = student.map(str::to_owned);
     let record = Record {
         name: name.into(),
@@ -76,7 +76,7 @@ fn entry(name: &str, slug: &str, student: [&str; 3], conditions: Conditions) -> 
         out_of: 75.0,
         remarks: Vec::new(),
     };
-    Entry { record, grade, standing: Standing::default() }
+    SubmissionReport { record, grade, standing: Standing::default() }
 }
 
 fn conditions(adapter: &str) -> Conditions {
@@ -89,7 +89,7 @@ fn conditions(adapter: &str) -> Conditions {
 }
 
 /// Fills the parts; each is (least, most, reason, evidence).
-fn grade(entry: &mut Entry, parts: [(f64, f64, &str, &str); 6]) {
+fn grade(entry: &mut SubmissionReport, parts: [(f64, f64, &str, &str); 6]) {
     let rules = rules();
     entry.grade.parts = rules
         .parts
@@ -125,7 +125,7 @@ fn check(
     Check { measures: measures.collect(), ..Check::new(id, scene, verdict, summary) }
 }
 
-fn perfect() -> Entry {
+fn perfect() -> SubmissionReport {
     let student = ["Ada", "Lampglow", "260000001"];
     let mut entry = entry("a2_ada.zip", "a2_ada", student, conditions("llvmpipe (LLVM 15)"));
     let right = "the offline images are right on every scene";
@@ -161,7 +161,7 @@ fn perfect() -> Entry {
     entry
 }
 
-fn two_cosines() -> Entry {
+fn two_cosines() -> SubmissionReport {
     let student = ["Jörg", "Müller", "0260000002"];
     let mut entry =
         entry("two_cosines.tar.gz", "two_cosines", student, conditions("llvmpipe (LLVM 15)"));
@@ -248,7 +248,7 @@ fn two_cosines() -> Entry {
     entry
 }
 
-fn does_not_build() -> Entry {
+fn does_not_build() -> SubmissionReport {
     let student = ["花子", "山田", "260000003"];
     let mut entry =
         entry("山田_花子.zip", "hand_in_3", student, conditions("none: no Vulkan driver"));

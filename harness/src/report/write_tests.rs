@@ -7,10 +7,10 @@ use super::*;
 #[test]
 fn every_file_is_there_and_no_temporary_one() {
     let out = tempfile::tempdir().unwrap();
-    let sheet = sample::sheet();
+    let report = sample::report();
     // Twice: a second run replaces what the first one wrote.
     for _ in 0..2 {
-        write(out.path(), &sheet).unwrap();
+        write(out.path(), &report).unwrap();
     }
     let mut names: Vec<String> = Vec::new();
     for folder in ["", "a2_ada", "two_cosines", "hand_in_3", "instructor/two_cosines"] {
@@ -36,14 +36,14 @@ fn every_file_is_there_and_no_temporary_one() {
         ]
     );
     let json = fs::read_to_string(out.path().join(JSON_FILE)).unwrap();
-    assert_eq!(json, json_report(&sheet).unwrap());
+    assert_eq!(json, report_json(&report).unwrap());
 }
 
 #[test]
 fn an_empty_batch_writes_nothing() {
     let out = tempfile::tempdir().unwrap();
-    let sheet = BatchReport { entries: Vec::new(), ..sample::sheet() };
-    assert!(matches!(write(out.path(), &sheet), Err(ReportError::Empty)));
+    let report = BatchReport { entries: Vec::new(), ..sample::report() };
+    assert!(matches!(write(out.path(), &report), Err(ReportError::Empty)));
     assert_eq!(fs::read_dir(out.path()).unwrap().count(), 0);
 }
 
@@ -51,9 +51,9 @@ fn an_empty_batch_writes_nothing() {
 fn a_slug_cannot_leave_the_folder_or_meet_another() {
     let out = tempfile::tempdir().unwrap();
     for slug in ["", "..", ".", "a/b", "/etc", "a/", "two_cosines", "report.html", "instructor"] {
-        let mut sheet = sample::sheet();
-        sheet.entries[0].record.slug = slug.into();
-        let error = write(&out.path().join("out"), &sheet).unwrap_err();
+        let mut report = sample::report();
+        report.entries[0].record.slug = slug.into();
+        let error = write(&out.path().join("out"), &report).unwrap_err();
         assert!(matches!(error, ReportError::Slug { .. }), "{slug:?}: {error}");
     }
     assert_eq!(fs::read_dir(out.path()).unwrap().count(), 0);
@@ -63,7 +63,7 @@ fn a_slug_cannot_leave_the_folder_or_meet_another() {
 fn what_cannot_be_written_names_its_file() {
     let out = tempfile::tempdir().unwrap();
     fs::write(out.path().join("a2_ada"), "a file where a folder must be").unwrap();
-    let error = write(out.path(), &sample::sheet()).unwrap_err().to_string();
+    let error = write(out.path(), &sample::report()).unwrap_err().to_string();
     assert!(error.contains("a2_ada") && error.contains("cannot write the report"), "{error}");
 }
 
@@ -79,11 +79,12 @@ fn all_bytes(folder: &Path) -> Vec<u8> {
 
 #[test]
 fn a_student_folder_names_nobody_else_has_no_note_for_instructors_and_leads_nowhere() {
-    let mut sheet = sample::sheet();
-    let mut records: Vec<Record> = sheet.entries.iter().map(|entry| entry.record.clone()).collect();
+    let mut report = sample::report();
+    let mut records: Vec<Record> =
+        report.entries.iter().map(|entry| entry.record.clone()).collect();
     let number = records[0].student.id.clone();
     for record in &mut records {
-        // All hand in one image; two go by one number.
+        // All submit one image; two go by one number.
         record.images = vec![crate::grading::ImageDigest {
             scene: "teapot".into(),
             path: "offline/a.exr".into(),
@@ -94,7 +95,7 @@ fn a_student_folder_names_nobody_else_has_no_note_for_instructors_and_leads_nowh
     crate::grading::judge_shared(&mut records);
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let gates = Assignment::load(root).unwrap().rules.gates;
-    for (entry, record) in sheet.entries.iter_mut().zip(records) {
+    for (entry, record) in report.entries.iter_mut().zip(records) {
         let failed = |check: &&Check| check.verdict == crate::evidence::Verdict::Fail;
         let failed = record.evidence.checks.iter().filter(failed);
         let closed = failed.flat_map(|check| gates.iter().filter(|gate| gate.check == check.id));
@@ -103,17 +104,19 @@ fn a_student_folder_names_nobody_else_has_no_note_for_instructors_and_leads_nowh
         entry.grade.remarks.extend(remarks);
         entry.record = record;
     }
-    sheet.rules.gates = gates;
+    report.rules.gates = gates;
     let out = tempfile::tempdir().unwrap();
-    write(out.path(), &sheet).unwrap();
-    for entry in &sheet.entries {
+    write(out.path(), &report).unwrap();
+    for entry in &report.entries {
         let folder = out.path().join(&entry.record.slug);
         let bytes = all_bytes(&folder);
         let has =
             |needle: &str| bytes.windows(needle.len()).any(|window| window == needle.as_bytes());
         assert!(has(&entry.record.name) && has("another submission"));
         assert!(!has("or the instructor:"), "a note for the instructor");
-        for Entry { record: other, .. } in sheet.entries.iter().filter(|other| *other != entry) {
+        for SubmissionReport { record: other, .. } in
+            report.entries.iter().filter(|other| *other != entry)
+        {
             let student = &other.student;
             for name in [&other.name, &other.slug, &student.full_name(), &student.last_name] {
                 assert!(!has(name), "{name} is in the folder of {}", entry.record.name);

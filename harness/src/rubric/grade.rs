@@ -407,7 +407,7 @@ fn charge_unexplained(rules: &Rules, evidence: &Evidence, worths: &mut [PartScor
             continue;
         }
         for (part, worth) in rules.parts.iter().zip(worths.iter_mut()) {
-            if part.id == path.blame {
+            if part.id == path.residual_part {
                 worth.least = fraction(rules, worst);
                 worth.most = worth.least;
                 worth.reason = format!("every part alone is right, but {}", worst.said());

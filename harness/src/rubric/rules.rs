@@ -63,7 +63,7 @@ pub struct PathRule {
     #[serde(default)]
     pub unseen: Vec<CheckId>,
     /// The part that pays when the proof fails and no part's own evidence says why.
-    pub blame: String,
+    pub residual_part: String,
 }
 
 /// One part of the assignment.
@@ -117,10 +117,10 @@ impl Rules {
             }
         }
         for (name, path) in &self.paths {
-            if !self.parts.iter().any(|part| part.id == path.blame && part.path == *name) {
+            if !self.parts.iter().any(|part| part.id == path.residual_part && part.path == *name) {
                 return Some(format!(
-                    "path \"{name}\": its blame part {} is not its own",
-                    path.blame
+                    "path \"{name}\": its residual_part part {} is not its own",
+                    path.residual_part
                 ));
             }
         }

@@ -27,7 +27,7 @@ pub use job::{
 };
 pub use mounts::as_given;
 pub use outcome::{Answer, Fault, JobReport, Late, Outcome, WitnessUse, WorkerRun};
-pub use retry_budget::{Budget, Reference, RetryBudget, blames_the_machine};
+pub use retry_budget::{Budget, Reference, RetryBudget, is_environment_failure};
 pub use supervise::{Progress, Supervisor};
 // What is parsed of a file that foreign code could write: public for its fuzz target.
 pub use table::{SLOT_BYTES, SlotState};

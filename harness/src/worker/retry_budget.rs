@@ -307,7 +307,7 @@ fn unconfirmed() -> Outcome {
 
 /// Whether an outcome may be a fault of the machine by the word of someone who could lie: it is
 /// believed when a renderer of ours fails on the same case.
-pub fn blames_the_machine(outcome: &Outcome) -> bool {
+pub fn is_environment_failure(outcome: &Outcome) -> bool {
     match outcome {
         Outcome::NoAdapter(_) => true,
         Outcome::NotRun { fault: Fault::Submission, .. } => false,

@@ -95,7 +95,7 @@ fn what_nobody_confirms_costs_nothing() {
     assert_eq!(late().fault(), Some(Fault::Environment));
     let over = retries.is_over(&job, &job.requests[0]);
     assert_eq!(over.and_then(|o| o.fault()), Some(Fault::Environment));
-    assert!(!blames_the_machine(&late()));
+    assert!(!is_environment_failure(&late()));
 }
 
 #[test]
@@ -172,7 +172,7 @@ fn a_budget_ends_a_path_by_cpu_time_of_the_reference_or_by_standing_still() {
 }
 
 #[test]
-fn blame_is_recognised() {
+fn environment_failures_are_recognised() {
     let machine = |fault| Outcome::NotRun { reason: "x".into(), fault };
     for (outcome, blames) in [
         (Outcome::NoAdapter(String::new()), true),
@@ -192,6 +192,6 @@ fn blame_is_recognised() {
         (Outcome::ExitedEarly(75), false),
         (Outcome::TimedOut(LATE.unwrap()), false),
     ] {
-        assert_eq!(blames_the_machine(&outcome), blames, "{outcome:?}");
+        assert_eq!(is_environment_failure(&outcome), blames, "{outcome:?}");
     }
 }

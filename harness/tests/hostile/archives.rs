@@ -8,7 +8,7 @@ pub fn run() -> Result<(usize, usize, String), String> {
     let output = Command::new(cargo)
         .args(["test", "--release", "--workspace", "--quiet", "--test", "it", "archives::"])
         .args(["--", "--skip", "real_archives::", "--format=pretty"])
-        .current_dir(crate::ground::workspace())
+        .current_dir(crate::fixture::workspace())
         .output()
         .map_err(|error| format!("cannot run the tests of archives: {error}"))?;
     let said = String::from_utf8_lossy(&output.stdout);

@@ -6,7 +6,7 @@
 #[cfg(target_os = "linux")]
 mod archives;
 #[cfg(target_os = "linux")]
-mod ground;
+mod fixture;
 #[cfg(target_os = "linux")]
 mod plugins;
 #[cfg(target_os = "linux")]

@@ -3,7 +3,7 @@
 use umbra::sandbox::Layers;
 use umbra::worker::{Fault, Outcome};
 
-use crate::ground::{Asked, Ground};
+use crate::fixture::{Asked, Fixture};
 
 /// One hostile plugin.
 pub struct Plugin {
@@ -11,12 +11,12 @@ pub struct Plugin {
     /// Its library in the stage.
     pub library: &'static str,
     /// What it is told to do.
-    pub deed: Deed,
+    pub action: Deed,
     asked: Asked,
     expect: Expect,
-    /// Whether the questions before and after the deed must be answered.
+    /// Whether the questions before and after the action must be answered.
     around: bool,
-    /// Whether the deed must succeed without any isolation: one that cannot proves nothing.
+    /// Whether the action must succeed without any isolation: one that cannot proves nothing.
     control: bool,
 }
 
@@ -24,7 +24,7 @@ pub struct Plugin {
 #[derive(Clone, Copy)]
 pub enum Deed {
     Is(&'static str),
-    Made(fn(&Ground) -> String),
+    Made(fn(&Fixture) -> String),
 }
 
 /// What must become of the question at which the plugin acts.
@@ -52,19 +52,19 @@ enum Expect {
 }
 
 impl Plugin {
-    pub fn options(&self, ground: &Ground) -> String {
-        match self.deed {
+    pub fn options(&self, fixture: &Fixture) -> String {
+        match self.action {
             Deed::Is(text) => text.to_owned(),
-            Deed::Made(make) => make(ground),
+            Deed::Made(make) => make(fixture),
         }
     }
 
     /// Runs it and answers what came of it.
-    pub fn run(&self, ground: &mut Ground) -> Result<String, String> {
-        let options = self.options(ground);
-        let limits = ground.limits(matches!(self.expect, Expect::TimedOut));
+    pub fn run(&self, fixture: &mut Fixture) -> Result<String, String> {
+        let options = self.options(fixture);
+        let limits = fixture.limits(matches!(self.expect, Expect::TimedOut));
         let asked = [(Asked::Offline, ""), (self.asked, &*options), (Asked::Offline, "")];
-        let report = ground.ask(self.library, &asked, &limits);
+        let report = fixture.ask(self.library, &asked, &limits);
         let said = format!("{:?}", report.outcomes[1]);
         let short: String = said.chars().take(100).collect();
         if !self.expect.holds(&report.outcomes[1]) {
@@ -77,23 +77,23 @@ impl Plugin {
         }
         if options.starts_with("keep ") {
             // Another worker of the same plugin, with no stage given.
-            let again = ground.ask(self.library, &[(Asked::Realtime, &options)], &limits);
+            let again = fixture.ask(self.library, &[(Asked::Realtime, &options)], &limits);
             if !calm(&again.outcomes[0]) {
                 return Err(format!("{:?}", again.outcomes[0]));
             }
         }
-        let next = ground.ask("fault.so", &[(Asked::Offline, "")], &limits);
+        let next = fixture.ask("fault.so", &[(Asked::Offline, "")], &limits);
         if !calm(&next.outcomes[0]) {
             return Err(format!("the next submission was harmed: {:?}", next.outcomes[0]));
         }
         Ok(short)
     }
 
-    /// Without isolation the deed must succeed, where that hurts nobody.
-    pub fn control(&self, ground: &Ground) -> Result<(), String> {
-        let options = self.options(ground);
-        let (asked, limits) = ([(self.asked, &*options)], ground.limits(false));
-        let free = |()| ground.ask_without(Layers::NONE, self.library, &asked, &limits);
+    /// Without isolation the action must succeed, where that hurts nobody.
+    pub fn control(&self, fixture: &Fixture) -> Result<(), String> {
+        let options = self.options(fixture);
+        let (asked, limits) = ([(self.asked, &*options)], fixture.limits(false));
+        let free = |()| fixture.ask_without(Layers::NONE, self.library, &asked, &limits);
         match self.control.then_some(()).map(free) {
             Some(free) if self.expect.holds(&free.outcomes[0]) => {
                 Err(format!("without isolation the same: {:?}", free.outcomes[0]))
@@ -127,20 +127,20 @@ impl Expect {
     }
 }
 
-/// A deed of the plugin in C, in an offline render.
-fn c(name: &'static str, deed: &'static str, expect: Expect) -> Plugin {
-    let (library, deed) = ("fault.so", Deed::Is(deed));
-    Plugin { name, library, deed, asked: Asked::Offline, expect, around: true, control: false }
+/// A action of the plugin in C, in an offline render.
+fn c(name: &'static str, action: &'static str, expect: Expect) -> Plugin {
+    let (library, action) = ("fault.so", Deed::Is(action));
+    Plugin { name, library, action, asked: Asked::Offline, expect, around: true, control: false }
 }
 
 /// The same with words that depend on the place; without isolation it must succeed.
-fn made(name: &'static str, deed: fn(&Ground) -> String, expect: Expect) -> Plugin {
-    Plugin { deed: Deed::Made(deed), control: true, ..c(name, "", expect) }
+fn made(name: &'static str, action: fn(&Fixture) -> String, expect: Expect) -> Plugin {
+    Plugin { action: Deed::Made(action), control: true, ..c(name, "", expect) }
 }
 
-/// A deed of the plugin in Rust.
-fn rust(name: &'static str, deed: &'static str, asked: Asked, expect: Expect) -> Plugin {
-    Plugin { library: "hostile.so", asked, ..c(name, deed, expect) }
+/// A action of the plugin in Rust.
+fn rust(name: &'static str, action: &'static str, asked: Asked, expect: Expect) -> Plugin {
+    Plugin { library: "hostile.so", asked, ..c(name, action, expect) }
 }
 
 /// A library that cannot even be loaded well: every question has the same outcome.

@@ -8,11 +8,11 @@ use umbra::assignment::Assignment;
 use umbra::evidence::{Evidence, Verdict};
 use umbra::expected::Store;
 use umbra::grading::{Conditions, Grading, Record, RenderPath, Stages, Student};
-use umbra::report::{self, BatchReport, Entry, Look};
+use umbra::report::{self, BatchReport, Look, SubmissionReport};
 use umbra::rubric::{self, PartGrade};
 use umbra::worker::{Adapter, AdapterKind};
 
-use crate::ground::{Ground, workspace};
+use crate::fixture::{Fixture, workspace};
 use crate::plugins;
 
 /// The scenes that are graded: the worst counts, so that fewer can only be kinder.
@@ -20,11 +20,11 @@ const SCENES: [&str; 2] = ["cbox", "sphere_phong"];
 const FILM: [u32; 2] = [64, 48];
 
 /// The points of every plugin that is loaded and asked, by name; none where it could not be judged.
-pub fn all(ground: &Ground) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> {
+pub fn all(fixture: &Fixture) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> {
     let mut assignment = Assignment::load(workspace())?;
     assignment.scenes.retain(|scene| SCENES.contains(&scene.name.as_str()));
     for scene in &mut assignment.scenes {
-        scene.hand_in = None;
+        scene.submitted = None;
         scene.film = Some(FILM);
     }
     assignment.limits.run.wall_s = 1.0;
@@ -35,7 +35,7 @@ pub fn all(ground: &Ground) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> 
     let store = Store {
         assignment: &assignment,
         reference: Some(library),
-        supervisor: &ground.supervisor,
+        supervisor: &fixture.supervisor,
         threads: 2,
         progress: &|_| (),
     };
@@ -50,7 +50,7 @@ pub fn all(ground: &Ground) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> 
     std::thread::scope(|scope| {
         let grade = || -> anyhow::Result<()> {
             while let Some(plugin) = plugins.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let (library, options) = (ground.path(plugin.library), plugin.options(ground));
+                let (library, options) = (fixture.path(plugin.library), plugin.options(fixture));
                 let library = Path::new(&library);
                 let (evidence, _) =
                     grading.plugin(library, &options, 1, &stages, &RenderPath::ALL)?;
@@ -65,7 +65,7 @@ pub fn all(ground: &Ground) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> 
                     check_reports(&BatchReport::new(
                         &assignment,
                         None,
-                        vec![Entry { record, grade, standing: Default::default() }],
+                        vec![SubmissionReport { record, grade, standing: Default::default() }],
                     ))?;
                 }
                 if let Ok(mut earned) = earned.lock() {
@@ -78,7 +78,7 @@ pub fn all(ground: &Ground) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> 
         let threads: Vec<_> = (0..4).map(|_| scope.spawn(grade)).collect();
         threads.into_iter().try_for_each(|thread| thread.join().expect("no panic"))
     })?;
-    believe_the_machine(&assignment, grading, ground, &stages)?;
+    believe_the_machine(&assignment, grading, fixture, &stages)?;
     Ok(earned.into_inner().unwrap_or_default())
 }
 
@@ -86,13 +86,13 @@ pub fn all(ground: &Ground) -> anyhow::Result<Vec<(&'static str, Option<f64>)>> 
 fn believe_the_machine(
     assignment: &Assignment,
     mut grading: Grading,
-    ground: &Ground,
+    fixture: &Fixture,
     stages: &Stages,
 ) -> anyhow::Result<()> {
-    grading.reference = Some(ground.path("NULL_ENTRY.so").into());
-    let library = ground.path("fault.so");
-    let (library, deed) = (Path::new(&library), "lost_device");
-    let (evidence, _) = grading.plugin(library, deed, 1, stages, &RenderPath::ALL)?;
+    grading.reference = Some(fixture.path("NULL_ENTRY.so").into());
+    let library = fixture.path("fault.so");
+    let (library, action) = (Path::new(&library), "lost_device");
+    let (evidence, _) = grading.plugin(library, action, 1, stages, &RenderPath::ALL)?;
     let grade = rubric::grade(&assignment.rules, &evidence);
     let proofs = evidence.checks.iter().filter(|check| check.id.name().starts_with("image."));
     anyhow::ensure!(
@@ -131,18 +131,18 @@ fn record(name: &str, evidence: Evidence) -> Record {
 
 /// Writes all reports and looks for what a terminal, a browser, a spreadsheet or a parser would
 /// act on.
-fn check_reports(sheet: &BatchReport) -> anyhow::Result<()> {
+fn check_reports(report: &BatchReport) -> anyhow::Result<()> {
     let folder = tempfile::tempdir()?;
-    report::write(folder.path(), sheet)?;
+    report::write(folder.path(), report)?;
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name));
-    let slug = &sheet.entries[0].record.slug;
+    let slug = &report.entries[0].record.slug;
     let pages = [read(report::HTML_FILE)?, read(&format!("{slug}/{}", report::HTML_FILE))?];
     let csv = read(report::CSV_FILE)?;
     let look = Look { width: 120, colours: false };
     let texts = [
-        report::text_table(sheet, 120, false)?,
-        report::text_detail(sheet, &sheet.entries[0], look, true),
-        report::text_detail(sheet, &sheet.entries[0], look, false),
+        report::text_table(report, 120, false)?,
+        report::text_detail(report, &report.entries[0], look, true),
+        report::text_detail(report, &report.entries[0], look, false),
         read(report::JSON_FILE)?,
         csv.clone(),
         pages.concat(),

@@ -8,7 +8,7 @@ use basecode::{
 };
 
 struct Hostile {
-    deed: String,
+    action: String,
 }
 
 struct Black;
@@ -36,7 +36,7 @@ impl RenderPass for Black {
 
 impl Hostile {
     fn act(&self) {
-        match self.deed.as_str() {
+        match self.action.as_str() {
             "panic" => panic!("on purpose"),
             "todo" => todo!(),
             "panic_in_thread" => {
@@ -68,7 +68,7 @@ impl Hostile {
     }
 
     fn act_on(&self, gpu: &Gpu) {
-        match self.deed.as_str() {
+        match self.action.as_str() {
             "shader" => {
                 let broken = Stage { name: "own.fs", text: "@fragment fn fs_main( { nonsense" };
                 gpu.pipeline(broken, broken);
@@ -139,7 +139,7 @@ fn deeper(depth: u64) -> u64 {
 
 impl Renderer for Hostile {
     fn new(options: &str) -> Result<Self> {
-        Ok(Self { deed: options.to_owned() })
+        Ok(Self { action: options.to_owned() })
     }
 
     fn bsdf(&self, _: &Material) -> Box<dyn Bsdf> {

@@ -6,7 +6,7 @@ use std::path::Path;
 use umbra::build::{BuildOutcome, BuildReport};
 use umbra::worker::JobReport;
 
-/// Bytes of a file that a thief takes, from its middle: `LOOT` in deeds.c.
+/// Bytes of a file that a thief takes, from its middle: `LOOT` in actions.c.
 const LOOT: usize = 32;
 
 /// A file that a submission must not read.

@@ -8,14 +8,14 @@ use umbra::build::{BuildOutcome, BuildReport, Recording, compile, default_limits
 use umbra::process::Limits;
 use umbra::worker::Supervisor;
 
-use crate::ground::{Ground, recording, workspace};
+use crate::fixture::{Fixture, recording, workspace};
 use crate::secrets::{Secret, leaks_of_build};
 
 /// One hostile source.
 pub struct Source {
     pub name: &'static str,
     /// The text of `lib.rs`.
-    text: fn(&Ground) -> String,
+    text: fn(&Fixture) -> String,
     /// A link in `src/`, to where it leads.
     link: Option<(&'static str, &'static str)>,
     expect: Expect,
@@ -34,14 +34,14 @@ enum Expect {
 }
 
 impl Source {
-    pub fn run(&self, ground: &mut Ground) -> Result<String, String> {
+    pub fn run(&self, fixture: &mut Fixture) -> Result<String, String> {
         let recording = recording()?;
         let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
         let begin = std::time::Instant::now();
-        let report = self.build(&recording, &ground.supervisor, folder.path(), ground);
-        let mut secrets = vec![Secret::of("/etc/passwd"), Secret::of(ground.path("other/lib.rs"))];
+        let report = self.build(&recording, &fixture.supervisor, folder.path(), fixture);
+        let mut secrets = vec![Secret::of("/etc/passwd"), Secret::of(fixture.path("other/lib.rs"))];
         secrets.push(Secret::of(workspace().join("reference_impl/src/lib.rs")));
-        ground.leaks += leaks_of_build(&secrets, &report);
+        fixture.leaks += leaks_of_build(&secrets, &report);
         if begin.elapsed().as_secs_f64() > 15.0 {
             return Err(format!("it took {:?}", begin.elapsed()));
         }
@@ -65,13 +65,13 @@ impl Source {
         recording: &Recording,
         supervisor: &Supervisor,
         folder: &Path,
-        ground: &Ground,
+        fixture: &Fixture,
     ) -> BuildReport {
         let (src, out) = (folder.join("src"), folder.join("out"));
         for folder in [&src, &out] {
             fs::create_dir(folder).expect("our own folder");
         }
-        fs::write(src.join("lib.rs"), (self.text)(ground)).expect("our own folder");
+        fs::write(src.join("lib.rs"), (self.text)(fixture)).expect("our own folder");
         if let Some((name, target)) = self.link {
             std::os::unix::fs::symlink(target, src.join(name)).expect("our own folder");
         }

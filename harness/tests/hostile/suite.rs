@@ -15,7 +15,7 @@ use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 use umbra::sandbox::{Isolation, Layers, doctor};
 
-use crate::ground::{self, Ground};
+use crate::fixture::{self, Fixture};
 use crate::{archives, plugins, points, sources};
 
 /// No case lives longer, whatever it does.
@@ -90,7 +90,7 @@ fn all(layers: Layers, only: &str) -> Result<bool, String> {
     let begin = Instant::now();
     let stage = tempfile::Builder::new().prefix("umbra_stage").tempdir();
     let stage = stage.map_err(|error| error.to_string())?;
-    ground::set_up(stage.path(), layers)?;
+    fixture::set_up(stage.path(), layers)?;
     let root = nix::unistd::geteuid().is_root();
     let mut cases = Vec::new();
     if only.is_empty() || only == "points" {
@@ -273,16 +273,16 @@ fn case(name: &str) -> ExitCode {
     let layers: Layers = serde_json::from_str(&layers).expect("layers of ours");
     // What a case leaves behind becomes its child, wherever it was.
     nix::sys::prctl::set_child_subreaper(true).expect("Linux 3.4");
-    let mut ground = Ground::new(&PathBuf::from(stage), layers);
+    let mut fixture = Fixture::new(&PathBuf::from(stage), layers);
     let mut earned = Vec::new();
     let plugin = plugins::all().into_iter().find(|p| Some(p.name) == name.strip_prefix("plugin "));
     let result = match name.split_once(' ') {
-        Some(("plugin", _)) => plugin.as_ref().expect("a plugin of this name").run(&mut ground),
+        Some(("plugin", _)) => plugin.as_ref().expect("a plugin of this name").run(&mut fixture),
         Some((_, name)) => {
             let source = sources::all().into_iter().find(|source| source.name == name);
-            source.expect("a source of this name").run(&mut ground)
+            source.expect("a source of this name").run(&mut fixture)
         }
-        None => match points::all(&ground) {
+        None => match points::all(&fixture) {
             Ok(points) => {
                 earned = points.into_iter().map(|(name, p)| (name.to_owned(), p)).collect();
                 Ok(format!("{} plugins graded", earned.len()))
@@ -291,11 +291,11 @@ fn case(name: &str) -> ExitCode {
         },
     };
     let mut survivors = processes_left();
-    survivors.extend(ground.left_over());
-    let free = plugin.map_or(Ok(()), |plugin| plugin.control(&ground));
+    survivors.extend(fixture.left_over());
+    let free = plugin.map_or(Ok(()), |plugin| plugin.control(&fixture));
     processes_left();
     let result = result.and_then(|said| free.map(|()| said));
-    let said = Said { result, survivors, leaks: ground.leaks, points: earned };
+    let said = Said { result, survivors, leaks: fixture.leaks, points: earned };
     println!("{}", serde_json::to_string(&said).expect("plain data"));
     ExitCode::SUCCESS
 }

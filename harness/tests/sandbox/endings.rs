@@ -11,16 +11,16 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use umbra::sandbox::{Bind, EXIT_NOT_LOCKED, Kind, Layers, locked_pid};
 
-use super::ground::{Ground, Who, everyone, open_to_all, piped, survivors, wait};
+use super::fixture::{Fixture, Who, everyone, open_to_all, piped, survivors, wait};
 
 #[test]
 fn endings_are_mirrored() {
     for who in everyone() {
-        let ground = Ground::new(who);
+        let fixture = Fixture::new(who);
         for kind in [Kind::Worker, Kind::Build] {
-            let policy = ground.policy(kind, Layers::full());
+            let policy = fixture.policy(kind, Layers::full());
             let status = |args: &[&str]| {
-                let outcome = ground.attack(&policy, args);
+                let outcome = fixture.attack(&policy, args);
                 assert!(outcome.report.is_ok(), "{outcome:?}");
                 outcome.status
             };
@@ -29,7 +29,7 @@ fn endings_are_mirrored() {
             assert_eq!(status(&["abort"]).signal(), Some(6));
             assert_eq!(status(&["segv"]).signal(), Some(11));
             // The code of a failed lock is no proof of one.
-            let forged = ground.attack(&policy, &["exit", &EXIT_NOT_LOCKED.to_string()]);
+            let forged = fixture.attack(&policy, &["exit", &EXIT_NOT_LOCKED.to_string()]);
             assert_eq!(forged.status.code(), Some(EXIT_NOT_LOCKED.into()));
             assert!(forged.report.is_ok());
         }
@@ -39,18 +39,18 @@ fn endings_are_mirrored() {
 #[test]
 fn a_daemon_dies_with_its_child_and_lets_go_of_the_pipe() {
     for who in everyone() {
-        let ground = Ground::new(who);
+        let fixture = Fixture::new(who);
         for pid_ns in [true, false] {
             // Without the layer (and the limits that end the free one): it must survive here.
             let layers = Layers { pid_ns, ..Layers::full() };
-            let policy = ground.policy(Kind::Build, layers);
-            let mut child = piped(&mut ground.command(&policy, &["daemon"]));
+            let policy = fixture.policy(Kind::Build, layers);
+            let mut child = piped(&mut fixture.command(&policy, &["daemon"]));
             let mut pipe = child.stdout.take().expect("a pipe");
             let status = wait(child);
             assert!(status.success(), "{who:?}, pid_ns {pid_ns}: {status}");
             let (text, closed) = drain(&mut pipe, Duration::from_millis(500));
             assert_eq!(closed, pid_ns, "{who:?}, pid_ns {pid_ns}: {text}");
-            let left = survivors(&ground.path("")).len();
+            let left = survivors(&fixture.path("")).len();
             assert_eq!(left, usize::from(!pid_ns), "{who:?}, pid_ns {pid_ns}");
             if !pid_ns {
                 let daemon = text.lines().find_map(|line| line.parse().ok());
@@ -82,15 +82,15 @@ fn drain(pipe: &mut (impl Read + AsFd), limit: Duration) -> (String, bool) {
 #[test]
 fn killing_the_launcher_ends_everything() {
     for who in everyone() {
-        let ground = Ground::new(who);
+        let fixture = Fixture::new(who);
         for kind in [Kind::Worker, Kind::Build] {
-            let policy = ground.policy(kind, Layers::full());
-            let mut child = piped(&mut ground.command(&policy, &["sleep", "60"]));
+            let policy = fixture.policy(kind, Layers::full());
+            let mut child = piped(&mut fixture.command(&policy, &["sleep", "60"]));
             let locked = until(|| locked_pid(child.id())).expect("a locked process");
             assert!(Path::new(&format!("/proc/{locked}")).exists());
             child.kill().expect("our child");
             child.wait().expect("our child");
-            assert_eq!(survivors(&ground.path("")), Vec::<String>::new());
+            assert_eq!(survivors(&fixture.path("")), Vec::<String>::new());
             until(|| (!Path::new(&format!("/proc/{locked}")).exists()).then_some(()))
                 .expect("the locked process is gone");
         }
@@ -99,11 +99,11 @@ fn killing_the_launcher_ends_everything() {
 
 #[test]
 fn a_child_dies_with_the_thread_that_started_it() {
-    let ground = Ground::new(everyone()[0]);
-    let policy = ground.policy(Kind::Build, Layers::full());
+    let fixture = Fixture::new(everyone()[0]);
+    let policy = fixture.policy(Kind::Build, Layers::full());
     let mut child = std::thread::scope(|scope| {
         let start = || {
-            let child = piped(&mut ground.command(&policy, &["sleep", "60"]));
+            let child = piped(&mut fixture.command(&policy, &["sleep", "60"]));
             until(|| locked_pid(child.id())).expect("a locked process");
             child
         };
@@ -111,7 +111,7 @@ fn a_child_dies_with_the_thread_that_started_it() {
     });
     let status = until(|| child.try_wait().expect("our child")).expect("it is gone");
     assert_eq!(status.signal(), Some(9));
-    assert_eq!(survivors(&ground.path("")), Vec::<String>::new());
+    assert_eq!(survivors(&fixture.path("")), Vec::<String>::new());
 }
 
 /// Asks for up to two seconds.
@@ -128,22 +128,22 @@ fn until<T>(mut ask: impl FnMut() -> Option<T>) -> Option<T> {
 #[test]
 fn inherited_files_are_closed() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let secret = std::fs::File::open(ground.path("secret")).expect("a file");
+        let fixture = Fixture::new(who);
+        let secret = std::fs::File::open(fixture.path("secret")).expect("a file");
         // SAFETY: a new descriptor, at 100 or above, without the flag that closes it on exec.
         let leaked = unsafe {
             let number = nix::libc::fcntl(secret.as_raw_fd(), nix::libc::F_DUPFD, 100);
             OwnedFd::from_raw_fd(number)
         };
         let number = leaked.as_raw_fd().to_string();
-        let plain = std::process::Command::new(ground.path("attack"))
+        let plain = std::process::Command::new(fixture.path("attack"))
             .args(["inherited", &number])
             .output()
             .expect("the attack");
         assert_eq!(plain.stdout, b"ok\n");
         for kind in [Kind::Worker, Kind::Build] {
-            let policy = ground.policy(kind, Layers::NONE);
-            assert_eq!(ground.attack(&policy, &["inherited", &number]).verdict(), "EBADF");
+            let policy = fixture.policy(kind, Layers::NONE);
+            assert_eq!(fixture.attack(&policy, &["inherited", &number]).verdict(), "EBADF");
         }
     }
 }
@@ -151,24 +151,24 @@ fn inherited_files_are_closed() {
 #[test]
 fn results_are_collected_by_process_1() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let host = ground.path("result");
+        let fixture = Fixture::new(who);
+        let host = fixture.path("result");
         let collect = |file_size_mib, script: &str| {
             std::fs::write(&host, "old").expect("a file");
             open_to_all(Path::new(&host), 0o666);
-            let mut policy = ground.policy(Kind::Build, Layers::full());
+            let mut policy = fixture.policy(Kind::Build, Layers::full());
             policy.limits.file_size_mib = file_size_mib;
             // Otherwise no file could be too long.
             policy.layers.rlimits = false;
             policy.collect.push(Bind::new(&host, "/scratch/out/result"));
             let mut command = umbra::sandbox::command(
-                Path::new(super::ground::UMBRA),
+                Path::new(super::fixture::UMBRA),
                 &policy,
                 Path::new("/bin/sh"),
                 ["-c", script],
             )
             .expect("orders");
-            super::ground::as_user(&mut command, who);
+            super::fixture::as_user(&mut command, who);
             command.env("PATH", "/usr/bin");
             let status = wait(command.spawn().expect("the binary under test"));
             (status.code(), std::fs::read(&host).expect("a file"))
@@ -188,17 +188,17 @@ fn results_are_collected_by_process_1() {
 #[test]
 fn what_cannot_be_had_is_an_error() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let full = ground.policy(Kind::Build, Layers::full());
+        let fixture = Fixture::new(who);
+        let full = fixture.policy(Kind::Build, Layers::full());
         let mut broken = vec![];
         let mut policy = full.clone();
-        policy.read_only.push(Bind::new(ground.path("nowhere"), "/src"));
+        policy.read_only.push(Bind::new(fixture.path("nowhere"), "/src"));
         broken.push(("mount_ns", policy));
         let mut policy = full.clone();
-        policy.read_only.push(Bind::new(ground.path("secret"), "/src/../secret"));
+        policy.read_only.push(Bind::new(fixture.path("secret"), "/src/../secret"));
         broken.push(("mount_ns", policy));
         let mut policy = full.clone();
-        policy.read_only.push(Bind::new(ground.path("private"), "/src"));
+        policy.read_only.push(Bind::new(fixture.path("private"), "/src"));
         if who == Who::Root || nix::unistd::geteuid().is_root() {
             broken.push(("launcher", policy));
         }
@@ -208,7 +208,7 @@ fn what_cannot_be_had_is_an_error() {
             broken.push(("pid_ns", policy));
         }
         for (layer, policy) in broken {
-            let outcome = ground.attack(&policy, &["write", "/scratch/mine"]);
+            let outcome = fixture.attack(&policy, &["write", "/scratch/mine"]);
             assert_eq!(outcome.status.code(), Some(EXIT_NOT_LOCKED.into()), "{outcome:?}");
             assert_eq!(outcome.word, "", "nothing ran");
             let error = outcome.report.expect_err("it was not locked");

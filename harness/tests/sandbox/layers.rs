@@ -4,7 +4,7 @@ use std::path::Path;
 
 use umbra::sandbox::{Bind, Kind, Layers};
 
-use super::ground::{Ground, Who, everyone, open_to_all};
+use super::fixture::{Fixture, Who, everyone, open_to_all};
 
 /// Only this layer, with what it needs to work at all.
 fn only(name: &str, who: Who) -> Layers {
@@ -21,12 +21,12 @@ fn words(words: &[&str]) -> Vec<String> {
 }
 
 /// Runs attacks with only one layer, expecting an errno, and without any, expecting success.
-fn expect(layer: &str, who: Who, kind: Kind, attacks: &[(Vec<String>, &str)], ground: &Ground) {
+fn expect(layer: &str, who: Who, kind: Kind, attacks: &[(Vec<String>, &str)], fixture: &Fixture) {
     for (args, errno) in attacks {
         let args = &args.iter().map(String::as_str).collect::<Vec<_>>()[..];
-        let free = ground.attack(&ground.policy(kind, Layers::NONE), args);
+        let free = fixture.attack(&fixture.policy(kind, Layers::NONE), args);
         assert_eq!(free.verdict(), "ok", "{who:?}, no layer, {args:?}: {free:?}");
-        let locked = ground.attack(&ground.policy(kind, only(layer, who)), args);
+        let locked = fixture.attack(&fixture.policy(kind, only(layer, who)), args);
         assert_eq!(locked.verdict(), *errno, "{who:?}, {layer}, {args:?}: {locked:?}");
         let in_force = locked.report.as_ref().expect("a report");
         assert_eq!(in_force.layers, only(layer, who));
@@ -36,11 +36,11 @@ fn expect(layer: &str, who: Who, kind: Kind, attacks: &[(Vec<String>, &str)], gr
 #[test]
 fn mount_namespace_hides_files() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let environ = format!("/proc/{}/environ", ground.victim.id());
+        let fixture = Fixture::new(who);
+        let environ = format!("/proc/{}/environ", fixture.victim.id());
         let mut attacks: Attacks = Vec::new();
-        let (secret, expected) = (ground.path("secret"), ground.path("expected"));
-        let (new, socket) = (ground.path("new"), ground.path("socket"));
+        let (secret, expected) = (fixture.path("secret"), fixture.path("expected"));
+        let (new, socket) = (fixture.path("new"), fixture.path("socket"));
         let all: [[&str; 2]; 6] = [
             ["read", &secret],
             ["list", &expected],
@@ -54,24 +54,24 @@ fn mount_namespace_hides_files() {
             attacks.push((words(&["read", "/etc/shadow"]), "ENOENT"));
             attacks.push((words(&["list", "/root"]), "ENOENT"));
         }
-        expect("mount_ns", who, Kind::Worker, &attacks, &ground);
+        expect("mount_ns", who, Kind::Worker, &attacks, &fixture);
         // Writable outside, read-only inside; and a root that is nobody's to change.
-        open_to_all(Path::new(&ground.path("jail")), 0o777);
-        let mut policy = ground.policy(Kind::Worker, only("mount_ns", who));
-        policy.read_only.push(Bind::new(ground.path("jail"), "/src"));
+        open_to_all(Path::new(&fixture.path("jail")), 0o777);
+        let mut policy = fixture.policy(Kind::Worker, only("mount_ns", who));
+        policy.read_only.push(Bind::new(fixture.path("jail"), "/src"));
         for place in ["/new", "/src/new", "/plugin/new"] {
-            assert_eq!(ground.attack(&policy, &["write", place]).verdict(), "EROFS", "{place}");
+            assert_eq!(fixture.attack(&policy, &["write", place]).verdict(), "EROFS", "{place}");
         }
-        let free = ground.policy(Kind::Worker, Layers::NONE);
-        assert_eq!(ground.attack(&free, &["write", &ground.path("jail/new")]).verdict(), "ok");
+        let free = fixture.policy(Kind::Worker, Layers::NONE);
+        assert_eq!(fixture.attack(&free, &["write", &fixture.path("jail/new")]).verdict(), "ok");
     }
 }
 
 #[test]
 fn process_namespace_hides_processes() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let victim = ground.victim.id().to_string();
+        let fixture = Fixture::new(who);
+        let victim = fixture.victim.id().to_string();
         let address = address_of(&victim);
         let mut attacks: Attacks =
             vec![(words(&["reach", "-1"]), "ESRCH"), (words(&["reach", &victim]), "ESRCH")];
@@ -79,32 +79,32 @@ fn process_namespace_hides_processes() {
         if who == Who::Root {
             attacks.push((words(&memory), "ESRCH"));
         }
-        expect("pid_ns", who, Kind::Worker, &attacks, &ground);
+        expect("pid_ns", who, Kind::Worker, &attacks, &fixture);
     }
 }
 
 #[test]
 fn network_namespace_reaches_nobody() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let tcp = ground.tcp.local_addr().expect("bound").port().to_string();
-        let udp = ground.udp.local_addr().expect("bound").port().to_string();
+        let fixture = Fixture::new(who);
+        let tcp = fixture.tcp.local_addr().expect("bound").port().to_string();
+        let udp = fixture.udp.local_addr().expect("bound").port().to_string();
         let attacks: Attacks = vec![
             (words(&["tcp", &tcp]), "ENETUNREACH"),
             (words(&["udp", &udp]), "ENETUNREACH"),
-            (words(&["abstract", &ground.abstract_name]), "ECONNREFUSED"),
+            (words(&["abstract", &fixture.abstract_name]), "ECONNREFUSED"),
         ];
-        expect("net_ns", who, Kind::Worker, &attacks, &ground);
+        expect("net_ns", who, Kind::Worker, &attacks, &fixture);
     }
 }
 
 #[test]
 fn root_becomes_nobody() {
     if everyone().contains(&Who::Root) {
-        let ground = Ground::new(Who::Root);
-        let victim = ground.victim.id().to_string();
+        let fixture = Fixture::new(Who::Root);
+        let victim = fixture.victim.id().to_string();
         let (private, jail, node) =
-            (ground.path("private"), ground.path("jail"), ground.path("node"));
+            (fixture.path("private"), fixture.path("jail"), fixture.path("node"));
         let attacks: Attacks = vec![
             (words(&["read", &private]), "EACCES"),
             (words(&["read", "/etc/shadow"]), "EACCES"),
@@ -114,27 +114,30 @@ fn root_becomes_nobody() {
             (words(&["chroot", &jail]), "EPERM"),
             (words(&["mknod", &node]), "EPERM"),
         ];
-        expect("drop_privileges", Who::Root, Kind::Worker, &attacks, &ground);
+        expect("drop_privileges", Who::Root, Kind::Worker, &attacks, &fixture);
         // With a mount namespace there is something to mount over, and nobody else notices.
         let mut layers = only("mount_ns", Who::Root);
         let mounts = ["mount", "/plugin"];
-        assert_eq!(ground.attack(&ground.policy(Kind::Worker, layers), &mounts).verdict(), "ok");
+        assert_eq!(fixture.attack(&fixture.policy(Kind::Worker, layers), &mounts).verdict(), "ok");
         layers.drop_privileges = true;
-        assert_eq!(ground.attack(&ground.policy(Kind::Worker, layers), &mounts).verdict(), "EPERM");
+        assert_eq!(
+            fixture.attack(&fixture.policy(Kind::Worker, layers), &mounts).verdict(),
+            "EPERM"
+        );
     }
 }
 
 #[test]
 fn landlock_guards_files_ports_and_signals() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let tcp = ground.tcp.local_addr().expect("bound").port().to_string();
-        let victim = ground.victim.id().to_string();
+        let fixture = Fixture::new(who);
+        let tcp = fixture.tcp.local_addr().expect("bound").port().to_string();
+        let victim = fixture.victim.id().to_string();
         let environ = format!("/proc/{victim}/environ");
-        let (secret, expected) = (ground.path("secret"), ground.path("expected"));
-        let (new, program) = (ground.path("new"), ground.path("attack"));
-        let version = ground
-            .attack(&ground.policy(Kind::Worker, only("landlock", who)), &["pid"])
+        let (secret, expected) = (fixture.path("secret"), fixture.path("expected"));
+        let (new, program) = (fixture.path("new"), fixture.path("attack"));
+        let version = fixture
+            .attack(&fixture.policy(Kind::Worker, only("landlock", who)), &["pid"])
             .report
             .expect("landlock")
             .landlock_abi;
@@ -153,26 +156,26 @@ fn landlock_guards_files_ports_and_signals() {
             attacks.push((words(&["tcp", &tcp]), "EACCES"));
         }
         if version >= 6 {
-            attacks.push((words(&["abstract", &ground.abstract_name]), "EPERM"));
+            attacks.push((words(&["abstract", &fixture.abstract_name]), "EPERM"));
             attacks.push((words(&["reach", &victim]), "EPERM"));
         }
-        expect("landlock", who, Kind::Worker, &attacks, &ground);
+        expect("landlock", who, Kind::Worker, &attacks, &fixture);
     }
 }
 
 #[test]
 fn filter_refuses_calls() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let tcp = ground.tcp.local_addr().expect("bound").port().to_string();
-        let udp = ground.udp.local_addr().expect("bound").port().to_string();
-        let victim = ground.victim.id().to_string();
-        let socket = ground.path("socket");
+        let fixture = Fixture::new(who);
+        let tcp = fixture.tcp.local_addr().expect("bound").port().to_string();
+        let udp = fixture.udp.local_addr().expect("bound").port().to_string();
+        let victim = fixture.victim.id().to_string();
+        let socket = fixture.path("socket");
         let network: Attacks = vec![
             (words(&["tcp", &tcp]), "EPERM"),
             (words(&["udp", &udp]), "EPERM"),
             (words(&["unix", &socket]), "EPERM"),
-            (words(&["abstract", &ground.abstract_name]), "EPERM"),
+            (words(&["abstract", &fixture.abstract_name]), "EPERM"),
         ];
         let personality = nix::libc::SYS_personality.to_string();
         let common: Attacks = vec![
@@ -189,11 +192,11 @@ fn filter_refuses_calls() {
         let worker: Attacks =
             vec![(words(&["exec", "/bin/sh"]), "EPERM"), (words(&["fork"]), "EPERM")];
         for kind in [Kind::Worker, Kind::Build] {
-            expect("seccomp", who, kind, &network, &ground);
-            expect("seccomp", who, kind, &common, &ground);
+            expect("seccomp", who, kind, &network, &fixture);
+            expect("seccomp", who, kind, &common, &fixture);
         }
         for kind in [Kind::Worker, Kind::Decode] {
-            expect("seccomp", who, kind, &worker, &ground);
+            expect("seccomp", who, kind, &worker, &fixture);
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use umbra::sandbox::{Kind, Layers, Limits};
 
-use super::ground::{Ground, Who, everyone, piped};
+use super::fixture::{Fixture, Who, everyone, piped};
 
 fn small() -> Limits {
     Limits { cpu_s: 1, memory_mib: 1024, file_size_mib: 1, open_files: 64, tasks: 16 }
@@ -13,8 +13,8 @@ fn small() -> Limits {
 #[test]
 fn each_limit_of_a_process_holds() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let scratch = ground.path("scratch");
+        let fixture = Fixture::new(who);
+        let scratch = fixture.path("scratch");
         // As root the count of processes needs another user, in a namespace of its own.
         let mut layers = Layers { rlimits: true, drop_privileges: true, ..Layers::NONE };
         layers.user_ns = true;
@@ -26,13 +26,13 @@ fn each_limit_of_a_process_holds() {
             (&["spin"], "SIGXCPU"),
         ];
         for (args, verdict) in attacks {
-            let mut policy = ground.policy(Kind::Worker, layers);
+            let mut policy = fixture.policy(Kind::Worker, layers);
             policy.limits = small();
-            let outcome = ground.attack(&policy, args);
+            let outcome = fixture.attack(&policy, args);
             assert_eq!(outcome.verdict(), verdict, "{who:?} {args:?}: {outcome:?}");
             if !matches!(args[0], "spin" | "descriptors") {
                 policy.layers = Layers::NONE;
-                let outcome = ground.attack(&policy, args);
+                let outcome = fixture.attack(&policy, args);
                 assert_eq!(outcome.verdict(), "ok", "{who:?} {args:?}, free: {outcome:?}");
             }
         }
@@ -42,37 +42,37 @@ fn each_limit_of_a_process_holds() {
 #[test]
 fn processes_are_counted_per_child() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let mut policy = ground.policy(Kind::Build, Layers::full());
+        let fixture = Fixture::new(who);
+        let mut policy = fixture.policy(Kind::Build, Layers::full());
         policy.limits.tasks = 16;
         // One at its limit does not keep another from starting.
-        let mut hog = ground.command(&policy, &["fork_forever", "10"]);
+        let mut hog = fixture.command(&policy, &["fork_forever", "10"]);
         let mut hog = hog.stdout(std::process::Stdio::null()).spawn().expect("the binary");
         std::thread::sleep(std::time::Duration::from_millis(100));
-        assert_eq!(ground.attack_beside(&policy, &["fork"]).verdict(), "ok", "{who:?}");
+        assert_eq!(fixture.attack_beside(&policy, &["fork"]).verdict(), "ok", "{who:?}");
         hog.kill().expect("our child");
         hog.wait().expect("our child");
-        assert_eq!(ground.attack(&policy, &["fork_forever"]).verdict(), "EAGAIN");
+        assert_eq!(fixture.attack(&policy, &["fork_forever"]).verdict(), "EAGAIN");
     }
 }
 
 #[test]
 fn the_scratch_has_a_quota() {
     for who in everyone() {
-        let ground = Ground::new(who);
+        let fixture = Fixture::new(who);
         let layers = Layers { mount_ns: true, user_ns: who == Who::User, ..Layers::NONE };
         for attack in ["fill", "many"] {
-            let mut policy = ground.policy(Kind::Worker, layers);
-            assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
+            let mut policy = fixture.policy(Kind::Worker, layers);
+            assert_eq!(fixture.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
             // To the kernel, 0 would mean without limit.
             match attack {
                 "fill" => policy.scratch.quota_mib = 0,
                 _ => policy.scratch.files = 0,
             }
-            assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
+            assert_eq!(fixture.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
             policy.scratch.quota_mib = 32;
             policy.scratch.files = 30_000;
-            assert_eq!(ground.attack(&policy, &[attack, "/scratch"]).verdict(), "ok");
+            assert_eq!(fixture.attack(&policy, &[attack, "/scratch"]).verdict(), "ok");
         }
     }
 }
@@ -80,10 +80,10 @@ fn the_scratch_has_a_quota() {
 #[test]
 fn a_control_group_counts_all_together() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let mut policy = ground.policy(Kind::Build, Layers { cgroup: true, ..Layers::NONE });
+        let fixture = Fixture::new(who);
+        let mut policy = fixture.policy(Kind::Build, Layers { cgroup: true, ..Layers::NONE });
         policy.limits = Limits { memory_mib: 64, ..small() };
-        let outcome = ground.attack(&policy, &["touch", "200"]);
+        let outcome = fixture.attack(&policy, &["touch", "200"]);
         if let Err(error) = &outcome.report {
             // Optional: not every machine has it. Then it says so, and nothing ran.
             assert_eq!((&*error.layer, &*outcome.word), ("cgroup", ""), "{outcome:?}");
@@ -91,17 +91,17 @@ fn a_control_group_counts_all_together() {
             continue;
         }
         assert_eq!(outcome.verdict(), "SIGKILL", "{outcome:?}");
-        assert_eq!(ground.attack(&policy, &["touch", "20"]).verdict(), "ok");
+        assert_eq!(fixture.attack(&policy, &["touch", "20"]).verdict(), "ok");
         policy.layers.pid_ns = true;
-        assert_eq!(ground.attack(&policy, &["fork_forever"]).verdict(), "EAGAIN");
+        assert_eq!(fixture.attack(&policy, &["fork_forever"]).verdict(), "EAGAIN");
         let full = Layers { cgroup: true, ..Layers::full() };
-        let mut child = piped(&mut ground.command(&ground.policy(Kind::Build, full), &["fork"]));
+        let mut child = piped(&mut fixture.command(&fixture.policy(Kind::Build, full), &["fork"]));
         assert!(child.wait().expect("our child").success());
         for controller in ["", "memory", "pids"] {
             let group = format!("/sys/fs/cgroup/{controller}/umbra-{}", child.id());
             assert!(!Path::new(&group).exists(), "{group} is left");
         }
         policy.layers.cgroup = false;
-        assert_eq!(ground.attack(&policy, &["touch", "200"]).verdict(), "ok");
+        assert_eq!(fixture.attack(&policy, &["touch", "200"]).verdict(), "ok");
     }
 }

@@ -4,7 +4,7 @@
 #![cfg(target_os = "linux")]
 
 mod endings;
-mod ground;
+mod fixture;
 mod layers;
 mod limits;
 mod useful;

@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 use umbra::sandbox::policy::{PLUGIN, SRC, TOOLCHAIN};
 use umbra::sandbox::{Bind, Isolation, Kind, Layers, Policy, command, doctor};
 
-use super::ground::{Ground, UMBRA, Who, as_user, everyone, open_to_all};
+use super::fixture::{Fixture, UMBRA, Who, as_user, everyone, open_to_all};
 
 fn sysroot() -> String {
     let output = Command::new("rustc").args(["--print", "sysroot"]).output().expect("rustc");
@@ -14,18 +14,18 @@ fn sysroot() -> String {
 }
 
 /// Compiles a library in a locked child, as root: its toolchain may lie in a home of mode 0700.
-fn compile(ground: &Ground, source: &str) -> (Output, Vec<u8>) {
-    let at = |name: &str| ground.path(name);
+fn compile(fixture: &Fixture, source: &str) -> (Output, Vec<u8>) {
+    let at = |name: &str| fixture.path(name);
     std::fs::create_dir_all(at("src")).expect("a folder");
     std::fs::write(at("src/lib.rs"), source).expect("a file");
     std::fs::write(at("lib.so"), "").expect("a file");
-    let mut policy = ground.policy(Kind::Build, Layers::full());
+    let mut policy = fixture.policy(Kind::Build, Layers::full());
     policy.read_only.push(Bind::new(sysroot(), TOOLCHAIN));
     policy.read_only.push(Bind::new(at("src"), SRC));
     policy.collect.push(Bind::new(at("lib.so"), "/scratch/lib.so"));
     policy.scratch.quota_mib = 64;
     let output = locked(
-        ground,
+        fixture,
         &policy,
         "/toolchain/bin/rustc",
         &[
@@ -40,9 +40,9 @@ fn compile(ground: &Ground, source: &str) -> (Output, Vec<u8>) {
     (output, std::fs::read(at("lib.so")).expect("a file"))
 }
 
-fn locked(ground: &Ground, policy: &Policy, program: &str, args: &[&str]) -> Output {
+fn locked(fixture: &Fixture, policy: &Policy, program: &str, args: &[&str]) -> Output {
     let mut command = command(Path::new(UMBRA), policy, Path::new(program), args).expect("orders");
-    as_user(&mut command, ground.who);
+    as_user(&mut command, fixture.who);
     command.env("PATH", "/usr/bin:/bin").env("TMPDIR", "/scratch").env("HOME", "/scratch");
     command.stdout(Stdio::piped()).stderr(Stdio::piped()).output().expect("the binary under test")
 }
@@ -54,66 +54,66 @@ fn owner() -> Who {
 
 #[test]
 fn rustc_compiles_what_a_worker_then_loads() {
-    let ground = Ground::new(owner());
+    let fixture = Fixture::new(owner());
     let source = r#"
         #[unsafe(no_mangle)]
         pub extern "C" fn attack(_: i32, _: *const *const std::ffi::c_char) -> i32 {
             let threads: Vec<_> = (0..4).map(|i| std::thread::spawn(move || i * 7)).collect();
             threads.into_iter().map(|thread| thread.join().unwrap()).sum()
         }"#;
-    let (output, library) = compile(&ground, source);
+    let (output, library) = compile(&fixture, source);
     assert!(output.status.success(), "{output:?}");
     assert!(library.starts_with(b"\x7fELF"));
-    std::fs::write(ground.path("attack.so"), library).expect("a file");
-    let policy = ground.policy(Kind::Worker, Layers::full());
-    let outcome = ground.attack(&policy, &["any"]);
+    std::fs::write(fixture.path("attack.so"), library).expect("a file");
+    let policy = fixture.policy(Kind::Worker, Layers::full());
+    let outcome = fixture.attack(&policy, &["any"]);
     assert_eq!(outcome.status.code(), Some(42), "{outcome:?}");
 }
 
 #[test]
 fn rustc_cannot_include_what_is_not_there() {
-    let ground = Ground::new(owner());
-    let secret = ground.path("secret");
+    let fixture = Fixture::new(owner());
+    let secret = fixture.path("secret");
     for path in [&*secret, "/etc/passwd", "/etc/shadow", "/proc/self/environ"] {
         let text = format!("pub static S: &[u8] = include_bytes!({path:?});");
-        let (output, library) = compile(&ground, &text);
+        let (output, library) = compile(&fixture, &text);
         assert_eq!(output.status.code(), Some(1), "{output:?}");
         assert!(library.is_empty());
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(stderr.contains("couldn't read"), "{stderr}");
         let assembly = format!(".incbin \"{path}\"");
         let text = format!("core::arch::global_asm!({assembly:?});");
-        let (output, library) = compile(&ground, &text);
+        let (output, library) = compile(&fixture, &text);
         assert!(!output.status.success() && library.is_empty(), "{output:?}");
     }
     // The same source compiles where the file is to be seen.
     let text = "pub static S: &[u8] = include_bytes!(\"lib.rs\");";
-    assert!(compile(&ground, text).0.status.success());
+    assert!(compile(&fixture, text).0.status.success());
 }
 
 #[test]
 fn the_linker_works_for_everyone() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        std::fs::create_dir(ground.path("src")).expect("a folder");
-        std::fs::write(ground.path("src/a.c"), "int two(void) { return 2; }").expect("a file");
-        let mut policy = ground.policy(Kind::Build, Layers::full());
-        policy.read_only.push(Bind::new(ground.path("src"), SRC));
-        std::fs::write(ground.path("lib.so"), "").expect("a file");
-        open_to_all(Path::new(&ground.path("lib.so")), 0o666);
-        policy.collect.push(Bind::new(ground.path("lib.so"), "/scratch/lib.so"));
+        let fixture = Fixture::new(who);
+        std::fs::create_dir(fixture.path("src")).expect("a folder");
+        std::fs::write(fixture.path("src/a.c"), "int two(void) { return 2; }").expect("a file");
+        let mut policy = fixture.policy(Kind::Build, Layers::full());
+        policy.read_only.push(Bind::new(fixture.path("src"), SRC));
+        std::fs::write(fixture.path("lib.so"), "").expect("a file");
+        open_to_all(Path::new(&fixture.path("lib.so")), 0o666);
+        policy.collect.push(Bind::new(fixture.path("lib.so"), "/scratch/lib.so"));
         let args = ["-shared", "-fPIC", "-o", "/scratch/lib.so", "/src/a.c"];
-        let output = locked(&ground, &policy, "/usr/bin/cc", &args);
+        let output = locked(&fixture, &policy, "/usr/bin/cc", &args);
         assert!(output.status.success(), "{who:?}: {output:?}");
-        assert!(std::fs::read(ground.path("lib.so")).expect("a file").starts_with(b"\x7fELF"));
+        assert!(std::fs::read(fixture.path("lib.so")).expect("a file").starts_with(b"\x7fELF"));
     }
 }
 
 #[test]
 fn without_namespaces_there_is_reduced_isolation() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let (source, result) = (ground.path("a.s"), ground.path("scratch/lib.so"));
+        let fixture = Fixture::new(who);
+        let (source, result) = (fixture.path("a.s"), fixture.path("scratch/lib.so"));
         std::fs::write(&source, ".globl two\ntwo: ret\n").expect("a file");
         let layers = Layers {
             drop_privileges: true,
@@ -122,7 +122,7 @@ fn without_namespaces_there_is_reduced_isolation() {
             rlimits: true,
             ..Layers::NONE
         };
-        let mut policy = ground.policy(Kind::Build, layers);
+        let mut policy = fixture.policy(Kind::Build, layers);
         // Counted with every process of the same user.
         policy.limits.tasks = 1000;
         policy.read_only.push(Bind::new(&source, "/src/a.s"));
@@ -137,10 +137,10 @@ fn without_namespaces_there_is_reduced_isolation() {
         let output = cc(args(&source));
         assert!(output.status.success(), "{who:?}: {output:?}");
         assert!(std::fs::read(&result).expect("a file").starts_with(b"\x7fELF"));
-        assert!(!cc(args(&ground.path("secret"))).status.success());
+        assert!(!cc(args(&fixture.path("secret"))).status.success());
         let missing = ["user_ns", "mount_ns", "pid_ns", "net_ns"].map(str::to_owned).to_vec();
         for (attack, errno) in [("read", "EACCES"), ("change", "EACCES")] {
-            let outcome = ground.attack(&policy, &[attack, &ground.path("secret")]);
+            let outcome = fixture.attack(&policy, &[attack, &fixture.path("secret")]);
             assert_eq!(outcome.verdict(), errno, "{outcome:?}");
             let isolation = outcome.report.expect("a report").isolation;
             assert_eq!(isolation, Isolation::Reduced { missing: missing.clone() });
@@ -151,11 +151,11 @@ fn without_namespaces_there_is_reduced_isolation() {
 #[test]
 fn a_given_file_is_changed_in_place() {
     for who in everyone() {
-        let ground = Ground::new(who);
-        let table = ground.path("secret");
-        let mut policy = ground.policy(Kind::Worker, Layers::full());
+        let fixture = Fixture::new(who);
+        let table = fixture.path("secret");
+        let mut policy = fixture.policy(Kind::Worker, Layers::full());
         let inside = format!("{PLUGIN}/table");
-        assert_eq!(ground.attack(&policy, &["change", &inside]).verdict(), "ENOENT");
+        assert_eq!(fixture.attack(&policy, &["change", &inside]).verdict(), "ENOENT");
         if who == Who::User {
             // What a user gives away is the user's own.
             std::fs::remove_file(&table).expect("a file");
@@ -166,7 +166,7 @@ fn a_given_file_is_changed_in_place() {
             open_to_all(Path::new(&table), 0o600);
         }
         policy.read_write.push(Bind::new(&table, &inside));
-        let outcome = ground.attack(&policy, &["change", &inside]);
+        let outcome = fixture.attack(&policy, &["change", &inside]);
         assert_eq!(outcome.verdict(), "ok", "{who:?}: {outcome:?}");
     }
 }

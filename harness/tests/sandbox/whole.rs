@@ -3,33 +3,33 @@
 use nix::libc;
 use umbra::sandbox::{Isolation, Kind, Layers};
 
-use super::ground::{Ground, Who, everyone};
+use super::fixture::{Fixture, Who, everyone};
 
 #[test]
 fn nothing_gets_through() {
     for who in everyone() {
-        let ground = Ground::new(who);
+        let fixture = Fixture::new(who);
         for kind in [Kind::Worker, Kind::Build] {
-            let policy = ground.policy(kind, Layers::full());
-            let in_force = ground.attack(&policy, &["pid"]).report.expect("full isolation");
+            let policy = fixture.policy(kind, Layers::full());
+            let in_force = fixture.attack(&policy, &["pid"]).report.expect("full isolation");
             assert_eq!(in_force.isolation, Isolation::Full);
             assert_eq!(in_force.started_as_root, who == Who::Root);
             assert_ne!(in_force.host_uid, 0);
-            for (args, errno) in attacks(&ground, kind) {
+            for (args, errno) in attacks(&fixture, kind) {
                 let args: Vec<&str> = args.iter().map(String::as_str).collect();
-                let outcome = ground.attack(&policy, &args);
+                let outcome = fixture.attack(&policy, &args);
                 assert_eq!(outcome.verdict(), errno, "{who:?} {kind:?} {args:?}: {outcome:?}");
             }
         }
     }
 }
 
-fn attacks(ground: &Ground, kind: Kind) -> Vec<(Vec<String>, &'static str)> {
-    let victim = ground.victim.id().to_string();
-    let port = ground.tcp.local_addr().expect("bound").port().to_string();
+fn attacks(fixture: &Fixture, kind: Kind) -> Vec<(Vec<String>, &'static str)> {
+    let victim = fixture.victim.id().to_string();
+    let port = fixture.tcp.local_addr().expect("bound").port().to_string();
     let umbra = std::process::id().to_string();
     let executes = kind.may_execute();
-    let path = |name: &str| ground.path(name);
+    let path = |name: &str| fixture.path(name);
     let mut all: Vec<(Vec<String>, &str)> = Vec::new();
     let mut add = |args: &[&str], errno| {
         all.push((args.iter().map(ToString::to_string).collect(), errno));
@@ -70,7 +70,7 @@ fn attacks(ground: &Ground, kind: Kind) -> Vec<(Vec<String>, &'static str)> {
     add(&["tcp", &port], "EPERM");
     add(&["udp", &port], "EPERM");
     add(&["unix", &path("socket")], "EPERM");
-    add(&["abstract", &ground.abstract_name], "EPERM");
+    add(&["abstract", &fixture.abstract_name], "EPERM");
     for pid in [&*victim, &*umbra, "1", "-1", "0"] {
         add(&["reach", pid], "EPERM");
         add(&["ptrace", pid], "EPERM");

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use umbra::assignment::Assignment;
 use umbra::decode::Decoder;
 use umbra::intake::{
-    Finding, HandIn, IntakeError, Limits, Severity, TreeSpec, unpack, unpack_bytes,
+    Finding, IntakeError, Limits, Severity, Submission, TreeSpec, unpack, unpack_bytes,
 };
 use umbra::worker::Supervisor;
 
@@ -35,7 +35,12 @@ impl Scratch {
     }
 
     /// In a locked child, as submissions are; in this process the same must come out.
-    pub fn unpack(&self, bytes: &[u8], name: &str, limits: &Limits) -> Result<HandIn, IntakeError> {
+    pub fn unpack(
+        &self,
+        bytes: &[u8],
+        name: &str,
+        limits: &Limits,
+    ) -> Result<Submission, IntakeError> {
         let tree = TreeSpec::default();
         let apart =
             with_decoder(|decoder| decoder.unpack_bytes(bytes, name, &self.dest, &tree, limits));
@@ -44,7 +49,7 @@ impl Scratch {
         match (&apart, &own) {
             (Ok(apart), Ok(own)) => {
                 let root = own.root.strip_prefix(&here.dest).unwrap();
-                assert_eq!(*apart, HandIn { root: self.dest.join(root), ..own.clone() });
+                assert_eq!(*apart, Submission { root: self.dest.join(root), ..own.clone() });
             }
             (Err(IntakeError::Refused(apart)), Err(IntakeError::Refused(own))) => {
                 assert_eq!(apart, own);
@@ -61,7 +66,7 @@ impl Scratch {
         bytes: &[u8],
         name: &str,
         limits: &Limits,
-    ) -> Result<HandIn, IntakeError> {
+    ) -> Result<Submission, IntakeError> {
         unpack_bytes(bytes, name, &self.dest, &TreeSpec::default(), limits)
     }
 }
@@ -138,14 +143,14 @@ pub fn assert_folder_refused(make: impl Fn(&Path), code: &str, path: &str) -> Fi
 fn check_refused(
     scratch: &Scratch,
     before: BTreeMap<PathBuf, Vec<u8>>,
-    result: Result<HandIn, IntakeError>,
+    result: Result<Submission, IntakeError>,
     code: &str,
     path: &str,
 ) -> Finding {
     let refusal = match result {
         Err(IntakeError::Refused(refusal)) => refusal,
         Err(other) => panic!("expected a refusal, found {other}"),
-        Ok(hand_in) => panic!("expected a refusal with {code}, found {hand_in:#?}"),
+        Ok(submission) => panic!("expected a refusal with {code}, found {submission:#?}"),
     };
     assert_eq!(scratch.outside(), before, "something outside the destination changed");
     assert_eq!(fs::read_dir(&scratch.dest).unwrap().count(), 0, "the destination is not empty");
@@ -164,19 +169,19 @@ fn check_refused(
 
 /// Asserts that the archive is accepted with a finding `code`, and only the destination written.
 #[track_caller]
-pub fn assert_accepted(bytes: &[u8], name: &str, code: &str) -> (HandIn, Scratch) {
+pub fn assert_accepted(bytes: &[u8], name: &str, code: &str) -> (Submission, Scratch) {
     let scratch = Scratch::new();
     let before = scratch.outside();
-    let hand_in = match scratch.unpack(bytes, name, &small_limits()) {
-        Ok(hand_in) => hand_in,
+    let submission = match scratch.unpack(bytes, name, &small_limits()) {
+        Ok(submission) => submission,
         Err(error) => panic!("expected a copy, found {error}"),
     };
     assert_eq!(scratch.outside(), before, "something outside the destination changed");
-    let codes: Vec<&str> = hand_in.findings.iter().map(|f| f.code.as_str()).collect();
+    let codes: Vec<&str> = submission.findings.iter().map(|f| f.code.as_str()).collect();
     if code.is_empty() {
-        assert_eq!(hand_in.findings, []);
+        assert_eq!(submission.findings, []);
     } else {
         assert!(codes.contains(&code), "{codes:?}");
     }
-    (hand_in, scratch)
+    (submission, scratch)
 }

@@ -41,21 +41,21 @@ impl Range {
 
 impl Expect {
     /// What differs in a submission's entry of `report.json`; empty when nothing does.
-    pub fn complaint(&self, hand_in: &Value, rules: &Rules) -> String {
+    pub fn complaint(&self, submission: &Value, rules: &Rules) -> String {
         if self.total.is_none() && self.parts.is_empty() {
             return "its recipe expects nothing".into();
         }
         let mut complaints = Vec::new();
         if let Some(range) = self.total {
-            complaints.extend(compare("total", hand_in, range));
+            complaints.extend(compare("total", submission, range));
         }
         if let Some(range) = self.unconfirmed {
-            let points = &hand_in["unconfirmed"];
+            let points = &submission["unconfirmed"];
             let earned = serde_json::json!({ "points": points, "points_max": points });
             complaints.extend(compare("unconfirmed", &earned, range));
         }
         if let Some(range) = self.public {
-            match serde_json::from_value::<Vec<Check>>(hand_in["checks"].clone()) {
+            match serde_json::from_value::<Vec<Check>>(submission["checks"].clone()) {
                 Ok(mut checks) => {
                     checks.retain(|check| !check.held_back);
                     let grade = rubric::grade(rules, &Evidence { checks });
@@ -68,14 +68,14 @@ impl Expect {
             }
         }
         for (id, range) in &self.parts {
-            let parts = hand_in["parts"].as_array();
+            let parts = submission["parts"].as_array();
             match parts.and_then(|parts| parts.iter().find(|part| part["id"] == id.as_str())) {
                 Some(part) => complaints.extend(compare(id, part, *range)),
                 None => complaints.push(format!("the report has no part {id}")),
             }
         }
         if let Some(expected) = &self.diagnosis {
-            complaints.extend(compare_diagnoses(expected, hand_in));
+            complaints.extend(compare_diagnoses(expected, submission));
         }
         complaints.join("; ")
     }
@@ -92,9 +92,9 @@ fn compare(what: &str, earned: &Value, range: Range) -> Option<String> {
 }
 
 /// What is wrong with what a submission is said to look like, if anything.
-fn compare_diagnoses(expected: &BTreeMap<String, String>, hand_in: &Value) -> Option<String> {
+fn compare_diagnoses(expected: &BTreeMap<String, String>, submission: &Value) -> Option<String> {
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
-    let found = hand_in["diagnoses"].as_array().map_or(&[][..], Vec::as_slice);
+    let found = submission["diagnoses"].as_array().map_or(&[][..], Vec::as_slice);
     let names = |found: &Value| found["mistakes"].as_array().cloned().unwrap_or_default();
     let fits = |found: &Value| match (expected.get(&text(&found["part"])), &names(found)[..]) {
         // Names that cannot be told apart stand together.

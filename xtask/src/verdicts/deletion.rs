@@ -13,7 +13,7 @@ use super::row::Row;
 /// Rules that only archives can break are proved by the samples.
 pub fn figure(matrix: &Matrix, rules: &Rules) -> Figure {
     let all = EvidenceRule::all(rules);
-    let all: Vec<&EvidenceRule> = all.iter().filter(|rule| !rule.is_of_hand_ins()).collect();
+    let all: Vec<&EvidenceRule> = all.iter().filter(|rule| !rule.is_of_submissions()).collect();
     let mut complaints = Vec::new();
     for rule in &all {
         let rows = matrix.variants.iter().chain(&matrix.singles).chain(&matrix.pairs);
@@ -63,7 +63,7 @@ impl EvidenceRule {
     }
 
     /// Whether only a submission can break it: by its tree or its images.
-    fn is_of_hand_ins(&self) -> bool {
+    fn is_of_submissions(&self) -> bool {
         match self {
             Self::Check(id) => {
                 id.name().starts_with("submission.") || id.name().starts_with("submitted.")
@@ -92,7 +92,7 @@ impl EvidenceRule {
             }
             Self::Blame(path) => {
                 if let Some(path) = rules.paths.get_mut(path) {
-                    path.blame.clear();
+                    path.residual_part.clear();
                 }
             }
         }
@@ -132,7 +132,7 @@ mod tests {
 
     /// What only a submission can break: images without a source, a tree, an image's size, a crash.
     #[test]
-    fn every_rule_of_hand_ins_is_needed() {
+    fn every_rule_of_submissions_is_needed() {
         let rules = rules();
         let all = EvidenceRule::all(&rules);
         let pass = |id: CheckId| Check::new(id, "teapot", Verdict::Pass, "right");
@@ -153,13 +153,14 @@ mod tests {
             own.for_each(|check| (check.verdict, check.error) = (Verdict::Fail, 1.0));
             checks
         };
-        let mut hand_ins: Vec<Vec<Check>> = images.iter().map(but).collect();
-        hand_ins.push(other_size);
-        let hand_ins: Vec<_> = hand_ins.into_iter().map(|checks| Evidence { checks }).collect();
+        let mut submissions: Vec<Vec<Check>> = images.iter().map(but).collect();
+        submissions.push(other_size);
+        let submissions: Vec<_> =
+            submissions.into_iter().map(|checks| Evidence { checks }).collect();
         let mut counted = 0;
-        for rule in all.iter().filter(|rule| rule.is_of_hand_ins()) {
+        for rule in all.iter().filter(|rule| rule.is_of_submissions()) {
             counted += 1;
-            let changes = hand_ins.iter().any(|evidence| {
+            let changes = submissions.iter().any(|evidence| {
                 let (less, rest) = rule.delete(&rules, evidence);
                 worth(&less, &rest) != worth(&rules, evidence)
             });

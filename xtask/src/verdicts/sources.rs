@@ -53,15 +53,16 @@ pub fn grade(
     let report = std::fs::read(&file).with_context(|| file.display().to_string())?;
     let report: Value = serde_json::from_slice(&report)?;
     ensure!(report["held_back"]["seed"] == PERTURB, "the report has another seed than {PERTURB}");
-    let hand_ins = report["hand_ins"].as_array().context("the report lists no hand-ins")?;
+    let submissions =
+        report["submissions"].as_array().context("the report lists no submissions")?;
     let complaint = |sample: &samples::Sample| {
         let file = sample.archive.file_name().unwrap_or_default().to_string_lossy();
-        let own = hand_ins.iter().find(|hand_in| hand_in["name"] == *file);
+        let own = submissions.iter().find(|submission| submission["name"] == *file);
         let complaint = match own {
-            Some(hand_in) => {
-                let complaint = sample.expect.complaint(hand_in, rules);
+            Some(submission) => {
+                let complaint = sample.expect.complaint(submission, rules);
                 if complaint.is_empty() {
-                    names_another(&out, hand_in, hand_ins)
+                    names_another(&out, submission, submissions)
                 } else {
                     complaint
                 }

@@ -1,7 +1,7 @@
 //! The page of the batch.
 
 use super::super::number::{due, is_range, of_part, points, range};
-use super::super::{BatchReport, Entry, HTML_FILE, INSTRUCTOR, ReportError};
+use super::super::{BatchReport, HTML_FILE, INSTRUCTOR, ReportError, SubmissionReport};
 use super::markup::Html;
 use super::{SORT, begin, class, end, part_class};
 use crate::class::Class;
@@ -14,41 +14,41 @@ use crate::intake::Severity;
 ///
 /// # Errors
 /// When there is no submission.
-pub fn batch(sheet: &BatchReport) -> Result<String, ReportError> {
-    if sheet.entries.is_empty() {
+pub fn batch(report: &BatchReport) -> Result<String, ReportError> {
+    if report.entries.is_empty() {
         return Err(ReportError::Empty);
     }
-    let mut html = begin(&sheet.title);
-    html.raw("<header class=\"top\">\n<p class=\"course\">").text(&sheet.course);
-    html.raw("</p>\n<h1>").text(&sheet.title).raw("</h1>\n<p>");
-    html.text(&count(sheet.entries.len(), "submission"));
-    let open = |entry: &&Entry| is_range(entry.grade.points, entry.grade.points_max);
-    match sheet.entries.iter().filter(open).count() {
+    let mut html = begin(&report.title);
+    html.raw("<header class=\"top\">\n<p class=\"course\">").text(&report.course);
+    html.raw("</p>\n<h1>").text(&report.title).raw("</h1>\n<p>");
+    html.text(&count(report.entries.len(), "submission"));
+    let open = |entry: &&SubmissionReport| is_range(entry.grade.points, entry.grade.points_max);
+    match report.entries.iter().filter(open).count() {
         0 => {}
         open => {
             html.raw(", ").show(open).raw(" not wholly judged (a range of points)");
         }
     }
-    html.raw("; due <time>").text(&due(&sheet.due)).raw("</time></p>\n</header>\n<main>\n");
-    table(&mut html, sheet);
-    if let Some(class) = &sheet.class {
-        about(&mut html, sheet, class);
+    html.raw("; due <time>").text(&due(&report.due)).raw("</time></p>\n</header>\n<main>\n");
+    table(&mut html, report);
+    if let Some(class) = &report.class {
+        about(&mut html, report, class);
     }
-    parts(&mut html, sheet);
-    conditions(&mut html, sheet);
+    parts(&mut html, report);
+    conditions(&mut html, report);
     html.raw("</main>\n<script>").raw(SORT).raw("</script>\n");
-    Ok(end(html, sheet))
+    Ok(end(html, report))
 }
 
-fn table(html: &mut Html, sheet: &BatchReport) {
+fn table(html: &mut Html, report: &BatchReport) {
     html.raw("<div class=\"scroll\" role=\"region\" aria-label=\"Grades\" tabindex=\"0\">\n");
     html.raw(
         "<table class=\"grades sortable\">\n<thead><tr><th scope=\"col\">Student, submission</th>",
     );
     html.raw("<th scope=\"col\" class=\"number\">Total<small>of ");
-    html.text(&points(sheet.rules.total_points())).raw("</small></th>");
+    html.text(&points(report.rules.total_points())).raw("</small></th>");
     html.raw("<th scope=\"col\">Number</th>");
-    for part in &sheet.rules.parts {
+    for part in &report.rules.parts {
         html.raw("<th scope=\"col\" class=\"number\" title=\"").text(&part.title).raw("\">");
         html.text(&part.id).raw("<small>").raw(if part.bonus { "+" } else { "of " });
         html.text(&points(part.points)).raw("</small></th>");
@@ -56,14 +56,14 @@ fn table(html: &mut Html, sheet: &BatchReport) {
     html.raw(
         "<th scope=\"col\">Findings</th><th scope=\"col\">Remarks</th></tr></thead>\n<tbody>\n",
     );
-    for entry in &sheet.entries {
-        row(html, sheet, entry);
+    for entry in &report.entries {
+        row(html, report, entry);
     }
     html.raw("</tbody>\n</table>\n</div>\n");
 }
 
-fn row(html: &mut Html, sheet: &BatchReport, entry: &Entry) {
-    let Entry { record, grade, .. } = entry;
+fn row(html: &mut Html, report: &BatchReport, entry: &SubmissionReport) {
+    let SubmissionReport { record, grade, .. } = entry;
     let student = entry.student();
     let name = student.full_name();
     let shown = if name.is_empty() { "(no name)" } else { &name };
@@ -71,14 +71,14 @@ fn row(html: &mut Html, sheet: &BatchReport, entry: &Entry) {
     html.raw("<tr><th scope=\"row\" data-sort=\"").text(&key).raw("\"><a href=\"");
     // The batch's page is the instructor's, too.
     let folder =
-        if entry.has_private(&sheet.rules) { format!("{INSTRUCTOR}/") } else { String::new() };
+        if entry.has_private(&report.rules) { format!("{INSTRUCTOR}/") } else { String::new() };
     html.address(&format!("{folder}{}/{HTML_FILE}", record.slug)).raw("\">").text(shown);
     html.raw("</a><small>").text(&record.name).raw("</small></th>");
     html.raw("<td class=\"number total ");
     html.raw(class(grade.points, grade.points_max, grade.out_of)).raw("\" data-sort=\"");
     html.show(grade.points).raw("\">").text(&range(grade.points, grade.points_max));
     html.raw("</td><td>").text(&student.id).raw("</td>");
-    for part in &sheet.rules.parts {
+    for part in &report.rules.parts {
         match grade.parts.iter().find(|own| own.id == part.id) {
             Some(own) => {
                 html.raw("<td class=\"number ").raw(part_class(own)).raw("\" data-sort=\"");
@@ -103,9 +103,9 @@ fn row(html: &mut Html, sheet: &BatchReport, entry: &Entry) {
 }
 
 /// Where the class comes from, who is missing, and what the instructor must decide.
-fn about(html: &mut Html, sheet: &BatchReport, class: &Class) {
-    let aside: Vec<&Entry> =
-        sheet.entries.iter().filter(|entry| !entry.standing.set_aside.is_empty()).collect();
+fn about(html: &mut Html, report: &BatchReport, class: &Class) {
+    let aside: Vec<&SubmissionReport> =
+        report.entries.iter().filter(|entry| !entry.standing.set_aside.is_empty()).collect();
     if class.is_quiet() && aside.is_empty() {
         return;
     }
@@ -134,7 +134,7 @@ fn about(html: &mut Html, sheet: &BatchReport, class: &Class) {
     }
     if !aside.is_empty() {
         html.raw("<p>Attempts that count:</p>\n<ul>\n");
-        for Entry { record, standing, .. } in aside {
+        for SubmissionReport { record, standing, .. } in aside {
             html.raw("<li>").text(&record.name).raw(", not ");
             html.text(&standing.set_aside.join(", ")).raw("</li>\n");
         }
@@ -147,14 +147,14 @@ fn about(html: &mut Html, sheet: &BatchReport, class: &Class) {
     html.raw("</section>\n");
 }
 
-fn parts(html: &mut Html, sheet: &BatchReport) {
+fn parts(html: &mut Html, report: &BatchReport) {
     html.raw("<details>\n<summary>The parts and what decides them</summary>\n");
     html.raw(
         "<div class=\"scroll\" role=\"region\" aria-label=\"Parts\" tabindex=\"0\">\n<table>\n",
     );
     html.raw("<thead><tr><th scope=\"col\">Part</th><th scope=\"col\">Title</th>");
     html.raw("<th scope=\"col\" class=\"number\">Points</th><th scope=\"col\">Checks</th></tr></thead>\n<tbody>\n");
-    for part in &sheet.rules.parts {
+    for part in &report.rules.parts {
         html.raw("<tr><th scope=\"row\">").text(&part.id).raw("</th><td>").text(&part.title);
         html.raw("</td><td class=\"number\">").raw(if part.bonus { "+" } else { "" });
         html.text(&points(part.points)).raw("</td><td>").text(&names(&part.evidence));
@@ -164,13 +164,13 @@ fn parts(html: &mut Html, sheet: &BatchReport) {
         html.raw("</td></tr>\n");
     }
     html.raw("</tbody>\n</table>\n</div>\n");
-    super::curve::curve(html, &sheet.rules.curve, &[]);
+    super::curve::curve(html, &report.rules.curve, &[]);
     html.raw("</details>\n");
 }
 
-fn conditions(html: &mut Html, sheet: &BatchReport) {
+fn conditions(html: &mut Html, report: &BatchReport) {
     let mut seen: Vec<(&Conditions, usize)> = Vec::new();
-    for Entry { record, .. } in &sheet.entries {
+    for SubmissionReport { record, .. } in &report.entries {
         match seen.iter_mut().find(|(other, _)| **other == record.conditions) {
             Some((_, number)) => *number += 1,
             None => seen.push((&record.conditions, 1)),
@@ -187,9 +187,9 @@ fn conditions(html: &mut Html, sheet: &BatchReport) {
         if seen.len() > 1 {
             html.raw("<p>").text(&count(*number, "submission")).raw(":</p>\n");
         }
-        super::hand_in::conditions(html, conditions);
+        super::submission::conditions(html, conditions);
     }
-    if let Some(held_back) = &sheet.held_back {
+    if let Some(held_back) = &report.held_back {
         let original = |(name, original): &(String, String)| format!("{name} ({original})");
         let scenes: Vec<String> = held_back.scenes.iter().map(original).collect();
         html.raw("<p>Held-back scenes: ").text(&scenes.join(", ")).raw("; seed ");

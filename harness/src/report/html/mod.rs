@@ -4,8 +4,8 @@
 mod batch;
 mod checks;
 mod curve;
-mod hand_in;
 mod markup;
+mod submission;
 #[cfg(test)]
 mod tests;
 
@@ -13,7 +13,7 @@ use base64::Engine as _;
 use sha2::Digest as _;
 
 pub use batch::batch;
-pub use hand_in::hand_in;
+pub use submission::submission;
 
 use self::markup::Html;
 use super::BatchReport;
@@ -49,10 +49,10 @@ fn begin(title: &str) -> Html {
 }
 
 /// Everything after the page's content.
-fn end(mut html: Html, sheet: &BatchReport) -> String {
-    html.raw("<footer>").text(&sheet.course).raw(" · ").text(&sheet.title).raw(" · due ");
+fn end(mut html: Html, report: &BatchReport) -> String {
+    html.raw("<footer>").text(&report.course).raw(" · ").text(&report.title).raw(" · due ");
     html.raw("<time>")
-        .text(&super::number::due(&sheet.due))
+        .text(&super::number::due(&report.due))
         .raw("</time></footer>\n</body>\n</html>\n");
     html.finish()
 }

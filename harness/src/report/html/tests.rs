@@ -3,8 +3,8 @@ use super::*;
 
 #[test]
 fn pages_say_what_matters() {
-    let sheet = sample::sheet();
-    let page = batch(&sheet).unwrap();
+    let report = sample::report();
+    let page = batch(&report).unwrap();
     for words in [
         "<a href=\"./instructor/two_cosines/report.html\">Jörg Müller</a><small>two_cosines.tar.gz</small>",
         "<td class=\"number total open\" data-sort=\"64.85\">64.85..84.85</td>",
@@ -17,7 +17,7 @@ fn pages_say_what_matters() {
     ] {
         assert!(page.contains(words), "{words:?} is not in the batch's page");
     }
-    let page = hand_in(&sheet, &sheet.entries[1], Reader::Instructor);
+    let page = submission(&report, &report.entries[1], Reader::Instructor);
     for words in [
         "<strong>64.85..84.85</strong> of 75 points",
         "<b>Hint</b> cos theta_i is multiplied twice: eval() holds it already",
@@ -31,17 +31,17 @@ fn pages_say_what_matters() {
     ] {
         assert!(page.contains(words), "{words:?} is not in the submission's page");
     }
-    let page = hand_in(&sheet, &sheet.entries[2], Reader::Student);
+    let page = submission(&report, &report.entries[2], Reader::Student);
     assert!(page.contains("expected `Vec3`, found `f32`"));
-    assert!(!hand_in(&sheet, &sheet.entries[0], Reader::Student).contains("What is wrong"));
+    assert!(!submission(&report, &report.entries[0], Reader::Student).contains("What is wrong"));
 }
 
 #[test]
 fn a_student_reads_nothing_of_held_back_scenes_but_that_they_are_wrong() {
-    let mut sheet = sample::sheet();
+    let mut report = sample::report();
     let words =
         ["sums", "hints", "measures", "titles", "files"].map(|what| format!("SECRET-{what}"));
-    let record = &mut sheet.entries[1].record;
+    let record = &mut report.entries[1].record;
     for check in record.evidence.checks.iter_mut().filter(|check| check.held_back) {
         let [summary, hint, measure, title, file] = words.clone();
         check.summary = summary;
@@ -51,7 +51,7 @@ fn a_student_reads_nothing_of_held_back_scenes_but_that_they_are_wrong() {
         check.pictures[0] = crate::evidence::Picture { title, file };
     }
     let [student, instructor] = [Reader::Student, Reader::Instructor]
-        .map(|reader| hand_in(&sheet, &sheet.entries[1], reader));
+        .map(|reader| submission(&report, &report.entries[1], reader));
     for word in &words {
         assert!(instructor.contains(word), "{word:?} is not on the instructor's page");
     }
@@ -63,8 +63,8 @@ fn a_student_reads_nothing_of_held_back_scenes_but_that_they_are_wrong() {
     // The instructor's page lies one folder deeper, beside the pictures of held-back scenes alone.
     assert!(instructor.contains("<a href=\"../../report.html\">"));
     assert!(instructor.contains("src=\"./SECRET-files\""));
-    sheet.entries[1].record.evidence.checks[2].held_back = false;
-    let instructor = hand_in(&sheet, &sheet.entries[1], Reader::Instructor);
+    report.entries[1].record.evidence.checks[2].held_back = false;
+    let instructor = submission(&report, &report.entries[1], Reader::Instructor);
     assert!(instructor.contains("src=\"./../../two_cosines/SECRET-files\""));
 }
 
@@ -76,9 +76,9 @@ fn tags(page: &str) -> Vec<&str> {
 #[test]
 fn hostile_words_stay_words() {
     let evil = "</title></pre><script>alert(1)</script><img src=x onerror=alert(1)>\"'><b>\u{1b}[2J\u{202e}\0";
-    let mut sheet = sample::sheet();
-    let plain = sheet.clone();
-    for entry in &mut sheet.entries {
+    let mut report = sample::report();
+    let plain = report.clone();
+    for entry in &mut report.entries {
         let record = &mut entry.record;
         record.name = evil.into();
         record.student.first_name = evil.into();
@@ -110,10 +110,13 @@ fn hostile_words_stay_words() {
             part.reason = evil.into();
         }
     }
-    let mut pages = vec![(batch(&plain).unwrap(), batch(&sheet).unwrap())];
-    for (plain_entry, entry) in plain.entries.iter().zip(&sheet.entries) {
+    let mut pages = vec![(batch(&plain).unwrap(), batch(&report).unwrap())];
+    for (plain_entry, entry) in plain.entries.iter().zip(&report.entries) {
         for reader in [Reader::Student, Reader::Instructor] {
-            pages.push((hand_in(&plain, plain_entry, reader), hand_in(&sheet, entry, reader)));
+            pages.push((
+                submission(&plain, plain_entry, reader),
+                submission(&report, entry, reader),
+            ));
         }
     }
     for (plain, page) in pages {
@@ -126,10 +129,10 @@ fn hostile_words_stay_words() {
 
 #[test]
 fn pages_load_nothing_from_elsewhere() {
-    let sheet = sample::sheet();
-    let mut pages = vec![batch(&sheet).unwrap()];
+    let report = sample::report();
+    let mut pages = vec![batch(&report).unwrap()];
     for reader in [Reader::Student, Reader::Instructor] {
-        pages.extend(sheet.entries.iter().map(|entry| hand_in(&sheet, entry, reader)));
+        pages.extend(report.entries.iter().map(|entry| submission(&report, entry, reader)));
     }
     for page in pages {
         assert!(!page.contains("http:") && !page.contains("https:") && !page.contains("url("));
@@ -139,8 +142,8 @@ fn pages_load_nothing_from_elsewhere() {
 
 #[test]
 fn an_empty_batch_is_an_error() {
-    let sheet = BatchReport { entries: Vec::new(), ..sample::sheet() };
-    assert!(matches!(batch(&sheet), Err(ReportError::Empty)));
+    let report = BatchReport { entries: Vec::new(), ..sample::report() };
+    assert!(matches!(batch(&report), Err(ReportError::Empty)));
 }
 
 /// Writes pages to look at: `UMBRA_LOOK=DIR cargo test --release -p umbra --lib look -- --ignored`.
@@ -148,13 +151,13 @@ fn an_empty_batch_is_an_error() {
 #[ignore = "for eyes, not for machines"]
 fn look() {
     let Some(out) = std::env::var_os("UMBRA_LOOK") else { return };
-    let mut sheet = sample::sheet();
+    let mut report = sample::report();
     // A batch has many rows and the handout nine parts.
     for id in ["2.1", "2.2", "2.3"] {
-        let mut part = sheet.rules.parts[0].clone();
+        let mut part = report.rules.parts[0].clone();
         part.id = id.into();
-        sheet.rules.parts.insert(sheet.rules.parts.len() - 2, part);
-        for entry in &mut sheet.entries {
+        report.rules.parts.insert(report.rules.parts.len() - 2, part);
+        for entry in &mut report.entries {
             let mut own = entry.grade.parts[0].clone();
             own.id = id.into();
             let place = entry.grade.parts.len() - 2;
@@ -162,9 +165,9 @@ fn look() {
         }
     }
     for index in 0..24 {
-        let mut entry = sheet.entries[index % 3].clone();
+        let mut entry = report.entries[index % 3].clone();
         entry.record.slug.push_str(&format!("_{index}"));
-        sheet.entries.push(entry);
+        report.entries.push(entry);
     }
-    super::super::write(std::path::Path::new(&out), &sheet).unwrap();
+    super::super::write(std::path::Path::new(&out), &report).unwrap();
 }

@@ -8,12 +8,12 @@ use crate::class::{Class, Kind};
 const NAMED: usize = 30;
 
 /// The lines below the table.
-pub(super) fn class(page: &mut Page, sheet: &BatchReport, class: &Class) {
+pub(super) fn class(page: &mut Page, report: &BatchReport, class: &Class) {
     if class.kind != Kind::Plain {
         let text = format!("recognised as a download of {}", class.kind.title());
         page.wrapped(&[], Style::Plain, &text);
     }
-    let aside = sheet.entries.iter().filter(|entry| !entry.standing.set_aside.is_empty());
+    let aside = report.entries.iter().filter(|entry| !entry.standing.set_aside.is_empty());
     let aside = aside
         .map(|entry| format!("{}, not {}", entry.record.name, entry.standing.set_aside.join(", ")));
     let missing = class.missing.iter().map(|missing| match missing.reason.as_str() {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::super::number::{plain, points, range};
-use super::super::{BatchReport, Entry};
+use super::super::{BatchReport, SubmissionReport};
 use super::page::{Look, Page, Style};
 use crate::evidence::{Check, Verdict};
 use crate::intake::Severity;
@@ -27,7 +27,12 @@ pub struct Closing<'a> {
 
 /// The last lines: where the page is, what changed since the last time, how many points there are, and
 /// what is next to do.
-pub fn closing(sheet: &BatchReport, entry: &Entry, closing: &Closing, look: Look) -> String {
+pub fn closing(
+    report: &BatchReport,
+    entry: &SubmissionReport,
+    closing: &Closing,
+    look: Look,
+) -> String {
     let grade = &entry.grade;
     let mut page = Page::new(look.width, look.colours);
     page.gap();
@@ -54,7 +59,7 @@ pub fn closing(sheet: &BatchReport, entry: &Entry, closing: &Closing, look: Look
     let whole = plain.iter().all(|part| is_whole(part)) && !grade.parts.is_empty();
     let style = if whole { Style::Good } else { Style::Bad };
     page.wrapped(&[(style, "verdict: ")], Style::Plain, &verdict);
-    page.wrapped(&[(Style::Heading, "next: ")], Style::Plain, &next(sheet, entry, closing));
+    page.wrapped(&[(Style::Heading, "next: ")], Style::Plain, &next(report, entry, closing));
     page.finish()
 }
 
@@ -73,7 +78,7 @@ fn is_whole(part: &PartGrade) -> bool {
 }
 
 /// What is next to do: what hinders most, then the parts in the handout's order, then submitting.
-fn next(sheet: &BatchReport, entry: &Entry, closing: &Closing) -> String {
+fn next(report: &BatchReport, entry: &SubmissionReport, closing: &Closing) -> String {
     let Closing { folder, umbra, .. } = closing;
     let checks = &entry.record.evidence.checks;
     let failed = |check: &&Check| check.verdict == Verdict::Fail;
@@ -105,7 +110,7 @@ fn next(sheet: &BatchReport, entry: &Entry, closing: &Closing) -> String {
         (None, Some(check)) => format!("make it ready to submit: {}", check.summary),
         (None, None) => format!("`{umbra} pack {folder}` makes the archive to submit"),
     };
-    match open(true).filter(|_| sheet.rules.parts.iter().any(|part| part.bonus)) {
+    match open(true).filter(|_| report.rules.parts.iter().any(|part| part.bonus)) {
         Some(part) => format!("{ready}; or the bonus, {} {}", part.id, part.title),
         None => ready,
     }
@@ -124,7 +129,12 @@ mod tests {
     use super::super::super::sample;
     use super::*;
 
-    fn closed(sheet: &BatchReport, index: usize, asked: &str, last: &[(&str, f64)]) -> Vec<String> {
+    fn closed(
+        report: &BatchReport,
+        index: usize,
+        asked: &str,
+        last: &[(&str, f64)],
+    ) -> Vec<String> {
         let files = BTreeMap::from([("1.3".to_owned(), "src/integrators/simple.rs".to_owned())]);
         let last = last.iter().map(|&(id, points)| (id.to_owned(), (points, points))).collect();
         let made_of = Closing {
@@ -136,14 +146,14 @@ mod tests {
             asked,
         };
         let look = Look { width: 400, colours: false };
-        let text = closing(sheet, &sheet.entries[index], &made_of, look);
+        let text = closing(report, &report.entries[index], &made_of, look);
         text.lines().map(str::to_owned).collect()
     }
 
     #[test]
     fn the_last_lines_are_the_verdict_and_the_next_thing_to_do() {
-        let mut sheet = sample::sheet();
-        let lines = closed(&sheet, 1, "", &[("1.1", 5.0), ("1.3", 0.0), ("1.4", 2.5), ("9", 1.0)]);
+        let mut report = sample::report();
+        let lines = closed(&report, 1, "", &[("1.1", 5.0), ("1.3", 0.0), ("1.4", 2.5), ("9", 1.0)]);
         assert_eq!(lines[1], "report: umbra-report/a/report.html");
         assert_eq!(lines[2], "since last time: 1.3 0 -> 9.85, 1.4 2.5 -> 15");
         assert_eq!(
@@ -158,15 +168,15 @@ mod tests {
         );
         assert!(!lines[4].contains("witness"), "{lines:?}");
         // What does not build comes first, whatever the parts are worth.
-        let lines = closed(&sheet, 2, "", &[]);
+        let lines = closed(&report, 2, "", &[]);
         assert!(lines[3].starts_with("next: the source does not build; "), "{lines:?}");
         // All is right: a file is missing, then nothing is.
-        let ready = closed(&sheet, 0, "", &[]);
+        let ready = closed(&report, 0, "", &[]);
         let pack = "next: `./umbra pack student_template` makes the archive to submit";
         assert_eq!(ready[3], pack);
-        let mistake = sheet.entries[2].record.findings[0].clone();
-        sheet.entries[0].record.findings.push(mistake);
-        let lines = closed(&sheet, 0, "", &[]);
+        let mistake = report.entries[2].record.findings[0].clone();
+        report.entries[0].record.findings.push(mistake);
+        let lines = closed(&report, 0, "", &[]);
         assert!(
             lines[3].starts_with("next: make it ready to submit: config.json:3: "),
             "{lines:?}"
@@ -175,9 +185,9 @@ mod tests {
 
     #[test]
     fn what_was_not_asked_is_said() {
-        let mut sheet = sample::sheet();
-        sheet.entries[1].grade.parts.retain(|part| part.id == "2.4");
-        let lines = closed(&sheet, 1, "part 2.4 on scene cbox", &[]);
+        let mut report = sample::report();
+        report.entries[1].grade.parts.retain(|part| part.id == "2.4");
+        let lines = closed(&report, 1, "part 2.4 on scene cbox", &[]);
         assert_eq!(
             lines[2],
             "verdict: 25 of 25 points on the public scenes; only part 2.4 on scene cbox was checked, not \

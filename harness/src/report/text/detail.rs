@@ -4,7 +4,7 @@ use super::super::harmless::harmless_lines;
 use super::super::number::{
     self, hints, is_failure, is_range, looks_like, of_part, plain, points, seconds, total,
 };
-use super::super::{BatchReport, Entry};
+use super::super::{BatchReport, SubmissionReport};
 use super::page::{Look, Page, Style, columns, left};
 use crate::columns::count;
 use crate::evidence::{Check, CheckId, Measure, Verdict};
@@ -19,10 +19,10 @@ const VERDICT_WIDTH: usize = 17;
 /// One submission: parts with points, and of those that lost some the reason and a hint; what is to be
 /// noticed besides; findings; what the compiler said. With `verbose`, every check with value, bound
 /// and verdict too, and under which conditions they were made.
-pub fn detail(sheet: &BatchReport, entry: &Entry, look: Look, verbose: bool) -> String {
-    let Entry { record, grade, .. } = entry;
+pub fn detail(report: &BatchReport, entry: &SubmissionReport, look: Look, verbose: bool) -> String {
+    let SubmissionReport { record, grade, .. } = entry;
     let mut page = Page::new(look.width, look.colours);
-    page.wrapped(&[], Style::Heading, &sheet.title);
+    page.wrapped(&[], Style::Heading, &report.title);
     page.wrapped(&[(Style::Plain, "checked  ")], Style::Plain, &record.name);
     let student = entry.student();
     let student = [student.full_name(), student.id];
@@ -42,10 +42,10 @@ pub fn detail(sheet: &BatchReport, entry: &Entry, look: Look, verbose: bool) -> 
     if verbose {
         checks(&mut page, &record.evidence.checks);
     } else {
-        noticed(&mut page, sheet, entry);
+        noticed(&mut page, report, entry);
     }
     let whole = |part: &PartGrade| part.bonus || points(part.points) == points(part.out_of);
-    let busy = grade.parts.len() < sheet.rules.parts.len() || !grade.parts.iter().all(whole);
+    let busy = grade.parts.len() < report.rules.parts.len() || !grade.parts.iter().all(whole);
     findings(&mut page, &record.findings, verbose, busy);
     diagnostics(&mut page, &record.diagnostics);
     if verbose {
@@ -59,7 +59,11 @@ fn heading(page: &mut Page, text: &str) {
     page.line(&[(Style::Heading, text)]);
 }
 
-fn parts(page: &mut Page, Entry { record, grade, .. }: &Entry, verbose: bool) {
+fn parts(
+    page: &mut Page,
+    SubmissionReport { record, grade, .. }: &SubmissionReport,
+    verbose: bool,
+) {
     heading(page, "parts");
     let worth = |part| format!("{}/{}", of_part(part), points(part.out_of));
     let ids = grade.parts.iter().map(|part| columns(&part.id)).max().unwrap_or(0);
@@ -107,8 +111,12 @@ fn parts(page: &mut Page, Entry { record, grade, .. }: &Entry, verbose: bool) {
 }
 
 /// What failed without being the matter of a part: it costs nothing, but somebody should look.
-fn noticed(page: &mut Page, sheet: &BatchReport, Entry { record, .. }: &Entry) {
-    let rules = &sheet.rules;
+fn noticed(
+    page: &mut Page,
+    report: &BatchReport,
+    SubmissionReport { record, .. }: &SubmissionReport,
+) {
+    let rules = &report.rules;
     let of_part = |check: &Check| {
         let named = rules.parts.iter().flat_map(|part| part.evidence.iter().chain(&part.fallback));
         let proofs = rules.paths.values().map(|path| &path.proof);
@@ -264,7 +272,7 @@ fn diagnostics(page: &mut Page, diagnostics: &str) {
     }
 }
 
-fn costs(page: &mut Page, Entry { record, .. }: &Entry) {
+fn costs(page: &mut Page, SubmissionReport { record, .. }: &SubmissionReport) {
     heading(page, "conditions");
     let conditions = &record.conditions;
     for (name, text) in [
@@ -298,16 +306,16 @@ mod tests {
 
     #[test]
     fn known_answer() {
-        let sheet = sample::sheet();
+        let report = sample::report();
         let look = Look { width: 100, colours: false };
-        insta::assert_snapshot!("detail", detail(&sheet, &sheet.entries[1], look, true));
-        insta::assert_snapshot!("detail_plain", detail(&sheet, &sheet.entries[1], look, false));
+        insta::assert_snapshot!("detail", detail(&report, &report.entries[1], look, true));
+        insta::assert_snapshot!("detail_plain", detail(&report, &report.entries[1], look, false));
     }
 
     #[test]
     fn what_does_not_build_shows_the_compiler() {
-        let sheet = sample::sheet();
-        let text = detail(&sheet, &sheet.entries[2], Look { width: 80, colours: false }, true);
+        let report = sample::report();
+        let text = detail(&report, &report.entries[2], Look { width: 80, colours: false }, true);
         for line in [
             "total    0/75",
             "remark   the source does not build; the images alone earn 11.44 points once the",
@@ -321,21 +329,21 @@ mod tests {
 
     #[test]
     fn what_a_compiler_says_is_never_wrapped() {
-        let mut sheet = sample::sheet();
+        let mut report = sample::report();
         let line = format!("69 │ {}", "let shadow = visibility(world_position, n);".repeat(3));
         let caret = format!("   │ {}^ expected `;`", " ".repeat(100));
-        sheet.entries[2].record.diagnostics = format!("{line}\n{caret}");
+        report.entries[2].record.diagnostics = format!("{line}\n{caret}");
         for width in [20, 80] {
-            let text = detail(&sheet, &sheet.entries[2], Look { width, colours: false }, true);
+            let text = detail(&report, &report.entries[2], Look { width, colours: false }, true);
             assert!(text.contains(&format!("\n  {line}\n  {caret}\n")), "{text}");
         }
     }
 
     #[test]
     fn hostile_words_keep_their_place() {
-        let mut sheet = sample::sheet();
+        let mut report = sample::report();
         let evil = "\u{1b}[2J\u{202e}\0\r\nchecks\r\n";
-        let entry = &mut sheet.entries[1];
+        let entry = &mut report.entries[1];
         entry.record.name = evil.into();
         entry.record.student.first_name = evil.repeat(30);
         entry.record.diagnostics = format!("{evil}\u{9b}1m{}", "x".repeat(500));
@@ -350,7 +358,7 @@ mod tests {
         let said = harmless_lines(&entry.record.diagnostics, DIAGNOSTIC_LINES);
         for width in [1, 7, 20, 33, 80, 200] {
             let look = Look { width, colours: false };
-            let text = detail(&sheet, &sheet.entries[1], look, true);
+            let text = detail(&report, &report.entries[1], look, true);
             assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
             // What a compiler says is shown as it is.
             let quoted = |line: &&str| said.iter().any(|said| *line == format!("  {said}"));
@@ -362,13 +370,13 @@ mod tests {
 
     #[test]
     fn colours_do_not_change_the_words() {
-        let sheet = sample::sheet();
+        let report = sample::report();
         let look = |colours| Look { width: 80, colours };
-        let mut text = detail(&sheet, &sheet.entries[1], look(true), true);
+        let mut text = detail(&report, &report.entries[1], look(true), true);
         assert!(text.contains("\u{1b}[31m"));
         for code in ["0", "1", "2", "31", "32", "33"] {
             text = text.replace(&format!("\u{1b}[{code}m"), "");
         }
-        assert_eq!(text, detail(&sheet, &sheet.entries[1], look(false), true));
+        assert_eq!(text, detail(&report, &report.entries[1], look(false), true));
     }
 }

@@ -1,7 +1,7 @@
 //! The table of many submissions.
 
 use super::super::number::{due, is_range, of_part, points, total};
-use super::super::{BatchReport, Entry, ReportError, harmless};
+use super::super::{BatchReport, ReportError, SubmissionReport, harmless};
 use super::page::{Page, Style, columns, left};
 use crate::columns::{count, right};
 use crate::grading::Record;
@@ -18,18 +18,18 @@ const NAME_MIN: usize = 8;
 ///
 /// # Errors
 /// When there is no submission.
-pub fn table(sheet: &BatchReport, width: usize, colours: bool) -> Result<String, ReportError> {
-    if sheet.entries.is_empty() {
+pub fn table(report: &BatchReport, width: usize, colours: bool) -> Result<String, ReportError> {
+    if report.entries.is_empty() {
         return Err(ReportError::Empty);
     }
     let mut page = Page::new(width, colours);
-    page.wrapped(&[], Style::Heading, &format!("{}, due {}", sheet.title, due(&sheet.due)));
+    page.wrapped(&[], Style::Heading, &format!("{}, due {}", report.title, due(&report.due)));
     page.gap();
-    let remarks = remarks(sheet);
-    let layout = Layout::new(sheet, &remarks, page.width);
-    layout.head(&mut page, sheet);
-    for entry in &sheet.entries {
-        layout.row(&mut page, sheet, entry, &remarks);
+    let remarks = remarks(report);
+    let layout = Layout::new(report, &remarks, page.width);
+    layout.head(&mut page, report);
+    for entry in &report.entries {
+        layout.row(&mut page, report, entry, &remarks);
     }
     if layout.parts.is_none() {
         page.gap();
@@ -45,15 +45,15 @@ pub fn table(sheet: &BatchReport, width: usize, colours: bool) -> Result<String,
         }
     }
     page.gap();
-    let open = |entry: &&Entry| is_range(entry.grade.points, entry.grade.points_max);
-    let mut summary = count(sheet.entries.len(), "submission");
-    match sheet.entries.iter().filter(open).count() {
+    let open = |entry: &&SubmissionReport| is_range(entry.grade.points, entry.grade.points_max);
+    let mut summary = count(report.entries.len(), "submission");
+    match report.entries.iter().filter(open).count() {
         0 => {}
         open => summary.push_str(&format!(", {open} not wholly judged (a range of points)")),
     }
     page.wrapped(&[], Style::Plain, &summary);
-    if let Some(class) = &sheet.class {
-        super::class::class(&mut page, sheet, class);
+    if let Some(class) = &report.class {
+        super::class::class(&mut page, report, class);
     }
     Ok(page.finish())
 }
@@ -66,9 +66,9 @@ pub fn in_a_line(record: &Record, grade: &Grade) -> String {
 }
 
 /// Every remark, once.
-fn remarks(sheet: &BatchReport) -> Vec<&str> {
+fn remarks(report: &BatchReport) -> Vec<&str> {
     let mut remarks: Vec<&str> = Vec::new();
-    for remark in sheet.entries.iter().flat_map(|entry| &entry.grade.remarks) {
+    for remark in report.entries.iter().flat_map(|entry| &entry.grade.remarks) {
         if !remarks.contains(&remark.as_str()) {
             remarks.push(remark);
         }
@@ -77,7 +77,7 @@ fn remarks(sheet: &BatchReport) -> Vec<&str> {
 }
 
 /// The numbers of a submission's remarks: `1, 3`.
-fn numbers(entry: &Entry, remarks: &[&str]) -> String {
+fn numbers(entry: &SubmissionReport, remarks: &[&str]) -> String {
     let number = |remark: &String| remarks.iter().position(|other| other == remark);
     let numbers = entry.grade.remarks.iter().filter_map(number);
     numbers.map(|index| (index + 1).to_string()).collect::<Vec<_>>().join(", ")
@@ -94,20 +94,20 @@ struct Layout {
 }
 
 impl Layout {
-    fn new(sheet: &BatchReport, remarks: &[&str], width: usize) -> Self {
-        let widest = |head: &str, text: &dyn Fn(&Entry) -> String| {
-            let texts = sheet.entries.iter().map(|entry| columns(&text(entry)));
+    fn new(report: &BatchReport, remarks: &[&str], width: usize) -> Self {
+        let widest = |head: &str, text: &dyn Fn(&SubmissionReport) -> String| {
+            let texts = report.entries.iter().map(|entry| columns(&text(entry)));
             texts.max().unwrap_or(0).max(columns(head))
         };
         let total = widest("total", &|entry| total(&entry.grade));
         let noted = widest("", &|entry| numbers(entry, remarks));
         let noted = if noted > 0 { noted.max("remarks".len()) } else { 0 };
-        let parts: Vec<usize> = sheet
+        let parts: Vec<usize> = report
             .rules
             .parts
             .iter()
             .map(|part| {
-                let own = |entry: &Entry| part_points(entry, &part.id);
+                let own = |entry: &SubmissionReport| part_points(entry, &part.id);
                 widest(&part.id, &own).max(most(part).len())
             })
             .collect();
@@ -123,12 +123,12 @@ impl Layout {
         Self { name, student, parts: fits.then_some(parts), total, remarks: noted }
     }
 
-    fn head(&self, page: &mut Page, sheet: &BatchReport) {
+    fn head(&self, page: &mut Page, report: &BatchReport) {
         let mut head =
             format!("{}{GAP}{}", left("submission", self.name), left("student", self.student));
         let mut best = right("out of", columns(&head));
         if let Some(parts) = &self.parts {
-            for (part, &width) in sheet.rules.parts.iter().zip(parts) {
+            for (part, &width) in report.rules.parts.iter().zip(parts) {
                 head.push_str(&format!("{GAP}{}", right(&part.id, width)));
                 best.push_str(&format!("{GAP}{}", right(&most(part), width)));
             }
@@ -143,8 +143,14 @@ impl Layout {
         }
     }
 
-    fn row(&self, page: &mut Page, sheet: &BatchReport, entry: &Entry, remarks: &[&str]) {
-        let Entry { record, grade, .. } = entry;
+    fn row(
+        &self,
+        page: &mut Page,
+        report: &BatchReport,
+        entry: &SubmissionReport,
+        remarks: &[&str],
+    ) {
+        let SubmissionReport { record, grade, .. } = entry;
         let names = format!(
             "{}{GAP}{}",
             left(&record.name, self.name),
@@ -152,7 +158,7 @@ impl Layout {
         );
         let mut cells = vec![(Style::Plain, names)];
         if let Some(parts) = &self.parts {
-            for (part, &width) in sheet.rules.parts.iter().zip(parts) {
+            for (part, &width) in report.rules.parts.iter().zip(parts) {
                 let own = grade.parts.iter().find(|own| own.id == part.id);
                 let style = match own {
                     Some(own) if own.bonus && own.points_max == 0.0 => Style::Faint,
@@ -178,7 +184,7 @@ fn most(part: &crate::rubric::Part) -> String {
     format!("{}{}", if part.bonus { "+" } else { "" }, points(part.points))
 }
 
-fn part_points(entry: &Entry, id: &str) -> String {
+fn part_points(entry: &SubmissionReport, id: &str) -> String {
     entry.grade.parts.iter().find(|own| own.id == id).map(of_part).unwrap_or_default()
 }
 
@@ -192,7 +198,7 @@ mod tests {
 
     #[test]
     fn known_answer() {
-        insta::assert_snapshot!("table", table(&sample::sheet(), 110, false).unwrap());
+        insta::assert_snapshot!("table", table(&sample::report(), 110, false).unwrap());
     }
 
     #[test]
@@ -201,19 +207,19 @@ mod tests {
             (82, "two_cosine…  Jörg Müll…    5   10  9.85   15   25  0..20  64.85..84.85/75"),
             (50, "two_cosine…  Jörg Müller  64.85..84.85/75"),
         ] {
-            let text = table(&sample::sheet(), width, false).unwrap();
+            let text = table(&sample::report(), width, false).unwrap();
             assert_eq!(text.lines().find(|line| line.starts_with("two_")), Some(row));
         }
     }
 
     #[test]
     fn no_line_is_wider_than_the_terminal() {
-        let mut sheet = sample::sheet();
-        sheet.entries[0].record.name = "a_very_long_name_".repeat(20);
-        sheet.entries[1].record.student.first_name = "\u{1b}[2J花子".repeat(20);
-        sheet.entries[1].grade.remarks.push("x".repeat(300));
+        let mut report = sample::report();
+        report.entries[0].record.name = "a_very_long_name_".repeat(20);
+        report.entries[1].record.student.first_name = "\u{1b}[2J花子".repeat(20);
+        report.entries[1].grade.remarks.push("x".repeat(300));
         for width in 1..200 {
-            let text = table(&sheet, width, false).unwrap();
+            let text = table(&report, width, false).unwrap();
             for line in text.lines() {
                 assert!(line.width() <= width.max(2), "{width}: {line:?}");
             }
@@ -222,21 +228,21 @@ mod tests {
 
     #[test]
     fn hostile_words_do_nothing_to_a_terminal() {
-        let mut sheet = sample::sheet();
-        sheet.entries[0].record.name = "\u{1b}]0;owned\u{7}\u{202e}\0\r\nfake.zip".into();
-        let text = table(&sheet, 140, false).unwrap();
+        let mut report = sample::report();
+        report.entries[0].record.name = "\u{1b}]0;owned\u{7}\u{202e}\0\r\nfake.zip".into();
+        let text = table(&report, 140, false).unwrap();
         assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
         assert!(text.contains("\\u{1b}]0;owned\\u{7}\\u{202e}\\u{0}\\r\\nfake.zip"), "{text}");
         assert_eq!(
             text.lines().count(),
-            table(&sample::sheet(), 140, false).unwrap().lines().count()
+            table(&sample::report(), 140, false).unwrap().lines().count()
         );
     }
 
     #[test]
     fn an_empty_batch_is_an_error() {
-        let sheet = BatchReport { entries: Vec::new(), ..sample::sheet() };
-        let error = table(&sheet, 80, false).unwrap_err();
+        let report = BatchReport { entries: Vec::new(), ..sample::report() };
+        let error = table(&report, 80, false).unwrap_err();
         assert!(error.to_string().starts_with("no submission to report: expected at least one"));
     }
 }

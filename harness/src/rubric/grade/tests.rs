@@ -30,7 +30,7 @@ fn rules() -> Rules {
         }],
         paths: [(
             "offline".into(),
-            PathRule { proof: IMAGE, unseen: vec![UNSEEN], blame: "2".into() },
+            PathRule { proof: IMAGE, unseen: vec![UNSEEN], residual_part: "2".into() },
         )]
         .into(),
         parts: vec![

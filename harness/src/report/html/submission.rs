@@ -2,7 +2,7 @@
 
 use super::super::harmless::harmless_lines;
 use super::super::number::{hints, is_range, looks_like, of_part, points, range, seconds};
-use super::super::{BatchReport, Entry, HTML_FILE};
+use super::super::{BatchReport, HTML_FILE, SubmissionReport};
 use super::markup::Html;
 use super::{Reader, begin, checks, class, end, part_class};
 use crate::evidence::{Check, Verdict};
@@ -15,22 +15,22 @@ const DIAGNOSTIC_LINES: usize = 400;
 
 /// The page of one submission: its parts with points and reasons, what failed with pictures, what
 /// could not be judged, what passed, findings, conditions and costs.
-pub fn hand_in(sheet: &BatchReport, entry: &Entry, reader: Reader) -> String {
+pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader) -> String {
     let known;
     // A student has the page's folder and nothing above it.
     let root = "../..";
     let entry = match reader {
         Reader::Instructor => entry,
         Reader::Student => {
-            known = entry.for_student(&sheet.rules);
+            known = entry.for_student(&report.rules);
             &known
         }
     };
-    let Entry { record, grade, standing } = entry;
+    let SubmissionReport { record, grade, standing } = entry;
     let student = entry.student();
     let name = student.full_name();
     let name = if name.is_empty() { &record.name } else { &name };
-    let mut html = begin(&format!("{name} - {}", sheet.title));
+    let mut html = begin(&format!("{name} - {}", report.title));
     html.raw("<header class=\"top\">\n");
     if reader == Reader::Instructor {
         html.raw("<nav><a href=\"")
@@ -39,7 +39,7 @@ pub fn hand_in(sheet: &BatchReport, entry: &Entry, reader: Reader) -> String {
             .raw(HTML_FILE)
             .raw("\">All submissions</a></nav>\n");
     }
-    html.raw("<p class=\"course\">").text(&sheet.title);
+    html.raw("<p class=\"course\">").text(&report.title);
     html.raw("</p>\n<h1>").text(name).raw("</h1>\n<p class=\"who\">");
     if !student.id.is_empty() {
         html.text(&student.id).raw(" · ");
@@ -83,15 +83,19 @@ pub fn hand_in(sheet: &BatchReport, entry: &Entry, reader: Reader) -> String {
     findings(&mut html, &record.findings);
     let marks: Vec<(f64, &str)> = grade.parts.iter().filter_map(|part| mark(part, entry)).collect();
     html.raw("<section>\n<h2>How an error becomes points</h2>\n");
-    super::curve::curve(&mut html, &sheet.rules.curve, &marks);
+    super::curve::curve(&mut html, &report.rules.curve, &marks);
     html.raw("</section>\n<section>\n<h2>Conditions and costs</h2>\n<div class=\"columns\">\n");
     conditions(&mut html, &record.conditions);
     stages(&mut html, &record.stages);
     html.raw("</div>\n</section>\n</main>\n");
-    end(html, sheet)
+    end(html, report)
 }
 
-fn parts(html: &mut Html, Entry { record, grade, .. }: &Entry, public_pictures: &str) {
+fn parts(
+    html: &mut Html,
+    SubmissionReport { record, grade, .. }: &SubmissionReport,
+    public_pictures: &str,
+) {
     html.raw("<section>\n<h2>Parts</h2>\n<table class=\"parts\">\n<thead><tr>");
     html.raw("<th scope=\"col\">Part</th><th scope=\"col\">Points</th></tr></thead>\n<tbody>\n");
     for part in &grade.parts {
@@ -139,7 +143,7 @@ fn decided_by(html: &mut Html, part: &PartGrade, all: &[Check]) {
 }
 
 /// The largest error among the failed checks that decided a part, for the curve.
-fn mark<'a>(part: &'a PartGrade, entry: &Entry) -> Option<(f64, &'a str)> {
+fn mark<'a>(part: &'a PartGrade, entry: &SubmissionReport) -> Option<(f64, &'a str)> {
     let decided = |name: String, id: &str| part.evidence.iter().any(|e| *e == name || e == id);
     let checks = entry.record.evidence.checks.iter();
     let failed = checks.filter(|check| check.verdict == Verdict::Fail);

@@ -18,7 +18,7 @@ const SMALL_WIDTH: u32 = 96;
 const FINE: usize = 3;
 
 /// A scene made ready for judging. Made once, used for every submission.
-pub struct Case {
+pub struct PreparedScene {
     /// What the assignment says of it.
     pub entry: SceneEntry,
     /// Whether students never see it.
@@ -36,11 +36,11 @@ pub struct Case {
     /// What is expected on the film it is judged on.
     pub expected: Expected,
     /// The small film.
-    pub small: Small,
+    pub probe_film: ProbeFilm,
 }
 
 /// A small film of a scene, on which single rays are judged.
-pub struct Small {
+pub struct ProbeFilm {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -84,7 +84,7 @@ impl Sampled {
 }
 
 /// The small film of a film, width and height in pixels.
-fn small_film([full_width, full_height]: [u32; 2]) -> [u32; 2] {
+fn probe_film_size([full_width, full_height]: [u32; 2]) -> [u32; 2] {
     let width = full_width.min(SMALL_WIDTH);
     [width, (full_height * width / full_width).max(1)]
 }
@@ -101,7 +101,7 @@ fn without_mirrors(scene: &Scene, surface: &SurfaceBuffer, mask: &RegionMask) ->
     mask
 }
 
-impl Case {
+impl PreparedScene {
     /// Makes a scene ready.
     ///
     /// # Errors
@@ -112,7 +112,7 @@ impl Case {
         let config = SceneConfig::load(&offline)?;
         let expected = store.expected(entry)?;
         let film = [expected.unshadowed.width as u32, expected.unshadowed.height as u32];
-        let [width, height] = small_film(film);
+        let [width, height] = probe_film_size(film);
         let (w, h) = (width as usize, height as usize);
         let scene = &expected.scene;
         let surface = SurfaceBuffer::new(scene, w, h)?;
@@ -121,7 +121,7 @@ impl Case {
         let fine = SurfaceBuffer::new(scene, FINE * w, FINE * h)?;
         let batch = RayBatch::new(&entry.name, scene, &surface, &asked);
         let batch = batch.with_contacts(scene, &fine, w);
-        let small = Small {
+        let probe_film = ProbeFilm {
             width,
             height,
             unshadowed_mask: regions(scene, w, h, false)?,
@@ -140,7 +140,7 @@ impl Case {
             spp: config.spp as u32,
             camera: CameraValue::from(config.camera),
             expected,
-            small,
+            probe_film,
             entry: entry.clone(),
             held_back: false,
         })
@@ -157,13 +157,13 @@ impl Case {
         let config = SceneConfig::load(&offline)?;
         let film = entry.film.unwrap_or([config.width as u32, config.height as u32]);
         let mut files = store.made_files(&offline, &realtime, film)?;
-        files.extend(store.made_files(&offline, &realtime, small_film(film))?);
+        files.extend(store.made_files(&offline, &realtime, probe_film_size(film))?);
         Ok(files)
     }
 
     /// Whether it only shows what others do not: no submission holds an image of it.
     pub fn is_probe(&self) -> bool {
-        self.entry.hand_in.is_none() && self.bonus.is_none()
+        self.entry.submitted.is_none() && self.bonus.is_none()
     }
 
     /// Width and height of the film that the scene is judged on, in pixels.

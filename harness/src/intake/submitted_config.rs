@@ -8,7 +8,7 @@ use super::tree::CONFIG_FILE;
 
 /// What the submission's `config.json` says; absent where it does not say it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct HandInConfig {
+pub struct SubmittedConfig {
     /// First name.
     pub first_name: Option<Field>,
     /// Last name.
@@ -43,7 +43,7 @@ pub struct ListedRender {
     pub line: u32,
 }
 
-impl HandInConfig {
+impl SubmittedConfig {
     /// Reads a `config.json`, whatever it is: what can be made out of it counts. The findings are warnings and
     /// name `config.json`, line and hint. The last answer is whether all was read: what is
     /// absent may else be in the rest.
@@ -367,7 +367,7 @@ mod tests {
     use super::*;
 
     fn names(text: &str) -> (String, String, Option<u64>) {
-        let (config, findings, _) = HandInConfig::parse(text.as_bytes());
+        let (config, findings, _) = SubmittedConfig::parse(text.as_bytes());
         for finding in findings {
             assert_eq!(finding.severity, crate::intake::Severity::Warning, "{finding}");
         }
@@ -377,7 +377,7 @@ mod tests {
 
     fn codes(text: &str) -> Vec<String> {
         let code = |f: &Finding| format!("{}@{}", f.code, f.line.unwrap_or(0));
-        HandInConfig::parse(text.as_bytes()).1.iter().map(code).collect()
+        SubmittedConfig::parse(text.as_bytes()).1.iter().map(code).collect()
     }
 
     #[test]
@@ -452,7 +452,7 @@ mod tests {
 
     #[test]
     fn reads_renders_with_lines() {
-        let (config, findings, _) = HandInConfig::parse(
+        let (config, findings, _) = SubmittedConfig::parse(
             b"{\"renders\": [\n{\"scene\": \"T\", \"render\": \"a.exr\"},\n\"b.exr\",\n{\"scene\": \"x\"}\n]}",
         );
         let listed: Vec<_> = config.renders.iter().map(|r| (r.render.as_str(), r.line)).collect();
@@ -464,13 +464,13 @@ mod tests {
     #[test]
     fn endless_lists_are_cut() {
         let text = format!("{{\"renders\": [{}\"a\"]}}", "\"a\",".repeat(5000));
-        let (config, findings, _) = HandInConfig::parse(text.as_bytes());
+        let (config, findings, _) = SubmittedConfig::parse(text.as_bytes());
         assert_eq!((config.renders.len(), findings.len()), (100, 1));
     }
 
     #[test]
     fn two_answers_are_not_one() {
-        let (_, findings, _) = HandInConfig::parse(b"{\"id\": 1,\n\"studentID\": 2}");
+        let (_, findings, _) = SubmittedConfig::parse(b"{\"id\": 1,\n\"studentID\": 2}");
         assert_eq!((findings[0].code.as_str(), findings[0].line), ("config_twice", Some(2)));
     }
 }

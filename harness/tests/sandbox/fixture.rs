@@ -54,7 +54,7 @@ pub fn everyone() -> Vec<Who> {
 }
 
 /// Targets that belong to one who starts, and the attacks, compiled.
-pub struct Ground {
+pub struct Fixture {
     pub who: Who,
     pub folder: tempfile::TempDir,
     pub victim: Child,
@@ -64,14 +64,14 @@ pub struct Ground {
     _listeners: [UnixListener; 2],
 }
 
-impl Drop for Ground {
+impl Drop for Fixture {
     fn drop(&mut self) {
         self.victim.kill().expect("the victim was started here");
         self.victim.wait().expect("the victim was started here");
     }
 }
 
-impl Ground {
+impl Fixture {
     pub fn new(who: Who) -> Self {
         let folder = tempfile::Builder::new().prefix("umbra_ground").tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
@@ -110,7 +110,7 @@ impl Ground {
         self.folder.path().join(name).display().to_string()
     }
 
-    /// A policy that sees the attacks and nothing else of the ground.
+    /// A policy that sees the attacks and nothing else of the fixture.
     pub fn policy(&self, kind: Kind, layers: Layers) -> Policy {
         let mut policy = Policy::new(kind);
         policy.layers = layers;

@@ -1,4 +1,4 @@
-//! The one walk over all pixels that every comparison makes, and the verdict on what it gathered.
+//! The one pass over all pixels that every comparison makes, and the verdict on what it gathered.
 
 use basecode::image::Image;
 use glam::{DVec3, Vec3};
@@ -33,12 +33,12 @@ pub(super) struct Row<'a> {
 
 /// Pixels with a property, and where the first is.
 #[derive(Default)]
-struct Spots {
+struct PixelCount {
     count: u32,
     first: Option<(usize, usize)>,
 }
 
-impl Spots {
+impl PixelCount {
     fn add(&mut self, x: usize, y: usize) {
         self.count += 1;
         self.first.get_or_insert((x, y));
@@ -57,9 +57,9 @@ impl Tally {
     }
 }
 
-/// Sums over the interior pixels of a region.
+/// RegionSums over the interior pixels of a region.
 #[derive(Clone, Default)]
-pub(super) struct Sums {
+pub(super) struct RegionSums {
     pixels: u32,
     non_finite: u32,
     actual: DVec3,
@@ -67,41 +67,41 @@ pub(super) struct Sums {
     variance: DVec3,
 }
 
-/// What one walk over all pixels gathers.
-pub(super) struct Walk {
+/// What one pass over all pixels gathers.
+pub(super) struct ComparisonStats {
     width: usize,
     height: usize,
-    non_finite: Spots,
-    negative: Spots,
+    non_finite: PixelCount,
+    negative: PixelCount,
     interior: Tally,
     edge: Tally,
     /// Two for each region of the mask: without and with highlight.
-    pub regions: Vec<Sums>,
+    pub regions: Vec<RegionSums>,
     /// Failing interior pixels.
     failing: Vec<bool>,
     worst: Option<WorstPixel>,
-    /// Sums of the squared difference and of what noise predicts for it.
+    /// RegionSums of the squared difference and of what noise predicts for it.
     noise: (f64, f64),
 }
 
 /// Applies `rule` row by row and gathers everything that the verdict needs.
-pub(super) fn walk(
+pub(super) fn accumulate(
     actual: &Image,
     expected: &Image,
     mask: &RegionMask,
     tolerances: &Tolerances,
     mut rule: impl FnMut(usize, &mut Row<'_>),
-) -> Walk {
+) -> ComparisonStats {
     let (width, height) = (expected.width, expected.height);
     let negative_limit = -tolerances.negative_limit as f32;
-    let mut walk = Walk {
+    let mut stats = ComparisonStats {
         width,
         height,
-        non_finite: Spots::default(),
-        negative: Spots::default(),
+        non_finite: PixelCount::default(),
+        negative: PixelCount::default(),
         interior: Tally::default(),
         edge: Tally::default(),
-        regions: vec![Sums::default(); 2 * mask.regions.len()],
+        regions: vec![RegionSums::default(); 2 * mask.regions.len()],
         failing: vec![false; width * height],
         worst: None,
         noise: (0.0, 0.0),
@@ -127,29 +127,29 @@ pub(super) fn walk(
             let (a, b) = (row.actual[x], row.expected[x]);
             let finite = a.is_finite();
             if !finite {
-                walk.non_finite.add(x, y);
+                stats.non_finite.add(x, y);
             } else if a.min_element() < negative_limit {
-                walk.negative.add(x, y);
+                stats.negative.add(x, y);
             }
             // Written so that a NaN fails.
             let within = finite && row.excess2[x] <= 1.0;
             if finite {
                 let d = a - b;
-                walk.noise.0 += f64::from((d * d).element_sum());
-                walk.noise.1 += f64::from(row.variance[x].element_sum());
+                stats.noise.0 += f64::from((d * d).element_sum());
+                stats.noise.1 += f64::from(row.variance[x].element_sum());
             }
             if flags & RegionMask::EDGE != 0 {
-                walk.edge.pixels += 1;
-                walk.edge.failing += u32::from(!within);
+                stats.edge.pixels += 1;
+                stats.edge.failing += u32::from(!within);
                 continue;
             }
-            walk.interior.pixels += 1;
-            walk.interior.failing += u32::from(!within);
-            walk.failing[start + x] = !within;
+            stats.interior.pixels += 1;
+            stats.interior.failing += u32::from(!within);
+            stats.failing[start + x] = !within;
             let e2 = if finite { row.excess2[x] } else { f32::INFINITY };
             if e2 > worst2 {
                 worst2 = e2;
-                walk.worst = Some(WorstPixel {
+                stats.worst = Some(WorstPixel {
                     x,
                     y,
                     actual: a.to_array(),
@@ -158,7 +158,7 @@ pub(super) fn walk(
                 });
             }
             let highlight = usize::from(flags & RegionMask::HIGHLIGHT != 0);
-            let sums = &mut walk.regions[2 * usize::from(flags & RegionMask::INDEX) + highlight];
+            let sums = &mut stats.regions[2 * usize::from(flags & RegionMask::INDEX) + highlight];
             sums.pixels += 1;
             if finite {
                 sums.actual += a.as_dvec3();
@@ -169,7 +169,7 @@ pub(super) fn walk(
             }
         }
     }
-    walk
+    stats
 }
 
 /// JSON has no infinity: what cannot be measured is the largest number.
@@ -177,7 +177,7 @@ fn presentable(value: f64) -> f64 {
     if value.is_finite() { value } else { f64::MAX.copysign(value) }
 }
 
-impl Walk {
+impl ComparisonStats {
     /// Every check with its verdict.
     pub fn judge(
         self,
@@ -186,7 +186,7 @@ impl Walk {
         scale: &Scale,
         tolerances: &Tolerances,
     ) -> ImageEvidence {
-        let spots = |id: &str, spots: &Spots, what: &str| Check {
+        let spots = |id: &str, spots: &PixelCount, what: &str| Check {
             id: id.into(),
             value: f64::from(spots.count),
             bound: 0.0,
@@ -283,7 +283,7 @@ impl Walk {
     }
 }
 
-impl Sums {
+impl RegionSums {
     /// Signed bias per channel; the channel that is worst against its bound speaks for the region.
     fn judge(
         &self,

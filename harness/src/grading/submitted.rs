@@ -5,15 +5,15 @@ use std::path::Path;
 
 use basecode::Image;
 
-use super::case::Case;
 use super::offline::Drawn;
+use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use super::shared::ImageDigest;
 use crate::decode::{Decoder, image_finding};
-use crate::evidence::handed_in::{
+use crate::evidence::images::{self, Kind};
+use crate::evidence::submitted::{
     has_own_noise, judge_copied, judge_noise, judge_scene, judge_seed,
 };
-use crate::evidence::images::{self, Kind};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::noise::NoisyPixels;
@@ -37,8 +37,8 @@ const REALTIME: [View; 3] = [
 ];
 
 /// An image in a submission.
-pub struct HandedIn<'a> {
-    case: &'a Case,
+pub struct SubmittedImage<'a> {
+    case: &'a PreparedScene,
     /// Its path in the submission.
     path: String,
     kind: Kind,
@@ -46,9 +46,14 @@ pub struct HandedIn<'a> {
     image: Result<Image, String>,
 }
 
-impl<'a> HandedIn<'a> {
+impl<'a> SubmittedImage<'a> {
     /// An image of a scene, with its path in the submission, or why there are no pixels.
-    pub fn new(case: &'a Case, path: &str, kind: Kind, image: Result<Image, String>) -> Self {
+    pub fn new(
+        case: &'a PreparedScene,
+        path: &str,
+        kind: Kind,
+        image: Result<Image, String>,
+    ) -> Self {
         Self { case, path: path.to_owned(), kind, image }
     }
 
@@ -68,7 +73,7 @@ impl<'a> HandedIn<'a> {
 fn views(kind: Kind) -> &'static [View] {
     match kind {
         Kind::Offline { .. } => &OFFLINE,
-        Kind::HandedInRealtime => &REALTIME,
+        Kind::SubmittedRealtime => &REALTIME,
         _ => &[],
     }
 }
@@ -82,19 +87,19 @@ pub fn read<'a>(
     decoder: &Decoder,
     root: &Path,
     tree: &TreeSpec,
-    cases: &'a [Case],
-) -> anyhow::Result<Vec<HandedIn<'a>>> {
+    cases: &'a [PreparedScene],
+) -> anyhow::Result<Vec<SubmittedImage<'a>>> {
     let mut found = Vec::new();
     for case in cases {
-        let Some(paths) = &case.entry.hand_in else { continue };
+        let Some(paths) = &case.entry.submitted else { continue };
         for (path, kind) in [
             (&paths.offline, Kind::Offline { spp: case.spp }),
-            (&paths.realtime, Kind::HandedInRealtime),
-            (&paths.bonus, Kind::HandedInShadows),
+            (&paths.realtime, Kind::SubmittedRealtime),
+            (&paths.bonus, Kind::SubmittedShadows),
         ] {
             if let Some(path) = tree.found_in(root, path) {
                 let image = decoder.image(&root.join(path), path)?;
-                found.push(HandedIn::new(case, path, kind, image));
+                found.push(SubmittedImage::new(case, path, kind, image));
             }
         }
     }
@@ -104,11 +109,11 @@ pub fn read<'a>(
 /// Judges an image. `drawn` holds what the submission's code drew, nothing when it does not build.
 /// Answers its digest when it has noise of its own.
 pub fn judge(
-    handed_in: &HandedIn,
+    submitted: &SubmittedImage,
     drawn: &[Drawn],
     tolerances: &Tolerances,
 ) -> (Vec<Check>, Option<ImageDigest>) {
-    let HandedIn { case, path, kind, image } = handed_in;
+    let SubmittedImage { case, path, kind, image } = submitted;
     let (name, kind, expected) = (&case.entry.name, *kind, &case.expected);
     let mut checks = Vec::new();
     let image = match image {
@@ -123,8 +128,8 @@ pub fn judge(
     }
     let right = checks.first().is_some_and(|check| check.verdict == Verdict::Pass);
     let drawn_as = match kind {
-        Kind::HandedInRealtime => Kind::Realtime,
-        Kind::HandedInShadows => Kind::RealtimeShadows,
+        Kind::SubmittedRealtime => Kind::Realtime,
+        Kind::SubmittedShadows => Kind::RealtimeShadows,
         offline => offline,
     };
     let own = drawn.iter().find(|drawn| drawn.scene == *name && drawn.kind == drawn_as);
@@ -132,7 +137,7 @@ pub fn judge(
     let own = origin.as_ref().is_some_and(|check| check.verdict == Verdict::Pass);
     checks.extend(origin);
     let mask = match kind {
-        Kind::HandedInRealtime => &expected.unshadowed_mask,
+        Kind::SubmittedRealtime => &expected.unshadowed_mask,
         _ => &expected.offline.mask,
     };
     checks.push(if right || own {
@@ -163,11 +168,11 @@ pub fn judge(
 pub fn judge_seeds(
     session: &Session,
     reference: &Path,
-    handed_in: &[HandedIn],
+    submitted: &[SubmittedImage],
     seed: u64,
 ) -> Vec<Check> {
     let mut checks = Vec::new();
-    for HandedIn { case, path, kind, image } in handed_in {
+    for SubmittedImage { case, path, kind, image } in submitted {
         let (Kind::Offline { spp }, Ok(image)) = (kind, image) else { continue };
         let noisy = NoisyPixels::new(&case.expected.offline);
         let noise = noisy.as_ref().and_then(|noisy| noisy.measure(image));
@@ -194,17 +199,17 @@ pub fn judge_seeds(
 /// Whether an image that was submitted is what the code draws. A finding: it costs nothing.
 fn judge_origin(
     path: &str,
-    case: &Case,
+    case: &PreparedScene,
     kind: Kind,
-    handed_in: &Image,
+    submitted: &Image,
     drawn: &Image,
     tolerances: &Tolerances,
 ) -> Check {
     let (id, name) = (CheckId::SubmittedOrigin, &case.entry.name);
-    if images::same_origin(kind, handed_in, drawn, &case.expected, tolerances) {
+    if images::same_origin(kind, submitted, drawn, &case.expected, tolerances) {
         return Check::new(id, name, Verdict::Pass, format!("{path} is what the code draws"));
     }
     let summary = format!("{path} is not what the code draws: it is stale, or another renderer's");
     Check::new(id, name, Verdict::Fail, summary)
-        .with_hint("it costs nothing; render it again with this code before handing in")
+        .with_hint("it costs nothing; render it again with this code before you submit it")
 }

@@ -32,7 +32,7 @@ pub fn workspace() -> &'static Path {
 pub fn set_up(stage: &Path, layers: Layers) -> Result<(), String> {
     let at = |name: &str| stage.join(name);
     let fail = |what: &str, error: &dyn ToString| format!("{what}: {}", error.to_string());
-    for folder in ["other", "home", "scene", "hand-in/src", "scratch"] {
+    for folder in ["other", "home", "scene", "submission/src", "scratch"] {
         std::fs::create_dir_all(at(folder)).map_err(|e| fail(folder, &e))?;
     }
     let own = std::env::current_exe().map_err(|e| fail("this program", &e))?;
@@ -51,7 +51,7 @@ pub fn set_up(stage: &Path, layers: Layers) -> Result<(), String> {
     }
 
     let exec = "-DATTACK_AT_LOAD=\"exec /bin/sh\"";
-    let attack = ["fault.c", "deeds.c", "attack.c"];
+    let attack = ["fault.c", "actions.c", "attack.c"];
     for (library, flags, sources) in [
         ("fault.so", vec![], &attack[..]),
         ("exit_at_load.so", vec!["-DFAULT_AT_LOAD"], &attack),
@@ -78,10 +78,10 @@ pub fn set_up(stage: &Path, layers: Layers) -> Result<(), String> {
 
     // The submission in Rust, as any other is built.
     let source = include_str!("renderer.rs");
-    std::fs::write(at("hand-in/src/lib.rs"), source).map_err(|e| fail("lib.rs", &e))?;
+    std::fs::write(at("submission/src/lib.rs"), source).map_err(|e| fail("lib.rs", &e))?;
     let recording = recording()?;
     let supervisor = Supervisor { isolation: layers, ..supervisor(stage, stage) };
-    let (src, limits) = (at("hand-in/src"), default_limits());
+    let (src, limits) = (at("submission/src"), default_limits());
     let never = AtomicBool::new(false);
     let report = compile(&recording, &supervisor, &src, stage, &limits, &never);
     match report.map_err(|e| fail("the compiler", &e))?.outcome {
@@ -119,7 +119,7 @@ pub enum Asked {
 }
 
 /// The place of one case.
-pub struct Ground {
+pub struct Fixture {
     stage: PathBuf,
     own: tempfile::TempDir,
     pub supervisor: Supervisor,
@@ -129,7 +129,7 @@ pub struct Ground {
     _listeners: [std::os::unix::net::UnixListener; 2],
 }
 
-impl Ground {
+impl Fixture {
     pub fn new(stage: &Path, layers: Layers) -> Self {
         use std::os::linux::net::SocketAddrExt;
         use std::os::unix::net::{SocketAddr, UnixListener};
@@ -146,7 +146,7 @@ impl Ground {
             UnixListener::bind(own.path().join("listener")).expect("a socket"),
             UnixListener::bind_addr(&address).expect("a socket"),
         ];
-        let mut ground = Self {
+        let mut fixture = Self {
             stage: stage.to_owned(),
             own,
             supervisor,
@@ -154,11 +154,11 @@ impl Ground {
             leaks: 0,
             _listeners: listeners,
         };
-        let results = vec![ground.own("results/report.json")];
-        let paths = [ground.references(), ground.home(), ground.others(), results].concat();
-        ground.secrets = paths.iter().map(Secret::of).collect();
-        ground.secrets.extend(["/etc/shadow", "/etc/passwd"].map(Secret::of));
-        ground
+        let results = vec![fixture.own("results/report.json")];
+        let paths = [fixture.references(), fixture.home(), fixture.others(), results].concat();
+        fixture.secrets = paths.iter().map(Secret::of).collect();
+        fixture.secrets.extend(["/etc/shadow", "/etc/passwd"].map(Secret::of));
+        fixture
     }
 
     /// A path in the stage.
@@ -200,7 +200,7 @@ impl Ground {
     }
 
     pub fn others(&self) -> Vec<String> {
-        vec![self.path("other/lib.rs"), self.path("hand-in/src/lib.rs")]
+        vec![self.path("other/lib.rs"), self.path("submission/src/lib.rs")]
     }
 
     /// Files of `/proc` that tell of this very process.
@@ -236,7 +236,7 @@ impl Ground {
         lines.iter().map(|line| line.trim().to_owned()).collect()
     }
 
-    /// Limits of about a second, for deeds that wait for them.
+    /// Limits of about a second, for actions that wait for them.
     pub fn limits(&self, waits: bool) -> Limits {
         Limits {
             wall_s: if waits { 1.0 } else { 20.0 },

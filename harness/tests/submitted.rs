@@ -3,7 +3,7 @@
 
 use basecode::Image;
 use glam::{Vec3, vec3};
-use umbra::evidence::handed_in::{
+use umbra::evidence::submitted::{
     has_own_noise, judge_copied, judge_noise, judge_scene, judge_seed,
 };
 use umbra::evidence::{Check, Verdict};
