@@ -10,6 +10,7 @@ use std::process::Command;
 use serde_json::Value;
 use similar_asserts::assert_eq;
 
+use crate::support::one_scene;
 use crate::support::zip_bytes::{Entry, Zip};
 
 /// A submission of somebody: a zip that follows the tree, but for its images, and does not compile.
@@ -59,23 +60,10 @@ impl Place {
         fs::write(path, bytes).unwrap();
     }
 
-    /// The repository's assignment with a late policy: its files are links.
+    /// The repository's assignment on one scene, with a late policy.
     fn assignment(&self, late: &str) -> PathBuf {
-        let root = self.at("assignment");
-        fs::create_dir_all(&root).unwrap();
-        let own = root_of_repository().canonicalize().unwrap();
-        for entry in own.read_dir().unwrap() {
-            let name = entry.unwrap().file_name();
-            if name != "config.json" && !root.join(&name).exists() {
-                std::os::unix::fs::symlink(own.join(&name), root.join(&name)).unwrap();
-            }
-        }
-        let text = fs::read_to_string(own.join("config.json")).unwrap();
-        let due = r#""due": "2019-10-06T23:59:00-04:00","#;
-        assert!(text.contains(due));
-        let text = text.replacen(due, &format!("{due} \"late\": {late},"), 1);
-        fs::write(root.join("config.json"), text).unwrap();
-        root
+        let late = serde_json::from_str::<Value>(late).unwrap();
+        one_scene(&self.at("assignment"), |config| config["late"] = late.clone())
     }
 
     fn run(&self, arguments: &[&str]) -> (Option<i32>, String, String) {
