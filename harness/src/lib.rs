@@ -67,6 +67,8 @@ pub mod rubric;
 #[doc(hidden)]
 pub mod sandbox;
 #[doc(hidden)]
+pub mod viewer;
+#[doc(hidden)]
 pub mod worker;
 
 pub use evidence::{Check, Evidence, Verdict};

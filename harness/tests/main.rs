@@ -30,4 +30,5 @@ mod sandbox;
 mod statistics;
 mod submitted;
 mod support;
+mod viewer;
 mod worker;

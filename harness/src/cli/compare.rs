@@ -40,6 +40,9 @@ pub struct CompareArguments {
     /// Write actual, expected and difference as PNG files into this folder
     #[arg(long, value_name = "DIR")]
     pictures: Option<PathBuf>,
+    /// Write a page with a viewer of both images and their difference into this folder
+    #[arg(long, value_name = "DIR")]
+    html: Option<PathBuf>,
 }
 
 /// One of the two images.
@@ -96,6 +99,9 @@ struct Comparison {
     values: Option<Values>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pictures: BTreeMap<PathBuf, String>,
+    /// The viewer's page.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    page: Option<PathBuf>,
 }
 
 /// How the pixels of two images of one size differ.
@@ -130,6 +136,11 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
     let mut comparison = compare(actual, expected, arguments);
     if let (Some(folder), Some(_)) = (&arguments.pictures, &comparison.values) {
         comparison.pictures = pictures(folder, &comparison)?;
+    }
+    if let Some(folder) = &arguments.html {
+        let sides = [("actual", &comparison.actual), ("expected", &comparison.expected)];
+        let images = sides.map(|(name, side)| (name.to_owned(), side.image.clone()));
+        comparison.page = Some(super::view::write_page(folder, &images)?);
     }
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&comparison)?);
@@ -202,7 +213,7 @@ fn compare(actual: Side, expected: Side, arguments: &CompareArguments) -> Compar
         values.metrics = Metrics::measure(&actual.image, &expected.image);
     }
     let equal = values.as_ref().is_some_and(|values| values.differing == 0);
-    Comparison { equal, actual, expected, notes, values, pictures: BTreeMap::new() }
+    Comparison { equal, actual, expected, notes, values, pictures: BTreeMap::new(), page: None }
 }
 
 fn primaries([red, green, blue, white]: &[[f32; 2]; 4]) -> String {
@@ -283,6 +294,9 @@ fn text(comparison: &Comparison) -> anyhow::Result<String> {
         let [a, b] =
             [&comparison.actual, &comparison.expected].map(|side| (side.width, side.height));
         writeln!(out, "actual is {}x{} but expected is {}x{}", a.0, a.1, b.0, b.1)?;
+        if let Some(page) = &comparison.page {
+            writeln!(out, "{}", page.display())?;
+        }
         return Ok(out);
     };
     writeln!(out, "{} of {} pixels differ", values.differing, values.pixels)?;
@@ -308,6 +322,9 @@ fn text(comparison: &Comparison) -> anyhow::Result<String> {
     }
     for (file, caption) in &comparison.pictures {
         writeln!(out, "{}: {caption}", file.display())?;
+    }
+    if let Some(page) = &comparison.page {
+        writeln!(out, "{}", page.display())?;
     }
     Ok(out)
 }

@@ -14,6 +14,7 @@ mod grade;
 mod render;
 mod terminal;
 mod tree;
+mod view;
 
 pub use render::AdapterChoice;
 
@@ -83,6 +84,8 @@ enum Command {
     Render(render::RenderArguments),
     /// Compare two EXR images
     Compare(compare::CompareArguments),
+    /// Look at EXR images in the browser: values, differences, exposure, wipe
+    View(view::ViewArguments),
     /// Explain a check, a rule or a part: what is asked, what its error means, where its bound lies
     Explain(explain::ExplainArguments),
     /// Show what this machine has: isolation, graphics adapters, compiler; exits with 0 when it can grade
@@ -205,6 +208,7 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Pack(arguments) => tree::pack(&arguments, root),
         Command::Render(arguments) => render::run(&arguments, root),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::View(arguments) => view::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments, root),
         #[cfg(target_os = "linux")]
         Command::Doctor => doctor::run(),

@@ -26,7 +26,9 @@ use thiserror::Error;
 
 pub use self::csv::grades as csv_grades;
 pub use self::harmless::harmless;
-pub use self::html::{Reader, batch as html_batch, submission as html_submission};
+pub use self::html::{
+    Reader, batch as html_batch, submission as html_submission, viewer as html_viewer,
+};
 pub use self::json::{SCHEMA, VERSION, report_json};
 pub use self::text::{
     Closing, Look, closing as text_closing, detail as text_detail, explain, explain_all, in_a_line,

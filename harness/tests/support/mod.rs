@@ -4,6 +4,7 @@
 // Each test file uses its part.
 #![allow(dead_code)]
 
+pub mod chromium;
 pub mod scratch;
 pub mod tar_bytes;
 pub mod zip_bytes;

@@ -8,12 +8,14 @@ mod markup;
 mod submission;
 #[cfg(test)]
 mod tests;
+mod viewer;
 
 use base64::Engine as _;
 use sha2::Digest as _;
 
 pub use batch::batch;
 pub use submission::submission;
+pub use viewer::viewer;
 
 use self::markup::Html;
 use super::BatchReport;
@@ -32,18 +34,34 @@ pub enum Reader {
     Instructor,
 }
 
+/// What a page may do beyond being read. Should an escape ever be forgotten, the browser still runs and loads nothing
+/// that is not ours.
+struct Powers<'a> {
+    /// Its style.
+    style: &'a str,
+    /// Its script; empty if it has none.
+    script: &'a str,
+    /// Whether its script may load others.
+    loads_scripts: bool,
+}
+
 /// Everything up to the page's content.
 fn begin(title: &str) -> Html {
+    begin_with(title, &Powers { style: STYLE, script: SORT, loads_scripts: false })
+}
+
+fn begin_with(title: &str, powers: &Powers) -> Html {
+    let hash =
+        |text: &str| base64::engine::general_purpose::STANDARD.encode(sha2::Sha256::digest(text));
     let mut html = Html::default();
     html.raw("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
-    // Should an escape ever be forgotten, the browser still runs and fetches nothing.
-    let script = base64::engine::general_purpose::STANDARD.encode(sha2::Sha256::digest(SORT));
     html.raw("<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; ");
-    html.raw("img-src 'self' file:; style-src 'unsafe-inline'; base-uri 'none'; ");
-    html.raw("form-action 'none'; script-src 'sha256-").text(&script).raw("'\">\n");
+    html.raw("img-src 'self' file:; base-uri 'none'; form-action 'none'; style-src 'sha256-");
+    html.text(&hash(powers.style)).raw("'; script-src 'sha256-").text(&hash(powers.script));
+    html.raw(if powers.loads_scripts { "' 'strict-dynamic'\">\n" } else { "'\">\n" });
     html.raw("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
     html.raw("<meta name=\"referrer\" content=\"no-referrer\">\n");
-    html.raw("<title>").text(title).raw("</title>\n<style>\n").raw(STYLE);
+    html.raw("<title>").text(title).raw("</title>\n<style>").own(powers.style);
     html.raw("</style>\n</head>\n<body>\n");
     html
 }

@@ -1,0 +1,184 @@
+/* The panel beside the images: what is selected, how it is shown, what the numbers are. */
+
+const get = (id) => document.getElementById(id);
+
+function element(name, attributes = {}, ...children) {
+  const made = Object.assign(document.createElement(name), attributes);
+  made.append(...children);
+  return made;
+}
+
+/** Fills the controls once; `change` redraws. */
+function makePanel(change) {
+  const choose = (id, values, names, set) => {
+    const select = get(id);
+    select.replaceChildren(...values.map((value) => element("option", { value, textContent: names(value) })));
+    select.addEventListener("change", () => change(() => set(select.value)));
+  };
+  choose("metric", METRICS, (name) => name, (value) => { state.metric = value; toneOfMetric(); });
+  choose("channel", CHANNELS, (name) => (name === "mean" ? "mean of R, G, B" : name.toUpperCase()), (value) => { state.channel = value; });
+  choose("tone", TONES, (name) => TONE_NAMES[name], (value) => { lookNow().tone = value; });
+  get("exposure").addEventListener("input", () => change(() => { lookNow().exposure = Number(get("exposure").value); }));
+  get("auto").addEventListener("click", () => change(() => { lookNow().exposure = null; }));
+}
+
+/** The look of the layer that is shown. */
+function lookNow() {
+  return state.look[stage.layers[state.layer].kind];
+}
+
+/** A difference with a sign has colors for both sides. */
+function toneOfMetric() {
+  Object.assign(state.look.difference, { tone: state.metric === "absolute" ? "false" : "signed", exposure: null });
+}
+
+/** The list of layers: each can be shown, or held against the one shown. */
+function fillLayers(change) {
+  get("layers").replaceChildren(...stage.layers.map((layer, index) => {
+    const show = element("button", { type: "button", className: "show", title: `Show (${index + 1})` },
+      element("kbd", { textContent: index + 1 }), ` ${layer.name}`);
+    show.addEventListener("click", (event) => change(() => {
+      if (event.shiftKey) state.reference = index;
+      else state.layer = index;
+    }));
+    const against = element("button", { type: "button", className: "against", textContent: "vs", title: `Hold against it (Shift+${index + 1})` });
+    against.setAttribute("aria-label", `hold ${layer.name} against the image shown`);
+    against.addEventListener("click", () => change(() => { state.reference = index; }));
+    return element("li", {}, show, against);
+  }));
+}
+
+/** Brings every control to the state. */
+function showState() {
+  const layer = stage.layers[state.layer];
+  const settings = settingsOf(layer);
+  for (const [index, item] of [...get("layers").children].entries()) {
+    item.firstChild.setAttribute("aria-pressed", index === state.layer);
+    item.lastChild.setAttribute("aria-pressed", index === state.reference);
+  }
+  for (const mode of MODES) get(`mode-${mode}`).setAttribute("aria-pressed", mode === state.mode);
+  get("metric").value = state.metric;
+  get("channel").value = state.channel;
+  get("tone").value = settings.tone;
+  get("exposure").value = settings.exposure;
+  get("exposure-value").textContent = `${settings.exposure > 0 ? "+" : ""}${short(settings.exposure)} stops`;
+  get("auto").setAttribute("aria-pressed", lookNow().exposure === null);
+  for (const id of ["exposure", "auto", "tone", "channel"]) get(id).disabled = layer.kind === "regions";
+  get("metric").disabled = !stage.layers.some((one) => one.kind === "difference");
+  get("zoom").textContent = `${Math.round(100 * view().zoom)} %`;
+  showLegend(layer, settings);
+  showHistogram(layer, settings);
+  showProbe();
+}
+
+/** What a layer's values are, with their unit. */
+function unitOf(layer) {
+  const unit = stage.about.unit || "value";
+  if (layer.kind === "excess") return "difference over its bound (1: the bound)";
+  if (layer.kind !== "difference") return unit;
+  if (state.metric === "relative") return "difference relative to what is expected (0.01: 1 %)";
+  return `${state.metric === "absolute" ? "size of the difference" : "difference"}, ${unit}`;
+}
+
+function showLegend(layer, settings) {
+  const canvas = get("legend");
+  const context = canvas.getContext("2d");
+  const { width, height } = canvas;
+  const limit = 2 ** -settings.exposure;
+  let ends = [0, limit / 2, limit];
+  const color = (at) => {
+    if (settings.tone === "signed") return colorAt(DIVERGING, at);
+    if (settings.tone === "false") return colorAt(VIRIDIS, at);
+    return [0, 1, 2].map(() => 255 * CURVES[settings.tone](at));
+  };
+  if (settings.tone === "signed") ends = [-limit, 0, limit];
+  else if (layer.kind === "excess" && settings.tone === "false") ends = [-1, 0, 1].map((t) => limit * 2 ** ((t * LOG_RANGE) / 2));
+  for (let x = 0; x < width; x++) {
+    context.fillStyle = `rgb(${color(x / (width - 1)).join(",")})`;
+    context.fillRect(x, 0, 1, height);
+  }
+  const regions = layer.kind === "regions";
+  get("legend-box").hidden = regions;
+  get("region-names").hidden = !regions;
+  if (regions) {
+    get("region-names").replaceChildren(...stage.about.regions.map((name, index) => {
+      const swatch = element("i");
+      swatch.style.background = `rgb(${regionColor(index).join(",")})`;
+      return element("li", {}, swatch, ` ${name}`);
+    }), element("li", { textContent: "half gray: edges; dark: the light source, not compared" }));
+  }
+  ends.forEach((value, i) => { get(`legend-${i}`).textContent = digits(value, 3); });
+  get("unit").textContent = unitOf(layer);
+}
+
+function showHistogram(layer, settings) {
+  const canvas = get("histogram");
+  const context = canvas.getContext("2d");
+  const { width, height } = canvas;
+  context.clearRect(0, 0, width, height);
+  get("facts").textContent = "";
+  if (layer.kind === "regions") return;
+  const { counts, least, most, sum, count, bad } = histogram(layer, settings, 96);
+  // Black pixels are many: the second largest bin sets the height.
+  const highest = Math.max(...counts.map((bins) => [...bins].sort((a, b) => b - a)[1])) || 1;
+  const colors = counts.length === 3 ? ["#e0453a", "#2fa84f", "#3b7de0"] : ["#8a93a3"];
+  context.globalCompositeOperation = counts.length === 3 ? "lighter" : "source-over";
+  counts.forEach((bins, c) => {
+    context.fillStyle = colors[c];
+    bins.forEach((n, i) => {
+      const h = Math.min(1, n / highest) * height;
+      context.fillRect((i * width) / bins.length, height - h, width / bins.length, h);
+    });
+  });
+  const words = count ? [`least ${digits(least)}`, `mean ${digits(sum / count)}`, `most ${digits(most)}`] : [];
+  if (bad) words.push(`${bad} not finite`);
+  get("facts").textContent = words.join(" · ");
+}
+
+/** The values at the probed pixel, in every layer, and which rule counts it. */
+function showProbe() {
+  const at = stage.hover ?? state.pin;
+  const { width, height } = sizeOf();
+  const rows = [];
+  if (at && at.x >= 0 && at.y >= 0 && at.x < width && at.y < height) {
+    for (const layer of stage.layers) {
+      if (layer.kind === "regions") continue;
+      const values = [...layerValues(layer, at.x, at.y, settingsOf(layer))];
+      const name = layer.kind === "difference" ? `${state.metric} ${layer.name}` : layer.name;
+      rows.push(element("tr", {}, element("th", { scope: "row", textContent: name }),
+        element("td", { colSpan: values.length === 1 ? 3 : 1, textContent: digits(values[0], 6) }),
+        ...values.slice(1).map((value) => element("td", { textContent: digits(value, 6) }))));
+    }
+    get("probe-place").textContent = `(${at.x}, ${at.y})`;
+    get("probe-rule").textContent = ruleAt(at);
+  } else {
+    get("probe-place").textContent = "none: point at the image";
+    get("probe-rule").textContent = "";
+  }
+  get("probe").replaceChildren(...rows);
+}
+
+/** Mask flags, as harness/src/imaging/reference.rs has them. */
+const EDGE = 0x8000, EMITTER = 0x4000, HIGHLIGHT = 0x2000, REGION = 0x1fff;
+
+/** What a pixel counts for, in words. */
+function ruleAt({ x, y }) {
+  const { mask, excess } = stage;
+  if (!mask) return "";
+  const value = mask.raw[y * mask.width + x];
+  if (value & EMITTER) return "The light source: not compared.";
+  const region = stage.about.regions[value & REGION] ?? "";
+  const words = [`${region}${value & HIGHLIGHT ? ", highlight" : ""}.`];
+  if (excess) {
+    const over = excess.at(x, y)[0];
+    const difference = stage.layers.find((layer) => layer.kind === "difference");
+    let bound = "";
+    if (difference && over > 0 && Number.isFinite(over)) {
+      const size = Math.max(...layerValues(difference, x, y, { metric: "absolute" }));
+      bound = ` The bound here is about ${digits(size / over, 3)}.`;
+    }
+    const rule = value & EDGE ? "edge (a few percent of edges may)" : "interior and blob";
+    words.push(over <= 1 ? `Within the bound.${bound}` : `${digits(over, 3)} times its bound: counts in ${rule}.${bound}`);
+  }
+  return words.join(" ");
+}

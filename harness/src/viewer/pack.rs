@@ -1,0 +1,194 @@
+//! Images as scripts that hand their bits to the viewer. `docs/decisions/0024-viewer-data.md` says why.
+
+use std::io::{self, Write as _};
+use std::path::Path;
+
+use base64::Engine as _;
+use basecode::Image;
+use flate2::{Compression, write::ZlibEncoder};
+use half::f16;
+use sha2::{Digest as _, Sha256};
+
+use super::{DATA_FOLDER, ImageFile, Samples};
+use crate::files::{hex, write_whole};
+use crate::imaging::reference::RegionMask;
+
+/// Level of zlib: higher ones take three times as long for 2 % of the bytes, since most bits are noise.
+const LEVEL: u32 = 3;
+/// Hexadecimal digits of a digest in a file's name.
+const DIGITS: usize = 20;
+
+/// Writes an image below `folder`: as halves where these hold its very bits, else as 32-bit floats. A file with the
+/// same content is the same file.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_image(folder: &Path, image: &Image) -> io::Result<ImageFile> {
+    let plane = |c: usize| image.pixels.iter().map(move |pixel| pixel[c]);
+    let values: Vec<f32> = (0..3).flat_map(plane).collect();
+    let halves: Option<Vec<u16>> = values.iter().map(|&value| exact_half(value)).collect();
+    let (samples, planes) = match halves {
+        Some(halves) => (Samples::Half, byte_planes(halves.into_iter().map(u32::from), 2)),
+        None => (Samples::Float, byte_planes(values.iter().map(|value| value.to_bits()), 4)),
+    };
+    let about = (image.width, image.height, 3, samples);
+    write(folder, about, &planes)
+}
+
+/// Writes how far each pixel lies off, over what is allowed there: above 1 it fails. Rounded to halves, but never
+/// across 1.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_excess(
+    folder: &Path,
+    (width, height): (usize, usize),
+    excess: &[f32],
+) -> io::Result<ImageFile> {
+    let rounded = excess.iter().map(|&value| {
+        let half = f16::from_f32(value.min(f16::MAX.to_f32()));
+        let one = f16::ONE.to_bits();
+        let bits = if value > 1.0 { half.to_bits().max(one + 1) } else { half.to_bits().min(one) };
+        // NaN is as far off as can be.
+        u32::from(if value.is_nan() { f16::INFINITY.to_bits() } else { bits })
+    });
+    write(folder, (width, height, 1, Samples::Half), &byte_planes(rounded, 2))
+}
+
+/// Writes a mask of regions.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_mask(folder: &Path, mask: &RegionMask) -> io::Result<ImageFile> {
+    let planes = byte_planes(mask.pixels.iter().map(|&value| u32::from(value)), 2);
+    write(folder, (mask.width, mask.height, 1, Samples::Uint16), &planes)
+}
+
+/// The half with the very value of a float, the bits of what is not a number included.
+fn exact_half(value: f32) -> Option<u16> {
+    let half = f16::from_f32(value);
+    (half.to_f32().to_bits() == value.to_bits()).then(|| half.to_bits())
+}
+
+/// Differences between successive samples, all their highest bytes first: neighbors are alike, so these are alike.
+fn byte_planes(samples: impl ExactSizeIterator<Item = u32>, bytes: usize) -> Vec<u8> {
+    let count = samples.len();
+    let mut planes = vec![0; count * bytes];
+    let mut last = 0u32;
+    for (index, sample) in samples.enumerate() {
+        let step = sample.wrapping_sub(last).to_le_bytes();
+        for plane in 0..bytes {
+            planes[plane * count + index] = step[bytes - 1 - plane];
+        }
+        last = sample;
+    }
+    planes
+}
+
+fn write(
+    folder: &Path,
+    (width, height, channels, samples): (usize, usize, usize, Samples),
+    planes: &[u8],
+) -> io::Result<ImageFile> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(LEVEL));
+    encoder.write_all(planes)?;
+    let packed = encoder.finish()?;
+    let mut digest = Sha256::new();
+    digest.update(format!("{width} {height} {channels} {samples:?} "));
+    digest.update(&packed);
+    let digest = hex(&digest.finalize());
+    let file = format!("{DATA_FOLDER}/{}.js", &digest[..DIGITS]);
+    let path = folder.join(&file);
+    if !path.is_file() {
+        let text = base64::engine::general_purpose::STANDARD.encode(packed);
+        write_whole(&path, format!("umbraImage(\"{file}\",\"{text}\");\n").as_bytes())?;
+    }
+    Ok(ImageFile { file, width, height, channels, samples })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read as _;
+
+    use basecode::Vec3;
+    use flate2::read::ZlibDecoder;
+
+    use super::*;
+
+    /// The samples of a data file, as data.js reads them.
+    fn samples(folder: &Path, image: &ImageFile) -> Vec<u32> {
+        let text = std::fs::read_to_string(folder.join(&image.file)).unwrap();
+        let packed = text.split('"').nth(3).unwrap();
+        let packed = base64::engine::general_purpose::STANDARD.decode(packed).unwrap();
+        let mut planes = Vec::new();
+        ZlibDecoder::new(packed.as_slice()).read_to_end(&mut planes).unwrap();
+        let count = image.width * image.height * image.channels;
+        let bytes = planes.len() / count;
+        let mask = if bytes == 2 { 0xffff } else { u32::MAX };
+        let mut last = 0u32;
+        let sample = |index| {
+            let step = (0..bytes)
+                .fold(0u32, |step, plane| step << 8 | u32::from(planes[plane * count + index]));
+            last = last.wrapping_add(step) & mask;
+            last
+        };
+        (0..count).map(sample).collect()
+    }
+
+    #[test]
+    fn every_bit_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let odd = [
+            0.1,
+            -0.0,
+            f32::NAN,
+            f32::INFINITY,
+            f32::from_bits(0x7fa0_0001),
+            f32::MIN_POSITIVE,
+            39.0,
+            -1e-45,
+        ];
+        let image = |values: &[f32]| Image {
+            width: 4,
+            height: values.len() / 4,
+            pixels: values.iter().map(|&v| Vec3::new(v, -v, 0.5)).collect(),
+        };
+        let floats = image(&odd);
+        let file = write_image(folder.path(), &floats).unwrap();
+        assert_eq!((file.samples, file.width, file.height), (Samples::Float, 4, 2));
+        let expected = (0..3).flat_map(|c| floats.pixels.iter().map(move |p| p[c].to_bits()));
+        assert_eq!(samples(folder.path(), &file), expected.collect::<Vec<_>>());
+
+        let halves = image(&[0.5, 65504.0, f32::NEG_INFINITY, 6e-8]);
+        assert_eq!(write_image(folder.path(), &halves).unwrap().samples, Samples::Float);
+        let halves = image(&[0.5, 65504.0, f32::NEG_INFINITY, f16::from_bits(1).to_f32()]);
+        let file = write_image(folder.path(), &halves).unwrap();
+        assert_eq!(file.samples, Samples::Half);
+        assert_eq!(samples(folder.path(), &file)[..4], [0x3800, 0x7bff, 0xfc00, 1]);
+    }
+
+    #[test]
+    fn one_image_is_one_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut image = Image::new(5, 3);
+        let file = write_image(folder.path(), &image).unwrap();
+        assert_eq!(write_image(folder.path(), &image).unwrap(), file);
+        image.pixels[7].y = 1.0;
+        assert_ne!(write_image(folder.path(), &image).unwrap().file, file.file);
+        // The same zeros in another shape are another image.
+        assert_ne!(write_image(folder.path(), &Image::new(3, 5)).unwrap().file, file.file);
+    }
+
+    #[test]
+    fn rounding_turns_no_verdict() {
+        let folder = tempfile::tempdir().unwrap();
+        let excess = [0.0, 1.0, 1.000_01, 0.999_99, 1e9, f32::INFINITY, f32::NAN, 2.5];
+        let file = write_excess(folder.path(), (8, 1), &excess).unwrap();
+        let found = samples(folder.path(), &file);
+        let found: Vec<f32> = found.iter().map(|&s| f16::from_bits(s as u16).to_f32()).collect();
+        for (value, found) in excess.iter().zip(&found) {
+            assert_eq!(*value <= 1.0, *found <= 1.0, "{value} became {found}");
+        }
+        assert_eq!(found[7], 2.5);
+    }
+}
