@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::conventions::Answers;
 use super::draw::{Frame, draw_each};
-use super::offline::{self, Drawn};
+use super::offline::{self, Drawn, Run};
 use super::pipeline::Grading;
 use super::realtime;
 use super::session::{self, Session};
@@ -190,7 +190,7 @@ impl Grading<'_> {
             let mut answers = Answers::default();
             answers.probe_bsdfs(&session, reference, &self.cases);
             for case in &self.cases {
-                let run = (1, self.threads);
+                let run = Run { seed: 1, threads: self.threads, whole: false };
                 let judged =
                     offline::judge_scene(&session, reference, case, run, tolerances, &mut answers);
                 drawn.extend(judged.1);

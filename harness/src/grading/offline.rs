@@ -13,7 +13,7 @@ use crate::evidence::images::{self, Kind};
 use crate::evidence::shading::{ShadedPoint, Shading};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::evidence::{loops, rays};
-use crate::expected::SurfacePoint;
+use crate::expected::{Expected, SurfacePoint};
 use crate::imaging::evidence::Tolerances;
 use crate::plugin::Witness;
 use crate::worker::{BsdfQuery, BsdfSource, Outcome, Request};
@@ -39,12 +39,24 @@ pub struct Drawn {
     pub image: Image,
 }
 
-/// Judges integrator, shadows, loop and image on one scene.
+/// How a plugin's offline images are drawn.
+#[derive(Clone, Copy)]
+pub struct Run {
+    /// The seed of its samplers.
+    pub seed: u64,
+    /// Its threads.
+    pub threads: u32,
+    /// Whether an image that is right on a small film is drawn on the scene's own film too.
+    pub whole: bool,
+}
+
+/// Judges integrator, shadows, loop and image on one scene. What is drawn is no answer where only a small
+/// film was: that image is right.
 pub fn judge_scene<'a>(
     session: &Session,
     plugin: &Path,
     case: &'a PreparedScene,
-    (seed, threads): (u64, u32),
+    run: Run,
     tolerances: &Tolerances,
     answers: &mut Answers<'a>,
 ) -> (Vec<Check>, Option<Drawn>) {
@@ -81,11 +93,14 @@ pub fn judge_scene<'a>(
     let plain = plain_surfaces(case);
     let queries = plain.iter().map(|(_, query)| *query).collect();
     requests.push(Request::EvalBsdf { scene: scene.clone(), queries });
-    let (width, height) = case.film();
-    requests.push(render(width, height, case.spp, seed, threads));
+    let first = case.first.as_ref().filter(|_| !run.whole);
+    let film =
+        |expected: &Expected| (expected.unshadowed.width as u32, expected.unshadowed.height as u32);
+    let (width, height) = film(first.unwrap_or(&case.expected));
+    requests.push(render(width, height, case.spp, run.seed, run.threads));
     if let Some(film) = &small.sampled {
         requests.push(radiance(&film.rays, Witness::True, true));
-        requests.push(render(film.film.width, film.film.height, loops::SAMPLES, seed, 1));
+        requests.push(render(film.film.width, film.film.height, loops::SAMPLES, run.seed, 1));
     }
     let outcomes = session.run(Some(plugin), requests);
     let [
@@ -188,20 +203,38 @@ pub fn judge_scene<'a>(
             },
         });
     }
-    match full {
-        Outcome::Done(answer) => {
-            let image = session::image(&answer.values, width, height);
-            let kind = Kind::Offline { spp: case.spp };
-            let (id, expected) = (CheckId::ImageOffline, &case.expected);
-            checks.push(images::judge(id, name, kind, &image, expected, &|_| true, tolerances));
-            (checks, Some(Drawn { scene: name.clone(), kind, image }))
-        }
-        other => {
+    let kind = Kind::Offline { spp: case.spp };
+    let judge = |outcome: &Outcome, expected: &Expected| {
+        let Outcome::Done(answer) = outcome else {
             let parts = ["1.1", "1.2", "1.3", "1.4"];
-            checks.push(session::unanswered(CheckId::ImageOffline, name, &parts, other));
-            (checks, None)
-        }
+            return (session::unanswered(CheckId::ImageOffline, name, &parts, outcome), None);
+        };
+        let (width, height) = film(expected);
+        let image = session::image(&answer.values, width, height);
+        let id = CheckId::ImageOffline;
+        let check = images::judge(id, name, kind, &image, expected, &|_| true, tolerances);
+        (check, Some(Drawn { scene: name.clone(), kind, image }))
+    };
+    let Some(first) = first else {
+        let (check, drawn) = judge(full, &case.expected);
+        checks.push(check);
+        return (checks, drawn);
+    };
+    let (check, _) = judge(full, first);
+    if check.verdict != Verdict::Fail {
+        checks.push(check);
+        return (checks, None);
     }
+    let (width, height) = film(&case.expected);
+    let whole = render(width, height, case.spp, run.seed, run.threads);
+    let outcomes = session.run(Some(plugin), vec![whole]);
+    let (whole, drawn) = match outcomes.first() {
+        Some(outcome) => judge(outcome, &case.expected),
+        None => (check.clone(), None),
+    };
+    // An image that is wrong on any film is wrong; the larger one is shown.
+    checks.push(if whole.verdict == Verdict::Fail { whole } else { check });
+    (checks, drawn)
 }
 
 /// What to ask a renderer about its own BSDF where lit rays end: the ray, and the question. Surfaces of

@@ -12,7 +12,7 @@ use super::cache::RecordCache;
 use super::conventions::Answers;
 use super::costs::ReferenceCosts;
 use super::draw::Frame;
-use super::offline::{self, Drawn};
+use super::offline::{self, Drawn, Run};
 use super::prepared_scene::PreparedScene;
 use super::record::{Conditions, Record, StageCost, Student};
 use super::session::Session;
@@ -320,9 +320,13 @@ impl<'a> Grading<'a> {
             .findings
             .extend(submitted.iter().filter_map(|image| image.finding(&submission.root)));
         record.findings.sort_by_key(|finding| finding.severity);
+        let is_right =
+            |check: &&Check| check.id == CheckId::ImageOffline && check.verdict == Verdict::Pass;
+        let right: Vec<String> =
+            checks.iter().filter(is_right).map(|check| check.scene.clone()).collect();
         for image in &submitted {
             let tolerances = &self.assignment.tolerances;
-            let (found, digest) = submitted::judge(image, &drawn, tolerances);
+            let (found, digest) = submitted::judge(image, &drawn, &right, tolerances);
             checks.extend(found);
             record.images.extend(digest);
         }
@@ -483,9 +487,12 @@ impl<'a> Grading<'a> {
         for (cases, (mut answers, probed)) in self.groups().into_iter().zip(probed) {
             let begin = checks.len();
             checks.extend(probed);
+            // One large image is drawn whole even if it is right.
+            let mut whole = true;
             for case in cheap_first(cases) {
                 self.stop_if_interrupted()?;
-                let run = (seed, self.threads);
+                let run = Run { seed, threads: self.threads, whole };
+                whole &= case.first.is_none();
                 let (found, image) =
                     offline::judge_scene(session, plugin, case, run, &tolerances, &mut answers);
                 checks.extend(found);

@@ -14,6 +14,10 @@ use crate::worker::{CameraValue, RayQuery};
 
 /// The widest film on which rays and stages are judged: enough to show every surface.
 const SMALL_WIDTH: u32 = 96;
+/// Width of the film on which an offline image of a large scene is judged first.
+const FIRST_WIDTH: u32 = 128;
+/// A scene is large when its film has so many times the pixels of that one.
+const LARGE: u32 = 4;
 /// A film so many times as wide is searched for points close to what shadows them.
 const FINE: usize = 3;
 
@@ -35,6 +39,9 @@ pub struct PreparedScene {
     pub camera: CameraValue,
     /// What is expected on the film it is judged on.
     pub expected: Expected,
+    /// The same on a small film, where that one is large. An offline image that is right there is right: it
+    /// is drawn on the scene's own film to be shown and compared where it is wrong, and on one scene always.
+    pub first: Option<Expected>,
     /// The small film.
     pub probe_film: ProbeFilm,
 }
@@ -89,6 +96,12 @@ fn probe_film_size([full_width, full_height]: [u32; 2]) -> [u32; 2] {
     [width, (full_height * width / full_width).max(1)]
 }
 
+/// The film that an offline image is judged on first, if the scene's own film is large.
+fn first_film([width, height]: [u32; 2]) -> Option<[u32; 2]> {
+    let first = [FIRST_WIDTH, (height * FIRST_WIDTH / width.max(1)).max(1)];
+    (width * height >= LARGE * first[0] * first[1]).then_some(first)
+}
+
 /// The mask with mirrors left out: they have no BSDF that light and shadow could be told by.
 fn without_mirrors(scene: &Scene, surface: &SurfaceBuffer, mask: &RegionMask) -> RegionMask {
     let mut mask = mask.clone();
@@ -112,6 +125,9 @@ impl PreparedScene {
         let config = SceneConfig::load(&offline)?;
         let expected = store.expected(entry)?;
         let film = [expected.unshadowed.width as u32, expected.unshadowed.height as u32];
+        let first = first_film(film)
+            .map(|film| store.expected(&SceneEntry { film: Some(film), ..entry.clone() }))
+            .transpose()?;
         let [width, height] = probe_film_size(film);
         let (w, h) = (width as usize, height as usize);
         let scene = &expected.scene;
@@ -140,13 +156,14 @@ impl PreparedScene {
             spp: config.spp as u32,
             camera: CameraValue::from(config.camera),
             expected,
+            first,
             probe_film,
             entry: entry.clone(),
             held_back: false,
         })
     }
 
-    /// The files that the reference renderer makes for a scene, on both films; some may be
+    /// The files that the reference renderer makes for a scene, on all its films; some may be
     /// stored elsewhere or not needed, and do not exist.
     ///
     /// # Errors
@@ -157,7 +174,9 @@ impl PreparedScene {
         let config = SceneConfig::load(&offline)?;
         let film = entry.film.unwrap_or([config.width as u32, config.height as u32]);
         let mut files = store.made_files(&offline, &realtime, film)?;
-        files.extend(store.made_files(&offline, &realtime, probe_film_size(film))?);
+        for film in [Some(probe_film_size(film)), first_film(film)].into_iter().flatten() {
+            files.extend(store.made_files(&offline, &realtime, film)?);
+        }
         Ok(files)
     }
 
@@ -169,5 +188,21 @@ impl PreparedScene {
     /// Width and height of the film that the scene is judged on, in pixels.
     pub fn film(&self) -> (u32, u32) {
         (self.expected.unshadowed.width as u32, self.expected.unshadowed.height as u32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_large_film_is_tried_on_a_small_one_of_its_shape() {
+        assert_eq!(first_film([640, 480]), Some([128, 96]));
+        assert_eq!(first_film([600, 450]), Some([128, 96]));
+        assert_eq!(first_film([4000, 10]), Some([128, 1]));
+        assert_eq!(first_film([256, 192]), Some([128, 96]));
+        for small in [[255, 192], [128, 96], [96, 64], [1, 1]] {
+            assert_eq!(first_film(small), None, "{small:?}");
+        }
     }
 }

@@ -106,11 +106,13 @@ pub fn read<'a>(
     Ok(found)
 }
 
-/// Judges an image. `drawn` holds what the submission's code drew, nothing when it does not build.
-/// Answers its digest when it has noise of its own.
+/// Judges an image. `drawn` holds what the submission's code drew, nothing when it does not build; `right`
+/// names the scenes whose offline images it draws right, perhaps on a small film alone. Answers its digest
+/// when it has noise of its own.
 pub fn judge(
     submitted: &SubmittedImage,
     drawn: &[Drawn],
+    right: &[String],
     tolerances: &Tolerances,
 ) -> (Vec<Check>, Option<ImageDigest>) {
     let SubmittedImage { case, path, kind, image } = submitted;
@@ -126,21 +128,27 @@ pub fn judge(
     for (id, wanted) in views(kind) {
         checks.push(images::judge(*id, name, kind, image, expected, wanted, tolerances));
     }
-    let right = checks.first().is_some_and(|check| check.verdict == Verdict::Pass);
+    let is_right = checks.first().is_some_and(|check| check.verdict == Verdict::Pass);
     let drawn_as = match kind {
         Kind::SubmittedRealtime => Kind::Realtime,
         Kind::SubmittedShadows => Kind::RealtimeShadows,
         offline => offline,
     };
     let own = drawn.iter().find(|drawn| drawn.scene == *name && drawn.kind == drawn_as);
-    let origin = own.map(|own| judge_origin(path, case, kind, image, &own.image, tolerances));
+    let same = match own {
+        Some(own) => Some(images::same_origin(kind, image, &own.image, expected, tolerances)),
+        // What the code draws is right: so is the image, or it is another.
+        None if matches!(kind, Kind::Offline { .. }) && right.contains(name) => Some(is_right),
+        None => None,
+    };
+    let origin = same.map(|same| judge_origin(path, name, same));
     let own = origin.as_ref().is_some_and(|check| check.verdict == Verdict::Pass);
     checks.extend(origin);
     let mask = match kind {
         Kind::SubmittedRealtime => &expected.unshadowed_mask,
         _ => &expected.offline.mask,
     };
-    checks.push(if right || own {
+    checks.push(if is_right || own {
         let summary = format!("{path} is right, or what the code draws of the scene");
         Check::new(CheckId::SubmittedScene, name, Verdict::Pass, summary)
     } else {
@@ -197,19 +205,12 @@ pub fn judge_seeds(
 }
 
 /// Whether an image that was submitted is what the code draws. A finding: it costs nothing.
-fn judge_origin(
-    path: &str,
-    case: &PreparedScene,
-    kind: Kind,
-    submitted: &Image,
-    drawn: &Image,
-    tolerances: &Tolerances,
-) -> Check {
-    let (id, name) = (CheckId::SubmittedOrigin, &case.entry.name);
-    if images::same_origin(kind, submitted, drawn, &case.expected, tolerances) {
-        return Check::new(id, name, Verdict::Pass, format!("{path} is what the code draws"));
+fn judge_origin(path: &str, scene: &str, same: bool) -> Check {
+    let id = CheckId::SubmittedOrigin;
+    if same {
+        return Check::new(id, scene, Verdict::Pass, format!("{path} is what the code draws"));
     }
     let summary = format!("{path} is not what the code draws: it is stale, or another renderer's");
-    Check::new(id, name, Verdict::Fail, summary)
+    Check::new(id, scene, Verdict::Fail, summary)
         .with_hint("it costs nothing; render it again with this code before you submit it")
 }

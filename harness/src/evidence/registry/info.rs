@@ -114,7 +114,8 @@ impl CheckId {
                 &[RuleId::ShadowLit, RuleId::ShadowDark],
             ),
             Self::ImageOffline => info(
-                "The full film at the scene's samples per pixel, with the student's seed. Passed on every \
+                "The scene's film at its samples per pixel, with the student's seed; for a large film a \
+                 small one first. Passed on every \
                     scene, it earns 1.1 to 1.4 in full.",
                 "The sum of differences over the sum of expected values, away from edges.",
                 "See *Images*.",
