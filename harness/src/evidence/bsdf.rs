@@ -4,9 +4,10 @@ use basecode::Vec3;
 use renderer_api as api;
 
 use super::convention::Convention;
+use super::lobe::{self, Answer};
 use super::price::{self, Answers};
 use super::shading::{ShadedPoint, Shading, energy_scale};
-use super::{Check, CheckId, Measure, RuleId, Verdict};
+use super::{Check, CheckId, Lobe, Measure, RuleId, Verdict};
 use crate::imaging::ratio::ratio_name;
 
 /// Which BSDF is probed.
@@ -310,7 +311,30 @@ pub fn judge(
         Measure::at_most(rule, "values not finite (count)", not_finite as f64, 0.0),
     ];
     check.measures.extend(price.and_then(|price| price.measure()));
+    if wrong > 0 && !of_shape {
+        check.lobe = lobe_of(probes, values, convention);
+    }
     check
+}
+
+/// The lobe that is furthest off.
+fn lobe_of(probes: &[BsdfProbe], values: &[[f32; 3]], convention: &Convention) -> Option<Lobe> {
+    let mean = |values: [f64; 3]| values.iter().sum::<f64>() / 3.0;
+    let asked = probes.iter().zip(values).filter(|(probe, _)| probe.length == 1.0);
+    let answers: Vec<Answer> = asked
+        .map(|(BsdfProbe { query, expected, .. }, found)| Answer {
+            material: query.material,
+            wo: query.wo,
+            wi: query.wi,
+            expected: mean(*expected),
+            found: mean(found.map(f64::from)),
+        })
+        .collect();
+    let right = |material: &api::MaterialValue, wo: [f32; 3], wi: [f32; 3]| {
+        let point = ShadedPoint::of_bsdf(material, energy_scale(material), wo, wi);
+        mean(convention.bsdf().radiance(&point))
+    };
+    lobe::worst(&answers, &right)
 }
 
 fn describe(

@@ -49,6 +49,13 @@ pub struct Check {
     pub measures: Vec<Measure>,
     /// Pictures that show it, as file names beside the report.
     pub pictures: Vec<Picture>,
+    /// Of a BSDF that is wrong: its lobe where that shows most.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lobe: Option<Lobe>,
+    /// Of shadow rays that are wrong: the pixel of the probe film of each, and whether it should be lit. For the
+    /// picture, and not kept.
+    #[serde(skip)]
+    pub wrong_rays: Vec<(usize, bool)>,
 }
 
 /// The answer to a check.
@@ -87,13 +94,36 @@ pub struct Measure {
 }
 
 /// A picture in a file beside the report.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Picture {
     /// What it shows: actual, expected, difference...
     pub title: String,
     /// File name, relative to the folder of the submission's report; of a held-back scene, to that of
     /// the instructor's.
     pub file: String,
+    /// Width in pixels; 0 where it is not known.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub width: usize,
+    /// Height in pixels; 0 where it is not known.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub height: usize,
+}
+
+/// A BSDF along the plane of `wo` and the normal: what is right and what was answered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Lobe {
+    /// The material, in words.
+    pub material: String,
+    /// The angle of `wo` from the normal [degrees].
+    pub wo_deg: f64,
+    /// Whether values differ so much that only their logarithms can be drawn.
+    pub log: bool,
+    /// The right values, finely: the angle of `wi` from the normal [degrees], positive on the side across from `wo`,
+    /// and the mean of the channels, cosine included [sr^-1].
+    pub expected: Vec<[f64; 2]>,
+    /// The same of what was answered, where it was asked.
+    #[serde(deserialize_with = "or_nan_points")]
+    pub found: Vec<[f64; 2]>,
 }
 
 impl Check {
@@ -113,6 +143,8 @@ impl Check {
             private: String::new(),
             measures: Vec::new(),
             pictures: Vec::new(),
+            lobe: None,
+            wrong_rays: Vec::new(),
         }
     }
 
@@ -162,6 +194,16 @@ fn whole() -> f64 {
 /// JSON has no number for what is not finite, and writes `null`.
 fn or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+/// The same for points of a curve.
+fn or_nan_points<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D::Error> {
+    let points: Vec<[Option<f64>; 2]> = Vec::deserialize(deserializer)?;
+    Ok(points.into_iter().map(|point| point.map(|value| value.unwrap_or(f64::NAN))).collect())
+}
+
+fn is_zero(size: &usize) -> bool {
+    *size == 0
 }
 
 /// Two digits: an error must not spell out a scene either.

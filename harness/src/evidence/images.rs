@@ -5,7 +5,9 @@ use basecode::Image;
 use super::price::Price;
 use super::{Check, CheckId, Measure, RuleId, Verdict, loops};
 use crate::expected::Expected;
-use crate::imaging::compare::{compare_offline, compare_realtime_linear, compare_srgb8};
+use crate::imaging::compare::{
+    compare_offline, compare_realtime_linear, compare_srgb8, offline, realtime_linear, srgb8,
+};
 use crate::imaging::correlation::Moments;
 use crate::imaging::evidence::{CompareError, ImageEvidence, Tolerances};
 use crate::imaging::origin::{same_draws, same_levels};
@@ -30,6 +32,45 @@ pub enum Kind {
     SubmittedShadows,
 }
 
+/// What an image of a kind is compared with, and its regions.
+pub fn reference_of(kind: Kind, expected: &Expected) -> (&Image, &RegionMask) {
+    match kind {
+        Kind::Offline { spp: 1 } | Kind::RealtimeShadows | Kind::SubmittedShadows => {
+            (&expected.offline.centre, &expected.offline.mask)
+        }
+        Kind::Offline { .. } => (&expected.offline.mean, &expected.offline.mask),
+        Kind::Realtime | Kind::SubmittedRealtime => {
+            (&expected.unshadowed, &expected.unshadowed_mask)
+        }
+    }
+}
+
+/// Compares all of an image, for whoever looks at single pixels: the second is each one's difference over the largest
+/// that is allowed there.
+///
+/// # Errors
+/// When the sizes differ.
+pub fn compare_pixels(
+    kind: Kind,
+    actual: &Image,
+    expected: &Expected,
+    tolerances: &Tolerances,
+) -> Result<(ImageEvidence, Vec<f32>), CompareError> {
+    let (reference, mask) = reference_of(kind, expected);
+    let mut excess = Vec::with_capacity(mask.pixels.len());
+    let kept = Some(&mut excess);
+    let evidence = match kind {
+        Kind::Offline { spp } => offline(actual, &expected.offline, spp, tolerances, kept),
+        Kind::Realtime | Kind::RealtimeShadows => {
+            realtime_linear(actual, reference, mask, tolerances, kept)
+        }
+        Kind::SubmittedRealtime | Kind::SubmittedShadows => {
+            srgb8(actual, reference, mask, tolerances, kept)
+        }
+    };
+    Ok((evidence?, excess))
+}
+
 /// Judges `actual`; regions for which `wanted` is false are left out.
 pub fn judge(
     id: CheckId,
@@ -40,15 +81,7 @@ pub fn judge(
     wanted: &dyn Fn(&Region) -> bool,
     tolerances: &Tolerances,
 ) -> Check {
-    let (reference, mask) = match kind {
-        Kind::Offline { spp: 1 } | Kind::RealtimeShadows | Kind::SubmittedShadows => {
-            (&expected.offline.centre, &expected.offline.mask)
-        }
-        Kind::Offline { .. } => (&expected.offline.mean, &expected.offline.mask),
-        Kind::Realtime | Kind::SubmittedRealtime => {
-            (&expected.unshadowed, &expected.unshadowed_mask)
-        }
-    };
+    let (reference, mask) = reference_of(kind, expected);
     let mask = only(mask, wanted);
     if !mask.pixels.iter().any(|value| value & (RegionMask::EDGE | RegionMask::EMITTER) == 0) {
         let summary = "no pixel away from edges shows what this is about";

@@ -6,6 +6,7 @@ pub mod bsdf;
 mod check;
 pub mod convention;
 pub mod images;
+mod lobe;
 pub mod loops;
 pub mod physical;
 pub mod pixels;
@@ -19,5 +20,5 @@ pub mod stages;
 pub mod submitted;
 pub mod vertex;
 
-pub use check::{Check, Evidence, Measure, Picture, Verdict};
+pub use check::{Check, Evidence, Lobe, Measure, Picture, Verdict};
 pub use registry::{CheckId, CheckInfo, RuleId};

@@ -258,7 +258,8 @@ impl RecordCache {
         let same = file.key == key
             && file.failing == failing(&file.record.evidence)
             && (budget || file.record.evidence.named(BUDGET).next().is_none())
-            && pictures(&file.record, out).all(|picture| picture.is_file());
+            && pictures(&file.record, out).all(|picture| picture.is_file())
+            && views(&file.record, out).all(|data| data.is_file());
         if same {
             self.settle(&file.record, true);
         }
@@ -295,6 +296,14 @@ fn pictures<'a>(record: &'a Record, out: &'a Folders) -> impl Iterator<Item = Pa
     });
     let of_diagnoses = record.diagnoses.iter().flat_map(|found| &found.pictures);
     of_checks.chain(of_diagnoses.map(at(&out.student)))
+}
+
+/// The data files of a record's images.
+fn views<'a>(record: &'a Record, out: &'a Folders) -> impl Iterator<Item = PathBuf> + 'a {
+    record.views.iter().flat_map(move |case| {
+        let folder = if case.held_back { &out.instructor } else { &out.student };
+        case.files().into_iter().map(move |file| folder.join(file))
+    })
 }
 
 #[cfg(test)]

@@ -248,8 +248,8 @@ fn pictures(diagnosis: &Diagnosis, input: &Input, out: &Path) -> anyhow::Result<
         let picture = tone_mapped(&tile.enlarged(ENLARGED), median_lit);
         std::fs::write(out.join(&file), picture.png()?)?;
         let (path, scene) = (view.kind.name(), &view.scene);
-        pictures
-            .push(Picture { title: format!("{title} ({path}, {scene}, every few pixels)"), file });
+        let title = format!("{title} ({path}, {scene}, every few pixels)");
+        pictures.push(Picture { title, file, width: picture.width, height: picture.height });
     }
     Ok(pictures)
 }

@@ -13,11 +13,12 @@ use super::conventions::Answers;
 use super::costs::ReferenceCosts;
 use super::draw::Frame;
 use super::offline::{self, Drawn, Run};
+use super::pictures::Images;
 use super::prepared_scene::PreparedScene;
 use super::record::{Conditions, Record, StageCost, Student};
 use super::session::Session;
 use super::stages::Stages;
-use super::{draw, isolate, mend, pictures, realtime, sampler, submitted, uploads};
+use super::{draw, isolate, mend, realtime, sampler, submitted, uploads};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
@@ -339,7 +340,9 @@ impl<'a> Grading<'a> {
         if let Some((_, built)) = &built {
             built.explain(&self.assignment.rules, &mut checks, &mut record.findings);
         }
-        pictures::draw(&mut checks, &self.cases, &drawn, &submitted, out)?;
+        let images = Images { cases: &self.cases, drawn: &drawn, submitted: &submitted };
+        images.draw(&mut checks, out)?;
+        record.views = images.view(&checks, &self.assignment.tolerances, out)?;
         costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
         record.diagnoses = self.diagnose(&session, &record.evidence, &drawn, Some(&out.student))?;
@@ -369,6 +372,7 @@ impl<'a> Grading<'a> {
             diagnostics: String::new(),
             evidence: Evidence::default(),
             diagnoses: Vec::new(),
+            views: Vec::new(),
             images: Vec::new(),
             stages: Vec::new(),
             conditions: self.conditions(),

@@ -6,6 +6,7 @@ use super::shared::ImageDigest;
 use crate::diagnosis::Diagnosis;
 use crate::evidence::Evidence;
 use crate::intake::{Field, Finding, SubmittedConfig};
+use crate::viewer::ViewedCase;
 
 /// One submission, after all evidence was collected. Rubric, dates and class list stay outside, so
 /// that grades can be derived from it again without rendering.
@@ -28,6 +29,9 @@ pub struct Record {
     /// What failing parts look like.
     #[serde(default)]
     pub diagnoses: Vec<Diagnosis>,
+    /// The images that the viewer shows: of each check of images that failed, the worst scene.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub views: Vec<ViewedCase>,
     /// The images submitted whose noise tells them from anybody else's.
     #[serde(default)]
     pub images: Vec<ImageDigest>,

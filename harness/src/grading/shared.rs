@@ -151,6 +151,7 @@ mod tests {
                 checks: vec![Check::new(CheckId::ImageOffline, "", Verdict::Pass, "")],
             },
             diagnoses: Vec::new(),
+            views: Vec::new(),
             images: vec![image],
             stages: Vec::new(),
             conditions: Conditions::default(),

@@ -62,10 +62,11 @@ impl<'a> SubmittedImage<'a> {
         image_finding(root, &self.path, &self.image)
     }
 
-    /// The image, when it is the one that a check of this id is about.
-    pub fn shown_by(&self, check: &Check) -> Option<&Image> {
+    /// The image and how it came about, when it is the one that a check of this id is about.
+    pub fn shown_by(&self, check: &Check) -> Option<(Kind, &Image)> {
         let first = views(self.kind).first().is_some_and(|(id, _)| *id == check.id);
-        (first && self.case.entry.name == check.scene).then_some(self.image.as_ref().ok()?)
+        let own = first && self.case.entry.name == check.scene;
+        own.then_some((self.kind, self.image.as_ref().ok()?))
     }
 }
 

@@ -26,6 +26,17 @@ pub fn compare_offline(
     spp: u32,
     tolerances: &Tolerances,
 ) -> Result<ImageEvidence, CompareError> {
+    offline(actual, reference, spp, tolerances, None)
+}
+
+/// [`compare_offline`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
+pub(crate) fn offline(
+    actual: &Image,
+    reference: &ReferenceImage,
+    spp: u32,
+    tolerances: &Tolerances,
+    excess: Option<&mut Vec<f32>>,
+) -> Result<ImageEvidence, CompareError> {
     check_size(actual, &reference.mean)?;
     let (expected, with, samples) = match spp {
         0 => return Err(CompareError::NoSamples),
@@ -38,7 +49,7 @@ pub fn compare_offline(
     let width = reference.mean.width;
     let mut tallest = vec![Vec3::ZERO; width];
 
-    let stats = accumulate(actual, expected, &reference.mask, tolerances, |y, row| {
+    let stats = accumulate(actual, expected, &reference.mask, tolerances, excess, |y, row| {
         if let Some(inverse) = samples {
             let own = &reference.variance.pixels[y * width..][..width];
             for (out, v) in row.variance.iter_mut().zip(own) {
@@ -77,6 +88,17 @@ pub fn compare_realtime_linear(
     mask: &RegionMask,
     tolerances: &Tolerances,
 ) -> Result<ImageEvidence, CompareError> {
+    realtime_linear(actual, centre, mask, tolerances, None)
+}
+
+/// [`compare_realtime_linear`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
+pub(crate) fn realtime_linear(
+    actual: &Image,
+    centre: &Image,
+    mask: &RegionMask,
+    tolerances: &Tolerances,
+    excess: Option<&mut Vec<f32>>,
+) -> Result<ImageEvidence, CompareError> {
     let (width, scale) = realtime_scale(actual, centre, mask, tolerances.interior_fraction)?;
     let floor = Vec3::splat((tolerances.floor_of_median * f64::from(scale.median_lit)) as f32);
     let relative: Vec<f32> = mask
@@ -88,7 +110,7 @@ pub fn compare_realtime_linear(
         .map(|r| r as f32)
         .collect();
     let snap = tolerances.realtime_snap_px as f32;
-    let stats = accumulate(actual, centre, mask, tolerances, |y, row| {
+    let stats = accumulate(actual, centre, mask, tolerances, excess, |y, row| {
         let other = |y: usize| &centre.pixels[y * width..][..width];
         let (above, below) = (other(y.saturating_sub(1)), other((y + 1).min(centre.height - 1)));
         for x in 0..width {
@@ -99,8 +121,7 @@ pub fn compare_realtime_linear(
                 to(row.expected[x.saturating_sub(1)]).max(to(row.expected[(x + 1).min(width - 1)]));
             let dy = to(above[x]).max(to(below[x]));
             let allowed = relative * b.abs() + snap * (dx + dy) + floor;
-            let excess = (row.actual[x] - b).abs() / allowed;
-            row.excess2[x] = excess.max_element().powi(2);
+            row.excess2[x] = ((row.actual[x] - b).abs() / allowed).max_element().powi(2);
         }
     });
     Ok(stats.judge(mask, ComparedWith::Centre, &scale, tolerances))
@@ -119,10 +140,21 @@ pub fn compare_srgb8(
     mask: &RegionMask,
     tolerances: &Tolerances,
 ) -> Result<ImageEvidence, CompareError> {
+    srgb8(actual, centre, mask, tolerances, None)
+}
+
+/// [`compare_srgb8`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
+pub(crate) fn srgb8(
+    actual: &Image,
+    centre: &Image,
+    mask: &RegionMask,
+    tolerances: &Tolerances,
+    excess: Option<&mut Vec<f32>>,
+) -> Result<ImageEvidence, CompareError> {
     let (width, scale) = realtime_scale(actual, centre, mask, tolerances.srgb_fraction)?;
     // A pixel fails from `srgb_levels` on, so the allowed difference lies half a level below.
     let allowed = tolerances.srgb_levels as f32 - 0.5;
-    let mut stats = accumulate(actual, centre, mask, tolerances, |_, row| {
+    let mut stats = accumulate(actual, centre, mask, tolerances, excess, |_, row| {
         for x in 0..width {
             let apart = srgb::levels_apart(row.actual[x], row.expected[x]);
             row.excess2[x] = (apart as f32 / allowed).powi(2);

@@ -202,6 +202,58 @@ pub fn signed_error(
     })
 }
 
+/// The relative error that a difference picture should show in full colour: of the steps 1, 2, 5 the first that all but
+/// one in a hundred compared pixels stay below, from 1 % to 500 %.
+pub fn full_scale(actual: &Image, expected: &Image, mask: &RegionMask, median_lit: f32) -> f32 {
+    const STEPS: [f32; 9] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0];
+    let darkest = (DARKEST * median_lit).max(f32::MIN_POSITIVE);
+    let pixels = actual.pixels.iter().zip(&expected.pixels).zip(&mask.pixels);
+    let compared = pixels.filter(|((a, _), flags)| {
+        *flags & (RegionMask::EDGE | RegionMask::EMITTER) == 0 && a.is_finite()
+    });
+    let mut sizes: Vec<f32> = compared
+        .map(|((a, b), _)| {
+            (a.element_sum() - b.element_sum()).abs() / 3.0 / (b.element_sum() / 3.0).max(darkest)
+        })
+        .collect();
+    if sizes.is_empty() {
+        return STEPS[3];
+    }
+    let most = sizes.len() * 99 / 100;
+    let (_, &mut size, _) = sizes.select_nth_unstable_by(most, f32::total_cmp);
+    STEPS.into_iter().find(|&step| step >= size).unwrap_or(STEPS[8])
+}
+
+/// So many pixels are a ray's wide and high in its map.
+const RAY_SIDE: usize = 6;
+/// Lit, though it should be in shadow; and the other way round (Okabe and Ito 2008: told apart by the colour-blind).
+const RAY_COLOURS: [[u8; 3]; 2] = [[230, 159, 0], [86, 180, 233]];
+
+/// A film without shadows in grey, and on it the rays that were judged wrongly: the pixel of each, and whether it should
+/// be lit.
+pub fn ray_map(film: &Image, rays: &[(usize, bool)], median_lit: f32) -> Picture {
+    let mut small = tone_mapped(film, median_lit);
+    for pixel in &mut small.pixels {
+        let grey = pixel.iter().map(|&level| u16::from(level)).sum::<u16>() / 6;
+        *pixel = [grey as u8; 3];
+    }
+    for &(index, should_be_lit) in rays {
+        if let Some(pixel) = small.pixels.get_mut(index) {
+            *pixel = RAY_COLOURS[usize::from(should_be_lit)];
+        }
+    }
+    let (width, height) = (small.width * RAY_SIDE, small.height * RAY_SIDE);
+    let at = |index: usize| {
+        small.pixels[index / width / RAY_SIDE * small.width + index % width / RAY_SIDE]
+    };
+    Picture {
+        width,
+        height,
+        pixels: (0..width * height).map(at).collect(),
+        caption: "orange: lit, but should be in shadow; blue: dark, but should be lit".into(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -261,6 +313,30 @@ mod tests {
         );
         assert_eq!(dark.unwrap().pixels, [red]);
         assert_eq!(signed_error(&actual, &row(&[Vec3::ONE]), &mask, 1.0, 0.1), None);
+    }
+
+    #[test]
+    fn the_scale_holds_almost_all_differences() {
+        let expected = Image { width: 200, height: 1, pixels: vec![Vec3::ONE; 200] };
+        let mask = RegionMask::background(200, 1);
+        let of = |size: f32| {
+            let mut actual = expected.clone();
+            actual.pixels.fill(Vec3::splat(1.0 + size));
+            actual.pixels[7] = Vec3::splat(1e9);
+            actual.pixels[8] = Vec3::NAN;
+            full_scale(&actual, &expected, &mask, 1.0)
+        };
+        assert_eq!([0.0, 0.015, 0.3, 77.0].map(of), [0.01, 0.02, 0.5, 5.0]);
+    }
+
+    #[test]
+    fn wrong_rays_stand_out_from_the_film() {
+        let film = Image { width: 3, height: 1, pixels: vec![Vec3::ONE; 3] };
+        let map = ray_map(&film, &[(0, false), (2, true), (99, true)], 1.0);
+        assert_eq!((map.width, map.height), (18, 6));
+        assert_eq!([map.pixels[0], map.pixels[18 * 6 - 1]], RAY_COLOURS);
+        let [r, g, b] = map.pixels[8];
+        assert!(r == g && g == b);
     }
 
     #[test]

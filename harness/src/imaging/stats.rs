@@ -84,12 +84,14 @@ pub(super) struct ComparisonStats {
     noise: (f64, f64),
 }
 
-/// Applies `rule` row by row and gathers everything that the verdict needs.
+/// Applies `rule` row by row and gathers everything that the verdict needs; what each pixel's difference is over the
+/// allowed one goes to `excess`, if somebody wants it.
 pub(super) fn accumulate(
     actual: &Image,
     expected: &Image,
     mask: &RegionMask,
     tolerances: &Tolerances,
+    mut excess: Option<&mut Vec<f32>>,
     mut rule: impl FnMut(usize, &mut Row<'_>),
 ) -> ComparisonStats {
     let (width, height) = (expected.width, expected.height);
@@ -119,6 +121,9 @@ pub(super) fn accumulate(
             variance: &mut variance,
         };
         rule(y, &mut row);
+        if let Some(excess) = &mut excess {
+            excess.extend(row.excess2.iter().map(|excess2| excess2.sqrt()));
+        }
         for x in 0..width {
             let flags = row.mask[x];
             if flags & RegionMask::EMITTER != 0 {

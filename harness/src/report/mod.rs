@@ -7,6 +7,12 @@
 //! It decides nothing. Every format lets a submission's words through one gate, `harmless`, and adds
 //! the escaping that the format itself needs.
 
+#[cfg(test)]
+mod browser_tests;
+#[cfg(test)]
+#[allow(dead_code)] // the viewer's tests use the rest
+#[path = "../../tests/support/chromium.rs"]
+mod chromium;
 mod csv;
 mod harmless;
 mod html;
@@ -49,6 +55,8 @@ pub const JSON_FILE: &str = "report.json";
 pub const CSV_FILE: &str = "grades.csv";
 /// The page for readers, in the batch's folder and in the folder of each submission.
 pub const HTML_FILE: &str = "report.html";
+/// The page of the viewer, beside a submission's page.
+pub const VIEW_FILE: &str = "view.html";
 /// The folder in the batch's folder that holds what students must not see.
 pub const INSTRUCTOR: &str = "instructor";
 
@@ -109,6 +117,11 @@ impl SubmissionReport {
             || self.grade.remarks.iter().any(|remark| is_private(remark, rules))
     }
 
+    /// Whether the instructor has a page of their own about it: among others it always leads to them.
+    pub fn has_instructor_page(&self, report: &BatchReport) -> bool {
+        report.entries.len() > 1 || self.has_private(&report.rules)
+    }
+
     /// The entry as its student may read it.
     pub fn for_student(&self, rules: &Rules) -> Self {
         let mut entry = self.clone();
@@ -116,6 +129,7 @@ impl SubmissionReport {
             *check = check.for_student();
         }
         entry.grade.remarks.retain(|remark| !is_private(remark, rules));
+        entry.record.views.retain(|view| !view.held_back);
         entry
     }
 }
@@ -202,7 +216,7 @@ impl BatchReport {
     }
 }
 
-/// Writes `report.json`, `grades.csv`, `report.html`, and `<slug>/report.html` for each submission,
+/// Writes `report.json`, `grades.csv`, `report.html`, and `<slug>/report.html` with `<slug>/view.html` for each submission,
 /// into the folder `out`, which is made when missing, and `instructor/<slug>/report.html` where
 /// there is more to know than the student may. The pictures are expected to lie in `<slug>/`, those of held-back scenes
 /// in `instructor/<slug>/` already.
@@ -218,14 +232,33 @@ pub fn write(out: &Path, report: &BatchReport) -> Result<(), ReportError> {
         let slug = &entry.record.slug;
         let page = html_submission(report, entry, Reader::Student);
         put(&out.join(slug), HTML_FILE, page.as_bytes())?;
-        if entry.has_private(&report.rules) {
+        view(&out.join(slug), report, entry, false)?;
+        if entry.has_instructor_page(report) {
             let page = html_submission(report, entry, Reader::Instructor);
-            put(&out.join(INSTRUCTOR).join(slug), HTML_FILE, page.as_bytes())?;
+            let folder = out.join(INSTRUCTOR).join(slug);
+            put(&folder, HTML_FILE, page.as_bytes())?;
+            view(&folder, report, entry, true)?;
         }
     }
     put(out, CSV_FILE, csv_grades(report)?.as_bytes())?;
     put(out, JSON_FILE, report_json(report)?.as_bytes())?;
     put(out, HTML_FILE, html_batch(report)?.as_bytes())
+}
+
+/// Writes the viewer's page of a submission's public or held-back scenes, if there is something to see.
+fn view(
+    folder: &Path,
+    report: &BatchReport,
+    entry: &SubmissionReport,
+    held_back: bool,
+) -> Result<(), ReportError> {
+    let views = entry.record.views.iter().filter(|view| view.held_back == held_back);
+    let views: Vec<_> = views.cloned().collect();
+    if views.is_empty() {
+        return Ok(());
+    }
+    let title = format!("{} - {}", entry.student().full_name(), report.title);
+    put(folder, VIEW_FILE, html_viewer(&title, Some(HTML_FILE), &views).as_bytes())
 }
 
 /// Writes one file.

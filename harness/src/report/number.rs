@@ -61,6 +61,14 @@ pub(super) fn significant(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }
 
+/// A share of a whole in percent, without digits behind the point; what is there at all is never `0 %`.
+pub(super) fn percent(part: usize, whole: usize) -> String {
+    match (100.0 * part as f64 / whole.max(1) as f64).round() {
+        0.0 if part > 0 => "under 1 %".to_owned(),
+        percent => format!("{percent} %"),
+    }
+}
+
 /// Seconds as `0.12 s`, `83.4 s`.
 pub(super) fn seconds(value: f64) -> String {
     if value.abs() < 9.995 { format!("{value:.2} s") } else { format!("{value:.1} s") }
@@ -153,6 +161,12 @@ mod tests {
         }
         assert_eq!(range(80.0, 100.0), "80..100");
         assert_eq!(range(80.0, 80.0 + 1e-9), "80");
+    }
+
+    #[test]
+    fn shares_are_in_percent() {
+        let shown = [(0, 7), (1, 300), (1, 3), (7, 7), (0, 0)].map(|(a, b)| percent(a, b));
+        assert_eq!(shown, ["0 %", "under 1 %", "33 %", "100 %", "0 %"]);
     }
 
     #[test]

@@ -60,6 +60,7 @@ fn entry(name: &str, slug: &str, student: [&str; 3], conditions: Conditions) -> 
         diagnostics: String::new(),
         evidence: Evidence::default(),
         diagnoses: Vec::new(),
+        views: Vec::new(),
         images: Vec::new(),
         stages: vec![
             StageCost { name: "intake".into(), wall_s: 0.021, cpu_s: 0.0 },
@@ -214,6 +215,7 @@ fn two_cosines() -> SubmissionReport {
         .map(|(title, file)| Picture {
             title: title.into(),
             file: format!("radiance_lit_cbox_{file}.png"),
+            ..Default::default()
         })
         .into();
     entry.record.evidence.checks = vec![

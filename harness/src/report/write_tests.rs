@@ -13,8 +13,10 @@ fn every_file_is_there_and_no_temporary_one() {
         write(out.path(), &report).unwrap();
     }
     let mut names: Vec<String> = Vec::new();
-    for folder in ["", "a2_ada", "two_cosines", "hand_in_3", "instructor/two_cosines"] {
-        for file in fs::read_dir(out.path().join(folder)).unwrap() {
+    let slugs = ["a2_ada", "two_cosines", "hand_in_3"];
+    let own = slugs.iter().map(|slug| format!("instructor/{slug}"));
+    for folder in [String::new()].into_iter().chain(slugs.map(String::from)).chain(own) {
+        for file in fs::read_dir(out.path().join(&folder)).unwrap() {
             names.push(format!("{folder}/{}", file.unwrap().file_name().display()));
         }
     }
@@ -31,6 +33,8 @@ fn every_file_is_there_and_no_temporary_one() {
             "/two_cosines",
             "a2_ada/report.html",
             "hand_in_3/report.html",
+            "instructor/a2_ada/report.html",
+            "instructor/hand_in_3/report.html",
             "instructor/two_cosines/report.html",
             "two_cosines/report.html",
         ]
@@ -106,6 +110,27 @@ fn a_student_folder_names_nobody_else_has_no_note_for_instructors_and_leads_nowh
     }
     report.rules.gates = gates;
     let out = tempfile::tempdir().unwrap();
+    // Images for the viewer, each with values and words of its own.
+    for (index, entry) in report.entries.iter_mut().enumerate() {
+        let slug = &entry.record.slug;
+        for (held_back, scene) in [(false, "cbox"), (true, "SECRET-scene")] {
+            let folder =
+                if held_back { out.path().join(INSTRUCTOR) } else { out.path().to_owned() };
+            let mut image = basecode::Image::new(8, 6);
+            image
+                .pixels
+                .fill(basecode::Vec3::splat(0.1 + index as f32 + f32::from(u8::from(held_back))));
+            let file = crate::viewer::write_image(&folder.join(slug), &image).unwrap();
+            entry.record.views.push(crate::viewer::ViewedCase {
+                id: format!("image.offline @ {scene}"),
+                title: format!("{scene} of {slug}"),
+                held_back,
+                layers: vec![crate::viewer::Layer::image("actual", &file)],
+                regions: vec![format!("floor of {scene}")],
+                ..Default::default()
+            });
+        }
+    }
     write(out.path(), &report).unwrap();
     for entry in &report.entries {
         let folder = out.path().join(&entry.record.slug);
@@ -114,6 +139,21 @@ fn a_student_folder_names_nobody_else_has_no_note_for_instructors_and_leads_nowh
             |needle: &str| bytes.windows(needle.len()).any(|window| window == needle.as_bytes());
         assert!(has(&entry.record.name) && has("another submission"));
         assert!(!has("or the instructor:"), "a note for the instructor");
+        assert!(
+            !has("SECRET") && has("image.offline @ cbox"),
+            "the viewer shows what is held back"
+        );
+        let [public, held_back] = [false, true].map(|held_back| {
+            let own = entry.record.views.iter().filter(move |view| view.held_back == held_back);
+            own.flat_map(|view| view.files()).collect::<Vec<_>>()
+        });
+        let data = crate::files::files_below(&folder.join(crate::viewer::DATA_FOLDER)).unwrap();
+        let data: Vec<_> = data.iter().map(|file| file.strip_prefix(&folder).unwrap()).collect();
+        assert_eq!(data, public.iter().map(Path::new).collect::<Vec<_>>());
+        for file in held_back {
+            assert!(!has(file), "data of a held-back scene");
+            assert!(out.path().join(INSTRUCTOR).join(&entry.record.slug).join(file).is_file());
+        }
         for SubmissionReport { record: other, .. } in
             report.entries.iter().filter(|other| *other != entry)
         {
@@ -130,7 +170,10 @@ fn a_student_folder_names_nobody_else_has_no_note_for_instructors_and_leads_nowh
             let target = quoted.split('"').next().unwrap();
             let there = match target.strip_prefix('#') {
                 Some(id) => page.contains(&format!("id=\"{id}\"")),
-                None => !target.contains("..") && folder.join(target).is_file(),
+                None => {
+                    let file = target.split('#').next().unwrap();
+                    !target.contains("..") && folder.join(file).is_file()
+                }
             };
             assert!(there, "{target} on the page of {}", entry.record.name);
         }

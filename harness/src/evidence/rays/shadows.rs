@@ -47,6 +47,7 @@ pub fn judge_shadows(
     let (mut lit_seen, mut dark_seen) = (Vec::new(), Vec::new());
     // What is known of visibility: the ray, and what was found.
     let mut known = Vec::new();
+    let mut wrong_rays = Vec::new();
     for index in 0..batch.points.len() {
         let expected = batch.unshadowed(index, bsdf(&batch.points[index]));
         let is_lit = index < batch.lit;
@@ -65,6 +66,7 @@ pub fn judge_shadows(
             let count = if is_lit { &mut lit_wrong } else { &mut dark_wrong };
             *count += 1;
             first = first.or(Some((index, visibility)));
+            wrong_rays.push((batch.pixels[index], is_lit));
         }
     }
     // What is black with shadows and without says nothing about visibility.
@@ -115,6 +117,7 @@ pub fn judge_shadows(
     };
     check.measures = measures;
     if check.verdict == Verdict::Fail {
+        check.wrong_rays = wrong_rays;
         let price = price(batch, &known, lit_fraction + dark_fraction, occluders);
         check.error = price.error;
         check.mistake = price.name();

@@ -1,9 +1,10 @@
 //! The page of the batch.
 
 use super::super::number::{due, is_range, of_part, points, range};
-use super::super::{BatchReport, HTML_FILE, INSTRUCTOR, ReportError, SubmissionReport};
+use super::super::{BatchReport, INSTRUCTOR, ReportError, SubmissionReport};
+use super::lost::is_lost;
 use super::markup::Html;
-use super::{SORT, begin, class, end, part_class};
+use super::{CLASS, begin, class, end, overview, part_class};
 use crate::class::Class;
 use crate::columns::count;
 use crate::evidence::CheckId;
@@ -30,13 +31,19 @@ pub fn batch(report: &BatchReport) -> Result<String, ReportError> {
         }
     }
     html.raw("; due <time>").text(&due(&report.due)).raw("</time></p>\n</header>\n<main>\n");
+    overview::waiting(&mut html, report);
     table(&mut html, report);
+    if report.entries.len() > 1 {
+        overview::mistakes(&mut html, report);
+        overview::distribution(&mut html, report);
+        overview::errors(&mut html, report);
+    }
     if let Some(class) = &report.class {
         about(&mut html, report, class);
     }
     parts(&mut html, report);
     conditions(&mut html, report);
-    html.raw("</main>\n<script>").raw(SORT).raw("</script>\n");
+    html.raw("</main>\n<script>").raw(CLASS).raw("</script>\n");
     Ok(end(html, report))
 }
 
@@ -49,7 +56,8 @@ fn table(html: &mut Html, report: &BatchReport) {
     html.text(&points(report.rules.total_points())).raw("</small></th>");
     html.raw("<th scope=\"col\">Number</th>");
     for part in &report.rules.parts {
-        html.raw("<th scope=\"col\" class=\"number\" title=\"").text(&part.title).raw("\">");
+        html.raw("<th scope=\"col\" class=\"number\" data-part=\"").text(&part.id);
+        html.raw("\" title=\"").text(&part.title).raw("\">");
         html.text(&part.id).raw("<small>").raw(if part.bonus { "+" } else { "of " });
         html.text(&points(part.points)).raw("</small></th>");
     }
@@ -68,11 +76,9 @@ fn row(html: &mut Html, report: &BatchReport, entry: &SubmissionReport) {
     let name = student.full_name();
     let shown = if name.is_empty() { "(no name)" } else { &name };
     let key = format!("{} {}", student.last_name, student.first_name);
-    html.raw("<tr><th scope=\"row\" data-sort=\"").text(&key).raw("\"><a href=\"");
-    // The batch's page is the instructor's, too.
-    let folder =
-        if entry.has_private(&report.rules) { format!("{INSTRUCTOR}/") } else { String::new() };
-    html.address(&format!("{folder}{}/{HTML_FILE}", record.slug)).raw("\">").text(shown);
+    html.raw("<tr><th scope=\"row\" data-sort=\"").text(&key).raw("\">");
+    overview::link(html, report, entry, "");
+    html.text(shown);
     html.raw("</a><small>").text(&record.name).raw("</small></th>");
     html.raw("<td class=\"number total ");
     html.raw(class(grade.points, grade.points_max, grade.out_of)).raw("\" data-sort=\"");
@@ -82,7 +88,14 @@ fn row(html: &mut Html, report: &BatchReport, entry: &SubmissionReport) {
         match grade.parts.iter().find(|own| own.id == part.id) {
             Some(own) => {
                 html.raw("<td class=\"number ").raw(part_class(own)).raw("\" data-sort=\"");
-                html.show(own.points).raw("\">").text(&of_part(own)).raw("</td>");
+                html.show(own.points).raw("\">");
+                // The page of a part that lost points, one click away.
+                if is_lost(own) {
+                    overview::link(html, report, entry, &own.id);
+                    html.text(&of_part(own)).raw("</a></td>");
+                } else {
+                    html.text(&of_part(own)).raw("</td>");
+                }
             }
             None => {
                 html.raw("<td></td>");
@@ -91,7 +104,8 @@ fn row(html: &mut Html, report: &BatchReport, entry: &SubmissionReport) {
     }
     html.raw("<td class=\"findings\">");
     let mut several = false;
-    for severity in [Severity::Error, Severity::Warning, Severity::Note] {
+    // Notes are what most submissions have.
+    for severity in [Severity::Error, Severity::Warning] {
         let number = record.findings.iter().filter(|found| found.severity == severity).count();
         if number > 0 {
             html.raw(if several { ", " } else { "" });

@@ -1,66 +1,42 @@
-//! The checks on a submission's page: what failed in full and with pictures, the rest folded.
+//! Checks on a submission's page: those that failed in full, the others a line each.
 
-use super::super::number::{self, is_failure, value};
+use super::super::number::{self, value};
 use super::markup::Html;
+use super::pictures::Places;
 use crate::columns::count;
-use crate::evidence::{Check, Measure, Picture, Verdict};
+use crate::evidence::{Check, Measure, Verdict};
 
-/// All checks, those that cost points first. `public_pictures` leads from the page to the folder of
-/// the pictures that are not held back: empty, or ending with a slash.
-pub(super) fn checks(html: &mut Html, checks: &[Check], public_pictures: &str) {
-    // A check is linked by its place in the evidence, wherever it is shown.
-    let pick = |wanted: fn(&Check) -> bool| -> Vec<(usize, &Check)> {
-        checks.iter().enumerate().filter(|(_, check)| wanted(check)).collect()
-    };
-    let failed = pick(is_failure);
-    if !failed.is_empty() {
-        html.raw("<section>\n<h2>What is wrong</h2>\n");
-        for (place, check) in failed {
-            article(html, place, check, public_pictures);
-        }
-        html.raw("</section>\n");
-    }
-    let silent = |check: &Check| matches!(check.verdict, Verdict::NotJudged | Verdict::NotRun);
-    let passed = |check: &Check| check.verdict == Verdict::Pass;
-    folded(html, "could not be judged", true, &pick(silent), public_pictures);
-    folded(html, "passed", false, &pick(passed), public_pictures);
-}
+/// A check and its place in the evidence, by which it is linked.
+pub(super) type Placed<'a> = (usize, &'a Check);
 
-fn folded(
+/// Checks behind a line that says what they are.
+pub(super) fn folded(
     html: &mut Html,
     what: &str,
     open: bool,
-    checks: &[(usize, &Check)],
-    public_pictures: &str,
+    checks: &[Placed],
+    show: impl Fn(&mut Html, Placed),
 ) {
     if checks.is_empty() {
         return;
     }
     html.raw(if open { "<details open>" } else { "<details>" }).raw("\n<summary>");
     html.text(&count(checks.len(), "check")).raw(" ").text(what).raw("</summary>\n");
-    for (place, check) in checks {
-        article(html, *place, check, public_pictures);
+    for &check in checks {
+        show(html, check);
     }
     html.raw("</details>\n");
 }
 
-fn article(html: &mut Html, place: usize, check: &Check, public_pictures: &str) {
-    html.raw("<article id=\"check-").show(place).raw("\">\n<h3>");
-    badge(html, check.verdict);
-    html.raw(" <code>").text(check.id.name()).raw("</code>");
-    if !check.scene.is_empty() {
-        html.raw(" <span class=\"scene\">on ").text(&check.scene).raw("</span>");
-    }
-    if check.held_back {
-        html.raw(" <span class=\"badge unsure\">held back</span>");
-    }
-    html.raw("</h3>\n<p>").text(&check.summary).raw("</p>\n");
+/// A check in full: what was found, its measures and pictures.
+pub(super) fn article(html: &mut Html, (place, check): Placed, places: &Places) {
+    html.raw("<article id=\"check-").show(place).raw("\">\n<h4>");
+    title(html, check);
+    html.raw("</h4>\n<p>").text(&check.summary).raw("</p>\n");
     if !check.hint.is_empty() {
         html.raw("<p class=\"hint\"><b>Hint</b> ").text(&check.hint).raw("</p>\n");
     }
-    if !check.private.is_empty() {
-        html.raw("<p class=\"notice\">For the instructor: ").text(&check.private).raw("</p>\n");
-    }
+    private(html, check);
     // Without a measure the error is only "wrong", which the verdict says.
     if check.verdict == Verdict::Fail && !check.measures.is_empty() {
         html.raw("<p class=\"error\">Error <b>").text(&value(check.error));
@@ -69,19 +45,45 @@ fn article(html: &mut Html, place: usize, check: &Check, public_pictures: &str) 
         );
     }
     measures(html, &check.measures);
-    let folder = if check.held_back { "" } else { public_pictures };
-    pictures(html, &check.name(), folder, &check.pictures);
+    places.of_check(html, check);
     html.raw("</article>\n");
 }
 
-fn badge(html: &mut Html, verdict: Verdict) {
+/// A check in a few lines: there are hundreds that passed.
+pub(super) fn line(html: &mut Html, (place, check): Placed) {
+    html.raw("<p class=\"check\" id=\"check-").show(place).raw("\">");
+    title(html, check);
+    html.raw(" ").text(&check.summary);
+    let said = |own: &Measure| format!("{}: {}", own.name, number::measure(own));
+    let said: Vec<String> = check.measures.iter().map(said).collect();
+    if !said.is_empty() {
+        html.raw(" <small>").text(&said.join("; ")).raw("</small>");
+    }
+    html.raw("</p>\n");
+    private(html, check);
+}
+
+fn private(html: &mut Html, check: &Check) {
+    if !check.private.is_empty() {
+        html.raw("<p class=\"notice\">For the instructor: ").text(&check.private).raw("</p>\n");
+    }
+}
+
+fn title(html: &mut Html, check: &Check) {
     // A sign and a word, so that nothing hangs on the colour.
-    html.raw(match verdict {
+    html.raw(match check.verdict {
         Verdict::Pass => "<span class=\"badge good\">✓ ",
         Verdict::Fail | Verdict::NotImplemented => "<span class=\"badge bad\">✗ ",
         Verdict::NotJudged | Verdict::NotRun => "<span class=\"badge unsure\">? ",
     });
-    html.text(number::verdict(verdict)).raw("</span>");
+    html.text(number::verdict(check.verdict)).raw("</span> <code>").text(check.id.name());
+    html.raw("</code>");
+    if !check.scene.is_empty() {
+        html.raw(" <span class=\"scene\">on ").text(&check.scene).raw("</span>");
+    }
+    if check.held_back {
+        html.raw(" <span class=\"badge unsure\">held back</span>");
+    }
 }
 
 fn measures(html: &mut Html, measures: &[Measure]) {
@@ -99,20 +101,4 @@ fn measures(html: &mut Html, measures: &[Measure]) {
         html.raw(if measure.passed { "✓ pass" } else { "✗ fail" }).raw("</td></tr>\n");
     }
     html.raw("</tbody>\n</table>\n");
-}
-
-/// Pictures side by side, of the thing called `name`; their files lie in `folder`, which ends in a
-/// slash or is empty.
-pub(super) fn pictures(html: &mut Html, name: &str, folder: &str, pictures: &[Picture]) {
-    if pictures.is_empty() {
-        return;
-    }
-    html.raw("<div class=\"pictures\">\n");
-    for Picture { title, file } in pictures {
-        let file = format!("{folder}{file}");
-        html.raw("<figure><a href=\"").address(&file).raw("\"><img loading=\"lazy\" src=\"");
-        html.address(&file).raw("\" alt=\"").text(name).raw(": ").text(title);
-        html.raw("\"></a><figcaption>").text(title).raw("</figcaption></figure>\n");
-    }
-    html.raw("</div>\n");
 }

@@ -4,7 +4,11 @@
 mod batch;
 mod checks;
 mod curve;
+mod lobe;
+mod lost;
 mod markup;
+mod overview;
+mod pictures;
 mod submission;
 #[cfg(test)]
 mod tests;
@@ -22,8 +26,8 @@ use super::BatchReport;
 use crate::rubric::PartGrade;
 
 const STYLE: &str = include_str!("style.css");
-/// Sorts the batch's table; the page is whole without it.
-const SORT: &str = include_str!("sort.js");
+/// Sorts, searches and filters the batch's table; the page is whole without it.
+const CLASS: &str = include_str!("class.js");
 
 /// Whom a page is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +51,7 @@ struct Powers<'a> {
 
 /// Everything up to the page's content.
 fn begin(title: &str) -> Html {
-    begin_with(title, &Powers { style: STYLE, script: SORT, loads_scripts: false })
+    begin_with(title, &Powers { style: STYLE, script: CLASS, loads_scripts: false })
 }
 
 fn begin_with(title: &str, powers: &Powers) -> Html {

@@ -1,10 +1,14 @@
 //! The page of one submission.
 
 use super::super::harmless::harmless_lines;
-use super::super::number::{hints, is_range, looks_like, of_part, points, range, seconds};
-use super::super::{BatchReport, HTML_FILE, SubmissionReport};
+use super::super::number::{is_failure, is_range, looks_like, of_part, points, range, seconds};
+use super::super::{BatchReport, HTML_FILE, INSTRUCTOR, SubmissionReport};
+use super::checks::{self, Placed};
+use super::lost::{Lost, is_lost};
 use super::markup::Html;
-use super::{Reader, begin, checks, class, end, part_class};
+use super::pictures::Places;
+use super::{Reader, begin, class, end, part_class};
+use crate::columns::count;
 use crate::evidence::{Check, Verdict};
 use crate::grading::{Conditions, StageCost};
 use crate::intake::{Finding, Severity};
@@ -13,12 +17,11 @@ use crate::rubric::PartGrade;
 /// So many lines of the compiler's are shown.
 const DIAGNOSTIC_LINES: usize = 400;
 
-/// The page of one submission: its parts with points and reasons, what failed with pictures, what
-/// could not be judged, what passed, findings, conditions and costs.
+/// The page of one submission, in the order in which it is wanted: the points; what was lost, why, and what it looks
+/// like; what the compiler says; findings; folded, what was right and everything else that was found out.
 pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader) -> String {
     let known;
-    // A student has the page's folder and nothing above it.
-    let root = "../..";
+    let own = entry;
     let entry = match reader {
         Reader::Instructor => entry,
         Reader::Student => {
@@ -26,18 +29,14 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
             &known
         }
     };
-    let SubmissionReport { record, grade, standing } = entry;
+    let SubmissionReport { record, grade, .. } = entry;
     let student = entry.student();
     let name = student.full_name();
     let name = if name.is_empty() { &record.name } else { &name };
     let mut html = begin(&format!("{name} - {}", report.title));
     html.raw("<header class=\"top\">\n");
     if reader == Reader::Instructor {
-        html.raw("<nav><a href=\"")
-            .raw(root)
-            .raw("/")
-            .raw(HTML_FILE)
-            .raw("\">All submissions</a></nav>\n");
+        neighbours(&mut html, report, own);
     }
     html.raw("<p class=\"course\">").text(&report.title);
     html.raw("</p>\n<h1>").text(name).raw("</h1>\n<p class=\"who\">");
@@ -53,6 +52,80 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     html.raw("\"><strong>").text(&range(grade.points, grade.points_max)).raw("</strong> of ");
     html.text(&points(grade.out_of)).raw(" points");
     html.bar(grade.points, grade.points_max, grade.out_of).raw("</p>\n");
+    notices(&mut html, entry, reader);
+    html.raw("</header>\n<main>\n");
+    let public = match reader {
+        Reader::Student => String::new(),
+        Reader::Instructor => format!("{ROOT}/{}/", record.slug),
+    };
+    let places = Places { public: &public, views: &record.views };
+    // Code that does not build is why the rest is as it is.
+    let builds = record
+        .evidence
+        .checks
+        .iter()
+        .all(|check| check.id != crate::rubric::BUILD || check.verdict == Verdict::Pass);
+    if !builds {
+        diagnostics(&mut html, &record.diagnostics);
+    }
+    let mut lost = Lost::new(&report.rules, record, places);
+    let losing: Vec<&PartGrade> = grade.parts.iter().filter(|part| is_lost(part)).collect();
+    if !losing.is_empty() {
+        html.raw("<section>\n<h2>What was lost</h2>\n");
+        for part in losing {
+            lost.part(&mut html, part);
+        }
+        html.raw("</section>\n");
+    }
+    for words in looks_like("", &record.diagnoses) {
+        html.raw("<p class=\"hint\"><b>Also looks like</b> ").text(&words).raw("</p>\n");
+    }
+    if builds {
+        diagnostics(&mut html, &record.diagnostics);
+    }
+    findings(&mut html, &record.findings);
+    html.raw("<section>\n<h2>Everything else</h2>\n");
+    right(&mut html, &grade.parts);
+    let shown = std::mem::take(&mut lost.shown);
+    rest(&mut html, &record.evidence.checks, &shown, &places);
+    let marks: Vec<(f64, &str)> = grade.parts.iter().filter_map(|part| mark(part, entry)).collect();
+    html.raw("<details>\n<summary>How an error becomes points</summary>\n");
+    super::curve::curve(&mut html, &report.rules.curve, &marks);
+    html.raw(
+        "</details>\n<details>\n<summary>Conditions and costs</summary>\n<div class=\"columns\">\n",
+    );
+    conditions(&mut html, &record.conditions);
+    stages(&mut html, &record.stages);
+    html.raw("</div>\n</details>\n</section>\n</main>\n");
+    end(html, report)
+}
+
+/// The report's folder, from the folder of an instructor's page. A student has the page's folder and nothing above it.
+const ROOT: &str = "../..";
+
+/// Links to all submissions, the one before and the one after.
+fn neighbours(html: &mut Html, report: &BatchReport, own: &SubmissionReport) {
+    html.raw("<nav><a href=\"").raw(ROOT).raw("/").raw(HTML_FILE).raw("\">All submissions</a>");
+    let place = report.entries.iter().position(|entry| entry.record.slug == own.record.slug);
+    let at = |place: Option<usize>| place.and_then(|place| report.entries.get(place));
+    for (class, entry) in [
+        ("previous", at(place.and_then(|place| place.checked_sub(1)))),
+        ("next", at(place.map(|place| place + 1))),
+    ] {
+        let Some(entry) = entry else { continue };
+        let slug = &entry.record.slug;
+        html.raw(" <a class=\"").raw(class).raw("\" rel=\"");
+        html.raw(if class == "next" { "next" } else { "prev" }).raw("\" href=\"");
+        let folder = if entry.has_instructor_page(report) { INSTRUCTOR } else { "." };
+        html.address(&format!("{ROOT}/{folder}/{slug}/{HTML_FILE}")).raw("\">");
+        html.raw(if class == "next" { "Next" } else { "Previous" }).raw("</a>");
+    }
+    html.raw("</nav>\n");
+}
+
+/// What holds for the submission as a whole.
+fn notices(html: &mut Html, entry: &SubmissionReport, reader: Reader) {
+    let SubmissionReport { record, grade, standing } = entry;
     if is_range(grade.points, grade.points_max) {
         html.raw(
             "<p class=\"notice\">A range: not everything could be judged. The part says why.</p>\n",
@@ -66,80 +139,45 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
         html.raw("<p class=\"notice\">").text(remark).raw("</p>\n");
     }
     if reader == Reader::Instructor {
-        html.raw("<p class=\"notice\">This page shows what students must not see (held-back scenes, other ");
-        html.raw(
-            "submissions): it is for the instructor, not for the student, who gets <a href=\"",
-        );
-        html.address(&format!("{root}/{}/{HTML_FILE}", record.slug)).raw("\">another</a>.</p>\n");
+        html.raw("<p class=\"notice\">For the instructor: held-back scenes and other submissions are on this page. ");
+        html.raw("The student gets <a href=\"");
+        html.address(&format!("{ROOT}/{}/{HTML_FILE}", record.slug)).raw("\">another</a>.</p>\n");
     }
-    html.raw("</header>\n<main>\n");
-    let public_pictures = match reader {
-        Reader::Student => String::new(),
-        Reader::Instructor => format!("{root}/{}/", record.slug),
-    };
-    parts(&mut html, entry, &public_pictures);
-    checks::checks(&mut html, &record.evidence.checks, &public_pictures);
-    diagnostics(&mut html, &record.diagnostics);
-    findings(&mut html, &record.findings);
-    let marks: Vec<(f64, &str)> = grade.parts.iter().filter_map(|part| mark(part, entry)).collect();
-    html.raw("<section>\n<h2>How an error becomes points</h2>\n");
-    super::curve::curve(&mut html, &report.rules.curve, &marks);
-    html.raw("</section>\n<section>\n<h2>Conditions and costs</h2>\n<div class=\"columns\">\n");
-    conditions(&mut html, &record.conditions);
-    stages(&mut html, &record.stages);
-    html.raw("</div>\n</section>\n</main>\n");
-    end(html, report)
 }
 
-fn parts(
-    html: &mut Html,
-    SubmissionReport { record, grade, .. }: &SubmissionReport,
-    public_pictures: &str,
-) {
-    html.raw("<section>\n<h2>Parts</h2>\n<table class=\"parts\">\n<thead><tr>");
-    html.raw("<th scope=\"col\">Part</th><th scope=\"col\">Points</th></tr></thead>\n<tbody>\n");
-    for part in &grade.parts {
+/// The parts that earned everything, and a bonus that nobody tried for.
+fn right(html: &mut Html, parts: &[PartGrade]) {
+    let right: Vec<&PartGrade> = parts.iter().filter(|part| !is_lost(part)).collect();
+    if right.is_empty() {
+        return;
+    }
+    html.raw("<details>\n<summary>").text(&count(right.len(), "part")).raw(" right: ");
+    let ids: Vec<&str> = right.iter().map(|part| part.id.as_str()).collect();
+    html.text(&ids.join(", ")).raw("</summary>\n<table class=\"parts\">\n<tbody>\n");
+    for part in right {
         html.raw("<tr class=\"").raw(part_class(part)).raw("\"><td><strong><span class=\"id\">");
         html.text(&part.id).raw("</span> ").text(&part.title).raw("</strong><p>");
-        html.text(&part.reason).raw("</p>");
-        if part.points < part.out_of {
-            for words in looks_like(&part.id, &record.diagnoses) {
-                html.raw("<p class=\"hint\"><b>Looks like</b> ").text(&words).raw("</p>");
-            }
-            for diagnosis in record.diagnoses.iter().filter(|found| found.part == part.id) {
-                checks::pictures(html, "looks like", public_pictures, &diagnosis.pictures);
-            }
-            for hint in hints(part, &record.evidence.checks) {
-                html.raw("<p class=\"hint\"><b>Hint</b> ").text(hint).raw("</p>");
-            }
-            decided_by(html, part, &record.evidence.checks);
-        }
-        html.raw("</td><td class=\"worth\"><strong>").text(&of_part(part));
-        html.raw("</strong> <span class=\"of\">of ").text(&points(part.out_of)).raw("</span>");
-        html.bar(part.points, part.points_max, part.out_of).raw("</td></tr>\n");
+        html.text(&part.reason).raw("</p></td><td class=\"worth\"><strong>").text(&of_part(part));
+        html.raw("</strong> <span class=\"of\">of ").text(&points(part.out_of));
+        html.raw("</span></td></tr>\n");
     }
-    html.raw("</tbody>\n</table>\n");
-    for words in looks_like("", &record.diagnoses) {
-        html.raw("<p class=\"hint\"><b>Also looks like</b> ").text(&words).raw("</p>\n");
-    }
-    html.raw("</section>\n");
+    html.raw("</tbody>\n</table>\n</details>\n");
 }
 
-/// Links to the checks that decided a part.
-fn decided_by(html: &mut Html, part: &PartGrade, all: &[Check]) {
-    for (index, name) in part.evidence.iter().enumerate() {
-        html.raw(if index == 0 { "<p class=\"decided\">Decided by " } else { ", " });
-        let place = all.iter().position(|check| check.name() == *name || check.id.name() == name);
-        match place {
-            Some(place) => {
-                html.raw("<a href=\"#check-").show(place).raw("\">").text(name).raw("</a>");
-            }
-            None => {
-                html.text(name);
-            }
-        }
-    }
-    html.raw(if part.evidence.is_empty() { "" } else { "</p>" });
+/// The checks that no part has shown.
+fn rest(html: &mut Html, all: &[Check], shown: &[usize], places: &Places) {
+    let pick = |wanted: fn(&Check) -> bool| -> Vec<Placed> {
+        let rest = all.iter().enumerate().filter(|(place, _)| !shown.contains(place));
+        rest.filter(|(_, check)| wanted(check)).collect()
+    };
+    let mut failed = pick(is_failure);
+    failed.sort_by(|a, b| b.1.error.total_cmp(&a.1.error));
+    let what = if shown.is_empty() { "failed" } else { "more failed" };
+    checks::folded(html, what, false, &failed, |html, check| checks::article(html, check, places));
+    let silent = |check: &Check| matches!(check.verdict, Verdict::NotJudged | Verdict::NotRun);
+    checks::folded(html, "could not be judged", false, &pick(silent), checks::line);
+    let passed = |check: &Check| check.verdict == Verdict::Pass;
+    checks::folded(html, "passed", false, &pick(passed), checks::line);
 }
 
 /// The largest error among the failed checks that decided a part, for the curve.
@@ -165,11 +203,27 @@ fn diagnostics(html: &mut Html, diagnostics: &str) {
     html.raw("</pre>\n</section>\n");
 }
 
+/// Errors and warnings; what is only noted, folded: most submissions have notes.
 fn findings(html: &mut Html, findings: &[Finding]) {
-    if findings.is_empty() {
-        return;
+    let of = |noted: bool| -> Vec<&Finding> {
+        let is_note = |finding: &&Finding| (finding.severity == Severity::Note) == noted;
+        findings.iter().filter(is_note).collect()
+    };
+    let (serious, notes) = (of(false), of(true));
+    if !serious.is_empty() {
+        html.raw("<section>\n<h2>Findings</h2>\n");
+        finding_list(html, &serious);
+        html.raw("</section>\n");
     }
-    html.raw("<section>\n<h2>Findings</h2>\n<ul class=\"findings\">\n");
+    if !notes.is_empty() {
+        html.raw("<details>\n<summary>").text(&count(notes.len(), "note")).raw("</summary>\n");
+        finding_list(html, &notes);
+        html.raw("</details>\n");
+    }
+}
+
+fn finding_list(html: &mut Html, findings: &[&Finding]) {
+    html.raw("<ul class=\"findings\">\n");
     for finding in findings {
         let class = match finding.severity {
             Severity::Error => "badge bad",
@@ -191,7 +245,7 @@ fn findings(html: &mut Html, findings: &[Finding]) {
         }
         html.raw("</li>\n");
     }
-    html.raw("</ul>\n</section>\n");
+    html.raw("</ul>\n");
 }
 
 /// Conditions as a list of terms.

@@ -1,0 +1,258 @@
+//! The class at a glance, in front of its table: what waits for the instructor, which mistakes were made, how points are
+//! spread, and where errors lie.
+
+use std::collections::BTreeMap;
+
+use super::super::number::{is_failure, is_range, percent, points, range, value};
+use super::super::{BatchReport, HTML_FILE, INSTRUCTOR, SubmissionReport, is_private};
+use super::markup::Html;
+use crate::columns::count;
+use crate::evidence::{Check, CheckId, Verdict};
+use crate::rubric::Part;
+
+/// So many names stand in a list before the rest is folded.
+const NAMES: usize = 12;
+/// Bins of a distribution, and one for all points.
+const BINS: usize = 10;
+
+/// What a check says of a renderer or a compiler that was ended for its time.
+const OUT_OF_TIME: &str = "ran out of time";
+
+/// Who a submission is by, for lists.
+pub(super) fn who(entry: &SubmissionReport) -> String {
+    let name = entry.student().full_name();
+    if name.is_empty() { entry.record.name.clone() } else { name }
+}
+
+/// A link to a submission's page, at a part of it if one is named.
+pub(super) fn link(html: &mut Html, report: &BatchReport, entry: &SubmissionReport, part: &str) {
+    let folder =
+        if entry.has_instructor_page(report) { format!("{INSTRUCTOR}/") } else { String::new() };
+    html.raw("<a href=\"").address(&format!("{folder}{}/{HTML_FILE}", entry.record.slug));
+    if !part.is_empty() {
+        html.raw("#part-").text(part);
+    }
+    html.raw("\">");
+}
+
+/// What the instructor must look at, each kind with its submissions; the page begins with it.
+pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
+    let mut kinds: Vec<(&str, Vec<(&SubmissionReport, String)>)> = Vec::new();
+    let mut add = |kind, of: &dyn Fn(&SubmissionReport) -> Option<String>| {
+        let found = report.entries.iter().filter_map(|entry| Some((entry, of(entry)?)));
+        let found: Vec<_> = found.collect();
+        if !found.is_empty() {
+            kinds.push((kind, found));
+        }
+    };
+    add("not wholly judged: grade again, or decide", &|entry| {
+        let (least, most) = (entry.grade.points, entry.grade.points_max);
+        is_range(least, most).then(|| format!("{} points", range(least, most)))
+    });
+    add("images without code: confirm or refuse", &|entry| {
+        let own = entry.grade.unconfirmed;
+        (own > 0.0).then(|| format!("{} points for images", points(own)))
+    });
+    add("to be looked at before their points count", &|entry| {
+        let mut private = entry.grade.remarks.iter().filter(|r| is_private(r, &report.rules));
+        private.next().cloned()
+    });
+    add("share something with another: see their pages", &|entry| {
+        let mut told =
+            entry.record.evidence.checks.iter().filter(|check| !check.private.is_empty());
+        told.next().map(|check| check.private.clone())
+    });
+    add("ran out of time", &|entry| {
+        let late = |check: &&Check| is_failure(check) && check.summary.contains(OUT_OF_TIME);
+        entry.record.evidence.checks.iter().find(late).map(Check::name)
+    });
+    add("when it was submitted is not known", &|entry| {
+        entry.standing.time_unknown.then(String::new)
+    });
+    if kinds.is_empty() {
+        return;
+    }
+    html.raw("<section>\n<h2>For you to decide</h2>\n");
+    for (kind, found) in kinds {
+        html.raw("<details class=\"waiting\"><summary>")
+            .text(&count(found.len(), "submission"))
+            .raw(" ");
+        html.text(kind).raw("</summary>\n<ul class=\"names\">\n");
+        for (entry, why) in found {
+            html.raw("<li>");
+            link(html, report, entry, "");
+            html.text(&who(entry)).raw("</a> <small>").text(&why).raw("</small></li>\n");
+        }
+        html.raw("</ul></details>\n");
+    }
+    html.raw("</section>\n");
+}
+
+/// What a group of submissions has in common.
+struct Group<'a> {
+    part: &'a str,
+    words: &'a str,
+    entries: Vec<&'a SubmissionReport>,
+}
+
+/// Groups by the mistake that a part looks like, the most frequent first.
+pub(super) fn mistakes(html: &mut Html, report: &BatchReport) {
+    let mut groups: BTreeMap<(&str, String), Group> = BTreeMap::new();
+    for entry in &report.entries {
+        for found in entry.record.diagnoses.iter().filter(|found| !found.part.is_empty()) {
+            // A fitted number may stand in the words: the mistake's name is the same for all.
+            let names: Vec<String> = found.mistakes.iter().map(|names| names.join("/")).collect();
+            let key = if names.is_empty() { found.words.clone() } else { names.join(" and ") };
+            let (part, words) = (found.part.as_str(), found.words.as_str());
+            let group = groups.entry((part, key));
+            let group = group.or_insert(Group { part, words, entries: Vec::new() });
+            group.entries.push(entry);
+        }
+        let undone = |check: &&Check| check.verdict == Verdict::NotImplemented;
+        for part in &report.rules.parts {
+            let lost =
+                entry.grade.parts.iter().any(|own| own.id == part.id && own.points_max == 0.0);
+            let mut own = entry.record.evidence.checks.iter().filter(undone);
+            if lost && own.any(|check| part.evidence.contains(&check.id)) {
+                let (part, words) = (part.id.as_str(), "not implemented");
+                let group = groups.entry((part, words.to_owned()));
+                group.or_insert(Group { part, words, entries: Vec::new() }).entries.push(entry);
+            }
+        }
+    }
+    let mut groups: Vec<Group> = groups.into_values().collect();
+    if groups.is_empty() {
+        return;
+    }
+    groups.sort_by_key(|group| std::cmp::Reverse(group.entries.len()));
+    html.raw("<section>\n<h2>Mistakes in this class</h2>\n<ul class=\"groups\">\n");
+    for Group { part, words, entries } in groups {
+        html.raw("<li><strong>").text(&percent(entries.len(), report.entries.len()));
+        html.raw("</strong> <span class=\"id\">").text(part).raw("</span> ").text(words);
+        html.raw(" <span class=\"names\">");
+        let (first, others) = entries.split_at(entries.len().min(NAMES));
+        names(html, report, part, first);
+        if !others.is_empty() {
+            html.raw("<details><summary>and ").text(&count(others.len(), "other"));
+            html.raw("</summary>");
+            names(html, report, part, others);
+            html.raw("</details>");
+        }
+        html.raw("</span></li>\n");
+    }
+    html.raw("</ul>\n</section>\n");
+}
+
+fn names(html: &mut Html, report: &BatchReport, part: &str, entries: &[&SubmissionReport]) {
+    for (index, entry) in entries.iter().enumerate() {
+        html.raw(if index == 0 { "" } else { ", " });
+        link(html, report, entry, part);
+        html.text(&who(entry)).raw("</a>");
+    }
+}
+
+/// How the points of each part are spread: a bar for each tenth of them, and one for all.
+pub(super) fn distribution(html: &mut Html, report: &BatchReport) {
+    html.raw("<section>\n<h2>Points by part</h2>\n<div class=\"spread\">\n");
+    for part in &report.rules.parts {
+        let (bins, mean) = spread(report, part);
+        let most = bins.iter().copied().max().unwrap_or_default().max(1);
+        html.raw("<figure><svg viewBox=\"0 0 112 42\" width=\"168\" height=\"63\" role=\"img\" aria-label=\"");
+        html.text(&format!(
+            "Part {}: {} of {} with all points, {} with none, mean {}",
+            part.id,
+            bins[BINS],
+            report.entries.len(),
+            bins[0],
+            value(mean)
+        ));
+        html.raw("\">");
+        for (bin, &number) in bins.iter().enumerate() {
+            if number > 0 {
+                // At least a line, so that one among a thousand is seen.
+                let height = (40.0 * number as f64 / most as f64).max(1.0);
+                html.raw("<rect class=\"").raw(if bin == BINS { "full" } else { "some" });
+                html.raw("\" x=\"").show(10 * bin + 1).raw("\" width=\"8\" y=\"");
+                html.text(&format!("{:.1}", 41.0 - height)).raw("\" height=\"");
+                html.text(&format!("{height:.1}")).raw("\"><title>").show(number);
+                html.raw("</title></rect>");
+            }
+        }
+        html.raw("<path class=\"grid\" d=\"M0 41.5H112\"/></svg><figcaption><b>").text(&part.id);
+        html.raw("</b> ").text(&part.title).raw("<br>mean ").text(&value(mean)).raw(" of ");
+        html.text(&points(part.points)).raw("; all points: ");
+        html.text(&percent(bins[BINS], report.entries.len())).raw("</figcaption></figure>\n");
+    }
+    html.raw("</div>\n</section>\n");
+}
+
+/// How many submissions have so many tenths of a part's points, and the mean.
+fn spread(report: &BatchReport, part: &Part) -> ([usize; BINS + 1], f64) {
+    let mut bins = [0; BINS + 1];
+    let mut sum = 0.0;
+    for entry in &report.entries {
+        let own = entry.grade.parts.iter().find(|own| own.id == part.id);
+        let earned = own.map_or(0.0, |own| own.points);
+        sum += earned;
+        let fraction = if part.points > 0.0 { earned / part.points } else { 1.0 };
+        let bin = if fraction >= 1.0 { BINS } else { (fraction * BINS as f64) as usize };
+        bins[bin.min(BINS)] += 1;
+    }
+    (bins, sum / report.entries.len().max(1) as f64)
+}
+
+/// The checks of images whose errors are shown by scene.
+const IMAGES: [CheckId; 4] =
+    [CheckId::ImageOffline, CheckId::ImageRealtime, CheckId::BonusImage, CheckId::ShadowRays];
+
+/// The mean error of images and shadows by scene: which scenes tell mistakes apart.
+pub(super) fn errors(html: &mut Html, report: &BatchReport) {
+    /// Sum of errors and how many there are.
+    type Sum = (f64, usize);
+    let mut scenes: BTreeMap<(bool, &str), [Sum; IMAGES.len()]> = BTreeMap::new();
+    for check in report.entries.iter().flat_map(|entry| &entry.record.evidence.checks) {
+        let Some(column) = IMAGES.iter().position(|id| *id == check.id) else { continue };
+        let judged =
+            matches!(check.verdict, Verdict::Pass | Verdict::Fail | Verdict::NotImplemented);
+        if judged && check.error.is_finite() && !check.scene.is_empty() {
+            let row = scenes.entry((check.held_back, &check.scene)).or_default();
+            row[column].0 += check.error.clamp(0.0, 1.0);
+            row[column].1 += 1;
+        }
+    }
+    if scenes.is_empty() {
+        return;
+    }
+    html.raw("<details>\n<summary>Mean error by scene</summary>\n<div class=\"scroll\" role=\"region\" aria-label=\"Mean error by scene\" tabindex=\"0\">\n");
+    html.raw("<table class=\"heat\">\n<thead><tr><th scope=\"col\">Scene</th>");
+    for id in IMAGES {
+        html.raw("<th scope=\"col\" class=\"number\">").text(id.name()).raw("</th>");
+    }
+    html.raw("</tr></thead>\n<tbody>\n");
+    for ((held_back, scene), row) in scenes {
+        html.raw("<tr><th scope=\"row\">").text(scene);
+        html.raw(if held_back { " <small>held back</small></th>" } else { "</th>" });
+        for (sum, number) in row {
+            if number == 0 {
+                html.raw("<td></td>");
+                continue;
+            }
+            let mean = sum / number as f64;
+            html.raw("<td class=\"number ").raw(heat(mean)).raw("\">").text(&value(mean));
+            html.raw("</td>");
+        }
+        html.raw("</tr>\n");
+    }
+    html.raw("</tbody>\n</table>\n</div>\n</details>\n");
+}
+
+/// The class of a mean error: how dark its cell is.
+fn heat(mean: f64) -> &'static str {
+    match mean {
+        m if m <= 0.0 => "h0",
+        m if m < 0.01 => "h1",
+        m if m < 0.05 => "h2",
+        m if m < 0.2 => "h3",
+        _ => "h4",
+    }
+}

@@ -1,0 +1,79 @@
+//! Pictures on pages, each with its size, and the way to the viewer.
+
+use super::markup::Html;
+use crate::evidence::{Check, Picture};
+use crate::report::VIEW_FILE;
+use crate::viewer::ViewedCase;
+
+/// Where the files of pictures lie, as seen from the page.
+#[derive(Clone, Copy)]
+pub(super) struct Places<'a> {
+    /// The folder of public pictures: empty, or ending with a slash.
+    pub public: &'a str,
+    /// What the viewer shows.
+    pub views: &'a [ViewedCase],
+}
+
+impl Places<'_> {
+    /// The pictures of a check, and a link to the viewer where it shows them.
+    pub(super) fn of_check(&self, html: &mut Html, check: &Check) {
+        let folder = if check.held_back { "" } else { self.public };
+        let name = check.name();
+        let view = self.views.iter().find(|view| view.id == name);
+        let target = view.map(|view| (format!("{folder}{VIEW_FILE}"), fragment(&view.id)));
+        let files = |picture: &Picture| format!("{folder}{}", picture.file);
+        figures(html, &name, &check.pictures, &files, target.as_ref());
+        if let Some((page, fragment)) = &target {
+            html.raw("<p class=\"open\"><a href=\"").address(page).raw("#").text(fragment);
+            html.raw("\">Open in the viewer</a>: exposure, wipe, pixel values, where each rule counts</p>\n");
+        }
+    }
+
+    /// Pictures of the thing called `name`.
+    pub(super) fn of(&self, html: &mut Html, name: &str, pictures: &[Picture]) {
+        let files = |picture: &Picture| format!("{}{}", self.public, picture.file);
+        figures(html, name, pictures, &files, None);
+    }
+}
+
+/// The part of the viewer's address that names a case.
+fn fragment(case: &str) -> String {
+    let mut fragment = "case=".to_owned();
+    for byte in case.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-_.".contains(&byte) {
+            fragment.push(char::from(byte));
+        } else {
+            fragment.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    fragment
+}
+
+/// Pictures side by side; each leads to the viewer, or to itself.
+fn figures(
+    html: &mut Html,
+    name: &str,
+    pictures: &[Picture],
+    file_of: &dyn Fn(&Picture) -> String,
+    view: Option<&(String, String)>,
+) {
+    if pictures.is_empty() {
+        return;
+    }
+    html.raw("<div class=\"pictures\">\n");
+    for picture in pictures {
+        let file = file_of(picture);
+        html.raw("<figure><a href=\"");
+        match view {
+            Some((page, fragment)) => html.address(page).raw("#").text(fragment),
+            None => html.address(&file),
+        };
+        html.raw("\"><img loading=\"lazy\" src=\"").address(&file);
+        if picture.width > 0 {
+            html.raw("\" width=\"").show(picture.width).raw("\" height=\"").show(picture.height);
+        }
+        html.raw("\" alt=\"").text(name).raw(": ").text(&picture.title);
+        html.raw("\"></a><figcaption>").text(&picture.title).raw("</figcaption></figure>\n");
+    }
+    html.raw("</div>\n");
+}
