@@ -18,7 +18,7 @@ use crate::viewer::{Layer, LayerKind, ViewedCase, write_excess, write_image, wri
 /// What the values of renders are.
 const UNIT: &str = "radiance L [W m⁻² sr⁻¹]";
 /// The median lit value comes to this linear value in the viewer.
-const MIDDLE: f32 = 0.25;
+const MIDDLE: f32 = 0.18;
 /// Relative differences are relative to no less than this fraction of the median lit value.
 const DARKEST: f32 = 0.05;
 /// The images of one submission for the viewer take so many bytes at most, students' and instructor's together: a

@@ -9,19 +9,21 @@ use crate::evidence::{Check, Measure, Verdict};
 /// A check and its place in the evidence, by which it is linked.
 pub(super) type Placed<'a> = (usize, &'a Check);
 
-/// Checks behind a line that says what they are.
+/// Checks behind a line that says how many of them did what: `3 more checks` `failed`.
 pub(super) fn folded(
     html: &mut Html,
-    what: &str,
-    open: bool,
+    (noun, what): (&str, &str),
     checks: &[Placed],
     show: impl Fn(&mut Html, Placed),
 ) {
     if checks.is_empty() {
         return;
     }
-    html.raw(if open { "<details open>" } else { "<details>" }).raw("\n<summary>");
-    html.text(&count(checks.len(), "check")).raw(" ").text(what).raw("</summary>\n");
+    html.raw("<details>\n<summary>")
+        .text(&count(checks.len(), noun))
+        .raw(" ")
+        .text(what)
+        .raw("</summary>\n");
     for &check in checks {
         show(html, check);
     }
@@ -30,9 +32,9 @@ pub(super) fn folded(
 
 /// A check in full: what was found, its measures and pictures.
 pub(super) fn article(html: &mut Html, (place, check): Placed, places: &Places) {
-    html.raw("<article id=\"check-").show(place).raw("\">\n<h4>");
+    html.raw("<article id=\"check-").show(place).raw("\">\n<h3>");
     title(html, check);
-    html.raw("</h4>\n<p>").text(&check.summary).raw("</p>\n");
+    html.raw("</h3>\n<p>").text(&check.summary).raw("</p>\n");
     if !check.hint.is_empty() {
         html.raw("<p class=\"hint\"><b>Hint</b> ").text(&check.hint).raw("</p>\n");
     }

@@ -25,7 +25,7 @@ pub(super) fn lobe(html: &mut Html, lobe: &Lobe) {
         let r = if value.is_finite() { radius(value.max(0.0)) } else { RADIUS };
         (r * sin, -r * cos)
     };
-    html.raw("<figure class=\"lobe\">\n<svg viewBox=\"-170 -170 340 190\" width=\"340\" height=\"190\" role=\"img\" ");
+    html.raw("<figure class=\"lobe\">\n<svg viewBox=\"-190 -170 380 190\" width=\"380\" height=\"190\" role=\"img\" ");
     html.raw("aria-label=\"Polar plot of the BSDF: expected as a line, found as dots\">\n");
     for ring in [0.25, 0.5, 0.75, 1.0] {
         let r = short(ring * RADIUS);

@@ -15,6 +15,8 @@ const NAMES: usize = 12;
 /// Bins of a distribution, and one for all points.
 const BINS: usize = 10;
 
+/// What a part that nobody began looks like.
+const UNDONE: &str = "not implemented";
 /// What a check says of a renderer or a compiler that was ended for its time.
 const OUT_OF_TIME: &str = "ran out of time";
 
@@ -76,7 +78,7 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
     for (kind, found) in kinds {
         html.raw("<details class=\"waiting\"><summary>")
             .text(&count(found.len(), "submission"))
-            .raw(" ");
+            .raw(": ");
         html.text(kind).raw("</summary>\n<ul class=\"names\">\n");
         for (entry, why) in found {
             html.raw("<li>");
@@ -95,7 +97,7 @@ struct Group<'a> {
     entries: Vec<&'a SubmissionReport>,
 }
 
-/// Groups by the mistake that a part looks like, the most frequent first.
+/// Groups by the mistake that a part looks like, the most frequent first; then what was not begun.
 pub(super) fn mistakes(html: &mut Html, report: &BatchReport) {
     let mut groups: BTreeMap<(&str, String), Group> = BTreeMap::new();
     for entry in &report.entries {
@@ -114,7 +116,7 @@ pub(super) fn mistakes(html: &mut Html, report: &BatchReport) {
                 entry.grade.parts.iter().any(|own| own.id == part.id && own.points_max == 0.0);
             let mut own = entry.record.evidence.checks.iter().filter(undone);
             if lost && own.any(|check| part.evidence.contains(&check.id)) {
-                let (part, words) = (part.id.as_str(), "not implemented");
+                let (part, words) = (part.id.as_str(), UNDONE);
                 let group = groups.entry((part, words.to_owned()));
                 group.or_insert(Group { part, words, entries: Vec::new() }).entries.push(entry);
             }
@@ -124,7 +126,7 @@ pub(super) fn mistakes(html: &mut Html, report: &BatchReport) {
     if groups.is_empty() {
         return;
     }
-    groups.sort_by_key(|group| std::cmp::Reverse(group.entries.len()));
+    groups.sort_by_key(|group| (group.words == UNDONE, std::cmp::Reverse(group.entries.len())));
     html.raw("<section>\n<h2>Mistakes in this class</h2>\n<ul class=\"groups\">\n");
     for Group { part, words, entries } in groups {
         html.raw("<li><strong>").text(&percent(entries.len(), report.entries.len()));

@@ -5,6 +5,9 @@ use crate::evidence::{Check, Picture};
 use crate::report::VIEW_FILE;
 use crate::viewer::ViewedCase;
 
+/// Narrower pictures than this, in pixels, are shown enlarged.
+const SMALL: usize = 300;
+
 /// Where the files of pictures lie, as seen from the page.
 #[derive(Clone, Copy)]
 pub(super) struct Places<'a> {
@@ -68,7 +71,10 @@ fn figures(
             Some((page, fragment)) => html.address(page).raw("#").text(fragment),
             None => html.address(&file),
         };
-        html.raw("\"><img loading=\"lazy\" src=\"").address(&file);
+        // A small film is enlarged: its pixels stay pixels.
+        let small = (1..SMALL).contains(&picture.width);
+        html.raw(if small { "\"><img class=\"small\"" } else { "\"><img" });
+        html.raw(" loading=\"lazy\" src=\"").address(&file);
         if picture.width > 0 {
             html.raw("\" width=\"").show(picture.width).raw("\" height=\"").show(picture.height);
         }

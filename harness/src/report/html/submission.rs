@@ -17,8 +17,8 @@ use crate::rubric::PartGrade;
 /// So many lines of the compiler's are shown.
 const DIAGNOSTIC_LINES: usize = 400;
 
-/// The page of one submission, in the order in which it is wanted: the points; what was lost, why, and what it looks
-/// like; what the compiler says; findings; folded, what was right and everything else that was found out.
+/// The page of one submission, in the order in which it is wanted: the points; what a compiler says; what was lost,
+/// why, and what it looks like; findings; folded, what was right and everything else that was found out.
 pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader) -> String {
     let known;
     let own = entry;
@@ -59,15 +59,8 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
         Reader::Instructor => format!("{ROOT}/{}/", record.slug),
     };
     let places = Places { public: &public, views: &record.views };
-    // Code that does not build is why the rest is as it is.
-    let builds = record
-        .evidence
-        .checks
-        .iter()
-        .all(|check| check.id != crate::rubric::BUILD || check.verdict == Verdict::Pass);
-    if !builds {
-        diagnostics(&mut html, &record.diagnostics);
-    }
+    // An error of the compiler or a shader is why the rest is as it is.
+    diagnostics(&mut html, &record.diagnostics);
     let mut lost = Lost::new(&report.rules, record, places);
     let losing: Vec<&PartGrade> = grade.parts.iter().filter(|part| is_lost(part)).collect();
     if !losing.is_empty() {
@@ -79,9 +72,6 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     }
     for words in looks_like("", &record.diagnoses) {
         html.raw("<p class=\"hint\"><b>Also looks like</b> ").text(&words).raw("</p>\n");
-    }
-    if builds {
-        diagnostics(&mut html, &record.diagnostics);
     }
     findings(&mut html, &record.findings);
     html.raw("<section>\n<h2>Everything else</h2>\n");
@@ -172,12 +162,14 @@ fn rest(html: &mut Html, all: &[Check], shown: &[usize], places: &Places) {
     };
     let mut failed = pick(is_failure);
     failed.sort_by(|a, b| b.1.error.total_cmp(&a.1.error));
-    let what = if shown.is_empty() { "failed" } else { "more failed" };
-    checks::folded(html, what, false, &failed, |html, check| checks::article(html, check, places));
+    let noun = if shown.is_empty() { "check" } else { "more check" };
+    checks::folded(html, (noun, "failed"), &failed, |html, check| {
+        checks::article(html, check, places)
+    });
     let silent = |check: &Check| matches!(check.verdict, Verdict::NotJudged | Verdict::NotRun);
-    checks::folded(html, "could not be judged", false, &pick(silent), checks::line);
+    checks::folded(html, ("check", "could not be judged"), &pick(silent), checks::line);
     let passed = |check: &Check| check.verdict == Verdict::Pass;
-    checks::folded(html, "passed", false, &pick(passed), checks::line);
+    checks::folded(html, ("check", "passed"), &pick(passed), checks::line);
 }
 
 /// The largest error among the failed checks that decided a part, for the curve.

@@ -16,6 +16,7 @@ const KEYS = [
   ["Ctrl+Right, Ctrl+Left or X", "signed, absolute, relative difference"],
   ["+, - or wheel", "zoom"],
   ["H, J, K, L or drag", "move"],
+  ["click or tap", "keep the probe on a pixel"],
   ["F; 0", "fit into the window; pixel by pixel"],
   ["P", "go to the pixel that is furthest off"],
   ["B", "go to the largest block of failing pixels"],
@@ -150,6 +151,8 @@ function listenToPointers(change) {
   const target = get("stage");
   const pointers = new Map();
   let drags = null;
+  /** Where a click or tap began; null once it is a drag. */
+  let tapped = null;
   const placeOf = (event) => {
     const { left, top } = target.getBoundingClientRect();
     return { x: event.clientX - left, y: event.clientY - top };
@@ -161,6 +164,7 @@ function listenToPointers(change) {
     const place = placeOf(event);
     pointers.set(event.pointerId, place);
     target.setPointerCapture(event.pointerId);
+    tapped = pointers.size === 1 ? place : null;
     if (pointers.size === 1) drags = nearEdge(place, event.pointerType === "touch") ? "wipe" : "image";
     else drags = "image";
     change(() => { stage.hover = pixelAt(place); });
@@ -175,6 +179,7 @@ function listenToPointers(change) {
       showProbe();
       return;
     }
+    if (tapped && Math.hypot(place.x - tapped.x, place.y - tapped.y) > 4) tapped = null;
     change(() => {
       if (drags === "wipe") state.wipe = clamp(place.x / stage.width, [0, 1]);
       else if (pointers.size === 1) move(place.x - before.x, place.y - before.y);
@@ -190,7 +195,12 @@ function listenToPointers(change) {
     move((place.x - before.x) / 2, (place.y - before.y) / 2);
   };
   for (const name of ["pointerup", "pointercancel"]) {
-    target.addEventListener(name, (event) => pointers.delete(event.pointerId));
+    target.addEventListener(name, (event) => {
+      pointers.delete(event.pointerId);
+      // The probe stays on a pixel that was clicked: a finger does not hover.
+      if (tapped && name === "pointerup" && drags === "image") change(() => { state.pin = pixelAt(tapped); });
+      if (pointers.size === 0) drags = null;
+    });
   }
   target.addEventListener("pointerleave", () => {
     stage.hover = null;

@@ -42,7 +42,7 @@ function fillLayers(change) {
       else state.layer = index;
     }));
     const against = element("button", { type: "button", className: "against", textContent: "vs", title: `Hold against it (Shift+${index + 1})` });
-    against.setAttribute("aria-label", `hold ${layer.name} against the image shown`);
+    against.setAttribute("aria-label", `vs ${layer.name}`);
     against.addEventListener("click", () => change(() => { state.reference = index; }));
     return element("li", {}, show, against);
   }));
