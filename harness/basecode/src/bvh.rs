@@ -1,30 +1,37 @@
-//! Ray casting: a bounding volume hierarchy over triangles, four children to a node.
+//! Ray casting: a bounding volume hierarchy over triangles, eight children to a node.
 //!
-//! obvhs builds a binary tree; folding it and the traversal are ours: a ray meets four boxes or four triangles at
-//! once, and any-hit queries stop at the first hit.
+//! obvhs builds a binary tree; folding it and the traversal are ours: a ray meets eight boxes or eight triangles at
+//! once, and any-hit queries stop at the first hit. Where the machine has AVX2 it is used, with the same hits.
 
-use glam::{Vec3, Vec4};
+mod lanes;
+#[cfg(test)]
+mod tests;
+
+use glam::Vec3;
 use obvhs::bvh2::builder::build_bvh2_from_tris;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::triangle::Triangle;
+use smallvec::SmallVec;
 
 use crate::Ray;
 use crate::realtime::refuse_rays;
+use lanes::{Eight, Lanes, Portable};
 
 /// A hierarchy over the triangles of a scene.
 pub struct Bvh {
     /// The first is the root.
     nodes: Vec<Node>,
     leaves: Vec<Triangles>,
-    stack_size: usize,
+    /// Whether this machine has AVX2.
+    avx2: bool,
 }
 
-/// The boxes of four children, axis by axis, and what is in them.
-#[derive(Clone, Copy)]
+/// The boxes of eight children, and what is in them.
+#[derive(Clone)]
 struct Node {
-    min: [Vec4; 3],
-    max: [Vec4; 3],
-    children: [Child; 4],
+    /// The lower and the upper bounds, axis by axis.
+    bounds: [[Eight; 3]; 2],
+    children: [Child; 8],
     /// Bit i: there is a child i.
     present: u32,
 }
@@ -47,21 +54,17 @@ pub struct Hit {
     pub triangle: usize,
 }
 
-/// Four triangles as the intersector wants them, coordinate by coordinate: a corner and the two edges that leave it.
-/// Where there are fewer, the rest has no area and is not hit.
-#[derive(Clone, Copy)]
+/// Up to eight triangles.
 struct Triangles {
-    corner: [Vec4; 3],
-    edge1: [Vec4; 3],
-    edge2: [Vec4; 3],
-    index: [u32; 4],
+    /// Vertex by vertex, axis by axis; NaN where there is no triangle.
+    vertices: [[Eight; 3]; 3],
+    index: [u32; 8],
     /// Bit i: triangle i takes part in any-hit queries.
     blocks: u32,
 }
 
-/// Trees are balanced enough that this many pending children never come together in practice; a
-/// deeper tree gets a stack on the heap.
-const STACK: usize = 48;
+/// So many pending children have room without an allocation; a deeper tree gets a stack on the heap.
+const STACK: usize = 96;
 
 impl Bvh {
     /// Builds a hierarchy. `blocks[i]` tells whether triangle i takes part in [`Bvh::any_hit`].
@@ -77,30 +80,64 @@ impl Bvh {
         let params = obvhs::BvhBuildParams::medium_build();
         let bvh = build_bvh2_from_tris(&triangles, params, &mut std::time::Duration::default());
         let mut leaves = Vec::new();
-        let (nodes, depth) = fold(&bvh.nodes, |first, count| {
+        let nodes = fold(&bvh.nodes, |first, count| {
             let indices = &bvh.primitive_indices[first as usize..(first + count) as usize];
             let at = leaves.len() as u32;
-            leaves.extend(indices.chunks(4).map(|four| Triangles::new(four, &triangles, blocks)));
+            leaves.extend(indices.chunks(8).map(|eight| Triangles::new(eight, vertices, blocks)));
             Child { first: at, leaves: leaves.len() as u32 - at }
         });
-        // Of four children one is gone into.
-        Self { nodes, leaves, stack_size: 3 * depth + 1 }
+        #[cfg(target_arch = "x86_64")]
+        let avx2 = lanes::is_here();
+        #[cfg(not(target_arch = "x86_64"))]
+        let avx2 = false;
+        Self { nodes, leaves, avx2 }
     }
 
-    /// The closest hit with t in [min_t, max_t], from either side of a triangle.
+    /// The closest hit with t in [min_t, max_t], from either side of a triangle; of several at one
+    /// distance that of the lowest index.
+    #[inline(never)]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let mut closest = None;
+        refuse_rays();
+        #[cfg(target_arch = "x86_64")]
+        if self.avx2 {
+            // SAFETY: the machine has AVX2.
+            return unsafe { closest_avx2(self, ray) };
+        }
+        self.closest::<Portable>(ray)
+    }
+
+    /// Whether any blocking triangle is hit with t in [min_t, max_t].
+    #[inline(never)]
+    pub fn any_hit(&self, ray: &Ray) -> bool {
+        refuse_rays();
+        #[cfg(target_arch = "x86_64")]
+        if self.avx2 {
+            // SAFETY: the machine has AVX2.
+            return unsafe { any_avx2(self, ray) };
+        }
+        self.any::<Portable>(ray)
+    }
+
+    #[inline(always)]
+    fn closest<L: Lanes>(&self, ray: &Ray) -> Option<Hit> {
+        let mut closest: Option<Hit> = None;
         let mut max_t = ray.max_t;
-        self.traverse(ray, |wide, leaves| {
+        self.traverse::<L, true>(ray, |wide, leaves| {
             for triangles in leaves {
-                let (mut hit, t, u, v) = triangles.meet(wide, max_t);
+                let (mut hit, found) = triangles.meet(wide, max_t);
+                if hit == 0 {
+                    continue;
+                }
+                let [t, u, v] = [found[0].to_array(), found[1].to_array(), found[2].to_array()];
                 while hit != 0 {
                     let i = hit.trailing_zeros() as usize;
                     hit &= hit - 1;
-                    if t[i] <= max_t {
+                    let triangle = triangles.index[i] as usize;
+                    let wins =
+                        |best: Hit| t[i] < best.t || (t[i] == best.t && triangle < best.triangle);
+                    if closest.is_none_or(wins) {
                         max_t = t[i];
-                        let (barycentric, triangle) = ([u[i], v[i]], triangles.index[i] as usize);
-                        closest = Some(Hit { t: t[i], barycentric, triangle });
+                        closest = Some(Hit { t: max_t, barycentric: [u[i], v[i]], triangle });
                     }
                 }
             }
@@ -109,36 +146,31 @@ impl Bvh {
         closest
     }
 
-    /// Whether any blocking triangle is hit with t in [min_t, max_t].
-    pub fn any_hit(&self, ray: &Ray) -> bool {
+    #[inline(always)]
+    fn any<L: Lanes>(&self, ray: &Ray) -> bool {
         let mut found = false;
-        self.traverse(ray, |wide, leaves| {
-            found = leaves.iter().any(|four| four.meet(wide, ray.max_t).0 & four.blocks != 0);
+        self.traverse::<L, false>(ray, |wide, leaves| {
+            found = leaves.iter().any(|eight| eight.meet(wide, ray.max_t).0 & eight.blocks != 0);
             (!found).then_some(ray.max_t)
         });
         found
     }
 
-    /// Visits the leaves along a ray, nearer ones first. `leaf` answers how far hits still
-    /// matter, or `None` to stop.
+    /// Visits the leaves along a ray, nearer ones first where they are `SORTED`. `leaf` answers how far hits
+    /// still matter, or `None` to stop.
     #[inline(always)]
-    fn traverse(&self, ray: &Ray, mut leaf: impl FnMut(&WideRay, &[Triangles]) -> Option<f32>) {
-        refuse_rays();
+    fn traverse<L: Lanes, const SORTED: bool>(
+        &self,
+        ray: &Ray,
+        mut leaf: impl FnMut(&WideRay<L>, &[Triangles]) -> Option<f32>,
+    ) {
         if self.nodes.is_empty() {
             return;
         }
-        let wide = WideRay::new(ray);
+        let wide = WideRay::<L>::new(ray);
         let mut max_t = ray.max_t;
         // Children put aside, and where the ray enters them; the nearest on top.
-        let mut small = [(Child::default(), 0.0f32); STACK];
-        let mut large = Vec::new();
-        let stack: &mut [(Child, f32)] = if self.stack_size <= STACK {
-            &mut small
-        } else {
-            large.resize(self.stack_size, (Child::default(), 0.0));
-            &mut large
-        };
-        let mut pending = 0;
+        let mut pending = SmallVec::<[(f32, Child); STACK]>::new();
         let mut child = Child::default();
         loop {
             let first = child.first as usize;
@@ -150,25 +182,27 @@ impl Bvh {
             } else {
                 let node = &self.nodes[first];
                 let (mut hit, enter) = node.meet(&wide, max_t);
-                let bottom = pending;
+                if hit.is_power_of_two() {
+                    child = node.children[hit.trailing_zeros() as usize % 8];
+                    continue;
+                }
+                let enter = enter.to_array();
+                let bottom = pending.len();
                 while hit != 0 {
-                    let index = hit.trailing_zeros() as usize;
+                    let index = hit.trailing_zeros() as usize % 8;
                     hit &= hit - 1;
-                    let mut at = pending;
-                    while at > bottom && stack[at - 1].1 < enter[index] {
-                        stack[at] = stack[at - 1];
+                    let next = (enter[index], node.children[index]);
+                    let mut at = pending.len();
+                    pending.push(next);
+                    while SORTED && at > bottom && pending[at - 1].0 < next.0 {
+                        pending[at] = pending[at - 1];
                         at -= 1;
                     }
-                    stack[at] = (node.children[index], enter[index]);
-                    pending += 1;
+                    pending[at] = next;
                 }
             }
             loop {
-                if pending == 0 {
-                    return;
-                }
-                pending -= 1;
-                let (next, enter) = stack[pending];
+                let Some((enter, next)) = pending.pop() else { return };
                 // The search may have narrowed since this child was put aside.
                 if enter <= max_t {
                     child = next;
@@ -179,24 +213,60 @@ impl Bvh {
     }
 }
 
-/// A ray, each component four times over.
-struct WideRay {
-    origin: [Vec4; 3],
-    direction: [Vec4; 3],
-    /// Finite even for a zero component, so that 0 times it is 0 and not NaN.
-    inverse: [Vec4; 3],
-    min_t: Vec4,
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn closest_avx2(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
+    bvh.closest::<lanes::Avx2>(ray)
 }
 
-impl WideRay {
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn any_avx2(bvh: &Bvh, ray: &Ray) -> bool {
+    bvh.any::<lanes::Avx2>(ray)
+}
+
+/// A ray, each component eight times over.
+struct WideRay<L> {
+    origin: [L; 3],
+    inverse: [L; 3],
+    /// By axis, which of a node's bounds the ray meets first.
+    near: [usize; 3],
+    /// The axes in an order in which the direction is longest along the last.
+    axes: [usize; 3],
+    /// The shear that turns the ray to the last axis, and the scale that makes it of length 1.
+    shear: [L; 3],
+    min_t: L,
+}
+
+impl<L: Lanes> WideRay<L> {
+    #[inline(always)]
     fn new(ray: &Ray) -> Self {
-        let four = |v: Vec3| [Vec4::splat(v.x), Vec4::splat(v.y), Vec4::splat(v.z)];
-        let inverse = ray.direction.recip().clamp(Vec3::splat(-1e18), Vec3::splat(1e18));
+        let (o, d) = (ray.origin, ray.direction);
+        // Finite even for a zero component, so that 0 times it is 0 and not NaN.
+        let inverse = d.recip().clamp(Vec3::splat(-1e18), Vec3::splat(1e18));
+        let length = d.abs();
+        let last = if length.z >= length.x && length.z >= length.y {
+            2
+        } else {
+            usize::from(length.y >= length.x)
+        };
+        let axes = [(last + 1) % 3, (last + 2) % 3, last];
+        let longest = d[last];
         Self {
-            origin: four(ray.origin),
-            direction: four(ray.direction),
-            inverse: four(inverse),
-            min_t: Vec4::splat(ray.min_t),
+            origin: [L::splat(o.x), L::splat(o.y), L::splat(o.z)],
+            inverse: [L::splat(inverse.x), L::splat(inverse.y), L::splat(inverse.z)],
+            near: [
+                usize::from(inverse.x < 0.0),
+                usize::from(inverse.y < 0.0),
+                usize::from(inverse.z < 0.0),
+            ],
+            axes,
+            shear: [
+                L::splat(d[axes[0]] / longest),
+                L::splat(d[axes[1]] / longest),
+                L::splat(1.0 / longest),
+            ],
+            min_t: L::splat(ray.min_t),
         }
     }
 }
@@ -206,93 +276,117 @@ impl Node {
     ///
     /// The slab test with the widening of Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013.
     #[inline(always)]
-    fn meet(&self, ray: &WideRay, max_t: f32) -> (u32, [f32; 4]) {
-        let slab = |axis: usize| {
-            let a = (self.min[axis] - ray.origin[axis]) * ray.inverse[axis];
-            let b = (self.max[axis] - ray.origin[axis]) * ray.inverse[axis];
-            (a.min(b), a.max(b))
-        };
-        let ((near_x, far_x), (near_y, far_y), (near_z, far_z)) = (slab(0), slab(1), slab(2));
-        let near = near_x.max(near_y).max(near_z).max(ray.min_t);
-        let far = (far_x.min(far_y).min(far_z) * 1.000_000_5).min(Vec4::splat(max_t));
-        (near.cmple(far).bitmask() & self.present, near.to_array())
+    fn meet<L: Lanes>(&self, ray: &WideRay<L>, max_t: f32) -> (u32, L) {
+        let [x, y, z] = ray.near;
+        let enter = self.slab(ray, 0, x).max(self.slab(ray, 1, y)).max(self.slab(ray, 2, z));
+        let leave =
+            self.slab(ray, 0, 1 - x).min(self.slab(ray, 1, 1 - y)).min(self.slab(ray, 2, 1 - z));
+        let (enter, leave) = (enter.max(ray.min_t), leave.times(L::splat(1.000_000_5)));
+        // A ray that is no number may seem to meet anything, children that are not there too.
+        (enter.at_most(leave.min(L::splat(max_t))) & self.present, enter)
+    }
+
+    /// Where the ray meets the planes that bound the boxes below or above along an axis.
+    #[inline(always)]
+    fn slab<L: Lanes>(&self, ray: &WideRay<L>, axis: usize, bound: usize) -> L {
+        L::load(&self.bounds[bound & 1][axis]).minus(ray.origin[axis]).times(ray.inverse[axis])
     }
 }
 
 impl Triangles {
-    fn new(indices: &[u32], triangles: &[Triangle], blocks: &[bool]) -> Self {
-        let zero = [Vec4::ZERO; 3];
-        let mut four = Self { corner: zero, edge1: zero, edge2: zero, index: [0; 4], blocks: 0 };
+    fn new(indices: &[u32], vertices: &[[Vec3; 3]], blocks: &[bool]) -> Self {
+        let nothing = [[Eight([f32::NAN; 8]); 3]; 3];
+        let mut eight = Self { vertices: nothing, index: [0; 8], blocks: 0 };
         for (i, &index) in indices.iter().enumerate() {
-            let t = &triangles[index as usize];
-            let (edge1, edge2) = (t.v1 - t.v0, t.v2 - t.v0);
-            for axis in 0..3 {
-                four.corner[axis][i] = t.v0[axis];
-                four.edge1[axis][i] = edge1[axis];
-                four.edge2[axis][i] = edge2[axis];
+            for (lanes, vertex) in eight.vertices.iter_mut().zip(vertices[index as usize]) {
+                for axis in 0..3 {
+                    lanes[axis].0[i] = vertex[axis];
+                }
             }
-            four.index[i] = index;
-            four.blocks |= u32::from(blocks[index as usize]) << i;
+            eight.index[i] = index;
+            eight.blocks |= u32::from(blocks[index as usize]) << i;
         }
-        four
+        eight
     }
 
-    /// Which triangles the ray hits within [min_t, max_t], a bit each; where, and the barycentric weights there.
-    ///
-    /// Möller and Trumbore, "Fast, Minimum Storage Ray-Triangle Intersection", 1997, without
-    /// culling. A triangle seen edge-on or of zero area is not hit.
+    /// Vertices as seen from the ray's origin: across the ray, and along it.
     #[inline(always)]
-    fn meet(&self, ray: &WideRay, max_t: f32) -> (u32, [f32; 4], [f32; 4], [f32; 4]) {
-        let p = cross(&ray.direction, &self.edge2);
-        let inv_det = 1.0 / dot(&self.edge1, &p);
-        let s = minus(&ray.origin, &self.corner);
-        let u = dot(&s, &p) * inv_det;
-        let q = cross(&s, &self.edge1);
-        let v = dot(&ray.direction, &q) * inv_det;
-        let t = dot(&self.edge2, &q) * inv_det;
-        // A zero determinant makes u and v infinite or NaN, and some comparison false.
-        let inside = u.cmpge(Vec4::ZERO) & v.cmpge(Vec4::ZERO) & (u + v).cmple(Vec4::ONE);
-        let hit = inside & t.cmpge(ray.min_t) & t.cmple(Vec4::splat(max_t));
-        (hit.bitmask(), t.to_array(), u.to_array(), v.to_array())
+    fn vertex<L: Lanes>(&self, ray: &WideRay<L>, i: usize) -> (L, L, L) {
+        let [x, y, z] = ray.axes;
+        let depth = L::load(&self.vertices[i][z]).minus(ray.origin[z]);
+        let right = L::load(&self.vertices[i][x]).minus(ray.origin[x]);
+        let up = L::load(&self.vertices[i][y]).minus(ray.origin[y]);
+        let [shear_x, shear_y, scale] = ray.shear;
+        (right.minus(shear_x.times(depth)), up.minus(shear_y.times(depth)), scale.times(depth))
+    }
+
+    /// Which triangles the ray hits within [min_t, max_t], a bit each; where, and the barycentric weights of
+    /// the second and the third vertex there.
+    ///
+    /// Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, without culling: no ray
+    /// passes between triangles that share an edge or a vertex. One of zero area as the ray sees it is not hit.
+    #[inline(always)]
+    fn meet<L: Lanes>(&self, ray: &WideRay<L>, max_t: f32) -> (u32, [L; 3]) {
+        let (ax, ay, az) = self.vertex(ray, 0);
+        let (bx, by, bz) = self.vertex(ray, 1);
+        let (cx, cy, cz) = self.vertex(ray, 2);
+        let (mut u, mut v, mut w) =
+            (edge(cx, cy, bx, by), edge(ax, ay, cx, cy), edge(bx, by, ax, ay));
+        let zero = L::splat(0.0);
+        let product = u.times(v).times(w);
+        if product.at_most(zero) & zero.at_most(product) != 0 {
+            // On an edge, or so it seems: products of single precision are exact in double precision.
+            u = edge_exactly(cx, cy, bx, by);
+            v = edge_exactly(ax, ay, cx, cy);
+            w = edge_exactly(bx, by, ax, ay);
+        }
+        let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+        let inside = zero.at_most(least) | most.at_most(zero);
+        if inside == 0 {
+            return (0, [zero; 3]);
+        }
+        // Of no area this is no number, and some comparison false.
+        let scale = L::splat(1.0).over(u.plus(v).plus(w));
+        let t = u.times(az).plus(v.times(bz)).plus(w.times(cz)).times(scale);
+        let hit = inside & ray.min_t.at_most(t) & t.at_most(L::splat(max_t));
+        (hit, [t, v.times(scale), w.times(scale)])
     }
 }
 
+/// On which side of an edge the ray passes, and how far.
 #[inline(always)]
-fn minus(a: &[Vec4; 3], b: &[Vec4; 3]) -> [Vec4; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+fn edge<L: Lanes>(ax: L, ay: L, bx: L, by: L) -> L {
+    ax.times(by).minus(ay.times(bx))
 }
 
+/// The same with the right sign, and zero for zero alone.
 #[inline(always)]
-fn dot(a: &[Vec4; 3], b: &[Vec4; 3]) -> Vec4 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+fn edge_exactly<L: Lanes>(ax: L, ay: L, bx: L, by: L) -> L {
+    let (ax, ay, bx, by) = (ax.to_array(), ay.to_array(), bx.to_array(), by.to_array());
+    let product = |a: f32, b: f32| f64::from(a) * f64::from(b);
+    let mut edge = Eight([0.0; 8]);
+    for (i, edge) in edge.0.iter_mut().enumerate() {
+        *edge = (product(ax[i], by[i]) - product(ay[i], bx[i])) as f32;
+    }
+    L::load(&edge)
 }
 
-#[inline(always)]
-fn cross(a: &[Vec4; 3], b: &[Vec4; 3]) -> [Vec4; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// Folds a binary tree into one with up to four children for each node, which are the largest boxes at hand; also
-/// answers how many nodes lie on the longest way down. `leaf` is given the first and the number of a leaf's primitives.
-fn fold(binary: &[Bvh2Node], mut leaf: impl FnMut(u32, u32) -> Child) -> (Vec<Node>, usize) {
-    let Some(root) = binary.first() else { return (Vec::new(), 0) };
+/// Folds a binary tree into one with up to eight children for each node, which are the largest boxes at hand.
+/// `leaf` is given the first and the number of a leaf's primitives.
+fn fold(binary: &[Bvh2Node], mut leaf: impl FnMut(u32, u32) -> Child) -> Vec<Node> {
+    let Some(root) = binary.first() else { return Vec::new() };
     let halves = |node: &Bvh2Node| {
         let first = node.first_index as usize;
         [binary[first], binary[first + 1]]
     };
-    let empty = Node {
-        min: [Vec4::ZERO; 3],
-        max: [Vec4::ZERO; 3],
-        children: [Child::default(); 4],
-        present: 0,
-    };
-    let (mut nodes, mut deepest) = (vec![empty], 0);
-    // What is to be folded into which node, at which depth.
-    let mut pending = vec![(*root, 0usize, 1usize)];
-    while let Some((from, index, depth)) = pending.pop() {
-        deepest = deepest.max(depth);
+    let empty =
+        Node { bounds: [[Eight([0.0; 8]); 3]; 2], children: [Child::default(); 8], present: 0 };
+    let mut nodes = vec![empty.clone()];
+    // What is to be folded into which node.
+    let mut pending = vec![(*root, 0usize)];
+    while let Some((from, index)) = pending.pop() {
         let mut children = vec![from];
-        while children.len() < 4 {
+        while children.len() < 8 {
             let inner = (0..children.len()).filter(|&i| children[i].prim_count == 0);
             let area = |i: &usize| children[*i].aabb().half_area();
             let Some(largest) = inner.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
@@ -306,8 +400,8 @@ fn fold(binary: &[Bvh2Node], mut leaf: impl FnMut(u32, u32) -> Child) -> (Vec<No
             let next = nodes.len() as u32;
             let node = &mut nodes[index];
             for axis in 0..3 {
-                node.min[axis][i] = aabb.min[axis];
-                node.max[axis][i] = aabb.max[axis];
+                node.bounds[0][axis].0[i] = aabb.min[axis];
+                node.bounds[1][axis].0[i] = aabb.max[axis];
             }
             node.children[i] = if inner {
                 Child { first: next, leaves: 0 }
@@ -316,121 +410,10 @@ fn fold(binary: &[Bvh2Node], mut leaf: impl FnMut(u32, u32) -> Child) -> (Vec<No
             };
             node.present |= 1 << i;
             if inner {
-                pending.push((*child, next as usize, depth + 1));
-                nodes.push(empty);
+                pending.push((*child, next as usize));
+                nodes.push(empty.clone());
             }
         }
     }
-    (nodes, deepest)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Sampler;
-    use glam::{DVec3, Vec3, vec3};
-
-    fn random_vec3(sampler: &Sampler) -> Vec3 {
-        vec3(sampler.next_1d(), sampler.next_1d(), sampler.next_1d()) * 2.0 - 1.0
-    }
-
-    /// Every triangle tested in f64: slow and without any tree.
-    fn brute_force(triangles: &[[Vec3; 3]], ray: &Ray) -> Option<(f64, usize, f64)> {
-        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-        let mut best: Option<(f64, usize, f64)> = None;
-        for (index, triangle) in triangles.iter().enumerate() {
-            let [a, b, c] = triangle.map(|v| v.as_dvec3());
-            let normal: DVec3 = (b - a).cross(c - a);
-            let t = (a - origin).dot(normal) / direction.dot(normal);
-            let p = origin + t * direction;
-            let inside = |from: DVec3, to: DVec3| (to - from).cross(p - from).dot(normal);
-            let margin = inside(a, b).min(inside(b, c)).min(inside(c, a)) / normal.length_squared();
-            if margin >= 0.0
-                && t >= f64::from(ray.min_t)
-                && t <= f64::from(ray.max_t)
-                && best.is_none_or(|(nearest, ..)| t < nearest)
-            {
-                best = Some((t, index, margin));
-            }
-        }
-        best
-    }
-
-    #[test]
-    fn agrees_with_brute_force_in_f64() {
-        let sampler = Sampler::new(1);
-        let triangles: Vec<[Vec3; 3]> = (0..400)
-            .map(|_| {
-                let centre = random_vec3(&sampler);
-                [(); 3].map(|()| centre + 0.2 * random_vec3(&sampler))
-            })
-            .collect();
-        let blocks: Vec<bool> = (0..400).map(|i| i % 3 != 0).collect();
-        let blocking: Vec<[Vec3; 3]> =
-            triangles.iter().zip(&blocks).filter(|(_, b)| **b).map(|(t, _)| *t).collect();
-        let bvh = Bvh::new(&triangles, &blocks);
-        let (mut hits, mut shadowed) = (0, 0);
-        for number in 0..4000 {
-            let mut direction = random_vec3(&sampler).normalize();
-            if number % 4 == 0 {
-                direction = [Vec3::X, -Vec3::Y, Vec3::Z][number / 4 % 3]; // zero components
-            }
-            let ray = Ray::segment(random_vec3(&sampler) * 1.5, direction, 0.01, 1.5);
-            let expected = brute_force(&triangles, &ray);
-            let found = bvh.closest_hit(&ray);
-            match (expected, found) {
-                (Some((t, index, margin)), Some(hit)) if margin > 1e-5 => {
-                    assert_eq!(hit.triangle, index);
-                    assert!((f64::from(hit.t) - t).abs() < 1e-4, "{} {t}", hit.t);
-                    hits += 1;
-                }
-                (Some((_, _, margin)), None) => assert!(margin < 1e-5, "missed by {margin}"),
-                (None, Some(hit)) => {
-                    let [u, v] = hit.barycentric;
-                    assert!(u.min(v).min(1.0 - u - v) < 1e-4, "hit nothing: {hit:?}");
-                }
-                _ => {}
-            }
-            let expected = brute_force(&blocking, &ray);
-            if expected.is_none_or(|(.., margin)| margin > 1e-5) {
-                assert_eq!(bvh.any_hit(&ray), expected.is_some());
-                shadowed += usize::from(expected.is_some());
-            }
-        }
-        assert!(hits > 500 && shadowed > 300, "too few rays hit: {hits}, {shadowed}");
-    }
-
-    /// Cards that double in size and distance make a tree like a ladder.
-    #[test]
-    fn deep_trees_are_walked_to_their_ends() {
-        let card = |i: i32| {
-            let size = 2f32.powi(i);
-            [vec3(size, 0.0, 0.0), vec3(size, size, 0.0), vec3(size, 0.0, size)]
-        };
-        let triangles: Vec<[Vec3; 3]> = (-38..38).map(card).collect();
-        let bvh = Bvh::new(&triangles, &[true; 76]);
-        assert!(bvh.stack_size > STACK, "{}", bvh.stack_size);
-        for (index, i) in (-38..38).enumerate() {
-            let size = 2f32.powi(i);
-            let from = vec3(size * 0.9, size * 0.2, size * 0.2);
-            let ray = Ray::segment(from, Vec3::X, 0.0, size);
-            assert_eq!(bvh.closest_hit(&ray).map(|hit| hit.triangle), Some(index));
-            assert!(bvh.any_hit(&ray) && !bvh.any_hit(&Ray { direction: Vec3::Y, ..ray }));
-        }
-    }
-
-    #[test]
-    fn odd_input_is_survived() {
-        let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
-        let flat = [Vec3::ZERO, Vec3::X, 2.0 * Vec3::X];
-        for triangles in [vec![], vec![triangle], vec![flat], vec![triangle; 300]] {
-            let bvh = Bvh::new(&triangles, &vec![true; triangles.len()]);
-            let down = Ray::new(vec3(0.2, 0.2, 1.0), -Vec3::Z);
-            assert_eq!(bvh.any_hit(&down), triangles.contains(&triangle));
-            let nan = Ray::new(Vec3::NAN, Vec3::NAN);
-            assert!(!bvh.any_hit(&nan) && bvh.closest_hit(&nan).is_none());
-            bvh.any_hit(&Ray::new(Vec3::ZERO, Vec3::ZERO));
-            bvh.any_hit(&Ray::new(Vec3::splat(1e30), Vec3::X));
-        }
-    }
+    nodes
 }

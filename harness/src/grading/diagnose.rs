@@ -12,6 +12,7 @@ use super::offline::{self, Drawn, Run};
 use super::pipeline::Grading;
 use super::realtime;
 use super::session::{self, Session};
+use super::stages::Stages;
 use crate::diagnosis::{
     Catalogue, Diagnosis, Input, Kind, KnownMistake, LENGTH, Material, Observations, Stored,
     StoredView, Thumbnail, View,
@@ -197,7 +198,13 @@ impl Grading<'_> {
             }
         }
         if belongs("2.") {
-            let judged = realtime::judge_images(&session, reference, &self.cases, tolerances);
+            let judged = realtime::judge_images(
+                &session,
+                reference,
+                &self.cases,
+                &Stages::default(),
+                tolerances,
+            );
             drawn.extend(judged.into_iter().flat_map(|judged| judged.drawn));
             // Under the reference's own vertex stage, which is right where a fragment stage is not.
             let frames: Vec<Frame> =

@@ -532,7 +532,7 @@ impl<'a> Grading<'a> {
         let tolerances = &self.assignment.tolerances;
         for cases in self.groups() {
             let begin = checks.len();
-            let judged = realtime::judge_images(session, plugin, cases, tolerances);
+            let judged = realtime::judge_images(session, plugin, cases, stages, tolerances);
             let fails = judged.iter().any(|judged| judged.fails);
             let footprints: Vec<_> = judged.iter().map(|judged| judged.footprint).collect();
             let uploaded = uploads::judge(session, plugin, cases, &footprints);

@@ -9,6 +9,7 @@ use super::draw::{Frame, draw, draw_plain};
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
+use super::stages::Stages;
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels;
 use crate::evidence::shadow_map::Shadows;
@@ -51,6 +52,7 @@ pub fn judge_images(
     session: &Session,
     plugin: &Path,
     cases: &[PreparedScene],
+    stages: &Stages,
     tolerances: &Tolerances,
 ) -> Vec<Judged> {
     let is_right = |case: &PreparedScene, outcome: &Outcome| {
@@ -72,6 +74,11 @@ pub fn judge_images(
             let plain = drawn.first().map(|drawn| &drawn.image);
             let (mut check, bonus) =
                 judge_bonus(session, plugin, case, &outcome, plain, tolerances);
+            if matches!(outcome, Outcome::Failed(_))
+                && let Some(rest) = judge_bonus_without(session, plugin, case, stages, tolerances)
+            {
+                check = rest;
+            }
             let required = case.entry.bonus_required;
             let id = if required { CheckId::BonusProbe } else { CheckId::BonusImage };
             // How shadows come about is the same on all scenes.
@@ -188,6 +195,39 @@ fn judge_bonus(
         check = judge_visibility(session, plugin, case, (&drawn.image, plain), check, tolerances);
     }
     (check, Some(drawn))
+}
+
+/// Judges the bonus of a submission that draws no frame with it, where that is the fault of a fragment stage:
+/// with the template's stage in its place, as with a Rust file that does not build. None when no frame comes
+/// of it either.
+fn judge_bonus_without(
+    session: &Session,
+    plugin: &Path,
+    case: &PreparedScene,
+    stages: &Stages,
+    tolerances: &Tolerances,
+) -> Option<Check> {
+    let bonus = case.bonus.as_deref()?;
+    let of_template =
+        |index: &usize| Stage { name: STAGES[*index].to_owned(), text: stages.template[*index].clone() };
+    let own: Vec<usize> = (1..STAGES.len())
+        .filter(|&index| stages.own[index].is_some() && !stages.is_template(index))
+        .collect();
+    let each = own.iter().map(|index| vec![*index]);
+    let sets = each.chain((own.len() > 1).then(|| own.clone()));
+    let drawn = |toml: &Path, shadow_map, stages: &[Stage]| {
+        let frame = Frame { toml, shadow_map, stages: stages.to_vec(), ..Frame::plain(case) };
+        let outcome = draw(session, Some(plugin), &frame);
+        let (width, height) = frame.size;
+        outcome.answer().map(|answer| session::image(&answer.values, width, height))
+    };
+    for set in sets {
+        let replaced: Vec<Stage> = set.iter().map(of_template).collect();
+        let Some(with) = drawn(bonus, true, &replaced) else { continue };
+        let without = drawn(&case.realtime, false, &replaced)?;
+        return shadows(case).judge(&case.entry.name, &with, &without, tolerances);
+    }
+    None
 }
 
 /// Whether a frame itself shows shadows that are right: by another stage than the submission's they may be

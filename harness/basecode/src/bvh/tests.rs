@@ -1,0 +1,200 @@
+use super::*;
+use crate::Sampler;
+use glam::{DVec3, Vec3, vec3};
+
+fn random_vec3(sampler: &Sampler) -> Vec3 {
+    vec3(sampler.next_1d(), sampler.next_1d(), sampler.next_1d()) * 2.0 - 1.0
+}
+
+/// Every triangle tested in f64: slow and without any tree.
+fn brute_force(triangles: &[[Vec3; 3]], ray: &Ray) -> Option<(f64, usize, f64)> {
+    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let mut best: Option<(f64, usize, f64)> = None;
+    for (index, triangle) in triangles.iter().enumerate() {
+        let [a, b, c] = triangle.map(|v| v.as_dvec3());
+        let normal: DVec3 = (b - a).cross(c - a);
+        let t = (a - origin).dot(normal) / direction.dot(normal);
+        let p = origin + t * direction;
+        let inside = |from: DVec3, to: DVec3| (to - from).cross(p - from).dot(normal);
+        let margin = inside(a, b).min(inside(b, c)).min(inside(c, a)) / normal.length_squared();
+        if margin >= 0.0
+            && t >= f64::from(ray.min_t)
+            && t <= f64::from(ray.max_t)
+            && best.is_none_or(|(nearest, ..)| t < nearest)
+        {
+            best = Some((t, index, margin));
+        }
+    }
+    best
+}
+
+#[test]
+fn agrees_with_brute_force_in_f64() {
+    let sampler = Sampler::new(1);
+    let triangles: Vec<[Vec3; 3]> = (0..400)
+        .map(|_| {
+            let centre = random_vec3(&sampler);
+            [(); 3].map(|()| centre + 0.2 * random_vec3(&sampler))
+        })
+        .collect();
+    let blocks: Vec<bool> = (0..400).map(|i| i % 3 != 0).collect();
+    let blocking: Vec<[Vec3; 3]> =
+        triangles.iter().zip(&blocks).filter(|(_, b)| **b).map(|(t, _)| *t).collect();
+    let bvh = Bvh::new(&triangles, &blocks);
+    let (mut hits, mut shadowed) = (0, 0);
+    for number in 0..4000 {
+        let mut direction = random_vec3(&sampler).normalize();
+        if number % 4 == 0 {
+            direction = [Vec3::X, -Vec3::Y, Vec3::Z][number / 4 % 3]; // zero components
+        }
+        let ray = Ray::segment(random_vec3(&sampler) * 1.5, direction, 0.01, 1.5);
+        let expected = brute_force(&triangles, &ray);
+        let found = bvh.closest_hit(&ray);
+        match (expected, found) {
+            (Some((t, index, margin)), Some(hit)) if margin > 1e-5 => {
+                assert_eq!(hit.triangle, index);
+                assert!((f64::from(hit.t) - t).abs() < 1e-4, "{} {t}", hit.t);
+                hits += 1;
+            }
+            (Some((_, _, margin)), None) => assert!(margin < 1e-5, "missed by {margin}"),
+            (None, Some(hit)) => {
+                let [u, v] = hit.barycentric;
+                assert!(u.min(v).min(1.0 - u - v) < 1e-4, "hit nothing: {hit:?}");
+            }
+            _ => {}
+        }
+        let expected = brute_force(&blocking, &ray);
+        if expected.is_none_or(|(.., margin)| margin > 1e-5) {
+            assert_eq!(bvh.any_hit(&ray), expected.is_some());
+            shadowed += usize::from(expected.is_some());
+        }
+    }
+    assert!(hits > 500 && shadowed > 300, "too few rays hit: {hits}, {shadowed}");
+}
+
+/// Cards that double in size and distance make a tree like a ladder.
+#[test]
+fn deep_trees_are_walked_to_their_ends() {
+    let card = |i: i32| {
+        let size = 2f32.powi(i);
+        [vec3(size, 0.0, 0.0), vec3(size, size, 0.0), vec3(size, 0.0, size)]
+    };
+    let triangles: Vec<[Vec3; 3]> = (-38..38).map(card).collect();
+    let bvh = Bvh::new(&triangles, &[true; 76]);
+    for (index, i) in (-38..38).enumerate() {
+        let size = 2f32.powi(i);
+        let from = vec3(size * 0.9, size * 0.2, size * 0.2);
+        let ray = Ray::segment(from, Vec3::X, 0.0, size);
+        assert_eq!(bvh.closest_hit(&ray).map(|hit| hit.triangle), Some(index));
+        assert!(bvh.any_hit(&ray) && !bvh.any_hit(&Ray { direction: Vec3::Y, ..ray }));
+    }
+}
+
+#[test]
+fn odd_input_is_survived() {
+    let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let flat = [Vec3::ZERO, Vec3::X, 2.0 * Vec3::X];
+    for triangles in [vec![], vec![triangle], vec![flat], vec![triangle; 300]] {
+        let bvh = Bvh::new(&triangles, &vec![true; triangles.len()]);
+        let down = Ray::new(vec3(0.2, 0.2, 1.0), -Vec3::Z);
+        assert_eq!(bvh.any_hit(&down), triangles.contains(&triangle));
+        let nan = Ray::new(Vec3::NAN, Vec3::NAN);
+        assert!(!bvh.any_hit(&nan) && bvh.closest_hit(&nan).is_none());
+        bvh.any_hit(&Ray::new(Vec3::ZERO, Vec3::ZERO));
+        bvh.any_hit(&Ray::new(Vec3::splat(1e30), Vec3::X));
+    }
+}
+
+/// Triangles of every kind: of usual size, tiny, huge, without area, twice the same, in one plane.
+fn odd_triangles(sampler: &Sampler) -> Vec<[Vec3; 3]> {
+    let mut triangles = Vec::new();
+    for number in 0..600 {
+        let centre = random_vec3(sampler);
+        let size = [0.2, 0.2, 1e-4, 30.0][number % 4];
+        let mut own = [(); 3].map(|()| centre + size * random_vec3(sampler));
+        match number % 50 {
+            7 => own[1] = own[0],
+            11 => own[2] = own[0] + 2.0 * (own[1] - own[0]),
+            13 => own = own.map(|v| vec3(v.x, v.y, 0.25)),
+            17 => own = triangles[number / 2],
+            _ => {}
+        }
+        triangles.push(own);
+    }
+    triangles
+}
+
+/// What AVX2 answers is what every other machine does, bit by bit.
+#[test]
+fn both_paths_hit_the_same() {
+    let sampler = Sampler::new(2);
+    for scale in [1.0, 1e-12, 1e12] {
+        let triangles =
+            odd_triangles(&sampler).into_iter().map(|t| t.map(|v| scale * v)).collect::<Vec<_>>();
+        let blocks: Vec<bool> = (0..triangles.len()).map(|i| i % 3 != 0).collect();
+        let fast = Bvh::new(&triangles, &blocks);
+        let portable = Bvh { avx2: false, ..Bvh::new(&triangles, &blocks) };
+        let mut hits = 0;
+        for number in 0..100_000 {
+            let triangle = triangles[number % triangles.len()];
+            let origin = scale * 2.0 * random_vec3(&sampler);
+            // At vertices, at edges, along axes, and anywhere.
+            let at = match number % 4 {
+                0 => triangle[number / 4 % 3],
+                1 => (triangle[0] + triangle[1]) / 2.0,
+                2 => origin + [Vec3::X, -Vec3::Y, Vec3::Z][number / 4 % 3],
+                _ => scale * random_vec3(&sampler),
+            };
+            let ray = Ray::segment(origin, (at - origin).normalize_or(Vec3::X), 0.0, scale * 10.0);
+            let found = fast.closest_hit(&ray);
+            assert_eq!(found, portable.closest_hit(&ray), "{ray:?}");
+            assert_eq!(fast.any_hit(&ray), portable.any_hit(&ray), "{ray:?}");
+            hits += usize::from(found.is_some());
+        }
+        assert!(hits > 10_000, "{hits}");
+    }
+}
+
+/// From inside a closed surface no ray gets out, least of all by an edge or a vertex.
+#[test]
+fn edges_and_vertices_are_tight() {
+    let sampler = Sampler::new(3);
+    const SIDES: usize = 40;
+    let vertex = |row: usize, side: usize| {
+        let (polar, around) = (
+            std::f32::consts::PI * row as f32 / SIDES as f32,
+            std::f32::consts::TAU * (side % SIDES) as f32 / SIDES as f32,
+        );
+        let ring = if row.is_multiple_of(SIDES) { 0.0 } else { polar.sin() };
+        vec3(ring * around.cos(), polar.cos(), ring * around.sin())
+    };
+    for moved in [Vec3::ZERO, vec3(100.0, -3.0, 7.0)] {
+        let vertex = |row, side| vertex(row, side) + moved;
+        let mut triangles = Vec::new();
+        for row in 0..SIDES {
+            for side in 0..SIDES {
+                let [a, b, c, d] =
+                    [(row, side), (row, side + 1), (row + 1, side), (row + 1, side + 1)]
+                        .map(|(r, s)| vertex(r, s));
+                triangles.extend([[a, b, c], [b, d, c]]);
+            }
+        }
+        let bvh = Bvh::new(&triangles, &vec![true; triangles.len()]);
+        for number in 0..60_000 {
+            let [a, b, _] = triangles[number % triangles.len()];
+            let between = (number / triangles.len()) as f32 / 20.0;
+            let origin = moved + 0.4 * random_vec3(&sampler);
+            let ray =
+                Ray::segment(origin, a.lerp(b, between.min(1.0)) - origin, 0.0, f32::INFINITY);
+            assert!(bvh.closest_hit(&ray).is_some() && bvh.any_hit(&ray), "{ray:?}");
+        }
+    }
+}
+
+#[test]
+fn of_equal_distances_the_lowest_index_counts() {
+    let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let bvh = Bvh::new(&[triangle; 100], &[true; 100]);
+    let ray = Ray::new(vec3(0.2, 0.2, 1.0), -Vec3::Z);
+    assert_eq!(bvh.closest_hit(&ray).map(|hit| hit.triangle), Some(0));
+}
