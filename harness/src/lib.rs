@@ -47,6 +47,7 @@ pub mod expected;
 pub mod files;
 #[doc(hidden)]
 pub mod grading;
+mod harmless;
 #[doc(hidden)]
 pub mod held_back;
 #[doc(hidden)]

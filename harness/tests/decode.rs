@@ -128,7 +128,7 @@ fn a_decoder_that_dies_refuses_its_file_and_no_other() {
     let never = AtomicBool::new(false);
     for (limits, how) in [
         (limits(|limits| limits.memory_mib = 48), "out of memory"),
-        (limits(|limits| limits.file_size_mib = 1), "wrote too large a file"),
+        (limits(|limits| limits.file_size_mib = 1), "wrote a larger file than is allowed"),
         (limits(|limits| limits.wall_s = 0.0), "ran out of time"),
     ] {
         let decoder = Decoder::new(&supervisor, &limits, &never);

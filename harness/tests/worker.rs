@@ -520,9 +520,10 @@ fn a_cancelled_job_ends_at_once_and_says_so() {
     let report = house.supervisor.run_job(&job, &house.limits, &cancel, &mut |progress| {
         assert_eq!(progress.requests, 3);
         last = progress.answered;
-        cancel.store(true, std::sync::atomic::Ordering::Relaxed);
+        // The second one hangs: on a busy machine progress may be told before the first is answered.
+        cancel.store(last == 1, std::sync::atomic::Ordering::Relaxed);
     });
-    assert_eq!(last, 1, "the first request was answered when progress was told");
+    assert_eq!(last, 1, "the first request was answered when the job was cancelled");
     let stopped = Outcome::NotRun { reason: "cancelled".into(), fault: Fault::Environment };
     assert_eq!(values(&report.outcomes[0]), [0.0; 135]);
     assert_eq!(report.outcomes[1..], [stopped.clone(), stopped]);

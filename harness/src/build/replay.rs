@@ -12,7 +12,7 @@ use super::diagnostics::parse;
 use super::record::externs;
 use super::{Diagnostic, Recording, TEMPLATE};
 use crate::files::library_name;
-use crate::process::{self, Confinement, Exit, Limits, signal_name};
+use crate::process::{self, Confinement, Exit, Limits};
 use crate::sandbox::policy::{CLOSURE, SCRATCH, SRC, TOOLCHAIN};
 use crate::sandbox::{Bind, Kind, Policy};
 use crate::worker::Supervisor;
@@ -33,16 +33,8 @@ pub enum BuildOutcome {
         /// At least one.
         errors: Vec<Diagnostic>,
     },
-    /// Out of CPU time, or it stood still too long.
-    TimedOut,
-    /// The compiler ended at its memory limit.
-    OutOfMemory,
-    /// Its library, or a file on the way there, grew larger than allowed.
-    FileTooLarge,
-    /// A signal ended the compiler; names it.
-    Crashed(String),
-    /// The user asked to stop.
-    Cancelled,
+    /// The compiler did not come to an end of its own, and not by the source's words.
+    Ended(Exit),
 }
 
 /// A compiler call.
@@ -88,7 +80,7 @@ pub fn compile(
     cancel: &AtomicBool,
 ) -> io::Result<BuildReport> {
     let late = |report: &io::Result<BuildReport>| match report {
-        Ok(report) => report.outcome == BuildOutcome::TimedOut,
+        Ok(report) => matches!(report.outcome, BuildOutcome::Ended(exit) if exit.is_out_of_time()),
         Err(error) => error.kind() == io::ErrorKind::TimedOut,
     };
     supervisor
@@ -139,9 +131,6 @@ fn compile_once(
     let ended = process::run(command, &lock, keep, cancel, &mut |_| ControlFlow::Continue(()))?;
     // What lies between was cut: a source may be warned of more than is kept.
     let said = parse(&[&*ended.stderr.head, &*ended.stderr.tail].join("\n"));
-    let out_of_memory = ended.stderr.contains("memory allocation of ")
-        || ended.stderr.contains("LLVM ERROR: out of memory")
-        || ended.peak_address_mib >= limits.memory_mib - limits.memory_mib / 10;
     let outcome = match ended.exit {
         Exit::Code(0)
             if fs::metadata(&library).is_ok_and(|file| file.is_file() && file.len() > 0) =>
@@ -158,7 +147,6 @@ fn compile_once(
                 format!("cannot keep what the compiler made in {}: no disk space?", out.display());
             return Err(io::Error::new(io::ErrorKind::StorageFull, message));
         }
-        Exit::Code(_) if said.errors.is_empty() && out_of_memory => BuildOutcome::OutOfMemory,
         Exit::Code(code) => {
             let mut errors = said.errors;
             if errors.is_empty() {
@@ -169,12 +157,8 @@ fn compile_once(
             }
             BuildOutcome::CompileError { errors }
         }
-        Exit::Signal(_) if out_of_memory => BuildOutcome::OutOfMemory,
-        Exit::Signal(signal) => BuildOutcome::Crashed(signal_name(signal)),
-        Exit::OutOfCpu | Exit::TimedOut => BuildOutcome::TimedOut,
         Exit::Starved => return Err(process::starved("the compiler")),
-        Exit::FileTooLarge => BuildOutcome::FileTooLarge,
-        Exit::Cancelled => BuildOutcome::Cancelled,
+        exit => BuildOutcome::Ended(exit),
     };
     let (wall_s, cpu_s) = (ended.wall_s, ended.cpu_s);
     Ok(BuildReport { outcome, warnings: said.warnings, wall_s, cpu_s })

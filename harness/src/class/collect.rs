@@ -10,7 +10,8 @@ use anyhow::{Context as _, bail};
 
 use super::download::{self, GRADESCOPE_METADATA};
 use super::layout::{self, Kind, Label, gradescope_metadata, is_labelled, label_of};
-use crate::intake::{Limits, TreeSpec, format_of_bytes, printable};
+use crate::harmless::printable;
+use crate::intake::{Limits, TreeSpec, format_of_bytes};
 
 /// So many folders below the one that is given.
 const MAX_DEPTH: usize = 8;

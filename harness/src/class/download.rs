@@ -13,7 +13,8 @@ use zip::ZipArchive;
 
 use super::collect::{end_of, has_end_of_archive};
 use super::layout::{Kind, label_of};
-use crate::intake::{Limits, TreeSpec, printable};
+use crate::harmless::printable;
+use crate::intake::{Limits, TreeSpec};
 
 /// The file that tells a Gradescope export.
 pub const GRADESCOPE_METADATA: &str = "submission_metadata.yml";

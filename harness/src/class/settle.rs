@@ -355,7 +355,7 @@ impl Class {
 }
 
 fn one_line(text: &str) -> String {
-    crate::intake::printable(text)
+    crate::harmless::printable(text)
 }
 
 #[cfg(test)]

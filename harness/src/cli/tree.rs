@@ -9,8 +9,8 @@ use unicode_width::UnicodeWidthStr as _;
 
 use super::context::{Context, INTERRUPTED};
 use crate::class::{Collected, Kind, Wanted, collect};
+use crate::harmless::harmless;
 use crate::intake::{self, IntakeError, Severity, Submission, Validation};
-use crate::report::harmless;
 
 /// Options of `umbra validate`.
 #[derive(clap::Args)]

@@ -21,8 +21,9 @@ use serde::Serialize;
 
 pub use child::child_main;
 
+use crate::harmless::printable;
 use crate::intake::{self, Finding, IntakeError, Refusal, Submission, TreeSpec, Validation};
-use crate::process::{self, ChildOutcome, Confinement, Exit, Limits, signal_name};
+use crate::process::{self, ChildOutcome, Confinement, Exit, Limits};
 use crate::sandbox::{Bind, Kind, Policy, policy::JOB};
 use crate::worker::Supervisor;
 // Public for its fuzz target: a child may write anything.
@@ -115,7 +116,7 @@ impl<'a> Decoder<'a> {
     ) -> Result<Submission, IntakeError> {
         let refused = |finding: Finding| {
             let findings = vec![finding];
-            let name = intake::printable(name);
+            let name = printable(name);
             IntakeError::Refused(Box::new(Refusal { name, format: None, findings }))
         };
         let question =
@@ -299,7 +300,7 @@ pub fn image_finding(root: &Path, path: &str, image: &Result<Image, String>) -> 
         // The message begins with the path.
         let error =
             error.strip_prefix(path).map_or(error.as_str(), |rest| rest.trim_start_matches(": "));
-        let message = format!("the image cannot be read: {}", intake::printable(error));
+        let message = format!("the image cannot be read: {}", printable(error));
         Finding::warning("image_unreadable", message).at(path).hint("render it again, as EXR")
     })
 }
@@ -313,18 +314,13 @@ fn death(ended: &ChildOutcome) -> Result<(), NoAnswer> {
     let how = match ended.exit {
         Exit::Code(0) => return Ok(()),
         Exit::Cancelled => return Err(io::Error::from(io::ErrorKind::Interrupted).into()),
-        Exit::OutOfCpu | Exit::TimedOut => "its decoder ran out of time".to_owned(),
         Exit::Starved => return Err(process::starved("a decoder").into()),
         // By its own word it could not work: no disk space, no memory, no lock. No hostile byte says that.
         Exit::Code(code) if code == i32::from(process::EXIT_NOT_LOCKED) => {
             return Err(io::Error::other(ended.stderr.head.trim().to_owned()).into());
         }
-        Exit::FileTooLarge => "its decoder wrote too large a file".to_owned(),
-        Exit::Code(_) | Exit::Signal(_) if ended.stderr.contains("memory allocation of ") => {
-            "its decoder ran out of memory".to_owned()
-        }
-        Exit::Code(code) => format!("its decoder ended with code {code}: {}", ended.stderr.head),
-        Exit::Signal(signal) => format!("its decoder was ended by {}", signal_name(signal)),
+        exit @ Exit::Code(_) => format!("its decoder {exit}: {}", ended.stderr.head),
+        exit => format!("its decoder {exit}"),
     };
     Err(NoAnswer::Died { how, late: matches!(ended.exit, Exit::OutOfCpu | Exit::TimedOut) })
 }

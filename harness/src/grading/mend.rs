@@ -10,6 +10,7 @@ use crate::build::{BuildOutcome, BuildReport, Diagnostic};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::files::files_below;
 use crate::intake::Finding;
+use crate::process::Exit;
 use crate::rubric::Rules;
 
 /// So many times files are replaced: the first time those that are wrong, then those that needed
@@ -86,7 +87,7 @@ pub fn build(
                 return Ok(Built { report, errors: submitted, src, replaced, cpu_s });
             }
             BuildOutcome::CompileError { errors } => errors,
-            BuildOutcome::Cancelled => return Ok(as_it_is(report, submitted, cpu_s)),
+            BuildOutcome::Ended(Exit::Cancelled) => return Ok(as_it_is(report, submitted, cpu_s)),
             _ => break,
         };
     }

@@ -27,6 +27,7 @@ use crate::evidence::{Check, CheckId, Evidence, Verdict, loops, price, rays, sha
 use crate::expected::Store;
 use crate::held_back::{self, HeldBack};
 use crate::intake::{self, IntakeError, Submission, TreeSpec, Validation};
+use crate::process::Exit;
 use crate::rubric::BUILD;
 use crate::worker::{Adapter, Budget, Reference, RetryBudget, Supervisor};
 
@@ -449,13 +450,8 @@ impl<'a> Grading<'a> {
                 hint = first;
                 (None, "the source does not build".to_owned())
             }
-            BuildOutcome::TimedOut => (None, "the compiler ran out of time".to_owned()),
-            BuildOutcome::OutOfMemory => (None, "the compiler ran out of memory".to_owned()),
-            BuildOutcome::FileTooLarge => {
-                (None, "the compiler wrote a larger file than is allowed".to_owned())
-            }
-            BuildOutcome::Crashed(signal) => (None, format!("the compiler crashed: {signal}")),
-            BuildOutcome::Cancelled => anyhow::bail!("interrupted"),
+            BuildOutcome::Ended(Exit::Cancelled) => anyhow::bail!("interrupted"),
+            BuildOutcome::Ended(exit) => (None, format!("the compiler {exit}")),
         };
         let verdict = if plugin.is_some() { Verdict::Pass } else { Verdict::Fail };
         checks.push(Check::new(BUILD, "", verdict, summary).with_hint(hint));

@@ -208,8 +208,10 @@ fn judge_bonus_without(
     tolerances: &Tolerances,
 ) -> Option<Check> {
     let bonus = case.bonus.as_deref()?;
-    let of_template =
-        |index: &usize| Stage { name: STAGES[*index].to_owned(), text: stages.template[*index].clone() };
+    let of_template = |index: &usize| Stage {
+        name: STAGES[*index].to_owned(),
+        text: stages.template[*index].clone(),
+    };
     let own: Vec<usize> = (1..STAGES.len())
         .filter(|&index| stages.own[index].is_some() && !stages.is_template(index))
         .collect();

@@ -2,11 +2,12 @@
 
 use std::collections::HashMap;
 
-use super::finding::{Finding, printable};
+use super::finding::Finding;
 use super::limits::Limits;
 use super::name::safe_path;
 use super::submitted_config::{Field, SubmittedConfig};
 use super::tree::{CONFIG_FILE, TreeSpec};
+use crate::harmless::printable;
 
 /// Checks what `config.json` says against the submission. Every finding has a line and a hint; what is
 /// missing altogether is put on line 1. A slip is a warning; only a student number that cannot be read is an

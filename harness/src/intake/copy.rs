@@ -9,12 +9,13 @@ use std::path::Path;
 use flate2::Crc;
 use sha2::{Digest, Sha256};
 
-use super::finding::{Finding, Findings, printable};
+use super::finding::{Finding, Findings};
 use super::limits::{Limits, mib};
 use super::name::safe_path;
 use super::tree::{CONFIG_FILE, TreeSpec};
 use super::unpack::{Format, IntakeError, Refusal, Submission, SubmittedFile, archive_magic};
 use crate::files::hex;
+use crate::harmless::printable;
 
 /// Why reading stops before the end.
 pub(super) enum Stop {

@@ -158,35 +158,6 @@ impl Findings {
     }
 }
 
-/// Whether a character may change how the text around it is shown: control characters and
-/// bidirectional overrides and isolates.
-pub(super) fn is_unprintable(c: char) -> bool {
-    c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-}
-
-/// Bytes of a hostile name as harmless text of at most about 160 characters.
-pub(super) fn printable_bytes(bytes: &[u8]) -> String {
-    printable(&String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]))
-}
-
-/// Hostile text as harmless text of at most about 160 characters.
-pub(crate) fn printable(text: &str) -> String {
-    const SHOWN: usize = 160;
-    let mut out = String::new();
-    for (i, c) in text.chars().enumerate() {
-        if i == SHOWN {
-            out.push_str("...");
-            break;
-        }
-        if is_unprintable(c) {
-            out.extend(c.escape_default());
-        } else {
-            out.push(c);
-        }
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -201,13 +172,6 @@ mod tests {
             finding.to_string(),
             "error: config.json:3: studentID is empty (hint: write your student number)"
         );
-    }
-
-    #[test]
-    fn hostile_text_is_made_harmless() {
-        assert_eq!(printable("a\u{1b}[2Jb\u{202e}c"), "a\\u{1b}[2Jb\\u{202e}c");
-        assert_eq!(printable_bytes(b"a\0\xff"), "a\\u{0}\u{fffd}");
-        assert_eq!(printable(&"x".repeat(1000)).len(), 163);
     }
 
     #[test]

@@ -10,8 +10,9 @@ use std::io;
 use std::path::Path;
 
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
-use super::finding::{Finding, printable_bytes};
+use super::finding::Finding;
 use super::unpack::IntakeError;
+use crate::harmless::printable_bytes;
 use open::Folder;
 
 /// What lies under a name, not followed.

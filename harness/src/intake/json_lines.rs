@@ -2,7 +2,8 @@
 //! trailing or missing commas, other quotes), recording each as a warning. Strict parsers stop at the first
 //! mistake and name none of them as a student would. Where it cannot go on, what was read so far counts.
 
-use super::finding::{Finding, printable};
+use super::finding::Finding;
+use crate::harmless::printable;
 
 /// A value and the line on which it starts, from 1.
 #[derive(Clone, Debug, PartialEq)]

@@ -34,7 +34,6 @@ mod zip;
 mod zip_headers;
 
 pub use check_config::check_config;
-pub(crate) use finding::printable;
 pub use finding::{Finding, Severity};
 pub use limits::Limits;
 pub use pack::{Packed, archive_name, fix, mends, pack};

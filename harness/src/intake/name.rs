@@ -1,7 +1,8 @@
 //! Names of entries: from hostile bytes to a relative path that cannot leave the destination.
 
-use super::finding::{Finding, is_unprintable, printable_bytes};
+use super::finding::Finding;
 use super::limits::Limits;
+use crate::harmless::printable_bytes;
 
 /// A checked path, relative, with `/` between plain components.
 #[derive(Debug, PartialEq, Eq)]
@@ -71,7 +72,7 @@ pub(super) fn safe_path(raw: &[u8], limits: &Limits) -> Result<SafePath, Finding
         .iter()
         .filter(|c| !matches!(**c, "Icon\r" | "._Icon\r"))
         .flat_map(|c| c.chars())
-        .find(|c| is_unprintable(*c));
+        .find(|c| c.is_control() || reorders(*c));
     if let Some(c) = hidden {
         return refuse(
             "name_control",
@@ -88,6 +89,11 @@ pub(super) fn safe_path(raw: &[u8], limits: &Limits) -> Result<SafePath, Finding
         return refuse("limit_depth", &found, "put the folders nearer to the root");
     }
     Ok(SafePath { path: components.join("/"), replaced })
+}
+
+/// Whether a character turns round the text after it: bidirectional overrides and isolates.
+fn reorders(c: char) -> bool {
+    matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// UTF-8 text of `raw`, with every other byte written as `_xHH`.

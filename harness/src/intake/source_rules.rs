@@ -4,9 +4,10 @@
 use std::collections::HashMap;
 use std::fs;
 
-use super::finding::{Finding, Findings, printable};
+use super::finding::{Finding, Findings};
 use super::lexer::{Token, TokenKind, tokens};
 use super::unpack::{IntakeError, Submission};
+use crate::harmless::printable;
 
 /// Findings of one kind that are listed per file.
 const SHOWN_PER_FILE: usize = 5;

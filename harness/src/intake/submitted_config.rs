@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::finding::{Finding, printable};
+use super::finding::Finding;
 use super::json_lines::{Node, Read, Value, parse};
 use super::tree::CONFIG_FILE;
+use crate::harmless::printable;
 
 /// What the submission's `config.json` says; absent where it does not say it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -9,8 +9,9 @@ use flate2::bufread::GzDecoder;
 use tar::{EntryType, Header};
 
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
-use super::finding::{Finding, printable, printable_bytes};
+use super::finding::Finding;
 use super::limits::{Limits, mib};
+use crate::harmless::{printable, printable_bytes};
 
 const BLOCK: usize = 512;
 /// Longest extended header that is read [bytes]; macOS writes a few KB of attributes.

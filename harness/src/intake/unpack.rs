@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
-use super::finding::{Finding, printable};
+use super::finding::Finding;
 use super::limits::{Limits, mib};
 use super::tree::TreeSpec;
 use super::{folder, tar, zip};
+use crate::harmless::printable;
 
 /// What a submission is, by its content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -15,10 +15,11 @@ use std::ops::Range;
 use flate2::read::DeflateDecoder;
 
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
-use super::finding::{Finding, printable_bytes};
+use super::finding::Finding;
 use super::zip_headers::{
     CENTRAL, Central, Entry, LOCAL, ZIP64, check_entry, u16_at, u32_at, u64_at,
 };
+use crate::harmless::printable_bytes;
 
 const END: &[u8] = b"PK\x05\x06";
 const ZIP64_END: &[u8] = b"PK\x06\x06";

@@ -2,8 +2,9 @@
 
 use flate2::Crc;
 
-use super::finding::{Finding, printable_bytes};
+use super::finding::Finding;
 use super::zip::AGAIN;
+use crate::harmless::printable_bytes;
 
 pub(super) const LOCAL: &[u8] = b"PK\x03\x04";
 pub(super) const CENTRAL: &[u8] = b"PK\x01\x02";

@@ -35,6 +35,8 @@ pub enum Exit {
     Code(i32),
     /// By this signal, which Umbra did not send.
     Signal(i32),
+    /// At its memory limit, or so it said: see [`Exit::with_memory`].
+    OutOfMemory,
     /// By the kernel, out of CPU time, or by Umbra, because whoever watched it found it had had enough.
     OutOfCpu,
     /// By Umbra, because it stood still too long: it neither computed nor waited for a processor.
@@ -45,6 +47,41 @@ pub enum Exit {
     FileTooLarge,
     /// By Umbra, because the user asked to stop.
     Cancelled,
+}
+
+impl Exit {
+    /// The same, when the end may have been the memory's: a child that died within a tenth of its limit, or whose
+    /// last words were those of an allocator (Rust's, C++'s, LLVM's) that got nothing, ran out of memory. A child
+    /// may say so falsely, and fools only its own report.
+    fn with_memory(self, stderr: &Captured, peak_mib: u64, limit_mib: u64) -> Self {
+        let says = ["memory allocation of ", "std::bad_alloc", "LLVM ERROR: out of memory"];
+        let said = says.iter().any(|words| stderr.contains(words));
+        match self {
+            Self::Signal(_) if said || peak_mib >= limit_mib - limit_mib / 10 => Self::OutOfMemory,
+            Self::Code(code) if said && code != 0 => Self::OutOfMemory,
+            other => other,
+        }
+    }
+
+    /// Whether its time was over, its own or the machine's.
+    pub fn is_out_of_time(self) -> bool {
+        matches!(self, Self::OutOfCpu | Self::TimedOut | Self::Starved)
+    }
+}
+
+/// In words that follow the child's name: "the compiler ran out of memory".
+impl std::fmt::Display for Exit {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Self::Code(code) => write!(f, "ended with code {code}"),
+            Self::Signal(signal) => write!(f, "was ended by {}", signal_name(*signal)),
+            Self::OutOfMemory => f.write_str("ran out of memory"),
+            Self::OutOfCpu | Self::TimedOut => f.write_str("ran out of time"),
+            Self::Starved => f.write_str("got no processor: this machine is too busy"),
+            Self::FileTooLarge => f.write_str("wrote a larger file than is allowed"),
+            Self::Cancelled => f.write_str("was interrupted"),
+        }
+    }
 }
 
 /// What is known about a child that is gone.
@@ -85,8 +122,7 @@ impl ChildOutcome {
 
 /// The error for a child that was [`Exit::Starved`].
 pub fn starved(what: &str) -> std::io::Error {
-    let message = format!("{what} got no processor: this machine is too busy");
-    std::io::Error::new(std::io::ErrorKind::TimedOut, message)
+    std::io::Error::new(std::io::ErrorKind::TimedOut, format!("{what} {}", Exit::Starved))
 }
 
 /// The usual name of a signal.

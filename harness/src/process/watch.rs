@@ -122,16 +122,20 @@ pub fn run(
         None => None,
     };
     let mut captured = pipes.into_iter().map(|pipe| pipe.capture.finish());
+    let (stdout, stderr) =
+        (captured.next().unwrap_or_default(), captured.next().unwrap_or_default());
+    // Kilobytes on Linux.
+    let peak_resident_mib = usage.ru_maxrss as u64 >> 10;
+    let peak_mib = peak_resident_mib.max(peak_address_mib);
     Ok(ChildOutcome {
-        exit,
+        exit: exit.with_memory(&stderr, peak_mib, lock.limits.memory_mib),
         pid: pid.as_raw() as u32,
-        stdout: captured.next().unwrap_or_default(),
-        stderr: captured.next().unwrap_or_default(),
+        stdout,
+        stderr,
         wall_s,
         cpu_s,
         still_s: still.so_far().as_secs_f64(),
-        // Kilobytes on Linux.
-        peak_resident_mib: usage.ru_maxrss as u64 >> 10,
+        peak_resident_mib,
         peak_address_mib,
         in_force,
         left_process,

@@ -47,7 +47,7 @@ pub fn run(
     let (stdout, out_held) = stdout.map(Stream::finish).unwrap_or_default();
     let (stderr, err_held) = stderr.map(Stream::finish).unwrap_or_default();
     Ok(ChildOutcome {
-        exit,
+        exit: exit.with_memory(&stderr, 0, u64::MAX),
         pid: child.id(),
         stdout,
         stderr,

@@ -14,7 +14,6 @@ mod browser_tests;
 #[path = "../../tests/support/chromium.rs"]
 mod chromium;
 mod csv;
-mod harmless;
 mod html;
 mod json;
 mod number;
@@ -31,7 +30,6 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use self::csv::grades as csv_grades;
-pub use self::harmless::harmless;
 pub use self::html::{
     Reader, batch as html_batch, submission as html_submission, viewer as html_viewer,
 };
@@ -40,6 +38,7 @@ pub use self::text::{
     Closing, Look, closing as text_closing, detail as text_detail, explain, explain_all, in_a_line,
     table as text_table,
 };
+pub use crate::harmless::harmless;
 
 use crate::assignment::Assignment;
 use crate::class::{Class, Standing};

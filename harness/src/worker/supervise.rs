@@ -169,7 +169,7 @@ impl Supervisor {
             report.renderer = report.renderer.or(run.renderer);
             let exit = run.ended.exit;
             report.runs.push(WorkerRun { requests: pending.clone(), ended: run.ended });
-            if !out_of_time(exit) {
+            if !exit.is_out_of_time() {
                 continue;
             }
             let open = |&index: &usize| match &outcomes[index] {
@@ -191,7 +191,7 @@ impl Supervisor {
                 outcomes[first] = match run {
                     Ok(run) => {
                         retries.spent(job, &run.ended);
-                        let late = out_of_time(run.ended.exit);
+                        let late = run.ended.exit.is_out_of_time();
                         report.runs.push(WorkerRun { requests: vec![first], ended: run.ended });
                         let outcome = run.outcomes.into_iter().next().flatten();
                         match (late, outcome) {
@@ -449,19 +449,14 @@ fn how_far(records: &[SlotState]) -> (usize, (u32, u32)) {
 fn not_started(ended: &ChildOutcome) -> Outcome {
     let (reason, fault) = match ended.exit {
         Exit::Cancelled => ("cancelled".to_owned(), Fault::Environment),
-        Exit::OutOfCpu | Exit::TimedOut | Exit::Starved => {
+        exit if exit.is_out_of_time() => {
             ("the worker had no time to begin".to_owned(), Fault::Environment)
         }
         exit => {
-            (format!("the worker did not begin ({exit:?}): {}", ended.stderr.head), Fault::Internal)
+            (format!("the worker did not begin, it {exit}: {}", ended.stderr.head), Fault::Internal)
         }
     };
     Outcome::NotRun { reason, fault }
-}
-
-/// Whether a worker ended because its time was over, its own or the machine's.
-fn out_of_time(exit: Exit) -> bool {
-    matches!(exit, Exit::OutOfCpu | Exit::TimedOut | Exit::Starved)
 }
 
 fn starved() -> Outcome {
@@ -486,7 +481,7 @@ fn death(ended: &ChildOutcome, allowed: &Allowed, index: usize) -> Outcome {
             Outcome::NotRun { reason: "cancelled".to_owned(), fault: Fault::Environment }
         }
         Exit::Code(code) => Outcome::ExitedEarly(code),
-        Exit::Signal(_) if out_of_memory(ended, limits) => Outcome::OutOfMemory,
+        Exit::OutOfMemory => Outcome::OutOfMemory,
         Exit::Signal(signal) => {
             let name = signal_name(signal);
             // What Rust's runtime says; a plugin may say it too, and only fools its own report.
@@ -498,16 +493,6 @@ fn death(ended: &ChildOutcome, allowed: &Allowed, index: usize) -> Outcome {
             })
         }
     }
-}
-
-/// Whether a crash looks like one at the memory limit: Rust or C++ said so, or the process was
-/// seen within a tenth of its limit.
-fn out_of_memory(ended: &ChildOutcome, limits: &Limits) -> bool {
-    let near = limits.memory_mib - limits.memory_mib / 10;
-    ended.peak_address_mib >= near
-        || ended.peak_resident_mib >= near
-        || ended.stderr.contains("memory allocation of ")
-        || ended.stderr.contains("std::bad_alloc")
 }
 
 #[cfg(test)]

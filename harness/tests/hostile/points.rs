@@ -124,6 +124,7 @@ fn record(name: &str, evidence: Evidence) -> Record {
         evidence,
         diagnoses: Vec::new(),
         images: Vec::new(),
+        views: Vec::new(),
         stages: Vec::new(),
         conditions: Conditions::default(),
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use umbra::build::{BuildOutcome, BuildReport, Recording, compile, default_limits};
-use umbra::process::Limits;
+use umbra::process::{Exit, Limits};
 use umbra::worker::Supervisor;
 
 use crate::fixture::{Fixture, recording, workspace};
@@ -98,8 +98,8 @@ impl Expect {
             (Self::NoPlugin(text), BuildOutcome::CompileError { errors }) => {
                 errors[0].rendered.contains(text)
             }
-            (Self::TimedOut, BuildOutcome::TimedOut)
-            | (Self::FileTooLarge, BuildOutcome::FileTooLarge)
+            (Self::TimedOut, BuildOutcome::Ended(Exit::OutOfCpu | Exit::TimedOut))
+            | (Self::FileTooLarge, BuildOutcome::Ended(Exit::FileTooLarge))
             | (Self::Built, BuildOutcome::Built { .. }) => true,
             _ => false,
         }

@@ -1,6 +1,5 @@
 //! The page of one submission.
 
-use super::super::harmless::harmless_lines;
 use super::super::number::{is_failure, is_range, looks_like, of_part, points, range, seconds};
 use super::super::{BatchReport, HTML_FILE, INSTRUCTOR, SubmissionReport};
 use super::checks::{self, Placed};
@@ -11,6 +10,7 @@ use super::{Reader, begin, class, end, part_class};
 use crate::columns::count;
 use crate::evidence::{Check, Verdict};
 use crate::grading::{Conditions, StageCost};
+use crate::harmless::harmless_lines;
 use crate::intake::{Finding, Severity};
 use crate::rubric::PartGrade;
 

@@ -1,6 +1,5 @@
 //! Every detail of one submission.
 
-use super::super::harmless::harmless_lines;
 use super::super::number::{
     self, hints, is_failure, is_range, looks_like, of_part, plain, points, seconds, total,
 };
@@ -8,6 +7,7 @@ use super::super::{BatchReport, SubmissionReport};
 use super::page::{Look, Page, Style, columns, left};
 use crate::columns::count;
 use crate::evidence::{Check, CheckId, Measure, Verdict};
+use crate::harmless::harmless_lines;
 use crate::intake::{Finding, Severity};
 use crate::rubric::{BUILD, PartGrade};
 

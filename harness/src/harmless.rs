@@ -18,9 +18,23 @@ pub fn harmless(text: &str) -> String {
     out
 }
 
+/// A foreign name or value as harmless text of at most about 160 characters.
+pub(crate) fn printable(text: &str) -> String {
+    const SHOWN: usize = 160;
+    match text.char_indices().nth(SHOWN) {
+        Some((end, _)) => harmless(&text[..end]) + "...",
+        None => harmless(text),
+    }
+}
+
+/// The same of bytes, which should be UTF-8.
+pub(crate) fn printable_bytes(bytes: &[u8]) -> String {
+    printable(&String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]))
+}
+
 /// The lines of a text, each [`harmless`], tabs as four spaces. At most `most` lines: the first
 /// and the last ones when there are more, with a line between them that says how many are left out.
-pub(super) fn harmless_lines(text: &str, most: usize) -> Vec<String> {
+pub(crate) fn harmless_lines(text: &str, most: usize) -> Vec<String> {
     /// A line of a compiler or a flood of output need not be read to its end.
     const COLUMNS: usize = 2000;
     let all: Vec<&str> = text.trim_end().lines().collect();
@@ -66,6 +80,14 @@ fn is_harmful(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_and_values_are_short_and_harmless() {
+        assert_eq!(printable("a\u{1b}[2Jb\u{202e}c"), "a\\u{1b}[2Jb\\u{202e}c");
+        assert_eq!(printable_bytes(b"a\0\xff"), "a\\u{0}\u{fffd}");
+        assert_eq!(printable("\u{feff}\u{61c}\u{2028}"), "\\u{feff}\\u{61c}\\u{2028}");
+        assert_eq!(printable(&"x".repeat(1000)).len(), 163);
+    }
 
     #[test]
     fn makes_visible_what_acts() {
