@@ -170,6 +170,63 @@ const LATE: &str =
     r#"{"penalty": 10, "unit": "percent", "of": "maximum", "per": "day", "grace_min": 5}"#;
 
 #[test]
+fn grades_go_back_where_the_class_list_came_from() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    let files = brightspace();
+    let entries: Vec<(String, &[u8])> =
+        files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+    place.put("Lab 02 Download Oct 9, 2019 905 AM.zip", &zip(&entries));
+    place.put("list.csv", LIST.as_bytes());
+    place.grade(&root, &["Lab 02 Download Oct 9, 2019 905 AM.zip", "--class", "list.csv"]);
+    let root = root.to_str().unwrap().to_owned();
+    let export = |format: &str, more: &[&str]| {
+        let mut all =
+            vec!["export", "grades", "--output", "out", "--root", &root, "--format", format];
+        all.extend(more);
+        let (code, said, errors) = place.run(&all);
+        (code, said + &errors, fs::read_to_string(place.at("grades")).unwrap_or_default())
+    };
+    let (code, said, book) = export("brightspace", &["--item", "A2, lights"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("grades: 5 grades for Brightspace"), "{said}");
+    assert!(
+        said.contains(
+            "107-5150 - Max Other - Oct 6, 2019 600 PM/cs101_hw3.zip: nobody of the class list"
+        ),
+        "{said}"
+    );
+    // The platform's own columns and keys, zeros in front too; nobody who is missing.
+    assert_eq!(
+        book,
+        "OrgDefinedId,Username,\"A2, lights Points Grade\",End-of-Line Indicator\n\
+         #0260000001,#zoneil,0.00,#\n#260000002,#bode,0.00,#\n#260000004,#alee2,0.00,#\n\
+         #260000003,#alee,0.00,#\n#260000008,#esol,0.00,#\n"
+    );
+    let (code, said, _) = export("canvas", &[]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("expected the export of Canvas, found that of Brightspace"), "{said}");
+
+    let (code, said, _) = export("gradescope", &[]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("takes one submission at a time, and there are 6"), "{said}");
+    let report: Value =
+        serde_json::from_slice(&fs::read(place.at("out/report.json")).unwrap()).unwrap();
+    let slug = text(&report["submissions"][0]["slug"]).to_owned();
+    let (_, _, results) = export("gradescope", &["--only", &slug]);
+    let results: Value = serde_json::from_str(&results).unwrap();
+    assert_eq!(results["score"], 0.0);
+    assert_eq!(results["tests"].as_array().unwrap().len(), 9);
+    assert_eq!(results["tests"][0]["number"], "1.1");
+    assert_eq!(results["tests"][0]["status"], "failed");
+
+    let (_, _, xml) = export("junit", &[]);
+    assert_eq!(xml.matches("<testsuite name=").count(), 6, "{xml}");
+    assert_eq!(xml.matches("<testcase ").count(), 6 * 9);
+    assert!(xml.contains("tests=\"9\" failures=\"8\" errors=\"0\""), "{xml}");
+}
+
+#[test]
 fn a_class_of_brightspace_zipped_and_unpacked() {
     let place = Place::new();
     let root = place.assignment(LATE);

@@ -10,6 +10,7 @@
 
 pub mod collect;
 mod download;
+pub mod export;
 pub mod late;
 pub mod layout;
 pub mod matching;

@@ -10,6 +10,7 @@ mod decide;
 #[cfg(target_os = "linux")]
 mod doctor;
 mod explain;
+mod export;
 mod grade;
 mod render;
 mod terminal;
@@ -76,6 +77,9 @@ enum Command {
     Confirm(decide::ConfirmArguments),
     /// List what a report still leaves to the instructor; exits with 0 when nothing waits, 1 when something does
     Status(decide::StatusArguments),
+    /// Write the grades of a report as another program takes them: a learning platform's grade book,
+    /// Gradescope's results, JUnit
+    Export(export::ExportArguments),
     /// Check the tree of submissions against the handout's; exits with 0 when all conform, 1 when not
     Validate(tree::ValidateArguments),
     /// Pack a working folder into an archive that conforms to the handout
@@ -204,6 +208,7 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Override(arguments) => decide::override_part(&arguments, root),
         Command::Confirm(arguments) => decide::confirm(&arguments, root),
         Command::Status(arguments) => decide::status(&arguments),
+        Command::Export(arguments) => export::export(&arguments, root),
         Command::Validate(arguments) => tree::validate(&arguments, root),
         Command::Pack(arguments) => tree::pack(&arguments, root),
         Command::Render(arguments) => render::run(&arguments, root),

@@ -58,7 +58,7 @@ fn row(report: &BatchReport, entry: &SubmissionReport) -> Vec<String> {
 }
 
 /// A cell that no spreadsheet takes for a formula: one that begins like it gets an apostrophe.
-fn cell(text: &str) -> String {
+pub fn cell(text: &str) -> String {
     let begins_as_formula = text.trim_start_matches(' ').starts_with([
         '=', '+', '-', '@', '\t', '\r', '\n', '\u{ff1d}', '\u{ff0b}', '\u{ff0d}', '\u{ff20}',
     ]);

@@ -29,7 +29,7 @@ use std::path::{Component, Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-pub use self::csv::grades as csv_grades;
+pub use self::csv::{cell as csv_cell, grades as csv_grades};
 pub use self::html::{
     Reader, batch as html_batch, submission as html_submission, viewer as html_viewer,
 };
