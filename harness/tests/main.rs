@@ -31,4 +31,5 @@ mod statistics;
 mod submitted;
 mod support;
 mod viewer;
+mod watch;
 mod worker;

@@ -50,6 +50,9 @@ pub struct CheckArguments {
     /// Print what each stage cost
     #[arg(long)]
     timings: bool,
+    /// Open the report in the browser
+    #[arg(long)]
+    open: bool,
 }
 
 /// What of an assignment is asked.
@@ -202,6 +205,9 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     last.parts.extend(points.map(|part| (part.id.clone(), (part.points, part.points_max))));
     last.seconds.insert(what, begun.elapsed().as_secs_f64());
     write_whole(&last_file, &serde_json::to_vec_pretty(&last)?)?;
+    if arguments.open {
+        super::view::open_page(&page);
+    }
     let whole = entry.grade.points >= entry.grade.out_of;
     Ok(if whole { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
 }

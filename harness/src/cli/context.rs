@@ -90,7 +90,7 @@ pub fn cores() -> u32 {
 }
 
 /// A second Ctrl-C ends the program at once.
-fn catch_interrupts() {
+pub fn catch_interrupts() {
     #[cfg(unix)]
     {
         extern "C" fn interrupted(_: i32) {

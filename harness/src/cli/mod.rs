@@ -16,6 +16,7 @@ mod render;
 mod terminal;
 mod tree;
 mod view;
+mod watch;
 
 pub use render::AdapterChoice;
 
@@ -88,6 +89,8 @@ enum Command {
     Render(render::RenderArguments),
     /// Compare two EXR images
     Compare(compare::CompareArguments),
+    /// Check a working folder on every save, with its report in the browser
+    Watch(watch::WatchArguments),
     /// Look at EXR images in the browser: values, differences, exposure, wipe
     View(view::ViewArguments),
     /// Explain a check, a rule or a part: what is asked, what its error means, where its bound lies
@@ -213,6 +216,7 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Pack(arguments) => tree::pack(&arguments, root),
         Command::Render(arguments) => render::run(&arguments, root),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Watch(arguments) => watch::run(&arguments, root),
         Command::View(arguments) => view::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments, root),
         #[cfg(target_os = "linux")]

@@ -101,7 +101,7 @@ pub fn write_page(folder: &Path, images: &[(String, Image)]) -> anyhow::Result<P
 }
 
 /// Opens a page in the browser, where a desktop is there to show it.
-fn open_page(page: &Path) {
+pub fn open_page(page: &Path) {
     let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let desktop = cfg!(not(target_os = "linux")) || set("DISPLAY") || set("WAYLAND_DISPLAY");
     if desktop && let Err(error) = open::that_detached(page) {

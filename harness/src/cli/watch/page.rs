@@ -1,0 +1,26 @@
+//! The page of `umbra watch`: a line that says what goes on, above the report.
+
+use base64::Engine as _;
+use sha2::Digest as _;
+
+const STYLE: &str = include_str!("watch.css");
+const SCRIPT: &str = include_str!("watch.js");
+
+/// The page, which shows `report`, a page of the folder `first` or `whole`, whichever is the newest. Nothing that anybody
+/// wrote is in it; what goes on reaches it as text, by its script.
+pub fn page(report: &'static str) -> String {
+    let hash =
+        |text: &str| base64::engine::general_purpose::STANDARD.encode(sha2::Sha256::digest(text));
+    let (style, script) = (hash(STYLE), hash(SCRIPT));
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; \
+         form-action 'none'; connect-src 'self'; frame-src 'self'; style-src 'sha256-{style}'; \
+         script-src 'sha256-{script}'\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>Umbra watches</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
+         <p id=\"status\" role=\"status\">Checking</p>\n\
+         <iframe id=\"report\" title=\"Report\" data-page=\"{report}\"></iframe>\n\
+         <script>{SCRIPT}</script>\n</body>\n</html>\n"
+    )
+}

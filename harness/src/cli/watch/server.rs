@@ -1,0 +1,447 @@
+//! Serves the page of `umbra watch`, on this machine alone.
+//!
+//! Every address begins with a secret. It reaches the browser through a file that only its owner can read, so that it
+//! stands in no command line. Requests for another host, or from another origin, are refused: a page elsewhere, or a
+//! name that somebody points at this machine, learns nothing.
+
+use std::io::{self, Write as _};
+use std::path::{Component, Path, PathBuf};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
+
+use anyhow::Context as _;
+use serde::Serialize;
+use tempfile::TempDir;
+use tiny_http::{Header, Method, Request, Response};
+
+use super::page::page as watch_page;
+use crate::report::HTML_FILE;
+
+/// A browser that went away is noticed after so long.
+const PING: Duration = Duration::from_secs(20);
+/// Bytes of the secret.
+const SECRET_BYTES: usize = 16;
+
+/// How far the last save is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// It is being checked.
+    #[default]
+    Running,
+    /// Its report is there.
+    Done,
+    /// There is no report.
+    Failed,
+}
+
+/// What a report is about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Look {
+    /// One small scene.
+    First,
+    /// Everything that was asked.
+    #[default]
+    Whole,
+}
+
+/// What the page shows beside the report.
+#[derive(Clone, Debug, Default, Serialize)]
+struct Shown {
+    /// Rises with every change.
+    version: u64,
+    stage: Stage,
+    message: String,
+    /// Which report is the newest.
+    look: Look,
+    /// How many reports there were: the page loads the newest when this rises.
+    reports: u64,
+}
+
+/// Where the watch tells its browsers what it does.
+#[derive(Default)]
+pub struct Board {
+    shown: Mutex<Shown>,
+    changed: Condvar,
+}
+
+impl Board {
+    /// Shows a stage; an empty message leaves the last one.
+    pub fn show(&self, stage: Stage, message: &str) {
+        self.change(stage, message, |_| ());
+    }
+
+    /// The same, and a new report.
+    pub fn report(&self, look: Look, stage: Stage, message: &str) {
+        self.change(stage, message, |shown| {
+            shown.look = look;
+            shown.reports += 1;
+        });
+    }
+
+    fn change(&self, stage: Stage, message: &str, what: impl FnOnce(&mut Shown)) {
+        let mut shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
+        what(&mut shown);
+        shown.version += 1;
+        shown.stage = stage;
+        if !message.is_empty() {
+            shown.message = crate::report::harmless(message);
+        }
+        self.changed.notify_all();
+    }
+
+    /// What is shown once it is newer than `version`; none when that takes long.
+    fn newer(&self, version: u64) -> Option<Shown> {
+        let shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
+        let old = |shown: &mut Shown| shown.version <= version;
+        let waited = self.changed.wait_timeout_while(shown, PING, old);
+        let (shown, waited) = waited.unwrap_or_else(PoisonError::into_inner);
+        (!waited.timed_out()).then(|| shown.clone())
+    }
+}
+
+/// The server; it ends with the program.
+pub struct Server {
+    /// `127.0.0.1:PORT`
+    host: String,
+    secret: String,
+}
+
+/// A private file that leads the browser to the page; gone when this is dropped.
+pub struct Door {
+    folder: TempDir,
+}
+
+impl Door {
+    /// The file.
+    pub fn path(&self) -> PathBuf {
+        self.folder.path().join("watch.html")
+    }
+}
+
+impl Server {
+    /// Serves the reports in the folders of a first look and of everything, and what is on the board.
+    ///
+    /// # Errors
+    /// When no port can be had.
+    pub fn start(folders: [PathBuf; 2], board: Arc<Board>) -> anyhow::Result<Self> {
+        let server = tiny_http::Server::http("127.0.0.1:0").map_err(anyhow::Error::from_boxed)?;
+        let address = server.server_addr().to_ip().context("a port of this machine")?;
+        let mut secret = [0; SECRET_BYTES];
+        getrandom::fill(&mut secret).map_err(io::Error::from)?;
+        let secret = crate::files::hex(&secret);
+        let own = Self { host: address.to_string(), secret: secret.clone() };
+        let (host, secret) = (own.host.clone(), secret);
+        std::thread::spawn(move || {
+            for request in server.incoming_requests() {
+                let asked = Asked::of(&request, &host, &secret);
+                let (folders, board) = (folders.clone(), Arc::clone(&board));
+                // One that only waits must not hold up the others.
+                std::thread::spawn(move || answer(request, asked, &folders, &board));
+            }
+        });
+        Ok(own)
+    }
+
+    /// A new file that leads to the page, which only its owner can read.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn door(&self) -> io::Result<Door> {
+        // The folder's mode is 0700.
+        let folder = tempfile::Builder::new().prefix("umbra-watch-").tempdir()?;
+        let door = Door { folder };
+        let mut options = std::fs::OpenOptions::new();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let (host, secret) = (&self.host, &self.secret);
+        writeln!(
+            options.open(door.path())?,
+            "<!DOCTYPE html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\">\
+             <meta http-equiv=\"refresh\" content=\"0;url=http://{host}/{secret}/\"><title>Umbra</title>"
+        )?;
+        Ok(door)
+    }
+}
+
+/// What a request asks for, after everything that could be wrong with it.
+#[derive(Debug, PartialEq)]
+enum Asked {
+    Page,
+    Events,
+    /// A file of a report, by a path of plain names.
+    File(Look, PathBuf),
+    /// Refused, with the status.
+    Nothing(u16),
+}
+
+impl Asked {
+    fn of(request: &Request, host: &str, secret: &str) -> Self {
+        let header = |name: &str| {
+            let mut all = request.headers().iter();
+            all.find(|header| header.field.as_str().as_str().eq_ignore_ascii_case(name))
+                .map(|header| header.value.as_str())
+        };
+        if *request.method() != Method::Get {
+            return Self::Nothing(405);
+        }
+        Self::of_parts(request.url(), header("host"), header("origin"), host, secret)
+    }
+
+    fn of_parts(
+        url: &str,
+        asked_host: Option<&str>,
+        origin: Option<&str>,
+        host: &str,
+        secret: &str,
+    ) -> Self {
+        let own = format!("http://{host}");
+        if asked_host != Some(host) || origin.is_some_and(|origin| origin != own) {
+            return Self::Nothing(403);
+        }
+        let path = url.split(['?', '#']).next().unwrap_or_default();
+        let mut parts = path.trim_start_matches('/').splitn(2, '/');
+        let (Some(given), Some(rest)) = (parts.next(), parts.next()) else {
+            return Self::Nothing(403);
+        };
+        if !same(given.as_bytes(), secret.as_bytes()) {
+            return Self::Nothing(403);
+        }
+        match rest {
+            "" => Self::Page,
+            "events" => Self::Events,
+            _ => {
+                let look = [(Look::First, "first/"), (Look::Whole, "whole/")];
+                let mut file = look.into_iter().filter_map(|(look, name)| {
+                    Some(Self::File(look, plain_path(rest.strip_prefix(name)?)?))
+                });
+                file.next().unwrap_or(Self::Nothing(404))
+            }
+        }
+    }
+}
+
+/// Whether two texts are equal, in a time that does not tell where they differ.
+fn same(a: &[u8], b: &[u8]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).fold(0, |apart, (a, b)| apart | (a ^ b)) == 0
+}
+
+/// A path of names that mean nothing but themselves, percent signs decoded.
+fn plain_path(text: &str) -> Option<PathBuf> {
+    let mut bytes = Vec::new();
+    let mut rest = text.bytes();
+    while let Some(byte) = rest.next() {
+        bytes.push(match byte {
+            b'%' => {
+                let digits = [rest.next()?, rest.next()?];
+                u8::from_str_radix(std::str::from_utf8(&digits).ok()?, 16).ok()?
+            }
+            other => other,
+        });
+    }
+    let text = String::from_utf8(bytes).ok()?;
+    let path = PathBuf::from(&text);
+    let plain = |part: Component| match part {
+        Component::Normal(name) => !name.as_encoded_bytes().starts_with(b"."),
+        _ => false,
+    };
+    let odd = text.contains(['\\', '\0', ':']) || text.contains("//");
+    (!odd && path.components().count() > 0 && path.components().all(plain)).then_some(path)
+}
+
+fn answer(request: Request, asked: Asked, folders: &[PathBuf; 2], board: &Board) {
+    // A browser that goes away is no error.
+    let _ = match asked {
+        Asked::Page => {
+            request.respond(page("text/html; charset=utf-8", watch_page(HTML_FILE).into_bytes()))
+        }
+        Asked::Events => events(request, board),
+        Asked::File(look, path) => match file(&folders[look as usize], &path) {
+            Some((kind, bytes)) => request.respond(page(kind, bytes)),
+            None => request.respond(refused(404)),
+        },
+        Asked::Nothing(status) => request.respond(refused(status)),
+    };
+}
+
+/// What every answer says: nothing of it is kept, guessed at, shown inside other pages or told to them.
+const HEADERS: [(&str, &str); 5] = [
+    ("Cache-Control", "no-store"),
+    ("X-Content-Type-Options", "nosniff"),
+    ("Referrer-Policy", "no-referrer"),
+    ("Cross-Origin-Resource-Policy", "same-origin"),
+    ("Content-Security-Policy", "frame-ancestors 'self'"),
+];
+
+fn page(kind: &str, bytes: Vec<u8>) -> Response<io::Cursor<Vec<u8>>> {
+    let all = HEADERS.iter().copied().chain([("Content-Type", kind)]);
+    let headers = all.filter_map(|(name, value)| Header::from_bytes(name, value).ok());
+    headers.fold(Response::from_data(bytes), Response::with_header)
+}
+
+fn refused(status: u16) -> Response<io::Cursor<Vec<u8>>> {
+    page("text/plain; charset=utf-8", b"umbra watch: refused\n".to_vec()).with_status_code(status)
+}
+
+/// A file below the report's folder, with its type; none for what is no file there.
+fn file(folder: &Path, path: &Path) -> Option<(&'static str, Vec<u8>)> {
+    let kind = match path.extension()?.to_str()? {
+        "html" => "text/html; charset=utf-8",
+        "js" => "text/javascript; charset=utf-8",
+        "png" => "image/png",
+        _ => return None,
+    };
+    // No link leads out.
+    let folder = folder.canonicalize().ok()?;
+    let file = folder.join(path).canonicalize().ok()?;
+    if !file.starts_with(&folder) || !file.is_file() {
+        return None;
+    }
+    Some((kind, std::fs::read(file).ok()?))
+}
+
+/// Tells a browser what is shown, whenever that changes.
+fn events(request: Request, board: &Board) -> io::Result<()> {
+    let mut out = request.into_writer();
+    write!(out, "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nConnection: close\r\n")?;
+    for (name, value) in HEADERS {
+        write!(out, "{name}: {value}\r\n")?;
+    }
+    write!(out, "\r\n")?;
+    let mut version = 0;
+    loop {
+        match board.newer(version) {
+            Some(shown) => {
+                version = shown.version;
+                let shown = serde_json::to_string(&shown).map_err(io::Error::other)?;
+                write!(out, "data: {shown}\n\n")?;
+            }
+            None => write!(out, ": still here\n\n")?,
+        }
+        out.flush()?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Read as _, Write as _};
+    use std::net::TcpStream;
+
+    use super::*;
+
+    #[test]
+    fn only_the_page_itself_may_ask() {
+        let (host, secret) = ("127.0.0.1:4000", "abcdef");
+        let ask = |url: &str, asked, origin| Asked::of_parts(url, asked, origin, host, secret);
+        let own = Some(host);
+        assert_eq!(ask("/abcdef/", own, None), Asked::Page);
+        assert_eq!(ask("/abcdef/events?x", own, Some("http://127.0.0.1:4000")), Asked::Events);
+        let file = |path: &str| Asked::File(Look::Whole, path.into());
+        assert_eq!(ask("/abcdef/whole/report.html", own, None), file("report.html"));
+        assert_eq!(ask("/abcdef/whole/viewer/a%20b.js", own, None), file("viewer/a b.js"));
+        // Another name for this machine, another origin, another secret.
+        for (url, asked, origin) in [
+            ("/abcdef/", Some("localhost:4000"), None),
+            ("/abcdef/", Some("evil.example:4000"), None),
+            ("/abcdef/", None, None),
+            ("/abcdef/", own, Some("null")),
+            ("/abcdef/", own, Some("http://evil.example")),
+            ("/abcdef/", own, Some("http://127.0.0.1:4001")),
+            ("/abcdeg/", own, None),
+            ("/abcde/", own, None),
+            ("/abcdef", own, None),
+            ("/", own, None),
+            ("//abcdef", own, None),
+        ] {
+            assert_eq!(ask(url, asked, origin), Asked::Nothing(403), "{url} {asked:?} {origin:?}");
+        }
+        for path in [
+            "../record.json",
+            "a/../../b.html",
+            "%2e%2e/b.html",
+            "/etc/passwd",
+            "//etc/passwd.html",
+            ".hidden.html",
+            "a\\b.html",
+            "a%00.html",
+            "%zz.html",
+            "c:/b.html",
+            "",
+        ] {
+            let asked = ask(&format!("/abcdef/whole/{path}"), own, None);
+            assert_eq!(asked, Asked::Nothing(404), "{path}");
+        }
+    }
+
+    #[test]
+    fn a_browser_gets_the_report_and_nothing_else() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("slug");
+        std::fs::create_dir(&folder).unwrap();
+        std::fs::write(folder.join("report.html"), "the report").unwrap();
+        std::fs::write(folder.join("last-check.json"), "{}").unwrap();
+        std::fs::write(place.path().join("secret.html"), "secret").unwrap();
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(place.path().join("secret.html"), folder.join("link.html"))
+            .unwrap();
+        let board = Arc::new(Board::default());
+        let server =
+            Server::start([place.path().join("none"), folder], Arc::clone(&board)).unwrap();
+        let (host, secret) = (server.host.clone(), server.secret.clone());
+        let ask = |path: &str, more: &str| {
+            let mut stream = TcpStream::connect(&host).unwrap();
+            write!(
+                stream,
+                "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n{more}\r\n"
+            )
+            .unwrap();
+            let mut answer = String::new();
+            stream.read_to_string(&mut answer).unwrap();
+            answer
+        };
+        let report = ask(&format!("/{secret}/whole/report.html"), "");
+        assert!(report.starts_with("HTTP/1.1 200") && report.ends_with("the report"), "{report}");
+        assert!(report.contains("no-store") && report.contains("frame-ancestors 'self'"));
+        for (path, more, status) in [
+            (format!("/{secret}/whole/last-check.json"), "", 404),
+            (format!("/{secret}/whole/link.html"), "", 404),
+            (format!("/{secret}/whole/../secret.html"), "", 404),
+            (format!("/{secret}/first/report.html"), "", 404),
+            (format!("/{secret}/"), "Origin: http://evil.example\r\n", 403),
+            ("/0123/whole/report.html".to_owned(), "", 403),
+        ] {
+            let answer = ask(&path, more);
+            assert!(answer.starts_with(&format!("HTTP/1.1 {status}")), "{path}: {answer}");
+            assert!(!answer.contains("secret"), "{answer}");
+        }
+
+        // What is shown arrives when it changes.
+        let mut stream = TcpStream::connect(&host).unwrap();
+        write!(stream, "GET /{secret}/events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+        let mut seen = String::new();
+        let mut until = |words: &str| {
+            while !seen.contains(words) {
+                let mut bytes = [0; 512];
+                let read = stream.read(&mut bytes).unwrap();
+                assert!(read > 0, "{seen}");
+                seen.push_str(&String::from_utf8_lossy(&bytes[..read]));
+            }
+        };
+        board.show(Stage::Running, "compiling\u{1b}[2J");
+        until("\"message\":\"compiling\\\\u{1b}[2J\"");
+        board.report(Look::Whole, Stage::Done, "");
+        until("\"stage\":\"done\",\"message\":\"compiling");
+        until("\"look\":\"whole\",\"reports\":1");
+
+        let door = server.door().unwrap();
+        let text = std::fs::read_to_string(door.path()).unwrap();
+        assert!(text.contains(&format!("http://{host}/{secret}/")));
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::MetadataExt as _;
+            assert_eq!(door.path().metadata().unwrap().mode() & 0o777, 0o600);
+        }
+    }
+}
