@@ -33,6 +33,13 @@ pub struct Diagnosis {
     pub pictures: Vec<Picture>,
 }
 
+impl Diagnosis {
+    /// The name of the viewer's case that shows the known mistake of a part.
+    pub fn view_of(part: &str) -> String {
+        format!("looks like @ {part}")
+    }
+}
+
 /// A known mistake that leaves less than this fraction of the difference is as good as exact.
 const EXACT: f64 = 0.05;
 

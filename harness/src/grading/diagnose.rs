@@ -21,6 +21,7 @@ use crate::evidence::{self, Evidence, Picture};
 use crate::expected::scene_digest;
 use crate::imaging::pictures::tone_mapped;
 use crate::rubric;
+use crate::viewer::{Layer, ViewedCase, write_image};
 
 /// A tile whose mean difference from what is right is less than this is not stored.
 const VISIBLE: f64 = 1e-5;
@@ -36,7 +37,7 @@ impl Grading<'_> {
         self.assignment.root.join("expected").join(&self.assignment.name).join("mistakes")
     }
 
-    /// What the parts that lost points look like; small pictures of it go to `out`.
+    /// What the parts that lost points look like; small pictures of it go to `out`, for the viewer too.
     ///
     /// # Errors
     /// When the stored answers or the catalogue cannot be used, or a picture cannot be written.
@@ -46,7 +47,7 @@ impl Grading<'_> {
         evidence: &Evidence,
         drawn: &[Drawn],
         out: Option<&Path>,
-    ) -> anyhow::Result<Vec<Diagnosis>> {
+    ) -> anyhow::Result<(Vec<Diagnosis>, Vec<ViewedCase>)> {
         let (evidence, failing) = (public(evidence), self.failing(evidence));
         let nothing = Stored::default();
         let stored = match self.stored.get() {
@@ -71,13 +72,16 @@ impl Grading<'_> {
             stored,
             catalogue: &catalogue,
         };
-        let mut diagnoses = input.diagnose();
+        let (mut diagnoses, mut views) = (input.diagnose(), Vec::new());
         for diagnosis in &mut diagnoses {
-            if let Some(out) = out {
-                diagnosis.pictures = pictures(diagnosis, &input, out)?;
+            if let Some(out) = out
+                && let Some((pictures, view)) = pictures(diagnosis, &input, out)?
+            {
+                diagnosis.pictures = pictures;
+                views.push(view);
             }
         }
-        Ok(diagnoses)
+        Ok((diagnoses, views))
     }
 
     /// The parts that are diagnosed: those that lost points on public scenes.
@@ -234,8 +238,12 @@ const ENLARGED: usize = 5;
 
 /// Draws what was drawn, what is right and what the known mistake draws, where it shows best;
 /// nothing of several mistakes together.
-fn pictures(diagnosis: &Diagnosis, input: &Input, out: &Path) -> anyhow::Result<Vec<Picture>> {
-    let [alike] = diagnosis.mistakes.as_slice() else { return Ok(Vec::new()) };
+fn pictures(
+    diagnosis: &Diagnosis,
+    input: &Input,
+    out: &Path,
+) -> anyhow::Result<Option<(Vec<Picture>, ViewedCase)>> {
+    let [alike] = diagnosis.mistakes.as_slice() else { return Ok(None) };
     let kind = if diagnosis.part.starts_with('1') { Kind::Offline } else { Kind::Realtime };
     let views = input.stored.views.iter().filter(|(view, _)| view.kind == kind);
     let shown = views.filter_map(|(view, stored)| {
@@ -243,22 +251,36 @@ fn pictures(diagnosis: &Diagnosis, input: &Input, out: &Path) -> anyhow::Result<
         Some((stored.differs(known), view, input.observations.tiles.get(view)?, stored, known))
     });
     let best = shown.max_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((_, view, seen, stored, known)) = best else { return Ok(Vec::new()) };
+    let Some((_, view, seen, stored, known)) = best else { return Ok(None) };
     let mut lit: Vec<f32> = stored.right.values().iter().map(|v| v.element_sum() / 3.0).collect();
     lit.retain(|value| *value > 0.0);
     lit.sort_by(f32::total_cmp);
     let median_lit = lit.get(lit.len() / 2).copied().unwrap_or(1.0);
     std::fs::create_dir_all(out)?;
-    let mut pictures = Vec::new();
+    let (mut pictures, mut files) = (Vec::new(), Vec::new());
     for (title, tile) in [("yours", seen), ("right", &stored.right), ("known mistake", known)] {
         let file = format!("diagnosis-{}-{}.png", diagnosis.part, title.replace(' ', "-"));
         let picture = tone_mapped(&tile.enlarged(ENLARGED), median_lit);
         std::fs::write(out.join(&file), picture.png()?)?;
+        files.push((title, write_image(out, &tile.enlarged(1))?));
         let (path, scene) = (view.kind.name(), &view.scene);
         let title = format!("{title} ({path}, {scene}, every few pixels)");
         pictures.push(Picture { title, file, width: picture.width, height: picture.height });
     }
-    Ok(pictures)
+    let mut layers: Vec<Layer> =
+        files.iter().map(|(title, file)| Layer::image(*title, file)).collect();
+    if let [(_, yours), (_, right), (_, known)] = files.as_slice() {
+        layers.push(Layer::difference("yours - right", yours, right));
+        layers.push(Layer::difference("yours - known mistake", yours, known));
+    }
+    let view = ViewedCase {
+        id: Diagnosis::view_of(&diagnosis.part),
+        title: format!("{}: what part {} looks like", view.scene, diagnosis.part),
+        note: "every few pixels".to_owned(),
+        layers,
+        ..ViewedCase::default()
+    };
+    Ok(Some((pictures, view)))
 }
 
 /// Whether a view is one of those that a mistake is looked for in.

@@ -13,7 +13,9 @@ use crate::evidence::images::{Kind, compare_pixels, reference_of};
 use crate::evidence::{Check, CheckId, Picture, Verdict};
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::pictures::{self, full_scale, signed_error, tone_mapped};
-use crate::viewer::{Layer, LayerKind, ViewedCase, write_excess, write_image, write_mask};
+use crate::viewer::{
+    Layer, LayerKind, ViewedCase, remove_others, write_excess, write_image, write_mask,
+};
 
 /// What the values of renders are.
 const UNIT: &str = "radiance L [W m⁻² sr⁻¹]";
@@ -86,6 +88,10 @@ impl Images<'_> {
             }
             bytes += own;
             views.push(view);
+        }
+        for (held_back, folder) in [(false, &out.student), (true, &out.instructor)] {
+            let own = views.iter().filter(|view| view.held_back == held_back);
+            remove_others(folder, &own.collect::<Vec<_>>())?;
         }
         Ok(views)
     }

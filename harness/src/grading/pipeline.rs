@@ -346,7 +346,10 @@ impl<'a> Grading<'a> {
         record.views = images.view(&checks, &self.assignment.tolerances, out)?;
         costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
-        record.diagnoses = self.diagnose(&session, &record.evidence, &drawn, Some(&out.student))?;
+        let (diagnoses, views) =
+            self.diagnose(&session, &record.evidence, &drawn, Some(&out.student))?;
+        record.diagnoses = diagnoses;
+        record.views.extend(views);
         record.stages = costs.end("diagnosis", 0.0);
         match (&self.cache, key) {
             (Some(cache), Some(key)) => {
@@ -406,7 +409,7 @@ impl<'a> Grading<'a> {
             self.realtime(&session, library, stages, &mut checks, &mut drawn)?;
         }
         let evidence = Evidence { checks };
-        let diagnoses = self.diagnose(&session, &evidence, &drawn, None)?;
+        let (diagnoses, _) = self.diagnose(&session, &evidence, &drawn, None)?;
         Ok((evidence, diagnoses))
     }
 

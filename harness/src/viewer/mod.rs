@@ -5,7 +5,7 @@ mod pack;
 
 use serde::{Deserialize, Serialize};
 
-pub use pack::{write_excess, write_image, write_mask};
+pub use pack::{remove_others, write_excess, write_image, write_mask};
 
 /// The folder of the data files, beside the page.
 pub const DATA_FOLDER: &str = "viewer";

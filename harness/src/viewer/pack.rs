@@ -1,5 +1,6 @@
 //! Images as scripts that hand their bits to the viewer. `docs/decisions/0024-viewer-data.md` says why.
 
+use std::collections::HashSet;
 use std::io::{self, Write as _};
 use std::path::Path;
 
@@ -9,8 +10,8 @@ use flate2::{Compression, write::ZlibEncoder};
 use half::f16;
 use sha2::{Digest as _, Sha256};
 
-use super::{DATA_FOLDER, ImageFile, Samples};
-use crate::files::{hex, write_whole};
+use super::{DATA_FOLDER, ImageFile, Samples, ViewedCase};
+use crate::files::{files_below, hex, write_whole};
 use crate::imaging::reference::RegionMask;
 
 /// Level of zlib: higher ones take three times as long for 2 % of the bytes, since most bits are noise.
@@ -64,6 +65,25 @@ pub fn write_mask(folder: &Path, mask: &RegionMask) -> io::Result<ImageFile> {
     write(folder, (mask.width, mask.height, 1, Samples::Uint16), &planes)
 }
 
+/// Removes the data files below `folder` that none of the cases needs: those of an earlier submission.
+///
+/// # Errors
+/// When one cannot be removed.
+pub fn remove_others(folder: &Path, cases: &[&ViewedCase]) -> io::Result<()> {
+    let needed: HashSet<&str> = cases.iter().flat_map(|case| case.files()).collect();
+    let data = folder.join(DATA_FOLDER);
+    if !data.is_dir() {
+        return Ok(());
+    }
+    for file in files_below(&data)? {
+        let name = file.strip_prefix(folder).ok().and_then(Path::to_str).unwrap_or_default();
+        if !needed.contains(name) {
+            std::fs::remove_file(&file)?;
+        }
+    }
+    Ok(())
+}
+
 /// The half with the very value of a float, the bits of what is not a number included.
 fn exact_half(value: f32) -> Option<u16> {
     let half = f16::from_f32(value);
@@ -113,6 +133,7 @@ mod tests {
     use basecode::Vec3;
     use flate2::read::ZlibDecoder;
 
+    use super::super::Layer;
     use super::*;
 
     /// The samples of a data file, as data.js reads them.
@@ -177,6 +198,19 @@ mod tests {
         assert_ne!(write_image(folder.path(), &image).unwrap().file, file.file);
         // The same zeros in another shape are another image.
         assert_ne!(write_image(folder.path(), &Image::new(3, 5)).unwrap().file, file.file);
+    }
+
+    #[test]
+    fn what_nobody_needs_any_more_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let [old, new] =
+            [3, 4].map(|side| write_image(folder.path(), &Image::new(side, side)).unwrap());
+        let case = ViewedCase { layers: vec![Layer::image("a", &new)], ..Default::default() };
+        remove_others(folder.path(), &[&case]).unwrap();
+        assert!(!folder.path().join(old.file).exists() && folder.path().join(new.file).exists());
+        remove_others(folder.path(), &[]).unwrap();
+        assert_eq!(folder.path().join(DATA_FOLDER).read_dir().unwrap().count(), 0);
+        remove_others(&folder.path().join("none"), &[]).unwrap();
     }
 
     #[test]

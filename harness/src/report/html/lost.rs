@@ -116,7 +116,7 @@ impl<'a> Lost<'a> {
         for diagnosis in self.record.diagnoses.iter().filter(|found| found.part == part.id) {
             if !diagnosis.pictures.is_empty() {
                 html.raw("<details>\n<summary>The known mistake beside yours</summary>\n");
-                self.places.of(html, "looks like", &diagnosis.pictures);
+                self.places.of_diagnosis(html, diagnosis);
                 html.raw("</details>\n");
             }
         }
@@ -132,7 +132,10 @@ impl<'a> Lost<'a> {
 
     /// Everything that decided, folded.
     fn evidence(&mut self, html: &mut Html, part: &PartGrade, own: &[Placed<'a>]) {
-        html.raw("<details>\n<summary>Evidence: ").text(&count(own.len(), "failed check"));
+        html.raw("<details>\n<summary>Evidence");
+        if !own.is_empty() {
+            html.raw(": ").text(&count(own.len(), "failed check"));
+        }
         html.raw("</summary>\n<p>").text(&part.reason).raw("</p>\n");
         decided_by(html, part, &self.record.evidence.checks);
         for &check in own {

@@ -1,6 +1,7 @@
 //! Pictures on pages, each with its size, and the way to the viewer.
 
 use super::markup::Html;
+use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, Picture};
 use crate::report::VIEW_FILE;
 use crate::viewer::ViewedCase;
@@ -22,20 +23,24 @@ impl Places<'_> {
     pub(super) fn of_check(&self, html: &mut Html, check: &Check) {
         let folder = if check.held_back { "" } else { self.public };
         let name = check.name();
-        let view = self.views.iter().find(|view| view.id == name);
-        let target = view.map(|view| (format!("{folder}{VIEW_FILE}"), fragment(&view.id)));
+        self.show(html, &name, &name, folder, &check.pictures);
+    }
+
+    /// Pictures of a diagnosis, likewise.
+    pub(super) fn of_diagnosis(&self, html: &mut Html, found: &Diagnosis) {
+        let view = Diagnosis::view_of(&found.part);
+        self.show(html, "looks like", &view, self.public, &found.pictures);
+    }
+
+    fn show(&self, html: &mut Html, name: &str, view: &str, folder: &str, pictures: &[Picture]) {
+        let is_viewed = self.views.iter().any(|own| own.id == view);
+        let target = is_viewed.then(|| (format!("{folder}{VIEW_FILE}"), fragment(view)));
         let files = |picture: &Picture| format!("{folder}{}", picture.file);
-        figures(html, &name, &check.pictures, &files, target.as_ref());
+        figures(html, name, pictures, &files, target.as_ref());
         if let Some((page, fragment)) = &target {
             html.raw("<p class=\"open\"><a href=\"").address(page).raw("#").text(fragment);
             html.raw("\">Open in the viewer</a>: exposure, wipe, pixel values, where each rule counts</p>\n");
         }
-    }
-
-    /// Pictures of the thing called `name`.
-    pub(super) fn of(&self, html: &mut Html, name: &str, pictures: &[Picture]) {
-        let files = |picture: &Picture| format!("{}{}", self.public, picture.file);
-        figures(html, name, pictures, &files, None);
     }
 }
 

@@ -137,14 +137,27 @@ fn notices(html: &mut Html, entry: &SubmissionReport, reader: Reader) {
 
 /// The parts that earned everything, and a bonus that nobody tried for.
 fn right(html: &mut Html, parts: &[PartGrade]) {
-    let right: Vec<&PartGrade> = parts.iter().filter(|part| !is_lost(part)).collect();
-    if right.is_empty() {
+    let of = |tried: bool| -> Vec<&PartGrade> {
+        let kept = parts.iter().filter(|part| !is_lost(part));
+        kept.filter(|part| (part_class(part) != "unearned") == tried).collect()
+    };
+    let (right, untried) = (of(true), of(false));
+    if right.is_empty() && untried.is_empty() {
         return;
     }
-    html.raw("<details>\n<summary>").text(&count(right.len(), "part")).raw(" right: ");
-    let ids: Vec<&str> = right.iter().map(|part| part.id.as_str()).collect();
-    html.text(&ids.join(", ")).raw("</summary>\n<table class=\"parts\">\n<tbody>\n");
-    for part in right {
+    let ids = |parts: &[&PartGrade]| {
+        parts.iter().map(|part| part.id.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    html.raw("<details>\n<summary>");
+    if !right.is_empty() {
+        html.text(&count(right.len(), "part")).raw(" right: ").text(&ids(&right));
+    }
+    if !untried.is_empty() {
+        html.raw(if right.is_empty() { "Not tried: " } else { "; not tried: " });
+        html.text(&ids(&untried));
+    }
+    html.raw("</summary>\n<table class=\"parts\">\n<tbody>\n");
+    for part in right.into_iter().chain(untried) {
         html.raw("<tr class=\"").raw(part_class(part)).raw("\"><td><strong><span class=\"id\">");
         html.text(&part.id).raw("</span> ").text(&part.title).raw("</strong><p>");
         html.text(&part.reason).raw("</p></td><td class=\"worth\"><strong>").text(&of_part(part));
