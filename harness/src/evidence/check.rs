@@ -114,11 +114,11 @@ pub struct Picture {
 pub struct Lobe {
     /// The material, in words.
     pub material: String,
-    /// The angle of `wo` from the normal [degrees].
+    /// The angle of `wo` from the normal, in degrees.
     pub wo_deg: f64,
     /// Whether values differ so much that only their logarithms can be drawn.
     pub log: bool,
-    /// The right values, finely: the angle of `wi` from the normal [degrees], positive on the side across from `wo`,
+    /// The right values, finely: the angle of `wi` from the normal, in degrees, positive on the side across from `wo`,
     /// and the mean of the channels, cosine included [sr^-1].
     pub expected: Vec<[f64; 2]>,
     /// The same of what was answered, where it was asked.

@@ -35,7 +35,7 @@ pub enum Exit {
     Code(i32),
     /// By this signal, which Umbra did not send.
     Signal(i32),
-    /// At its memory limit, or so it said: see [`Exit::with_memory`].
+    /// At its memory limit, or so it said.
     OutOfMemory,
     /// By the kernel, out of CPU time, or by Umbra, because whoever watched it found it had had enough.
     OutOfCpu,
