@@ -1,7 +1,7 @@
 /* A plugin that misbehaves on purpose. What it does in each call is the scene's options text;
  * without options it draws zeros. FAULT_AT_LOAD makes a constructor that ends the worker.
  * With ATTACKS it is linked with hostile/attack.c, and options of several words are an attack;
- * ATTACK_AT_LOAD is one for the constructor. With DEEDS it is linked with hostile/deeds.c, which
+ * ATTACK_AT_LOAD is one for the constructor. With ACTIONS it is linked with hostile/actions.c, which
  * knows more. WRONG_MAGIC, WRONG_VERSION, WRONG_SIZE and NULL_ENTRY make tables that a host must
  * refuse. */
 #include "umbra_renderer.h"
@@ -69,9 +69,9 @@ static void attack_by(const char *text)
 }
 #endif
 
-#ifdef DEEDS
-/* Answers whether it knows the deed. */
-int deed(const char *what, float *values, size_t count, UmbraMessage *message,
+#ifdef ACTIONS
+/* Answers whether it knows the action. */
+int action(const char *what, float *values, size_t count, UmbraMessage *message,
          UmbraStatus *status);
 /* Remembers a stage's text by every means, or tells what is remembered. */
 void remember(const char *where, const UmbraText *text);
@@ -122,9 +122,9 @@ static UmbraStatus act(UmbraScene scene, float *pixels, size_t float_count, Umbr
 {
     static int start[1], drawn;
     memset(pixels, 0, float_count * sizeof(float));
-#ifdef DEEDS
+#ifdef ACTIONS
     UmbraStatus status = UMBRA_STATUS_OK;
-    if (deed(((Loaded *)scene)->mode, pixels, float_count, message, &status))
+    if (action(((Loaded *)scene)->mode, pixels, float_count, message, &status))
         return status;
 #endif
 #ifdef ATTACKS
@@ -221,7 +221,7 @@ static UmbraStatus open_realtime(UmbraScene s, const UmbraRealtimeSettings *t, U
                                  UmbraMessage *m)
 {
     (void)t, (void)m;
-#ifdef DEEDS
+#ifdef ACTIONS
     const char *mode = ((Loaded *)s)->mode;
     if (strncmp(mode, "keep ", 5) == 0) {
         if (t->stage_count > 0)

@@ -64,7 +64,7 @@ pub fn set_up(stage: &Path, layers: Layers) -> Result<(), String> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let mut cc = Command::new("cc");
         cc.args(["-shared", "-fPIC", "-O1", "-std=gnu11", "-D_GNU_SOURCE", "-w", "-pthread"]);
-        cc.args(["-DATTACKS", "-DDEEDS"]).args(flags).arg("-I").arg(root.join("api/include"));
+        cc.args(["-DATTACKS", "-DACTIONS"]).args(flags).arg("-I").arg(root.join("api/include"));
         for source in sources {
             let folders = ["tests/c_plugin", "tests/hostile"].map(|f| root.join(f).join(source));
             cc.args(folders.iter().find(|path| path.is_file()));

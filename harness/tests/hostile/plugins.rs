@@ -11,7 +11,7 @@ pub struct Plugin {
     /// Its library in the stage.
     pub library: &'static str,
     /// What it is told to do.
-    pub action: Deed,
+    pub action: Action,
     asked: Asked,
     expect: Expect,
     /// Whether the questions before and after the action must be answered.
@@ -22,7 +22,7 @@ pub struct Plugin {
 
 /// Options of a scene, or what makes them where a case runs.
 #[derive(Clone, Copy)]
-pub enum Deed {
+pub enum Action {
     Is(&'static str),
     Made(fn(&Fixture) -> String),
 }
@@ -54,8 +54,8 @@ enum Expect {
 impl Plugin {
     pub fn options(&self, fixture: &Fixture) -> String {
         match self.action {
-            Deed::Is(text) => text.to_owned(),
-            Deed::Made(make) => make(fixture),
+            Action::Is(text) => text.to_owned(),
+            Action::Made(make) => make(fixture),
         }
     }
 
@@ -127,18 +127,18 @@ impl Expect {
     }
 }
 
-/// A action of the plugin in C, in an offline render.
+/// An action of the plugin in C, in an offline render.
 fn c(name: &'static str, action: &'static str, expect: Expect) -> Plugin {
-    let (library, action) = ("fault.so", Deed::Is(action));
+    let (library, action) = ("fault.so", Action::Is(action));
     Plugin { name, library, action, asked: Asked::Offline, expect, around: true, control: false }
 }
 
 /// The same with words that depend on the place; without isolation it must succeed.
 fn made(name: &'static str, action: fn(&Fixture) -> String, expect: Expect) -> Plugin {
-    Plugin { action: Deed::Made(action), control: true, ..c(name, "", expect) }
+    Plugin { action: Action::Made(action), control: true, ..c(name, "", expect) }
 }
 
-/// A action of the plugin in Rust.
+/// An action of the plugin in Rust.
 fn rust(name: &'static str, action: &'static str, asked: Asked, expect: Expect) -> Plugin {
     Plugin { library: "hostile.so", asked, ..c(name, action, expect) }
 }

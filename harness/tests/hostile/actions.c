@@ -1,4 +1,4 @@
-/* What a hostile plugin does, by name; see c_plugin/fault.c. Each deed says in its message how far it
+/* What a hostile plugin does, by name; see c_plugin/fault.c. Each action says in its message how far it
  * came. Everything is bounded, so that a hole in the sandbox hurts nobody, and aims at nothing but
  * what the test made. */
 #include "umbra_renderer.h"
@@ -39,7 +39,7 @@ static const char *name_of(int error)
     return error ? strerrorname_np(error) : "no error";
 }
 
-/* Ends a deed with what there is to say. */
+/* Ends an action with what there is to say. */
 __attribute__((format(printf, 2, 3))) static UmbraStatus say(UmbraMessage *message,
                                                              const char *format, ...)
 {
@@ -401,7 +401,7 @@ int recall(const char *where, UmbraMessage *message)
     return getenv("KEPT") != NULL && ((void)say(message, "kept in the environment"), 1);
 }
 
-int deed(const char *what, float *values, size_t count, UmbraMessage *message,
+int action(const char *what, float *values, size_t count, UmbraMessage *message,
          UmbraStatus *status)
 {
     char copy[4096], *words = copy;
