@@ -121,6 +121,22 @@ fn compile_errors_name_file_and_line() {
     assert!(lines.contains(&3) && lines.contains(&4), "{lines:?}");
 }
 
+/// What an allocator says when it gets nothing may stand in a source, too.
+#[test]
+fn a_source_that_quotes_an_allocator_is_refused_for_its_own_errors() {
+    for words in
+        ["memory allocation of 8 bytes failed", "std::bad_alloc", "LLVM ERROR: out of memory"]
+    {
+        for text in
+            [format!("compile_error!(\"{words}\");\n"), format!("const A: u8 = \"{words}\";\n")]
+        {
+            let report = build_text(&text, &default_limits());
+            let refused = matches!(&report.outcome, BuildOutcome::CompileError { .. });
+            assert!(refused, "{text}: {:#?}", report.outcome);
+        }
+    }
+}
+
 #[test]
 fn warnings_are_kept_and_umbras_own_crates_are_out_of_reach() {
     let report = build_text("fn unused() {}\n", &default_limits());

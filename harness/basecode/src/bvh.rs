@@ -23,6 +23,7 @@ pub struct Bvh {
     nodes: Vec<Node>,
     leaves: Vec<Triangles>,
     /// Whether this machine has AVX2.
+    #[cfg_attr(not(target_arch = "x86_64"), expect(dead_code, reason = "only x86-64 has AVX2"))]
     avx2: bool,
 }
 
@@ -87,7 +88,7 @@ impl Bvh {
             Child { first: at, leaves: leaves.len() as u32 - at }
         });
         #[cfg(target_arch = "x86_64")]
-        let avx2 = lanes::is_here();
+        let avx2 = lanes::has_avx2();
         #[cfg(not(target_arch = "x86_64"))]
         let avx2 = false;
         Self { nodes, leaves, avx2 }

@@ -147,6 +147,10 @@ fn compile_once(
                 format!("cannot keep what the compiler made in {}: no disk space?", out.display());
             return Err(io::Error::new(io::ErrorKind::StorageFull, message));
         }
+        // Words of the compiler's count more than those of an allocator, which a source may quote.
+        Exit::OutOfMemory if !said.errors.is_empty() => {
+            BuildOutcome::CompileError { errors: said.errors }
+        }
         Exit::Code(code) => {
             let mut errors = said.errors;
             if errors.is_empty() {

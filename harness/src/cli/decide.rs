@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
-use serde::Deserialize;
 
 use super::class;
 use super::context::Context;
+use super::earlier::{Report, Row};
 use crate::class::matching::{Match, find};
 use crate::class::overrides::{Decision, OVERRIDES, Overrides, Subject, entry, fingerprint};
-use crate::class::{Claim, Class, Matches, Roster, Standing, names};
+use crate::class::{Claim, Matches, Roster, names};
 use crate::files::write_whole;
 use crate::grading::{Record, RecordCache};
 use crate::report::{self, harmless};
@@ -222,39 +222,9 @@ fn one(wanted: &str, output: &Path, rules: &rubric::Rules) -> anyhow::Result<Gra
     }
 }
 
-/// The few keys of `report.json` that tell what waits.
-#[derive(Deserialize)]
-struct Report {
-    class: Option<Class>,
-    submissions: Vec<Row>,
-    assignment: About,
-}
-
-#[derive(Deserialize)]
-struct About {
-    rules: rubric::Rules,
-}
-
-#[derive(Deserialize)]
-struct Row {
-    name: String,
-    slug: String,
-    points: f64,
-    points_max: f64,
-    unconfirmed: f64,
-    remarks: Vec<String>,
-    standing: Standing,
-}
-
 /// Lists what waits for the instructor; exit 1 where anything does.
 pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
-    let file = arguments.output.join(report::JSON_FILE);
-    let bytes = std::fs::read(&file).with_context(|| {
-        format!("cannot read {}: expected the --output of an earlier `umbra grade`", file.display())
-    })?;
-    let report: Report = serde_json::from_slice(&bytes).with_context(|| {
-        format!("{}: not a report of this version of Umbra; grade again", file.display())
-    })?;
+    let report = Report::read(&arguments.output)?;
     let class = report.class.unwrap_or_default();
     let rules = &report.assignment.rules;
     let row = |row: &Row, what: &str| format!("{} ({}): {what}", row.name, row.slug);

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
-use serde::Deserialize;
 use serde_json::json;
 
 use super::class;
 use super::context::Context;
+use super::earlier::{Report, Row};
+use crate::class::Kind;
 use crate::class::export::{Points, grade_book};
-use crate::class::{Class, Kind, Standing};
 use crate::columns::count;
 use crate::files::write_whole;
 use crate::report::{self, harmless};
@@ -49,44 +49,16 @@ pub struct ExportArguments {
     only: Option<String>,
 }
 
-/// The keys of `report.json` that an export needs.
-#[derive(Deserialize)]
-struct Report {
-    assignment: About,
-    submissions: Vec<Row>,
-    class: Option<Class>,
-}
-
-#[derive(Deserialize)]
-struct About {
-    title: String,
-    rules: Rules,
-}
-
-#[derive(Deserialize)]
-struct Row {
-    name: String,
-    slug: String,
-    points: f64,
-    points_max: f64,
-    out_of: f64,
-    remarks: Vec<String>,
-    parts: Vec<PartGrade>,
-    standing: Standing,
-}
-
 /// Writes the grades and says who is not in them.
 pub fn export(arguments: &ExportArguments, root: Option<&Path>) -> anyhow::Result<u8> {
-    let file = arguments.output.join(report::JSON_FILE);
-    let bytes = std::fs::read(&file).with_context(|| {
-        format!("cannot read {}: expected the --output of an earlier `umbra grade`", file.display())
-    })?;
-    let mut report: Report = serde_json::from_slice(&bytes).with_context(|| {
-        format!("{}: not a report of this version of Umbra; grade again", file.display())
-    })?;
+    let mut report = Report::read(&arguments.output)?;
     if let Some(only) = &arguments.only {
         report.submissions.retain(|row| row.slug == *only);
-        ensure!(!report.submissions.is_empty(), "{} has no submission \"{only}\"", file.display());
+        ensure!(
+            !report.submissions.is_empty(),
+            "{} has no submission \"{only}\"",
+            arguments.output.display()
+        );
     }
     let text = match arguments.format {
         Format::Brightspace => book(arguments, root, &report, Kind::Brightspace)?,

@@ -9,6 +9,7 @@ mod context;
 mod decide;
 #[cfg(target_os = "linux")]
 mod doctor;
+mod earlier;
 mod explain;
 mod export;
 mod grade;

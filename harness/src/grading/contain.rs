@@ -47,7 +47,7 @@ fn contained<T>(
     }
     let result = panics::contain(grade);
     if let (Err(bug), Some(cache)) = (&result, cache) {
-        // Where it cannot be cache, it is met again, and contained again.
+        // Where it cannot be kept, it is met again, and contained again.
         let _ = cache.keep_bug(bug, source, out);
     }
     result

@@ -50,8 +50,8 @@ pub struct Run {
     pub whole: bool,
 }
 
-/// Judges integrator, shadows, loop and image on one scene. What is drawn is no answer where only a small
-/// film was: that image is right.
+/// Judges integrator, shadows, loop and image on one scene. Answers no image where only a small film was
+/// drawn: it is right.
 pub fn judge_scene<'a>(
     session: &Session,
     plugin: &Path,
@@ -247,8 +247,8 @@ fn plain_surfaces(case: &PreparedScene) -> Vec<(usize, BsdfQuery)> {
         let material = scene.material_of(point.shape);
         let bitmap = |texture| matches!(texture, &Texture::Bitmap(_));
         let plain = !bitmap(&material.diffuse) && !bitmap(&material.specular);
-        let submitted = plain && material.model != MaterialModel::Mirror;
-        submitted.then(|| {
+        let asked = plain && material.model != MaterialModel::Mirror;
+        asked.then(|| {
             let (shape, primitive) = (point.shape as u32, point.primitive as u32);
             let query = BsdfQuery {
                 source: BsdfSource::Shape { shape, primitive },

@@ -83,7 +83,7 @@ impl Lanes for Portable {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub use avx2::{Avx2, is_here};
+pub use avx2::{Avx2, has_avx2};
 
 /// The only `unsafe` code of ray casting.
 #[cfg(target_arch = "x86_64")]
@@ -93,12 +93,12 @@ mod avx2 {
     use super::{Eight, Lanes};
 
     /// Whether this machine has AVX2.
-    pub fn is_here() -> bool {
+    pub fn has_avx2() -> bool {
         std::arch::is_x86_feature_detected!("avx2")
     }
 
     /// Eight numbers in one register. Its values are made and used in functions with
-    /// `#[target_feature(enable = "avx2")]` alone, which nobody calls unless [`is_here`] says so.
+    /// `#[target_feature(enable = "avx2")]` alone, which nobody calls unless [`has_avx2`] says so.
     #[derive(Clone, Copy)]
     pub struct Avx2(__m256);
 
