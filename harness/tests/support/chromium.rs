@@ -82,6 +82,11 @@ impl Chromium {
 
     /// Asks for something and waits for the answer.
     pub fn call(&mut self, method: &str, parameters: Value) -> Value {
+        self.asked(method, parameters).unwrap_or_else(|error| panic!("{method}: {error}"))
+    }
+
+    /// The same, with Chromium's error where it has one.
+    fn asked(&mut self, method: &str, parameters: Value) -> Result<Value, Value> {
         self.last += 1;
         let mut command = json!({"id": self.last, "method": method, "params": parameters});
         if !self.session.is_empty() {
@@ -91,8 +96,12 @@ impl Chromium {
         loop {
             let message = self.messages.recv_timeout(PATIENCE).expect("Chromium answers");
             if message["id"] == json!(self.last) {
-                assert!(message["error"].is_null(), "{method}: {}", message["error"]);
-                return message["result"].clone();
+                let error = &message["error"];
+                return if error.is_null() {
+                    Ok(message["result"].clone())
+                } else {
+                    Err(error.clone())
+                };
             }
         }
     }
@@ -116,21 +125,30 @@ impl Chromium {
 
     /// The value of an expression in the page; promises are waited for.
     pub fn value(&mut self, expression: &str) -> Value {
-        let request =
-            json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
-        let answer = self.call("Runtime.evaluate", request);
-        let thrown = &answer["exceptionDetails"];
-        assert!(thrown.is_null(), "{expression}: {thrown}");
-        answer["result"]["value"].clone()
+        let answer = self.evaluate(expression);
+        answer.unwrap_or_else(|error| panic!("{expression}: {error}"))
     }
 
-    /// Waits until an expression is true.
+    fn evaluate(&mut self, expression: &str) -> Result<Value, Value> {
+        let request =
+            json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
+        let answer = self.asked("Runtime.evaluate", request)?;
+        let thrown = &answer["exceptionDetails"];
+        assert!(thrown.is_null(), "{expression}: {thrown}");
+        Ok(answer["result"]["value"].clone())
+    }
+
+    /// Waits until an expression is true. A page that another one takes the place of has no answer.
     pub fn until(&mut self, expression: &str) {
         let begun = Instant::now();
         let guarded =
             format!("(() => {{ try {{ return !!({expression}) }} catch {{ return false }} }})()");
-        while self.value(&guarded) != json!(true) {
-            assert!(begun.elapsed() < PATIENCE, "never true: {expression}");
+        loop {
+            let answer = self.evaluate(&guarded);
+            if answer == Ok(json!(true)) {
+                return;
+            }
+            assert!(begun.elapsed() < PATIENCE, "never true: {expression} ({answer:?})");
             thread::sleep(Duration::from_millis(20));
         }
     }
