@@ -48,7 +48,7 @@ fn main() -> ExitCode {
         Command::Scenes { check: true } => scenes::check(),
         Command::Scenes { check: false } => scenes::write(),
         Command::Checks => checks::run(root(), false),
-        Command::Samples => samples::pack(root(), &|_| true).map(|samples| {
+        Command::Samples => samples::pack(root(), &|_, _| true).map(|samples| {
             let paths = samples.iter().map(|sample| sample.archive.display().to_string());
             paths.collect::<Vec<_>>().join("\n")
         }),

@@ -23,7 +23,7 @@ use umbra::worker::{
 };
 
 use archive::write_archive;
-use expect::Expect;
+pub use expect::Expect;
 
 use crate::parallel;
 
@@ -94,14 +94,18 @@ fn template() -> String {
     "template".to_owned()
 }
 
-/// Packs the samples whose names are wanted where the archive is missing or older than its sources,
+/// Which samples are wanted, by name and expectation.
+pub type Wanted<'a> = &'a (dyn Fn(&str, &Expect) -> bool + Sync);
+
+/// Packs the samples that are wanted where the archive is missing or older than its sources,
 /// as many at a time as there are cores.
 ///
 /// # Errors
 /// When a sample contradicts itself or cannot be drawn; names it.
-pub fn pack(root: &Path, wanted: &(dyn Fn(&str) -> bool + Sync)) -> Result<Vec<Sample>> {
+pub fn pack(root: &Path, wanted: Wanted) -> Result<Vec<Sample>> {
     let packer = Packer::new(root)?;
-    let names: Vec<&String> = packer.recipes.keys().filter(|name| wanted(name)).collect();
+    let recipes = packer.recipes.iter().filter(|(name, recipe)| wanted(name, &recipe.expect));
+    let names: Vec<&String> = recipes.map(|(name, _)| name).collect();
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     parallel::each(&names, cores, |_, name| {
         packer.pack(name).with_context(|| format!("sample {name}"))

@@ -40,6 +40,11 @@ impl Range {
 }
 
 impl Expect {
+    /// Whether some part of it must look like a known mistake.
+    pub fn is_known_mistake(&self) -> bool {
+        self.diagnosis.iter().flatten().any(|(part, _)| !part.is_empty())
+    }
+
     /// What differs in a submission's entry of `report.json`; empty when nothing does.
     pub fn complaint(&self, submission: &Value, rules: &Rules) -> String {
         if self.total.is_none() && self.parts.is_empty() {

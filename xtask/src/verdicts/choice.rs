@@ -16,6 +16,8 @@ const SEEDS: [u64; 4] = [260_000_001, 260_712_345, 261_999_999, 7];
 pub const QUICK_STEP: usize = 6;
 pub const QUICK_PAIRS: usize = 60;
 pub const QUICK_TRIPLES: usize = 20;
+/// The samples per pixel of all these.
+pub const QUICK_SPP: u32 = 4;
 /// So many triples otherwise.
 pub const TRIPLES: usize = 500;
 
