@@ -384,3 +384,6 @@ fn median_length(offsets: &mut [[f32; 2]]) -> f64 {
     };
     median(0).hypot(median(1))
 }
+
+#[cfg(test)]
+mod tests;

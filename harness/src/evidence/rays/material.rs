@@ -110,3 +110,70 @@ pub fn set_apart(checks: &mut [Check]) {
         check.summary = format!("radiance is wrong under other BSDFs too ({})", check.summary);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::batch;
+    use super::*;
+
+    /// The renderer's own BSDF where each lit ray ends: another on each surface.
+    fn own(batch: &RayBatch) -> Vec<OwnValue> {
+        let value = |ray: usize| [0.2, 0.1 + 0.7 * (ray as f32 * 0.29).fract(), 0.5];
+        (0..batch.lit).map(|ray| (ray, value(ray))).collect()
+    }
+
+    /// Judges radiance that is what `change` makes of the value at each ray's end, times I / r^2.
+    fn judge(change: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> Check {
+        let batch = batch();
+        let own = own(&batch);
+        let mut radiance = vec![[0.0; 3]; batch.points.len()];
+        for (ray, value) in &own {
+            let value = change(*ray, value.map(f64::from));
+            radiance[*ray] = batch.unshadowed(*ray, value).map(|v| v as f32);
+        }
+        judge_material(&batch, &own, &radiance)
+    }
+
+    #[test]
+    fn what_the_surfaces_own_bsdf_answers_is_right_under_any_convention() {
+        let cos_i = |ray: usize| f64::from(Frame::cos_theta(batch().points[ray].wi));
+        for right in [
+            judge(|_, value| value),
+            judge(|ray, value| value.map(|v| v * cos_i(ray))),
+            judge(|_, value| value.map(|v| v / std::f64::consts::PI)),
+        ] {
+            assert_eq!((right.verdict, right.error), (Verdict::Pass, 0.0), "{}", right.summary);
+        }
+    }
+
+    #[test]
+    fn another_surfaces_bsdf_is_a_slip_and_the_first_ray_is_told() {
+        let of = own(&batch());
+        let next = |ray: usize| of[(ray + 1) % of.len()].1.map(f64::from);
+        let wrong = judge(|ray, _| next(ray));
+        assert_eq!(wrong.verdict, Verdict::Fail);
+        assert_eq!(wrong.error, Class::Slip.price());
+        assert!(wrong.summary.contains("of 40 rays"), "{}", wrong.summary);
+        // One ray of forty is more than a seam explains.
+        assert_eq!(judge(|ray, own| if ray == 7 { next(7) } else { own }).verdict, Verdict::Fail);
+        assert_eq!(judge(|ray, own| own.map(|v| if ray == 7 { f64::NAN } else { v })).verdict, {
+            Verdict::NotJudged
+        });
+    }
+
+    #[test]
+    fn nothing_is_said_of_black_or_where_the_light_is_wrong() {
+        assert_eq!(judge(|_, _| [0.0; 3]).verdict, Verdict::NotJudged);
+        let none = judge_material(&batch(), &[], &[]);
+        assert_eq!(none.verdict, Verdict::NotJudged);
+        let wrong = || Check::new(ID, "s", Verdict::Fail, "");
+        let lit = |verdict| Check::new(CheckId::RadianceLit, "other", verdict, "");
+        for (light, verdict) in
+            [(Verdict::Fail, Verdict::NotJudged), (Verdict::Pass, Verdict::Fail)]
+        {
+            let mut checks = [wrong(), lit(light)];
+            set_apart(&mut checks);
+            assert_eq!(checks[0].verdict, verdict);
+        }
+    }
+}

@@ -7,7 +7,7 @@ use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict, price};
 use crate::expected::Visibility;
 
 /// Forty lit and twenty dark rays at various distances and angles.
-fn batch() -> RayBatch {
+pub(super) fn batch() -> RayBatch {
     let point = |index: usize| {
         let cos = 0.1 + 0.9 * (index as f32 * 0.37).fract();
         let wi = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
