@@ -490,8 +490,8 @@ impl<'a> Grading<'a> {
         for (cases, (mut answers, probed)) in self.groups().into_iter().zip(probed) {
             let begin = checks.len();
             checks.extend(probed);
-            // One large image is drawn whole even if it is right.
-            let mut whole = true;
+            // One large image is drawn whole even if it is right: a public one, which can be shown.
+            let mut whole = cases.iter().all(|case| !case.held_back);
             for case in cheap_first(cases) {
                 self.stop_if_interrupted()?;
                 let run = Run { seed, threads: self.threads, whole };

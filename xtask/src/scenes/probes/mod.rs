@@ -11,6 +11,10 @@ use glam::DVec3;
 /// Width and height of a probe's film unless the probe needs more.
 const FILM: [u32; 2] = [128, 96];
 
+/// Samples per pixel of a probe's image unless the probe needs others: rays and BSDFs that are asked about decide,
+/// the image only confirms.
+const SPP: u32 = 4;
+
 /// A probe, and what it holds and shows.
 type Probe = (fn() -> Scene, &'static str);
 
@@ -133,7 +137,8 @@ fn item(text: &str) -> String {
 
 /// An empty probe scene.
 fn probe(name: &'static str, eye: DVec3, at: DVec3, fov_deg: f64) -> Scene {
-    Scene::new(&format!("probes/{name}"), name, Camera { eye, at, fov_deg }, FILM)
+    let scene = Scene::new(&format!("probes/{name}"), name, Camera { eye, at, fov_deg }, FILM);
+    Scene { spp: SPP, ..scene }
 }
 
 /// Several meshes as one.
