@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use tempfile::TempDir;
+use tempfile::{NamedTempFile, TempDir};
 
 /// What the folders of processes are called.
 const RUN: &str = "run-";
@@ -58,6 +58,21 @@ impl Scratch {
 /// # Errors
 /// When it cannot be written; the old content is still there then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    draft(path, bytes)?.persist(path)?;
+    Ok(())
+}
+
+/// The same for a file that is not there yet: of several that write it at the same time one succeeds.
+///
+/// # Errors
+/// When it is there (`AlreadyExists`), or cannot be written.
+pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    draft(path, bytes)?.persist_noclobber(path)?;
+    Ok(())
+}
+
+/// A whole file under another name, synced; it is gone unless it is renamed.
+fn draft(path: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
     let folder = path.parent().unwrap_or(Path::new(""));
     std::fs::create_dir_all(folder)?;
     let mut builder = tempfile::Builder::new();
@@ -68,8 +83,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = builder.tempfile_in(folder)?;
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
-    file.persist(path)?;
-    Ok(())
+    Ok(file)
 }
 
 /// All files below a folder, sorted by path. Links are followed: for folders of ours.
@@ -133,6 +147,9 @@ mod tests {
             write_whole(&path, content.as_bytes()).unwrap();
             assert_eq!(std::fs::read_to_string(&path).unwrap(), content);
         }
+        let error = write_new(&path, b"three").unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "two");
         assert_eq!(folder.path().join("new").read_dir().unwrap().count(), 1);
         std::fs::create_dir(folder.path().join("taken")).unwrap();
         write_whole(&folder.path().join("taken"), b"x").unwrap_err();

@@ -14,7 +14,7 @@ use crate::support::one_scene;
 use crate::support::zip_bytes::{Entry, Zip};
 
 /// A submission of somebody: a zip that follows the tree, but for its images, and does not compile.
-fn submission(config: &str) -> Vec<u8> {
+pub fn submission(config: &str) -> Vec<u8> {
     let images = ["cbox_simple_offline", "teapot_simple_offline"]
         .map(|name| format!("offline/{name}.exr"))
         .into_iter()
@@ -30,43 +30,43 @@ fn submission(config: &str) -> Vec<u8> {
     zip(&files)
 }
 
-fn zip(files: &[(String, &[u8])]) -> Vec<u8> {
+pub fn zip(files: &[(String, &[u8])]) -> Vec<u8> {
     Zip::of(files.iter().map(|(path, bytes)| Entry::deflated(path, bytes))).bytes()
 }
 
-fn config(first: &str, last: &str, number: &str) -> String {
+pub fn config(first: &str, last: &str, number: &str) -> String {
     format!(
         r#"{{"firstName": "{first}", "lastName": "{last}", "studentID": "{number}", "renders": []}}"#
     )
 }
 
 /// A place with a download, an assignment with a late policy, and a report.
-struct Place {
+pub struct Place {
     folder: tempfile::TempDir,
 }
 
 impl Place {
-    fn new() -> Self {
+    pub fn new() -> Self {
         Self { folder: tempfile::tempdir().unwrap() }
     }
 
-    fn at(&self, name: &str) -> PathBuf {
+    pub fn at(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    fn put(&self, name: &str, bytes: &[u8]) {
+    pub fn put(&self, name: &str, bytes: &[u8]) {
         let path = self.at(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, bytes).unwrap();
     }
 
     /// The repository's assignment on one scene, with a late policy.
-    fn assignment(&self, late: &str) -> PathBuf {
+    pub fn assignment(&self, late: &str) -> PathBuf {
         let late = serde_json::from_str::<Value>(late).unwrap();
         one_scene(&self.at("assignment"), |config| config["late"] = late.clone())
     }
 
-    fn run(&self, arguments: &[&str]) -> (Option<i32>, String, String) {
+    pub fn run(&self, arguments: &[&str]) -> (Option<i32>, String, String) {
         let output = Command::new(env!("CARGO_BIN_EXE_umbra"))
             .args(arguments)
             .current_dir(self.folder.path())
@@ -78,7 +78,7 @@ impl Place {
     }
 
     /// Grades into `out`, and answers what is said and `report.json`.
-    fn grade(&self, root: &Path, arguments: &[&str]) -> (String, Value) {
+    pub fn grade(&self, root: &Path, arguments: &[&str]) -> (String, Value) {
         let fixed = ["--perturb", "off", "--isolation", "reduced", "--output", "out", "--root"];
         let mut all = vec!["grade"];
         all.extend(fixed);
@@ -104,12 +104,12 @@ fn root_of_repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-fn text(value: &Value) -> &str {
+pub fn text(value: &Value) -> &str {
     value.as_str().unwrap_or_default()
 }
 
 /// Of each submission in a report: its name, whose it is by the class list, and its remarks.
-fn rows(report: &Value) -> Vec<(String, String, String)> {
+pub fn rows(report: &Value) -> Vec<(String, String, String)> {
     let rows = report["submissions"].as_array().unwrap().iter();
     let row = |row: &Value| {
         let remarks = row["remarks"].as_array().unwrap().iter().map(text).collect::<Vec<_>>();
@@ -123,7 +123,7 @@ fn rows(report: &Value) -> Vec<(String, String, String)> {
 }
 
 /// The download of a class on Brightspace, as the platform names it.
-fn brightspace() -> Vec<(String, Vec<u8>)> {
+pub fn brightspace() -> Vec<(String, Vec<u8>)> {
     let folder = |id: u32, name: &str, when: &str| format!("{id}-5150 - {name} - Oct {when}");
     vec![
         ("index.html".to_owned(), b"<html>".to_vec()),
@@ -160,13 +160,13 @@ fn brightspace() -> Vec<(String, Vec<u8>)> {
     ]
 }
 
-const LIST: &str = "\u{feff}OrgDefinedId,Username,Last Name,First Name,Email,End-of-Line Indicator\r\n\
+pub const LIST: &str = "\u{feff}OrgDefinedId,Username,Last Name,First Name,Email,End-of-Line Indicator\r\n\
     #0260000001,#zoneil,\"O'Neil, \",Zoë,z@example.org,#\r\n#260000002,#bode,Ode,Bo,b@example.org,#\r\n\
     #260000003,#alee,Lee,Ann,a@example.org,#\r\n#260000004,#alee2,Lee,Ann,a2@example.org,#\r\n\
     #260000005,#cpoe,Poe,Cy,c@example.org,#\r\n#260000006,#drue,Rue,Di,d@example.org,#\r\n\
     #260000007,#gtam,Tam,Gil,g@example.org,#\r\n#260000008,#esol,Sol,Eve,e@example.org,#\r\n";
 
-const LATE: &str =
+pub const LATE: &str =
     r#"{"penalty": 10, "unit": "percent", "of": "maximum", "per": "day", "grace_min": 5}"#;
 
 #[test]

@@ -24,6 +24,7 @@ mod original_scene;
 mod program;
 mod race;
 mod real_archives;
+mod regrade;
 mod render_command;
 #[path = "sandbox/main.rs"]
 mod sandbox;

@@ -10,6 +10,9 @@ use super::layout::{Kind, Label};
 use super::roster::{Roster, Student};
 use super::{names, stamps};
 
+/// The file of the instructor's decisions on whose submissions are, in the report's folder.
+pub const MATCHES: &str = "matches.toml";
+
 /// What `matches.toml` calls a submission that is nobody's and does not count.
 const NOBODY: &str = "none";
 
@@ -68,20 +71,11 @@ struct Entry {
 }
 
 impl Matches {
-    /// Reads a file of decisions; none where there is no file.
+    /// Reads the text of a file of decisions.
     ///
     /// # Errors
-    /// When it cannot be read, or says what means nothing; names the file and line.
-    pub fn read(path: &Path) -> anyhow::Result<Self> {
-        match std::fs::read_to_string(path) {
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Self::default()),
-            text => {
-                Self::parse(&text.with_context(|| format!("cannot read {}", path.display()))?, path)
-            }
-        }
-    }
-
-    fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
+    /// When it says what means nothing; names the file and line.
+    pub fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
         let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
         let file: File = toml::from_str(text).map_err(|error| {
             anyhow::anyhow!(
@@ -109,6 +103,15 @@ impl Matches {
             decisions.push(Decision { submission, student, submitted, place });
         }
         Ok(Self(decisions))
+    }
+
+    /// What is decided, wherever in the file it stands: submission, student, time.
+    pub fn says(&self) -> Vec<[Option<&str>; 3]> {
+        let all = self.0.iter();
+        all.map(|own| {
+            [Some(own.submission.as_str()), own.student.as_deref(), own.submitted.as_deref()]
+        })
+        .collect()
     }
 
     fn of<'a>(&'a self, claim: &'a Claim) -> impl Iterator<Item = &'a Decision> {

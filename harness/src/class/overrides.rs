@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, bail};
+use anyhow::bail;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use toml::Spanned;
@@ -81,20 +81,11 @@ pub struct Subject<'a> {
 }
 
 impl Overrides {
-    /// Reads a file of decisions; none where there is no file.
+    /// Reads the text of a file of decisions.
     ///
     /// # Errors
-    /// When it cannot be read, or says what means nothing; names the file and line.
-    pub fn read(path: &Path) -> anyhow::Result<Self> {
-        match std::fs::read_to_string(path) {
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Self::default()),
-            text => {
-                Self::parse(&text.with_context(|| format!("cannot read {}", path.display()))?, path)
-            }
-        }
-    }
-
-    fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
+    /// When it says what means nothing; names the file and line.
+    pub fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
         let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
         let file: File = toml::from_str(text).map_err(|error| {
             let place = place(error.span().map_or(0, |span| span.start));
@@ -127,6 +118,11 @@ impl Overrides {
         }
         decisions.sort_by_key(|(_, line)| *line);
         Ok(Self(decisions))
+    }
+
+    /// What is decided, in its order.
+    pub fn says(&self) -> Vec<&Decision> {
+        self.0.iter().map(|(decision, _)| decision).collect()
     }
 
     /// Decisions on submissions that are not there, or on parts that the assignment does not have, with their lines.

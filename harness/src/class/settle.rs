@@ -102,7 +102,7 @@ pub struct Undecided {
 
 /// Which attempts of a student need not be graded, by index: those that the platform's names alone tell do not
 /// count. The best attempt is known only when all are graded.
-pub fn set_aside(labels: &[Option<&Label>], deciding: &Deciding) -> BTreeSet<usize> {
+pub fn set_aside(labels: &[Option<&Label>], attempt: Attempt) -> BTreeSet<usize> {
     let mut people: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (index, label) in labels.iter().enumerate() {
         if let Some(label) = label {
@@ -115,9 +115,7 @@ pub fn set_aside(labels: &[Option<&Label>], deciding: &Deciding) -> BTreeSet<usi
             .iter()
             .map(|&at| labels[at].map_or("", |label| label.submitted.as_str()))
             .collect();
-        if let (false, Some(counts)) =
-            (deciding.attempt == Attempt::Best, by_time(&stamps, deciding.attempt))
-        {
+        if let (false, Some(counts)) = (attempt == Attempt::Best, by_time(&stamps, attempt)) {
             aside.extend(
                 attempts.iter().enumerate().filter(|(at, _)| *at != counts).map(|(_, own)| *own),
             );
@@ -406,9 +404,8 @@ mod tests {
         attempt: Attempt,
         matches: &str,
     ) -> Settled {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), matches).unwrap();
-        let (roster, matches) = (roster(), Matches::read(file.path()).unwrap());
+        let matches = Matches::parse(matches, Path::new("matches.toml")).unwrap();
+        let roster = roster();
         let policy: Policy =
             serde_json::from_str(r#"{"penalty": 10, "unit": "points", "per": "day"}"#).unwrap();
         let deciding = Deciding {
@@ -457,11 +454,7 @@ mod tests {
         let several = [claim(FIRST, ""), claims[1].clone(), third];
         assert_eq!(run(&several, &[1.0; 3], false, Attempt::Latest, "").names, [SECOND]);
         let labels: Vec<Option<&Label>> = claims.iter().map(|claim| claim.label.as_ref()).collect();
-        let matches = Matches::default();
-        let deciding =
-            |attempt| Deciding { roster: None, matches: &matches, policy: None, due: "", attempt };
-        let aside =
-            |attempt| set_aside(&labels, &deciding(attempt)).into_iter().collect::<Vec<_>>();
+        let aside = |attempt| set_aside(&labels, attempt).into_iter().collect::<Vec<_>>();
         assert_eq!(aside(Attempt::Latest), [0]);
         assert_eq!(aside(Attempt::First), [1]);
         assert_eq!(aside(Attempt::Best), [0usize; 0]);

@@ -14,16 +14,15 @@ use super::class::{self, Source};
 use super::context::{Context, INTERRUPTED, cores};
 use super::grade::{BudgetChoice, IsolationChoice, Perturb};
 use super::render::AdapterChoice;
-use crate::class::overrides::{Applied, OVERRIDES, Overrides, Subject};
-use crate::class::{
-    Attempt, Claim, Class, Collected, Deciding, Kind, Label, Wanted, collect, settle,
-};
+use super::settling::{self, Found};
+use crate::assignment::Assignment;
+use crate::class::{Attempt, Collected, Decided, Kind, Label, Pins, Stated, Wanted, collect};
 use crate::files::write_whole;
-use crate::grading::{Folders, Grading, Mode, Record, RecordCache, judge_shared};
+use crate::grading::{Earlier, Folders, Grading, Mode, Record, RecordCache, judge_shared};
 use crate::held_back::recorded_seed;
 use crate::program::graded;
-use crate::report::{self, BatchReport, SubmissionReport};
-use crate::rubric::{self, Grade};
+use crate::report::{self, BatchReport};
+use crate::rubric;
 use crate::sandbox::Isolation;
 
 /// The file with the seed of a batch's held-back scenes, in the instructor's folder.
@@ -31,10 +30,6 @@ const SEED_FILE: &str = "held-back-seed.txt";
 
 /// The file with what the reference renderer took on this machine, where a slow submission needed it.
 const COSTS_FILE: &str = "reference-costs.json";
-
-/// What a grade says of a submission that was judged in another way than the others of its class.
-const OTHER_CONDITIONS: &str = "graded before with other scenes, limits or another version of Umbra: \
-                                not comparable, grade it again";
 
 /// Submissions to be taken through all stages.
 pub struct Batch<'a> {
@@ -62,8 +57,8 @@ pub struct Batch<'a> {
     pub from: Option<Kind>,
     /// The class list; that of an earlier run where none is named.
     pub list: Option<&'a Path>,
-    /// Which attempt of a student counts.
-    pub attempt: Attempt,
+    /// Which attempt of a student counts; as before where it is not said.
+    pub attempt: Option<Attempt>,
     /// Whether what was found out before is found out anew.
     pub force: bool,
     /// Whether to print what each stage cost.
@@ -117,30 +112,25 @@ impl Batch<'_> {
         if let Some(asked) = self.asked {
             asked.restrict(&mut context.assignment)?;
         }
+        let instructor = self.output.join(report::INSTRUCTOR);
+        let mut pins = match self.mode {
+            Mode::Grade => Some(self.pin(&mut context.assignment)?),
+            Mode::Check => None,
+        };
         let context = &context;
         let seed = match self.perturb {
             Some(Perturb(seed)) => seed,
-            None => Some(recorded_seed(&self.output.join(report::INSTRUCTOR).join(SEED_FILE))?),
+            None => Some(recorded_seed(&instructor.join(SEED_FILE))?),
         };
         let all = class::sources(&collected.sources, self.output);
-        let (roster, matches) = match self.mode {
-            Mode::Grade => (class::roster(self.list, self.output)?, class::matches(self.output)?),
-            Mode::Check => Default::default(),
+        let roster = match self.mode {
+            Mode::Grade => class::roster(self.list, self.output)?,
+            Mode::Check => None,
         };
-        let deciding = Deciding {
-            roster: roster.as_ref(),
-            matches: &matches,
-            policy: context.assignment.late.as_ref(),
-            due: &context.assignment.due,
-            attempt: self.attempt,
+        let aside = match &pins {
+            Some((_, decided)) => self.set_aside(&all, decided)?,
+            None => HashSet::new(),
         };
-        let told = |source: &Source| !matches.mention(&source.claim());
-        let labels: Vec<Option<&Label>> =
-            all.iter().map(|source| source.label.as_ref().filter(|_| told(source))).collect();
-        let aside: HashSet<String> = crate::class::set_aside(&labels, &deciding)
-            .into_iter()
-            .map(|at| all[at].slug.clone())
-            .collect();
         let mut chosen = class::only(context, self.output, &all, self.only)?;
         chosen.retain(|source| !aside.contains(&source.slug));
         let result = context.with_store(|store| {
@@ -179,105 +169,92 @@ impl Batch<'_> {
             return Ok(None);
         }
         let (results, held_back, cache) = result?;
-        let mut records = results.into_iter().collect::<anyhow::Result<Vec<Record>>>()?;
-        let mut incomparable = Vec::new();
-        if let Some(cache) = cache {
-            if cache.found() > 0 {
-                eprintln!(
-                    "umbra: {} of {} submissions keep their earlier grades",
-                    cache.found(),
-                    chosen.len()
-                );
+        let records = results.into_iter().collect::<anyhow::Result<Vec<Record>>>()?;
+        let report = match (&mut pins, cache) {
+            (Some((pins, decided)), Some(cache)) => {
+                if cache.found() > 0 {
+                    eprintln!(
+                        "umbra: {} of {} submissions keep their earlier grades",
+                        cache.found(),
+                        chosen.len()
+                    );
+                }
+                let mut found = Found::new(&collected, &all, |source| aside.contains(&source.slug));
+                (found.conditions, found.held_back) = (cache.conditions(), held_back);
+                let list = self.list.and_then(Path::file_name);
+                found.list = list.unwrap_or_default().to_string_lossy().into_owned();
+                found.join(Found::read(self.output)?.unwrap_or_default(), self.output);
+                found.keep(self.output)?;
+                let new = |record| Earlier { record, comparable: true };
+                let mut records: Vec<Earlier> = records.into_iter().map(new).collect();
+                class::join(&cache, self.output, &all, &aside, &mut records);
+                let settled =
+                    settling::settled(self.output, decided, &found, roster.as_ref(), records)?;
+                let pinned = pins.current().map(|pin| pin.decided.differs(decided, self.output));
+                if pinned.transpose()?.is_none_or(|differs| !differs.is_empty()) {
+                    pins.apply(decided.clone(), "graded", Vec::new(), false)?;
+                }
+                settling::write(self.output, &settled)?;
+                settled
             }
-            incomparable = class::join(&cache, self.output, &all, &aside, &mut records);
-        }
-        // In an order that does not hang on who was graded when.
-        records.sort_by_key(|record| record.slug.to_lowercase());
-        judge_shared(&mut records);
-        let rules = &context.assignment.rules;
-        let mut entries = Vec::new();
-        for record in records {
-            let mut entry = graded(record, rules);
-            if let Some(asked) = self.asked {
-                asked.only_of(&mut entry.grade);
+            _ => {
+                let rules = &context.assignment.rules;
+                let entry = |record| {
+                    let mut entry = graded(record, rules);
+                    if let Some(asked) = self.asked {
+                        asked.only_of(&mut entry.grade);
+                    }
+                    entry
+                };
+                let mut records = records;
+                judge_shared(&mut records);
+                let entries = records.into_iter().map(entry).collect();
+                let report = BatchReport::new(&context.assignment, held_back, entries);
+                report::write(self.output, &report)?;
+                report
             }
-            if incomparable.contains(&entry.record.slug) {
-                entry.grade.remarks.push(OTHER_CONDITIONS.to_owned());
-            }
-            entries.push(entry);
-        }
-        let class = match self.mode {
-            Mode::Grade => Some(self.settle(&mut entries, &collected, &aside, &all, &deciding)?),
-            Mode::Check => None,
         };
-        let report =
-            BatchReport { class, ..BatchReport::new(&context.assignment, held_back, entries) };
-        report::write(self.output, &report)?;
         if self.timings {
             print_timings(&report);
         }
         Ok(Some((report, collected)))
     }
 
-    /// Settles whose the graded submissions are and which of them count; the others leave `entries`.
-    fn settle(
-        &self,
-        entries: &mut Vec<SubmissionReport>,
-        collected: &Collected,
-        aside: &HashSet<String>,
-        all: &[Source],
-        deciding: &Deciding,
-    ) -> anyhow::Result<Class> {
-        let claims: Vec<Claim> =
-            entries.iter().map(|entry| class::claim(self.output, &entry.record)).collect();
-        let mut grades: Vec<Grade> = entries.iter().map(|entry| entry.grade.clone()).collect();
-        let overrides = Overrides::read(&self.output.join(OVERRIDES))?;
-        let subjects: Vec<Subject> = entries
-            .iter()
-            .zip(&claims)
-            .map(|(SubmissionReport { record, .. }, claim)| Subject {
-                slug: &record.slug,
-                numbers: super::decide::numbers(claim, deciding.roster, deciding.matches),
-                digest: &record.digest,
-                evidence: &record.evidence,
-            })
-            .collect();
-        let decisions: Vec<Vec<Applied>> = subjects
-            .iter()
-            .zip(&mut grades)
-            .map(|(subject, grade)| overrides.apply(subject, grade))
-            .collect();
-        let parts = grades.first().map(|grade| grade.parts.iter().map(|part| part.id.clone()));
-        let parts: Vec<String> = parts.into_iter().flatten().collect();
-        let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
-        let unused = overrides.unused(&subjects, &parts);
-        let mut absent: Vec<(Label, String)> =
-            collected.empty.iter().map(|empty| (empty.label.clone(), empty.reason())).collect();
-        let is_graded = |source: &Source| claims.iter().any(|claim| claim.slug == source.slug);
-        let open = all.iter().filter(|source| !is_graded(source) && !aside.contains(&source.slug));
-        absent.extend(open.filter_map(|s| Some((s.label.clone()?, "not graded yet".to_owned()))));
-        let (standings, mut class) =
-            settle(&claims, &mut grades, &absent, collected.kind, deciding)?;
-        class.unused = unused;
-        class::ask(&class, self.output)?;
-        let mut counting = Vec::new();
-        for (at, mut standing) in standings {
-            // Attempts that were not graded are told, too.
-            let own = standing.label.as_ref().map(Label::person);
-            let others = all.iter().filter(|source| aside.contains(&source.slug));
-            let others = others.filter(|source| source.label.as_ref().map(Label::person) == own);
-            let others = others.map(|source| source.name.clone());
-            let known: Vec<String> =
-                others.filter(|name| !standing.set_aside.contains(name)).collect();
-            standing.set_aside.extend(known);
-            let stale = decisions[at].iter().filter(|own| own.stale);
-            class.stale.extend(stale.map(|own| format!("{}: {}", claims[at].name, own.words())));
-            standing.decisions.clone_from(&decisions[at]);
-            let grade = grades[at].clone();
-            counting.push(SubmissionReport { record: entries[at].record.clone(), grade, standing });
+    /// What the report is settled by: what is pinned there, which takes the place of what `config.json` says by now,
+    /// with the instructor's decisions as they are now.
+    fn pin(&self, assignment: &mut Assignment) -> anyhow::Result<(Pins, Decided)> {
+        let stated = Stated::of(assignment);
+        let attempt = self.attempt.unwrap_or_default();
+        let mut decided = Decided::read(self.output, stated, attempt)?;
+        let first = Decided { matches: String::new(), overrides: String::new(), ..decided.clone() };
+        let pins = Pins::begin(&self.output.join(report::INSTRUCTOR), &first)?;
+        if let Some(pin) = pins.current() {
+            let pinned = &pin.decided.assignment;
+            let differs = decided.assignment.differs(pinned);
+            if !differs.is_empty() {
+                eprintln!(
+                    "umbra: config.json has other {} than this report, which keeps what it was settled by on {} for \
+                     all submissions; `umbra regrade --output {}` shows what would change",
+                    differs.join(", "),
+                    pin.when,
+                    self.output.display()
+                );
+                pinned.replace(assignment);
+                decided.assignment = pinned.clone();
+            }
+            decided.attempt = self.attempt.unwrap_or(pin.decided.attempt);
         }
-        *entries = counting;
-        Ok(class)
+        Ok((pins, decided))
+    }
+
+    /// The slugs of attempts that need not be graded: another one of the same student counts.
+    fn set_aside(&self, all: &[Source], decided: &Decided) -> anyhow::Result<HashSet<String>> {
+        let matches = decided.matches(self.output)?;
+        let told = |source: &Source| !matches.mention(&source.claim());
+        let labels: Vec<Option<&Label>> =
+            all.iter().map(|source| source.label.as_ref().filter(|_| told(source))).collect();
+        let aside = crate::class::set_aside(&labels, decided.attempt);
+        Ok(aside.into_iter().map(|at| all[at].slug.clone()).collect())
     }
 
     /// Takes submissions through all stages, in their order; none is begun after Ctrl-C. To be graded, one

@@ -14,7 +14,7 @@ use super::grade::{BudgetChoice, IsolationChoice, Perturb};
 use super::render::AdapterChoice;
 use super::{class, terminal};
 use crate::assignment::Assignment;
-use crate::class::{Attempt, Source};
+use crate::class::Source;
 use crate::files::{files_below, write_whole};
 use crate::grading::{Mode, RenderPath};
 use crate::report::{self, Closing, Look};
@@ -180,7 +180,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         only: &[],
         from: None,
         list: None,
-        attempt: Attempt::Latest,
+        attempt: None,
         force: false,
         timings: arguments.timings,
     };

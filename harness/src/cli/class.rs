@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, ensure};
 
 use super::context::Context;
-use crate::class::{self, Claim, Label, Matches, Roster};
+use crate::class::{self, Claim, Label, MATCHES, Roster};
 use crate::columns::count;
 use crate::files::write_whole;
 use crate::grading::{Earlier, Folders, Record, RecordCache, Student};
@@ -20,8 +20,6 @@ const SOURCE: &str = "source.txt";
 const LABEL: &str = "label.json";
 /// The class list of a report, in the instructor's folder.
 const LIST: &str = "class.csv";
-/// The instructor's decisions on whose submissions are, in the report's folder.
-pub const MATCHES: &str = "matches.toml";
 /// So many names stand in a message.
 const NAMES: usize = 5;
 
@@ -69,14 +67,6 @@ pub fn roster(given: Option<&Path>, output: &Path) -> anyhow::Result<Option<Rost
         None if kept.is_file() => Roster::read(&kept).map(Some),
         None => Ok(None),
     }
-}
-
-/// The instructor's decisions in a report's folder.
-///
-/// # Errors
-/// When they cannot be read.
-pub fn matches(output: &Path) -> anyhow::Result<Matches> {
-    Matches::read(&output.join(MATCHES))
 }
 
 /// Writes the questions that are open, to be answered, unless the instructor has begun to.
@@ -189,17 +179,16 @@ pub fn folders(output: &Path) -> Vec<String> {
 }
 
 /// Adds to `records`, made of some of the submissions `all`, what earlier runs into the same report
-/// found out about others, and says so; `aside` are attempts that do not count. Answers whose were found out under
-/// other conditions.
+/// found out about others, and says so; `aside` are attempts that do not count.
 pub fn join(
     cache: &RecordCache,
     output: &Path,
     all: &[Source],
     aside: &HashSet<String>,
-    records: &mut Vec<Record>,
-) -> Vec<String> {
-    let graded: HashSet<String> = records.iter().map(|record| record.slug.clone()).collect();
-    let (mut incomparable, mut gone) = (Vec::new(), Vec::new());
+    records: &mut Vec<Earlier>,
+) {
+    let graded: HashSet<String> = records.iter().map(|own| own.record.slug.clone()).collect();
+    let mut gone = Vec::new();
     let mut missing: HashSet<&str> = all.iter().map(|source| source.slug.as_str()).collect();
     missing.retain(|slug| !graded.contains(*slug) && !aside.contains(*slug));
     for slug in folders(output) {
@@ -207,7 +196,7 @@ pub fn join(
         if graded.contains(&slug) {
             continue;
         }
-        let Earlier { record, comparable } = match cache.earlier(&instructor) {
+        let earlier = match RecordCache::earlier(&instructor, &cache.conditions()) {
             Ok(Some(earlier)) => earlier,
             Ok(None) => continue,
             Err(error) => {
@@ -215,14 +204,15 @@ pub fn join(
                 continue;
             }
         };
+        let record = &earlier.record;
         let is_given = missing.remove(slug.as_str()) || aside.contains(&slug);
-        if !is_given && let Some(new) = records.iter().find(|new| is_newer(new, &record)) {
+        if !is_given && let Some(new) = records.iter().find(|new| is_newer(&new.record, record)) {
             match cache.replace(&instructor) {
                 Ok(()) => eprintln!(
                     "umbra: {} of {} is graded again as {}: it replaces the one in {}",
                     record.name,
                     who(&record.student),
-                    new.slug,
+                    new.record.slug,
                     instructor.display()
                 ),
                 Err(error) => eprintln!("umbra: {}: {error}", instructor.display()),
@@ -232,10 +222,7 @@ pub fn join(
         if !is_given {
             gone.push(record.name.clone());
         }
-        if !comparable {
-            incomparable.push(slug);
-        }
-        records.push(record);
+        records.push(earlier);
     }
     if !gone.is_empty() {
         let stay = if gone.len() == 1 { "stays" } else { "stay" };
@@ -257,7 +244,6 @@ pub fn join(
             some(&missing)
         );
     }
-    incomparable
 }
 
 /// Whether `new` resubmits `old`: the same file name, by the same student.

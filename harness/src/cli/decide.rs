@@ -4,16 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
 
-use super::class;
-use super::context::Context;
 use super::earlier::{Report, Row};
-use crate::class::matching::{Match, find};
-use crate::class::overrides::{Decision, OVERRIDES, Overrides, Subject, entry, fingerprint};
-use crate::class::{Claim, Matches, Roster, names};
+use super::settling::Kept;
+use crate::class::overrides::{Decision, OVERRIDES, Subject, entry, fingerprint};
+use crate::class::{Decided, names};
 use crate::files::write_whole;
-use crate::grading::{Record, RecordCache};
-use crate::report::{self, harmless};
-use crate::rubric::{self, Grade};
+use crate::report::{self, SubmissionReport, harmless};
 
 /// Options of `umbra override`.
 #[derive(clap::Args)]
@@ -61,39 +57,29 @@ pub struct StatusArguments {
 
 /// A submission of a report, as it was kept.
 struct Graded {
-    record: Record,
-    grade: Grade,
+    entry: SubmissionReport,
     numbers: Vec<String>,
 }
 
 impl Graded {
     fn subject(&self) -> Subject<'_> {
+        let record = &self.entry.record;
         Subject {
-            slug: &self.record.slug,
+            slug: &record.slug,
             numbers: self.numbers.clone(),
-            digest: &self.record.digest,
-            evidence: &self.record.evidence,
+            digest: &record.digest,
+            evidence: &record.evidence,
         }
     }
 }
 
-/// The numbers that a submission is known by: its own, the platform's, the class list's.
-pub fn numbers(claim: &Claim, roster: Option<&Roster>, matches: &Matches) -> Vec<String> {
-    let listed = roster.and_then(|roster| match find(claim, roster, matches) {
-        Ok(Match::Student(at, _)) => Some(roster.students[at].number.clone()),
-        _ => None,
-    });
-    let label = claim.label.as_ref().map(|label| label.number.clone());
-    let all = [Some(claim.number.clone()), label, listed].into_iter().flatten();
-    all.filter(|number| !number.is_empty()).collect()
-}
-
 /// Sets the points of a part.
-pub fn override_part(arguments: &OverrideArguments, root: Option<&Path>) -> anyhow::Result<u8> {
-    let assignment = Context::assignment(root)?;
+pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
     let OverrideArguments { student, part, points, decision } = arguments;
-    let known = assignment.rules.parts.iter().find(|own| own.id == *part).with_context(|| {
-        let parts: Vec<&str> = assignment.rules.parts.iter().map(|own| own.id.as_str()).collect();
+    let kept = Kept::read(&decision.output)?;
+    let parts = &kept.decided()?.assignment.rules.parts;
+    let known = parts.iter().find(|own| own.id == *part).with_context(|| {
+        let parts: Vec<&str> = parts.iter().map(|own| own.id.as_str()).collect();
         format!("there is no part {part}; expected one of {}", parts.join(", "))
     })?;
     ensure!(
@@ -101,51 +87,48 @@ pub fn override_part(arguments: &OverrideArguments, root: Option<&Path>) -> anyh
         "part {part} is worth 0 to {} points, found {points}",
         known.points
     );
-    let graded = one(student, &decision.output, &assignment.rules)?;
-    let own = graded.grade.parts.iter().position(|own| own.id == *part);
-    let own = own.map(|at| &graded.grade.parts[at..=at]).unwrap_or_default();
+    let graded = one(student, &decision.output, &kept)?;
+    let own = graded.entry.grade.parts.iter().position(|own| own.id == *part);
+    let own = own.map(|at| &graded.entry.grade.parts[at..=at]).unwrap_or_default();
     let evidence = fingerprint(&graded.subject(), own);
     let before = own.first().map(|own| own.points).unwrap_or_default();
-    decision.add(&graded, Some((part, *points)), evidence)?;
+    decision.add(kept, &graded, Some((part, *points)), evidence)?;
     println!(
         "{}: part {part} has {points} points from now on, the evidence says {before}",
-        harmless(&who(&graded.record))
+        harmless(&graded.entry.who())
     );
-    again(&decision.output)
+    said(&decision.output)
 }
 
 /// Confirms what was left to the instructor.
-pub fn confirm(arguments: &ConfirmArguments, root: Option<&Path>) -> anyhow::Result<u8> {
-    let assignment = Context::assignment(root)?;
+pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     let ConfirmArguments { student, decision } = arguments;
-    let graded = one(student, &decision.output, &assignment.rules)?;
-    let evidence = fingerprint(&graded.subject(), &graded.grade.parts);
-    decision.add(&graded, None, evidence)?;
-    let name = harmless(&who(&graded.record));
-    match graded.grade.unconfirmed {
+    let kept = Kept::read(&decision.output)?;
+    let graded = one(student, &decision.output, &kept)?;
+    let grade = &graded.entry.grade;
+    let evidence = fingerprint(&graded.subject(), &grade.parts);
+    decision.add(kept, &graded, None, evidence)?;
+    let name = harmless(&graded.entry.who());
+    match grade.unconfirmed {
         0.0 => println!("{name}: confirmed, no points hang on it"),
         points => println!("{name}: {points} points for the images are confirmed"),
     }
-    again(&decision.output)
+    said(&decision.output)
 }
 
-fn again(output: &Path) -> anyhow::Result<u8> {
+fn said(output: &Path) -> anyhow::Result<u8> {
     println!(
-        "kept in {}; `umbra grade` with the same --output shows it in the reports and renders nothing",
+        "kept in {}; the reports show it; `umbra regrade --undo` takes it back",
         output.join(OVERRIDES).display()
     );
     Ok(super::EXIT_OK)
 }
 
-fn who(record: &Record) -> String {
-    let name = record.student.full_name();
-    if name.is_empty() { record.slug.clone() } else { format!("{name} ({})", record.slug) }
-}
-
 impl DecisionArguments {
-    /// Adds a decision to the file.
+    /// Adds a decision to the file, and writes the reports by it.
     fn add(
         &self,
+        mut kept: Kept,
         graded: &Graded,
         part: Option<(&String, f64)>,
         evidence: String,
@@ -154,7 +137,7 @@ impl DecisionArguments {
         let account = || std::env::var("USER").or_else(|_| std::env::var("USERNAME")).ok();
         let number = graded.numbers.first().cloned();
         let decision = Decision {
-            student: number.unwrap_or_else(|| graded.record.slug.clone()),
+            student: number.unwrap_or_else(|| graded.entry.record.slug.clone()),
             part: part.map(|(part, _)| part.clone()),
             points: part.map(|(_, points)| points),
             reason: self.reason.trim().to_owned(),
@@ -164,46 +147,35 @@ impl DecisionArguments {
         };
         let file = self.output.join(OVERRIDES);
         // What is there must be right before anything is added to it.
-        Overrides::read(&file)?;
-        let mut text = match std::fs::read_to_string(&file) {
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::from(
+        let current = kept.decided()?.clone();
+        let mut decided = Decided::read(&self.output, current.assignment.clone(), current.attempt)?;
+        decided.matches = current.matches;
+        if decided.overrides.is_empty() {
+            decided.overrides = String::from(
                 "# What the instructor decided on points. Commands only add to this file; the last decision on\n\
-                 # something counts. Delete one to take it back.\n",
-            ),
-            text => text.with_context(|| format!("cannot read {}", file.display()))?,
-        };
-        text += &entry(&decision)?;
-        write_whole(&file, text.as_bytes())
-            .with_context(|| format!("cannot write {}", file.display()))
+                 # something counts. Delete one to take it back, and run `umbra regrade`.\n",
+            );
+        }
+        decided.overrides += &entry(&decision)?;
+        write_whole(&file, decided.overrides.as_bytes())
+            .with_context(|| format!("cannot write {}", file.display()))?;
+        kept.apply(&self.output, decided, &decision.reason, false)
     }
 }
 
 /// The one submission of a student in a report.
-fn one(wanted: &str, output: &Path, rules: &rubric::Rules) -> anyhow::Result<Graded> {
-    let instructor = output.join(report::INSTRUCTOR);
-    ensure!(
-        instructor.is_dir(),
-        "{} is no report: expected the --output of an earlier `umbra grade`",
-        output.display()
-    );
-    let (roster, matches) = (class::roster(None, output)?, class::matches(output)?);
+fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
     let mut found: Vec<Graded> = Vec::new();
     let mut names = Vec::new();
-    for slug in class::folders(output) {
-        let Some(mut record) = RecordCache::record(&instructor.join(&slug))? else { continue };
-        let claim = class::claim(output, &record);
-        let numbers = numbers(&claim, roster.as_ref(), &matches);
-        let full_name = record.student.full_name();
+    for (entry, numbers) in kept.graded(output)? {
+        let full_name = entry.record.student.full_name();
         let is_number = numbers.iter().any(|own| names::number(own) == names::number(wanted));
         let is_name = !full_name.is_empty() && names::words(&full_name) == names::words(wanted);
-        if slug != wanted && !is_number && !is_name {
-            names.push(slug);
-            continue;
+        if entry.record.slug == wanted || is_number || is_name {
+            found.push(Graded { entry, numbers });
+        } else {
+            names.push(entry.record.slug);
         }
-        // As a batch does it.
-        let grade = rubric::grade(rules, &record.evidence);
-        record.evidence = rubric::settle(rules, &record.evidence);
-        found.push(Graded { record, grade, numbers });
     }
     match found.len() {
         1 => Ok(found.remove(0)),
@@ -213,7 +185,7 @@ fn one(wanted: &str, output: &Path, rules: &rubric::Rules) -> anyhow::Result<Gra
             names.first().map_or("a2_ada_lampglow", String::as_str)
         ),
         several => {
-            let slugs: Vec<&str> = found.iter().map(|own| own.record.slug.as_str()).collect();
+            let slugs: Vec<&str> = found.iter().map(|own| own.entry.record.slug.as_str()).collect();
             bail!(
                 "{several} submissions are \"{wanted}\"; name the folder of one: {}",
                 slugs.join(", ")

@@ -7,7 +7,7 @@ use super::batch::Batch;
 use super::context::cores;
 use super::render::AdapterChoice;
 use super::terminal;
-use crate::class::{Attempt, Kind};
+use crate::class::{Attempt, Kind, MATCHES};
 use crate::evidence::Verdict;
 use crate::grading::{INTERNAL_ERROR, Mode};
 use crate::report::{self, BatchReport};
@@ -26,9 +26,9 @@ pub struct GradeArguments {
     /// missing; kept in --output for later runs
     #[arg(long, value_name = "LIST.csv")]
     class: Option<PathBuf>,
-    /// Which of a student's attempts counts
-    #[arg(long, value_enum, default_value_t = Attempt::Latest)]
-    attempt: Attempt,
+    /// Which of a student's attempts counts [default: as in earlier runs into --output, else latest]
+    #[arg(long, value_enum)]
+    attempt: Option<Attempt>,
     /// Where to write report.html, report.json, grades.csv and each submission's own report. Results
     /// are kept there too: the same command resumes an interrupted batch and grades what is new or has
     /// changed; other submissions join the class that is there
@@ -124,7 +124,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         println!("skipped, not submissions: {skipped}");
     }
     if report.class.as_ref().is_some_and(|class| !class.undecided.is_empty()) {
-        let file = arguments.output.join(super::class::MATCHES);
+        let file = arguments.output.join(MATCHES);
         println!("decide in {}, and run the same command again", file.display());
     }
     println!("report: {}", arguments.output.join(report::HTML_FILE).display());

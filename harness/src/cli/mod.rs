@@ -13,7 +13,9 @@ mod earlier;
 mod explain;
 mod export;
 mod grade;
+mod regrade;
 mod render;
+mod settling;
 mod terminal;
 mod tree;
 mod view;
@@ -77,6 +79,8 @@ enum Command {
     Override(decide::OverrideArguments),
     /// Confirm what a report leaves to the instructor, such as images without code
     Confirm(decide::ConfirmArguments),
+    /// Show what other rules, policies, matches or overrides make of a graded class; --apply writes it. Nothing is rendered
+    Regrade(regrade::RegradeArguments),
     /// List what a report still leaves to the instructor; exits with 0 when nothing waits, 1 when something does
     Status(decide::StatusArguments),
     /// Write the grades of a report as another program takes them: a learning platform's grade book,
@@ -209,8 +213,9 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
     match command {
         Command::Check(arguments) => check::check(&arguments, root),
         Command::Grade(arguments) => grade::grade(&arguments, root),
-        Command::Override(arguments) => decide::override_part(&arguments, root),
-        Command::Confirm(arguments) => decide::confirm(&arguments, root),
+        Command::Override(arguments) => decide::override_part(&arguments),
+        Command::Confirm(arguments) => decide::confirm(&arguments),
+        Command::Regrade(arguments) => regrade::regrade(&arguments, root),
         Command::Status(arguments) => decide::status(&arguments),
         Command::Export(arguments) => export::export(&arguments, root),
         Command::Validate(arguments) => tree::validate(&arguments, root),

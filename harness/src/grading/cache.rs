@@ -35,7 +35,8 @@ pub struct RecordCache {
     settled: Mutex<HashMap<String, bool>>,
 }
 
-/// A record of an earlier run.
+/// A record with its place among others.
+#[derive(Clone)]
 pub struct Earlier {
     /// The record.
     pub record: Record,
@@ -169,25 +170,21 @@ impl RecordCache {
         Ok(())
     }
 
-    /// The record that an earlier run kept in an instructor's folder, if any.
-    ///
-    /// # Errors
-    /// When it cannot be read.
-    pub fn earlier(&self, instructor: &Path) -> anyhow::Result<Option<Earlier>> {
-        let file = Self::file(instructor)?;
-        let earlier = |file: File<Record>| Earlier {
-            comparable: file.batch == hex(&self.batch),
-            record: file.record,
-        };
-        Ok(file.map(earlier))
+    /// Digest of all that a record depends on, but for the submission: records of another one are not comparable.
+    pub fn conditions(&self) -> String {
+        hex(&self.batch)
     }
 
-    /// The record that an earlier run kept in an instructor's folder, whatever it was made under.
+    /// The record that a run kept in an instructor's folder, if any; comparable to those of some `conditions`.
     ///
     /// # Errors
     /// When it cannot be read.
-    pub fn record(instructor: &Path) -> anyhow::Result<Option<Record>> {
-        Ok(Self::file(instructor)?.map(|file| file.record))
+    pub fn earlier(instructor: &Path, conditions: &str) -> anyhow::Result<Option<Earlier>> {
+        let earlier = |file: File<Record>| Earlier {
+            comparable: file.batch == conditions,
+            record: file.record,
+        };
+        Ok(Self::file(instructor)?.map(earlier))
     }
 
     fn file(instructor: &Path) -> anyhow::Result<Option<File<Record>>> {

@@ -41,7 +41,7 @@ pub use self::text::{
 pub use crate::harmless::harmless;
 
 use crate::assignment::Assignment;
-use crate::class::{Class, Standing};
+use crate::class::{Class, Standing, Stated};
 use crate::evidence::Check;
 use crate::files::write_whole;
 use crate::grading::{Record, Student};
@@ -109,6 +109,12 @@ pub struct BatchReport {
 }
 
 impl SubmissionReport {
+    /// Name and folder, for a message.
+    pub fn who(&self) -> String {
+        let (name, slug) = (self.student().full_name(), &self.record.slug);
+        if name.is_empty() { slug.clone() } else { format!("{name} ({slug})") }
+    }
+
     /// Whether there is more to know than the student may.
     pub fn has_private(&self, rules: &Rules) -> bool {
         let private = |check: &Check| check.held_back || !check.private.is_empty();
@@ -191,6 +197,17 @@ impl BatchReport {
             entries,
             class: None,
         }
+    }
+
+    /// The report of a class by what is pinned.
+    pub fn settled(
+        stated: Stated,
+        held_back: Option<HeldBack>,
+        entries: Vec<SubmissionReport>,
+        class: Class,
+    ) -> Self {
+        let Stated { name: assignment, title, course, due, rules, .. } = stated;
+        Self { assignment, title, course, due, rules, held_back, entries, class: Some(class) }
     }
 
     fn check(&self) -> Result<(), ReportError> {

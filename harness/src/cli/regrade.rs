@@ -1,0 +1,156 @@
+//! `umbra regrade`: what other rules, policies, matches or overrides make of a graded class.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+
+use super::context::Context;
+use super::settling::{self, Kept, changes};
+use crate::class::overrides::OVERRIDES;
+use crate::class::pins::Change;
+use crate::class::{Decided, MATCHES, Stated};
+use crate::columns::{count, left, right};
+use crate::files::write_whole;
+use crate::report::{BatchReport, harmless};
+
+/// Options of `umbra regrade`.
+#[derive(clap::Args)]
+pub struct RegradeArguments {
+    /// Write the new points into the reports, and keep the change with its time and reason
+    #[arg(long, requires = "reason")]
+    apply: bool,
+    /// Return to what held before the last applied change; `matches.toml` and `overrides.toml` are again what they were
+    #[arg(long, conflicts_with = "apply")]
+    undo: bool,
+    /// Why; kept with the change
+    #[arg(long, value_name = "TEXT")]
+    reason: Option<String>,
+    /// The report's folder
+    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    output: PathBuf,
+}
+
+/// Shows what changes; applies it where that is asked.
+pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+    let RegradeArguments { apply, undo, reason, output } = arguments;
+    let reason = reason.as_deref().map(str::trim);
+    anyhow::ensure!(reason != Some(""), "--reason: expected a reason, found nothing");
+    let mut kept = Kept::read(output)?;
+    let current = kept.pins.current().context("nothing is pinned")?.clone();
+    println!(
+        "settled by change {} of {}: {}",
+        current.number,
+        current.when,
+        harmless(&current.reason)
+    );
+    let decided = if *undo {
+        kept.pins.before()?.decided.clone()
+    } else {
+        let stated = Stated::of(&Context::assignment(root)?);
+        anyhow::ensure!(
+            stated.name == current.decided.assignment.name,
+            "{} is a report of assignment \"{}\", not \"{}\"; hint: --root",
+            output.display(),
+            current.decided.assignment.name,
+            stated.name
+        );
+        Decided::read(output, stated, current.decided.attempt)?
+    };
+    let differs = decided.differs(&current.decided, output)?;
+    let before = kept.report(output, &current.decided)?;
+    if differs.is_empty() && !undo {
+        println!("config.json, {MATCHES} and {OVERRIDES} say what is pinned: nothing changes");
+        if *apply {
+            settling::write(output, &before)?;
+        }
+        return Ok(super::EXIT_OK);
+    }
+    println!("what differs: {}", differs.join(", "));
+    let after = kept.report(output, &decided)?;
+    print!("{}", table(&changes(&before, &after)));
+    println!("{}", summary(&before, &after));
+    if *undo {
+        // The files first: a change that is applied without them would come back with the next run.
+        for (name, text, old) in [
+            (MATCHES, &decided.matches, &current.decided.matches),
+            (OVERRIDES, &decided.overrides, &current.decided.overrides),
+        ] {
+            let file = output.join(name);
+            if text != old {
+                write_whole(&file, text.as_bytes())
+                    .with_context(|| format!("cannot write {}", file.display()))?;
+            }
+        }
+        let reason = reason.map_or_else(|| format!("undone: {}", current.reason), str::to_owned);
+        kept.apply(output, decided, &reason, true)?;
+        println!("undone; the reports are written");
+    } else if *apply {
+        kept.apply(output, decided, reason.unwrap_or_default(), false)?;
+        println!("applied; the reports are written, and --undo takes it back");
+    } else {
+        println!("nothing is written; --apply --reason TEXT does");
+    }
+    Ok(super::EXIT_OK)
+}
+
+/// Old and new points, a line for each part and total that changes.
+fn table(changes: &[Change]) -> String {
+    let points = |range: Option<[f64; 2]>| match range {
+        None => "-".to_owned(),
+        Some([least, most]) if least == most => least.to_string(),
+        Some([least, most]) => format!("{least}..{most}"),
+    };
+    let mut rows = vec![["student", "part", "old", "new"].map(str::to_owned)];
+    for (at, Change { slug, who, part, before, after }) in changes.iter().enumerate() {
+        let first = at == 0 || changes[at - 1].slug != *slug;
+        let who = if first { harmless(who) } else { String::new() };
+        let part = if part.is_empty() { "total".to_owned() } else { harmless(part) };
+        rows.push([who, part, points(*before), points(*after)]);
+    }
+    if rows.len() == 1 {
+        return String::new();
+    }
+    use unicode_width::UnicodeWidthStr as _;
+    let width = |column: usize| rows.iter().map(|row| row[column].width()).max().unwrap_or(0);
+    let widths = [width(0), width(1), width(2), width(3)];
+    let line = |[who, part, old, new]: &[String; 4]| {
+        format!(
+            "{}  {}  {}  {}\n",
+            left(who, widths[0]),
+            left(part, widths[1]),
+            right(old, widths[2]),
+            right(new, widths[3])
+        )
+    };
+    rows.iter().map(line).collect()
+}
+
+/// How many rise and fall.
+fn summary(before: &BatchReport, after: &BatchReport) -> String {
+    let total = |report: &BatchReport, slug: &str| {
+        let own = report.entries.iter().find(|entry| entry.record.slug == slug);
+        own.map(|entry| entry.grade.points + entry.grade.points_max)
+    };
+    let (mut rise, mut fall, mut stay, mut new) = (0, 0, 0, 0);
+    for entry in &after.entries {
+        let now = entry.grade.points + entry.grade.points_max;
+        match total(before, &entry.record.slug) {
+            None => new += 1,
+            Some(old) if now > old => rise += 1,
+            Some(old) if now < old => fall += 1,
+            Some(_) => stay += 1,
+        }
+    }
+    let gone = before.entries.iter().filter(|own| total(after, &own.record.slug).is_none()).count();
+    let mut words = format!(
+        "{}: {rise} rise, {fall} fall, {stay} stay",
+        count(after.entries.len(), "submission")
+    );
+    if new > 0 {
+        words += &format!(", {new} more now count");
+    }
+    if gone > 0 {
+        words += &format!(", {gone} no longer count");
+    }
+    words
+}

@@ -1,0 +1,367 @@
+//! A report from what its folder keeps: records, what the last run found beside them, and what is pinned. No
+//! submission is needed, and nothing is rendered.
+
+use std::path::Path;
+
+use anyhow::{Context as _, bail};
+use serde::{Deserialize, Serialize};
+
+use super::class;
+use crate::class::matching::{Match, find};
+use crate::class::overrides::{Applied, Subject};
+use crate::class::pins::Change;
+use crate::class::{
+    Claim, Collected, Decided, Deciding, Kind, Label, Matches, Pins, Roster, settle,
+};
+use crate::files::write_whole;
+use crate::grading::{Earlier, Record, RecordCache, judge_shared};
+use crate::held_back::HeldBack;
+use crate::program::graded;
+use crate::report::{self, BatchReport, SubmissionReport};
+use crate::rubric::Grade;
+
+/// The file of [`Found`], in the instructor's folder.
+const FILE: &str = "batch.json";
+
+/// What a grade says of a submission that was judged in another way than the others of its class.
+const OTHER_CONDITIONS: &str = "graded before with other scenes, limits or another version of Umbra: \
+                                not comparable, grade it again";
+
+/// What is known of a batch beside its records.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Found {
+    /// Digest of what the last run judged by: records of another one are not comparable.
+    pub conditions: String,
+    /// Where the submissions come from.
+    pub kind: Kind,
+    /// File name of the class list; empty without one.
+    pub list: String,
+    /// What is held back, if anything.
+    pub held_back: Option<HeldBack>,
+    /// What was there, graded or not.
+    pub seen: Vec<Seen>,
+}
+
+/// Something that was submitted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Seen {
+    /// Its folder in the report; empty where there is nothing to grade.
+    pub slug: String,
+    /// What reports call it.
+    pub name: String,
+    /// What the platform says.
+    pub label: Option<Label>,
+    /// Whether another attempt of the same student counts by its time.
+    pub aside: bool,
+    /// Why there is nothing to grade; empty where there is something.
+    pub empty: String,
+}
+
+impl Found {
+    /// What one run found: submissions `all`, of which those in `aside` do not count, and what is none.
+    pub fn new(
+        collected: &Collected,
+        all: &[class::Source],
+        aside: impl Fn(&class::Source) -> bool,
+    ) -> Self {
+        let mut seen: Vec<Seen> = Vec::new();
+        for source in all {
+            let (name, label) = (source.name.clone(), source.label.clone());
+            let slug = source.slug.clone();
+            seen.push(Seen { slug, name, label, aside: aside(source), empty: String::new() });
+        }
+        seen.extend(collected.empty.iter().map(|empty| Seen {
+            name: empty.label.submission.clone(),
+            label: Some(empty.label.clone()),
+            empty: empty.reason(),
+            ..Seen::default()
+        }));
+        Self { kind: collected.kind, seen, ..Self::default() }
+    }
+
+    /// Adds what an earlier run into `output` found of those that this one was not given.
+    pub fn join(&mut self, earlier: Self, output: &Path) {
+        let instructor = output.join(report::INSTRUCTOR);
+        if self.kind == Kind::default() {
+            self.kind = earlier.kind;
+        }
+        if self.list.is_empty() {
+            self.list = earlier.list;
+        }
+        for old in earlier.seen {
+            let same = |new: &Seen| {
+                if old.slug.is_empty() { new.label == old.label } else { new.slug == old.slug }
+            };
+            let stays = old.aside || !old.empty.is_empty() || instructor.join(&old.slug).is_dir();
+            if stays && !self.seen.iter().any(same) {
+                self.seen.push(old);
+            }
+        }
+    }
+
+    /// Gives records the names that reports call them by; in their files they have that of the archive alone.
+    fn name(&self, records: &mut [Earlier]) {
+        for Earlier { record, .. } in records {
+            if let Some(seen) = self.seen.iter().find(|seen| seen.slug == record.slug) {
+                record.name.clone_from(&seen.name);
+            }
+        }
+    }
+
+    /// Reads what the last run into a report found.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn read(output: &Path) -> anyhow::Result<Option<Self>> {
+        let file = output.join(report::INSTRUCTOR).join(FILE);
+        match std::fs::read(&file) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            bytes => {
+                let bytes = bytes.with_context(|| format!("cannot read {}", file.display()))?;
+                let found = serde_json::from_slice(&bytes);
+                found.map(Some).with_context(|| {
+                    format!("{}: not of this version of Umbra; grade again", file.display())
+                })
+            }
+        }
+    }
+
+    /// Keeps it for later runs.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn keep(&self, output: &Path) -> anyhow::Result<()> {
+        let file = output.join(report::INSTRUCTOR).join(FILE);
+        write_whole(&file, &serde_json::to_vec_pretty(self)?)
+            .with_context(|| format!("cannot write {}", file.display()))
+    }
+}
+
+/// A report's folder, as it was kept.
+pub struct Kept {
+    /// What grades are settled by.
+    pub pins: Pins,
+    found: Found,
+    roster: Option<Roster>,
+    records: Vec<Earlier>,
+}
+
+impl Kept {
+    /// Reads all that a report is made from.
+    ///
+    /// # Errors
+    /// When the folder holds no report, or one of another version.
+    pub fn read(output: &Path) -> anyhow::Result<Self> {
+        let instructor = output.join(report::INSTRUCTOR);
+        let pins = Pins::read(&instructor)?;
+        let Some(found) = Found::read(output)?.filter(|_| pins.current().is_some()) else {
+            bail!(
+                "{}: expected the --output of an earlier `umbra grade` of this version; hint: grade once more",
+                output.display()
+            );
+        };
+        let mut records = Vec::new();
+        for slug in class::folders(output) {
+            let earlier = RecordCache::earlier(&instructor.join(&slug), &found.conditions)
+                .with_context(|| format!("{slug} cannot be settled; grade it again"))?;
+            records.extend(earlier);
+        }
+        found.name(&mut records);
+        let roster = class::roster(None, output)?;
+        Ok(Self { pins, found, roster, records })
+    }
+
+    /// What is pinned.
+    pub fn decided(&self) -> anyhow::Result<&Decided> {
+        Ok(&self.pins.current().context("nothing is pinned")?.decided)
+    }
+
+    /// The report by what is decided.
+    ///
+    /// # Errors
+    /// When a decision means nothing.
+    pub fn report(&self, output: &Path, decided: &Decided) -> anyhow::Result<BatchReport> {
+        let records = self.records.iter().map(Earlier::clone).collect();
+        settled(output, decided, &self.found, self.roster.as_ref(), records)
+    }
+
+    /// The submissions that are graded, with what they are worth before anything is decided, and the numbers that
+    /// each is known by.
+    ///
+    /// # Errors
+    /// When a decision means nothing.
+    pub fn graded(&self, output: &Path) -> anyhow::Result<Vec<(SubmissionReport, Vec<String>)>> {
+        let decided = self.decided()?;
+        let matches = decided.matches(output)?;
+        let mut records: Vec<Record> =
+            self.records.iter().map(|earlier| earlier.record.clone()).collect();
+        judge_shared(&mut records);
+        let entry = |record: Record| {
+            let claim = class::claim(output, &record);
+            let numbers = numbers(&claim, self.roster.as_ref(), &matches);
+            (graded(record, &decided.assignment.rules), numbers)
+        };
+        Ok(records.into_iter().map(entry).collect())
+    }
+
+    /// Pins what is decided from now on and writes the report by it.
+    ///
+    /// # Errors
+    /// When it cannot be written, or a decision means nothing.
+    pub fn apply(
+        &mut self,
+        output: &Path,
+        decided: Decided,
+        reason: &str,
+        undoes: bool,
+    ) -> anyhow::Result<()> {
+        let before = self.report(output, self.decided()?)?;
+        let after = self.report(output, &decided)?;
+        self.pins.apply(decided, reason, changes(&before, &after), undoes)?;
+        write(output, &after)
+    }
+}
+
+/// Writes a report with the questions that it leaves open.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write(output: &Path, report: &BatchReport) -> anyhow::Result<()> {
+    if let Some(class) = &report.class {
+        class::ask(class, output)?;
+    }
+    Ok(report::write(output, report)?)
+}
+
+/// The numbers that a submission is known by: its own, the platform's, the class list's.
+fn numbers(claim: &Claim, roster: Option<&Roster>, matches: &Matches) -> Vec<String> {
+    let listed = roster.and_then(|roster| match find(claim, roster, matches) {
+        Ok(Match::Student(at, _)) => Some(roster.students[at].number.clone()),
+        _ => None,
+    });
+    let label = claim.label.as_ref().map(|label| label.number.clone());
+    let all = [Some(claim.number.clone()), label, listed].into_iter().flatten();
+    all.filter(|number| !number.is_empty()).collect()
+}
+
+/// The report of some records: points by what is decided, whose each is, which of them count, what lateness costs.
+///
+/// # Errors
+/// When a decision means nothing.
+pub fn settled(
+    output: &Path,
+    decided: &Decided,
+    found: &Found,
+    roster: Option<&Roster>,
+    mut records: Vec<Earlier>,
+) -> anyhow::Result<BatchReport> {
+    let stated = &decided.assignment;
+    let (matches, overrides) = (decided.matches(output)?, decided.overrides(output)?);
+    let deciding = Deciding {
+        roster,
+        matches: &matches,
+        policy: stated.late.as_ref(),
+        due: &stated.due,
+        attempt: decided.attempt,
+    };
+    found.name(&mut records);
+    // In an order that does not hang on who was graded when.
+    records.sort_by_key(|earlier| earlier.record.slug.to_lowercase());
+    let comparable: Vec<bool> = records.iter().map(|earlier| earlier.comparable).collect();
+    let mut records: Vec<Record> = records.into_iter().map(|earlier| earlier.record).collect();
+    judge_shared(&mut records);
+    let claims: Vec<Claim> = records.iter().map(|record| class::claim(output, record)).collect();
+    let mut entries: Vec<SubmissionReport> =
+        records.into_iter().map(|record| graded(record, &stated.rules)).collect();
+    for (entry, comparable) in entries.iter_mut().zip(comparable) {
+        if !comparable {
+            entry.grade.remarks.push(OTHER_CONDITIONS.to_owned());
+        }
+    }
+    let mut grades: Vec<Grade> = entries.iter().map(|entry| entry.grade.clone()).collect();
+    let subjects: Vec<Subject> = entries
+        .iter()
+        .zip(&claims)
+        .map(|(SubmissionReport { record, .. }, claim)| Subject {
+            slug: &record.slug,
+            numbers: numbers(claim, roster, &matches),
+            digest: &record.digest,
+            evidence: &record.evidence,
+        })
+        .collect();
+    let decisions: Vec<Vec<Applied>> = subjects
+        .iter()
+        .zip(&mut grades)
+        .map(|(subject, grade)| overrides.apply(subject, grade))
+        .collect();
+    let parts: Vec<&str> = stated.rules.parts.iter().map(|part| part.id.as_str()).collect();
+    let unused = overrides.unused(&subjects, &parts);
+    let is_graded = |seen: &Seen| claims.iter().any(|claim| claim.slug == seen.slug);
+    let open = found.seen.iter().filter(|seen| !seen.aside && !is_graded(seen));
+    let absent: Vec<(Label, String)> = open
+        .filter_map(|seen| {
+            let reason = if seen.empty.is_empty() { "not graded yet" } else { &seen.empty };
+            Some((seen.label.clone()?, reason.to_owned()))
+        })
+        .collect();
+    let (standings, mut class) = settle(&claims, &mut grades, &absent, found.kind, &deciding)?;
+    class.unused = unused;
+    class.list.clone_from(&found.list);
+    let mut counting = Vec::new();
+    for (at, mut standing) in standings {
+        // Attempts that were not graded are told, too.
+        let own = standing.label.as_ref().map(Label::person);
+        let others = found.seen.iter().filter(|seen| seen.aside && !is_graded(seen));
+        let others = others.filter(|seen| seen.label.as_ref().map(Label::person) == own);
+        let others = others.map(|seen| seen.name.clone());
+        let known: Vec<String> = others.filter(|name| !standing.set_aside.contains(name)).collect();
+        standing.set_aside.extend(known);
+        let stale = decisions[at].iter().filter(|own| own.stale);
+        class.stale.extend(stale.map(|own| format!("{}: {}", claims[at].name, own.words())));
+        standing.decisions.clone_from(&decisions[at]);
+        let grade = grades[at].clone();
+        counting.push(SubmissionReport { record: entries[at].record.clone(), grade, standing });
+    }
+    let held_back = found.held_back.clone();
+    Ok(BatchReport::settled(stated.clone(), held_back, counting, class))
+}
+
+/// Points that are others in `after`, by submission and part.
+pub fn changes(before: &BatchReport, after: &BatchReport) -> Vec<Change> {
+    let of = |report: &BatchReport, slug: &str| {
+        report.entries.iter().find(|entry| entry.record.slug == slug).cloned()
+    };
+    let mut slugs: Vec<&str> =
+        before.entries.iter().chain(&after.entries).map(|own| own.record.slug.as_str()).collect();
+    slugs.sort_by_key(|slug| slug.to_lowercase());
+    slugs.dedup();
+    let mut changes = Vec::new();
+    for slug in slugs {
+        let (old, new) = (of(before, slug), of(after, slug));
+        let who = new.as_ref().or(old.as_ref()).map(SubmissionReport::who).unwrap_or_default();
+        let mut add = |part: &str, before: Option<[f64; 2]>, after: Option<[f64; 2]>| {
+            if before != after {
+                let (slug, part, who) = (slug.to_owned(), part.to_owned(), who.clone());
+                changes.push(Change { slug, who, part, before, after });
+            }
+        };
+        let total = |own: &Option<SubmissionReport>| {
+            own.as_ref().map(|own| [own.grade.points, own.grade.points_max])
+        };
+        if let (Some(old), Some(new)) = (&old, &new) {
+            let ids = old.grade.parts.iter().chain(&new.grade.parts).map(|part| part.id.as_str());
+            let mut ids: Vec<&str> = ids.collect();
+            ids.sort_unstable();
+            ids.dedup();
+            for id in ids {
+                let points = |own: &SubmissionReport| {
+                    let part = own.grade.parts.iter().find(|part| part.id == id);
+                    part.map(|part| [part.points, part.points_max])
+                };
+                add(id, points(old), points(new));
+            }
+        }
+        add("", total(&old), total(&new));
+    }
+    changes
+}
