@@ -68,6 +68,8 @@ pub mod rubric;
 #[doc(hidden)]
 pub mod sandbox;
 #[doc(hidden)]
+pub mod store;
+#[doc(hidden)]
 pub mod viewer;
 #[doc(hidden)]
 pub mod worker;

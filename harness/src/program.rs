@@ -7,11 +7,11 @@ use anyhow::ensure;
 
 use crate::assignment::Assignment;
 use crate::class::Standing;
-use crate::expected::{Store, reference_library};
 use crate::grading::{Folders, Grading, Mode, Record};
 use crate::report::{self, BatchReport, SubmissionReport};
 use crate::rubric::{self, Rules};
 use crate::sandbox::Isolation;
+use crate::store::{Store, reference_library};
 use crate::worker::{Adapter, AdapterKind, Supervisor};
 
 /// The folder of the submission in the report.

@@ -10,9 +10,9 @@ use umbra::diagnosis::{
     Catalogue, Diagnosis, Input, Kind, KnownMistake, LoopSeen, Observations, Stored, StoredView,
 };
 use umbra::evidence::{Check, CheckId, Evidence, Verdict};
-use umbra::expected::Store;
 use umbra::files::library_name;
 use umbra::grading::Grading;
+use umbra::store::Store;
 use umbra::worker::{Adapter, AdapterKind, Supervisor};
 
 fn root() -> PathBuf {

@@ -8,10 +8,11 @@ use basecode::Image;
 use umbra::assignment::{Assignment, SceneEntry};
 use umbra::evidence::images::{Kind, judge};
 use umbra::evidence::{Check, CheckId, Evidence, Verdict};
-use umbra::expected::{Expected, Store};
+use umbra::expected::Expected;
 use umbra::files::library_name;
 use umbra::process::Limits;
 use umbra::rubric::grade;
+use umbra::store::Store;
 use umbra::worker::{Job, Outcome, Request, SceneRef, Supervisor};
 
 /// A seed that no stored image was made with.

@@ -11,13 +11,14 @@ use basecode::Image;
 use umbra::assignment::{Assignment, SceneEntry};
 use umbra::evidence::CheckId;
 use umbra::evidence::loops::judge_agreement;
-use umbra::expected::{Expected, Store, SurfaceBuffer};
+use umbra::expected::{Expected, SurfaceBuffer};
 use umbra::files::library_name;
 use umbra::grading::{CORRELATED, row_correlation};
 use umbra::imaging::compare::compare_offline;
 use umbra::imaging::reference::ReferenceImage;
 use umbra::plugin::Witness;
 use umbra::process::Limits;
+use umbra::store::Store;
 use umbra::worker::{Job, Outcome, RayQuery, Request, SceneRef, Supervisor};
 
 /// Scenes with shadow edges and dark corners, a highlight, steep lobes, a coloured light.

@@ -12,9 +12,9 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 use umbra::assignment::Assignment;
-use umbra::expected::Store;
 use umbra::files::library_name;
 use umbra::grading::PreparedScene;
+use umbra::store::Store;
 use umbra::worker::Supervisor;
 
 /// What goes into the kit as it is: files, and folders with all below.

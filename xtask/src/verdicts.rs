@@ -21,10 +21,10 @@ use umbra::assignment::Assignment;
 use umbra::cli::AdapterChoice;
 use umbra::diagnosis::Catalogue;
 use umbra::evidence::Check;
-use umbra::expected::Store;
 use umbra::files::library_name;
 use umbra::grading::{Grading, RenderPath, Stages};
 use umbra::rubric;
+use umbra::store::Store;
 use umbra::worker::{STAGES, Supervisor};
 
 use choice::{Subject, pairs, singles, variants};

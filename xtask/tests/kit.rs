@@ -8,8 +8,8 @@ use std::process::Command;
 
 use serde_json::Value;
 use umbra::assignment::Assignment;
-use umbra::expected::Store;
 use umbra::grading::PreparedScene;
+use umbra::store::Store;
 use umbra::worker::Supervisor;
 
 /// So many lines in a row that the reference has too, most of them not the template's, are no chance.

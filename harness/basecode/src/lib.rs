@@ -85,6 +85,7 @@
 //! # }
 //! ```
 
+mod bsdf;
 mod bvh;
 mod camera;
 mod error;
@@ -101,6 +102,7 @@ mod renderer;
 mod sampler;
 pub mod scene;
 
+pub use bsdf::{Bsdf, ShadingKind};
 pub use bvh::Bvh;
 pub use camera::{Camera, CameraConfig};
 pub use error::{Error, Result};
@@ -109,7 +111,7 @@ pub use frame::Frame;
 pub use glam::{Mat3, Mat4, Vec2, Vec3, Vec4, vec2, vec3, vec4};
 pub use image::Image;
 pub use ray::{Ray, SurfaceInteraction};
-pub use renderer::{Bsdf, Integrator, RenderJob, Renderer, ShadingKind};
+pub use renderer::{Integrator, RenderJob, Renderer};
 pub use sampler::Sampler;
 pub use scene::{Material, MaterialModel, Scene, Shape, Texture};
 pub use {bytemuck, glam};

@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::gpu::{Gpu, RenderPass};
-use crate::{Error, Film, Material, Ray, Result, Sampler, Scene, SurfaceInteraction};
+use crate::{Bsdf, Error, Film, Material, Ray, Result, Sampler, Scene, ShadingKind};
 
 /// A renderer: what [`crate::export_renderer!`] turns into a plugin.
 ///
@@ -51,23 +51,6 @@ pub trait Renderer: Send + Sync {
         scene: &Scene,
         shadow_map: bool,
     ) -> Result<Box<dyn RenderPass>>;
-}
-
-/// How a scene is shaded, offline and realtime: `type` in the `[renderer]` section of its file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ShadingKind {
-    /// Direct light from the point light: `"simple"` or `"direct"`, and what a scene gets that
-    /// says nothing.
-    Simple,
-    /// Normals as colors, from the previous assignment: `"normal"`.
-    Normal,
-}
-
-/// A bidirectional scattering distribution function.
-pub trait Bsdf: Send + Sync {
-    /// The BSDF's value for `i.wo` and `i.wi` (unit vectors in the local shading frame, leaving
-    /// the surface), *times* the cosine of `i.wi` [sr^-1]. Zero unless both face the surface.
-    fn eval(&self, i: &SurfaceInteraction) -> Vec3;
 }
 
 /// Computes the radiance along camera rays.

@@ -9,16 +9,16 @@ use std::time::Instant;
 use anyhow::{Context as _, ensure};
 
 use super::MachineLacks;
-use super::check::Asked;
+use super::asked::Asked;
+use super::choices::{BudgetChoice, IsolationChoice, Perturb};
 use super::class::{self, Source};
 use super::context::{Context, INTERRUPTED, cores};
-use super::grade::{BudgetChoice, IsolationChoice, Perturb};
 use super::render::AdapterChoice;
 use super::settling::{self, Found};
 use crate::assignment::Assignment;
 use crate::class::{Attempt, Collected, Decided, Kind, Label, Pins, Stated, Wanted, collect};
 use crate::files::write_whole;
-use crate::grading::{Earlier, Folders, Grading, Mode, Record, RecordCache, judge_shared};
+use crate::grading::{Earlier, Folders, Grading, Mode, Record, judge_shared};
 use crate::held_back::recorded_seed;
 use crate::program::graded;
 use crate::report::{self, BatchReport};
@@ -137,7 +137,7 @@ impl Batch<'_> {
             let adapter = self.adapter.adapter();
             let mut grading = Grading::prepare(store, adapter, seed, &INTERRUPTED)?;
             if self.mode == Mode::Grade {
-                grading.cache = Some(RecordCache::of(&grading, self.force)?);
+                grading.cache = Some(grading.record_cache(self.force)?);
             }
             if self.budget == BudgetChoice::None {
                 grading.budget = None;

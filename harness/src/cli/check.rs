@@ -5,20 +5,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::ensure;
 use serde::{Deserialize, Serialize};
 
+use super::asked::Asked;
 use super::batch::Batch;
+use super::choices::{BudgetChoice, IsolationChoice, Perturb};
 use super::context::Context;
-use super::grade::{BudgetChoice, IsolationChoice, Perturb};
 use super::render::AdapterChoice;
 use super::{class, terminal};
-use crate::assignment::Assignment;
 use crate::class::Source;
 use crate::files::{files_below, write_whole};
-use crate::grading::{Mode, RenderPath};
+use crate::grading::Mode;
 use crate::report::{self, Closing, Look};
-use crate::rubric::{Grade, Part};
+use crate::rubric::Part;
 
 /// What the last check found, in the submission's folder in the report.
 const LAST: &str = "last-check.json";
@@ -53,93 +52,6 @@ pub struct CheckArguments {
     /// Open the report in the browser
     #[arg(long)]
     open: bool,
-}
-
-/// What of an assignment is asked.
-pub struct Asked {
-    /// The parts; empty for all.
-    parts: Vec<String>,
-    /// The scenes; empty for all.
-    scenes: Vec<String>,
-}
-
-impl Asked {
-    /// Whether nothing is left out.
-    pub fn is_all(&self) -> bool {
-        self.parts.is_empty() && self.scenes.is_empty()
-    }
-
-    /// Takes out of an assignment what is not asked.
-    ///
-    /// # Errors
-    /// When there is no such part or scene.
-    pub fn restrict(&self, assignment: &mut Assignment) -> anyhow::Result<()> {
-        let ids: Vec<&str> = assignment.rules.parts.iter().map(|part| part.id.as_str()).collect();
-        for part in &self.parts {
-            ensure!(
-                ids.contains(&part.as_str()),
-                "there is no part {part}; expected one of {}",
-                ids.join(", ")
-            );
-        }
-        let names: Vec<&str> = assignment.scenes.iter().map(|scene| scene.name.as_str()).collect();
-        for scene in &self.scenes {
-            ensure!(
-                names.contains(&scene.as_str()),
-                "there is no scene {scene}; expected one of {}",
-                names.join(", ")
-            );
-        }
-        if !self.scenes.is_empty() {
-            assignment.scenes.retain(|scene| self.scenes.contains(&scene.name));
-        }
-        let bonus = assignment.rules.parts.iter().any(|part| part.bonus && self.asks(&part.id));
-        if !bonus {
-            assignment.scenes.iter_mut().for_each(|scene| scene.bonus = None);
-        }
-        Ok(())
-    }
-
-    /// The halves of the assignment that the parts belong to. The bonus is drawn.
-    pub fn paths(&self, context: &Context) -> Vec<RenderPath> {
-        let path = |part: &Part| match part.path.as_str() {
-            "offline" => RenderPath::Offline,
-            _ => RenderPath::Realtime,
-        };
-        let parts = &context.assignment.rules.parts;
-        let asked =
-            |path_asked| parts.iter().any(|part| self.asks(&part.id) && path(part) == path_asked);
-        RenderPath::ALL.into_iter().filter(|&path| asked(path)).collect()
-    }
-
-    /// Takes out of a grade what was not asked.
-    pub fn only_of(&self, grade: &mut Grade) {
-        if self.is_all() {
-            return;
-        }
-        grade.parts.retain(|part| self.asks(&part.id));
-        grade.points = grade.parts.iter().map(|part| part.points).sum();
-        grade.points_max = grade.parts.iter().map(|part| part.points_max).sum();
-        grade.out_of = grade.parts.iter().map(|part| part.out_of).sum();
-        grade.remarks.push(format!("only {} was checked, not the rest", self.in_words()));
-    }
-
-    fn asks(&self, part: &str) -> bool {
-        self.parts.is_empty() || self.parts.iter().any(|asked| asked == part)
-    }
-
-    /// `part 2.3 on scene cbox`; empty for all.
-    fn in_words(&self) -> String {
-        let list = |noun: &str, names: &[String]| match names {
-            [] => None,
-            [one] => Some(format!("{noun} {one}")),
-            many => Some(format!("{noun}s {}", many.join(", "))),
-        };
-        match (list("part", &self.parts), list("scene", &self.scenes)) {
-            (Some(parts), Some(scenes)) => format!("{parts} on {scenes}"),
-            (parts, scenes) => parts.or(scenes).unwrap_or_default(),
-        }
-    }
 }
 
 /// What the last check found.
@@ -248,46 +160,7 @@ fn task_files(root: Option<&Path>, parts: &[Part]) -> BTreeMap<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn asked(parts: &[&str], scenes: &[&str]) -> Asked {
-        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
-        Asked { parts: owned(parts), scenes: owned(scenes) }
-    }
-
-    #[test]
-    fn what_is_not_asked_is_taken_out() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let load = || Assignment::load(&root).unwrap();
-        let restricted = |asked: Asked| {
-            let mut assignment = load();
-            asked.restrict(&mut assignment).map(|()| assignment)
-        };
-        let whole = restricted(asked(&[], &[])).unwrap();
-        assert_eq!(whole.scenes, load().scenes);
-        let pixels = restricted(asked(&["2.3"], &["cbox", "scale"])).unwrap();
-        let names: Vec<&str> = pixels.scenes.iter().map(|scene| scene.name.as_str()).collect();
-        assert_eq!(names, ["cbox", "scale"]);
-        assert!(pixels.scenes.iter().all(|scene| scene.bonus.is_none()));
-        assert!(restricted(asked(&["2.5"], &["cbox"])).unwrap().scenes[0].bonus.is_some());
-        let error = restricted(asked(&["2.9"], &[])).unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "there is no part 2.9; expected one of 1.1, 1.2, 1.3, 1.4, 2.1, 2.2, 2.3, 2.4, 2.5"
-        );
-        let error = restricted(asked(&[], &["teepot"])).unwrap_err().to_string();
-        assert!(
-            error.starts_with("there is no scene teepot; expected one of teapot, cbox"),
-            "{error}"
-        );
-    }
-
-    #[test]
-    fn what_is_asked_has_words() {
-        assert_eq!(asked(&[], &[]).in_words(), "");
-        assert_eq!(asked(&["1.1"], &[]).in_words(), "part 1.1");
-        assert_eq!(asked(&["1.1", "2.5"], &["cbox"]).in_words(), "parts 1.1, 2.5 on scene cbox");
-        assert_eq!(asked(&[], &["a", "b"]).in_words(), "scenes a, b");
-    }
+    use crate::assignment::Assignment;
 
     #[test]
     fn every_part_has_the_file_of_its_task() {

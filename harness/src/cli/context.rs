@@ -8,8 +8,8 @@ use anyhow::Context as _;
 use super::terminal::Progress;
 use crate::assignment::Assignment;
 use crate::decode::Decoder;
-use crate::expected::{Store, reference_library};
 use crate::files::Scratch;
+use crate::store::{Store, reference_library};
 use crate::worker::Supervisor;
 
 /// Set by Ctrl-C; whatever runs ends soon after, and nothing half-written is left.

@@ -1,9 +1,9 @@
 //! `umbra grade`: a class through all stages, and its report.
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use super::batch::Batch;
+use super::choices::{BudgetChoice, IsolationChoice, Perturb};
 use super::context::cores;
 use super::render::AdapterChoice;
 use super::terminal;
@@ -61,42 +61,6 @@ pub struct GradeArguments {
     /// Print what each stage cost
     #[arg(long)]
     timings: bool,
-}
-
-/// How much time a submission has in all.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum BudgetChoice {
-    /// As config.json says
-    Config,
-    /// No limit
-    None,
-}
-
-/// A seed of held-back scenes, or none of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Perturb(pub Option<u64>);
-
-impl FromStr for Perturb {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text == "off" {
-            return Ok(Self(None));
-        }
-        let seed = text.parse().map_err(|_| {
-            format!("expected off or a whole number from 0 to {}, found {text}", u64::MAX)
-        })?;
-        Ok(Self(Some(seed)))
-    }
-}
-
-/// How much isolation is demanded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum IsolationChoice {
-    /// Every layer
-    Full,
-    /// Whatever this machine has
-    Reduced,
 }
 
 /// Grades submissions and prints the table; exit 0 when all could be graded, whatever their points.

@@ -1,8 +1,10 @@
 //! The command line: parses, calls, prints. Each command is one file.
 
+mod asked;
 mod batch;
 mod bless;
 mod check;
+mod choices;
 mod class;
 mod compare;
 mod context;

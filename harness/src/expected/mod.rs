@@ -1,10 +1,31 @@
-//! What a right renderer draws: references, and the geometry that tells where they can be trusted.
+//! What is right: the images that a right renderer draws of a scene, and the geometry that tells where they can be
+//! trusted. Where the images come from is [`crate::store`]'s matter.
 
 mod regions;
-mod store;
+mod scene_file;
 mod surface;
 
+use basecode::{Image, Scene};
+
+use crate::imaging::reference::{ReferenceImage, RegionMask};
+
 pub use regions::regions;
-pub(crate) use store::scene_digest;
-pub use store::{Blessing, Expected, Store, load_scene, reference_library};
+pub(crate) use regions::table as region_table;
+pub use scene_file::load_scene;
+pub(crate) use scene_file::scene_digest;
 pub use surface::{FARTHEST_START, SurfaceBuffer, SurfacePoint, Visibility};
+
+/// What a right renderer draws of one scene, on one film.
+pub struct Expected {
+    /// The scene as the base code loads it, without BSDFs.
+    pub scene: Scene,
+    /// Offline, with shadows.
+    pub offline: ReferenceImage,
+    /// At pixel centres, without shadows: what realtime draws.
+    pub unshadowed: Image,
+    /// The regions of `unshadowed`.
+    pub unshadowed_mask: RegionMask,
+    /// As `unshadowed`, by stages that do not renormalise the interpolated normal: as good. Absent
+    /// where it was neither kept nor can be drawn.
+    pub raw_normals: Option<Image>,
+}

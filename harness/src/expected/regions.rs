@@ -50,7 +50,7 @@ pub fn regions(scene: &Scene, width: usize, height: usize, shadows: bool) -> Res
 }
 
 /// A mask that is background everywhere, with the regions of a scene: two for each material.
-pub(super) fn table(scene: &Scene, width: usize, height: usize) -> RegionMask {
+pub(crate) fn table(scene: &Scene, width: usize, height: usize) -> RegionMask {
     let mut mask = RegionMask::background(width, height);
     for material in scene.materials() {
         let exponent = match material.model {

@@ -1,8 +1,10 @@
 //! The machine's word against a submission's: who blames the machine (no adapter, a lost device, a full
 //! disk, a worker that could not begin) is believed when a renderer of ours fails on the same case.
 
-use super::draw;
+use std::path::Path;
+
 use super::session::Session;
+use super::stages::named;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
 use crate::process::Limits;
 use crate::worker::{
@@ -10,9 +12,22 @@ use crate::worker::{
     is_environment_failure,
 };
 
+impl Session<'_> {
+    /// Asks a plugin, or Umbra's neutral pass when there is none.
+    pub fn run(&self, plugin: Option<&Path>, requests: Vec<Request>) -> Vec<Outcome> {
+        if requests.is_empty() {
+            return Vec::new();
+        }
+        let job = Job { plugin: plugin.map(Path::to_owned), requests };
+        let mut outcomes = self.run_job(&job);
+        attribute_failures(self, &job, &mut outcomes);
+        outcomes
+    }
+}
+
 /// Settles the outcomes of `job` that blame the machine: what a renderer of ours does is the
 /// submission's own failure; otherwise they are asked again while there is retries, and stay ungraded.
-pub fn attribute_failures(session: &Session, job: &Job, outcomes: &mut [Outcome]) {
+fn attribute_failures(session: &Session, job: &Job, outcomes: &mut [Outcome]) {
     loop {
         let blaming = |&index: &usize| is_environment_failure(&outcomes[index]);
         let blaming: Vec<usize> = (0..outcomes.len()).filter(blaming).collect();
@@ -79,7 +94,7 @@ fn control_run(session: &Session, job: &Job, request: &Request) -> Option<&'stat
 
 /// A frame of the same scene by Umbra's own pass, under stages of ours.
 fn own_pass(request: &Request) -> Request {
-    let stages = draw::named([VERTEX, SHOW_NORMAL, SHOW_NORMAL].map(str::to_owned));
+    let stages = named([VERTEX, SHOW_NORMAL, SHOW_NORMAL].map(str::to_owned));
     match request.clone() {
         Request::RenderRealtime { scene, width, height, shadow_map, adapter, cameras, .. } => {
             Request::RenderRealtime { scene, width, height, shadow_map, adapter, stages, cameras }

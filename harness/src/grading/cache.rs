@@ -10,12 +10,10 @@ use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::pipeline::{Folders, Grading};
-use super::record::{Record, Student};
+use super::record::{Folders, Record, Student};
 use super::session::BUDGET;
 use crate::evidence::{Check, Evidence, Picture, Verdict};
-use crate::expected::scene_digest;
-use crate::files::{files_below, hex, write_whole};
+use crate::files::{hex, write_whole};
 use crate::panics::Bug;
 
 /// The record's file, beside the instructor's report on the submission.
@@ -67,36 +65,9 @@ struct File<R> {
 }
 
 impl RecordCache {
-    /// For the records that `grading` makes; `force` finds none again.
-    ///
-    /// # Errors
-    /// When something that they depend on cannot be read.
-    pub fn of(grading: &Grading, force: bool) -> anyhow::Result<Self> {
-        let mut hash = Sha256::new();
-        let assignment = grading.assignment;
-        hash.update(serde_json::to_vec(&(
-            (&assignment.scenes, &assignment.tree, &assignment.tolerances, &assignment.limits),
-            grading.held_back.as_ref(),
-        ))?);
-        let mut files = grading.supervisor.programs().to_vec();
-        files.extend(grading.reference.clone());
-        // Stored images, what known mistakes answer, and what a submission began from.
-        let folder = assignment.root.join("expected");
-        let below = files_below(&folder);
-        files.extend(below.with_context(|| format!("cannot read {}", folder.display()))?);
-        for file in files {
-            let bytes =
-                fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
-            hash.update(file.as_os_str().as_encoded_bytes());
-            hash.update(Sha256::digest(bytes));
-        }
-        hash.update(scene_digest(&assignment.root.join(&assignment.sampler_scene))?);
-        for case in &grading.cases {
-            for scene in [&case.offline, &case.realtime].into_iter().chain(&case.bonus) {
-                hash.update(scene_digest(scene)?);
-            }
-        }
-        Ok(Self { batch: hash.finalize().into(), force, settled: Mutex::default() })
+    /// For records that depend on what has this SHA-256; `force` finds none again.
+    pub(super) fn new(batch: [u8; 32], force: bool) -> Self {
+        Self { batch, force, settled: Mutex::default() }
     }
 
     /// The bug that this program met with the submission at `source` before.

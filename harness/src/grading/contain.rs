@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::cache::RecordCache;
-use super::pipeline::{Folders, Grading, Mode};
-use super::record::Record;
+use super::pipeline::{Grading, Mode};
+use super::record::{Folders, Record};
 use crate::evidence::{Check, CheckId, Evidence, Verdict};
 use crate::panics::{self, Bug};
 

@@ -1,25 +1,17 @@
-//! What the reference renderer takes on this machine: measured when a submission is slow, once for
-//! all of a batch.
+//! What the reference renderer takes on this machine.
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock};
 
 use serde::Serialize;
-use sha2::{Digest, Sha256};
-
-use super::pipeline::Grading;
-use super::stages::Stages;
-use crate::files::hex;
-use crate::process::Limits;
-use crate::worker::{Job, Reference, Request, RetryBudget};
 
 /// CPU seconds of the reference renderer, as far as they were needed.
 #[derive(Default)]
 pub(super) struct ReferenceCosts {
     /// Of single questions, by the digest of what is asked.
-    questions: Mutex<BTreeMap<String, Cost>>,
-    offline: OnceLock<Option<f64>>,
-    realtime: OnceLock<Option<f64>>,
+    pub(super) questions: Mutex<BTreeMap<String, Cost>>,
+    pub(super) offline: OnceLock<Option<f64>>,
+    pub(super) realtime: OnceLock<Option<f64>>,
 }
 
 /// What one question costs the reference renderer, in a worker of its own.
@@ -29,66 +21,4 @@ pub struct Cost {
     pub what: String,
     /// CPU seconds; nothing when the reference gave no answer.
     pub cpu_s: Option<f64>,
-}
-
-impl Grading<'_> {
-    /// All that was measured of the reference renderer.
-    pub fn costs_of_reference(&self) -> Vec<Cost> {
-        let questions =
-            self.reference_costs.questions.lock().unwrap_or_else(PoisonError::into_inner);
-        let path = |what: &str, cost: &OnceLock<Option<f64>>| {
-            cost.get().map(|&cpu_s| Cost { what: what.to_owned(), cpu_s })
-        };
-        let paths = [
-            path("offline", &self.reference_costs.offline),
-            path("realtime", &self.reference_costs.realtime),
-        ];
-        questions.values().cloned().chain(paths.into_iter().flatten()).collect()
-    }
-
-    /// CPU seconds of all that the reference is asked on a path, if it can be asked.
-    fn measure_path(&self, offline: bool) -> Option<f64> {
-        let reference = self.reference.as_deref()?;
-        let mut session = self.session("");
-        session.retries = RetryBudget::none();
-        session.reference = None;
-        let (mut checks, mut drawn) = (Vec::new(), Vec::new());
-        let done = if offline {
-            self.offline(&session, reference, 0, &mut checks, &mut drawn)
-        } else {
-            self.realtime(&session, reference, &Stages::default(), &mut checks, &mut drawn)
-        };
-        done.ok().map(|()| session.end_path()).filter(|cpu_s| *cpu_s > 0.0)
-    }
-}
-
-impl Reference for Grading<'_> {
-    fn question_cpu_s(&self, request: &Request) -> Option<f64> {
-        let reference = self.reference.clone()?;
-        let mut request = request.clone();
-        request.scene_mut().options.clear();
-        let key = hex(&Sha256::digest(serde_json::to_vec(&request).unwrap_or_default()));
-        // Whoever asks the same meanwhile waits.
-        let mut known =
-            self.reference_costs.questions.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(cost) = known.get(&key) {
-            return cost.cpu_s;
-        }
-        let what = format!("{} of {}", request.kind(), request.scene().path.display());
-        let job = Job { plugin: Some(reference), requests: vec![request] };
-        let limits = Limits { threads: self.threads, ..Limits::default() };
-        let report = self.supervisor.run_job(&job, &limits, self.cancel, &mut |_| ());
-        let answered = report.outcomes.iter().all(|outcome| outcome.answer().is_some());
-        let cpu_s = report.runs.iter().map(|run| run.ended.cpu_s).sum::<f64>();
-        let cpu_s = (answered && cpu_s > 0.0).then_some(cpu_s);
-        known.insert(key, Cost { what, cpu_s });
-        cpu_s
-    }
-
-    fn path_cpu_s(&self, request: &Request) -> Option<f64> {
-        let offline = !matches!(request, Request::RenderRealtime { .. });
-        let cost =
-            if offline { &self.reference_costs.offline } else { &self.reference_costs.realtime };
-        *cost.get_or_init(|| self.measure_path(offline))
-    }
 }

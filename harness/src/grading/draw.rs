@@ -4,8 +4,9 @@ use std::path::Path;
 
 use super::prepared_scene::PreparedScene;
 use super::session::Session;
+use super::stages::named;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
-use crate::worker::{CameraValue, Matrices, Outcome, Request, STAGES, Stage};
+use crate::worker::{CameraValue, Matrices, Outcome, Request, Stage};
 
 /// A frame to be drawn.
 #[derive(Clone)]
@@ -38,12 +39,6 @@ impl<'a> Frame<'a> {
     pub fn probe(case: &'a PreparedScene, stages: Vec<Stage>) -> Self {
         Self { size: (case.probe_film.width, case.probe_film.height), stages, ..Self::plain(case) }
     }
-}
-
-/// Texts under the names of the stages.
-pub fn named(texts: [String; 3]) -> Vec<Stage> {
-    let named = STAGES.iter().zip(texts);
-    named.map(|(&name, text)| Stage { name: name.to_owned(), text }).collect()
 }
 
 /// Draws once what workers draw again and again, so that their shaders are compiled: with a trusted

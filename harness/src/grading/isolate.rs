@@ -6,11 +6,12 @@ use std::path::Path;
 
 use basecode::{Image, Vec3};
 
-use super::draw::{Frame, draw_each, draw_scenes, named};
+use super::draw::{Frame, draw_each, draw_scenes};
 use super::observe;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session, headline};
 use super::stages::Stages;
+use super::stages::named;
 use crate::diagnosis::{Kind, Thumbnail, View};
 use crate::evidence::premultiplied::Premultiplied;
 use crate::evidence::stages::{BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass};
@@ -312,7 +313,7 @@ fn swap_failed(
             Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
         }
         Outcome::StageRefused(message) => {
-            session.quote(case, message);
+            session.quote(case.held_back, message);
             session::unanswered(id, &case.entry.name, &[], outcome)
         }
         Outcome::Failed(message) => not_possible(id, case, message),

@@ -6,8 +6,8 @@ use std::path::Path;
 use basecode::Image;
 
 use super::offline::Drawn;
-use super::pipeline::Folders;
 use super::prepared_scene::PreparedScene;
+use super::record::Folders;
 use super::submitted::SubmittedImage;
 use crate::evidence::images::{Kind, compare_pixels, reference_of};
 use crate::evidence::{Check, CheckId, Picture, Verdict};

@@ -15,7 +15,7 @@ use super::draw::Frame;
 use super::offline::{self, Drawn, Run};
 use super::pictures::Images;
 use super::prepared_scene::PreparedScene;
-use super::record::{Conditions, Record, StageCost, Student};
+use super::record::{Conditions, Folders, Record, StageCost, Student};
 use super::session::Session;
 use super::stages::Stages;
 use super::{draw, isolate, mend, realtime, sampler, submitted, uploads};
@@ -24,11 +24,11 @@ use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
 use crate::diagnosis::{Diagnosis, Stored};
 use crate::evidence::{Check, CheckId, Evidence, Verdict, loops, price, rays, shadow_map};
-use crate::expected::Store;
 use crate::held_back::{self, HeldBack};
 use crate::intake::{self, IntakeError, Submission, TreeSpec, Validation};
 use crate::process::Exit;
 use crate::rubric::BUILD;
+use crate::store::Store;
 use crate::worker::{Adapter, Budget, Reference, RetryBudget, Supervisor};
 
 /// The check that says whether the submission follows the tree.
@@ -78,14 +78,6 @@ pub struct Grading<'a> {
     pub(super) reference_costs: ReferenceCosts,
     /// What known mistakes answer, read when it is first needed.
     pub(super) stored: OnceLock<Stored>,
-}
-
-/// Where the pictures of one submission go; the folders are made when there is something to show.
-pub struct Folders {
-    /// Those of public scenes.
-    pub student: PathBuf,
-    /// Those of held-back scenes.
-    pub instructor: PathBuf,
 }
 
 /// How a submission is to be looked at.

@@ -8,8 +8,9 @@ use basecode::{Image, MaterialModel, Scene};
 use crate::assignment::SceneEntry;
 use crate::evidence::loops::{RAYS, SAMPLED_WIDTH, SampledFilm};
 use crate::evidence::rays::RayBatch;
-use crate::expected::{Expected, Store, SurfaceBuffer, regions};
+use crate::expected::{Expected, SurfaceBuffer, regions};
 use crate::imaging::reference::RegionMask;
+use crate::store::Store;
 use crate::worker::{CameraValue, RayQuery};
 
 /// The widest film on which rays and stages are judged: enough to show every surface.

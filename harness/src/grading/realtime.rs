@@ -133,7 +133,7 @@ fn drawn(
     let scene = &case.entry.name;
     let Outcome::Done(answer) = outcome else {
         if let Outcome::Failed(said) = outcome {
-            session.quote(case, said);
+            session.quote(case.held_back, said);
         }
         return Err(Box::new(session::unanswered(id, scene, &parts, outcome)));
     };

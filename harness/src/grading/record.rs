@@ -1,12 +1,22 @@
 //! What is kept of one graded submission: everything that its report and its grade are made from.
 
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 
-use super::shared::ImageDigest;
+use super::image_digest::ImageDigest;
 use crate::diagnosis::Diagnosis;
 use crate::evidence::Evidence;
 use crate::intake::{Field, Finding, SubmittedConfig};
 use crate::viewer::ViewedCase;
+
+/// Where the pictures of one submission go; the folders are made when there is something to show.
+pub struct Folders {
+    /// Those of public scenes.
+    pub student: PathBuf,
+    /// Those of held-back scenes.
+    pub instructor: PathBuf,
+}
 
 /// One submission, after all evidence was collected. Rubric, dates and class list stay outside, so
 /// that grades can be derived from it again without rendering.

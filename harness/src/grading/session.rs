@@ -7,13 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use basecode::{Image, Ray, Vec3};
 use renderer_api as api;
 
-use super::attribution;
-use super::prepared_scene::PreparedScene;
 use crate::diagnosis::{Observations, Thumbnail, View};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, BsdfQuery, BsdfSource, Fault, Job, JobReport, Outcome, RayQuery, Request, RetryBudget,
+    Adapter, BsdfQuery, BsdfSource, Fault, Job, JobReport, Outcome, RayQuery, RetryBudget,
     SceneRef, Supervisor,
 };
 
@@ -53,17 +51,6 @@ pub struct Session<'a> {
 }
 
 impl Session<'_> {
-    /// Asks a plugin, or Umbra's neutral pass when there is none.
-    pub fn run(&self, plugin: Option<&Path>, requests: Vec<Request>) -> Vec<Outcome> {
-        if requests.is_empty() {
-            return Vec::new();
-        }
-        let job = Job { plugin: plugin.map(Path::to_owned), requests };
-        let mut outcomes = self.run_job(&job);
-        attribution::attribute_failures(self, &job, &mut outcomes);
-        outcomes
-    }
-
     /// Runs a job while there is retries.
     pub fn run_job(&self, job: &Job) -> Vec<Outcome> {
         let JobReport { outcomes, runs, .. } = self.supervisor.run_job_patiently(
@@ -108,9 +95,9 @@ impl Session<'_> {
         }
     }
 
-    /// Keeps what a compiler said about a public scene, where it is more than its first line.
-    pub fn quote(&self, case: &PreparedScene, said: &str) {
-        if case.held_back || said.lines().nth(1).is_none() {
+    /// Keeps what a compiler said about a scene, unless it is held back, where it is more than its first line.
+    pub fn quote(&self, held_back: bool, said: &str) {
+        if held_back || said.lines().nth(1).is_none() {
             return;
         }
         if let Ok(mut quotes) = self.quotes.lock()

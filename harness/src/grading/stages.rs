@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::draw::named;
 use crate::evidence::stages::{bare, is_template};
 use crate::files::files_below;
 use crate::intake::Finding;
@@ -132,6 +131,12 @@ fn written(texts: &BTreeMap<PathBuf, String>, template: &BTreeMap<PathBuf, Strin
         found.fragment |= made_by_code || holds("@fragment");
     }
     found
+}
+
+/// Texts under the names of the stages.
+pub fn named(texts: [String; 3]) -> Vec<Stage> {
+    let named = STAGES.iter().zip(texts);
+    named.map(|(&name, text)| Stage { name: name.to_owned(), text }).collect()
 }
 
 #[cfg(test)]

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use basecode::Image;
 
+use super::image_digest::ImageDigest;
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
-use super::shared::ImageDigest;
 use crate::decode::{Decoder, image_finding};
 use crate::evidence::images::{self, Kind};
 use crate::evidence::submitted::{

@@ -38,13 +38,13 @@ const MANIFESTS: [&str; 5] = [
 ];
 
 impl Gpu {
-    /// What this machine has of the usual drivers'; none when there is no device.
-    pub fn of_this_machine() -> Option<Self> {
+    /// What this machine has of the usual drivers', but for what a worker sees anyway; none when there is no device.
+    pub fn of_this_machine(is_seen: &dyn Fn(&Path) -> bool) -> Option<Self> {
         static FOUND: OnceLock<Option<Gpu>> = OnceLock::new();
-        FOUND.get_or_init(Self::find).clone()
+        FOUND.get_or_init(|| Self::find(is_seen)).clone()
     }
 
-    fn find() -> Option<Self> {
+    fn find(is_seen: &dyn Fn(&Path) -> bool) -> Option<Self> {
         let nodes = [("/dev/dri", "renderD"), ("/dev", "nvidia")];
         let nodes: Vec<_> =
             nodes.into_iter().flat_map(|(folder, start)| named(folder, start)).collect();
@@ -60,7 +60,9 @@ impl Gpu {
             let libraries = library(&manifest).map(|library| places(&library)).unwrap_or_default();
             // A driver's library loads others from beside it.
             let folders = libraries.iter().filter_map(|library| library.parent());
-            files.extend(folders.map(Path::to_owned).chain([manifest]).filter(|path| hidden(path)));
+            files.extend(
+                folders.map(Path::to_owned).chain([manifest]).filter(|path| !is_seen(path)),
+            );
         }
         Some(Self { nodes, files: files.into_iter().collect() })
     }
@@ -98,20 +100,17 @@ fn places(library: &Path) -> Vec<PathBuf> {
     lines.lines().filter_map(of).collect()
 }
 
-/// Whether no worker sees it anyway.
-fn hidden(path: &Path) -> bool {
-    let seen = super::policy::Policy::new(super::Kind::Worker).read_only;
-    !seen.iter().any(|bind| path.starts_with(&bind.host))
-}
-
 #[cfg(all(test, target_os = "linux"))]
 mod tests {
+    use super::super::{Kind, Policy};
     use super::*;
 
     #[test]
     fn manifests_lead_to_libraries() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().canonicalize().unwrap().join(name);
+        let usual = Policy::new(Kind::Worker).read_only;
+        let is_seen = |path: &Path| usual.iter().any(|bind| path.starts_with(&bind.host));
         fs::write(at("driver.so"), "").unwrap();
         let named = |library: &Path| {
             let manifest = serde_json::json!({"ICD": {"library_path": library}});
@@ -123,8 +122,8 @@ mod tests {
         // Every program's; the cache may know more than one architecture's.
         let found = named(Path::new("libc.so.6"));
         assert!(!found.is_empty() && found.iter().all(|path| path.is_file()), "{found:?}");
-        assert!(found.iter().all(|path| !hidden(path)));
-        assert!(hidden(&at("driver.so")));
+        assert!(found.iter().all(|path| is_seen(path)));
+        assert!(!is_seen(&at("driver.so")));
         fs::write(at("icd.json"), "{").unwrap();
         assert_eq!(super::library(&at("icd.json")), None);
     }

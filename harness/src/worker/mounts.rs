@@ -60,7 +60,9 @@ impl Mounts {
         }
         let drawn_by = |request: &&Request| request.adapter();
         if requests.iter().filter_map(drawn_by).any(|kind| kind != AdapterKind::Software) {
-            policy.gpu = Gpu::of_this_machine();
+            let usual = Policy::new(Kind::Worker).read_only;
+            let is_seen = |path: &Path| usual.iter().any(|bind| path.starts_with(&bind.host));
+            policy.gpu = Gpu::of_this_machine(&is_seen);
         }
         let job = if layers.mount_ns { PathBuf::from(JOB) } else { dir.to_owned() };
         Ok(Self { policy, plugin, scenes, job })

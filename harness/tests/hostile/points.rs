@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use umbra::assignment::Assignment;
 use umbra::evidence::{Evidence, Verdict};
-use umbra::expected::Store;
 use umbra::grading::{Conditions, Grading, Record, RenderPath, Stages, Student};
 use umbra::report::{self, BatchReport, Look, SubmissionReport};
 use umbra::rubric::{self, PartGrade};
+use umbra::store::Store;
 use umbra::worker::{Adapter, AdapterKind};
 
 use crate::fixture::{Fixture, workspace};

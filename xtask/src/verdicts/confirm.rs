@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
 use umbra::diagnosis::Catalogue;
-use umbra::expected::Store;
 use umbra::grading::Grading;
+use umbra::store::Store;
 
 use super::Bench;
 use super::choice::{Subject, singles, variants};

@@ -49,7 +49,7 @@ pub fn singles(rows: &[Row]) -> Figure {
 /// How many single mistakes cost what their class says, those aside that nothing tells from another
 /// class ([`price::excuse`]): they are printed.
 pub fn prices(rows: &[Row]) -> Figure {
-    let beside = rows.iter().filter_map(|row| Some((row.subject.name(), row.price()?)));
+    let beside = rows.iter().filter_map(|row| Some((row.subject.name(), price::of_row(row)?)));
     let (excused, complaints): (Vec<_>, Vec<_>) =
         beside.partition(|(name, _)| price::excuse(name).is_some());
     excused.iter().for_each(|(name, said)| println!("price: {name}: {said}"));

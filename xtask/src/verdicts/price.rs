@@ -57,6 +57,17 @@ pub fn complaint(class: Class, fraction: f64) -> Option<String> {
     })
 }
 
+/// What is wrong with what the first part of a row lost, where the scenes show all of it: the range of the
+/// mistake's class is another.
+pub fn of_row(row: &Row) -> Option<String> {
+    let (class, part) = (row.subject.class?, row.subject.parts.first()?);
+    let part = row.grade.parts.iter().find(|own| own.id == *part)?;
+    // That it loses nothing is another complaint.
+    let lost = part.points < part.out_of && row.all_shown;
+    let fraction = (part.out_of - part.points) / part.out_of;
+    complaint(class, fraction).filter(|_| lost).map(|said| format!("{} {said}", part.id))
+}
+
 /// The table mistake, part, points lost, as Markdown.
 pub fn table(catalogue: &Catalogue, singles: &[Row]) -> String {
     let mut text = String::from(
@@ -92,7 +103,7 @@ fn line(mistake: &KnownMistake, singles: &[Row]) -> Option<String> {
         .map(|part| format!("{}: {:.2} of {}", part.id, part.out_of - part.points, part.out_of))
         .collect();
     let mut lost = if lost.is_empty() { "none".to_owned() } else { lost.join(", ") };
-    if let (Some(why), true) = (excuse(&mistake.name), row.price().is_some()) {
+    if let (Some(why), true) = (excuse(&mistake.name), of_row(row).is_some()) {
         lost += &format!(" ({why})");
     }
     let class = format!("{:?}", mistake.class).to_lowercase();

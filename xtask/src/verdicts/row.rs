@@ -6,7 +6,6 @@ use umbra::evidence::{Check, Evidence, Measure, Verdict};
 use umbra::rubric::Grade;
 
 use super::choice::Subject;
-use super::price;
 
 /// What one renderer lost, and by which evidence.
 pub struct Row {
@@ -54,17 +53,6 @@ impl Row {
         let unfound = declared.filter(|id| !self.evidence.named(**id).any(fails));
         complaints.extend(unfound.map(|id| format!("{id} finds nothing")));
         complaints.join("; ")
-    }
-
-    /// What is wrong with what the first part lost, where the scenes show all of it: the range of the
-    /// mistake's class is another.
-    pub fn price(&self) -> Option<String> {
-        let (class, part) = (self.subject.class?, self.subject.parts.first()?);
-        let part = self.grade.parts.iter().find(|own| own.id == *part)?;
-        // That it loses nothing is another complaint.
-        let lost = part.points < part.out_of && self.all_shown;
-        let fraction = (part.out_of - part.points) / part.out_of;
-        price::complaint(class, fraction).filter(|_| lost).map(|said| format!("{} {said}", part.id))
     }
 
     /// Whether the diagnosis says all there is to say: a single mistake by its name in some part, a

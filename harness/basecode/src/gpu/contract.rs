@@ -8,6 +8,11 @@ use glam::{Mat4, Vec3, Vec4};
 
 use crate::Camera;
 
+/// Format of the colours: linear radiance, not clamped.
+pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+/// Format of the depths, 0 near to 1 far.
+pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
 /// Index of the bind group that holds [`FrameUniforms`].
 pub const FRAME_GROUP: u32 = 0;
 /// Index of the bind group that holds [`ObjectUniforms`].

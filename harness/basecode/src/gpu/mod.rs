@@ -21,6 +21,7 @@
 
 mod context;
 mod contract;
+mod layouts;
 mod matrices;
 mod mesh;
 mod message;
@@ -32,14 +33,15 @@ mod watched;
 
 pub use context::{AdapterKind, Gpu};
 pub use contract::{
-    FRAME_GROUP, FrameUniforms, MATERIAL_GROUP, MaterialUniforms, OBJECT_GROUP, ObjectUniforms,
-    SHADOW_GROUP, SHADOW_LAYERS, ShadowUniforms, VERTEX_STRIDE,
+    COLOR_FORMAT, DEPTH_FORMAT, FRAME_GROUP, FrameUniforms, MATERIAL_GROUP, MaterialUniforms,
+    OBJECT_GROUP, ObjectUniforms, SHADOW_GROUP, SHADOW_LAYERS, ShadowUniforms, VERTEX_STRIDE,
 };
+pub use layouts::Layouts;
 pub use matrices::{look_at, orthographic, perspective};
 pub use mesh::Mesh;
-pub use pipeline::{EMITTER_FS, Layouts, Stage};
+pub use pipeline::{EMITTER_FS, Stage};
 pub use shadow::ShadowMap;
-pub use target::{COLOR_FORMAT, DEPTH_FORMAT, Target};
+pub use target::Target;
 pub use uniform::Uniform;
 pub use watched::{Device, EVERY_FRAGMENT, Footprint, OUTLINES, Queue, UNDRAWN_MAPS};
 

@@ -2,13 +2,8 @@
 
 use glam::Vec3;
 
-use super::Gpu;
+use super::{COLOR_FORMAT, DEPTH_FORMAT, Gpu};
 use crate::{Error, Image, Result};
-
-/// Format of the colours: linear radiance, not clamped.
-pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
-/// Format of the depths, 0 near to 1 far.
-pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// Bytes of a pixel in [`COLOR_FORMAT`].
 const PIXEL_SIZE: u64 = 16;

@@ -9,8 +9,8 @@ use basecode::exr_io::{ExrLayers, Precision, read_exr_layers, write_exr_layers};
 use basecode::{Image, Scene, Vec3};
 use sha2::{Digest, Sha256};
 
-use super::regions::regions;
 use crate::assignment::{Assignment, SceneEntry};
+use crate::expected::{Expected, load_scene, region_table, regions, scene_digest};
 use crate::files::{hex, library_name};
 use crate::imaging::reference::{ReferenceImage, RegionMask};
 use crate::process::Limits;
@@ -28,21 +28,6 @@ const CACHED_SPP: u32 = 4;
 const BATCHES_PER_JOB: u32 = 8;
 /// The seed of the first batch. Not a student id.
 const FIRST_SEED: u64 = 0x5EED_0000_0000_0000;
-
-/// What a right renderer draws of one scene, on one film.
-pub struct Expected {
-    /// The scene as the base code loads it, without BSDFs.
-    pub scene: Scene,
-    /// Offline, with shadows.
-    pub offline: ReferenceImage,
-    /// At pixel centres, without shadows: what realtime draws.
-    pub unshadowed: Image,
-    /// The regions of `unshadowed`.
-    pub unshadowed_mask: RegionMask,
-    /// As `unshadowed`, by stages that do not renormalise the interpolated normal: as good. Absent
-    /// where it was neither kept nor can be drawn.
-    pub raw_normals: Option<Image>,
-}
 
 /// The reference renderer's library: where cargo builds it below the assignment's root, else beside the
 /// program `umbra`. A student's kit has none.
@@ -413,46 +398,6 @@ impl Store<'_> {
     }
 }
 
-/// Loads a scene for its geometry and its light.
-///
-/// # Errors
-/// As [`Scene::load`], and when the scene has no light: there is nothing to grade in it.
-pub fn load_scene(toml: &Path) -> basecode::Result<Scene> {
-    struct NoBsdf;
-    impl basecode::Bsdf for NoBsdf {
-        fn eval(&self, _: &basecode::SurfaceInteraction) -> Vec3 {
-            Vec3::ZERO
-        }
-    }
-    let scene = Scene::load(toml, &|_| Box::new(NoBsdf))?;
-    if scene.light().is_none() {
-        let message = "the scene has no light: no shape has a material with a Ke above 0";
-        return Err(basecode::Error::file(&scene.config().mesh, message));
-    }
-    Ok(scene)
-}
-
-/// SHA-256 over all that an image of a scene depends on: the TOML file and the files beside its mesh.
-pub(crate) fn scene_digest(toml: &Path) -> anyhow::Result<String> {
-    let config = basecode::scene::SceneConfig::load(toml)?;
-    let mut hash = Sha256::new();
-    hash.update(std::fs::read(toml)?);
-    let folder = config.mesh.parent().unwrap_or(Path::new(""));
-    let mut files = Vec::new();
-    for entry in folder.read_dir().with_context(|| format!("{}", folder.display()))? {
-        let entry = entry?;
-        if entry.file_type()?.is_file() {
-            files.push(entry.path());
-        }
-    }
-    files.sort();
-    for file in files {
-        hash.update(file.file_name().unwrap_or_default().as_encoded_bytes());
-        hash.update(std::fs::read(&file)?);
-    }
-    Ok(hex(&hash.finalize()))
-}
-
 fn mean_radiance(image: &Image) -> f64 {
     let sum: f64 = image.pixels.iter().map(|p| f64::from(p.element_sum()) / 3.0).sum();
     sum / image.pixels.len() as f64
@@ -465,7 +410,7 @@ fn as_image(mask: &RegionMask) -> Image {
 }
 
 fn as_mask(scene: &Scene, image: &Image) -> RegionMask {
-    let mut mask = super::regions::table(scene, image.width, image.height);
+    let mut mask = region_table(scene, image.width, image.height);
     for (value, pixel) in mask.pixels.iter_mut().zip(&image.pixels) {
         *value = pixel.x as u16;
     }

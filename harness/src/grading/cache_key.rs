@@ -1,0 +1,45 @@
+//! What the records of a batch depend on.
+
+use std::fs;
+
+use anyhow::Context;
+use sha2::{Digest, Sha256};
+
+use super::cache::RecordCache;
+use super::pipeline::Grading;
+use crate::expected::scene_digest;
+use crate::files::files_below;
+
+impl Grading<'_> {
+    /// For the records that this makes; `force` finds none again.
+    ///
+    /// # Errors
+    /// When something that they depend on cannot be read.
+    pub fn record_cache(&self, force: bool) -> anyhow::Result<RecordCache> {
+        let mut hash = Sha256::new();
+        let assignment = self.assignment;
+        hash.update(serde_json::to_vec(&(
+            (&assignment.scenes, &assignment.tree, &assignment.tolerances, &assignment.limits),
+            self.held_back.as_ref(),
+        ))?);
+        let mut files = self.supervisor.programs().to_vec();
+        files.extend(self.reference.clone());
+        // Stored images, what known mistakes answer, and what a submission began from.
+        let folder = assignment.root.join("expected");
+        let below = files_below(&folder);
+        files.extend(below.with_context(|| format!("cannot read {}", folder.display()))?);
+        for file in files {
+            let bytes =
+                fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
+            hash.update(file.as_os_str().as_encoded_bytes());
+            hash.update(Sha256::digest(bytes));
+        }
+        hash.update(scene_digest(&assignment.root.join(&assignment.sampler_scene))?);
+        for case in &self.cases {
+            for scene in [&case.offline, &case.realtime].into_iter().chain(&case.bonus) {
+                hash.update(scene_digest(scene)?);
+            }
+        }
+        Ok(RecordCache::new(hash.finalize().into(), force))
+    }
+}
