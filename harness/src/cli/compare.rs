@@ -1,4 +1,7 @@
 //! `umbra compare`: two images, without a scene.
+//!
+//! One pass over both files: bands of rows are decoded on every core and compared at once, so that
+//! neither image is ever whole in memory unless a picture or a metric asks for it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
