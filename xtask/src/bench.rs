@@ -5,6 +5,7 @@ mod figures;
 mod files;
 mod page;
 mod rays;
+mod renders;
 mod workers;
 
 use std::path::{Path, PathBuf};
@@ -21,7 +22,7 @@ pub struct Arguments {
     /// Print the table only, do not write docs/performance.md
     #[arg(long)]
     dry: bool,
-    /// Only what has this in its name: rays, compare, objects, workers
+    /// Only what has this in its name: compare, rays, renders, objects, workers
     only: Option<String>,
 }
 
@@ -65,6 +66,10 @@ pub fn run(root: &Path, arguments: &Arguments) -> anyhow::Result<String> {
         lines.extend(table);
         let words = "Rays against triangles, on knots of 1,000 to 4 million:";
         plots.push(("rays", words, ["triangles", "million rays a second"], curves));
+    }
+    if wanted("renders") {
+        eprintln!("the teapot beside Mitsuba ...");
+        lines.extend(renders::run(&bench)?);
     }
     if wanted("objects") {
         eprintln!("OBJ beside tinyobjloader ...");
