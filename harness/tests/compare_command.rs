@@ -3,9 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use basecode::exr_io::{ExrLayers, Precision, write_exr, write_exr_layers};
+use basecode::exr_io::{
+    ExrLayers, ExrRows, Precision, read_exr, write_exr, write_exr_channels, write_exr_layers,
+};
 use basecode::{Image, Vec3};
 use serde_json::Value;
+use umbra::imaging::difference::{Count, Differences, Different, Odd};
+use umbra::imaging::rows::{Channels, Row, visit_rows};
 
 /// Exit code, standard output and standard error.
 fn compare(arguments: &[&Path]) -> (i32, String, String) {
@@ -160,4 +164,232 @@ fn json_is_json_alone() {
     let (code, told) = json(&[&small, &b]);
     assert_eq!((code, &told["equal"], &told["actual"]["width"]), (1, &false.into(), &1.into()));
     assert_eq!(told.get("differing"), None);
+}
+
+#[test]
+fn ssim_and_flip_come_only_when_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, gain: f32| {
+        let mut image = Image::new(32, 24);
+        for (i, pixel) in image.pixels.iter_mut().enumerate() {
+            *pixel = Vec3::new(0.5, 0.1 + i as f32 * 0.001, 0.25) * gain;
+        }
+        let path = folder.path().join(name);
+        write_exr(&path, &image, Precision::Float, &[]).unwrap();
+        path
+    };
+    let (a, b) = (write("a.exr", 1.25), write("b.exr", 1.0));
+    let metrics = |more: &[&str]| -> Value {
+        let more: Vec<&Path> = more.iter().map(Path::new).collect();
+        let (_, out, _) = compare(&[&more[..], &[&*a, &*b, Path::new("--json")]].concat());
+        serde_json::from_str::<Value>(&out).unwrap()["metrics"].clone()
+    };
+    let (few, all) = (metrics(&[]), metrics(&["--metrics"]));
+    assert!(few.get("ssim").is_none() && few.get("flip_hdr").is_none(), "{few}");
+    for name in ["mae", "rmse", "rel_mse", "psnr_db", "peak"] {
+        let (few, all) = (few[name].as_f64().unwrap(), all[name].as_f64().unwrap());
+        assert!((few - all).abs() <= 1e-12 * all, "{name}: {few} and {all}");
+    }
+    assert!(all["ssim"].as_f64().unwrap() > 0.5 && all["flip_ldr"].as_f64().unwrap() > 0.0);
+}
+
+/// A float that is often one of those that are not like others.
+fn any_float(state: &mut u64) -> f32 {
+    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    let random = (*state >> 33) as u32;
+    let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0, 0.0, 1e-45, -1.0, f32::MAX];
+    match random % 16 {
+        i @ 0..8 => odd[i as usize],
+        8..13 => 0.5,
+        _ => (random >> 8) as f32 / 65536.0,
+    }
+}
+
+/// The one pass over rows against a plain loop over whole images, with any number of threads.
+#[test]
+fn one_pass_finds_what_a_plain_loop_finds() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut state = 1;
+    for (round, (width, height)) in
+        [(1, 1), (3, 2), (5, 700), (130, 33), (1000, 300)].into_iter().enumerate()
+    {
+        let [a, b] = ["a.exr", "b.exr"].map(|name| {
+            let mut image = Image::new(width, height);
+            image.pixels.fill_with(|| Vec3::from_array([0; 3].map(|_| any_float(&mut state))));
+            if round % 2 == 1 {
+                // Most pixels are equal, as of two versions of an image.
+                let mut other = 7;
+                for (i, pixel) in image.pixels.iter_mut().enumerate() {
+                    let same = Vec3::from_array([0; 3].map(|_| any_float(&mut other)));
+                    *pixel = if i % 11 == 0 { *pixel } else { same };
+                }
+            }
+            (folder.path().join(name), image)
+        });
+        write_exr(&a.0, &a.1, Precision::Float, &[]).unwrap();
+        let layers = [(String::new(), b.1.clone())].into();
+        let content = ExrLayers { layers, ..ExrLayers::default() };
+        write_exr_layers(&b.0, &content, Precision::Float).unwrap();
+        let files = [&a.0, &b.0].map(|path| ExrRows::open(path).unwrap());
+        let channels = files.each_ref().map(|file| file.layers().unwrap().0[0].1);
+        for nan_is_error in [false, true] {
+            let expected = plain(&a.1, &b.1, nan_is_error);
+            let mut before = None;
+            for threads in [1, 2, 7] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let found = pool.install(|| one_pass(&files, &channels, nan_is_error));
+                assert_eq!(told(&found.0, &found.1), expected, "{width}x{height} {nan_is_error}");
+                let sums = format!("{:?}", found.1.sums);
+                assert_eq!(*before.get_or_insert(sums.clone()), sums, "{threads} threads");
+            }
+        }
+    }
+}
+
+fn one_pass(
+    files: &[ExrRows<'static>; 2],
+    channels: &[[usize; 3]; 2],
+    nan_is_error: bool,
+) -> ([Odd; 2], Differences) {
+    let images = [0, 1].map(|i| Channels { file: &files[i], channels: &channels[i] });
+    let visit = |(odd, found): &mut ([Odd; 2], Differences), row: Row| {
+        let finite = [0, 1].map(|i| odd[i].add(row.y, row.colors(i)));
+        found.add(&row, nan_is_error, finite == [true; 2], &mut Vec::new());
+    };
+    let mut all: ([Odd; 2], Differences) = Default::default();
+    for (odd, found) in visit_rows(&images, visit).unwrap() {
+        all.0.iter_mut().zip(&odd).for_each(|(all, odd)| all.append(odd));
+        all.1.append(&found);
+    }
+    all
+}
+
+/// Counts and places, as text.
+fn told(odd: &[Odd; 2], found: &Differences) -> String {
+    let odd = odd.map(|odd| (odd.not_finite, odd.negative));
+    let place = |found: Option<Different>| found.map(|found| (found.at, found.size.to_bits()));
+    format!(
+        "{odd:?} {} {:?} {:?}",
+        found.differing,
+        place(found.largest),
+        place(found.largest_finite)
+    )
+}
+
+/// What `umbra compare` did before it read rows.
+fn plain(a: &Image, b: &Image, nan_is_error: bool) -> String {
+    let count = |image: &Image, is_so: fn(&Vec3) -> bool| {
+        let first = image.pixels.iter().position(is_so).unwrap_or_default();
+        let count = image.pixels.iter().filter(|pixel| is_so(pixel)).count();
+        Count { count, first: [first % image.width, first / image.width] }
+    };
+    let odd = [a, b].map(|image| Odd {
+        not_finite: count(image, |p| !p.is_finite()),
+        negative: count(image, |p| p.to_array().iter().any(|&v| v < 0.0)),
+    });
+    let mut found = Differences::default();
+    for (i, (a, b)) in a.pixels.iter().zip(&b.pixels).enumerate() {
+        let mut size = None;
+        for (x, y) in a.to_array().into_iter().zip(b.to_array()) {
+            let differs = if x.is_nan() && y.is_nan() { nan_is_error } else { x != y };
+            let apart = (x - y).abs();
+            let apart = if apart.is_nan() { f32::INFINITY } else { apart };
+            if differs && size.is_none_or(|size| apart > size) {
+                size = Some(apart);
+            }
+        }
+        let Some(size) = size else { continue };
+        found.differing += 1;
+        found.largest = larger(found.largest, size, i);
+        if size.is_finite() {
+            found.largest_finite = larger(found.largest_finite, size, i);
+        }
+    }
+    for kept in [&mut found.largest, &mut found.largest_finite].into_iter().flatten() {
+        kept.at = [kept.at[0] % a.width, kept.at[0] / a.width];
+    }
+    told(&odd, &found)
+}
+
+fn larger(kept: Option<Different>, size: f32, index: usize) -> Option<Different> {
+    match kept {
+        Some(kept) if kept.size >= size => Some(kept),
+        _ => Some(Different { at: [index, 0], size, actual: [0.0; 3], expected: [0.0; 3] }),
+    }
+}
+
+/// Exit codes and words of idiff 2.4.7 on these images, but for what `docs/reference/compare.md` excepts.
+#[test]
+fn idiff_s_arguments_have_idiff_s_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    let half = Vec3::splat(0.5);
+    file(&folder, "a.exr", &[]);
+    file(&folder, "b.exr", &[(3, half * 1.5)]);
+    file(&folder, "c.exr", &[(2, Vec3::new(0.5, 1.5, 0.5)), (3, half * 1.5)]);
+    file(&folder, "nan.exr", &[(0, Vec3::NAN)]);
+    file(&folder, "inf.exr", &[(0, Vec3::INFINITY)]);
+    file(&folder, "minus.exr", &[(0, Vec3::NEG_INFINITY)]);
+    write_exr(folder.path().join("small.exr"), &Image::new(2, 1), Precision::Float, &[]).unwrap();
+    write_exr_channels(folder.path().join("xyz.exr"), 2, &[("X", vec![0.5; 4])]).unwrap();
+    let run = |line: &str| {
+        let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
+            .current_dir(folder.path())
+            .args(["compare", "--idiff"])
+            .args(line.split(' '))
+            .output()
+            .unwrap();
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (run.status.code().unwrap(), text(&run.stdout), text(&run.stderr))
+    };
+    for (line, code) in [
+        ("a.exr a.exr", 0),
+        ("a.exr b.exr", 2),
+        ("-fail 0.3 a.exr b.exr", 0),
+        ("--fail 0.3 a.exr b.exr", 0),
+        ("a.exr -fail 0.2 b.exr", 2),
+        ("-failpercent 25 a.exr b.exr", 1),
+        ("-failpercent 24 a.exr b.exr", 2),
+        ("-failpercent 25 -warnpercent 25 a.exr b.exr", 0),
+        ("-failpercent 25 -hardfail 0.2 a.exr b.exr", 2),
+        ("-failpercent 50 -hardfail 1 -warnpercent 50 a.exr c.exr", 0),
+        ("-failpercent 50 -hardwarn 0.9 -warnpercent 50 a.exr c.exr", 1),
+        ("-failrelative 0.41 a.exr b.exr", 0),
+        ("-failrelative 0.39 a.exr b.exr", 2),
+        ("-fail 0.3 -failrelative 0.1 a.exr b.exr", 0),
+        ("-allowfailures 1 a.exr b.exr", 0),
+        ("-allowfailures 1 a.exr c.exr", 2),
+        ("inf.exr inf.exr", 0),
+        ("nan.exr nan.exr", 0),
+        // idiff passes these.
+        ("nan.exr a.exr", 2),
+        ("a.exr nan.exr", 2),
+        ("inf.exr minus.exr", 2),
+        ("nan.exr inf.exr", 2),
+        ("-fail 1e30 a.exr inf.exr", 2),
+        ("-fail 0.3 -warn 0.1 a.exr b.exr", 1),
+        ("-fail 0.3 -hardfail 0.1 a.exr b.exr", 2),
+        ("a.exr xyz.exr", 2),
+        ("a.exr small.exr", 3),
+        ("a.exr none.exr", 4),
+        ("-fail much a.exr b.exr", 4),
+        ("-unknown a.exr b.exr", 4),
+        ("a.exr", 4),
+        ("-o d.png a.exr b.exr", 4),
+    ] {
+        let (found, out, err) = run(line);
+        assert_eq!(found, code, "{line}\n{out}{err}");
+    }
+    let (_, out, _) = run("a.exr c.exr");
+    let words = "Comparing \"a.exr\" and \"c.exr\"\n  Mean error = 0.145833\n  RMS error = 0.314576\n  \
+                 Peak SNR = 13.5673\n  Max error  = 1 @ (0, 1, G)  values are 0.5, 0.5, 0.5 vs 0.5, 1.5, 0.5\n  \
+                 2 pixels (50%) over 1e-06\n  2 pixels (50%) over 1e-06\nFAILURE\n";
+    assert_eq!(out, words);
+    assert_eq!(run("-q a.exr a.exr"), (0, String::new(), String::new()));
+    assert_eq!(run("-q a.exr b.exr"), (2, String::new(), "FAILURE\n".to_owned()));
+
+    run("-q -abs -scale 10 -o d.exr a.exr c.exr");
+    let difference = read_exr(folder.path().join("d.exr")).unwrap();
+    assert_eq!(difference.pixels[2..], [Vec3::new(0.0, 10.0, 0.0), Vec3::splat(2.5)]);
+    run("-q -od -o none.exr a.exr a.exr");
+    assert!(!folder.path().join("none.exr").exists());
 }

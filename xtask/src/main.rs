@@ -1,5 +1,7 @@
 //! `xtask`: the chores of this repository that are not part of grading.
 
+#[cfg(unix)]
+mod bench;
 mod checks;
 mod dist;
 mod parallel;
@@ -27,6 +29,17 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
+    /// Measure Umbra beside Embree, OpenImageIO and others; write docs/performance.md.
+    #[cfg(unix)]
+    Bench(bench::Arguments),
+    /// Run a command and print what it cost, for `bench`.
+    #[cfg(unix)]
+    #[command(hide = true)]
+    BenchChild {
+        /// The command line.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        command: Vec<String>,
+    },
     /// Write the list of checks into docs/evidence.md.
     Checks,
     /// Pack the sample submissions into target/umbra/samples, with the images that their code draws.
@@ -47,6 +60,10 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Scenes { check: true } => scenes::check(),
         Command::Scenes { check: false } => scenes::write(),
+        #[cfg(unix)]
+        Command::Bench(arguments) => bench::run(root(), &arguments),
+        #[cfg(unix)]
+        Command::BenchChild { command } => bench::child::run(&command),
         Command::Checks => checks::run(root(), false),
         Command::Samples => samples::pack(root(), &|_, _| true).map(|samples| {
             let paths = samples.iter().map(|sample| sample.archive.display().to_string());

@@ -7,8 +7,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use basecode::exr_io::{
-    ExrLayers, ImageError, Precision, decode_exr, read_exr, read_exr_layers, write_exr,
-    write_exr_layers,
+    Band, ExrLayers, ExrRows, ImageError, Precision, decode_exr, read_exr, read_exr_layers,
+    write_exr, write_exr_layers,
 };
 use basecode::image::Image;
 use exr::block::{self, UncompressedBlock, writer::ChunksWriter};
@@ -438,4 +438,82 @@ fn a_block_stored_twice_is_refused() {
     assert_eq!(bytes[at..at + 4], 2i32.to_le_bytes());
     bytes[at] = 1;
     assert!(message(&bytes).contains("row 1 are stored twice"), "{}", message(&bytes));
+}
+
+/// Any rows of any channels, whatever the blocks; and from several threads at once.
+#[test]
+fn rows_are_read_from_anywhere() {
+    use Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
+    let (width, height) = (21, 75);
+    let value = |channel: usize, x: usize, y: usize| (channel * 512 + y * 4 + x % 3) as f32;
+    let tiles = BlockDescription::Tiles(TileDescription {
+        tile_size: Vec2(8, 10),
+        level_mode: LevelMode::Singular,
+        rounding_mode: RoundingMode::Down,
+    });
+    let kinds = [SampleType::F16, SampleType::F32, SampleType::F16, SampleType::F32];
+    let folder = Folder::new("rows");
+    for (round, (compression, blocks)) in [Uncompressed, RLE, ZIP1, ZIP16, PIZ]
+        .into_iter()
+        .flat_map(|compression| [LINES, tiles].map(|blocks| (compression, blocks)))
+        .enumerate()
+    {
+        let channel = |(name, kind): (&str, SampleType)| {
+            ChannelDescription::new(Text::new_or_panic(name), kind, false)
+        };
+        let list: exr::prelude::SmallVec<[ChannelDescription; 5]> =
+            ["A", "B", "G", "R"].into_iter().zip(kinds).map(channel).collect();
+        let mut header = Header::new(Text::default(), (width, height), list);
+        header = header.with_encoding(compression, blocks, LineOrder::Increasing);
+        header.own_attributes.layer_name = None;
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        block::write(&mut bytes, std::iter::once(header).collect(), false, |meta, writer| {
+            for (index, position) in block::enumerate_ordered_header_block_indices(&meta.headers) {
+                let channels = &meta.headers[0].channels;
+                let block = UncompressedBlock::from_lines(channels, position, |line| {
+                    let (channel, Vec2(left, y)) = (line.location.channel, line.location.position);
+                    match kinds[channel] {
+                        SampleType::F16 => line.write_samples(|i| {
+                            exr::prelude::f16::from_f32(value(channel, left + i, y))
+                        }),
+                        _ => line.write_samples(|i| value(channel, left + i, y)),
+                    }
+                    .unwrap();
+                });
+                writer.write_chunk(index, block.compress_to_chunk(&meta.headers)?)?;
+            }
+            Ok(())
+        })
+        .unwrap();
+        let path = folder.0.join(format!("{round}.exr"));
+        std::fs::write(&path, bytes.into_inner()).unwrap();
+        let file = ExrRows::open(&path).unwrap();
+        assert_eq!(file.channels(), ["A", "B", "G", "R"]);
+        assert_eq!(file.layers().unwrap().0, [(String::new(), [3, 2, 1])]);
+        let check = |rows: std::ops::Range<usize>, channels: &[usize], band: &mut Band| {
+            file.read(rows.clone(), channels, band).unwrap();
+            for (plane, &channel) in channels.iter().enumerate() {
+                for y in rows.clone() {
+                    let expected: Vec<f32> = (0..width).map(|x| value(channel, x, y)).collect();
+                    assert_eq!(band.row(plane, y - rows.start), expected, "{compression}, row {y}");
+                }
+            }
+        };
+        std::thread::scope(|scope| {
+            for thread in 0..3 {
+                let check = &check;
+                scope.spawn(move || {
+                    let mut band = Band::default();
+                    for first in (thread..height).step_by(7) {
+                        check(first..height.min(first + 1 + 9 * thread), &[3, 0], &mut band);
+                        check(first..first + 1, &[2], &mut band);
+                    }
+                    check(0..height, &[0, 1, 2, 3], &mut band);
+                });
+            }
+        });
+        let whole = read_exr(&path).unwrap();
+        let color = |i: usize| [3, 2, 1].map(|c| value(c, i % width, i / width));
+        assert!((0..width * height).all(|i| whole.pixels[i].to_array() == color(i)));
+    }
 }

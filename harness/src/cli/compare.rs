@@ -1,19 +1,25 @@
 //! `umbra compare`: two images, without a scene.
+//!
+//! One pass over both files: bands of rows are decoded on every core and compared at once, so that
+//! neither image is ever whole in memory unless a picture, a page or SSIM and FLIP ask for it.
+
+mod idiff;
+mod pictures;
+mod text;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::ffi::OsString;
+use std::path::PathBuf;
 
 use anyhow::bail;
-use basecode::exr_io::{ExrLayers, REC_709, read_exr_layers};
+use basecode::exr_io::{ExrRows, REC_709};
 use basecode::{Image, Vec3};
 use serde::Serialize;
 
-use crate::imaging::metrics::Metrics;
-use crate::imaging::pictures::{signed_error, tone_mapped};
-use crate::imaging::reference::RegionMask;
+use crate::imaging::difference::{Count, Differences, Different, Odd};
+use crate::imaging::metrics::{Errors, Metrics};
+use crate::imaging::rows::{Channels, Row, visit_rows};
 
-/// The relative error that the difference picture shows in full colour.
-const FULL_SCALE: f32 = 0.1;
 /// Chromaticities closer than this are the same (they are written with four digits).
 const SAME_PRIMARIES: f32 = 1e-3;
 
@@ -21,9 +27,11 @@ const SAME_PRIMARIES: f32 = 1e-3;
 #[derive(clap::Args)]
 pub struct CompareArguments {
     /// The actual image
-    actual: PathBuf,
+    #[arg(required_unless_present = "idiff")]
+    actual: Option<PathBuf>,
     /// The expected image
-    expected: PathBuf,
+    #[arg(required_unless_present = "idiff")]
+    expected: Option<PathBuf>,
     /// The layer to compare, such as `mean` of a stored expected image; a file with only plain R, G
     /// and B is used as it is [default: plain R, G and B, or the only layer]
     #[arg(long, value_name = "NAME")]
@@ -31,8 +39,11 @@ pub struct CompareArguments {
     /// Count a pixel with a NaN as different, even where both images have one
     #[arg(long)]
     nan_is_error: bool,
-    /// Leave out the metrics, FLIP and SSIM among them, which take most of the time of large images
+    /// Measure SSIM and FLIP too, which take most of the time
     #[arg(long)]
+    metrics: bool,
+    /// Leave out all metrics, the mean errors too
+    #[arg(long, conflicts_with = "metrics")]
     no_metrics: bool,
     /// Print one JSON object and nothing else
     #[arg(long)]
@@ -43,6 +54,13 @@ pub struct CompareArguments {
     /// Write a page with a viewer of both images and their difference into this folder
     #[arg(long, value_name = "DIR")]
     html: Option<PathBuf>,
+    /// Take all that follows as the arguments of OpenImageIO's idiff, and end with its exit codes
+    /// (`umbra compare --idiff -help` lists them)
+    #[arg(
+        long, num_args = 0.., allow_hyphen_values = true, value_name = "ARGUMENTS",
+        conflicts_with_all = ["layer", "nan_is_error", "metrics", "no_metrics", "json", "pictures", "html"]
+    )]
+    idiff: Option<Vec<OsString>>,
 }
 
 /// One of the two images.
@@ -59,10 +77,6 @@ struct Side {
     not_finite: Option<Pixels>,
     #[serde(skip_serializing_if = "Option::is_none")]
     negative: Option<Pixels>,
-    #[serde(skip)]
-    image: Image,
-    #[serde(skip)]
-    primaries: [[f32; 2]; 4],
 }
 
 /// Some pixels of an image.
@@ -114,106 +128,221 @@ struct Values {
     /// The largest among pixels with finite values.
     largest_finite: Option<Difference>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    metrics: Option<Metrics>,
+    metrics: Option<Measured>,
+}
+
+/// The error metrics that were asked for.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Measured {
+    Errors(Errors),
+    All(Metrics),
+}
+
+/// What is learned of a band of rows.
+#[derive(Default)]
+struct Found {
+    odd: [Odd; 2],
+    differences: Differences,
+    /// The pixels, where they are wanted.
+    pixels: [Vec<Vec3>; 2],
+    sizes: Vec<i32>,
+}
+
+/// An image that is open, and the layer that is compared.
+struct Open {
+    file: ExrRows<'static>,
+    layer: String,
+    channels: [usize; 3],
+    notes: Vec<String>,
 }
 
 /// Prints where two images differ; exit 0 when they are equal, 1 when not. Without the scene's
 /// variance nothing more can be decided: `check` and `grade` decide, this only measures.
 pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
-    let layers = [&arguments.actual, &arguments.expected].map(read_exr_layers);
-    let [actual, expected] = layers;
-    let (actual, expected) = (actual?, expected?);
-    let wanted = arguments.layer.as_deref();
-    if let Some(name) = wanted
-        && ![&actual, &expected].iter().any(|file| file.layers.contains_key(name))
-    {
-        let [a, b] = [&actual, &expected].map(names);
-        let (first, second) = (arguments.actual.display(), arguments.expected.display());
-        bail!("no layer \"{name}\" in {first} (it has: {a}) nor in {second} (it has: {b})");
+    let images = [&arguments.actual, &arguments.expected];
+    if let Some(theirs) = &arguments.idiff {
+        let before = images.into_iter().flatten().map(|path| path.clone().into_os_string());
+        return Ok(idiff::run(&before.chain(theirs.iter().cloned()).collect::<Vec<_>>()));
     }
-    let actual = Side::new(&arguments.actual, actual, wanted)?;
-    let expected = Side::new(&arguments.expected, expected, wanted)?;
-    let mut comparison = compare(actual, expected, arguments);
-    if let (Some(folder), Some(_)) = (&arguments.pictures, &comparison.values) {
-        comparison.pictures = pictures(folder, &comparison)?;
+    let [Some(actual), Some(expected)] = images else {
+        bail!("expected two images");
+    };
+    let [actual, expected] = open([actual, expected], arguments.layer.as_deref())?;
+    let mut notes = Vec::new();
+    notes.extend(different_primaries(&actual.file, &expected.file));
+    let keep = arguments.metrics || arguments.pictures.is_some() || arguments.html.is_some();
+    let same_size = actual.size() == expected.size();
+    let mut found = if same_size {
+        survey(&[&actual, &expected], arguments.nan_is_error, keep)?
+    } else {
+        let mut found = survey(&[&actual], false, keep)?;
+        let other = survey(&[&expected], false, keep)?;
+        let [odd, _] = other.odd;
+        let [pixels, _] = other.pixels;
+        (found.odd[1], found.pixels[1]) = (odd, pixels);
+        found
+    };
+    let [actual_pixels, expected_pixels] = std::mem::take(&mut found.pixels);
+    let images = keep.then(|| [actual.image(actual_pixels), expected.image(expected_pixels)]);
+    let values = same_size.then(|| {
+        let count = actual.file.width() * actual.file.height();
+        let metrics = match &images {
+            Some([a, b]) if arguments.metrics => Metrics::measure(a, b).map(Measured::All),
+            _ if arguments.no_metrics => None,
+            _ => Some(Measured::Errors(Errors::of_sums(&found.differences.sums, count))),
+        };
+        Values {
+            pixels: count,
+            differing: found.differences.differing,
+            largest: found.differences.largest.map(Difference::from),
+            largest_finite: found.differences.largest_finite.map(Difference::from),
+            metrics,
+        }
+    });
+    let [odd_actual, odd_expected] = found.odd;
+    let mut comparison = Comparison {
+        equal: values.as_ref().is_some_and(|values| values.differing == 0),
+        actual: actual.side(&odd_actual),
+        expected: expected.side(&odd_expected),
+        notes,
+        values,
+        pictures: BTreeMap::new(),
+        page: None,
+    };
+    if let (Some(folder), Some(images), true) = (&arguments.pictures, &images, same_size) {
+        comparison.pictures = pictures::write(folder, images)?;
     }
-    if let Some(folder) = &arguments.html {
-        let sides = [("actual", &comparison.actual), ("expected", &comparison.expected)];
-        let images = sides.map(|(name, side)| (name.to_owned(), side.image.clone()));
+    if let (Some(folder), Some([actual, expected])) = (&arguments.html, images) {
+        let images = [("actual".to_owned(), actual), ("expected".to_owned(), expected)];
         comparison.page = Some(super::view::write_page(folder, &images)?);
     }
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&comparison)?);
     } else {
-        print!("{}", text(&comparison)?);
+        print!("{}", text::text(&comparison)?);
     }
     Ok(if comparison.equal { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
 }
 
-/// The names of a file's layers, for messages.
-fn names(file: &ExrLayers) -> String {
-    let name = |name: &String| if name.is_empty() { "plain R, G, B".into() } else { name.clone() };
-    file.layers.keys().map(name).collect::<Vec<_>>().join(", ")
+/// Opens both images and finds the layer to compare.
+fn open(paths: [&PathBuf; 2], wanted: Option<&str>) -> anyhow::Result<[Open; 2]> {
+    let [actual, expected] = paths.map(|path| {
+        let file = ExrRows::open(path)?;
+        let (layers, notes) = file.layers()?;
+        anyhow::Ok((file, layers, notes))
+    });
+    let (actual, expected) = (actual?, expected?);
+    if let Some(wanted) = wanted
+        && ![&actual.1, &expected.1].iter().any(|layers| layers.iter().any(|(n, _)| n == wanted))
+    {
+        let [a, b] = [&actual.1, &expected.1].map(|layers| names(layers));
+        let [first, second] = paths.map(|path| path.display());
+        bail!("no layer \"{wanted}\" in {first} (it has: {a}) nor in {second} (it has: {b})");
+    }
+    let choose = |(file, layers, notes)| Open::new(file, layers, notes, wanted);
+    Ok([choose(actual)?, choose(expected)?])
 }
 
-impl Side {
+/// The names of a file's layers, for messages.
+fn names(layers: &[(String, [usize; 3])]) -> String {
+    layers.iter().map(|(name, _)| shown(name)).collect::<Vec<_>>().join(", ")
+}
+
+fn shown(layer: &str) -> &str {
+    if layer.is_empty() { "plain R, G, B" } else { layer }
+}
+
+impl Open {
     /// Takes the layer out of a file: the one wanted, if it is there; else plain R, G and B, or the
     /// only one.
-    fn new(path: &Path, mut file: ExrLayers, wanted: Option<&str>) -> anyhow::Result<Self> {
-        let all = names(&file);
-        let only = file.layers.keys().next().filter(|_| file.layers.len() == 1).cloned();
-        let choices = [wanted.map(str::to_owned), Some(String::new()), only];
-        let layer = choices.into_iter().flatten().find(|name| file.layers.contains_key(name));
-        let found = layer.and_then(|name| file.layers.remove_entry(&name));
-        let Some((layer, image)) = found else {
-            bail!("{}: which layer? hint: --layer NAME, one of {all}", path.display());
+    fn new(
+        file: ExrRows<'static>,
+        mut layers: Vec<(String, [usize; 3])>,
+        mut notes: Vec<String>,
+        wanted: Option<&str>,
+    ) -> anyhow::Result<Self> {
+        let at = |name: &str| layers.iter().position(|(own, _)| own == name);
+        let only = (layers.len() == 1).then_some(0);
+        let Some(index) = wanted.and_then(at).or_else(|| at("")).or(only) else {
+            let all = names(&layers);
+            bail!("{}: which layer? hint: --layer NAME, one of {all}", file.path().display());
         };
-        let mut notes = file.notes;
-        if !file.layers.is_empty() {
-            let others = file.layers.keys().map(|name| match name.as_str() {
-                "" => "plain R, G, B",
-                name => name,
-            });
-            let others = others.collect::<Vec<_>>().join(", ");
+        let (layer, channels) = layers.remove(index);
+        if !layers.is_empty() {
+            let others = names(&layers);
             notes.push(format!("other layers are not compared: {others} (--layer NAME)"));
         }
-        let pixels = |wanted: fn(&Vec3) -> bool| {
-            let first = image.pixels.iter().position(wanted)?;
-            let count = image.pixels.iter().filter(|pixel| wanted(pixel)).count();
-            Some(Pixels { count, first: [first % image.width, first / image.width] })
-        };
-        Ok(Self {
-            file: path.to_owned(),
-            layer,
-            width: image.width,
-            height: image.height,
-            notes,
-            not_finite: pixels(|p| !p.is_finite()),
-            negative: pixels(|p| p.to_array().iter().any(|&v| v < 0.0)),
-            primaries: file.chromaticities.unwrap_or(REC_709),
-            image,
-        })
+        Ok(Self { file, layer, channels, notes })
+    }
+
+    fn size(&self) -> [usize; 2] {
+        [self.file.width(), self.file.height()]
+    }
+
+    fn image(&self, pixels: Vec<Vec3>) -> Image {
+        Image { width: self.file.width(), height: self.file.height(), pixels }
+    }
+
+    fn side(&self, odd: &Odd) -> Side {
+        let pixels = |Count { count, first }| (count > 0).then_some(Pixels { count, first });
+        let [width, height] = self.size();
+        Side {
+            file: self.file.path().to_owned(),
+            layer: self.layer.clone(),
+            width,
+            height,
+            notes: self.notes.clone(),
+            not_finite: pixels(odd.not_finite),
+            negative: pixels(odd.negative),
+        }
     }
 }
 
-fn compare(actual: Side, expected: Side, arguments: &CompareArguments) -> Comparison {
-    let mut notes = Vec::new();
-    let apart = actual.primaries.iter().flatten().zip(expected.primaries.iter().flatten());
-    if apart.into_iter().any(|(a, b)| (a - b).is_nan() || (a - b).abs() > SAME_PRIMARIES) {
-        notes.push(format!(
+/// Goes through all rows of one image or of two of one size; `keep` the pixels too.
+fn survey(images: &[&Open], nan_is_error: bool, keep: bool) -> anyhow::Result<Found> {
+    let channels: Vec<Channels> = images
+        .iter()
+        .map(|image| Channels { file: &image.file, channels: &image.channels })
+        .collect();
+    let visit = |found: &mut Found, row: Row| {
+        let mut finite = true;
+        for (image, odd) in found.odd.iter_mut().enumerate().take(images.len()) {
+            let colors = row.colors(image);
+            finite &= odd.add(row.y, colors);
+            if keep {
+                let [red, green, blue] = colors;
+                let colors = red.iter().zip(green).zip(blue);
+                found.pixels[image].extend(colors.map(|((&r, &g), &b)| Vec3::new(r, g, b)));
+            }
+        }
+        if images.len() == 2 {
+            found.differences.add(&row, nan_is_error, finite, &mut found.sizes);
+        }
+    };
+    let mut all = Found::default();
+    for mut band in visit_rows(&channels, visit)? {
+        for i in 0..2 {
+            all.odd[i].append(&band.odd[i]);
+            all.pixels[i].append(&mut band.pixels[i]);
+        }
+        all.differences.append(&band.differences);
+    }
+    Ok(all)
+}
+
+/// What is said of files with different primaries.
+fn different_primaries(actual: &ExrRows, expected: &ExrRows) -> Option<String> {
+    let [actual, expected] =
+        [actual, expected].map(|file| file.chromaticities().unwrap_or(REC_709));
+    let apart = |(a, b): (&f32, &f32)| (a - b).is_nan() || (a - b).abs() > SAME_PRIMARIES;
+    actual.iter().flatten().zip(expected.iter().flatten()).any(apart).then(|| {
+        format!(
             "chromaticities differ, and values are compared as they are: actual {}, expected {}",
-            primaries(&actual.primaries),
-            primaries(&expected.primaries)
-        ));
-    }
-    let same_size = (actual.width, actual.height) == (expected.width, expected.height);
-    let mut values =
-        same_size.then(|| Values::new(&actual.image, &expected.image, arguments.nan_is_error));
-    if let Some(values) = values.as_mut().filter(|_| !arguments.no_metrics) {
-        values.metrics = Metrics::measure(&actual.image, &expected.image);
-    }
-    let equal = values.as_ref().is_some_and(|values| values.differing == 0);
-    Comparison { equal, actual, expected, notes, values, pictures: BTreeMap::new(), page: None }
+            primaries(&actual),
+            primaries(&expected)
+        )
+    })
 }
 
 fn primaries([red, green, blue, white]: &[[f32; 2]; 4]) -> String {
@@ -222,143 +351,11 @@ fn primaries([red, green, blue, white]: &[[f32; 2]; 4]) -> String {
     format!("red {red} green {green} blue {blue} white {white}")
 }
 
-impl Values {
-    fn new(actual: &Image, expected: &Image, nan_is_error: bool) -> Self {
-        let mut differing = 0;
-        // Index and size of the largest difference, and of the largest finite one.
-        let (mut largest, mut largest_finite) = (None, None);
-        for (index, (a, b)) in actual.pixels.iter().zip(&expected.pixels).enumerate() {
-            let Some(difference) = difference(*a, *b, nan_is_error) else { continue };
-            differing += 1;
-            let keep = |largest: &mut Option<(usize, f32)>| {
-                if largest.is_none_or(|(_, size)| difference > size) {
-                    *largest = Some((index, difference));
-                }
-            };
-            keep(&mut largest);
-            if difference.is_finite() {
-                keep(&mut largest_finite);
-            }
-        }
-        let told = |(index, size): (usize, f32)| Difference {
-            x: index % actual.width,
-            y: index / actual.width,
-            actual: actual.pixels[index].to_array(),
-            expected: expected.pixels[index].to_array(),
-            difference: Some(size).filter(|size| size.is_finite()),
-        };
-        Self {
-            pixels: actual.pixels.len(),
-            differing,
-            largest: largest.map(told),
-            largest_finite: largest_finite.map(told),
-            metrics: None,
-        }
+impl From<Different> for Difference {
+    fn from(found: Different) -> Self {
+        let Different { at: [x, y], size, actual, expected } = found;
+        Self { x, y, actual, expected, difference: Some(size).filter(|size| size.is_finite()) }
     }
-}
-
-/// The largest difference of a channel, infinite where only one value is finite or both are infinite
-/// apart; none when all are equal. NaN equals NaN, unless `nan_is_error`.
-fn difference(a: Vec3, b: Vec3, nan_is_error: bool) -> Option<f32> {
-    let channels = a.to_array().into_iter().zip(b.to_array());
-    let differ =
-        channels.filter(|(a, b)| if a.is_nan() && b.is_nan() { nan_is_error } else { a != b });
-    let size = |(a, b): (f32, f32)| {
-        let size = (a - b).abs();
-        if size.is_nan() { f32::INFINITY } else { size }
-    };
-    differ.map(size).max_by(f32::total_cmp)
-}
-
-fn text(comparison: &Comparison) -> anyhow::Result<String> {
-    use std::fmt::Write;
-    let mut out = String::new();
-    for (name, side) in [("actual", &comparison.actual), ("expected", &comparison.expected)] {
-        if !side.layer.is_empty() {
-            writeln!(out, "{name}: layer {}", side.layer)?;
-        }
-        for note in &side.notes {
-            writeln!(out, "{name}: {note}")?;
-        }
-        for (pixels, what) in [(&side.not_finite, "not finite"), (&side.negative, "negative")] {
-            if let Some(Pixels { count, first: [x, y] }) = pixels {
-                let are = if *count == 1 { "pixel is" } else { "pixels are" };
-                writeln!(out, "{name}: {count} {are} {what}; first at ({x}, {y})")?;
-            }
-        }
-    }
-    for note in &comparison.notes {
-        writeln!(out, "{note}")?;
-    }
-    let Some(values) = &comparison.values else {
-        let [a, b] =
-            [&comparison.actual, &comparison.expected].map(|side| (side.width, side.height));
-        writeln!(out, "actual is {}x{} but expected is {}x{}", a.0, a.1, b.0, b.1)?;
-        if let Some(page) = &comparison.page {
-            writeln!(out, "{}", page.display())?;
-        }
-        return Ok(out);
-    };
-    writeln!(out, "{} of {} pixels differ", values.differing, values.pixels)?;
-    let mut tell = |what: &str, found: &Difference| {
-        let (a, b) = (Vec3::from(found.actual), Vec3::from(found.expected));
-        let by = found.difference.map_or(String::new(), |size| format!(", difference {size}"));
-        writeln!(out, "{what} at ({}, {}): actual {a}, expected {b}{by}", found.x, found.y)
-    };
-    if let Some(largest) = &values.largest {
-        tell("largest", largest)?;
-    }
-    match (&values.largest, &values.largest_finite) {
-        (Some(Difference { difference: None, .. }), Some(finite)) => {
-            tell("largest finite difference", finite)?;
-        }
-        (Some(Difference { difference: None, .. }), None) => {
-            writeln!(out, "no pixel with finite values differs")?;
-        }
-        _ => {}
-    }
-    if let Some(metrics) = &values.metrics {
-        writeln!(out, "{}", serde_json::to_string_pretty(metrics)?)?;
-    }
-    for (file, caption) in &comparison.pictures {
-        writeln!(out, "{}: {caption}", file.display())?;
-    }
-    if let Some(page) = &comparison.page {
-        writeln!(out, "{}", page.display())?;
-    }
-    Ok(out)
-}
-
-/// Writes the pictures and answers their files and captions.
-fn pictures(folder: &Path, comparison: &Comparison) -> anyhow::Result<BTreeMap<PathBuf, String>> {
-    std::fs::create_dir_all(folder)?;
-    let (actual, expected) = (&comparison.actual.image, &comparison.expected.image);
-    let scale = median(expected);
-    let mask = RegionMask::background(actual.width, actual.height);
-    let mut written = BTreeMap::new();
-    for (name, picture) in [
-        ("actual", Some(tone_mapped(actual, scale))),
-        ("expected", Some(tone_mapped(expected, scale))),
-        ("difference", signed_error(actual, expected, &mask, scale, FULL_SCALE)),
-    ] {
-        let Some(picture) = picture else { continue };
-        let file = folder.join(format!("{name}.png"));
-        std::fs::write(&file, picture.png()?)?;
-        written.insert(file, picture.caption);
-    }
-    Ok(written)
-}
-
-/// The median of what is not black, for exposure.
-fn median(image: &Image) -> f32 {
-    let mut lit: Vec<f32> = image
-        .pixels
-        .iter()
-        .map(|p| p.element_sum() / 3.0)
-        .filter(|v| v.is_finite() && *v > 0.0)
-        .collect();
-    lit.sort_by(f32::total_cmp);
-    lit.get(lit.len() / 2).copied().unwrap_or(1.0)
 }
 
 /// Values in JSON; those that are not finite become text.

@@ -6,6 +6,7 @@
 pub mod blob;
 pub mod compare;
 pub mod correlation;
+pub mod difference;
 pub mod evidence;
 pub mod flip;
 pub mod likeness;
@@ -15,5 +16,7 @@ pub mod origin;
 pub mod pictures;
 pub mod ratio;
 pub mod reference;
+pub mod rows;
 pub mod srgb;
 mod stats;
+pub mod thresholds;

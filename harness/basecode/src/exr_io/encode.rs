@@ -10,10 +10,12 @@ use exr::meta::BlockDescription;
 use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType, Text};
 use exr::meta::header::Header;
 use exr::prelude::{SmallVec, Vec2, f16};
-use glam::Vec3;
 
 use super::{ImageError, MAX_PIXELS, MAX_SIDE, Precision};
 use crate::image::Image;
+
+/// A channel: its name, and what puts the samples of pixels (from, how many) into a line of the file.
+type Channel<'a> = (String, Box<dyn Fn(usize, usize, &mut [u8]) + 'a>);
 
 /// One part with the channels of all layers.
 pub(super) fn encode(
@@ -26,16 +28,7 @@ pub(super) fn encode(
     let unwritable = |what: String| ImageError::Unwritable { path: path.into(), what };
     let &(_, first) = layers.first().ok_or_else(|| unwritable("there is no image".into()))?;
     let (width, height) = (first.width, first.height);
-    if width == 0
-        || height == 0
-        || width > MAX_SIDE
-        || height > MAX_SIDE
-        || width * height > MAX_PIXELS
-    {
-        return Err(unwritable(format!("the image is {width}x{height}")));
-    }
-    // The format wants channels sorted by name: B, G, R within a layer.
-    let mut channels = Vec::new();
+    let mut channels: Vec<Channel> = Vec::new();
     for &(layer, image) in layers {
         if (image.width, image.height, image.pixels.len()) != (width, height, width * height) {
             return Err(unwritable(format!("layer \"{layer}\" is not {width}x{height}")));
@@ -46,16 +39,67 @@ pub(super) fn encode(
             if !name.bytes().all(|b| b.is_ascii_graphic()) {
                 return Err(unwritable(format!("\"{layer}\" is no name for a layer")));
             }
-            channels.push((name, image, component));
+            let put = move |start: usize, count: usize, out: &mut [u8]| {
+                store(
+                    image.pixels[start..start + count].iter().map(|p| p[component]),
+                    precision,
+                    out,
+                );
+            };
+            channels.push((name, Box::new(put)));
         }
     }
+    write(channels, (width, height), attributes, precision, compression, path)
+}
+
+/// One part, uncompressed, with these channels of 32-bit floats, each as long as the others.
+pub(super) fn encode_channels(
+    width: usize,
+    planes: &[(&str, Vec<f32>)],
+    path: &Path,
+) -> Result<Vec<u8>, ImageError> {
+    let unwritable = |what: &str| ImageError::Unwritable { path: path.into(), what: what.into() };
+    let (_, first) = planes.first().ok_or_else(|| unwritable("there is no channel"))?;
+    let height = first.len().checked_div(width).unwrap_or_default();
+    if planes.iter().any(|(_, plane)| plane.len() != width * height) {
+        return Err(unwritable("its channels are not of one size"));
+    }
+    let mut channels: Vec<Channel> = Vec::new();
+    for (name, plane) in planes {
+        let put = move |start: usize, count: usize, out: &mut [u8]| {
+            store(plane[start..start + count].iter().copied(), Precision::Float, out);
+        };
+        channels.push(((*name).to_owned(), Box::new(put)));
+    }
+    let (size, attributes) = ((width, height), BTreeMap::new());
+    write(channels, size, &attributes, Precision::Float, Compression::Uncompressed, path)
+}
+
+fn write(
+    mut channels: Vec<Channel>,
+    (width, height): (usize, usize),
+    attributes: &BTreeMap<String, String>,
+    precision: Precision,
+    compression: Compression,
+    path: &Path,
+) -> Result<Vec<u8>, ImageError> {
+    let unwritable = |what: String| ImageError::Unwritable { path: path.into(), what };
+    if width == 0
+        || height == 0
+        || width > MAX_SIDE
+        || height > MAX_SIDE
+        || width * height > MAX_PIXELS
+    {
+        return Err(unwritable(format!("the image is {width}x{height}")));
+    }
+    // The format wants channels sorted by name: B, G, R within a layer.
     channels.sort_by(|a, b| a.0.cmp(&b.0));
 
     let sample_type = match precision {
         Precision::Half => SampleType::F16,
         Precision::Float => SampleType::F32,
     };
-    let described = channels.iter().map(|(name, ..)| {
+    let described = channels.iter().map(|(name, _)| {
         ChannelDescription::new(Text::new_or_none(name).unwrap_or_default(), sample_type, false)
     });
     let mut header =
@@ -73,15 +117,9 @@ pub(super) fn encode(
         for (index, position) in block::enumerate_ordered_header_block_indices(&meta.headers) {
             let block =
                 UncompressedBlock::from_lines(&meta.headers[0].channels, position, |line| {
-                    let (_, image, component) = &channels[line.location.channel];
                     let Vec2(x, y) = line.location.position;
-                    let start = y * width + x;
-                    store(
-                        &image.pixels[start..start + line.location.sample_count],
-                        *component,
-                        precision,
-                        line.value,
-                    );
+                    let (_, put) = &channels[line.location.channel];
+                    put(y * width + x, line.location.sample_count, line.value);
                 });
             writer.write_chunk(index, block.compress_to_chunk(&meta.headers)?)?;
         }
@@ -91,17 +129,17 @@ pub(super) fn encode(
     Ok(file.into_inner())
 }
 
-/// One component of a row of pixels as the file's samples.
-fn store(row: &[Vec3], component: usize, precision: Precision, out: &mut [u8]) {
+/// Values as the file's samples.
+fn store(values: impl Iterator<Item = f32>, precision: Precision, out: &mut [u8]) {
     match precision {
         Precision::Half => {
-            for (pixel, sample) in row.iter().zip(out.chunks_exact_mut(2)) {
-                sample.copy_from_slice(&f16::from_f32(pixel[component]).to_ne_bytes());
+            for (value, sample) in values.zip(out.chunks_exact_mut(2)) {
+                sample.copy_from_slice(&f16::from_f32(value).to_ne_bytes());
             }
         }
         Precision::Float => {
-            for (pixel, sample) in row.iter().zip(out.chunks_exact_mut(4)) {
-                sample.copy_from_slice(&pixel[component].to_ne_bytes());
+            for (value, sample) in values.zip(out.chunks_exact_mut(4)) {
+                sample.copy_from_slice(&value.to_ne_bytes());
             }
         }
     }

@@ -86,7 +86,7 @@ impl MeshFile {
 fn material_of(path: &Path, obj: &Obj, library: &Library, part: &Part) -> Result<usize> {
     let wrong = |line, message| Error::File { path: path.to_owned(), line: Some(line), message };
     let Some(used) = part.material.map(|index| &obj.uses[index]) else {
-        let line = obj.faces[part.faces.start].line;
+        let line = obj.faces[part.faces.start].line as usize;
         let message = "face has no material; expected a usemtl statement before it";
         return Err(wrong(line, message.to_owned()));
     };
@@ -116,16 +116,20 @@ impl Builder<'_> {
         let mut made: Vec<(Corner, u32)> = Vec::new();
         let mut outline = Vec::new();
         for face in &self.obj.faces[part.faces.clone()] {
-            let corners = &self.obj.corners[face.corners.clone()];
+            let corners = &self.obj.corners[face.range()];
             let position = |corner: &Corner| self.obj.positions[corner.v as usize];
             outline.clear();
             outline.extend(corners.iter().map(position));
-            for triangle in triangulate(&outline) {
+            let mut add = |triangle: [usize; 3]| {
                 let [a, b, c] = triangle.map(|i| outline[i]);
-                let flat = (b - a).cross(c - a).normalize_or_zero();
+                let flat = || (b - a).cross(c - a).normalize_or_zero();
                 let vertices =
                     triangle.map(|i| self.vertex(corners[i], flat, &mut shape, &mut made));
                 shape.triangles.push(vertices);
+            };
+            match corners.len() {
+                3 => add([0, 1, 2]),
+                _ => triangulate(&outline).into_iter().for_each(add),
             }
         }
         for (corner, _) in made {
@@ -134,11 +138,11 @@ impl Builder<'_> {
         shape
     }
 
-    /// The vertex of a corner. One without a normal has its triangle's, `flat`, and is not shared.
+    /// The vertex of a corner. One without a normal has its triangle's, `flat()`, and is not shared.
     fn vertex(
         &mut self,
         corner: Corner,
-        flat: Vec3,
+        flat: impl Fn() -> Vec3,
         shape: &mut Shape,
         made: &mut Vec<(Corner, u32)>,
     ) -> u32 {
@@ -162,7 +166,7 @@ impl Builder<'_> {
         shape.positions.push(obj.positions[corner.v as usize]);
         shape.normals.push(match obj.normals.get(corner.vn as usize) {
             Some(normal) => normal.normalize_or_zero(),
-            None => flat,
+            None => flat(),
         });
         shape.uvs.push(obj.uvs.get(corner.vt as usize).copied().unwrap_or_default());
         vertex

@@ -1,15 +1,25 @@
-//! The statements of an OBJ file.
+//! An OBJ file.
 //!
 //! Written after Wavefront's specification ("Advanced Visualizer Manual", appendix B1), and as
-//! lenient as the exporters in use demand.
+//! lenient as the exporters in use demand. A large file is read in pieces, on all cores: `piece.rs`
+//! reads the statements of one, and what depends on those before it is settled here, piece by piece.
+
+mod fast;
+mod piece;
+#[cfg(test)]
+mod tests;
 
 use std::ops::Range;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
-use super::text::{Statements, split_keyword, unquoted, without_comment};
 use crate::{Error, Result};
+use piece::{Mark, Piece, Wrong, wrong_corner};
+
+/// A file is cut into pieces of about so many bytes.
+const PIECE_BYTES: usize = 1 << 20;
 
 /// What a corner does not have.
 pub(super) const MISSING: u32 = u32::MAX;
@@ -27,9 +37,16 @@ pub(super) struct Corner {
 #[derive(Clone, Debug)]
 pub(super) struct Face {
     /// Its line, from 1.
-    pub line: usize,
+    pub line: u32,
     /// Where its corners lie in [`Obj::corners`].
-    pub corners: Range<usize>,
+    pub corners: Range<u32>,
+}
+
+impl Face {
+    /// Where its corners lie in [`Obj::corners`].
+    pub fn range(&self) -> Range<usize> {
+        self.corners.start as usize..self.corners.end as usize
+    }
 }
 
 /// A name, and the line that gives it.
@@ -75,18 +92,48 @@ impl Obj {
     /// # Errors
     /// At the first statement that cannot be understood, or that names a vertex that is not there.
     pub(super) fn parse(path: &Path, text: &str) -> Result<Self> {
-        let mut reader = Reader { path, ..Reader::default() };
-        for (line, statement) in Statements::new(text) {
-            reader.read(line, &statement)?;
+        Self::parse_in_pieces(path, text, PIECE_BYTES)
+    }
+
+    fn parse_in_pieces(path: &Path, text: &str, bytes: usize) -> Result<Self> {
+        let texts = cut(text, bytes);
+        let pieces: Vec<(Piece, Option<Wrong>)> = match &texts[..] {
+            [whole] => vec![Piece::read(whole)],
+            texts => texts.par_iter().map(|text| Piece::read(text)).collect(),
+        };
+        let mut whole = Assembly { path, ..Assembly::default() };
+        for (piece, wrong) in pieces {
+            whole.append(piece, wrong)?;
         }
-        reader.finish()
+        whole.finish()
     }
 }
 
-/// An OBJ file on its way in.
-struct Reader<'a> {
+/// Cuts behind ends of lines, but not where a statement goes on in the next.
+fn cut(text: &str, piece_bytes: usize) -> Vec<&str> {
+    let bytes = text.as_bytes();
+    let mut pieces = Vec::new();
+    let (mut start, mut from) = (0, piece_bytes);
+    while let Some(at) = bytes.get(from..).and_then(|rest| memchr::memchr(b'\n', rest)) {
+        let end = from + at + 1;
+        from = end;
+        // Whatever may be white space, a backslash may stand before.
+        let last = bytes[start..end].iter().rev().find(|byte| !byte.is_ascii_whitespace());
+        if last.is_none_or(|&last| last != b'\\' && last != 0x0b && last.is_ascii()) {
+            pieces.push(&text[start..end]);
+            (start, from) = (end, end + piece_bytes);
+        }
+    }
+    pieces.push(&text[start..]);
+    pieces
+}
+
+/// A file of which some pieces are in.
+struct Assembly<'a> {
     path: &'a Path,
     obj: Obj,
+    /// Lines so far.
+    lines: usize,
     name: String,
     material: Option<usize>,
     first_face: usize,
@@ -98,11 +145,12 @@ struct Reader<'a> {
 
 const UNNAMED: &str = "unnamed_object";
 
-impl Default for Reader<'_> {
+impl Default for Assembly<'_> {
     fn default() -> Self {
         Self {
             path: Path::new(""),
             obj: Obj::default(),
+            lines: 0,
             name: UNNAMED.to_owned(),
             material: None,
             first_face: 0,
@@ -116,159 +164,88 @@ impl Default for Reader<'_> {
     }
 }
 
-impl Reader<'_> {
+impl Assembly<'_> {
     fn wrong(&self, line: usize, message: String) -> Error {
         Error::File { path: self.path.to_owned(), line: Some(line), message }
     }
 
-    fn read(&mut self, line: usize, statement: &str) -> Result<()> {
-        let (keyword, rest) = split_keyword(statement);
-        match keyword {
-            "v" => {
-                let position = self.position(line, rest)?;
-                self.keep_finite("v", self.obj.positions.len(), line, position.is_finite());
-                self.obj.positions.push(position);
+    /// Takes the next piece in; `wrong` is where it ended early.
+    fn append(&mut self, mut piece: Piece, wrong: Option<Wrong>) -> Result<()> {
+        let obj = &mut self.obj;
+        let before = [obj.positions.len(), obj.uvs.len(), obj.normals.len()];
+        for relative in piece.relative {
+            let index = before[relative.which] as i64 + relative.index;
+            let Some(index) = u32::try_from(index).ok().filter(|&index| index != MISSING) else {
+                let message = wrong_corner(&relative.word);
+                return Err(self.wrong(self.lines + relative.line, message));
+            };
+            if let Some(corner) = piece.corners.get_mut(relative.corner) {
+                *[&mut corner.v, &mut corner.vt, &mut corner.vn][relative.which] = index;
             }
-            "vt" => {
-                // A second coordinate is optional, a third has no meaning for a bitmap.
-                let [u, v] = self.numbers::<2>(line, keyword, rest, 1)?;
-                self.keep_finite("vt", self.obj.uvs.len(), line, u.is_finite() && v.is_finite());
-                self.obj.uvs.push(Vec2::new(u, v));
+        }
+        if let Some(Wrong { line, message }) = wrong {
+            return Err(self.wrong(self.lines + line, message));
+        }
+        let (corners, faces) = (obj.corners.len() as u32, obj.faces.len());
+        for face in &mut piece.faces {
+            face.line += self.lines as u32;
+            face.corners = face.corners.start + corners..face.corners.end + corners;
+        }
+        append(&mut obj.positions, piece.positions);
+        append(&mut obj.uvs, piece.uvs);
+        append(&mut obj.normals, piece.normals);
+        append(&mut obj.corners, piece.corners);
+        append(&mut obj.faces, piece.faces);
+        for (at, mark) in piece.marks {
+            self.mark(faces + at, mark);
+        }
+        let line = |named: Named| Named { line: self.lines + named.line, name: named.name };
+        self.obj.libraries.extend(piece.libraries.into_iter().map(line));
+        for (statement, index, line) in piece.not_finite {
+            let which = ["v", "vt", "vn"].iter().position(|own| *own == statement);
+            let index = before[which.unwrap_or_default()] + index;
+            self.not_finite.push((statement, index, self.lines + line));
+        }
+        for ((_, count, first), (more, line)) in
+            self.without_area.iter_mut().zip(piece.without_area)
+        {
+            if *count == 0 {
+                *first = self.lines + line;
             }
-            "vn" => {
-                let normal = Vec3::from(self.numbers::<3>(line, keyword, rest, 3)?);
-                self.keep_finite("vn", self.obj.normals.len(), line, normal.is_finite());
-                self.obj.normals.push(normal);
+            *count += more;
+        }
+        self.lines += piece.lines;
+        Ok(())
+    }
+
+    /// A name or a material, before the face `at`.
+    fn mark(&mut self, at: usize, mark: Mark) {
+        match mark {
+            Mark::Name(name) => {
+                self.end_part(at);
+                self.name = if name.is_empty() { UNNAMED.to_owned() } else { name };
             }
-            "f" | "fo" => self.face(line, rest)?,
-            "p" => self.leave_out(0, line),
-            "l" => self.leave_out(1, line),
-            "o" | "g" => {
-                self.end_part();
-                let name = without_comment(rest);
-                self.name = if name.is_empty() { UNNAMED.to_owned() } else { name.to_owned() };
-            }
-            "usemtl" => {
-                let name = unquoted(rest);
-                if name.is_empty() {
-                    return Err(self.wrong(line, "usemtl names no material".to_owned()));
-                }
+            Mark::Use(Named { line, name }) => {
                 let current = self.material.map(|index| self.obj.uses[index].name.as_str());
-                if current != Some(name) {
-                    self.end_part();
+                if current != Some(&name) {
+                    self.end_part(at);
                     self.material = Some(self.obj.uses.len());
-                    self.obj.uses.push(Named { line, name: name.to_owned() });
+                    self.obj.uses.push(Named { line: self.lines + line, name });
                 }
             }
-            "mtllib" => self.obj.libraries.push(Named { line, name: rest.to_owned() }),
-            // Smoothing groups, free-form geometry, whatever else there is.
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn keep_finite(&mut self, statement: &'static str, index: usize, line: usize, finite: bool) {
-        if !finite {
-            self.not_finite.push((statement, index, line));
         }
     }
 
-    fn leave_out(&mut self, what: usize, line: usize) {
-        let (_, count, first) = &mut self.without_area[what];
-        *count += 1;
-        if *count == 1 {
-            *first = line;
-        }
-    }
-
-    fn number(&self, line: usize, keyword: &str, word: &str) -> Result<f32> {
-        word.parse().map_err(|_| {
-            self.wrong(line, format!("{keyword} has \"{word}\" where a number is expected"))
-        })
-    }
-
-    /// The first `N` numbers of a statement, of which `least` must be there; the others are 0.
-    fn numbers<const N: usize>(
-        &self,
-        line: usize,
-        keyword: &str,
-        rest: &str,
-        least: usize,
-    ) -> Result<[f32; N]> {
-        let mut numbers = [0.0; N];
-        let mut found = 0;
-        for word in words(rest).take(N) {
-            numbers[found] = self.number(line, keyword, word)?;
-            found += 1;
-        }
-        if found < least {
-            return Err(
-                self.wrong(line, format!("{keyword} has {found} numbers, expected {least}"))
-            );
-        }
-        Ok(numbers)
-    }
-
-    /// `x y z`, with a weight `w` behind them or a colour of any number of components.
-    fn position(&self, line: usize, rest: &str) -> Result<Vec3> {
-        let position = Vec3::from(self.numbers::<3>(line, "v", rest, 3)?);
-        let mut more = words(rest).skip(3);
-        let (Some(weight), None) = (more.next(), more.next()) else { return Ok(position) };
-        match self.number(line, "v", weight)? {
-            0.0 => Err(self.wrong(line, "v has the weight 0".to_owned())),
-            weight => Ok(position / weight),
-        }
-    }
-
-    fn face(&mut self, line: usize, rest: &str) -> Result<()> {
-        let start = self.obj.corners.len();
-        for word in words(rest) {
-            let corner = self.corner(word).ok_or_else(|| {
-                let message = format!(
-                    "f has \"{word}\" where a corner is expected: v, v/vt, v//vn or v/vt/vn, counted from 1, \
-                     or from -1 backwards"
-                );
-                self.wrong(line, message)
-            })?;
-            self.obj.corners.push(corner);
-        }
-        if self.obj.corners.len() - start < 3 {
-            self.obj.corners.truncate(start);
-            self.leave_out(2, line);
-            return Ok(());
-        }
-        self.obj.faces.push(Face { line, corners: start..self.obj.corners.len() });
-        Ok(())
-    }
-
-    /// A corner; `None` when its word is none. What it names may come later in the file.
-    fn corner(&self, word: &str) -> Option<Corner> {
-        let mut indices = [MISSING; 3];
-        let known = [self.obj.positions.len(), self.obj.uvs.len(), self.obj.normals.len()];
-        for (which, text) in word.split('/').enumerate() {
-            let index = indices.get_mut(which)?;
-            if text.is_empty() {
-                continue;
-            }
-            let number: i64 = text.parse().ok()?;
-            let from_zero =
-                if number < 0 { i64::try_from(known[which]).ok()? + number } else { number - 1 };
-            *index = u32::try_from(from_zero).ok().filter(|&index| index != MISSING)?;
-        }
-        let [v, vt, vn] = indices;
-        (v != MISSING).then_some(Corner { v, vt, vn })
-    }
-
-    fn end_part(&mut self) {
-        let faces = self.first_face..self.obj.faces.len();
-        self.first_face = faces.end;
+    fn end_part(&mut self, at: usize) {
+        let faces = self.first_face..at;
+        self.first_face = at;
         if !faces.is_empty() {
             self.obj.parts.push(Part { name: self.name.clone(), material: self.material, faces });
         }
     }
 
     fn finish(mut self) -> Result<Obj> {
-        self.end_part();
+        self.end_part(self.obj.faces.len());
         // Exporters write indices of what they leave out.
         let (no_uvs, no_normals) = (self.obj.uvs.is_empty(), self.obj.normals.is_empty());
         for corner in &mut self.obj.corners {
@@ -280,8 +257,8 @@ impl Reader<'_> {
             }
         }
         for face in &self.obj.faces {
-            for corner in &self.obj.corners[face.corners.clone()] {
-                self.check(face.line, corner)?;
+            for corner in &self.obj.corners[face.range()] {
+                self.check(face.line as usize, corner)?;
             }
         }
         for (what, count, line) in self.without_area {
@@ -324,7 +301,11 @@ impl Reader<'_> {
     }
 }
 
-/// The words of a numeric statement, up to a comment.
-fn words(rest: &str) -> impl Iterator<Item = &str> {
-    rest.split('#').next().unwrap_or_default().split_whitespace()
+/// Moves what it can.
+fn append<T>(all: &mut Vec<T>, mut more: Vec<T>) {
+    if all.is_empty() {
+        *all = more;
+    } else {
+        all.append(&mut more);
+    }
 }

@@ -30,7 +30,22 @@ pub(super) struct Statements<'a> {
 
 impl<'a> Statements<'a> {
     pub(super) fn new(text: &'a str) -> Self {
-        Self { rest: text, line: 0 }
+        Self::from_line(text, 0)
+    }
+
+    /// A text behind so many lines.
+    pub(super) fn from_line(text: &'a str, line: usize) -> Self {
+        Self { rest: text, line }
+    }
+
+    /// What has not been read.
+    pub(super) fn rest(&self) -> &'a str {
+        self.rest
+    }
+
+    /// Lines that have been read.
+    pub(super) fn line(&self) -> usize {
+        self.line
     }
 
     /// The next line without its end.
@@ -39,9 +54,8 @@ impl<'a> Statements<'a> {
             return None;
         }
         self.line += 1;
-        let is_end = |&byte: &u8| byte == b'\n' || byte == b'\r';
         let bytes = self.rest.as_bytes();
-        let Some(at) = bytes.iter().position(is_end) else {
+        let Some(at) = memchr::memchr2(b'\n', b'\r', bytes) else {
             return Some(std::mem::take(&mut self.rest));
         };
         let end = if bytes[at..].starts_with(b"\r\n") { at + 2 } else { at + 1 };

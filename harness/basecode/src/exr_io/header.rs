@@ -1,0 +1,228 @@
+//! What a file says of itself, checked before memory for pixels is taken.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use exr::compression::Compression;
+use exr::meta::BlockDescription;
+use exr::meta::attribute::{ChannelList, LevelMode, SampleType, Text};
+use exr::meta::header::Header;
+use exr::prelude::Vec2;
+
+use super::{ImageError, MAX_PIXELS, MAX_SIDE};
+
+/// The most channels a file may hold.
+const MAX_CHANNELS: usize = 64;
+/// No codec of the format shrinks pixels more than deflate can: 1032 to 1 (zlib's technical notes).
+const MAX_COMPRESSION_RATIO: usize = 1032;
+
+/// The components of a colour, in the order of an [`crate::Image`]'s pixels.
+const RGB: [&str; 3] = ["R", "G", "B"];
+
+/// Splits `mean.R` into (`mean`, `R`) and `R` into (``, `R`): EXR's convention for layers.
+fn split_channel(name: &str) -> (&str, &str) {
+    name.rsplit_once('.').unwrap_or(("", name))
+}
+
+/// The layers of a file: their names, sorted, and the channels that hold their R, G and B.
+pub(super) type Channels = Vec<(String, [usize; 3])>;
+
+/// One file on its way in, for checks and messages.
+pub(super) struct Checks<'a> {
+    pub path: &'a Path,
+    pub file_bytes: u64,
+}
+
+impl Checks<'_> {
+    /// Magic number and version field, the first six bytes, for messages that the decoder would not give.
+    pub(super) fn signature(&self, start: &[u8]) -> Result<(), ImageError> {
+        let found = match start {
+            [] => "nothing (the file is empty)".to_owned(),
+            bytes => bytes.iter().take(4).map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" "),
+        };
+        let magic = &exr::meta::magic_number::BYTES[..];
+        if start.is_empty() || !start.starts_with(&magic[..start.len().min(4)]) {
+            return Err(ImageError::NotExr { path: self.path.into(), found });
+        }
+        let Some(flags) = start.get(5) else {
+            return Err(self.truncated("the version field"));
+        };
+        match flags {
+            f if f & 0x08 != 0 => Err(self.unsupported("deep data", "one colour a pixel")),
+            f if f & 0x10 != 0 => Err(self.unsupported("several parts", "one part")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Everything that must hold before memory for pixels is taken; returns width and height.
+    pub(super) fn header(
+        &self,
+        header: &Header,
+        notes: &mut Vec<String>,
+    ) -> Result<(usize, usize), ImageError> {
+        let Vec2(width, height) = header.layer_size;
+        if width == 0
+            || height == 0
+            || width > MAX_SIDE
+            || height > MAX_SIDE
+            || width * height > MAX_PIXELS
+        {
+            return Err(ImageError::Size {
+                path: self.path.into(),
+                found: format!("the image is {width}x{height}"),
+                expected: format!("1 to {MAX_SIDE} pixels a side and at most {MAX_PIXELS} pixels"),
+            });
+        }
+        let display = header.shared_attributes.display_window;
+        let data = header.data_window();
+        if data != display {
+            let words =
+                |w: Vec2<usize>, p: Vec2<i32>| format!("{}x{} at ({}, {})", w.0, w.1, p.0, p.1);
+            return Err(ImageError::Windows {
+                path: self.path.into(),
+                data: words(data.size, data.position),
+                display: words(display.size, display.position),
+            });
+        }
+        if data.position != Vec2(0, 0) {
+            notes.push(format!(
+                "both windows start at ({}, {}) instead of (0, 0)",
+                data.position.0, data.position.1
+            ));
+        }
+        if let BlockDescription::Tiles(tiles) = header.blocks {
+            if tiles.level_mode != LevelMode::Singular {
+                return Err(self.unsupported("several resolution levels", "full resolution only"));
+            }
+            if tiles.tile_size.0 > MAX_SIDE || tiles.tile_size.1 > MAX_SIDE {
+                return Err(self.malformed(format!(
+                    "tiles of {}x{} pixels",
+                    tiles.tile_size.0, tiles.tile_size.1
+                )));
+            }
+        }
+        use Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
+        if !matches!(header.compression, Uncompressed | RLE | ZIP1 | ZIP16 | PIZ) {
+            return Err(self.unsupported(&header.compression.to_string(), "none, RLE, ZIP or PIZ"));
+        }
+        if header.channels.list.len() > MAX_CHANNELS {
+            return Err(
+                self.unsupported(&format!("{} channels", header.channels.list.len()), "R, G and B")
+            );
+        }
+        let pixel_bytes = width * height * header.channels.bytes_per_pixel;
+        let least = 8 * header.chunk_count
+            + if header.compression == Uncompressed {
+                pixel_bytes
+            } else {
+                pixel_bytes / MAX_COMPRESSION_RATIO
+            };
+        if self.file_bytes < least as u64 {
+            return Err(self.truncated(&format!(
+                "the pixels of a {width}x{height} image, which take {least} bytes or more"
+            )));
+        }
+        Ok((width, height))
+    }
+
+    /// Finds R, G and B of each layer.
+    pub(super) fn layers(
+        &self,
+        channels: &ChannelList,
+        notes: &mut Vec<String>,
+    ) -> Result<Channels, ImageError> {
+        let all: Vec<String> = channels.list.iter().map(|c| c.name.to_string()).collect();
+        let find = |layer: &str, component: &str| {
+            all.iter().rposition(|name| split_channel(name) == (layer, component))
+        };
+        let mut names: Vec<&str> = all.iter().map(|name| split_channel(name).0).collect();
+        names.sort_unstable();
+        names.dedup();
+        names.retain(|layer| RGB.iter().any(|c| find(layer, c).is_some()));
+        if names.is_empty() {
+            return Err(match all.iter().any(|name| name == "Y") {
+                true => ImageError::LuminanceOnly { path: self.path.into() },
+                false => self.missing_channel("R", &all),
+            });
+        }
+        let mut layers = Vec::with_capacity(names.len());
+        for layer in names {
+            let mut found = [0; 3];
+            for (index, c) in found.iter_mut().zip(RGB) {
+                *index = find(layer, c).ok_or_else(|| {
+                    let full = if layer.is_empty() { c.to_owned() } else { format!("{layer}.{c}") };
+                    self.missing_channel(&full, &all)
+                })?;
+            }
+            layers.push((layer.to_owned(), found));
+        }
+        for (index, (channel, name)) in channels.list.iter().zip(&all).enumerate() {
+            let is_color = layers.iter().any(|(_, found)| found.contains(&index));
+            // Subsampled channels have been refused with the header.
+            if is_color && channel.sample_type == SampleType::U32 {
+                return Err(self.integers(name));
+            }
+            if !is_color {
+                notes.push(format!("channel {name} is ignored"));
+            }
+        }
+        Ok(layers)
+    }
+
+    pub(super) fn integers(&self, channel: &str) -> ImageError {
+        self.unsupported(&format!("channel {channel} holds integers"), "half or float")
+    }
+
+    /// What the decoder said of a place in the file.
+    pub(super) fn error(&self, error: exr::error::Error, place: &str) -> ImageError {
+        match error {
+            exr::error::Error::Io(source) => ImageError::Io { path: self.path.into(), source },
+            // The crate's only name for an unexpected end of file.
+            exr::error::Error::Invalid(what) if what == "reference to missing bytes" => {
+                self.truncated(place)
+            }
+            exr::error::Error::NotSupported(what) => {
+                self.unsupported(&what, "R, G and B in scan lines, each for every pixel")
+            }
+            other => self.malformed(format!("{place}: {other}")),
+        }
+    }
+
+    pub(super) fn truncated(&self, missing: &str) -> ImageError {
+        ImageError::Truncated {
+            path: self.path.into(),
+            found_bytes: self.file_bytes,
+            missing: missing.into(),
+        }
+    }
+
+    pub(super) fn unsupported(&self, what: &str, expected: &str) -> ImageError {
+        ImageError::Unsupported {
+            path: self.path.into(),
+            what: what.into(),
+            expected: expected.into(),
+        }
+    }
+
+    pub(super) fn malformed(&self, what: String) -> ImageError {
+        ImageError::Malformed { path: self.path.into(), what }
+    }
+
+    fn missing_channel(&self, channel: &str, all: &[String]) -> ImageError {
+        ImageError::MissingChannel {
+            path: self.path.into(),
+            channel: channel.into(),
+            found: all.join(", "),
+        }
+    }
+}
+
+/// The `name = text` lines of a file's `comments`.
+pub(super) fn provenance(header: &Header) -> BTreeMap<String, String> {
+    let comments = header.own_attributes.comments.as_ref().map(Text::to_string).unwrap_or_default();
+    comments
+        .lines()
+        .filter_map(|l| l.split_once(" = "))
+        .map(|(k, v)| (k.to_owned(), v.to_owned()))
+        .collect()
+}

@@ -1,0 +1,46 @@
+//! Pictures of two images and of their difference.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use basecode::Image;
+
+use crate::imaging::pictures::{signed_error, tone_mapped};
+use crate::imaging::reference::RegionMask;
+
+/// The relative error that the difference picture shows in full colour.
+const FULL_SCALE: f32 = 0.1;
+
+/// Writes the pictures and answers their files and captions.
+pub(super) fn write(
+    folder: &Path,
+    [actual, expected]: &[Image; 2],
+) -> anyhow::Result<BTreeMap<PathBuf, String>> {
+    std::fs::create_dir_all(folder)?;
+    let scale = median(expected);
+    let mask = RegionMask::background(actual.width, actual.height);
+    let mut written = BTreeMap::new();
+    for (name, picture) in [
+        ("actual", Some(tone_mapped(actual, scale))),
+        ("expected", Some(tone_mapped(expected, scale))),
+        ("difference", signed_error(actual, expected, &mask, scale, FULL_SCALE)),
+    ] {
+        let Some(picture) = picture else { continue };
+        let file = folder.join(format!("{name}.png"));
+        std::fs::write(&file, picture.png()?)?;
+        written.insert(file, picture.caption);
+    }
+    Ok(written)
+}
+
+/// The median of what is not black, for exposure.
+fn median(image: &Image) -> f32 {
+    let mut lit: Vec<f32> = image
+        .pixels
+        .iter()
+        .map(|p| p.element_sum() / 3.0)
+        .filter(|v| v.is_finite() && *v > 0.0)
+        .collect();
+    lit.sort_by(f32::total_cmp);
+    lit.get(lit.len() / 2).copied().unwrap_or(1.0)
+}

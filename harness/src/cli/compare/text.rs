@@ -1,0 +1,65 @@
+//! What is said of two images, as text.
+
+use basecode::Vec3;
+
+use super::{Comparison, Difference, Pixels};
+
+/// All of it, line by line.
+pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
+    use std::fmt::Write;
+    let mut out = String::new();
+    for (name, side) in [("actual", &comparison.actual), ("expected", &comparison.expected)] {
+        if !side.layer.is_empty() {
+            writeln!(out, "{name}: layer {}", side.layer)?;
+        }
+        for note in &side.notes {
+            writeln!(out, "{name}: {note}")?;
+        }
+        for (pixels, what) in [(&side.not_finite, "not finite"), (&side.negative, "negative")] {
+            if let Some(Pixels { count, first: [x, y] }) = pixels {
+                let are = if *count == 1 { "pixel is" } else { "pixels are" };
+                writeln!(out, "{name}: {count} {are} {what}; first at ({x}, {y})")?;
+            }
+        }
+    }
+    for note in &comparison.notes {
+        writeln!(out, "{note}")?;
+    }
+    let Some(values) = &comparison.values else {
+        let [a, b] =
+            [&comparison.actual, &comparison.expected].map(|side| (side.width, side.height));
+        writeln!(out, "actual is {}x{} but expected is {}x{}", a.0, a.1, b.0, b.1)?;
+        if let Some(page) = &comparison.page {
+            writeln!(out, "{}", page.display())?;
+        }
+        return Ok(out);
+    };
+    writeln!(out, "{} of {} pixels differ", values.differing, values.pixels)?;
+    let mut tell = |what: &str, found: &Difference| {
+        let (a, b) = (Vec3::from(found.actual), Vec3::from(found.expected));
+        let by = found.difference.map_or(String::new(), |size| format!(", difference {size}"));
+        writeln!(out, "{what} at ({}, {}): actual {a}, expected {b}{by}", found.x, found.y)
+    };
+    if let Some(largest) = &values.largest {
+        tell("largest", largest)?;
+    }
+    match (&values.largest, &values.largest_finite) {
+        (Some(Difference { difference: None, .. }), Some(finite)) => {
+            tell("largest finite difference", finite)?;
+        }
+        (Some(Difference { difference: None, .. }), None) => {
+            writeln!(out, "no pixel with finite values differs")?;
+        }
+        _ => {}
+    }
+    if let Some(metrics) = &values.metrics {
+        writeln!(out, "{}", serde_json::to_string_pretty(metrics)?)?;
+    }
+    for (file, caption) in &comparison.pictures {
+        writeln!(out, "{}: {caption}", file.display())?;
+    }
+    if let Some(page) = &comparison.page {
+        writeln!(out, "{}", page.display())?;
+    }
+    Ok(out)
+}

@@ -1,0 +1,224 @@
+//! Rays of one thread beside Embree's, and how their cost grows.
+
+use std::ffi::OsStr;
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::Context;
+use basecode::{
+    Bsdf, Bvh, Camera, CameraConfig, Ray, Sampler, Scene, SurfaceInteraction, Vec3, vec3,
+};
+
+use super::child::Server;
+use super::figures::{Line, Samples};
+use super::page::Curve;
+use super::{Bench, knot};
+
+const WIDTH: usize = 320;
+const HEIGHT: usize = 240;
+/// The kinds of rays, in the order of the file that Embree's side reads.
+const KINDS: [(&str, &str); 3] = [
+    ("camera rays", "rtcIntersect1"),
+    ("shadow rays to a point", "rtcOccluded1"),
+    ("shuffled bounces", "rtcIntersect1"),
+];
+const SCENES: [&str; 3] = ["sphere_diffuse", "teapot", "cbox"];
+
+/// No ray asks for it.
+struct Black;
+
+impl Bsdf for Black {
+    fn eval(&self, _: &SurfaceInteraction) -> Vec3 {
+        Vec3::ZERO
+    }
+}
+
+/// Triangles, and rays of each kind.
+struct Cast {
+    name: String,
+    triangles: Vec<[Vec3; 3]>,
+    bvh: Bvh,
+    rays: [Vec<Ray>; 3],
+}
+
+impl Cast {
+    fn new(name: &str, triangles: Vec<[Vec3; 3]>, camera: Vec<Ray>, light: Vec3) -> Self {
+        let bvh = build(&triangles);
+        let sampler = Sampler::new(1);
+        let (mut shadow, mut bounces) = (Vec::new(), Vec::new());
+        for (ray, hit) in camera.iter().filter_map(|ray| Some((ray, bvh.closest_hit(ray)?))) {
+            let p = ray.at(hit.t);
+            let to_light = light - p;
+            let distance = to_light.length();
+            shadow.push(Ray::segment(p, to_light / distance, 1e-3, distance - 1e-3));
+            let anywhere = Vec3::new(sampler.next_1d(), sampler.next_1d(), sampler.next_1d());
+            bounces.push(Ray::new(p, (2.0 * anywhere - 1.0).normalize_or(Vec3::X)));
+        }
+        let mut state = 1usize;
+        for i in (1..bounces.len()).rev() {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            bounces.swap(i, (state >> 33) % (i + 1));
+        }
+        Self { name: name.to_owned(), triangles, bvh, rays: [camera, shadow, bounces] }
+    }
+
+    fn of_scene(root: &Path, name: &str) -> anyhow::Result<Self> {
+        let file = match name {
+            "teapot" | "cbox" => format!("{name}_simple_offline.toml"),
+            _ => format!("{name}_offline.toml"),
+        };
+        let path = root.join("scenes/a2").join(name).join("tinyrender").join(file);
+        let scene = Scene::load(&path, &|_| Box::new(Black))?;
+        let view = scene.camera(WIDTH, HEIGHT)?;
+        let at = |i: usize| view.ray((i % WIDTH) as f32 + 0.5, (i / WIDTH) as f32 + 0.5);
+        let triangles = scene.shapes();
+        let corners = triangles
+            .iter()
+            .flat_map(|shape| (0..shape.triangles.len()).map(move |i| shape.corners(i)));
+        let camera = (0..WIDTH * HEIGHT).map(at).collect();
+        Ok(Self::new(name, corners.collect(), camera, scene.first_light_position()))
+    }
+
+    fn of_knot(triangles: usize) -> anyhow::Result<Self> {
+        let (eye, at) = (vec3(0.0, 0.0, 9.0), Vec3::ZERO);
+        let camera = CameraConfig { eye, at, up: Vec3::Y, fov_y_deg: 45.0 };
+        let view = Camera::new(camera, WIDTH, HEIGHT)?;
+        let at = |i: usize| view.ray((i % WIDTH) as f32 + 0.5, (i / WIDTH) as f32 + 0.5);
+        let corners = knot(triangles).corners();
+        let name = format!("knot of {} triangles", thousands(corners.len()));
+        let rays = (0..WIDTH * HEIGHT).map(at).collect();
+        Ok(Self::new(&name, corners, rays, vec3(4.0, 6.0, 8.0)))
+    }
+
+    /// Seconds that one thread takes for all rays of a kind, and what was hit.
+    fn measure(&self, kind: usize) -> (f64, usize) {
+        let begin = Instant::now();
+        let hits = match kind {
+            1 => self.rays[1].iter().filter(|ray| self.bvh.any_hit(ray)).count(),
+            _ => self.rays[kind].iter().filter(|ray| self.bvh.closest_hit(ray).is_some()).count(),
+        };
+        (begin.elapsed().as_secs_f64(), hits)
+    }
+
+    fn write(&self, path: &Path) -> anyhow::Result<()> {
+        let mut bytes = (self.triangles.len() as u32).to_le_bytes().to_vec();
+        let mut put = |v: f32| bytes.extend(v.to_le_bytes());
+        self.triangles.iter().flatten().for_each(|p| p.to_array().into_iter().for_each(&mut put));
+        for rays in &self.rays {
+            bytes.extend((rays.len() as u32).to_le_bytes());
+            for ray in rays {
+                let ends = [ray.min_t, ray.max_t];
+                let all = ray.origin.to_array().into_iter().chain(ray.direction.to_array());
+                all.chain(ends).for_each(|v| bytes.extend(v.to_le_bytes()));
+            }
+        }
+        Ok(std::fs::File::create(path)?.write_all(&bytes)?)
+    }
+}
+
+fn build(triangles: &[[Vec3; 3]]) -> Bvh {
+    Bvh::new(triangles, &vec![true; triangles.len()])
+}
+
+fn thousands(count: usize) -> String {
+    match count {
+        1_000_000.. => format!("{:.1}M", count as f64 / 1e6),
+        _ => format!("{:.0}k", count as f64 / 1e3),
+    }
+}
+
+/// The table's rows, and plots of millions of rays a second against the number of triangles.
+pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
+    let program = bench.folder.join("embree");
+    let source = bench.root.join("xtask/bench/embree.cpp");
+    super::child::compile(&source, &program, &[bench.embree_library()])?;
+    let mut casts = Vec::new();
+    for name in SCENES {
+        casts.push(Cast::of_scene(&bench.root, name)?);
+    }
+    casts.push(Cast::of_knot(200_000)?);
+    let mut lines: [Vec<Line>; 4] = Default::default();
+    for cast in &casts {
+        let file = bench.folder.join("rays.bin");
+        cast.write(&file)?;
+        let mut plain = Server::start(&program, &[file.as_os_str()])?;
+        let mut robust = Server::start(&program, &[file.as_os_str(), OsStr::new("robust")])?;
+        for (kind, (words, call)) in KINDS.iter().enumerate() {
+            let (mut ours, mut theirs) = (Samples::default(), Samples::default());
+            let mut safe = Samples::default();
+            let mut found = [0; 3];
+            for _ in 0..bench.rounds {
+                for (side, samples) in [&mut ours, &mut theirs, &mut safe].into_iter().enumerate() {
+                    let (seconds, hits) = match side {
+                        0 => cast.measure(kind),
+                        1 => plain.measure(&kind.to_string())?,
+                        _ => robust.measure(&kind.to_string())?,
+                    };
+                    samples.push(seconds);
+                    found[side] = hits;
+                }
+            }
+            let apart = found[0].abs_diff(found[2]);
+            anyhow::ensure!(
+                apart * 100 <= cast.rays[kind].len(),
+                "{}, {words}: {} hits, Embree {}",
+                cast.name,
+                found[0],
+                found[2]
+            );
+            let rate = |samples: &Samples| {
+                format!("{:.1} M/s", cast.rays[kind].len() as f64 / samples.median() / 1e6)
+            };
+            for (anchor, theirs) in
+                [((*call).to_owned(), theirs), (format!("{call}, robust"), safe)]
+            {
+                lines[kind].push(Line {
+                    work: format!("{words}, {}", cast.name),
+                    anchor: format!("Embree `{anchor}`").replace(", robust`", "`, robust"),
+                    theirs: rate(&theirs),
+                    ours: rate(&ours),
+                    ratio: ours.faster_than(&theirs).ratio(),
+                });
+            }
+        }
+        if cast.triangles.len() > 100_000 {
+            let (mut ours, mut theirs) = (Samples::default(), Samples::default());
+            for _ in 0..bench.rounds {
+                let begin = Instant::now();
+                std::hint::black_box(build(&cast.triangles));
+                ours.push(begin.elapsed().as_secs_f64());
+                theirs.push(plain.measure("build")?.0);
+            }
+            let work = format!("BVH, {}", cast.name);
+            lines[3].push(Line::of_times(work, "Embree, all cores", &theirs, &ours));
+        }
+    }
+    Ok((lines.into_iter().flatten().collect(), growth(bench, &program)?))
+}
+
+/// Rays against triangles.
+fn growth(bench: &Bench, program: &Path) -> anyhow::Result<Vec<Curve>> {
+    let mut curves: Vec<Curve> = ["Umbra", "Embree"]
+        .iter()
+        .flat_map(|who| KINDS.iter().map(move |(kind, _)| Curve::new(&format!("{who}, {kind}"))))
+        .collect();
+    for count in [1_000, 8_000, 64_000, 500_000, 4_000_000] {
+        let cast = Cast::of_knot(count).context("a knot")?;
+        let file = bench.folder.join("rays.bin");
+        cast.write(&file)?;
+        let mut embree = Server::start(program, &[file.as_os_str()])?;
+        for kind in 0..KINDS.len() {
+            let (mut ours, mut theirs) = (Samples::default(), Samples::default());
+            for _ in 0..3 {
+                ours.push(cast.measure(kind).0);
+                theirs.push(embree.measure(&kind.to_string())?.0);
+            }
+            for (side, samples) in [ours, theirs].iter().enumerate() {
+                let rate = cast.rays[kind].len() as f64 / samples.median() / 1e6;
+                curves[3 * side + kind].push(cast.triangles.len() as f64, rate);
+            }
+        }
+    }
+    Ok(curves)
+}
