@@ -31,6 +31,7 @@ mod sandbox;
 mod statistics;
 mod submitted;
 mod support;
+mod tasks;
 mod viewer;
 mod watch;
 mod worker;

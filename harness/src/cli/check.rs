@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::ensure;
 use serde::{Deserialize, Serialize};
 
-use super::batch::Batch;
+use super::batch::{Batch, Ended};
 use super::context::Context;
 use super::grade::{BudgetChoice, IsolationChoice, Perturb};
 use super::render::AdapterChoice;
@@ -178,6 +178,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         budget: BudgetChoice::Config,
         asked: Some(&asked),
         only: &[],
+        slice: None,
         from: None,
         list: None,
         attempt: None,
@@ -185,7 +186,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         timings: arguments.timings,
     };
     let begun = Instant::now();
-    let Some((report, _)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    let Ended::Report(report, _) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
     let entry = &report.entries[0].for_student(&report.rules);
     let width = terminal::width().min(READABLE_COLUMNS);
     let look = Look { width, colours: terminal::colours() };
