@@ -18,6 +18,7 @@ mod full_disk;
 mod intake;
 mod intake_properties;
 mod isolation;
+mod kill;
 mod labelled;
 mod metrics;
 mod original_scene;
