@@ -58,7 +58,10 @@ impl Scratch {
 /// # Errors
 /// When it cannot be written; the old content is still there then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    draft(path, bytes)?.persist(path)?;
+    let file = draft(path, bytes)?;
+    end_at(path, "written");
+    file.persist(path)?;
+    end_at(path, "named");
     Ok(())
 }
 
@@ -67,8 +70,23 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// # Errors
 /// When it is there (`AlreadyExists`), or cannot be written.
 pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    draft(path, bytes)?.persist_noclobber(path)?;
+    let file = draft(path, bytes)?;
+    end_at(path, "written");
+    file.persist_noclobber(path)?;
+    end_at(path, "named");
     Ok(())
+}
+
+/// For tests of what an ended process leaves: with `UMBRA_KILL_AT=record.json:written` in its environment this process
+/// ends itself before the file has its name, with `record.json:named` after.
+fn end_at(path: &Path, stage: &str) {
+    let Some(at) = std::env::var_os("UMBRA_KILL_AT") else { return };
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if at.to_str() == Some(format!("{name}:{stage}").as_str()) {
+        #[cfg(unix)]
+        let _ = nix::sys::signal::raise(nix::sys::signal::Signal::SIGKILL);
+        std::process::abort();
+    }
 }
 
 /// A whole file under another name, synced; it is gone unless it is renamed.

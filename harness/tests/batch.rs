@@ -13,18 +13,18 @@ use similar_asserts::assert_eq;
 
 use crate::support::one_scene;
 
-const WRONG: &str = "fn main() { not_rust }";
+pub const WRONG: &str = "fn main() { not_rust }";
 /// Compiles until it is ended.
 const ENDLESS: &str = "#![allow(long_running_const_eval)]\n\
     pub const N: u64 = { let mut n = 0; while n < u64::MAX { n += 1; } n };\n";
 
 /// Submissions and the folder that they are graded into.
-struct Batch {
-    place: tempfile::TempDir,
+pub struct Batch {
+    pub place: tempfile::TempDir,
 }
 
 impl Batch {
-    fn new(submissions: &[(&str, &str)]) -> Self {
+    pub fn new(submissions: &[(&str, &str)]) -> Self {
         let batch = Self { place: tempfile::tempdir().unwrap() };
         submissions.iter().for_each(|(name, lib)| batch.submission(name, lib));
         // The seed that other suites use too: their scenes are there already.
@@ -33,17 +33,17 @@ impl Batch {
         batch
     }
 
-    fn submission(&self, name: &str, lib: &str) {
+    pub fn submission(&self, name: &str, lib: &str) {
         let src = self.place.path().join("submissions").join(name).join("src");
         fs::create_dir_all(&src).unwrap();
         fs::write(src.join("lib.rs"), lib).unwrap();
     }
 
-    fn out(&self) -> PathBuf {
+    pub fn out(&self) -> PathBuf {
         self.place.path().join("out")
     }
 
-    fn instructor(&self, path: &str) -> PathBuf {
+    pub fn instructor(&self, path: &str) -> PathBuf {
         self.out().join("instructor").join(path)
     }
 
@@ -51,7 +51,12 @@ impl Batch {
         self.start_with(&[self.place.path().join("submissions")], &[])
     }
 
-    fn start_with(&self, paths: &[PathBuf], options: &[&str]) -> Child {
+    pub fn start_with(&self, paths: &[PathBuf], options: &[&str]) -> Child {
+        self.command(paths, options).spawn().unwrap()
+    }
+
+    /// The command that grades some paths with more options.
+    pub fn command(&self, paths: &[PathBuf], options: &[&str]) -> Command {
         let mut umbra = Command::new(env!("CARGO_BIN_EXE_umbra"));
         umbra.arg("grade").args(paths).args(options);
         umbra.args(["--isolation", "reduced", "--jobs", "1", "--output"]).arg(self.out());
@@ -59,16 +64,22 @@ impl Batch {
         let assignment =
             one_scene(&Path::new(env!("CARGO_TARGET_TMPDIR")).join("one-scene"), |_| ());
         umbra.arg("--root").arg(assignment).current_dir(root());
-        umbra.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+        umbra.stdout(Stdio::piped()).stderr(Stdio::piped());
+        umbra
+    }
+
+    /// The folder of all submissions.
+    pub fn submissions(&self) -> PathBuf {
+        self.place.path().join("submissions")
     }
 
     /// Grades to the end: the exit code and what was said on standard error.
-    fn grade(&self) -> (Option<i32>, String) {
+    pub fn grade(&self) -> (Option<i32>, String) {
         said(&self.start().wait_with_output().unwrap())
     }
 
     /// Grades some submissions, named from the folder of all, with more options.
-    fn grade_with(&self, names: &[&str], options: &[&str]) -> (Option<i32>, String) {
+    pub fn grade_with(&self, names: &[&str], options: &[&str]) -> (Option<i32>, String) {
         let path = |name: &&str| self.place.path().join("submissions").join(name);
         let paths: Vec<PathBuf> = names.iter().map(path).collect();
         said(&self.start_with(&paths, options).wait_with_output().unwrap())
@@ -104,25 +115,25 @@ impl Batch {
     }
 
     /// All of `report.json` but what it cost.
-    fn canonical(&self) -> String {
+    pub fn canonical(&self) -> String {
         let report = fs::read_to_string(self.out().join("report.json")).unwrap();
         report.split("\n  \"timings\":").next().unwrap().to_owned()
     }
 }
 
-fn root() -> PathBuf {
+pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
 /// How many scratch folders of a process there are.
-fn scratch_of(pid: u32) -> usize {
+pub fn scratch_of(pid: u32) -> usize {
     let all = root().join("target/umbra/scratch").read_dir().unwrap();
     let own = format!("run-{pid}-");
     all.filter(|entry| entry.as_ref().unwrap().file_name().to_string_lossy().starts_with(&own))
         .count()
 }
 
-fn said(output: &Output) -> (Option<i32>, String) {
+pub fn said(output: &Output) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 

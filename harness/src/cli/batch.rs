@@ -10,7 +10,7 @@ use anyhow::{Context as _, ensure};
 
 use super::MachineLacks;
 use super::asked::Asked;
-use super::choices::{BudgetChoice, IsolationChoice, Perturb};
+use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::class::{self, Source};
 use super::context::{Context, INTERRUPTED, cores};
 use super::render::AdapterChoice;
@@ -21,7 +21,7 @@ use crate::files::write_whole;
 use crate::grading::{Earlier, Folders, Grading, Mode, Record, judge_shared};
 use crate::held_back::recorded_seed;
 use crate::program::graded;
-use crate::report::{self, BatchReport};
+use crate::report::{self, BatchReport, SubmissionReport};
 use crate::rubric;
 use crate::sandbox::Isolation;
 
@@ -53,6 +53,8 @@ pub struct Batch<'a> {
     pub asked: Option<&'a Asked>,
     /// Whose submissions alone are graded, unless it is empty.
     pub only: &'a [String],
+    /// Which share of them alone is graded, without a report.
+    pub slice: Option<Slice>,
     /// Where they come from; recognised where it is not said.
     pub from: Option<Kind>,
     /// The class list; that of an earlier run where none is named.
@@ -65,9 +67,19 @@ pub struct Batch<'a> {
     pub timings: bool,
 }
 
+/// How a batch ended.
+pub enum Ended {
+    /// By Ctrl-C.
+    Interrupted,
+    /// With its report, and what was found.
+    Report(Box<BatchReport>, Collected),
+    /// With the records of a slice, their points, and the number of all submissions that count.
+    Slice(Vec<SubmissionReport>, usize),
+}
+
 impl Batch<'_> {
-    /// Grades all and writes the reports; nothing when Ctrl-C came in between. Answers what was found, too.
-    pub fn run(&self, root: Option<&Path>) -> anyhow::Result<Option<(BatchReport, Collected)>> {
+    /// Grades all and writes the reports, or the records of a slice.
+    pub fn run(&self, root: Option<&Path>) -> anyhow::Result<Ended> {
         for path in &self.paths {
             ensure!(path.exists(), "{} does not exist", path.display());
         }
@@ -123,21 +135,32 @@ impl Batch<'_> {
             None => Some(recorded_seed(&instructor.join(SEED_FILE))?),
         };
         let all = class::sources(&collected.sources, self.output);
-        let roster = match self.mode {
-            Mode::Grade => class::roster(self.list, self.output)?,
-            Mode::Check => None,
-        };
+        if self.mode == Mode::Grade {
+            class::roster(self.list, self.output)?;
+        }
         let aside = match &pins {
             Some((_, decided)) => self.set_aside(&all, decided)?,
             None => HashSet::new(),
         };
         let mut chosen = class::only(context, self.output, &all, self.only)?;
         chosen.retain(|source| !aside.contains(&source.slug));
+        let mut found = self.found(&collected, &all, &aside);
+        let counting = chosen.len();
+        if let Some(slice) = self.slice {
+            let own = chosen.into_iter().enumerate().filter(|(at, _)| slice.holds(*at));
+            chosen = own.map(|(_, source)| source).collect();
+        }
         let result = context.with_store(|store| {
             let adapter = self.adapter.adapter();
             let mut grading = Grading::prepare(store, adapter, seed, &INTERRUPTED)?;
             if self.mode == Mode::Grade {
-                grading.cache = Some(grading.record_cache(self.force)?);
+                let cache = grading.record_cache(self.force)?;
+                found.conditions = cache.conditions();
+                found.held_back.clone_from(&grading.held_back);
+                grading.cache = Some(cache);
+            }
+            if self.slice.is_some() {
+                found.begin(self.output)?;
             }
             if self.budget == BudgetChoice::None {
                 grading.budget = None;
@@ -166,10 +189,15 @@ impl Batch<'_> {
                 _ => String::new(),
             };
             eprintln!("umbra: interrupted{goes_on}");
-            return Ok(None);
+            return Ok(Ended::Interrupted);
         }
         let (results, held_back, cache) = result?;
         let records = results.into_iter().collect::<anyhow::Result<Vec<Record>>>()?;
+        if self.slice.is_some() {
+            let rules = &context.assignment.rules;
+            let entries = records.into_iter().map(|record| graded(record, rules)).collect();
+            return Ok(Ended::Slice(entries, counting));
+        }
         let report = match (&mut pins, cache) {
             (Some((pins, decided)), Some(cache)) => {
                 if cache.found() > 0 {
@@ -179,23 +207,10 @@ impl Batch<'_> {
                         chosen.len()
                     );
                 }
-                let mut found = Found::new(&collected, &all, |source| aside.contains(&source.slug));
-                (found.conditions, found.held_back) = (cache.conditions(), held_back);
-                let list = self.list.and_then(Path::file_name);
-                found.list = list.unwrap_or_default().to_string_lossy().into_owned();
-                found.join(Found::read(self.output)?.unwrap_or_default(), self.output);
-                found.keep(self.output)?;
                 let new = |record| Earlier { record, comparable: true };
                 let mut records: Vec<Earlier> = records.into_iter().map(new).collect();
-                class::join(&cache, self.output, &all, &aside, &mut records);
-                let settled =
-                    settling::settled(self.output, decided, &found, roster.as_ref(), records)?;
-                let pinned = pins.current().map(|pin| pin.decided.differs(decided, self.output));
-                if pinned.transpose()?.is_none_or(|differs| !differs.is_empty()) {
-                    pins.apply(decided.clone(), "graded", Vec::new(), false)?;
-                }
-                settling::write(self.output, &settled)?;
-                settled
+                class::join(self.output, &found, &mut records);
+                settling::finish(self.output, pins, decided, found, records)?
             }
             _ => {
                 let rules = &context.assignment.rules;
@@ -217,7 +232,17 @@ impl Batch<'_> {
         if self.timings {
             print_timings(&report);
         }
-        Ok(Some((report, collected)))
+        Ok(Ended::Report(Box::new(report), collected))
+    }
+
+    /// What is known of the batch before anything is graded.
+    fn found(&self, collected: &Collected, all: &[Source], aside: &HashSet<String>) -> Found {
+        let mut found = Found::new(collected, all, |source| aside.contains(&source.slug));
+        let list = self.list.and_then(Path::file_name);
+        found.list = list.unwrap_or_default().to_string_lossy().into_owned();
+        let whole = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+        found.paths = self.paths.iter().map(whole).collect();
+        found
     }
 
     /// What the report is settled by: what is pinned there, which takes the place of what `config.json` says by now,
@@ -242,7 +267,12 @@ impl Batch<'_> {
                 pinned.replace(assignment);
                 decided.assignment = pinned.clone();
             }
-            decided.attempt = self.attempt.unwrap_or(pin.decided.attempt);
+            let attempt = pin.decided.attempt;
+            ensure!(
+                self.slice.is_none() || self.attempt.is_none_or(|own| own == attempt),
+                "--attempt: all tasks of a partition choose the same one, which the first of them pinned"
+            );
+            decided.attempt = self.attempt.unwrap_or(attempt);
         }
         Ok((pins, decided))
     }

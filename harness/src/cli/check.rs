@@ -8,7 +8,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::asked::Asked;
-use super::batch::Batch;
+use super::batch::{Batch, Ended};
 use super::choices::{BudgetChoice, IsolationChoice, Perturb};
 use super::context::Context;
 use super::render::AdapterChoice;
@@ -90,6 +90,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         budget: BudgetChoice::Config,
         asked: Some(&asked),
         only: &[],
+        slice: None,
         from: None,
         list: None,
         attempt: None,
@@ -97,7 +98,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         timings: arguments.timings,
     };
     let begun = Instant::now();
-    let Some((report, _)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    let Ended::Report(report, _) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
     let entry = &report.entries[0].for_student(&report.rules);
     let width = terminal::width().min(READABLE_COLUMNS);
     let look = Look { width, colours: terminal::colours() };

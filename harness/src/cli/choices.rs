@@ -29,6 +29,37 @@ impl FromStr for Perturb {
     }
 }
 
+/// A share of the submissions: every `of`th, from the `index`th on, which is 1 for the first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Slice {
+    /// Which, from 1.
+    pub index: usize,
+    /// Of how many.
+    pub of: usize,
+}
+
+impl Slice {
+    /// Whether a submission belongs to it, by its place among all.
+    pub fn holds(self, at: usize) -> bool {
+        at % self.of == self.index - 1
+    }
+}
+
+impl FromStr for Slice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.strip_prefix("slice:").and_then(|text| text.split_once('/'));
+        let parsed = numbers.and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+        match parsed {
+            Some((index, of)) if (1..=of).contains(&index) => Ok(Self { index, of }),
+            _ => Err(format!(
+                "expected slice:K/N with K from 1 to N, such as slice:2/4, found {text}"
+            )),
+        }
+    }
+}
+
 /// How much isolation is demanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum IsolationChoice {

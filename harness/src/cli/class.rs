@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, ensure};
 
 use super::context::Context;
+use super::settling::{self, Found};
 use crate::class::{self, Claim, Label, MATCHES, Roster};
 use crate::columns::count;
 use crate::files::write_whole;
@@ -85,7 +86,9 @@ pub fn ask(class: &class::Class, output: &Path) -> anyhow::Result<()> {
 /// Submissions with the folders that they have in the report at `output`: those that they had before,
 /// else what their names allow, made unique.
 pub fn sources(given: &[class::Source], output: &Path) -> Vec<Source> {
-    let mut taken = HashSet::from([report::INSTRUCTOR.to_owned()]);
+    // Folders of the report's own.
+    let own = [report::INSTRUCTOR, class::pins::FOLDER, settling::WORK];
+    let mut taken = HashSet::from(own.map(str::to_owned));
     let mut known: HashMap<String, VecDeque<String>> = HashMap::new();
     for slug in folders(output) {
         let file = output.join(report::INSTRUCTOR).join(&slug).join(SOURCE);
@@ -178,25 +181,23 @@ pub fn folders(output: &Path) -> Vec<String> {
     names
 }
 
-/// Adds to `records`, made of some of the submissions `all`, what earlier runs into the same report
-/// found out about others, and says so; `aside` are attempts that do not count.
-pub fn join(
-    cache: &RecordCache,
-    output: &Path,
-    all: &[Source],
-    aside: &HashSet<String>,
-    records: &mut Vec<Earlier>,
-) {
+/// Adds to `records`, made of some of the submissions that were found, what earlier runs into the same report
+/// found out about others, and says so.
+pub fn join(output: &Path, found: &Found, records: &mut Vec<Earlier>) {
     let graded: HashSet<String> = records.iter().map(|own| own.record.slug.clone()).collect();
     let mut gone = Vec::new();
-    let mut missing: HashSet<&str> = all.iter().map(|source| source.slug.as_str()).collect();
-    missing.retain(|slug| !graded.contains(*slug) && !aside.contains(*slug));
+    let slugs = |aside: bool| -> HashSet<&str> {
+        let own = found.seen.iter().filter(|seen| seen.aside == aside && seen.empty.is_empty());
+        own.map(|seen| seen.slug.as_str()).collect()
+    };
+    let (mut missing, aside) = (slugs(false), slugs(true));
+    missing.retain(|slug| !graded.contains(*slug));
     for slug in folders(output) {
         let instructor = output.join(report::INSTRUCTOR).join(&slug);
         if graded.contains(&slug) {
             continue;
         }
-        let earlier = match RecordCache::earlier(&instructor, &cache.conditions()) {
+        let earlier = match RecordCache::earlier(&instructor, &found.conditions) {
             Ok(Some(earlier)) => earlier,
             Ok(None) => continue,
             Err(error) => {
@@ -205,9 +206,9 @@ pub fn join(
             }
         };
         let record = &earlier.record;
-        let is_given = missing.remove(slug.as_str()) || aside.contains(&slug);
+        let is_given = missing.remove(slug.as_str()) || aside.contains(slug.as_str());
         if !is_given && let Some(new) = records.iter().find(|new| is_newer(&new.record, record)) {
-            match cache.replace(&instructor) {
+            match RecordCache::replace(&instructor) {
                 Ok(()) => eprintln!(
                     "umbra: {} of {} is graded again as {}: it replaces the one in {}",
                     record.name,
@@ -263,7 +264,7 @@ fn who(student: &Student) -> String {
 }
 
 /// The first of several names.
-fn some(names: &[String]) -> String {
+pub fn some(names: &[String]) -> String {
     let shown = names[..names.len().min(NAMES)].join(", ");
     match names.len().saturating_sub(NAMES) {
         0 => shown,
@@ -390,8 +391,11 @@ mod tests {
         assert_eq!(slugs(&twice), ["a2", "a2-4"]);
         note(&twice);
         assert_eq!(slugs(&sources(&[path("bob"), path("bob")], &output)), ["a2", "a2-4"]);
-        let odd = sources(&["instructor".into(), "???".into(), "A2.tar.gz".into()], &output);
-        assert_eq!(slugs(&odd), ["instructor-2", "submission", "A2-5"]);
+        let odd = ["instructor", "work.zip", "settled", "???", "A2.tar.gz"].map(PathBuf::from);
+        assert_eq!(
+            slugs(&sources(&odd, &output)),
+            ["instructor-2", "work-2", "settled-2", "submission", "A2-5"]
+        );
     }
 
     #[test]

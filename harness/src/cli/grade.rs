@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use super::batch::Batch;
-use super::choices::{BudgetChoice, IsolationChoice, Perturb};
+use super::batch::{Batch, Ended};
+use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::context::cores;
 use super::render::AdapterChoice;
 use super::terminal;
 use crate::class::{Attempt, Kind, MATCHES};
+use crate::columns::count;
 use crate::evidence::Verdict;
 use crate::grading::{INTERNAL_ERROR, Mode};
-use crate::report::{self, BatchReport};
+use crate::report::{self, BatchReport, SubmissionReport};
 
 /// Options of `umbra grade`.
 #[derive(clap::Args)]
@@ -51,6 +52,10 @@ pub struct GradeArguments {
     /// Grade only this student's submission, by number, name or file name; the others keep their grades
     #[arg(long, value_name = "STUDENT")]
     only: Vec<String>,
+    /// Grade only this share of the submissions, such as slice:2/4, and write no report: tasks on several machines share
+    /// --output, and `umbra merge` makes the reports
+    #[arg(long, value_name = "slice:K/N", conflicts_with = "only")]
+    partition: Option<Slice>,
     /// Grade again what has not changed since it was graded
     #[arg(long)]
     force: bool,
@@ -76,34 +81,68 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         budget: arguments.budget,
         asked: None,
         only: &arguments.only,
+        slice: arguments.partition,
         from: arguments.from,
         list: arguments.class.as_deref(),
         attempt: arguments.attempt,
         force: arguments.force,
         timings: arguments.timings,
     };
-    let Some((report, collected)) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
-    print!("{}", report::text_table(&report, terminal::width(), terminal::colours())?);
-    if let Some(skipped) = collected.skipped() {
+    let (report, collected) = match batch.run(root)? {
+        Ended::Interrupted => return Ok(super::EXIT_INTERRUPTED),
+        Ended::Report(report, collected) => (report, collected),
+        Ended::Slice(entries, all) => {
+            println!(
+                "{} of {all} graded; `umbra merge --output {}` makes the reports when all tasks are done",
+                count(entries.len(), "submission"),
+                arguments.output.display()
+            );
+            return Ok(exit_code(&entries));
+        }
+    };
+    shown(&report, &arguments.output, collected.skipped())
+}
+
+/// Prints the table of a report, what was skipped, and what is left to do; the exit code that it stands for.
+pub fn shown(report: &BatchReport, output: &Path, skipped: Option<String>) -> anyhow::Result<u8> {
+    print!("{}", report::text_table(report, terminal::width(), terminal::colours())?);
+    if let Some(skipped) = skipped {
         println!("skipped, not submissions: {skipped}");
     }
     if report.class.as_ref().is_some_and(|class| !class.undecided.is_empty()) {
-        let file = arguments.output.join(MATCHES);
+        let file = output.join(MATCHES);
         println!("decide in {}, and run the same command again", file.display());
     }
-    println!("report: {}", arguments.output.join(report::HTML_FILE).display());
+    println!("report: {}", output.join(report::HTML_FILE).display());
     if let Some(held_back) = &report.held_back {
         println!("held-back seed {0}; --perturb {0} reproduces this batch", held_back.seed);
     }
-    Ok(exit_code(&report))
+    Ok(exit_code(&report.entries))
 }
 
 /// What a batch ends with: a bug of ours counts more than what the machine lacks.
-fn exit_code(report: &BatchReport) -> u8 {
-    let mut checks = report.entries.iter().flat_map(|entry| &entry.record.evidence.checks);
+fn exit_code(entries: &[SubmissionReport]) -> u8 {
+    let mut checks = entries.iter().flat_map(|entry| &entry.record.evidence.checks);
     if checks.any(|check| check.id == INTERNAL_ERROR && check.verdict == Verdict::Fail) {
         return super::EXIT_BUG;
     }
-    let ungraded = report.entries.iter().any(|entry| entry.grade.points < entry.grade.points_max);
+    let ungraded = entries.iter().any(|entry| entry.grade.points < entry.grade.points_max);
     if ungraded { super::EXIT_MACHINE } else { super::EXIT_OK }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slices_share_all_without_a_rest() {
+        let slices: Vec<Slice> =
+            (1..=4).map(|index| format!("slice:{index}/4").parse().unwrap()).collect();
+        for at in 0..24 {
+            assert_eq!(slices.iter().filter(|slice| slice.holds(at)).count(), 1, "{at}");
+        }
+        for slip in ["slice:0/4", "slice:5/4", "2/4", "slice:2", "slice:a/b", "slice:1/0"] {
+            assert!(slip.parse::<Slice>().unwrap_err().contains("such as slice:2/4"), "{slip}");
+        }
+    }
 }

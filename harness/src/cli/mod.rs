@@ -15,6 +15,7 @@ mod earlier;
 mod explain;
 mod export;
 mod grade;
+mod merge;
 mod regrade;
 mod render;
 mod settling;
@@ -77,6 +78,8 @@ enum Command {
     Check(check::CheckArguments),
     /// Grade submissions: archives (.zip, .tar, .tar.gz), folders, or what holds many of them
     Grade(grade::GradeArguments),
+    /// Make the reports of a class that several tasks graded into one folder with `umbra grade --partition`
+    Merge(merge::MergeArguments),
     /// Set the points of a part by hand, with a reason that both reports show
     Override(decide::OverrideArguments),
     /// Confirm what a report leaves to the instructor, such as images without code
@@ -215,6 +218,7 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
     match command {
         Command::Check(arguments) => check::check(&arguments, root),
         Command::Grade(arguments) => grade::grade(&arguments, root),
+        Command::Merge(arguments) => merge::merge(&arguments, root),
         Command::Override(arguments) => decide::override_part(&arguments),
         Command::Confirm(arguments) => decide::confirm(&arguments),
         Command::Regrade(arguments) => regrade::regrade(&arguments, root),

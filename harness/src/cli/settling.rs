@@ -1,10 +1,12 @@
 //! A report from what its folder keeps: records, what the last run found beside them, and what is pinned. No
 //! submission is needed, and nothing is rendered.
 
-use std::path::Path;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
 
 use super::class;
 use crate::class::matching::{Match, find};
@@ -13,7 +15,7 @@ use crate::class::pins::Change;
 use crate::class::{
     Claim, Collected, Decided, Deciding, Kind, Label, Matches, Pins, Roster, settle,
 };
-use crate::files::write_whole;
+use crate::files::{files_below, hex, write_new, write_whole};
 use crate::grading::{Earlier, Record, RecordCache, judge_shared};
 use crate::held_back::HeldBack;
 use crate::program::graded;
@@ -22,6 +24,9 @@ use crate::rubric::Grade;
 
 /// The file of [`Found`], in the instructor's folder.
 const FILE: &str = "batch.json";
+
+/// The folder of what tasks of a partition found, in the instructor's folder.
+pub const WORK: &str = "work";
 
 /// What a grade says of a submission that was judged in another way than the others of its class.
 const OTHER_CONDITIONS: &str = "graded before with other scenes, limits or another version of Umbra: \
@@ -40,6 +45,10 @@ pub struct Found {
     pub held_back: Option<HeldBack>,
     /// What was there, graded or not.
     pub seen: Vec<Seen>,
+    /// The version of Umbra.
+    pub umbra: String,
+    /// Where the submissions were looked for.
+    pub paths: Vec<PathBuf>,
 }
 
 /// Something that was submitted.
@@ -76,7 +85,8 @@ impl Found {
             empty: empty.reason(),
             ..Seen::default()
         }));
-        Self { kind: collected.kind, seen, ..Self::default() }
+        let umbra = env!("CARGO_PKG_VERSION").to_owned();
+        Self { kind: collected.kind, seen, umbra, ..Self::default() }
     }
 
     /// Adds what an earlier run into `output` found of those that this one was not given.
@@ -115,7 +125,7 @@ impl Found {
     pub fn read(output: &Path) -> anyhow::Result<Option<Self>> {
         let file = output.join(report::INSTRUCTOR).join(FILE);
         match std::fs::read(&file) {
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
             bytes => {
                 let bytes = bytes.with_context(|| format!("cannot read {}", file.display()))?;
                 let found = serde_json::from_slice(&bytes);
@@ -124,6 +134,42 @@ impl Found {
                 })
             }
         }
+    }
+
+    /// Keeps it for `umbra merge`, as long as tasks of a partition are at work: those that found the same keep one file.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn begin(&self, output: &Path) -> anyhow::Result<()> {
+        let bytes = serde_json::to_vec_pretty(self)?;
+        let name = format!("{}.json", &hex(&Sha256::digest(&bytes))[..12]);
+        let file = output.join(report::INSTRUCTOR).join(WORK).join(name);
+        match write_new(&file, &bytes) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(()),
+            written => written.with_context(|| format!("cannot write {}", file.display())),
+        }
+    }
+
+    /// What tasks of a partition found, each with its file.
+    ///
+    /// # Errors
+    /// When a file cannot be read.
+    pub fn begun(output: &Path) -> anyhow::Result<Vec<(PathBuf, Self)>> {
+        let folder = output.join(report::INSTRUCTOR).join(WORK);
+        let mut begun = Vec::new();
+        for file in files_below(&folder).unwrap_or_default() {
+            // What a killed task left has no such name.
+            if file.extension().is_none_or(|extension| extension != "json") {
+                continue;
+            }
+            let bytes =
+                std::fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
+            let found = serde_json::from_slice(&bytes).with_context(|| {
+                format!("{}: not of this version of Umbra; delete it", file.display())
+            })?;
+            begun.push((file, found));
+        }
+        Ok(begun)
     }
 
     /// Keeps it for later runs.
@@ -222,6 +268,29 @@ impl Kept {
     }
 }
 
+/// The report of a run that graded all that it was given: keeps what it found, pins what is decided by now, and writes.
+///
+/// # Errors
+/// When a file cannot be read or written, or a decision means nothing.
+pub fn finish(
+    output: &Path,
+    pins: &mut Pins,
+    decided: &Decided,
+    mut found: Found,
+    records: Vec<Earlier>,
+) -> anyhow::Result<BatchReport> {
+    found.join(Found::read(output)?.unwrap_or_default(), output);
+    found.keep(output)?;
+    let roster = class::roster(None, output)?;
+    let settled = settled(output, decided, &found, roster.as_ref(), records)?;
+    let pinned = pins.current().map(|pin| pin.decided.differs(decided, output));
+    if pinned.transpose()?.is_none_or(|differs| !differs.is_empty()) {
+        pins.apply(decided.clone(), "graded", Vec::new(), false)?;
+    }
+    write(output, &settled)?;
+    Ok(settled)
+}
+
 /// Writes a report with the questions that it leaves open.
 ///
 /// # Errors
@@ -306,7 +375,9 @@ pub fn settled(
         .collect();
     let (standings, mut class) = settle(&claims, &mut grades, &absent, found.kind, &deciding)?;
     class.unused = unused;
-    class.list.clone_from(&found.list);
+    if !found.list.is_empty() {
+        class.list.clone_from(&found.list);
+    }
     let mut counting = Vec::new();
     for (at, mut standing) in standings {
         // Attempts that were not graded are told, too.

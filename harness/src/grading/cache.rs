@@ -158,6 +158,11 @@ impl RecordCache {
         Ok(Self::file(instructor)?.map(earlier))
     }
 
+    /// The conditions of the record in an instructor's folder, if there is one.
+    pub fn conditions_of(instructor: &Path) -> Option<String> {
+        Self::file(instructor).ok()?.map(|file| file.batch)
+    }
+
     fn file(instructor: &Path) -> anyhow::Result<Option<File<Record>>> {
         let path = instructor.join(FILE);
         let bytes = match fs::read(&path) {
@@ -181,7 +186,7 @@ impl RecordCache {
     ///
     /// # Errors
     /// When its file cannot be renamed.
-    pub fn replace(&self, instructor: &Path) -> io::Result<()> {
+    pub fn replace(instructor: &Path) -> io::Result<()> {
         fs::rename(instructor.join(FILE), instructor.join(REPLACED))
     }
 
@@ -221,6 +226,17 @@ impl RecordCache {
         if self.force {
             return None;
         }
+        let found = Self::kept(key, failing, budget, out)?;
+        self.settle(&found, true);
+        Some(found)
+    }
+
+    fn kept(
+        key: &str,
+        failing: impl Fn(&Evidence) -> Vec<String>,
+        budget: bool,
+        out: &Folders,
+    ) -> Option<Record> {
         let bytes = fs::read(out.instructor.join(FILE)).ok()?;
         let file: File<Record> = serde_json::from_slice(&bytes).ok()?;
         let same = file.key == key
@@ -228,27 +244,31 @@ impl RecordCache {
             && (budget || file.record.evidence.named(BUDGET).next().is_none())
             && pictures(&file.record, out).all(|picture| picture.is_file())
             && views(&file.record, out).all(|data| data.is_file());
-        if same {
-            self.settle(&file.record, true);
-        }
         same.then_some(file.record)
     }
 
-    /// Keeps a record, unless the machine left something of it unjudged. Answers what will be found.
+    /// Keeps a record, unless the machine left something of it unjudged. Answers what will be found: where another
+    /// process has kept one with the same key meanwhile, that one stays.
     ///
     /// # Errors
     /// When it cannot be written.
     pub(super) fn keep(
         &self,
         key: &str,
-        failing: Vec<String>,
+        failing: impl Fn(&Evidence) -> Vec<String>,
         record: Record,
         out: &Folders,
     ) -> anyhow::Result<Record> {
+        let budget = record.evidence.named(BUDGET).next().is_some();
+        let first = Self::kept(key, &failing, budget, out).filter(|_| !self.force);
+        if let Some(first) = first {
+            self.settle(&first, false);
+            return Ok(first);
+        }
         if record.evidence.checks.iter().any(|check| check.verdict == Verdict::NotRun) {
             return Ok(record);
         }
-        let bytes = self.write(key, failing, &record, out)?;
+        let bytes = self.write(key, failing(&record.evidence), &record, out)?;
         self.settle(&record, false);
         let file: File<Record> = serde_json::from_slice(&bytes).context("a record just kept")?;
         Ok(file.record)
@@ -305,7 +325,14 @@ mod tests {
         let failing = |_: &Evidence| vec!["1.3".to_owned()];
         let found = || cache.find("key", failing, true, &out);
         assert!(found().is_none());
-        let first = cache.keep("key", failing(&record.evidence), record.clone(), &out).unwrap();
+        let first = cache.keep("key", failing, record.clone(), &out).unwrap();
+        // Another process's with the same key stays.
+        let later = Record { diagnostics: "later".into(), ..record.clone() };
+        let kept = RecordCache::with([1; 32]).keep("key", failing, later.clone(), &out).unwrap();
+        assert_eq!(format!("{kept:?}"), format!("{record:?}"));
+        let forced = RecordCache { force: true, ..RecordCache::with([1; 32]) };
+        assert_eq!(forced.keep("key", failing, later, &out).unwrap().diagnostics, "later");
+        assert!(forced.keep("key", failing, record.clone(), &out).is_ok());
         // NaN equals nothing, itself included.
         assert_eq!(format!("{first:?}"), format!("{record:?}"));
         assert_eq!(format!("{:?}", found().unwrap()), format!("{record:?}"));
@@ -322,7 +349,7 @@ mod tests {
         assert!(found().is_none());
 
         record.evidence.checks.push(Check::new(BUDGET, "", Verdict::Fail, ""));
-        cache.keep("key", failing(&record.evidence), record, &out).unwrap();
+        cache.keep("key", failing, record, &out).unwrap();
         assert!(found().is_some());
         assert!(cache.find("key", failing, false, &out).is_none(), "grades it without a budget");
     }
@@ -336,7 +363,7 @@ mod tests {
         let mut record = sample::report().entries.remove(0).record;
         let not_run = Check::new(CheckId::BonusImage, "", Verdict::NotRun, "no adapter");
         record.evidence.checks.push(not_run);
-        assert_eq!(cache.keep("key", Vec::new(), record.clone(), &out).unwrap(), record);
+        assert_eq!(cache.keep("key", |_| Vec::new(), record.clone(), &out).unwrap(), record);
         assert_eq!(place.path().read_dir().unwrap().count(), 0);
     }
 

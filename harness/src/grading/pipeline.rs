@@ -345,7 +345,7 @@ impl<'a> Grading<'a> {
         record.stages = costs.end("diagnosis", 0.0);
         match (&self.cache, key) {
             (Some(cache), Some(key)) => {
-                cache.keep(&key, self.failing(&record.evidence), record, out)
+                cache.keep(&key, |evidence| self.failing(evidence), record, out)
             }
             _ => Ok(record),
         }

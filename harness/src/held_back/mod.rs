@@ -20,7 +20,7 @@ use sha2::{Digest, Sha256};
 
 use crate::assignment::{Assignment, SceneEntry};
 use crate::expected::load_scene;
-use crate::files::{hex, write_whole};
+use crate::files::{hex, write_new};
 use draw::Draw;
 use files::File;
 use preview::ScenePreview;
@@ -49,23 +49,25 @@ pub fn secret_seed() -> anyhow::Result<u64> {
     Ok(u64::from_le_bytes(bytes))
 }
 
-/// The secret seed that is recorded in `file`, or a new one, which is recorded there.
+/// The secret seed that is recorded in `file`, or a new one, which is recorded there. Processes that ask at the same
+/// time get the same.
 ///
 /// # Errors
 /// When the file holds no seed or cannot be written, or [`secret_seed`] fails.
 pub fn recorded_seed(file: &Path) -> anyhow::Result<u64> {
-    match std::fs::read_to_string(file) {
-        Ok(text) => text.trim().parse().with_context(|| {
-            format!("{}: expected the seed of held-back scenes, found {text:?}", file.display())
-        }),
-        Err(error) if error.kind() == ErrorKind::NotFound => {
-            let seed = secret_seed()?;
-            let written = write_whole(file, format!("{seed}\n").as_bytes());
-            written.with_context(|| format!("cannot write {}", file.display()))?;
-            Ok(seed)
+    if !file.exists() {
+        let seed = secret_seed()?;
+        match write_new(file, format!("{seed}\n").as_bytes()) {
+            // Another process was faster.
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            written => written.with_context(|| format!("cannot write {}", file.display()))?,
         }
-        Err(error) => Err(error).with_context(|| format!("cannot read {}", file.display())),
     }
+    let text =
+        std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+    text.trim().parse().with_context(|| {
+        format!("{}: expected the seed of held-back scenes, found {text:?}", file.display())
+    })
 }
 
 /// Makes the held-back scenes of a batch below the assignment's cache, if they are not there yet.

@@ -201,3 +201,17 @@ fn folders_are_for_their_owner_and_found_again() {
         assert_eq!(parent.metadata().unwrap().permissions().mode() & 0o777, 0o700);
     }
 }
+
+#[test]
+fn processes_that_ask_at_the_same_time_get_the_same_seed() {
+    for _ in 0..20 {
+        let place = tempfile::tempdir().unwrap();
+        let file = place.path().join("instructor/seed.txt");
+        let seeds: Vec<u64> = std::thread::scope(|scope| {
+            let ask = || scope.spawn(|| super::recorded_seed(&file).unwrap());
+            let threads: Vec<_> = (0..4).map(|_| ask()).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+        });
+        assert!(seeds.iter().all(|seed| *seed == seeds[0]), "{seeds:?}");
+    }
+}

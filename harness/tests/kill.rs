@@ -1,0 +1,168 @@
+//! The process that grades is ended by SIGKILL, at every step that lasts and at many moments between, and begun again:
+//! the results are those of a run that nobody disturbed.
+
+#![cfg(target_os = "linux")]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::os::unix::process::ExitStatusExt as _;
+use std::path::{Path, PathBuf};
+use std::process::Child;
+use std::time::{Duration, Instant};
+
+use similar_asserts::assert_eq;
+
+use crate::batch::{Batch, WRONG};
+
+const CLASS: [(&str, &str); 3] = [("ada", WRONG), ("bob", "what?"), ("eve", WRONG)];
+
+/// What a batch leaves that counts: `report.json` without what it cost, the grade book, and what students get.
+fn results(batch: &Batch) -> BTreeMap<PathBuf, String> {
+    let out = batch.out();
+    let mut results = BTreeMap::from([(PathBuf::from("report.json"), batch.canonical())]);
+    for name in ["grades.csv", "ada/report.html", "bob/report.html", "eve/report.html"] {
+        results.insert(name.into(), fs::read_to_string(out.join(name)).unwrap());
+    }
+    results
+}
+
+/// Waits until no process is left that works for a graders' process.
+fn nobody_is_left_of(pid: u32) {
+    let own = format!("run-{pid}-");
+    let works_for = |process: &Path| {
+        ["cmdline", "environ"].iter().any(|file| {
+            let bytes = fs::read(process.join(file)).unwrap_or_default();
+            String::from_utf8_lossy(&bytes).contains(&own)
+        })
+    };
+    let begun = Instant::now();
+    loop {
+        let all = Path::new("/proc").read_dir().unwrap().flatten();
+        let left: Vec<_> = all.map(|entry| entry.path()).filter(|path| works_for(path)).collect();
+        if left.is_empty() {
+            return;
+        }
+        assert!(begun.elapsed() < Duration::from_secs(10), "{left:?} outlive process {pid}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn kill(mut child: Child) -> bool {
+    let pid = child.id();
+    child.kill().unwrap();
+    let ended = child.wait_with_output().unwrap();
+    nobody_is_left_of(pid);
+    ended.status.signal() == Some(9)
+}
+
+#[test]
+fn ended_at_every_step_that_lasts_a_batch_goes_on_from_there() {
+    let undisturbed = Batch::new(&CLASS);
+    assert_eq!(undisturbed.grade().0, Some(0));
+    let batch = Batch::new(&CLASS);
+    let seed = batch.instructor("held-back-seed.txt");
+    let known = fs::read_to_string(&seed).unwrap();
+    fs::remove_file(&seed).unwrap();
+    let files = [
+        "held-back-seed.txt",
+        "0001.json",
+        "source.txt",
+        "label.json",
+        "record.json",
+        "batch.json",
+        "report.html",
+        "grades.csv",
+        "report.json",
+    ];
+    // The pin comes before the seed.
+    let files = [files[1], files[0]].into_iter().chain(files[2..].iter().copied());
+    for file in files {
+        for stage in ["written", "named"] {
+            let at = format!("{file}:{stage}");
+            let mut umbra = batch.command(&[batch.submissions()], &[]);
+            let child = umbra.env("UMBRA_KILL_AT", &at).spawn().unwrap();
+            let pid = child.id();
+            let ended = child.wait_with_output().unwrap();
+            assert_eq!(ended.status.signal(), Some(9), "{at}: it was never there");
+            nobody_is_left_of(pid);
+            if at == "held-back-seed.txt:named" {
+                let made: u64 = fs::read_to_string(&seed).unwrap().trim().parse().unwrap();
+                assert_ne!(made, 20191006);
+                // That of the undisturbed run, for the same scenes.
+                fs::write(&seed, &known).unwrap();
+            }
+        }
+    }
+    let (code, said) = batch.grade();
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("3 of 3 submissions keep their earlier grades"), "{said}");
+    assert_eq!(results(&batch), results(&undisturbed));
+}
+
+#[test]
+fn ended_at_any_moment_a_batch_goes_on_from_there() {
+    let moments = std::env::var("UMBRA_KILL_MOMENTS").ok();
+    let moments: usize = moments.map_or(50, |text| text.parse().unwrap());
+    let undisturbed = Batch::new(&CLASS);
+    let begun = Instant::now();
+    assert_eq!(undisturbed.grade().0, Some(0));
+    let whole = begun.elapsed();
+    let expected = results(&undisturbed);
+    let mut batch = Batch::new(&CLASS);
+    let (mut killed, mut batches) = (0, 1);
+    // A sequence that spreads evenly, whatever its length; where it met nobody alive, the next one counts.
+    for moment in 0..4 * moments {
+        if killed == moments {
+            break;
+        }
+        let share = (moment as f64 * 0.618_033_988_749_895).fract();
+        let mut child = batch.start_with(&[batch.submissions()], &[]);
+        let until = Instant::now() + whole.mul_f64(share);
+        while Instant::now() < until && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        killed += usize::from(kill(child));
+        if batch.out().join("report.html").exists() {
+            let (code, said) = batch.grade();
+            assert_eq!(code, Some(0), "{said}");
+            assert_eq!(results(&batch), expected);
+            batch = Batch::new(&CLASS);
+            batches += 1;
+        }
+    }
+    let (code, said) = batch.grade();
+    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(results(&batch), expected);
+    assert_eq!(killed, moments, "so few moments met it alive");
+    println!(
+        "killed at {killed} moments of {:.2} s, in {batches} batches: all results are those of a run undisturbed",
+        whole.as_secs_f64()
+    );
+}
+
+#[test]
+fn two_graders_on_one_folder_and_a_submission_that_goes_away() {
+    let undisturbed = Batch::new(&CLASS);
+    assert_eq!(undisturbed.grade().0, Some(0));
+    let batch = Batch::new(&CLASS);
+    let both: Vec<Child> = (0..2).map(|_| batch.start_with(&[batch.submissions()], &[])).collect();
+    for child in both {
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+    }
+    assert_eq!(results(&batch), results(&undisturbed));
+
+    let batch = Batch::new(&CLASS);
+    let mut child = batch.start_with(&[batch.submissions()], &[]);
+    while !batch.instructor("ada/record.json").exists() {
+        assert!(child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    fs::remove_dir_all(batch.submissions().join("eve")).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("eve"), "{said}");
+    let canonical = batch.canonical();
+    assert!(canonical.contains("\"slug\": \"bob\"") && canonical.contains("\"slug\": \"eve\""));
+}
