@@ -73,7 +73,16 @@ fn decode(bytes: &[u8]) -> (String, Option<Finding>) {
         let text = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
         (text.collect::<String>(), other(1, "json_encoding", "expected UTF-8, found UTF-16"))
     };
+    let wider = |bytes: &[u8], unit: fn([u8; 4]) -> u32| {
+        let units = bytes.as_chunks::<4>().0.iter().map(|four| unit(*four));
+        let text = units.map(|unit| char::from_u32(unit).unwrap_or(char::REPLACEMENT_CHARACTER));
+        (text.collect::<String>(), other(1, "json_encoding", "expected UTF-8, found UTF-32"))
+    };
     match bytes {
+        [0xff, 0xfe, 0, 0, rest @ ..] => return wider(rest, u32::from_le_bytes),
+        [0, 0, 0xfe, 0xff, rest @ ..] => return wider(rest, u32::from_be_bytes),
+        [1..=255, 0, 0, 0, ..] => return wider(bytes, u32::from_le_bytes),
+        [0, 0, 0, 1..=255, ..] => return wider(bytes, u32::from_be_bytes),
         [0xff, 0xfe, rest @ ..] => return wide(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => return wide(rest, u16::from_be_bytes),
         // A text begins with a character of ASCII here.
@@ -237,7 +246,7 @@ impl Reader {
             Some(c) if is_quote(c) => Value::Text(self.text()),
             Some(c) if c == '-' || c.is_ascii_digit() => Value::Number(self.number()),
             Some(c) if c.is_alphabetic() => {
-                let word = self.word();
+                let word = self.words();
                 match word.as_str() {
                     "null" => Value::Null,
                     "true" => Value::Bool(true),
@@ -269,6 +278,30 @@ impl Reader {
             self.next();
         }
         word
+    }
+
+    /// Unquoted words of one line, up to a sign, or to a word that is a key.
+    fn words(&mut self) -> String {
+        let mut words = self.word();
+        loop {
+            let rest = &self.chars[self.at..];
+            let gap =
+                rest.iter().take_while(|c| c.is_whitespace() && !['\n', '\r'].contains(*c)).count();
+            let word = rest[gap..]
+                .iter()
+                .take_while(|c| c.is_alphanumeric() || "-._'".contains(**c))
+                .count();
+            let after = rest[gap + word..].iter().find(|c| !c.is_whitespace() || **c == '\n');
+            let ends =
+                after.is_none_or(|c| [',', ';', '}', ']', '\n'].contains(c) || c.is_alphabetic());
+            let begins = rest.get(gap).is_some_and(|c| c.is_alphabetic());
+            if gap == 0 || !begins || !ends {
+                return words;
+            }
+            words.push(' ');
+            words.extend(&rest[gap..gap + word]);
+            self.at += gap + word;
+        }
     }
 
     /// A number, also one in groups: `260 123 456`.

@@ -94,9 +94,15 @@ impl Validation {
         self
     }
 
-    /// Whether the tree is the handout's, whatever `config.json` says. Of a refused one nothing is known.
+    /// Whether the tree is the handout's, whatever `config.json` says and wherever it lies. Of a refused one nothing
+    /// is known.
     pub fn follows_tree(&self) -> bool {
-        let fits = |line: &TreeLine| !matches!(line.mark, Mark::Missing | Mark::WrongPlace);
+        let is_config = |line: &TreeLine| line.expected.as_deref() == Some(CONFIG_FILE);
+        let fits = |line: &TreeLine| match line.mark {
+            Mark::Missing => false,
+            Mark::WrongPlace => is_config(line),
+            Mark::Ok | Mark::Absent | Mark::Unexpected => true,
+        };
         !self.tree.is_empty() && self.tree.iter().all(fits)
     }
 }
