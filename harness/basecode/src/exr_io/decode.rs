@@ -85,7 +85,11 @@ impl Decoder<'_> {
     fn check_signature(&self) -> Result<(), ImageError> {
         let found = match self.bytes {
             [] => "nothing (the file is empty)".to_owned(),
-            bytes => bytes.iter().take(4).map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" "),
+            bytes => {
+                let start: Vec<String> = bytes.iter().take(4).map(|b| format!("{b:02x}")).collect();
+                let start = start.join(" ");
+                kind_of(bytes).map_or(start.clone(), |kind| format!("{start}, as {kind}"))
+            }
         };
         let magic = &exr::meta::magic_number::BYTES[..];
         if self.bytes.is_empty() || !self.bytes.starts_with(&magic[..self.bytes.len().min(4)]) {
@@ -185,7 +189,8 @@ impl Decoder<'_> {
         layers.dedup();
         layers.retain(|layer| ["R", "G", "B"].iter().any(|c| has(layer, c)));
         if layers.is_empty() {
-            return Err(match all.iter().any(|name| name == "Y") {
+            let of_luminance = |name: &String| ["Y", "RY", "BY", "A"].contains(&name.as_str());
+            return Err(match all.iter().any(|name| name == "Y") && all.iter().all(of_luminance) {
                 true => ImageError::LuminanceOnly { path: self.path.into() },
                 false => self.missing_channel("R", &all),
             });
@@ -298,6 +303,28 @@ impl Decoder<'_> {
             found: all.join(", "),
         }
     }
+}
+
+/// What a file is by its first bytes, when it is no EXR.
+fn kind_of(bytes: &[u8]) -> Option<&'static str> {
+    const KINDS: [(&[u8], &str); 15] = [
+        (b"\x89PNG", "a PNG image does"),
+        (b"\xff\xd8\xff", "a JPEG image does"),
+        (b"#?RA", "a Radiance HDR image does"),
+        (b"#?RGBE", "a Radiance HDR image does"),
+        (b"PF\n", "a PFM image does"),
+        (b"Pf\n", "a PFM image does"),
+        (b"P6", "a PPM image does"),
+        (b"II*\0", "a TIFF image does"),
+        (b"MM\0*", "a TIFF image does"),
+        (b"GIF8", "a GIF image does"),
+        (b"BM", "a BMP image does"),
+        (b"PK\x03\x04", "a zip archive does"),
+        (b"\x1f\x8b", "gzip data do"),
+        (b"<", "a web page does"),
+        (b"version https://git-lfs", "the pointer does that Git LFS leaves in a file's place"),
+    ];
+    KINDS.iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, kind)| *kind)
 }
 
 /// The `name = text` lines of a file's `comments`.
