@@ -435,9 +435,13 @@ fn text_of_a_broken_config() {
         said,
         "
 warning: config.json:9: a comma before ']'
+  9 |     { \"scene\": \"Cornell box, realtime\", \"render\": \"realtime/cbox_simple_realtime.exr\" },
+    |                                                                                        ^
   hint: remove the comma
 
 warning: config.json:2: \"firstName\" is empty
+  2 |   \"firstName\": \"\",
+    |    ^
   hint: write your name: \"firstName\": \"Ada\"
 "
     );

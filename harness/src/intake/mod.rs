@@ -36,7 +36,7 @@ mod zip;
 mod zip_headers;
 
 pub use check_config::check_config;
-pub use finding::{Finding, Severity};
+pub use finding::{Excerpt, Finding, Severity};
 pub use limits::Limits;
 pub use pack::{Packed, archive_name, fix, mends, pack};
 pub use source_rules::{scan_source, scan_text};

@@ -261,8 +261,8 @@ impl SubmittedConfig {
                         Value::Text(text) => Some((text.clone(), node.line)),
                         _ => None,
                     });
-                    let paths = texts.filter(|(text, _)| text.to_lowercase().ends_with(".exr"));
-                    (String::new(), paths.last())
+                    let is_path = |(text, _): &(String, u32)| text.to_lowercase().ends_with(".exr");
+                    (String::new(), texts.filter(is_path).next_back())
                 }
                 _ => (String::new(), None),
             };

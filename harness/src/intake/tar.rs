@@ -401,7 +401,8 @@ fn names(
                 ));
             }
             key if key.starts_with("GNU.sparse") => {
-                if !sparse.get_or_insert_default().take(key, &value) {
+                let makes_sense = sparse.get_or_insert_default().take(key, &value);
+                if !makes_sense {
                     let finding = special(EntryType::GNUSparse).at(printable_bytes(&name));
                     return Err(copy.refuse(finding));
                 }

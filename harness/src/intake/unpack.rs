@@ -141,7 +141,8 @@ pub(crate) fn read_archive(source: &Path, limits: &Limits) -> Result<Option<Vec<
         return refuse(Finding::error("link", message).hint("name what it leads to"));
     }
     if !metadata.is_file() {
-        return refuse(Finding::error("not_a_file", "expected an archive or a folder"));
+        let message = "expected an archive or a folder, found a device, fifo or socket";
+        return refuse(Finding::error("not_a_file", message));
     }
     let file = folder::open_file(path).map_err(|e| IntakeError::io("read", source, e))?;
     if !file.metadata().is_ok_and(|opened| opened.is_file()) {
