@@ -197,7 +197,13 @@ impl Entry {
             "map_ks" => self.maps[1] = Some((at.line, rest.to_owned())),
             "bump" | "disp" | "decal" | "refl" | "norm" => return Ok(false),
             other if other.starts_with("map_") => return Ok(false),
-            // Ambient light, transparency, refraction and what else has no part in the assignment.
+            // All is opaque here. `-halo` may stand before the number.
+            "d" | "tr" => {
+                let opaque = if keyword.eq_ignore_ascii_case("d") { 1.0 } else { 0.0 };
+                let value = words(rest).last().and_then(|word| word.parse::<f32>().ok());
+                return Ok(value.is_none_or(|value| value == opaque));
+            }
+            // Ambient light, refraction and what else has no part in the assignment.
             _ => {}
         }
         Ok(true)
