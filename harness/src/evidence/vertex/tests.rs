@@ -18,8 +18,7 @@ struct Fixture {
 impl Fixture {
     fn new() -> Self {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let scene =
-            load_scene(&root.join("scenes/a2/cbox/tinyrender/cbox_simple_offline.toml"));
+        let scene = load_scene(&root.join("scenes/a2/cbox/tinyrender/cbox_simple_offline.toml"));
         let scene = scene.unwrap();
         let (width, height) = FILM;
         let surface = SurfaceBuffer::new(&scene, width, height).unwrap();
