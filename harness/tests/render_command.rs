@@ -302,6 +302,9 @@ fn what_is_no_mesh_is_told_from_one_without_faces() {
     let glowing = MTL.replacen("Kd ", "Ke 1 1 1\nKd ", 1);
     let (_, said) = Scene::new(&plain(), &glowing).run(&["s.toml", "--output", "o.exr"]);
     assert!(said.contains("s.obj: 2 shapes emit light; the light is the first"), "{said}");
+    let clear = MTL.replacen("Kd ", "d -halo 0.5\nTr 0\nKd ", 1);
+    let (_, said) = Scene::new(&plain(), &clear).run(&["s.toml", "--output", "o.exr"]);
+    assert!(said.contains("m.mtl:3: d is ignored") && !said.contains("Tr is"), "{said}");
 }
 
 #[test]
