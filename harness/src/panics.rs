@@ -30,12 +30,22 @@ impl fmt::Display for Bug {
 
 impl std::error::Error for Bug {}
 
+impl Bug {
+    /// What kept `print!` from writing to standard output, if that is what panicked: no bug, but a full disk.
+    pub fn unprintable(&self) -> Option<&str> {
+        self.message.strip_prefix("failed printing to stdout: ")
+    }
+}
+
 /// From now on panics are told on standard error in one line (with a backtrace when `RUST_BACKTRACE`
 /// asks for it), and [`contain`] knows their places.
 pub fn note() {
     std::panic::set_hook(Box::new(|info: &PanicHookInfo| {
         let place = info.location().map(ToString::to_string).unwrap_or_default();
         let bug = Bug { message: text(info.payload()), place };
+        if bug.unprintable().is_some() {
+            return;
+        }
         eprintln!("umbra: internal error: {bug}");
         let trace = std::backtrace::Backtrace::capture();
         if trace.status() == std::backtrace::BacktraceStatus::Captured {

@@ -213,3 +213,54 @@ fn fix_repacks_names_with_backslashes() {
     assert_eq!(code, Some(0));
     assert!(!said.contains("backslash"), "{said}");
 }
+
+#[test]
+fn what_cannot_be_packed_or_written_is_named_with_its_reason() {
+    let place = tempfile::tempdir().unwrap();
+    put(place.path().join("file"), b"x");
+    let at = |name: &str| place.path().join(name);
+    for (folder, expected) in
+        [("gone", "gone does not exist"), ("file", "is a file, expected your")]
+    {
+        let (code, _, said) = umbra(&["pack"], &[&at(folder)]);
+        assert!(code == Some(2) && said.contains(expected), "{said}");
+        let (code, _, said) = umbra(&["check"], &[&at(folder)]);
+        let expected = expected.replace("a file, expected your", "no archive, expected your");
+        assert!(code == Some(2) && said.contains(&expected), "{said}");
+        assert!(!said.contains("compil"), "it is said before any work: {said}");
+    }
+    let (code, _, said) = umbra(&["check", "--part", "2.6"], &[place.path()]);
+    assert!(code == Some(2) && said.starts_with("umbra: there is no part 2.6"), "{said}");
+}
+
+/// What is renamed onto a device would take its place.
+#[cfg(unix)]
+#[test]
+fn an_archive_is_not_written_over_what_is_no_file() {
+    let place = tempfile::tempdir().unwrap();
+    let config = config("Ada", "Lampglow", "260123456");
+    put(place.path().join("a.zip"), &zip(&submission(&config, "src/lib.rs", "x")));
+    let fifo = place.path().join("fifo");
+    nix::unistd::mkfifo(&fifo, nix::sys::stat::Mode::from_bits_truncate(0o600)).unwrap();
+    let archive = place.path().join("a.zip");
+    let (code, _, said) = umbra(&["validate"], &[&archive, Path::new("--fix"), &fifo]);
+    assert!(code == Some(2) && said.contains("it is there, and no file"), "{said}");
+    use std::os::unix::fs::FileTypeExt as _;
+    assert!(fifo.symlink_metadata().unwrap().file_type().is_fifo());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_under_standard_output_is_no_bug() {
+    for arguments in [&["explain"][..], &["completions", "bash"]] {
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let run = Command::new(env!("CARGO_BIN_EXE_umbra")).args(arguments).stdout(full).output();
+        let run = run.unwrap();
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(3), "{said}");
+        assert!(
+            said.starts_with("umbra: cannot write to standard output: No space left"),
+            "{said}"
+        );
+    }
+}

@@ -194,6 +194,60 @@ fn a_submission_that_the_machine_fails_on_costs_the_others_nothing() {
     assert!(said.contains("held-back-seed.txt: expected the seed of held-back scenes"), "{said}");
 }
 
+/// What Umbra keeps of a bug that it met with `submission`: the keys of the batch and of all files, see
+/// `RecordCache::keep_bug`.
+fn keep_bug(batch: &Batch, name: &str) {
+    use sha2::{Digest as _, Sha256};
+    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x}")).collect::<String>();
+    let record = fs::read(batch.instructor(name).join("record.json")).unwrap();
+    let record: serde_json::Value = serde_json::from_slice(&record).unwrap();
+    let own = record["batch"].as_str().unwrap().as_bytes();
+    let nibble = |sign: u8| (sign as char).to_digit(16).unwrap() as u8;
+    let own: Vec<u8> = own.chunks(2).map(|two| 16 * nibble(two[0]) + nibble(two[1])).collect();
+    let mut hash = Sha256::new_with_prefix(own);
+    let folder = batch.place.path().join("submissions").join(name);
+    for path in [&folder, &folder.join("src"), &folder.join("src/lib.rs")] {
+        let meta = path.symlink_metadata().unwrap();
+        hash.update(path.as_os_str().as_encoded_bytes());
+        hash.update(meta.len().to_le_bytes());
+        hash.update(format!("{:?}", meta.modified().ok()));
+    }
+    let bug = serde_json::json!({"message": "a pixel of -0.0", "place": "srgb.rs:1:1"});
+    let met = serde_json::json!({"key": hex(&hash.finalize()), "bug": bug});
+    fs::write(batch.instructor(name).join("internal-error.json"), met.to_string()).unwrap();
+}
+
+#[test]
+fn a_bug_that_one_submission_meets_ends_with_70_and_costs_the_others_nothing() {
+    let batch = Batch::new(&[("ada", WRONG), ("bob", WRONG), ("eve", WRONG)]);
+    assert_eq!(batch.grade().0, Some(0));
+    keep_bug(&batch, "bob");
+    fs::remove_file(batch.instructor("bob/record.json")).unwrap();
+    batch.submission("fay", WRONG);
+    for others in [2, 3] {
+        // Neither is it met again, nor forgotten.
+        let (code, said) = batch.grade();
+        assert_eq!(code, Some(70), "{said}");
+        assert!(said.contains(&format!("{others} of 4 submissions keep")), "{said}");
+        let csv = fs::read_to_string(batch.out().join("grades.csv")).unwrap();
+        let line = |name: &str| csv.lines().find(|line| line.contains(name)).unwrap().to_owned();
+        assert!(
+            line("bob").contains("ungraded") && line("bob").contains("internal error"),
+            "{csv}"
+        );
+        for other in ["ada", "eve", "fay"] {
+            assert!(!line(other).contains("ungraded"), "{csv}");
+        }
+        let page = fs::read_to_string(batch.out().join("bob/report.html")).unwrap();
+        assert!(!page.contains("srgb.rs"), "what a bug says may hold anything");
+    }
+    // A changed submission, or --force, is tried again.
+    let (code, said) = batch.grade_with(&["bob"], &["--force"]);
+    assert_eq!(code, Some(0), "{said}");
+    let csv = fs::read_to_string(batch.out().join("grades.csv")).unwrap();
+    assert!(!csv.contains("ungraded"), "{csv}");
+}
+
 #[test]
 fn a_class_grows_and_nobody_falls_out_of_it() {
     let batch = Batch::new(&[("a/ada", WRONG), ("a/bob", WRONG), ("b/eve", WRONG)]);

@@ -435,9 +435,13 @@ fn text_of_a_broken_config() {
         said,
         "
 warning: config.json:9: a comma before ']'
+  9 |     { \"scene\": \"Cornell box, realtime\", \"render\": \"realtime/cbox_simple_realtime.exr\" },
+    |                                                                                        ^
   hint: remove the comma
 
 warning: config.json:2: \"firstName\" is empty
+  2 |   \"firstName\": \"\",
+    |    ^
   hint: write your name: \"firstName\": \"Ada\"
 "
     );
@@ -494,18 +498,28 @@ fn what_systems_add_to_a_name_is_known_and_two_of_a_kind_are_none() {
         ("config.json", "config.json.txt"),
         ("config.json", "config (1).json"),
         ("config.json", "Config - Copy.json"),
+        ("config.json", "Config.JSON"),
+        ("config.json", "src/config.json"),
+        ("config.json", "config"),
+        ("config.json", "conifg.json"),
+        ("config.json", "my_config.jsonc"),
+        ("config.json", ".config.json"),
         ("src/lib.rs", "src/lib.rs.txt"),
         ("offline/cbox_simple_offline.exr", "offline/cbox_simple_offline(2).exr"),
     ] {
         let renamed = |path: &str| if path == name { seen } else { path }.to_owned();
         let found = validate_files(&moved(|path| Some(renamed(path))));
         let wrong: Vec<_> =
-            found.findings.iter().filter(|f| f.severity == Severity::Error).collect();
+            found.findings.iter().filter(|f| f.code == "tree_wrong_place").collect();
+        // Wherever config.json lies, it is read.
+        let weight = if name == "config.json" { Severity::Warning } else { Severity::Error };
         assert!(
-            matches!(wrong.as_slice(), [f] if f.code == "tree_wrong_place" && f.path.as_deref() == Some(seen)),
+            matches!(wrong.as_slice(), [f] if f.severity == weight && f.path.as_deref() == Some(seen)),
             "{}",
             found.to_text()
         );
+        assert_eq!(found.conforms, weight == Severity::Warning, "{seen}");
+        assert_eq!(found.follows_tree(), found.conforms, "{seen}");
         let student = found.config.unwrap();
         assert_eq!(student.sampler_seed(), Some(260_123_456), "{seen}");
     }
@@ -513,12 +527,24 @@ fn what_systems_add_to_a_name_is_known_and_two_of_a_kind_are_none() {
     let mut files = perfect();
     files.push(("config (1).json".into(), b"{}".to_vec()));
     assert!(validate_files(&files).conforms);
+    // Of two configurations the first counts, of two sources none.
     let mut files = moved(|path| (path != "config.json").then(|| path.to_owned()));
     for name in ["config (1).json", "config (2).json"] {
         files.push((name.into(), CONFIG.into()));
     }
     let found = validate_files(&files);
-    assert!(found.findings.iter().any(|f| f.code == "tree_missing"), "{}", found.to_text());
+    assert!(found.conforms && found.config.is_some(), "{}", found.to_text());
+    let mut files = moved(|path| (path != "src/lib.rs").then(|| path.to_owned()));
+    for name in ["v1/lib.rs", "v2/lib.rs"] {
+        files.push((name.into(), b"x".to_vec()));
+    }
+    let found = validate_files(&files);
+    let said = found.findings.iter().find(|f| f.code == "tree_ambiguous").unwrap();
+    assert_eq!(
+        said.message,
+        "expected once in the submission, found 2 files of this name: v1/lib.rs, v2/lib.rs"
+    );
+    assert!(!found.follows_tree());
 }
 
 // --- pack and fix ---
@@ -726,6 +752,17 @@ fn a_slip_in_the_config_is_a_warning_and_the_tree_is_as_it_is() {
         ("an image that is not there", swapped("teapot_simple_offline.exr\"", "teapot.exr\"")),
         ("a backslash", swapped("offline/cbox", "offline\\\\cbox")),
         ("no list", swapped("\"renders\"", "\"x\"")),
+        ("dots in the number", swapped("260123456", "260.123.456")),
+        ("a letter before the number", swapped("260123456", "A260123456")),
+        ("words around the number", swapped("260123456", "ID: 260123456 (McGill)")),
+        ("a spreadsheet's number", swapped("\"260123456\"", "2.60123456e8")),
+        ("a list", swapped("\"260123456\"", "[\"260123456\"]")),
+        ("an object", swapped("\"260123456\"", "{\"number\": 260123456}")),
+        ("wide digits", swapped("260123456", "\u{ff12}60123456")),
+        ("UTF-32", CONFIG.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect()),
+        ("a slash before", swapped("offline/cbox", "/offline/cbox")),
+        ("a tab for a backslash", swapped("offline/teapot", "offline\\teapot")),
+        ("another machine's path", swapped("offline/cbox", "C:/Users/ada/a2/offline/cbox")),
     ] {
         let mut files = perfect();
         files[0].1 = config;

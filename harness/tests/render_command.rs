@@ -250,6 +250,102 @@ fn forms_that_exporters_write_are_read() {
     }
 }
 
+#[test]
+fn places_on_another_machine_are_looked_for_beside_the_file() {
+    let right = Scene::new(&plain(), MTL).image();
+    let scene = Scene::new("", MTL);
+    let here = scene.path("m.mtl").display().to_string();
+    for place in ["C:\\Users\\ada\\m.mtl", "/home/ada/a2/m.mtl", "\\\\server\\a2\\m.mtl", &here] {
+        fs::write(scene.path("s.obj"), plain().replace("m.mtl", place)).unwrap();
+        assert_eq!(scene.image().pixels, right.pixels, "{place}");
+        let (_, said) = scene.run(&["s.toml", "--output", "o.exr"]);
+        assert!(said.contains(&format!("s.obj:1: {place} is absolute; taken is m.mtl")), "{said}");
+    }
+    let uvs = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    let obj = mesh(&format!("{uvs}f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"));
+    let right = Scene::new(&obj, TEXTURED).image();
+    let with = |place: &str| Scene::new(&obj, &TEXTURED.replace("t.png", place));
+    assert_eq!(with("-s 1 1 D:/a/t.png").image().pixels, right.pixels);
+    for (statement, expected) in [
+        ("/home/ada/gone.png", "; /home/ada/gone.png is absolute, so it was looked for here"),
+        ("T.PNG", "; there is t.png: upper and lower case count"),
+        ("t.png -s 2 2", "-s 2 2 stands behind the file, expected options before it"),
+        (
+            "m.mtl",
+            "cannot decode the texture m.mtl: expected PNG, JPEG, TGA or BMP, found something else",
+        ),
+    ] {
+        let said = with(statement).error();
+        assert!(said.trim_end().ends_with(expected), "{said}");
+    }
+}
+
+#[test]
+fn what_is_no_mesh_is_told_from_one_without_faces() {
+    for (obj, expected) in [
+        (
+            "<!doctype html>\n",
+            "it has no vertex (v) and no face (f), and begins with \"<!doctype html>\"",
+        ),
+        ("\u{1f}\u{8b}\u{8}", "begins with \"???\""),
+        (
+            "v 0 0 0\nv 0 0 1\n",
+            "s.obj: mesh holds no triangle: it has 2 vertices (v) and no face (f)",
+        ),
+    ] {
+        let said = Scene::new(obj, MTL).error();
+        assert!(said.contains(expected), "{said}");
+    }
+    let right = Scene::new(&plain(), MTL).image();
+    let upper = plain().replace("v ", "V ").replace("f ", "F ").replace("usemtl ", "USEMTL ");
+    assert_eq!(Scene::new(&upper, MTL).image().pixels, right.pixels);
+    let glowing = MTL.replacen("Kd ", "Ke 1 1 1\nKd ", 1);
+    let (_, said) = Scene::new(&plain(), &glowing).run(&["s.toml", "--output", "o.exr"]);
+    assert!(said.contains("s.obj: 2 shapes emit light; the light is the first"), "{said}");
+    let clear = MTL.replacen("Kd ", "d -halo 0.5\nTr 0\nKd ", 1);
+    let (_, said) = Scene::new(&plain(), &clear).run(&["s.toml", "--output", "o.exr"]);
+    assert!(said.contains("m.mtl:3: d is ignored") && !said.contains("Tr is"), "{said}");
+}
+
+#[test]
+fn slips_in_a_scene_file_are_told_in_plain_words() {
+    let right = Scene::new(&plain(), MTL);
+    let folder = right.path("").file_name().unwrap().to_string_lossy().into_owned();
+    let expected = right.image();
+    fs::write(right.path("s.toml"), TOML.replace("s.obj", &format!("../{folder}/s.obj"))).unwrap();
+    assert_eq!(
+        right.image().pixels,
+        expected.pixels,
+        "a way that leaves the folder and comes back"
+    );
+    for (from, to, expected) in [
+        (
+            "[0.0, 3.0, 4.0]",
+            "[0, 3, 4, 1]",
+            "s.toml:4: camera.eye has 4 numbers, expected 3: [x, y, z]",
+        ),
+        ("[0.0, 3.0, 4.0]", "[0, 3]", "s.toml:4: invalid length 2, expected 3 numbers: [x, y, z]"),
+        (
+            "spp = 4",
+            "spp = 99999999999999999999",
+            "invalid type: integer `99999999999999999999`, expected a whole",
+        ),
+        (
+            "s.obj",
+            "C:/scenes/s.obj",
+            "s.toml:2: input.objfile is C:/scenes/s.obj but must be relative",
+        ),
+    ] {
+        let scene = Scene::new(&plain(), MTL);
+        fs::write(scene.path("s.toml"), TOML.replacen(from, to, 1)).unwrap();
+        let said = scene.error();
+        assert!(said.contains(expected), "{said}");
+    }
+    let (code, said) =
+        Scene::new(&plain(), MTL).run(&["s.toml", "--output", "o.exr", "--spp", "0"]);
+    assert!(code == 2 && said.contains("0 is not in 1..="), "{said}");
+}
+
 /// The scene `scale` times as large, its light as bright.
 fn scaled(obj: &str, scale: f64) -> Scene {
     let resized = obj.lines().map(|line| match line.strip_prefix("v ") {

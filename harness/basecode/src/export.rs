@@ -125,7 +125,7 @@ unsafe extern "C" fn unload_scene(scene: api::Scene) {
     // SAFETY: the host hands back what `load_scene` gave, once.
     let loaded = unsafe { Box::from_raw(scene.cast::<Loaded>()) };
     // A panic in a student's `drop` must not cross the boundary.
-    let _ = catch_unwind(AssertUnwindSafe(|| drop(loaded)));
+    catch_unwind(AssertUnwindSafe(|| drop(loaded))).unwrap_or_else(forget);
 }
 
 unsafe extern "C" fn set_witness(
@@ -335,12 +335,13 @@ unsafe extern "C" fn close_realtime(pass: api::Pass) {
     // SAFETY: the host hands back what `open_realtime` gave, once.
     let open = unsafe { Box::from_raw(pass.cast::<OpenPass>()) };
     // A panic in a student's `drop` must not cross the boundary; the device goes with it.
-    let _ = catch_unwind(AssertUnwindSafe(|| {
+    let dropped = catch_unwind(AssertUnwindSafe(|| {
         let OpenPass { pass, target, gpu, adapter: (kind, name), realtime: _realtime, opening: _ } =
             *open;
         drop((pass, target));
         gpu.keep(kind, &name);
     }));
+    dropped.unwrap_or_else(forget);
 }
 
 /// A surface point of no scene, for materials given by value.
@@ -482,7 +483,11 @@ fn guard_noting(message: *mut api::Message, body: impl FnOnce() -> Result<String
         // The status says it already: the message is the task alone, as for `todo!()`.
         Ok(Err(Error::NotImplemented(task))) => (api::STATUS_NOT_IMPLEMENTED, task),
         Ok(Err(error)) => (status_of(&error), error.to_string()),
-        Err(payload) => describe_panic(payload.as_ref()),
+        Err(payload) => {
+            let described = describe_panic(payload.as_ref());
+            forget(payload);
+            described
+        }
     };
     // SAFETY: the host's message with a buffer of `capacity` bytes.
     unsafe {
@@ -510,6 +515,11 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
     let text = payload.downcast_ref::<&str>().copied();
     text.or_else(|| payload.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("a panic without a message")
+}
+
+/// What a panic carries may itself panic when it is dropped, which would end the worker.
+fn forget(payload: Box<dyn Any + Send>) {
+    std::mem::forget(payload);
 }
 
 /// `todo!()` and `unimplemented!()` are panics with a fixed beginning: not a crash, but work to do.

@@ -274,7 +274,15 @@ fn wrong_kinds_of_file_are_named() {
         message(b""),
         "submission.exr: not an EXR file: it starts with nothing (the file is empty), expected 76 2f 31 01"
     );
-    assert!(message(b"\x89PNG\r\n\x1a\n").contains("it starts with 89 50 4e 47"));
+    for (start, said) in [
+        (&b"\x89PNG\r\n\x1a\n"[..], "89 50 4e 47, as a PNG image does, expected 76 2f 31 01"),
+        (b"#?RADIANCE\n", "23 3f 52 41, as a Radiance HDR image does, expected"),
+        (b"PF\n4 3\n", "50 46 0a 34, as a PFM image does, expected"),
+        (b"version https://git-lfs.github.com", "76 65 72 73, as the pointer does that Git LFS"),
+        (b"some text", "it starts with 73 6f 6d 65, expected"),
+    ] {
+        assert!(message(start).contains(said), "{}", message(start));
+    }
     assert!(
         message(&patched(plain(), &[0x76, 0x2f, 0x31, 0x01, 2], 0, &[8])).contains("deep data")
     );
@@ -314,6 +322,10 @@ fn wrong_channels_are_named() {
         "submission.exr: luminance only (channel Y); expected R, G and B"
     );
     assert!(file(&[("Z", half)]).contains("no channel R"));
+    assert_eq!(
+        file(&[("X", half), ("Y", half), ("Z", half)]),
+        "submission.exr: no channel R; expected R, G and B, found X, Y, Z"
+    );
     assert!(
         file(&[("B", half), ("G", half), ("R", half), ("x.B", half), ("x.R", half)])
             .contains("no channel x.G")

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use anyhow::ensure;
 use serde::{Deserialize, Serialize};
 
 use super::asked::Asked;
@@ -16,6 +17,7 @@ use super::{class, terminal};
 use crate::class::Source;
 use crate::files::{files_below, write_whole};
 use crate::grading::Mode;
+use crate::intake::{format_of_bytes, read_archive};
 use crate::report::{self, Closing, Look};
 use crate::rubric::Part;
 
@@ -68,6 +70,18 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let (parts, scenes) = (arguments.part.clone(), arguments.scene.clone());
     let asked = Asked { parts, scenes };
     let folder = &arguments.submission;
+    // What cannot be done is said before it is said what is done.
+    let mut assignment = Context::assignment(root)?;
+    asked.restrict(&mut assignment)?;
+    ensure!(folder.exists(), "{} does not exist", folder.display());
+    if folder.is_file() {
+        let bytes = read_archive(folder, &assignment.limits.archive)?.unwrap_or_default();
+        ensure!(
+            format_of_bytes(&bytes).is_some(),
+            "{} is no archive, expected your working folder or what umbra pack made of it",
+            folder.display()
+        );
+    }
     // `.` has no name of its own.
     let named = || folder.canonicalize().ok();
     let source = Some(folder.clone()).filter(|folder| folder.file_name().is_some());

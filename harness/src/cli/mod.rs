@@ -31,6 +31,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+use crate::columns::wrap;
 use crate::panics;
 
 /// Success.
@@ -149,18 +150,49 @@ pub fn main() -> ExitCode {
         signal(Signal::SIGPIPE, SigHandler::SigDfl)
     };
     panics::note();
-    let Arguments { command, root } = Arguments::parse();
+    let Arguments { command, root } = Arguments::try_parse().unwrap_or_else(|error| {
+        if error.kind() != clap::error::ErrorKind::DisplayHelp {
+            error.exit()
+        }
+        let help = error.render();
+        let help = if terminal::colours() { help.ansi().to_string() } else { help.to_string() };
+        print!("{}", wrapped(&help, terminal::width().min(HELP_COLUMNS)));
+        std::process::exit(i32::from(EXIT_OK))
+    });
     match panics::contain(|| run(command, root.as_deref())) {
         Ok(Ok(code)) => ExitCode::from(code),
-        Err(_) => {
-            eprintln!("umbra: {BUG}");
-            ExitCode::from(EXIT_BUG)
-        }
+        Err(bug) => match bug.unprintable() {
+            Some(error) => {
+                eprintln!("umbra: cannot write to standard output: {error}");
+                ExitCode::from(EXIT_MACHINE)
+            }
+            None => {
+                eprintln!("umbra: {BUG}");
+                ExitCode::from(EXIT_BUG)
+            }
+        },
         Ok(Err(error)) => {
             eprintln!("umbra: {}", told_once(&error));
             ExitCode::from(if machine_lacks(&error) { EXIT_MACHINE } else { EXIT_USAGE })
         }
     }
+}
+
+/// Help is not wider than this, however wide the terminal is.
+const HELP_COLUMNS: usize = 100;
+
+/// A text in which no line is wider than `width` columns. What follows of a line is as far in as it began.
+fn wrapped(text: &str, width: usize) -> String {
+    let mut out = String::new();
+    for line in text.lines() {
+        let rest = line.trim_start_matches(' ');
+        let indent = &line[..line.len() - rest.len()];
+        for part in wrap(rest, width.saturating_sub(indent.len()).max(20)) {
+            out.push_str(format!("{indent}{part}").trim_end());
+            out.push('\n');
+        }
+    }
+    out
 }
 
 /// An error and its causes, without those that it tells of already.
@@ -234,12 +266,9 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         #[cfg(target_os = "linux")]
         Command::Doctor => doctor::run(),
         Command::Completions { shell } => {
-            clap_complete::generate(
-                shell,
-                &mut Arguments::command(),
-                "umbra",
-                &mut std::io::stdout(),
-            );
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "umbra", &mut script);
+            print!("{}", String::from_utf8_lossy(&script));
             Ok(EXIT_OK)
         }
         Command::Bless(arguments) => bless::run(&arguments, root),
@@ -264,6 +293,19 @@ mod tests {
         // Where there is no sandbox there is no `doctor`.
         if cfg!(target_os = "linux") {
             insta::assert_snapshot!("help", all);
+        }
+    }
+
+    #[test]
+    fn help_is_as_wide_as_the_terminal() {
+        let text = "Usage: umbra\n\n          one two three four five six\n";
+        let expected = "Usage: umbra\n\n          one two three four\n          five six\n";
+        assert_eq!(wrapped(text, 30), expected);
+        let mut grade = Arguments::command().find_subcommand("grade").unwrap().clone();
+        for width in [40, 80, 100] {
+            let help = wrapped(&grade.render_long_help().to_string(), width);
+            let widest = help.lines().map(|line| line.chars().count()).max();
+            assert!(widest <= Some(width), "{help}");
         }
     }
 

@@ -32,7 +32,7 @@ pub struct RenderArguments {
     #[arg(long, short, value_name = "OUT.exr|OUT.png")]
     output: PathBuf,
     /// Samples per pixel, offline [default: the scene's]
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     spp: Option<u32>,
     /// Seed of the samplers [default: the student number in the config.json of the submission that the
     /// image is written into, else 0]

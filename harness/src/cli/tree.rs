@@ -1,10 +1,11 @@
 //! `umbra validate` and `umbra pack`: a submission's tree, without running anything of it.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use std::sync::atomic::Ordering;
 
-use anyhow::{bail, ensure};
+use anyhow::{Context as _, bail, ensure};
 use unicode_width::UnicodeWidthStr as _;
 
 use super::context::{Context, INTERRUPTED};
@@ -176,6 +177,9 @@ fn look(
         Err(IntakeError::Refused(refusal)) => {
             Ok((intake::validate_refusal(&refusal), Err(IntakeError::Refused(refusal))))
         }
+        Err(IntakeError::Io { source, .. }) if source.kind() == ErrorKind::Other => {
+            Err(super::MachineLacks(format!("{}: {source}", archive.display())).into())
+        }
         Err(error) => bail!(error),
     }
 }
@@ -185,7 +189,12 @@ pub fn pack(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8
     let context = Context::new(root)?;
     let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
     let out = arguments.output.as_deref().unwrap_or(Path::new("."));
-    match intake::pack(&arguments.folder, out, tree, limits) {
+    let folder = arguments.folder.display();
+    ensure!(arguments.folder.exists(), "{folder} does not exist");
+    ensure!(arguments.folder.is_dir(), "{folder} is a file, expected your working folder");
+    // A link of one's own may be followed.
+    let source = arguments.folder.canonicalize().with_context(|| folder.to_string())?;
+    match intake::pack(&source, out, tree, limits) {
         Ok(packed) => {
             // As whoever grades it will see it.
             let private = tempfile::tempdir_in(&context.supervisor.scratch)?;

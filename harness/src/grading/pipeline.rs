@@ -673,8 +673,16 @@ fn config_check(validation: &Validation) -> Option<Check> {
     let own = |f: &&intake::Finding| {
         f.path.as_deref() == Some(intake::CONFIG_FILE) && f.severity != intake::Severity::Note
     };
-    let slip = validation.findings.iter().find(|finding| own(finding) && finding.line.is_some())?;
-    let line = slip.line.unwrap_or(1);
-    let words = format!("{}:{line}: {}", intake::CONFIG_FILE, slip.message);
+    let slip = validation.findings.iter().find(|finding| own(finding) && finding.line.is_some());
+    // One under another name is read all the same, and said to be.
+    let misplaced = || validation.findings.iter().find(|finding| finding.is_misplaced_config());
+    let words = match slip {
+        Some(slip) => {
+            format!("{}:{}: {}", intake::CONFIG_FILE, slip.line.unwrap_or(1), slip.message)
+        }
+        None => misplaced().map(|slip| {
+            format!("{}: {}", slip.path.as_deref().unwrap_or_default(), slip.message)
+        })?,
+    };
     Some(Check::new(CONFIG, "", Verdict::Fail, "config.json has a slip").with_hint(words))
 }

@@ -153,13 +153,14 @@ fn check_renders(
     let mut listed: HashMap<String, u32> = HashMap::new();
     for render in &config.renders {
         let written = printable(&render.render);
-        let path = match resolve(&render.render) {
-            Ok(path) => path,
+        let (path, slip) = match resolve(&render.render, paths, tree) {
+            Ok(found) => found,
             Err(finding) => {
                 findings.push(finding.at(CONFIG_FILE).on_line(render.line));
                 continue;
             }
         };
+        findings.extend(slip.map(|finding| finding.at(CONFIG_FILE).on_line(render.line)));
         let name = canonical(&path, tree);
         if let Some(line) = listed.get(&name) {
             let message = format!("'{written}' is listed twice, first on line {line}");
@@ -228,20 +229,53 @@ fn canonical(path: &str, tree: &TreeSpec) -> String {
     tree.file_at(path).map_or(path, |file| &file.path).to_owned()
 }
 
-/// A listed path as a plain relative path.
-fn resolve(written: &str) -> Result<String, Finding> {
+/// A listed path as a plain relative path, and what is to be said of how it is written.
+fn resolve(
+    written: &str,
+    paths: &[&str],
+    tree: &TreeSpec,
+) -> Result<(String, Option<Finding>), Finding> {
+    const FROM_ROOT: &str = "write the image's path from the root of the submission, such as \
+        offline/cbox_simple_offline.exr";
+    let shown = printable(written.trim());
+    let slip = |code: &str, message: String| Finding::warning(code, message);
     if written.trim().is_empty() {
-        return Err(Finding::warning("config_render_missing", "a render with an empty path")
-            .hint("write the image's path from the root of the submission"));
+        return Err(
+            slip("config_render_missing", "a render with an empty path".to_owned()).hint(FROM_ROOT)
+        );
     }
-    match safe_path(written.trim().as_bytes(), &Limits::default()) {
-        Ok(safe) => Ok(safe.path),
-        Err(finding) if finding.code == "name_backslash" => {
-            Err(Finding::warning("config_backslash", format!("'{}' holds a backslash", printable(written)))
-                .hint(format!("write \"{}\"", printable(&written.replace('\\', "/")))))
+    // In JSON `\t` is a tab: `offline\teapot.exr`.
+    let unescaped = written.trim().replace('\t', "\\t").replace('\r', "\\r").replace('\n', "\\n");
+    let unescaped = unescaped.replace('\u{8}', "\\b").replace('\u{c}', "\\f");
+    let slashed = unescaped.replace('\\', "/");
+    let plain = safe_path(slashed.as_bytes(), &Limits::default());
+    // What a path from elsewhere ends with may be the submission's own: `/home/ada/a2/offline/cbox.exr`.
+    let end_of = |path: &&&str| {
+        slashed
+            .strip_suffix(**path)
+            .is_some_and(|before| before.is_empty() || before.ends_with('/'))
+    };
+    let own = paths.iter().filter(|path| path.contains('/')).find(end_of);
+    match (plain, own) {
+        (Ok(safe), _) if slashed == written.trim() => Ok((safe.path, None)),
+        (Ok(safe), _) => {
+            let finding = slip("config_backslash", format!("'{shown}' holds a backslash"));
+            Ok((safe.path, Some(finding.hint(format!("write \"{}\"", printable(&slashed))))))
         }
-        Err(_) => Err(Finding::warning("config_path_escape", format!("'{}' leaves the submission", printable(written)))
-            .hint("write the image's path from the root of the submission, such as offline/cbox_simple_offline.exr")),
+        (Err(_), Some(own)) => {
+            let what = if slashed.starts_with('/') {
+                "begins with a slash"
+            } else {
+                "is no path from the root"
+            };
+            let finding = slip("config_path", format!("'{shown}' {what}"));
+            let own = canonical(own, tree);
+            Ok((own.clone(), Some(finding.hint(format!("write \"{}\"", printable(&own))))))
+        }
+        (Err(_), None) => {
+            let message = format!("'{shown}' leaves the submission");
+            Err(slip("config_path_escape", message).hint(FROM_ROOT))
+        }
     }
 }
 
@@ -292,10 +326,19 @@ mod tests {
         assert_eq!(check("\"offline/nothing.exr\"", &[]), ["config_render_missing@3"]);
         assert_eq!(check("\"../../etc/passwd\"", &[]), ["config_path_escape@3"]);
         assert_eq!(check("\"/etc/passwd\"", &[]), ["config_path_escape@3"]);
-        assert_eq!(
-            check("\"offline\\\\cbox_simple_offline.exr\"", &[CBOX]),
-            ["config_not_listed@1", "config_backslash@3"]
-        );
+        for (written, code) in [
+            ("offline\\\\cbox_simple_offline.exr", "config_backslash@3"),
+            ("/offline/cbox_simple_offline.exr", "config_path@3"),
+            ("/home/ada/a2/offline/cbox_simple_offline.exr", "config_path@3"),
+            ("C:\\\\a2\\\\offline\\\\cbox_simple_offline.exr", "config_path@3"),
+            ("../offline/cbox_simple_offline.exr", "config_path@3"),
+        ] {
+            // It is listed all the same.
+            assert_eq!(check(&format!("\"{written}\""), &[CBOX]), [code], "{written}");
+        }
+        let tab = "realtime\\teapot_simple_realtime.exr";
+        let found = check(&format!("\"{tab}\""), &["realtime/teapot_simple_realtime.exr"]);
+        assert_eq!(found, ["config_backslash@3"], "\\t is a tab");
         assert_eq!(check("\"Offline/cbox_simple_offline.exr\"", &[CBOX]), ["config_wrong_case@3"]);
         assert_eq!(
             check(&format!("\"{CBOX}\",\n\"./{CBOX}\""), &[CBOX]),

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use flate2::Crc;
 use sha2::{Digest, Sha256};
+use unicode_normalization::UnicodeNormalization as _;
 
 use super::finding::{Finding, Findings};
 use super::limits::{Limits, mib};
@@ -166,17 +167,6 @@ impl<'a> PrivateCopy<'a> {
             );
             return EntryAction::Refused;
         }
-        if kind == Kind::File && self.files.contains_key(&path) {
-            self.findings.push(
-                Finding::error(
-                    "duplicate_entry",
-                    "expected one entry of this name, found a second",
-                )
-                .at(path)
-                .hint("make a new archive instead of adding to an old one"),
-            );
-            return EntryAction::Refused;
-        }
         self.folders.extend(parents.into_iter().map(str::to_owned));
         match kind {
             Kind::Folder => {
@@ -184,7 +174,8 @@ impl<'a> PrivateCopy<'a> {
                 EntryAction::Folder
             }
             Kind::File => {
-                self.files.insert(path.clone(), None);
+                // A second of this name must hold the same, see `write`.
+                self.files.entry(path.clone()).or_default();
                 EntryAction::File(path)
             }
         }
@@ -195,18 +186,22 @@ impl<'a> PrivateCopy<'a> {
         let ends = path.match_indices('/').map(|(i, _)| i).chain([path.len()]);
         for end in ends {
             let part = &path[..end];
-            let Some(first) = self.spellings.get(&part.to_lowercase()) else {
-                self.spellings.insert(part.to_lowercase(), part.to_owned());
+            // A letter with an accent is one character or two.
+            let plain: String = part.to_lowercase().nfc().collect();
+            let Some(first) = self.spellings.get(&plain) else {
+                self.spellings.insert(plain, part.to_owned());
                 continue;
             };
             if first != part {
+                let message = if first.to_lowercase() == part.to_lowercase() {
+                    format!("differs only in case from '{first}'")
+                } else {
+                    format!("looks like '{first}': its accents are written in another way")
+                };
                 self.findings.push(
-                    Finding::warning(
-                        "case_collision",
-                        format!("differs only in case from '{first}'"),
-                    )
-                    .at(part)
-                    .hint("use one spelling; both are the same file on Windows and macOS"),
+                    Finding::warning("case_collision", message)
+                        .at(part)
+                        .hint("use one spelling; both are the same file on Windows and macOS"),
                 );
                 // The parts below it follow from this one.
                 return;
@@ -229,6 +224,17 @@ impl<'a> PrivateCopy<'a> {
         Ok(())
     }
 
+    /// The content of a file that came before, by its raw name; none where none came, or nothing is kept.
+    pub(super) fn earlier(&self, raw: &[u8]) -> Result<Option<File>, Stop> {
+        let Ok(safe) = safe_path(raw, self.limits) else { return Ok(None) };
+        let came = self.files.get(&safe.path).is_some_and(Option::is_some);
+        if !came || self.findings.has_errors() {
+            return Ok(None);
+        }
+        let path = self.dest.join(&safe.path);
+        Ok(Some(File::open(&path).map_err(|e| IntakeError::io("read", &path, e))?))
+    }
+
     /// Writes one admitted file from `reader` up to its end, and counts what comes.
     ///
     /// `packed_bytes` is the size of what `reader` unpacks, for the ratio. Once the submission is
@@ -241,7 +247,9 @@ impl<'a> PrivateCopy<'a> {
         reader: &mut dyn Read,
         packed_bytes: Option<u64>,
     ) -> Result<io::Result<Written>, Stop> {
-        let mut out = if self.findings.has_errors() { None } else { self.create(path)? };
+        let first = self.files.get(path).cloned().flatten();
+        let is_kept = first.is_none() && !self.findings.has_errors();
+        let mut out = if is_kept { self.create(path)? } else { None };
         let mut sha256 = Sha256::new();
         let mut crc = Crc::new();
         let mut bytes = 0u64;
@@ -286,6 +294,10 @@ impl<'a> PrivateCopy<'a> {
             }
         }
         let sha256 = hex(&sha256.finalize());
+        if let Some(first) = first {
+            self.findings.push(second(path, first.sha256 == sha256));
+            return Ok(Ok(Written { bytes, crc32: crc.sum() }));
+        }
         self.files
             .insert(path.to_owned(), Some(SubmittedFile { path: path.to_owned(), bytes, sha256 }));
         Ok(Ok(Written { bytes, crc32: crc.sum() }))
@@ -371,6 +383,17 @@ impl<'a> PrivateCopy<'a> {
     }
 }
 
+/// What to say of a second entry of one name: programs differ in which of the two they take.
+fn second(path: &str, is_same: bool) -> Finding {
+    let finding = if is_same {
+        Finding::warning("duplicate_entry", "it stands twice in the archive, with the same content")
+    } else {
+        let message = "expected one entry of this name, found a second with another content";
+        Finding::error("duplicate_entry", message)
+    };
+    finding.at(path).hint("make a new archive instead of adding to an old one")
+}
+
 /// Lets everybody read a copy, whatever the user's umask is: under root, whoever looks at it
 /// (decoders, the compiler) is another user. The folder around it keeps others out.
 fn open_to_readers(
@@ -419,7 +442,7 @@ fn digest(files: &[SubmittedFile]) -> String {
 }
 
 /// Removes what was written; the destination was empty before.
-fn clear(dest: &Path) -> Result<(), IntakeError> {
+pub(super) fn clear(dest: &Path) -> Result<(), IntakeError> {
     let entries = fs::read_dir(dest).map_err(|e| IntakeError::io("list", dest, e))?;
     for entry in entries {
         let path = entry.map_err(|e| IntakeError::io("list", dest, e))?.path();

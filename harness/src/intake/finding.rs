@@ -3,6 +3,9 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use unicode_width::UnicodeWidthStr as _;
+
+use super::name::reorders;
 
 /// How much a finding weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -43,9 +46,21 @@ pub struct Finding {
     pub line: Option<u32>,
     /// What is the fault: expected and found.
     pub message: String,
+    /// The place on the line.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub excerpt: Option<Box<Excerpt>>,
     /// What to do about it.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub hint: Option<String>,
+}
+
+/// A line, or what stands around a place of a long one.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Excerpt {
+    /// The text, without control characters.
+    pub text: String,
+    /// Columns of the text before the place.
+    pub caret: usize,
 }
 
 impl Finding {
@@ -56,6 +71,7 @@ impl Finding {
             path: None,
             line: None,
             message: message.into(),
+            excerpt: None,
             hint: None,
         }
     }
@@ -75,6 +91,11 @@ impl Finding {
         Self::new(Severity::Note, code, message)
     }
 
+    /// Whether it says that the configuration lies under another name, where it is read all the same.
+    pub fn is_misplaced_config(&self) -> bool {
+        self.code == "tree_wrong_place" && self.severity == Severity::Warning
+    }
+
     /// Names the entry or file.
     #[must_use]
     pub fn at(mut self, path: impl Into<String>) -> Self {
@@ -86,6 +107,22 @@ impl Finding {
     #[must_use]
     pub fn on_line(mut self, line: u32) -> Self {
         self.line = Some(line);
+        self
+    }
+
+    /// Shows the place on its line: `column` counts characters from 0.
+    #[must_use]
+    pub(super) fn showing(mut self, line: &str, column: usize) -> Self {
+        /// Characters of a long line that are shown before and after the place.
+        const AROUND: usize = 50;
+        let visible = |c: char| if c.is_control() || reorders(c) { ' ' } else { c };
+        let is_long = line.chars().nth(2 * AROUND).is_some();
+        let begin = if is_long { column.saturating_sub(AROUND) } else { 0 };
+        let shown: String =
+            line.chars().skip(begin).take(2 * AROUND).map(visible).collect::<String>();
+        let before: String = shown.chars().take(column - begin).collect();
+        let text = shown.trim_end().to_owned();
+        self.excerpt = Some(Box::new(Excerpt { text, caret: before.width() }));
         self
     }
 

@@ -52,6 +52,11 @@ pub(super) struct Read {
     pub(super) findings: Vec<Finding>,
 }
 
+/// The text in these bytes.
+pub(super) fn text_of(bytes: &[u8]) -> String {
+    decode(bytes).0
+}
+
 /// Reads `bytes`, whatever they are.
 pub(super) fn parse(bytes: &[u8]) -> Read {
     let (text, encoding) = decode(bytes);
@@ -73,7 +78,16 @@ fn decode(bytes: &[u8]) -> (String, Option<Finding>) {
         let text = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
         (text.collect::<String>(), other(1, "json_encoding", "expected UTF-8, found UTF-16"))
     };
+    let wider = |bytes: &[u8], unit: fn([u8; 4]) -> u32| {
+        let units = bytes.as_chunks::<4>().0.iter().map(|four| unit(*four));
+        let text = units.map(|unit| char::from_u32(unit).unwrap_or(char::REPLACEMENT_CHARACTER));
+        (text.collect::<String>(), other(1, "json_encoding", "expected UTF-8, found UTF-32"))
+    };
     match bytes {
+        [0xff, 0xfe, 0, 0, rest @ ..] => return wider(rest, u32::from_le_bytes),
+        [0, 0, 0xfe, 0xff, rest @ ..] => return wider(rest, u32::from_be_bytes),
+        [1..=255, 0, 0, 0, ..] => return wider(bytes, u32::from_le_bytes),
+        [0, 0, 0, 1..=255, ..] => return wider(bytes, u32::from_be_bytes),
         [0xff, 0xfe, rest @ ..] => return wide(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => return wide(rest, u16::from_be_bytes),
         // A text begins with a character of ASCII here.
@@ -170,15 +184,23 @@ impl Reader {
         Some(c)
     }
 
-    fn warn_on(&mut self, line: u32, code: &str, message: &str, hint: &str) {
+    /// Warns of what stands at character `at`.
+    fn warn_at(&mut self, at: usize, code: &str, message: &str, hint: &str) {
         // One mistake may follow from another: a few are enough.
-        if self.findings.len() < 8 {
-            self.findings.push(Finding::warning(code, message).on_line(line).hint(hint));
+        if self.findings.len() >= 8 {
+            return;
         }
+        let before = &self.chars[..at];
+        let line = 1 + before.iter().filter(|c| **c == '\n').count() as u32;
+        let ends = |c: &char| matches!(c, '\n' | '\r');
+        let begin = before.iter().rposition(ends).map_or(0, |end| end + 1);
+        let text: String = self.chars[begin..].iter().take_while(|c| !ends(c)).collect();
+        let finding = Finding::warning(code, message).on_line(line).hint(hint);
+        self.findings.push(finding.showing(&text, at - begin));
     }
 
     fn warn(&mut self, code: &str, message: &str, hint: &str) {
-        self.warn_on(self.line, code, message, hint);
+        self.warn_at(self.at, code, message, hint);
     }
 
     fn stop<T>(&mut self, expected: &str) -> Result<T, Stop> {
@@ -237,13 +259,15 @@ impl Reader {
             Some(c) if is_quote(c) => Value::Text(self.text()),
             Some(c) if c == '-' || c.is_ascii_digit() => Value::Number(self.number()),
             Some(c) if c.is_alphabetic() => {
-                let word = self.word();
+                let begin = self.at;
+                let word = self.words();
                 match word.as_str() {
                     "null" => Value::Null,
                     "true" => Value::Bool(true),
                     "false" => Value::Bool(false),
                     _ => {
-                        self.warn(
+                        self.warn_at(
+                            begin,
                             "json_quotes",
                             &format!("text needs double quotes: {}", printable(&word)),
                             "write \"...\" around it",
@@ -271,6 +295,30 @@ impl Reader {
         word
     }
 
+    /// Unquoted words of one line, up to a sign, or to a word that is a key.
+    fn words(&mut self) -> String {
+        let mut words = self.word();
+        loop {
+            let rest = &self.chars[self.at..];
+            let gap =
+                rest.iter().take_while(|c| c.is_whitespace() && !['\n', '\r'].contains(*c)).count();
+            let word = rest[gap..]
+                .iter()
+                .take_while(|c| c.is_alphanumeric() || "-._'".contains(**c))
+                .count();
+            let after = rest[gap + word..].iter().find(|c| !c.is_whitespace() || **c == '\n');
+            let ends =
+                after.is_none_or(|c| [',', ';', '}', ']', '\n'].contains(c) || c.is_alphabetic());
+            let begins = rest.get(gap).is_some_and(|c| c.is_alphabetic());
+            if gap == 0 || !begins || !ends {
+                return words;
+            }
+            words.push(' ');
+            words.extend(&rest[gap..gap + word]);
+            self.at += gap + word;
+        }
+    }
+
     /// A number, also one in groups: `260 123 456`.
     fn number(&mut self) -> String {
         let mut number = self.word();
@@ -296,17 +344,22 @@ impl Reader {
 
     /// A text in quotes; one that is not closed ends with its line.
     fn text(&mut self) -> String {
-        let line = self.line;
+        let begin = self.at;
         let open = self.next().unwrap_or('"');
         if open != '"' {
-            self.warn("json_quotes", "text needs plain double quotes", "write \"...\" around it");
+            self.warn_at(
+                begin,
+                "json_quotes",
+                "text needs plain double quotes",
+                "write \"...\" around it",
+            );
         }
         let mut text = String::new();
         loop {
             match self.peek() {
                 None | Some('\n' | '\r') => {
-                    self.warn_on(
-                        line,
+                    self.warn_at(
+                        begin,
                         "json_open_text",
                         "the text has no closing quote on its line",
                         "close it with \"",
@@ -380,16 +433,11 @@ impl Reader {
                 Ok(false)
             }
             Some(sign @ (',' | ';')) => {
-                let line = self.line;
+                let at = self.at;
                 self.next();
                 self.skip_space();
                 if sign == ';' {
-                    self.warn_on(
-                        line,
-                        "json_separator",
-                        "expected a comma, found ';'",
-                        "write ','",
-                    );
+                    self.warn_at(at, "json_separator", "expected a comma, found ';'", "write ','");
                 }
                 while self.peek() == Some(',') {
                     self.warn("json_trailing_comma", "two commas", "remove one of them");
@@ -397,8 +445,8 @@ impl Reader {
                     self.skip_space();
                 }
                 if self.peek() == Some(close) {
-                    self.warn_on(
-                        line,
+                    self.warn_at(
+                        at,
                         "json_trailing_comma",
                         &format!("a comma before '{close}'"),
                         "remove the comma",
@@ -476,8 +524,10 @@ impl Reader {
         let key = match self.peek() {
             Some(c) if is_quote(c) => self.text(),
             Some(c) if c.is_alphabetic() => {
+                let begin = self.at;
                 let word = self.word();
-                self.warn(
+                self.warn_at(
+                    begin,
                     "json_quotes",
                     &format!("keys need double quotes: {}", printable(&word)),
                     "write \"...\" around it",

@@ -92,7 +92,7 @@ pub(super) fn safe_path(raw: &[u8], limits: &Limits) -> Result<SafePath, Finding
 }
 
 /// Whether a character turns round the text after it: bidirectional overrides and isolates.
-fn reorders(c: char) -> bool {
+pub(super) fn reorders(c: char) -> bool {
     matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 

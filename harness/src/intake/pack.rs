@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{Cursor, Write};
+use std::io::{self, Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use ::zip::write::SimpleFileOptions;
@@ -126,6 +126,11 @@ fn write(
         Some(config) if out.is_dir() => out.join(archive_name(config, tree)),
         _ => out.to_owned(),
     };
+    // What is renamed onto a device takes its place.
+    if archive.metadata().is_ok_and(|there| !there.is_file()) {
+        let source = io::Error::new(io::ErrorKind::AlreadyExists, "it is there, and no file");
+        return Err(IntakeError::io("write", &archive, source));
+    }
     validation.name = archive.file_name().unwrap_or_default().to_string_lossy().into_owned();
     // Beside the target, so that a half-written archive is never seen under its name.
     let partial = archive.with_extension("zip.partial");

@@ -1,6 +1,7 @@
 //! The `config.json` of a submission: credentials and the list of renders, read tolerantly.
 
 use serde::{Deserialize, Serialize};
+use unicode_normalization::UnicodeNormalization as _;
 
 use super::finding::Finding;
 use super::json_lines::{Node, Read, Value, parse};
@@ -99,15 +100,17 @@ impl SubmittedConfig {
                 let finding = Finding::warning("config_key", message).on_line(*line);
                 findings.push(finding.hint(hint));
             }
+            // `"student": 260123456` is no name.
+            let is_number = plain_text(node).is_some_and(|text| is_digits(&text));
             match known {
                 Key::First => take(&mut self.first_name, key, *line, node, findings),
                 Key::Last => take(&mut self.last_name, key, *line, node, findings),
+                Key::Full if is_number => take(&mut self.student_id, key, *line, node, findings),
                 Key::Id => take(&mut self.student_id, key, *line, node, findings),
                 Key::Email => take(&mut self.email, key, *line, node, findings),
-                Key::Full => match &node.value {
-                    Value::Object(members) if is_top => {
-                        self.take_members(members, false, findings);
-                    }
+                Key::Full => match (&node.value, members_of(node)) {
+                    (_, Some(members)) if is_top => self.take_members(members, false, findings),
+                    (Value::List(items), _) => self.take_names(key, *line, items, findings),
                     _ => self.take_full_name(key, *line, node, findings),
                 },
                 Key::Renders if is_top => {
@@ -115,6 +118,18 @@ impl SubmittedConfig {
                     self.take_renders(node, findings);
                 }
                 Key::Renders => {}
+            }
+        }
+        // Whatever else an object is called, it may hold what is still missing.
+        for (key, _, node) in members.iter().filter(|_| is_top) {
+            if let Some(members) = members_of(node).filter(|_| known_key(key).is_none()) {
+                let mut inner = Self::default();
+                inner.take_members(members, false, findings);
+                let fill = |own: &mut Option<Field>, inner| *own = own.take().or(inner);
+                fill(&mut self.first_name, inner.first_name);
+                fill(&mut self.last_name, inner.last_name);
+                fill(&mut self.student_id, inner.student_id);
+                fill(&mut self.email, inner.email);
             }
         }
     }
@@ -147,21 +162,12 @@ impl SubmittedConfig {
         }
     }
 
-    /// A student number in groups, such as `260 123-456`, without what is between them.
+    /// A student number with other signs around or between its digits, without them.
     fn tidy_number(&mut self, findings: &mut Vec<Finding>) {
         let Some(field) = &mut self.student_id else { return };
-        let between = |c: char| {
-            c.is_whitespace()
-                || "-_,'".contains(c)
-                || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2060}' | '\u{feff}')
-        };
-        let text =
-            field.text.trim_start_matches('#').trim_matches(|c: char| between(c) && c != '-');
-        let digits: String = text.chars().filter(|c| !between(*c)).collect();
-        let is_number = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
-        if !is_number || digits == field.text || text.starts_with('-') {
+        let Some(digits) = number_in(&field.text).filter(|digits| *digits != field.text) else {
             return;
-        }
+        };
         let message = format!(
             "\"studentID\": expected digits only, found '{}': read as {digits}",
             printable(&field.text)
@@ -172,6 +178,22 @@ impl SubmittedConfig {
                 .hint(format!("write \"studentID\": \"{digits}\"")),
         );
         field.text = digits;
+    }
+
+    /// `["Ada", "Lampglow"]`, or a list of students, of whom the first counts.
+    fn take_names(&mut self, key: &str, line: u32, items: &[Node], findings: &mut Vec<Finding>) {
+        let message = format!("'{}': expected text, found a list", printable(key));
+        let finding = Finding::warning("config_type", message).on_line(line);
+        findings.push(finding.hint("write one name in double quotes"));
+        if let Some(members) = items.first().and_then(members_of) {
+            return self.take_members(members, false, findings);
+        }
+        let names: Vec<String> = items.iter().filter_map(plain_text).collect();
+        let is_word = |name: &String| !name.contains(char::is_whitespace);
+        let text = if names.iter().all(is_word) { names.join(" ") } else { names[0].clone() };
+        if !text.is_empty() {
+            self.set_full_name(&Field { text, line });
+        }
     }
 
     fn take_full_name(&mut self, key: &str, line: u32, node: &Node, findings: &mut Vec<Finding>) {
@@ -185,10 +207,12 @@ impl SubmittedConfig {
     /// `Ada King Lampglow`: the last word is the last name; `Lampglow, Ada` says so itself. `ada_lampglow` is
     /// how archives are named.
     fn set_full_name(&mut self, Field { text, line }: &Field) {
+        // `Ada Lampglow <ada@example.org>`
+        let text = text.split_once('<').map_or(text.as_str(), |(name, _)| name.trim());
         let sign = |c: char| c.is_whitespace() || (c == '_' && !text.contains(char::is_whitespace));
         let (first, last) = match text.split_once(',') {
             Some((last, first)) => (first, last),
-            None => text.rsplit_once(sign).unwrap_or((text.as_str(), "")),
+            None => text.rsplit_once(sign).unwrap_or((text, "")),
         };
         let field = |text: &str| Field { text: text.trim().to_owned(), line: *line };
         self.first_name.get_or_insert(field(first));
@@ -198,13 +222,23 @@ impl SubmittedConfig {
     }
 
     fn take_renders(&mut self, list: &Node, findings: &mut Vec<Finding>) {
-        let Value::List(items) = &list.value else {
+        if !matches!(list.value, Value::List(_)) {
             let message =
                 format!("expected a list of renders [ ... ], found {}", list.value.kind());
             findings.push(
                 Finding::warning("config_renders", message).on_line(list.line).hint(RENDER_HINT),
             );
-            return;
+        }
+        let named;
+        let items: &[Node] = match &list.value {
+            Value::List(items) => items,
+            Value::Object(members) if path_of(members).is_none() => {
+                // Scenes as keys, paths as values.
+                named = members.iter().map(|(.., node)| node.clone()).collect::<Vec<_>>();
+                &named
+            }
+            Value::Text(_) | Value::Object(_) => std::slice::from_ref(list),
+            _ => return,
         };
         if items.len() > MAX_RENDERS {
             let message = format!("expected a few renders, found {}", items.len());
@@ -218,17 +252,17 @@ impl SubmittedConfig {
             let (scene, render) = match &item.value {
                 Value::Text(path) => (String::new(), Some((path.clone(), item.line))),
                 Value::Object(members) => {
-                    let text = |names: &[&str]| {
-                        members.iter().find_map(|(key, _, node)| match &node.value {
-                            Value::Text(text) if names.contains(&key.to_lowercase().as_str()) => {
-                                Some((text.clone(), node.line))
-                            }
-                            _ => None,
-                        })
-                    };
-                    let scene =
-                        text(&["scene", "name", "title"]).map(|(text, _)| text).unwrap_or_default();
-                    (scene, text(&["render", "path", "file", "image"]))
+                    let scene = text_of(members, &["scene", "name", "title"]);
+                    (scene.map(|(text, _)| text).unwrap_or_default(), path_of(members))
+                }
+                // `["Teapot", "offline/teapot.exr"]`
+                Value::List(pair) => {
+                    let texts = pair.iter().filter_map(|node| match &node.value {
+                        Value::Text(text) => Some((text.clone(), node.line)),
+                        _ => None,
+                    });
+                    let is_path = |(text, _): &(String, u32)| text.to_lowercase().ends_with(".exr");
+                    (String::new(), texts.filter(is_path).next_back())
                 }
                 _ => (String::new(), None),
             };
@@ -242,6 +276,92 @@ impl SubmittedConfig {
             }
         }
     }
+}
+
+/// The text of a member with one of these names, and its line.
+fn text_of(members: &[(String, u32, Node)], names: &[&str]) -> Option<(String, u32)> {
+    members.iter().find_map(|(key, _, node)| match &node.value {
+        Value::Text(text) if names.contains(&key.to_lowercase().as_str()) => {
+            Some((text.clone(), node.line))
+        }
+        _ => None,
+    })
+}
+
+/// The path in an entry of the list of renders.
+fn path_of(members: &[(String, u32, Node)]) -> Option<(String, u32)> {
+    text_of(members, &["render", "path", "file", "image", "filename", "exr"])
+}
+
+/// The members of an object, also of one that is alone in a list.
+fn members_of(node: &Node) -> Option<&[(String, u32, Node)]> {
+    match &node.value {
+        Value::Object(members) => Some(members),
+        Value::List(items) => match &items[..] {
+            [only] => members_of(only),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// A text or number, also one that is alone in a list or an object; empty for null.
+fn plain_text(node: &Node) -> Option<String> {
+    match &node.value {
+        Value::Text(text) | Value::Number(text) => Some(text.trim().to_owned()),
+        Value::Null => Some(String::new()),
+        Value::List(items) => match &items[..] {
+            [only] => plain_text(only),
+            _ => None,
+        },
+        Value::Object(members) => match &members[..] {
+            [(.., only)] => plain_text(only),
+            _ => None,
+        },
+        Value::Bool(_) => None,
+    }
+}
+
+fn is_digits(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Fewer digits than this are no student number by themselves: `1.5`, `+1`.
+const FEW_DIGITS: usize = 5;
+/// So many digits are a whole number, though a letter follows them at once; with fewer, the letter may stand in a
+/// digit's place.
+const MANY_DIGITS: usize = 9;
+
+/// The digits of a student number that is written in groups (`260 123-456`), as a decimal number, in digits of another
+/// script, or with words around it; none where it is not clear which digits count.
+fn number_in(text: &str) -> Option<String> {
+    let between = |c: char| {
+        c.is_whitespace()
+            || "-_,'".contains(c)
+            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2060}' | '\u{feff}')
+    };
+    // Wide digits are digits.
+    let text: String = text.nfkc().collect();
+    let own = text.trim_start_matches('#').trim_matches(|c: char| between(c) && c != '-');
+    let digits: String = own.chars().filter(|c| !between(*c)).collect();
+    if is_digits(&digits) {
+        return (!own.starts_with('-')).then_some(digits);
+    }
+    let groups: Vec<&str> = own.split('.').collect();
+    let (first, rest) = groups.split_first()?;
+    if is_digits(first) && rest.iter().all(|group| group.len() == 3 && is_digits(group)) {
+        return Some(groups.concat());
+    }
+    // As a spreadsheet writes it.
+    let value = own.parse::<f64>().ok().filter(|value| value.fract() == 0.0);
+    if let Some(value) = value.filter(|value| (1e4..9e15).contains(value)) {
+        return Some(format!("{value:.0}"));
+    }
+    let mut runs = text.split(|c: char| !c.is_ascii_digit()).filter(|run| !run.is_empty());
+    let run = runs.next().filter(|run| run.len() >= FEW_DIGITS && runs.next().is_none())?;
+    let (before, after) = text.split_once(run)?;
+    let is_whole = run.len() >= MANY_DIGITS || !after.starts_with(char::is_alphanumeric);
+    (is_whole && !before.ends_with(['-', '.'])).then(|| run.to_owned())
 }
 
 /// A key that means something here.
@@ -272,21 +392,66 @@ impl Key {
 /// What keys are called, in lower case without signs: the template's names, those of other years (`firstlast`)
 /// and what students write.
 const KEYS: [(Key, &[&str]); 6] = [
-    (Key::First, &["firstname", "first", "givenname", "forename", "fname", "prenom"]),
-    (Key::Last, &["lastname", "last", "surname", "familyname", "lname", "nom"]),
+    (
+        Key::First,
+        &[
+            "firstname",
+            "first",
+            "givenname",
+            "given",
+            "givennames",
+            "forename",
+            "fname",
+            "fn",
+            "preferredname",
+            "prenom",
+            "prenoms",
+            "vorname",
+            "nombre",
+            "nome",
+            "\u{540d}",
+        ],
+    ),
+    (
+        Key::Last,
+        &[
+            "lastname",
+            "last",
+            "surname",
+            "familyname",
+            "family",
+            "familynames",
+            "lname",
+            "ln",
+            "nom",
+            "nomdefamille",
+            "nachname",
+            "apellido",
+            "apellidos",
+            "cognome",
+            "\u{59d3}",
+        ],
+    ),
     (
         Key::Full,
         &[
             "firstlast",
             "name",
+            "names",
             "fullname",
             "studentname",
             "yourname",
             "firstlastname",
             "student",
+            "students",
             "credentials",
             "author",
+            "authors",
             "user",
+            "group",
+            "members",
+            "nomcomplet",
+            "\u{59d3}\u{540d}",
         ],
     ),
     (
@@ -295,14 +460,30 @@ const KEYS: [(Key, &[&str]); 6] = [
             "studentid",
             "id",
             "studentnumber",
+            "studentnum",
             "mcgillid",
+            "mcgillidnumber",
+            "mcgillnumber",
+            "mcgill",
             "studentno",
             "studentnr",
             "number",
+            "no",
+            "nr",
             "sid",
+            "uid",
             "idnumber",
+            "idnum",
             "studentidnumber",
             "matricule",
+            "matricola",
+            "matricula",
+            "matrikelnummer",
+            "matrikelnr",
+            "numero",
+            "numerodetudiant",
+            "numeroetudiant",
+            "\u{5b66}\u{53f7}",
         ],
     ),
     (Key::Email, &["email", "mail", "emailaddress"]),
@@ -314,8 +495,10 @@ const KEYS: [(Key, &[&str]); 6] = [
 fn known_key(key: &str) -> Option<(Key, bool)> {
     /// Shorter names are too near to each other.
     const LONG: usize = 7;
+    // Accents fall away with the signs.
     let plain: String =
-        key.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
+        key.nfd().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
+    let plain = ["your", "my"].iter().find_map(|own| plain.strip_prefix(own)).unwrap_or(&plain);
     let names = || KEYS.iter().flat_map(|(key, names)| names.iter().map(move |name| (*key, *name)));
     if let Some((key, _)) = names().find(|(_, name)| *name == plain) {
         return Some((key, false));
@@ -325,7 +508,7 @@ fn known_key(key: &str) -> Option<(Key, bool)> {
         return None;
     }
     let long = names().filter(|(_, name)| name.len() >= LONG);
-    let near = long.map(|(key, name)| (strsim::osa_distance(&plain, name), key));
+    let near = long.map(|(key, name)| (strsim::osa_distance(plain, name), key));
     let (distance, key) = near.min_by_key(|(distance, _)| *distance)?;
     // `username` is two letters from `surname`.
     (distance <= 1 || distance == 2 && plain.len() > LONG + 1).then_some((key, true))
@@ -339,19 +522,15 @@ const RENDER_HINT: &str =
 
 /// Takes a text or a number.
 fn take(slot: &mut Option<Field>, key: &str, line: u32, node: &Node, findings: &mut Vec<Finding>) {
-    let text = match &node.value {
-        Value::Text(text) | Value::Number(text) => text.trim().to_owned(),
-        Value::Null => String::new(),
-        other => {
-            let message = format!("'{}': expected text, found {}", printable(key), other.kind());
-            findings.push(
-                Finding::warning("config_type", message)
-                    .on_line(node.line)
-                    .hint("write it in double quotes"),
-            );
-            return;
-        }
-    };
+    if !matches!(node.value, Value::Text(_) | Value::Number(_) | Value::Null) {
+        let message = format!("'{}': expected text, found {}", printable(key), node.value.kind());
+        findings.push(
+            Finding::warning("config_type", message)
+                .on_line(node.line)
+                .hint("write it in double quotes"),
+        );
+    }
+    let Some(text) = plain_text(node) else { return };
     if let Some(first) = slot
         && first.text != text
     {
@@ -374,6 +553,87 @@ mod tests {
         }
         let text = |f: &Option<Field>| f.as_ref().map(|f| f.text.clone()).unwrap_or_default();
         (text(&config.first_name), text(&config.last_name), config.sampler_seed())
+    }
+
+    #[test]
+    fn keys_of_other_languages_and_shapes_are_known() {
+        let ada = ("Ada".to_owned(), "Lampglow".to_owned(), Some(260_123_456));
+        for keys in [
+            "given,family,matricola",
+            "given names,surname,UID",
+            "pr\u{e9}nom,nom,matricule",
+            "Vorname,Nachname,Matrikelnummer",
+            "nombre,apellidos,matr\u{ed}cula",
+            "nome,cognome,no",
+            "your first name,your last name,your student id",
+            "fn,ln,student#",
+            "first,last,studentNum",
+            "preferredName,family name,Num\u{e9}ro d'\u{e9}tudiant",
+            "\u{540d},\u{59d3},\u{5b66}\u{53f7}",
+        ] {
+            let [first, last, id] = keys.split(',').collect::<Vec<_>>().try_into().unwrap();
+            let text = format!(r#"{{"{first}": "Ada", "{last}": "Lampglow", "{id}": 260123456}}"#);
+            assert_eq!(names(&text), ada, "{text}");
+        }
+        for text in [
+            r#"{"students": [{"firstName": "Ada", "lastName": "Lampglow", "id": 260123456}]}"#,
+            r#"{"name": ["Ada", "Lampglow"], "id": [260123456]}"#,
+            r#"{"group": ["Ada Lampglow", "Bob Byte"], "id": 260123456}"#,
+            r#"{"info": {"firstName": "Ada", "lastName": "Lampglow", "number": "260123456"}}"#,
+            r#"{"author": "Ada Lampglow <ada@example.org>", "student": 260123456}"#,
+            r#"{"firstName": {"value": "Ada"}, "lastName": ["Lampglow"], "id": {"is": "260123456"}}"#,
+            "{firstName: Ada, lastName: Lampglow, studentID: 260123456}",
+            // What is said by its own name counts.
+            r#"{"firstName": "Ada", "lastName": "Lampglow", "studentID": 260123456, "x": {"id": 7}}"#,
+        ] {
+            assert_eq!(names(text), ada, "{text}");
+        }
+        assert_eq!(names("{firstName: Ada Mary, lastName: van der Berg}").0, "Ada Mary");
+        assert_eq!(names("{firstName: Ada lastName: Lampglow}").1, "Lampglow");
+    }
+
+    #[test]
+    fn numbers_are_found_among_other_signs_where_they_are_clear() {
+        for text in [
+            "260 123 456",
+            "260.123.456",
+            "260,123,456",
+            "#260123456",
+            "A260123456",
+            "ID 260123456",
+            "(260123456)",
+            "no. 260123456",
+            "<260123456>",
+            "+260123456",
+            "260123456.0",
+            "2.60123456e8",
+            "2.60123456E+08",
+            "260123456L",
+            "260123456 (McGill)",
+            "s260123456@mail",
+            "\u{ff12}60123456",
+        ] {
+            assert_eq!(number_in(text).as_deref(), Some("260123456"), "{text}");
+        }
+        for text in [
+            "26012345x",
+            "26O123456",
+            "-260123456",
+            "-1",
+            "+1",
+            "1.5",
+            "0xF8",
+            "260123456/260999999",
+            "1e3",
+            "two",
+            "",
+            "260.12.3456",
+            "nan",
+            "inf",
+            "1e300",
+        ] {
+            assert_eq!(number_in(text), None, "{text}");
+        }
     }
 
     fn codes(text: &str) -> Vec<String> {

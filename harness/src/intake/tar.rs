@@ -1,27 +1,34 @@
-//! Tar archives, plain and gzipped, read block by block: header fields by the `tar` crate, and
+//! Tar archives, read block by block: header fields by the `tar` crate, and
 //! everything that gives an entry its name or meaning decided here.
 //!
 //! Formats: POSIX pax interchange (IEEE 1003.1, `pax`), and GNU tar's long names.
 
 use std::io::{self, Read};
+use std::path::Path;
 
-use flate2::bufread::GzDecoder;
 use tar::{EntryType, Header};
 
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::Finding;
-use super::limits::{Limits, mib};
+use super::gz::unreadable;
+use super::tar_sparse::{Map, Records, gnu_map};
+use super::unpack::IntakeError;
 use crate::harmless::{printable, printable_bytes};
 
-const BLOCK: usize = 512;
+pub(super) const BLOCK: usize = 512;
 /// Longest extended header that is read [bytes]; macOS writes a few KB of attributes.
 const MAX_EXTENDED: u64 = 1 << 20;
-/// Zero blocks after the end; GNU tar pads to 10 KiB [bytes].
-const MAX_PADDING: u64 = 1 << 20;
-/// Members of gzip data; programs that pack in pieces take 64 KiB or more for each.
-const MAX_MEMBERS: u64 = 1 << 14;
-const AGAIN: &str =
+/// What may stand after the end beside zeros, such as a line that a mailer added [bytes].
+const MAX_AFTER: u64 = 1 << 20;
+/// Zeros after the end that no limit counts; GNU tar pads to 10 KiB, by option to some MiB [bytes].
+pub(super) const PADDING: u64 = 1 << 20;
+pub(super) const AGAIN: &str =
     "make the archive again with 'tar czf a2_first_last.tar.gz FOLDER', or with umbra pack";
+
+/// The type of the name of a whole tape, by `tar --label`.
+const VOLUME_LABEL: u8 = b'V';
+/// The type of a folder in an incremental backup, by `tar --listed-incremental`.
+const DUMPED_FOLDER: u8 = b'D';
 
 /// Whether the first block is a tar header, or the zeros of an empty tar.
 pub(super) fn looks_like_tar(bytes: &[u8]) -> bool {
@@ -41,120 +48,21 @@ fn is_header(block: &[u8]) -> bool {
     block.len() == BLOCK && Header::from_byte_slice(block).cksum().is_ok_and(|found| found == sum)
 }
 
-/// Reads a gzipped tar.
-pub(super) fn read_gz(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop> {
-    let mut gz = Gz {
-        packed: bytes.len(),
-        member: GzDecoder::new(bytes),
-        members: 1,
-        rest: None,
-        unpacked: 0,
-        limits: copy.limits,
-    };
-    read(&mut gz, copy)?;
-    match gz.rest {
-        None => Ok(()),
-        Some(rest) if rest.iter().all(|byte| *byte == 0) => {
-            let message = format!("{} zeros after the gzip data", rest.len());
-            copy.findings.push(Finding::note("gz_padding", message));
-            Ok(())
-        }
-        Some(rest) => {
-            let message = format!("{} bytes follow the gzip data", rest.len());
-            Err(copy.refuse(Finding::error("gz_data_after", message).hint(AGAIN)))
-        }
-    }
-}
-
-/// Gzip data under the limits: a series of members (RFC 1952, 2.2), one after the other.
-struct Gz<'a> {
-    member: GzDecoder<&'a [u8]>,
-    members: u64,
-    /// What follows the last member, if anything.
-    rest: Option<&'a [u8]>,
-    packed: usize,
-    unpacked: u64,
-    limits: &'a Limits,
-}
-
-impl Read for Gz<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if buffer.is_empty() || self.rest.is_some() {
-            return Ok(0);
-        }
-        let n = loop {
-            let n = self.member.read(buffer)?;
-            let rest = *self.member.get_ref();
-            if n > 0 || rest.is_empty() {
-                break n;
-            }
-            if !rest.starts_with(b"\x1f\x8b") {
-                self.rest = Some(rest);
-                break 0;
-            }
-            self.members += 1;
-            // Each costs more than it weighs.
-            if self.members > MAX_MEMBERS {
-                return Err(io::Error::other(GzLimit::Members));
-            }
-            self.member = GzDecoder::new(rest);
-        };
-        self.unpacked += n as u64;
-        let consumed = self.packed - self.member.get_ref().len();
-        if self.limits.ratio_exceeded(self.unpacked, consumed as u64) {
-            return Err(io::Error::other(GzLimit::Ratio));
-        }
-        // Headers and padding come on top of the contents: at most two blocks an entry.
-        let overhead = self.limits.max_entries.saturating_mul(2 * BLOCK as u64) + 2 * MAX_PADDING;
-        if self.unpacked > mib(self.limits.max_total_mib).saturating_add(overhead) {
-            return Err(io::Error::other(GzLimit::Total));
-        }
-        Ok(n)
-    }
-}
-
-/// A limit that gzip data exceed, on its way through an [`io::Error`].
-#[derive(Debug, thiserror::Error)]
-enum GzLimit {
-    #[error("ratio limit")]
-    Ratio,
-    #[error("total limit")]
-    Total,
-    #[error("members limit")]
-    Members,
-}
-
-/// What a reading error means.
-fn unreadable(error: &io::Error, limits: &Limits) -> Finding {
-    const HINT: &str = "submit only the files of the tree";
-    match error.get_ref().and_then(|inner| inner.downcast_ref()) {
-        Some(GzLimit::Ratio) => {
-            let message =
-                format!("unpacks to more than {} times its packed size", limits.max_ratio);
-            Finding::error("limit_ratio", message).hint(HINT)
-        }
-        Some(GzLimit::Total) => {
-            let message = format!("unpacks to more than the limit of {} MiB", limits.max_total_mib);
-            Finding::error("limit_total", message).hint(HINT)
-        }
-        Some(GzLimit::Members) => {
-            let message = format!("more than {MAX_MEMBERS} pieces of gzip data");
-            Finding::error("limit_members", message).hint(AGAIN)
-        }
-        None => {
-            let message =
-                format!("the compressed data cannot be read: {}", printable(&error.to_string()));
-            Finding::error("gz_corrupt", message)
-                .hint("the upload may have been cut off; submit it again")
-        }
-    }
-}
-
 /// Extended headers that stand before an entry.
 #[derive(Default)]
 struct Extended {
     long_name: Option<Vec<u8>>,
+    long_link: Option<Vec<u8>>,
     pax: Vec<(String, Vec<u8>)>,
+}
+
+/// What an entry is, by its headers.
+struct Named {
+    name: Vec<u8>,
+    /// What a link leads to.
+    link: Vec<u8>,
+    /// Where the data of a sparse file belong, in pax.
+    sparse: Option<Records>,
 }
 
 /// Reads a tar from `reader` into the copy.
@@ -187,14 +95,16 @@ pub(super) fn read(mut reader: impl Read, copy: &mut PrivateCopy<'_>) -> Result<
         copy.count_entry()?;
         let header = Header::from_byte_slice(&block);
         let raw_name = header.path_bytes().into_owned();
+        let entry_type = header.entry_type();
         let size = match header.entry_size() {
             Ok(size) => size,
+            // GNU tar leaves it blank.
+            Err(_) if entry_type.as_byte() == VOLUME_LABEL => 0,
             Err(_) => {
                 let finding = Finding::error("tar_header", "the size field is not a number");
                 return Err(copy.refuse(finding.at(printable_bytes(&raw_name)).hint(AGAIN)));
             }
         };
-        let entry_type = header.entry_type();
         match entry_type {
             EntryType::GNULongName
             | EntryType::GNULongLink
@@ -205,6 +115,7 @@ pub(super) fn read(mut reader: impl Read, copy: &mut PrivateCopy<'_>) -> Result<
                 take_extended(entry_type, data, pending, copy)?;
                 if entry_type == EntryType::XGlobalHeader
                     && pending.long_name.is_none()
+                    && pending.long_link.is_none()
                     && pending.pax.is_empty()
                 {
                     extended = None;
@@ -212,7 +123,7 @@ pub(super) fn read(mut reader: impl Read, copy: &mut PrivateCopy<'_>) -> Result<
             }
             _ => {
                 let extended = extended.take().unwrap_or_default();
-                read_entry(&mut reader, entry_type, &raw_name, size, extended, copy)?;
+                read_entry(&mut reader, header, size, extended, copy)?;
             }
         }
     }
@@ -254,24 +165,33 @@ fn truncated(message: &str) -> Finding {
         .hint("the upload may have been cut off; submit it again")
 }
 
-/// After the first zero block only zeros may follow.
+/// What follows the first zero block: zeros, or something that is surely no second archive.
 fn check_padding(reader: &mut impl Read, copy: &mut PrivateCopy<'_>) -> Result<(), Stop> {
-    let mut buffer = [0; 8 * BLOCK];
     let mut padding = 0u64;
+    let mut after = 0u64;
     loop {
-        let n = match reader.read(&mut buffer) {
-            Ok(0) => return Ok(()),
-            Ok(n) => n,
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
+        let mut block = Vec::with_capacity(BLOCK);
+        match reader.by_ref().take(BLOCK as u64).read_to_end(&mut block) {
+            Ok(0) => break,
+            Ok(n) => padding += n as u64,
             Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits))),
-        };
-        padding += n as u64;
-        if padding > MAX_PADDING || buffer[..n].iter().any(|b| *b != 0) {
-            return Err(copy.refuse(
-                Finding::error("tar_data_after", "data follow the end of the archive").hint(AGAIN),
-            ));
+        }
+        if padding > PADDING {
+            copy.count_bytes(block.len() as u64, "what follows the end")?;
+        }
+        if after > 0 || block.iter().any(|b| *b != 0) {
+            after += block.len() as u64;
+        }
+        if after > MAX_AFTER || is_header(&block) {
+            let message = "data follow the end of the archive";
+            return Err(copy.refuse(Finding::error("tar_data_after", message).hint(AGAIN)));
         }
     }
+    if after > 0 {
+        let message = format!("{after} bytes after the end of the archive belong to no part of it");
+        copy.findings.push(Finding::warning("tar_data_after", message).hint(AGAIN));
+    }
+    Ok(())
 }
 
 /// The data of an extended header, without its padding.
@@ -318,8 +238,12 @@ fn take_extended(
                 ));
             }
         }
-        // Links are refused whatever they point to.
-        EntryType::GNULongLink => {}
+        EntryType::GNULongLink => {
+            if data.last() == Some(&0) {
+                data.pop();
+            }
+            extended.long_link = Some(data);
+        }
         _ => {
             let Some(records) = pax_records(&data) else {
                 return Err(copy.refuse(
@@ -360,39 +284,65 @@ fn pax_records(mut data: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
 
 fn read_entry(
     reader: &mut impl Read,
-    entry_type: EntryType,
-    header_name: &[u8],
+    header: &Header,
     size: u64,
     extended: Extended,
     copy: &mut PrivateCopy<'_>,
 ) -> Result<(), Stop> {
-    let name = entry_name(header_name, size, extended, copy)?;
+    let Named { name, link, sparse } = names(header, size, extended, copy)?;
+    let entry_type = header.entry_type();
+    let is_folder = entry_type.is_dir() || entry_type.as_byte() == DUMPED_FOLDER;
     // Old tars mark a folder by its name alone.
     let kind = match entry_type {
-        EntryType::Directory => Kind::Folder,
+        _ if is_folder => Kind::Folder,
         EntryType::Regular | EntryType::Continuous if name.ends_with(b"/") => Kind::Folder,
-        EntryType::Regular | EntryType::Continuous => Kind::File,
+        EntryType::Regular | EntryType::Continuous | EntryType::GNUSparse => Kind::File,
         // Nothing of it is copied, and nothing lies behind it.
         _ if copy.is_ignored(&name) => return skip(reader, padded(size), &name, copy),
+        EntryType::Link => return read_link(reader, size, &name, &link, copy),
+        other if other.as_byte() == VOLUME_LABEL => {
+            let message = format!("the archive calls itself '{}'", printable_bytes(&name));
+            copy.findings.push(Finding::note("tar_label", message));
+            return skip(reader, padded(size), &name, copy);
+        }
         other => {
             copy.findings.push(special(other).at(printable_bytes(&name)));
             return skip(reader, padded(size), &name, copy);
         }
     };
+    // An incremental backup lists a folder in its data.
+    let is_empty = size == 0 || entry_type.as_byte() == DUMPED_FOLDER;
     match copy.accept(&name, kind) {
         EntryAction::File(path) => {
-            let mut data = reader.by_ref().take(size);
+            let map = match (sparse, entry_type) {
+                (Some(records), _) => records.map(size, reader),
+                (None, EntryType::GNUSparse) => {
+                    gnu_map(header, size, reader).map(|map| map.map(|map| (map, 0)))
+                }
+                (None, _) => Ok(Some((Map::whole(size), 0))),
+            };
+            let (map, read) = match map {
+                Ok(Some(map)) => map,
+                Ok(None) => {
+                    let message = "a sparse file whose pieces do not fit together";
+                    let finding = Finding::error("tar_sparse", message).at(path);
+                    return Err(copy.refuse(finding.hint("make the archive without --sparse")));
+                }
+                Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits).at(path))),
+            };
+            let whole = map.size;
+            let mut data = map.expand(reader.by_ref().take(size - read));
             match copy.write(&path, &mut data, None)? {
-                Ok(written) if written.bytes == size => {}
+                Ok(written) if written.bytes == whole => {}
                 Ok(written) => {
-                    let message = format!("expected {size} bytes, found {}", written.bytes);
+                    let message = format!("expected {whole} bytes, found {}", written.bytes);
                     return Err(copy.refuse(truncated(&message).at(path)));
                 }
                 Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits).at(path))),
             }
             skip(reader, padded(size) - size, &name, copy)
         }
-        EntryAction::Folder if size > 0 => {
+        EntryAction::Folder if !is_empty => {
             let message = format!("a folder that holds {size} bytes");
             Err(copy.refuse(
                 Finding::error("tar_header", message).at(printable_bytes(&name)).hint(AGAIN),
@@ -402,21 +352,45 @@ fn read_entry(
     }
 }
 
-/// The name that counts: pax before GNU before the header's own, as GNU tar and bsdtar do.
-fn entry_name(
-    header_name: &[u8],
+/// A hard link is a second name of a file that came before. It holds no data.
+fn read_link(
+    reader: &mut impl Read,
+    size: u64,
+    name: &[u8],
+    link: &[u8],
+    copy: &mut PrivateCopy<'_>,
+) -> Result<(), Stop> {
+    let file = if size == 0 { copy.earlier(link)? } else { None };
+    let Some(mut file) = file else {
+        copy.findings.push(special(EntryType::Link).at(printable_bytes(name)));
+        return skip(reader, padded(size), name, copy);
+    };
+    if let EntryAction::File(path) = copy.accept(name, Kind::File) {
+        copy.write(&path, &mut file, None)?
+            .map_err(|e| IntakeError::io("read", Path::new(&path), e))?;
+    }
+    Ok(())
+}
+
+/// The names that count: pax before GNU before the header's own, as GNU tar and bsdtar do.
+fn names(
+    header: &Header,
     size: u64,
     extended: Extended,
     copy: &mut PrivateCopy<'_>,
-) -> Result<Vec<u8>, Stop> {
-    let mut name = extended.long_name.unwrap_or_else(|| header_name.to_owned());
+) -> Result<Named, Stop> {
+    let mut name = extended.long_name.unwrap_or_else(|| header.path_bytes().into_owned());
+    let own_link = || header.link_name_bytes().map(|link| link.into_owned()).unwrap_or_default();
+    let mut link = extended.long_link.unwrap_or_else(own_link);
     let mut paths = 0;
+    let mut sparse: Option<Records> = None;
     for (key, value) in extended.pax {
         match key.as_str() {
             "path" => {
                 name = value;
                 paths += 1;
             }
+            "linkpath" => link = value,
             "size" if value != size.to_string().as_bytes() => {
                 let message = format!(
                     "size: the entry's header says {size}, the pax header {}",
@@ -427,8 +401,11 @@ fn entry_name(
                 ));
             }
             key if key.starts_with("GNU.sparse") => {
-                let finding = special(EntryType::GNUSparse).at(printable_bytes(&name));
-                return Err(copy.refuse(finding));
+                let makes_sense = sparse.get_or_insert_default().take(key, &value);
+                if !makes_sense {
+                    let finding = special(EntryType::GNUSparse).at(printable_bytes(&name));
+                    return Err(copy.refuse(finding));
+                }
             }
             _ => {}
         }
@@ -438,7 +415,8 @@ fn entry_name(
         return Err(copy
             .refuse(Finding::error("tar_header", message).at(printable_bytes(&name)).hint(AGAIN)));
     }
-    Ok(name)
+    name = sparse.as_ref().and_then(Records::name).unwrap_or(name);
+    Ok(Named { name, link, sparse })
 }
 
 fn special(entry_type: EntryType) -> Finding {

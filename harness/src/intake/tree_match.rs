@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 
 use super::finding::Finding;
-use super::tree::{TreeFile, TreeSpec};
+use super::tree::{CONFIG_FILE, TreeFile, TreeSpec};
+use crate::harmless::printable;
 
 /// How one line of the tree fares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -125,14 +126,28 @@ fn find_lost<'a>(file: &TreeFile, paths: &[&'a str], taken: &BTreeSet<&str>) -> 
     if candidates.is_empty() {
         candidates = named(&|path| as_it_was(&base(path)));
     }
+    let is_config = file.path == CONFIG_FILE;
+    if candidates.is_empty() && is_config {
+        candidates = free().filter(|path| may_be_config(&base(path))).collect();
+    }
     candidates.sort_by_key(|path| path.matches('/').count());
     match candidates.as_slice() {
         [one] => Some(one),
+        // It decides no points, and says whose submission it is.
+        [first, ..] if is_config => Some(first),
         [first, second, ..] if first.matches('/').count() < second.matches('/').count() => {
             Some(first)
         }
         _ => None,
     }
+}
+
+/// Whether a file is probably the configuration under a name of its own: `config`, `my_config.json`, `conifg.json`.
+fn may_be_config(name: &str) -> bool {
+    let (stem, end) = name.rsplit_once('.').unwrap_or((name, ""));
+    let is_text = ["", "json", "jsonc", "json5", "txt", "yaml", "yml", "toml"].contains(&end);
+    let near = strsim::osa_distance(stem.trim_start_matches('.'), "config") <= 2;
+    is_text && (near || stem.contains("config")) || name == ".config"
 }
 
 /// A name without what systems add to it: the `.txt` of an editor that hides it, the ` (1)` of a second
@@ -177,11 +192,16 @@ pub(super) fn tree_findings(lines: &[TreeLine], paths: &[&str]) -> Vec<Finding> 
                 // An alias is as good as the name; the tree beside it shows both.
                 Mark::Ok | Mark::Absent => None,
                 Mark::Missing => Some(missing(expected, paths)),
-                Mark::WrongPlace => Some(
-                    Finding::error("tree_wrong_place", format!("expected at '{expected}'"))
-                        .at(found)
-                        .hint("move it there, or let umbra validate --fix do it"),
-                ),
+                Mark::WrongPlace => {
+                    let message = format!("expected at '{expected}'");
+                    let finding = if expected == CONFIG_FILE {
+                        // It is read all the same.
+                        Finding::warning("tree_wrong_place", message)
+                    } else {
+                        Finding::error("tree_wrong_place", message)
+                    };
+                    Some(finding.at(found).hint("move it there, or let umbra validate --fix do it"))
+                }
                 Mark::Unexpected => Some(
                     Finding::warning("tree_unexpected", "not part of the expected tree")
                         .at(found)
@@ -207,6 +227,19 @@ const LANGUAGES: [(&str, &[&str]); 7] = [
 fn missing(expected: String, paths: &[&str]) -> Finding {
     let end = |path: &str| path.rsplit_once('.').map(|(_, end)| end.to_lowercase());
     let ends: Vec<String> = paths.iter().filter_map(|path| end(path)).collect();
+    let base = |path: &str| path.rsplit('/').next().unwrap_or(path).to_lowercase();
+    let alike: Vec<&str> = paths.iter().copied().filter(|p| base(p) == base(&expected)).collect();
+    if alike.len() > 1 {
+        let named = alike.iter().take(3).map(|path| printable(path)).collect::<Vec<_>>().join(", ");
+        let more = if alike.len() > 3 { ", ..." } else { "" };
+        let message = format!(
+            "expected once in the submission, found {} files of this name: {named}{more}",
+            alike.len()
+        );
+        return Finding::error("tree_ambiguous", message)
+            .at(expected)
+            .hint("submit only one of them");
+    }
     let own = end(&expected).filter(|end| end == "rs" && !ends.contains(end));
     let count = |own: &[&str]| ends.iter().filter(|end| own.contains(&end.as_str())).count();
     let other = LANGUAGES.iter().map(|(name, ends)| (count(ends), name)).max_by_key(|(n, _)| *n);

@@ -76,6 +76,12 @@ fn write_finding(out: &mut String, finding: &Finding) {
         _ => String::new(),
     };
     let _ = writeln!(out, "\n{}: {place}{}", finding.severity, finding.message);
+    if let Some(excerpt) = &finding.excerpt {
+        let number = finding.line.unwrap_or_default().to_string();
+        let gap = " ".repeat(number.len());
+        let _ = writeln!(out, "  {number} | {}", excerpt.text);
+        let _ = writeln!(out, "  {gap} | {}^", " ".repeat(excerpt.caret));
+    }
     if let Some(hint) = &finding.hint {
         let _ = writeln!(out, "  hint: {hint}");
     }

@@ -1,15 +1,16 @@
 //! The entry of intake: decides the format by content and makes the private copy.
 
+use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
+use super::copy::{EntryAction, Kind, PrivateCopy, Stop, clear};
 use super::finding::Finding;
 use super::limits::{Limits, mib};
 use super::tree::TreeSpec;
-use super::{folder, tar, zip};
+use super::{folder, gz, tar, zip};
 use crate::harmless::printable;
 
 /// What a submission is, by its content.
@@ -140,7 +141,8 @@ pub(crate) fn read_archive(source: &Path, limits: &Limits) -> Result<Option<Vec<
         return refuse(Finding::error("link", message).hint("name what it leads to"));
     }
     if !metadata.is_file() {
-        return refuse(Finding::error("not_a_file", "expected an archive or a folder"));
+        let message = "expected an archive or a folder, found a device, fifo or socket";
+        return refuse(Finding::error("not_a_file", message));
     }
     let file = folder::open_file(path).map_err(|e| IntakeError::io("read", source, e))?;
     if !file.metadata().is_ok_and(|opened| opened.is_file()) {
@@ -221,11 +223,59 @@ pub(crate) fn name_of(source: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// Like [`unpack`], of the archive with these bytes. `name` only serves the messages.
+/// Like [`unpack`], of the archive with these bytes. `name` only serves the messages. An archive that holds
+/// nothing but another one is opened twice.
 ///
 /// # Errors
 /// As [`unpack`].
 pub fn unpack_bytes(
+    bytes: &[u8],
+    name: &str,
+    dest: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<Submission, IntakeError> {
+    if format_of_bytes(bytes) == Some(Format::TarGz)
+        && let Some(inner) = gz::packed_again(bytes, limits)
+    {
+        let found = Finding::warning("packed_twice", "compressed twice, one in the other");
+        return within(found, unpack_once(&inner, name, dest, tree, limits));
+    }
+    let outer = unpack_once(bytes, name, dest, tree, limits)?;
+    let [only] = &outer.files[..] else { return Ok(outer) };
+    let path = outer.root.join(&only.path);
+    let inner = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
+    if format_of_bytes(&inner).is_none() {
+        return Ok(outer);
+    }
+    clear(dest)?;
+    let message = format!("holds nothing but the archive '{}'", printable(&only.path));
+    let found = Finding::warning("packed_twice", message);
+    within(found, unpack_once(&inner, name, dest, tree, limits))
+}
+
+/// What came of the inner one of two archives, with what is to be said of the outer one.
+fn within(
+    found: Finding,
+    inner: Result<Submission, IntakeError>,
+) -> Result<Submission, IntakeError> {
+    let found = found.hint("submit the inner archive itself");
+    match inner {
+        Ok(mut submission) => {
+            submission.findings.retain(|finding| finding.code != "wrong_extension");
+            submission.findings.insert(0, found);
+            Ok(submission)
+        }
+        Err(IntakeError::Refused(mut refusal)) => {
+            refusal.findings.push(found);
+            Err(IntakeError::Refused(refusal))
+        }
+        error => error,
+    }
+}
+
+/// Unpacks an archive; what is an archive in it stays one.
+fn unpack_once(
     bytes: &[u8],
     name: &str,
     dest: &Path,
@@ -244,7 +294,7 @@ pub fn unpack_bytes(
     let result = match format {
         Format::Zip => zip::read(bytes, &mut copy),
         Format::Tar => tar::read(bytes, &mut copy),
-        Format::TarGz => tar::read_gz(bytes, &mut copy),
+        Format::TarGz => gz::read(bytes, &mut copy),
         Format::Folder => Err(Stop::Refused),
     };
     copy.finish(name, format, result)
@@ -273,7 +323,7 @@ pub fn format_of_bytes(bytes: &[u8]) -> Option<Format> {
 
 /// The kind of a packed file by its first bytes.
 pub(super) fn archive_magic(bytes: &[u8]) -> Option<&'static str> {
-    const MAGIC: [(&[u8], &str); 8] = [
+    const MAGIC: [(&[u8], &str); 14] = [
         (b"PK\x03\x04", "zip"),
         (b"\x1f\x8b", "gzip"),
         (b"Rar!\x1a\x07", "rar"),
@@ -282,6 +332,12 @@ pub(super) fn archive_magic(bytes: &[u8]) -> Option<&'static str> {
         (b"\xfd7zXZ\0", "xz"),
         (b"\x28\xb5\x2f\xfd", "zstd"),
         (b"MSCF", "cab"),
+        (b"\x1f\x9d", "compress"),
+        (b"LZIP", "lzip"),
+        (b"\x04\x22\x4d\x18", "lz4"),
+        (b"!<arch>\n", "ar"),
+        (b"070701", "cpio"),
+        (b"070707", "cpio"),
     ];
     MAGIC.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, kind)| *kind)
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::check_config::check_config;
 use super::finding::{Finding, Findings, Severity};
+use super::json_lines::text_of;
 use super::submitted_config::SubmittedConfig;
 use super::tree::{CONFIG_FILE, TreeSpec};
 use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
@@ -64,6 +65,8 @@ pub fn validate_submission(
             let (parsed, said, is_whole) = SubmittedConfig::parse(&bytes);
             let (present, missing) = places(&lines);
             let more = check_config(&parsed, is_whole, &present, &missing, tree);
+            let text = text_of(&bytes);
+            let more = more.into_iter().map(|finding| show(finding, &text));
             findings.extend(said.into_iter().chain(more).map(|finding| finding.at(name)));
             config = Some(parsed);
         }
@@ -94,10 +97,33 @@ impl Validation {
         self
     }
 
-    /// Whether the tree is the handout's, whatever `config.json` says. Of a refused one nothing is known.
+    /// Whether the tree is the handout's, whatever `config.json` says and wherever it lies. Of a refused one nothing
+    /// is known.
     pub fn follows_tree(&self) -> bool {
-        let fits = |line: &TreeLine| !matches!(line.mark, Mark::Missing | Mark::WrongPlace);
+        let is_config = |line: &TreeLine| line.expected.as_deref() == Some(CONFIG_FILE);
+        let fits = |line: &TreeLine| match line.mark {
+            Mark::Missing => false,
+            Mark::WrongPlace => is_config(line),
+            Mark::Ok | Mark::Absent | Mark::Unexpected => true,
+        };
         !self.tree.is_empty() && self.tree.iter().all(fits)
+    }
+}
+
+/// A finding with its line and the place of what it quotes, if that stands there.
+fn show(finding: Finding, text: &str) -> Finding {
+    let lines = finding.line.and_then(|line| text.lines().nth((line as usize).checked_sub(1)?));
+    let Some(line) = lines.filter(|_| finding.excerpt.is_none()) else { return finding };
+    // What is found is said last.
+    let mut quoted = finding.message.split(['\'', '"']).skip(1).step_by(2).collect::<Vec<_>>();
+    quoted.reverse();
+    let place = quoted.iter().filter(|words| !words.is_empty()).find_map(|words| line.find(words));
+    match place {
+        Some(place) => {
+            let column = line[..place].chars().count();
+            finding.showing(line, column)
+        }
+        None => finding,
     }
 }
 

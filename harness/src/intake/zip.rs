@@ -69,11 +69,14 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop>
     Ok(())
 }
 
-/// Some Windows programs write a backslash between folders. Where no name holds a slash, nothing else can
-/// be meant.
+/// Some Windows programs write a backslash between folders. Where no name holds a slash, or all such names are
+/// of Windows, nothing else can be meant.
 fn slashes(entries: &mut [Entry<'_>], copy: &mut PrivateCopy<'_>) {
-    let holds = |sign: u8| entries.iter().any(|entry| entry.name.contains(&sign));
-    if !holds(b'\\') || holds(b'/') {
+    let holds = |entry: &Entry<'_>, sign: u8| entry.name.contains(&sign);
+    let mut with_backslash = entries.iter().filter(|entry| holds(entry, b'\\')).peekable();
+    let is_clear = !entries.iter().any(|entry| holds(entry, b'/'))
+        || with_backslash.clone().all(|entry| entry.of_windows);
+    if with_backslash.peek().is_none() || !is_clear {
         return;
     }
     for sign in entries.iter_mut().flat_map(|entry| &mut entry.name) {

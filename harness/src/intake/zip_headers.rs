@@ -25,6 +25,8 @@ pub(super) struct Entry<'a> {
     pub(super) data: &'a [u8],
     /// Whether the file system that it comes from says that it is a folder.
     pub(super) marked_folder: bool,
+    /// Whether a backslash cannot be part of its name, where it was made.
+    pub(super) of_windows: bool,
     /// Bytes of the archive that it takes: local header, data, descriptor.
     pub(super) start: usize,
     pub(super) end: usize,
@@ -43,6 +45,9 @@ impl Entry<'_> {
 
 /// A header of the central directory.
 pub(super) struct Central<'a> {
+    /// The kind of file system that it was made on (4.4.2): 0 FAT, 10 NTFS, 14 VFAT, 11 MVS in the
+    /// specification and NTFS in Info-ZIP's programs.
+    pub(super) host: u8,
     pub(super) flags: u16,
     pub(super) method: u16,
     pub(super) crc32: u32,
@@ -67,6 +72,7 @@ impl<'a> Central<'a> {
         let end = extra_end + usize::from(u16_at(bytes, at + 32)?);
         bytes.get(..end)?;
         Some(Self {
+            host: *bytes.get(at + 5)?,
             flags: u16_at(bytes, at + 8)?,
             method: u16_at(bytes, at + 10)?,
             crc32: u32_at(bytes, at + 16)?,
@@ -164,6 +170,7 @@ pub(super) fn check_entry<'a>(
         unpacked_bytes: unpacked,
         crc32: central.crc32,
         data: &bytes[data_start..data_end],
+        of_windows: matches!(central.host, 0 | 10 | 11 | 14),
         marked_folder: central.attributes >> 28 == 0o4 || central.attributes & DOS_FOLDER != 0,
         start: at,
         end: data_end + descriptor,

@@ -102,7 +102,7 @@ fn scene(toml: &Path, roots: &mut Vec<PathBuf>, policy: &mut Policy) -> io::Resu
     let (Some(folder), Some(name)) = (folder, toml.file_name()) else { return Ok(toml) };
     let toml = folder.join(name);
     let mesh = mesh_folder(&toml);
-    let root = common(&folder, mesh.as_deref().unwrap_or(&folder));
+    let root = root_of(&folder, &toml, mesh.as_deref());
     let number = roots.iter().position(|known| *known == root).unwrap_or_else(|| {
         roots.push(root.clone());
         roots.len() - 1
@@ -134,8 +134,8 @@ pub fn as_given(words: &str, toml: &Path, plugin: &Path) -> String {
     if let Ok(folder) =
         fs::canonicalize(if given.as_os_str().is_empty() { Path::new(".") } else { given })
     {
-        let mesh = mesh_folder(&folder.join(toml.file_name().unwrap_or_default()));
-        let root = common(&folder, mesh.as_deref().unwrap_or(&folder));
+        let toml = folder.join(toml.file_name().unwrap_or_default());
+        let root = root_of(&folder, &toml, mesh_folder(&toml).as_deref());
         let scene = Path::new(SCENE).join("0");
         let rest = folder.strip_prefix(&root).unwrap_or(Path::new(""));
         // Without a mount namespace workers see true names.
@@ -180,6 +180,25 @@ fn add(policy: &mut Policy, bind: Bind) {
 fn mesh_folder(toml: &Path) -> Option<PathBuf> {
     let mesh = plain(&SceneConfig::load(toml).ok()?.mesh);
     mesh.parent().filter(|folder| folder.is_dir()).map(Path::to_owned)
+}
+
+/// The folder that holds a scene's TOML file, its mesh, and all that the way from one to the other goes through:
+/// `../teapot/s.obj` leads above the folder `teapot`, even from there.
+fn root_of(folder: &Path, toml: &Path, mesh: Option<&Path>) -> PathBuf {
+    let mut top = common(folder, mesh.unwrap_or(folder));
+    let way = SceneConfig::load(toml).map(|config| config.mesh).unwrap_or_default();
+    let mut at = PathBuf::new();
+    for part in way.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => {
+                at.pop();
+                top = common(&top, &at);
+            }
+            part => at.push(part),
+        }
+    }
+    top
 }
 
 /// A path without `.` and `..`, by its text.

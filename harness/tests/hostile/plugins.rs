@@ -158,6 +158,7 @@ pub fn all() -> Vec<Plugin> {
         rust("panic_in_thread", "panic_in_thread", Offline, Panicked("a good thread")),
         rust("panic_in_a_lost_thread", "panic_in_a_lost_thread", Offline, Zeros),
         rust("panic_while_panicking", "panic_in_drop", Offline, Crash("SIGABRT")),
+        rust("panic_with_a_bomb", "panic_with_a_bomb", Offline, Panicked("")),
         c("abort", "abort", Crash("SIGABRT")),
         c("segfault", "segv", Crash("SIGSEGV")),
         c("stack_overflow", "stack", Crash("SIGABRT, stack overflow")),

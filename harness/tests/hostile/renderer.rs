@@ -56,6 +56,15 @@ impl Hostile {
                 let _bomb = Bomb;
                 panic!("first");
             }
+            "panic_with_a_bomb" => {
+                struct Bomb;
+                impl Drop for Bomb {
+                    fn drop(&mut self) {
+                        panic!("when nobody expects it");
+                    }
+                }
+                std::panic::panic_any(Bomb);
+            }
             "overflow" => {
                 println!("{}", deeper(1));
             }

@@ -34,11 +34,15 @@ pub(super) struct Checks<'a> {
 }
 
 impl Checks<'_> {
-    /// Magic number and version field, the first six bytes, for messages that the decoder would not give.
+    /// Magic number and version field, of the first bytes, for messages that the decoder would not give.
     pub(super) fn signature(&self, start: &[u8]) -> Result<(), ImageError> {
         let found = match start {
             [] => "nothing (the file is empty)".to_owned(),
-            bytes => bytes.iter().take(4).map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" "),
+            bytes => {
+                let first: Vec<String> = bytes.iter().take(4).map(|b| format!("{b:02x}")).collect();
+                let first = first.join(" ");
+                kind_of(bytes).map_or(first.clone(), |kind| format!("{first}, as {kind}"))
+            }
         };
         let magic = &exr::meta::magic_number::BYTES[..];
         if start.is_empty() || !start.starts_with(&magic[..start.len().min(4)]) {
@@ -140,7 +144,8 @@ impl Checks<'_> {
         names.dedup();
         names.retain(|layer| RGB.iter().any(|c| find(layer, c).is_some()));
         if names.is_empty() {
-            return Err(match all.iter().any(|name| name == "Y") {
+            let of_luminance = |name: &String| ["Y", "RY", "BY", "A"].contains(&name.as_str());
+            return Err(match all.iter().any(|name| name == "Y") && all.iter().all(of_luminance) {
                 true => ImageError::LuminanceOnly { path: self.path.into() },
                 false => self.missing_channel("R", &all),
             });
@@ -225,4 +230,26 @@ pub(super) fn provenance(header: &Header) -> BTreeMap<String, String> {
         .filter_map(|l| l.split_once(" = "))
         .map(|(k, v)| (k.to_owned(), v.to_owned()))
         .collect()
+}
+
+/// What a file is by its first bytes, when it is no EXR.
+fn kind_of(bytes: &[u8]) -> Option<&'static str> {
+    const KINDS: [(&[u8], &str); 15] = [
+        (b"\x89PNG", "a PNG image does"),
+        (b"\xff\xd8\xff", "a JPEG image does"),
+        (b"#?RA", "a Radiance HDR image does"),
+        (b"#?RGBE", "a Radiance HDR image does"),
+        (b"PF\n", "a PFM image does"),
+        (b"Pf\n", "a PFM image does"),
+        (b"P6", "a PPM image does"),
+        (b"II*\0", "a TIFF image does"),
+        (b"MM\0*", "a TIFF image does"),
+        (b"GIF8", "a GIF image does"),
+        (b"BM", "a BMP image does"),
+        (b"PK\x03\x04", "a zip archive does"),
+        (b"\x1f\x8b", "gzip data do"),
+        (b"<", "a web page does"),
+        (b"version https://git-lfs", "the pointer does that Git LFS leaves in a file's place"),
+    ];
+    KINDS.iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, kind)| *kind)
 }

@@ -214,8 +214,8 @@ impl<'a> ExrRows<'a> {
     /// Reads the header and finds the blocks, which follow each other in any order.
     fn index(source: Source<'a>, path: &Path) -> Result<Self, ImageError> {
         let checks = Checks { path, file_bytes: source.len() };
-        let mut start = [0; 6];
-        let start = &mut start[..source.len().min(6) as usize];
+        let mut start = [0; 24];
+        let start = &mut start[..source.len().min(24) as usize];
         source.read(start, 0).map_err(|source| ImageError::Io { path: path.into(), source })?;
         checks.signature(start)?;
         let mut cursor = BufReader::new(Cursor { source: &source, at: 0 });

@@ -117,8 +117,17 @@ impl SceneConfig {
         let file: File = toml::from_str(text).map_err(|error| {
             let line = error.span().map(|span| line_at(text, span.start));
             // The parser names Rust's types.
-            let message = error.message().replace("expected i64", "expected a whole number");
-            wrong(line, message.replace("expected f32", "expected a number"))
+            let mut message = error.message().to_owned();
+            for (own, plain) in [
+                ("expected i64", "expected a whole number"),
+                ("expected f32", "expected a number"),
+                ("expected a sequence of 3 f32 values", "expected 3 numbers: [x, y, z]"),
+                (" as i128", ""),
+                (" as u128", ""),
+            ] {
+                message = message.replace(own, plain);
+            }
+            wrong(line, message)
         })?;
         let in_range = |section: &str, key: &str, value: i64, max: i64| {
             usize::try_from(value).ok().filter(|_| (1..=max).contains(&value)).ok_or_else(|| {
@@ -139,6 +148,18 @@ impl SceneConfig {
             let message = format!("camera.fov is {fov} but must lie between 0 and 180 degrees");
             return Err(wrong(line, message));
         }
+        // Serde takes the first three of four.
+        let numbers = |key| {
+            let table: toml::Table = text.parse().ok()?;
+            Some(table.get("camera")?.get(key)?.as_array()?.len())
+        };
+        for key in ["eye", "at", "up"] {
+            if let Some(count) = numbers(key).filter(|count| *count != 3) {
+                let line = line_of_key(text, "camera", key);
+                let message = format!("camera.{key} has {count} numbers, expected 3: [x, y, z]");
+                return Err(wrong(line, message));
+            }
+        }
         let renderer = file.renderer;
         // Written on Windows, perhaps.
         let mesh = file.input.objfile.trim().replace('\\', "/");
@@ -147,7 +168,8 @@ impl SceneConfig {
             return Err(wrong(line_of_key(text, "input", "objfile"), message));
         }
         // A worker sees the files under other names; so does whoever moves the folder.
-        if Path::new(&mesh).is_absolute() {
+        let on_drive = matches!(mesh.as_bytes(), [b'a'..=b'z' | b'A'..=b'Z', b':', ..]);
+        if on_drive || mesh.starts_with('/') || Path::new(&mesh).is_absolute() {
             let message =
                 format!("input.objfile is {mesh} but must be relative to the folder of this file");
             return Err(wrong(line_of_key(text, "input", "objfile"), message));

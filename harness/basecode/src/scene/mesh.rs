@@ -64,8 +64,8 @@ impl MeshFile {
     pub fn load(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path)
             .map_err(|error| Error::file(path, format!("cannot read the mesh: {error}")))?;
-        let obj = Obj::parse(path, &decode(&bytes))?;
-        drop(bytes);
+        let text = decode(&bytes);
+        let obj = Obj::parse(path, &text)?;
         let library = Library::load(path, &obj.libraries)?;
         let mut builder = Builder { obj: &obj, newest: vec![MISSING; obj.positions.len()] };
         let shape = |part| {
@@ -74,12 +74,38 @@ impl MeshFile {
         };
         let shapes = obj.parts.iter().map(shape).collect::<Result<Vec<_>>>()?;
         if shapes.is_empty() {
-            return Err(Error::file(path, "mesh holds no triangle"));
+            let what = match (obj.positions.len(), obj.faces.len()) {
+                (0, _) => {
+                    let first = text.lines().next().unwrap_or_default().trim();
+                    let first: String = first.chars().take(40).map(visible).collect();
+                    format!(
+                        "it has no vertex (v) and no face (f), and begins with \"{first}\": is it an OBJ file?"
+                    )
+                }
+                (vertices, _) => format!("it has {vertices} vertices (v) and no face (f)"),
+            };
+            return Err(Error::file(path, format!("mesh holds no triangle: {what}")));
+        }
+        let emits = |shape: &&Shape| library.materials[shape.material].is_emitter();
+        let mut lights = shapes.iter().filter(emits);
+        let mut remarks = [&obj.remarks[..], &library.remarks[..]].concat();
+        if let (Some(first), more @ 1..) = (lights.next(), lights.count()) {
+            remarks.push(format!(
+                "{}: {} shapes emit light; the light is the first, \"{}\", of material \"{}\"",
+                path.display(),
+                more + 1,
+                first.name,
+                library.materials[first.material].name
+            ));
         }
         let files = std::iter::once(path.to_owned()).chain(library.files().cloned()).collect();
-        let remarks = [obj.remarks, library.remarks].concat();
         Ok(Self { shapes, materials: library.materials, remarks, files })
     }
+}
+
+/// A character as a message shows it.
+fn visible(c: char) -> char {
+    if c.is_control() { '?' } else { c }
 }
 
 /// Index of the material of a part.

@@ -48,8 +48,12 @@ impl Library {
                     continue;
                 }
                 let bytes = std::fs::read(&file).map_err(|error| {
-                    wrong(format!("cannot read the material file {}: {error}", file.display()))
+                    let why = why_missing(&statement.name, &file);
+                    wrong(format!("cannot read the material file {}: {error}{why}", file.display()))
                 })?;
+                if is_absolute(&statement.name) {
+                    library.remarks.push(taken_beside(obj, statement.line, &statement.name, &file));
+                }
                 library.read(&file, &decode(&bytes))?;
                 library.files.push(file);
             }
@@ -119,7 +123,8 @@ impl Library {
     fn add(&mut self, path: &Path, entry: Option<Entry>) -> Result<()> {
         if let Some(entry) = entry {
             let names = [entry.name.clone(), entry.plain.clone()];
-            self.materials.push(entry.material(path, &mut self.textures)?);
+            let material = entry.material(path, &mut self.textures, &mut self.remarks)?;
+            self.materials.push(material);
             self.names.push(names);
         }
         Ok(())
@@ -192,14 +197,25 @@ impl Entry {
             "map_ks" => self.maps[1] = Some((at.line, rest.to_owned())),
             "bump" | "disp" | "decal" | "refl" | "norm" => return Ok(false),
             other if other.starts_with("map_") => return Ok(false),
-            // Ambient light, transparency, refraction and what else has no part in the assignment.
+            // All is opaque here. `-halo` may stand before the number.
+            "d" | "tr" => {
+                let opaque = if keyword.eq_ignore_ascii_case("d") { 1.0 } else { 0.0 };
+                let value = words(rest).last().and_then(|word| word.parse::<f32>().ok());
+                return Ok(value.is_none_or(|value| value == opaque));
+            }
+            // Ambient light, refraction and what else has no part in the assignment.
             _ => {}
         }
         Ok(true)
     }
 
     /// Loads the textures, which lie beside the MTL file at `path`.
-    fn material(self, path: &Path, files: &mut Vec<PathBuf>) -> Result<Material> {
+    fn material(
+        self,
+        path: &Path,
+        files: &mut Vec<PathBuf>,
+        remarks: &mut Vec<String>,
+    ) -> Result<Material> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut texture = |map: &Option<(usize, String)>, keyword: &str, colour: Vec3| {
             let Some((line, statement)) = map else { return Ok(Texture::Constant(colour)) };
@@ -207,9 +223,21 @@ impl Entry {
                 Place { path, line: *line }
                     .wrong(format!("material \"{}\": {keyword}: {message}", self.name))
             };
-            let (mapping, file) = texture_statement(statement).map_err(wrong)?;
-            let file = existing(folder, file);
-            let texture = Texture::load(&file, mapping).map_err(wrong)?;
+            let (mapping, name) = texture_statement(statement).map_err(wrong)?;
+            let file = existing(folder, name);
+            if !file.is_file()
+                && let Some((before, options)) = name.split_once(" -")
+                && existing(folder, before).is_file()
+            {
+                return Err(wrong(format!(
+                    "-{options} stands behind the file, expected options before it"
+                )));
+            }
+            let texture = Texture::load(&file, mapping)
+                .map_err(|error| wrong(error + &why_missing(name, &file)))?;
+            if is_absolute(name) {
+                remarks.push(taken_beside(path, *line, name, &file));
+            }
             files.push(file);
             Ok(texture)
         };
@@ -330,9 +358,56 @@ fn leading_numbers(text: &str, most: usize) -> (Vec<f32>, &str) {
     (values, rest)
 }
 
-/// The file of that name in `folder`: as it stands if there is one, else without a comment behind it.
+/// Whether a name is a place on the machine of whoever exported it.
+fn is_absolute(name: &str) -> bool {
+    let name = unquoted(name).as_bytes();
+    matches!(name, [b'/' | b'\\', ..] | [b'a'..=b'z' | b'A'..=b'Z', b':', b'/' | b'\\', ..])
+}
+
+/// The remark on a file that is taken from beside the file that names it.
+fn taken_beside(path: &Path, line: usize, name: &str, file: &Path) -> String {
+    format!(
+        "{}:{line}: {} is absolute; taken is {}",
+        path.display(),
+        unquoted(name),
+        file.display()
+    )
+}
+
+/// What else is to be said of a file that is not there.
+fn why_missing(name: &str, file: &Path) -> String {
+    if file.exists() {
+        return String::new();
+    }
+    let wanted = file.file_name().unwrap_or_default();
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let entries = folder.unwrap_or(Path::new(".")).read_dir().into_iter().flatten().flatten();
+    let mut alike = entries.map(|entry| entry.file_name());
+    if let Some(other) = alike.find(|other| other.eq_ignore_ascii_case(wanted)) {
+        return format!("; there is {}: upper and lower case count", other.display());
+    }
+    if is_absolute(name) {
+        return format!("; {} is absolute, so it was looked for here", unquoted(name));
+    }
+    String::new()
+}
+
+/// The file of that name in `folder`: as it stands if there is one, else without a comment behind it. Of an
+/// absolute name the end that is there counts: the rest is another machine's, or none that a renderer
+/// sees.
 fn existing(folder: &Path, name: &str) -> PathBuf {
     let candidates = [name, without_comment(name)];
+    if is_absolute(name) {
+        let ends = candidates.iter().flat_map(|name| {
+            let name = unquoted(name);
+            name.match_indices(['/', '\\']).map(move |(at, _)| &name[at + 1..])
+        });
+        let mut ends = ends.filter(|end| !end.is_empty() && !is_absolute(end)).collect::<Vec<_>>();
+        ends.sort_by_key(|end| std::cmp::Reverse(end.len()));
+        let mut paths = ends.iter().flat_map(|end| spellings(folder, end));
+        let last = ends.last().map(|end| folder.join(without_comment(end)));
+        return paths.find(|path| path.is_file()).or(last).unwrap_or_else(|| folder.to_owned());
+    }
     let mut paths = candidates.iter().flat_map(|name| spellings(folder, name));
     let first = folder.join(unquoted(without_comment(name)).replace('\\', "/"));
     paths.find(|path| path.is_file()).unwrap_or(first)

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-/// The text of a file: UTF-8 or UTF-16 by its byte order mark, else UTF-8, else Latin-1.
+/// The text of a file: UTF-8 or UTF-16 by its byte order mark, UTF-16 by its zeros, else UTF-8, else Latin-1.
 pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
     if let Some(rest) = bytes.strip_prefix(b"\xef\xbb\xbf") {
         return decode(rest);
@@ -14,6 +14,9 @@ pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
     match bytes {
         [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes),
+        // A text begins with a character of ASCII here.
+        [1..=127, 0, 1..=127, 0, ..] => utf16(bytes, u16::from_le_bytes),
+        [0, 1..=127, 0, 1..=127, ..] => utf16(bytes, u16::from_be_bytes),
         _ => match std::str::from_utf8(bytes) {
             Ok(text) => Cow::Borrowed(text),
             Err(_) => Cow::Owned(bytes.iter().map(|&byte| char::from(byte)).collect()),
@@ -136,6 +139,9 @@ mod tests {
         let little: Vec<u8> = "\u{feff}ü".encode_utf16().flat_map(u16::to_le_bytes).collect();
         let big: Vec<u8> = "\u{feff}ü".encode_utf16().flat_map(u16::to_be_bytes).collect();
         assert_eq!((decode(&little), decode(&big)), ("ü".into(), "ü".into()));
+        let little: Vec<u8> = "v 1".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let big: Vec<u8> = "v 1".encode_utf16().flat_map(u16::to_be_bytes).collect();
+        assert_eq!((decode(&little), decode(&big)), ("v 1".into(), "v 1".into()));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Colours that may vary over a surface.
 
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -84,14 +85,28 @@ impl Texture {
         let mut reader = image::ImageReader::open(path)
             .and_then(image::ImageReader::with_guessed_format)
             .map_err(|error| format!("cannot read the texture {file}: {error}"))?;
+        let format = reader.format();
         let mut limits = image::Limits::default();
         limits.max_image_width = Some(MAX_SIDE);
         limits.max_image_height = Some(MAX_SIDE);
         reader.limits(limits);
-        let picture = reader
-            .decode()
-            .map_err(|error| format!("cannot decode the texture {file}: {error}"))?
-            .into_rgb8();
+        let picture = reader.decode().map_err(|error| match error {
+            image::ImageError::IoError(error) if error.kind() != ErrorKind::UnexpectedEof => {
+                format!("cannot read the texture {file}: {error}")
+            }
+            image::ImageError::Unsupported(_) => {
+                let names = format.map(|format| format.extensions_str().first().copied());
+                let found = names.flatten().map_or("something else".into(), str::to_uppercase);
+                format!("cannot decode the texture {file}: expected PNG, JPEG, TGA or BMP, found {found}")
+            }
+            error => {
+                // The decoder of PNG adds its own types to what it says.
+                let error = error.to_string();
+                let said = error.split(" while decoding ").next().unwrap_or_default();
+                format!("cannot decode the texture {file}: {said}")
+            }
+        })?;
+        let picture = picture.into_rgb8();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         if width == 0 || height == 0 {
             return Err(format!(

@@ -10,6 +10,12 @@ use crate::rubric::{Part, Rules};
 /// When nothing has the name; the message names what is most alike.
 pub fn explain(rules: &Rules, name: &str, look: Look) -> Result<String, String> {
     let mut page = Page::new(look.width, look.colours);
+    let name = &*name.trim().to_lowercase();
+    // `shadow_rays` is near enough.
+    let plain = |name: &str| name.replace('_', ".");
+    let checks = CheckId::ALL.iter().map(|check| check.name());
+    let known = checks.chain(RuleId::ALL.iter().map(|rule| rule.name()));
+    let name = known.into_iter().find(|known| plain(known) == plain(name)).unwrap_or(name);
     if let Some(part) = rules.parts.iter().find(|part| part.id == name) {
         explain_part(&mut page, rules, part);
         return Ok(page.finish());
@@ -24,9 +30,22 @@ pub fn explain(rules: &Rules, name: &str, look: Look) -> Result<String, String> 
                 explain_check(&mut page, rules, check);
             }
         }
-        (Err(error), _) => return Err(error),
+        (Err(error), _) => return Err(not_found(rules, name).unwrap_or(error)),
     }
     Ok(page.finish())
+}
+
+/// What to say of a name that is none: the parts where it looks like one, or the checks that it is a piece of.
+fn not_found(rules: &Rules, name: &str) -> Option<String> {
+    if name.starts_with(|c: char| c.is_ascii_digit()) {
+        let parts: Vec<&str> = rules.parts.iter().map(|part| part.id.as_str()).collect();
+        return Some(format!("there is no part {name}; expected one of {}", parts.join(", ")));
+    }
+    let checks = CheckId::ALL.iter().map(|check| check.name());
+    let pieces: Vec<&str> = checks.filter(|check| check.split('.').any(|p| p == name)).collect();
+    let named = pieces.join(", ");
+    (!pieces.is_empty())
+        .then(|| format!("there is no check \"{name}\"; with it in their name: {named}"))
 }
 
 /// All checks, a line each.
@@ -109,6 +128,11 @@ mod tests {
             of("shadow.ray").unwrap_err(),
             "there is no check \"shadow.ray\"; did you mean \"shadow.rays\"?"
         );
+        assert!(of(" Shadow_Rays ").is_ok());
+        let error = of("9.9").unwrap_err();
+        assert!(error.starts_with("there is no part 9.9; expected one of 1.1, 1.2"), "{error}");
+        let error = of("phong").unwrap_err();
+        assert!(error.contains("in their name: ") && error.contains("bsdf.phong"), "{error}");
     }
 
     #[test]

@@ -82,6 +82,9 @@ impl Piece {
 
     fn statement(&mut self, line: usize, statement: &str) -> Result<(), Wrong> {
         let (keyword, rest) = split_keyword(statement);
+        // Some write them in upper case.
+        let lower = keyword.to_ascii_lowercase();
+        let keyword = if keyword.len() <= 6 { lower.as_str() } else { keyword };
         match keyword {
             "v" => {
                 let position = self.position(line, rest)?;
@@ -240,5 +243,8 @@ pub(super) fn wrong_corner(word: &str) -> String {
 
 /// The words of a numeric statement, up to a comment.
 fn words(rest: &str) -> impl Iterator<Item = &str> {
-    rest.split('#').next().unwrap_or_default().split_whitespace()
+    // `1.#IND` is how Microsoft's compilers write what is no number.
+    let mut signs = rest.match_indices('#').map(|(at, _)| at);
+    let end = signs.find(|&at| !rest[..at].ends_with('.')).unwrap_or(rest.len());
+    rest[..end].split_whitespace()
 }

@@ -1,0 +1,146 @@
+//! Gzip data: a series of members (RFC 1952, 2.2), which hold a tar.
+
+use std::io::{self, Read};
+
+use flate2::bufread::GzDecoder;
+
+use super::copy::{PrivateCopy, Stop};
+use super::finding::Finding;
+use super::limits::{Limits, mib};
+use super::tar::{self, AGAIN, BLOCK, PADDING};
+use crate::harmless::printable;
+
+/// Members of gzip data; programs that pack in pieces take 64 KiB or more for each.
+const MAX_MEMBERS: u64 = 1 << 14;
+/// How a member begins: deflate is gzip's only method.
+const MEMBER: &[u8] = b"\x1f\x8b\x08";
+
+/// Reads a gzipped tar.
+pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop> {
+    let mut gz = Gz {
+        packed: bytes.len(),
+        member: GzDecoder::new(bytes),
+        members: 1,
+        rest: None,
+        unpacked: 0,
+        limits: copy.limits,
+    };
+    tar::read(&mut gz, copy)?;
+    match gz.rest {
+        None => Ok(()),
+        Some(rest) if rest.iter().all(|byte| *byte == 0) => {
+            let message = format!("{} zeros after the gzip data", rest.len());
+            copy.findings.push(Finding::note("gz_padding", message));
+            Ok(())
+        }
+        // Some programs go on with a member behind zeros, others do not.
+        Some(rest) if rest.windows(3).any(|bytes| bytes == MEMBER) => {
+            let message = format!("{} bytes follow the gzip data, and hold more of it", rest.len());
+            Err(copy.refuse(Finding::error("gz_data_after", message).hint(AGAIN)))
+        }
+        Some(rest) => {
+            let message =
+                format!("{} bytes after the gzip data belong to no part of it", rest.len());
+            copy.findings.push(Finding::warning("gz_data_after", message).hint(AGAIN));
+            Ok(())
+        }
+    }
+}
+
+/// What gzip data hold when it is no tar but another archive: some browsers and servers pack what is packed already.
+/// Nothing where it is a tar, or cannot be read.
+pub(super) fn packed_again(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
+    let mut gz = GzDecoder::new(bytes);
+    let mut unpacked = Vec::new();
+    gz.by_ref().take(4).read_to_end(&mut unpacked).ok()?;
+    if !unpacked.starts_with(MEMBER) && !unpacked.starts_with(b"PK\x03\x04") {
+        return None;
+    }
+    let most = mib(limits.max_file_mib);
+    gz.by_ref().take(most).read_to_end(&mut unpacked).ok()?;
+    (unpacked.len() as u64 <= most && gz.get_ref().is_empty()).then_some(unpacked)
+}
+
+/// Gzip data under the limits: a series of members (RFC 1952, 2.2), one after the other.
+struct Gz<'a> {
+    member: GzDecoder<&'a [u8]>,
+    members: u64,
+    /// What follows the last member, if anything.
+    rest: Option<&'a [u8]>,
+    packed: usize,
+    unpacked: u64,
+    limits: &'a Limits,
+}
+
+impl Read for Gz<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if buffer.is_empty() || self.rest.is_some() {
+            return Ok(0);
+        }
+        let n = loop {
+            let n = self.member.read(buffer)?;
+            let rest = *self.member.get_ref();
+            if n > 0 || rest.is_empty() {
+                break n;
+            }
+            if !rest.starts_with(b"\x1f\x8b") {
+                self.rest = Some(rest);
+                break 0;
+            }
+            self.members += 1;
+            // Each costs more than it weighs.
+            if self.members > MAX_MEMBERS {
+                return Err(io::Error::other(GzLimit::Members));
+            }
+            self.member = GzDecoder::new(rest);
+        };
+        self.unpacked += n as u64;
+        let consumed = self.packed - self.member.get_ref().len();
+        if self.limits.ratio_exceeded(self.unpacked, consumed as u64) {
+            return Err(io::Error::other(GzLimit::Ratio));
+        }
+        // Headers and padding come on top of the contents: at most two blocks an entry.
+        let overhead = self.limits.max_entries.saturating_mul(2 * BLOCK as u64) + 2 * PADDING;
+        if self.unpacked > mib(self.limits.max_total_mib).saturating_add(overhead) {
+            return Err(io::Error::other(GzLimit::Total));
+        }
+        Ok(n)
+    }
+}
+
+/// A limit that gzip data exceed, on its way through an [`io::Error`].
+#[derive(Debug, thiserror::Error)]
+enum GzLimit {
+    #[error("ratio limit")]
+    Ratio,
+    #[error("total limit")]
+    Total,
+    #[error("members limit")]
+    Members,
+}
+
+/// What a reading error means.
+pub(super) fn unreadable(error: &io::Error, limits: &Limits) -> Finding {
+    const HINT: &str = "submit only the files of the tree";
+    match error.get_ref().and_then(|inner| inner.downcast_ref()) {
+        Some(GzLimit::Ratio) => {
+            let message =
+                format!("unpacks to more than {} times its packed size", limits.max_ratio);
+            Finding::error("limit_ratio", message).hint(HINT)
+        }
+        Some(GzLimit::Total) => {
+            let message = format!("unpacks to more than the limit of {} MiB", limits.max_total_mib);
+            Finding::error("limit_total", message).hint(HINT)
+        }
+        Some(GzLimit::Members) => {
+            let message = format!("more than {MAX_MEMBERS} pieces of gzip data");
+            Finding::error("limit_members", message).hint(AGAIN)
+        }
+        None => {
+            let message =
+                format!("the compressed data cannot be read: {}", printable(&error.to_string()));
+            Finding::error("gz_corrupt", message)
+                .hint("the upload may have been cut off; submit it again")
+        }
+    }
+}
