@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::class::{Policy, Stated};
 use crate::files::Scratch;
 use crate::imaging::evidence::Tolerances;
 use crate::rubric::Rules;
@@ -24,7 +25,7 @@ pub struct Assignment {
     pub due: String,
     /// What a late submission costs; nothing when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub late: Option<crate::class::Policy>,
+    pub late: Option<Policy>,
     /// The scenes, the submission's own first.
     pub scenes: Vec<SceneEntry>,
     /// The offline TOML file of a scene that does not vary over rows, for findings on samplers.
@@ -196,7 +197,7 @@ impl Assignment {
         if let Some(problem) = self.rules.problem() {
             return Some(problem);
         }
-        if let Some(problem) = self.late.as_ref().and_then(crate::class::Policy::problem) {
+        if let Some(problem) = self.late.as_ref().and_then(Policy::problem) {
             return Some(problem);
         }
         for (index, scene) in self.scenes.iter().enumerate() {
@@ -256,5 +257,21 @@ impl Assignment {
     /// Where Umbra keeps what it can make again.
     pub fn cache(&self) -> PathBuf {
         self.root.join("target").join("umbra")
+    }
+}
+
+impl From<&Assignment> for Stated {
+    fn from(assignment: &Assignment) -> Self {
+        let Assignment { name, title, course, due, late, rules, .. } = assignment.clone();
+        Self { name, title, course, due, late, rules }
+    }
+}
+
+impl Assignment {
+    /// Puts what is pinned in the place of what the assignment says.
+    pub fn pin(&mut self, pinned: &Stated) {
+        let Stated { name: _, title, course, due, late, rules } = pinned.clone();
+        (self.title, self.course, self.due) = (title, course, due);
+        (self.late, self.rules) = (late, rules);
     }
 }

@@ -77,6 +77,26 @@ fn is_harmful(c: char) -> bool {
         || matches!(u32::from(c) & 0xffff, 0xfffe | 0xffff)
 }
 
+/// A cell that no spreadsheet takes for a formula: one that begins like it gets an apostrophe.
+pub fn csv_cell(text: &str) -> String {
+    let begins_as_formula = text.trim_start_matches(' ').starts_with([
+        '=', '+', '-', '@', '\t', '\r', '\n', '\u{ff1d}', '\u{ff0b}', '\u{ff0d}', '\u{ff20}',
+    ]);
+    let clean = harmless(text);
+    if begins_as_formula && !is_number(text) { format!("'{clean}") } else { clean }
+}
+
+/// `-12.5` and the like; nothing that a spreadsheet could read in another way.
+fn is_number(text: &str) -> bool {
+    let digits = text.strip_prefix(['+', '-']).unwrap_or(text);
+    digits.chars().all(|c| c.is_ascii_digit() || c == '.') && text.parse::<f64>().is_ok()
+}
+
+/// Whether a character turns round the text after it: bidirectional overrides and isolates.
+pub fn reorders(c: char) -> bool {
+    matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,7 +9,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 
 use super::download::{self, GRADESCOPE_METADATA};
-use super::layout::{self, Kind, Label, gradescope_metadata, is_labelled, label_of};
+use super::layout::{
+    self, ARCHIVES, Kind, Label, end_of, gradescope_metadata, has_end_of_archive, is_labelled,
+    label_of,
+};
 use crate::harmless::printable;
 use crate::intake::{Limits, TreeSpec, format_of_bytes};
 
@@ -21,9 +24,6 @@ const NOTHING: &str = " (nothing in it)";
 const NAMED: usize = 12;
 /// Largest metadata of a platform that is read [bytes].
 const MAX_METADATA: u64 = 64 << 20;
-/// Ends of names of archives, also of those that are refused with a reason.
-const ARCHIVES: [&str; 11] =
-    ["zip", "tar", "gz", "tgz", "rar", "7z", "bz2", "tbz", "xz", "txz", "zst"];
 /// Ends of names of files that are zips by content and hold something else.
 const DOCUMENTS: [&str; 10] =
     ["docx", "xlsx", "pptx", "odt", "ods", "odp", "pages", "key", "jar", "epub"];
@@ -373,16 +373,6 @@ fn is_submission(folder: &Path, tree: &TreeSpec) -> anyhow::Result<bool> {
         }
     }
     Ok(has_top || (is_part && !holds_archive))
-}
-
-/// What follows the last dot of a name, in lower case.
-pub(super) fn end_of(name: &str) -> String {
-    name.rsplit_once('.').map(|(_, end)| end.to_lowercase()).unwrap_or_default()
-}
-
-/// Whether a file is named like an archive.
-pub(super) fn has_end_of_archive(name: &str) -> bool {
-    ARCHIVES.contains(&end_of(name).as_str())
 }
 
 /// Whether a file is an archive by its name or, when that says nothing, by its content.

@@ -11,8 +11,7 @@ use std::path::{Component, Path, PathBuf};
 use anyhow::Context as _;
 use zip::ZipArchive;
 
-use super::collect::{end_of, has_end_of_archive};
-use super::layout::{Kind, label_of};
+use super::layout::{Kind, end_of, has_end_of_archive, label_of};
 use crate::harmless::printable;
 use crate::intake::{Limits, TreeSpec};
 

@@ -3,7 +3,7 @@
 use super::layout::Kind;
 use super::names;
 use super::roster::{Roster, Student};
-use crate::report::csv_cell;
+use crate::harmless::csv_cell;
 
 /// The points of one student of a class list.
 #[derive(Clone, Debug, PartialEq)]

@@ -290,6 +290,20 @@ fn scalar(text: &str) -> String {
     if ["null", "~"].contains(&text) { String::new() } else { text.to_owned() }
 }
 
+/// Ends of names of archives, also of those that are refused with a reason.
+pub(super) const ARCHIVES: [&str; 11] =
+    ["zip", "tar", "gz", "tgz", "rar", "7z", "bz2", "tbz", "xz", "txz", "zst"];
+
+/// What follows the last dot of a name, in lower case.
+pub(super) fn end_of(name: &str) -> String {
+    name.rsplit_once('.').map(|(_, end)| end.to_lowercase()).unwrap_or_default()
+}
+
+/// Whether a file is named like an archive.
+pub(super) fn has_end_of_archive(name: &str) -> bool {
+    ARCHIVES.contains(&end_of(name).as_str())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,7 +11,6 @@ use super::late::Policy;
 use super::matching::{MATCHES, Matches};
 use super::overrides::{OVERRIDES, Overrides};
 use super::settle::Attempt;
-use crate::assignment::Assignment;
 use crate::files::write_new;
 use crate::rubric::Rules;
 
@@ -81,19 +80,6 @@ pub struct Change {
 }
 
 impl Stated {
-    /// What an assignment says.
-    pub fn of(assignment: &Assignment) -> Self {
-        let Assignment { name, title, course, due, late, rules, .. } = assignment.clone();
-        Self { name, title, course, due, late, rules }
-    }
-
-    /// Puts what is pinned in the place of what the assignment says.
-    pub fn replace(&self, assignment: &mut Assignment) {
-        let Self { name: _, title, course, due, late, rules } = self.clone();
-        (assignment.title, assignment.course, assignment.due) = (title, course, due);
-        (assignment.late, assignment.rules) = (late, rules);
-    }
-
     /// The keys that differ.
     pub fn differs(&self, other: &Self) -> Vec<&'static str> {
         let keys = [

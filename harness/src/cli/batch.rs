@@ -13,6 +13,7 @@ use super::asked::Asked;
 use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::class::{self, Source};
 use super::context::{Context, INTERRUPTED, cores};
+use super::join::join;
 use super::render::AdapterChoice;
 use super::settling::{self, Found};
 use crate::assignment::Assignment;
@@ -209,7 +210,7 @@ impl Batch<'_> {
                 }
                 let new = |record| Earlier { record, comparable: true };
                 let mut records: Vec<Earlier> = records.into_iter().map(new).collect();
-                class::join(self.output, &found, &mut records);
+                join(self.output, &found, &mut records);
                 settling::finish(self.output, pins, decided, found, records)?
             }
             _ => {
@@ -248,7 +249,7 @@ impl Batch<'_> {
     /// What the report is settled by: what is pinned there, which takes the place of what `config.json` says by now,
     /// with the instructor's decisions as they are now.
     fn pin(&self, assignment: &mut Assignment) -> anyhow::Result<(Pins, Decided)> {
-        let stated = Stated::of(assignment);
+        let stated = Stated::from(&*assignment);
         let attempt = self.attempt.unwrap_or_default();
         let mut decided = Decided::read(self.output, stated, attempt)?;
         let first = Decided { matches: String::new(), overrides: String::new(), ..decided.clone() };
@@ -264,7 +265,7 @@ impl Batch<'_> {
                     pin.when,
                     self.output.display()
                 );
-                pinned.replace(assignment);
+                assignment.pin(pinned);
                 decided.assignment = pinned.clone();
             }
             let attempt = pin.decided.attempt;

@@ -8,11 +8,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, ensure};
 
 use super::context::Context;
-use super::settling::{self, Found};
 use crate::class::{self, Claim, Label, MATCHES, Roster};
 use crate::columns::count;
 use crate::files::write_whole;
-use crate::grading::{Earlier, Folders, Record, RecordCache, Student};
+use crate::grading::{Folders, Record, RecordCache, Student};
 use crate::report;
 
 /// The file that says where a submission lay, in its instructor's folder.
@@ -21,6 +20,8 @@ const SOURCE: &str = "source.txt";
 const LABEL: &str = "label.json";
 /// The class list of a report, in the instructor's folder.
 const LIST: &str = "class.csv";
+/// The folder of what tasks of a partition found, in the instructor's folder.
+pub const WORK: &str = "work";
 /// So many names stand in a message.
 const NAMES: usize = 5;
 
@@ -87,7 +88,7 @@ pub fn ask(class: &class::Class, output: &Path) -> anyhow::Result<()> {
 /// else what their names allow, made unique.
 pub fn sources(given: &[class::Source], output: &Path) -> Vec<Source> {
     // Folders of the report's own.
-    let own = [report::INSTRUCTOR, class::pins::FOLDER, settling::WORK];
+    let own = [report::INSTRUCTOR, class::pins::FOLDER, WORK];
     let mut taken = HashSet::from(own.map(str::to_owned));
     let mut known: HashMap<String, VecDeque<String>> = HashMap::new();
     for slug in folders(output) {
@@ -181,84 +182,7 @@ pub fn folders(output: &Path) -> Vec<String> {
     names
 }
 
-/// Adds to `records`, made of some of the submissions that were found, what earlier runs into the same report
-/// found out about others, and says so.
-pub fn join(output: &Path, found: &Found, records: &mut Vec<Earlier>) {
-    let graded: HashSet<String> = records.iter().map(|own| own.record.slug.clone()).collect();
-    let mut gone = Vec::new();
-    let slugs = |aside: bool| -> HashSet<&str> {
-        let own = found.seen.iter().filter(|seen| seen.aside == aside && seen.empty.is_empty());
-        own.map(|seen| seen.slug.as_str()).collect()
-    };
-    let (mut missing, aside) = (slugs(false), slugs(true));
-    missing.retain(|slug| !graded.contains(*slug));
-    for slug in folders(output) {
-        let instructor = output.join(report::INSTRUCTOR).join(&slug);
-        if graded.contains(&slug) {
-            continue;
-        }
-        let earlier = match RecordCache::earlier(&instructor, &found.conditions) {
-            Ok(Some(earlier)) => earlier,
-            Ok(None) => continue,
-            Err(error) => {
-                eprintln!("umbra: {} is skipped: {}", slug, super::told_once(&error));
-                continue;
-            }
-        };
-        let record = &earlier.record;
-        let is_given = missing.remove(slug.as_str()) || aside.contains(slug.as_str());
-        if !is_given && let Some(new) = records.iter().find(|new| is_newer(&new.record, record)) {
-            match RecordCache::replace(&instructor) {
-                Ok(()) => eprintln!(
-                    "umbra: {} of {} is graded again as {}: it replaces the one in {}",
-                    record.name,
-                    who(&record.student),
-                    new.record.slug,
-                    instructor.display()
-                ),
-                Err(error) => eprintln!("umbra: {}: {error}", instructor.display()),
-            }
-            continue;
-        }
-        if !is_given {
-            gone.push(record.name.clone());
-        }
-        records.push(earlier);
-    }
-    if !gone.is_empty() {
-        let stay = if gone.len() == 1 { "stays" } else { "stay" };
-        eprintln!(
-            "umbra: {} {stay} in {} from earlier runs: {}; to remove one, delete its folder in {}",
-            count(gone.len(), "submission"),
-            output.display(),
-            some(&gone),
-            output.join(report::INSTRUCTOR).display()
-        );
-    }
-    if !missing.is_empty() {
-        let mut missing: Vec<String> = missing.into_iter().map(str::to_owned).collect();
-        missing.sort();
-        let are = if missing.len() == 1 { "is" } else { "are" };
-        eprintln!(
-            "umbra: {} {are} not graded yet, and not in the report: {}",
-            count(missing.len(), "submission"),
-            some(&missing)
-        );
-    }
-}
-
-/// Whether `new` resubmits `old`: the same file name, by the same student.
-fn is_newer(new: &Record, old: &Record) -> bool {
-    let (a, b) = (&new.student, &old.student);
-    let same = if a.id.is_empty() && b.id.is_empty() {
-        !a.full_name().is_empty() && a.full_name() == b.full_name()
-    } else {
-        a.id.trim() == b.id.trim()
-    };
-    same && new.name == old.name
-}
-
-fn who(student: &Student) -> String {
+pub fn who(student: &Student) -> String {
     let name = student.full_name();
     if name.is_empty() { student.id.clone() } else { name }
 }
@@ -342,7 +266,6 @@ fn student_of(context: &Context, source: &Path) -> Option<Student> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::sample;
 
     fn source(path: &str, slug: &str) -> Source {
         Source {
@@ -414,24 +337,5 @@ mod tests {
             assert!(!is_called(&source, &student, name), "{name}");
         }
         assert!(!is_called(&source, &Student::default(), " "));
-    }
-
-    #[test]
-    fn the_same_file_of_the_same_student_is_submitted_again() {
-        let record = sample::report().entries.remove(0).record;
-        assert!(is_newer(&record, &record));
-        let with = |name: &str, id: &str, last: &str| {
-            let mut other = record.clone();
-            other.name = name.into();
-            other.student.id = id.into();
-            other.student.last_name = last.into();
-            other
-        };
-        assert!(!is_newer(&record, &with("b.zip", "260000001", "Lampglow")));
-        assert!(!is_newer(&record, &with("a2_ada.zip", "260000009", "Lampglow")));
-        let (a, b) = (with("a.zip", "", "Lampglow"), with("a.zip", "", "Dimmoor"));
-        assert!(is_newer(&a, &a) && !is_newer(&a, &b));
-        let nobody = Record { student: Student::default(), ..a };
-        assert!(!is_newer(&nobody, &nobody));
     }
 }

@@ -11,6 +11,7 @@ use super::choices::{BudgetChoice, IsolationChoice, Perturb};
 use super::class::{self, some};
 use super::context::Context;
 use super::grade;
+use super::join::join;
 use super::render::AdapterChoice;
 use super::settling::{self, Found, Seen};
 use crate::class::{Decided, Pins, Stated};
@@ -69,7 +70,7 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
     let pinned = &pins.current().context("nothing is pinned; run a task again")?.decided;
     let (stated, attempt) = (pinned.assignment.clone(), pinned.attempt);
     if let Ok(assignment) = Context::assignment(root) {
-        let differs = Stated::of(&assignment).differs(&stated);
+        let differs = Stated::from(&assignment).differs(&stated);
         if !differs.is_empty() {
             eprintln!(
                 "umbra: config.json has other {} than the tasks pinned; `umbra regrade` shows what would change",
@@ -78,7 +79,7 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
         }
     }
     let decided = Decided::read(output, stated, attempt)?;
-    class::join(output, &found, &mut records);
+    join(output, &found, &mut records);
     let report = settling::finish(output, &mut pins, &decided, found, records)?;
     for file in files {
         std::fs::remove_file(&file).with_context(|| format!("cannot remove {}", file.display()))?;

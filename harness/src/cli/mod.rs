@@ -15,6 +15,7 @@ mod earlier;
 mod explain;
 mod export;
 mod grade;
+mod join;
 mod merge;
 mod regrade;
 mod render;

@@ -46,7 +46,7 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
     let decided = if *undo {
         kept.pins.before()?.decided.clone()
     } else {
-        let stated = Stated::of(&Context::assignment(root)?);
+        let stated = Stated::from(&Context::assignment(root)?);
         anyhow::ensure!(
             stated.name == current.decided.assignment.name,
             "{} is a report of assignment \"{}\", not \"{}\"; hint: --root",

@@ -8,7 +8,7 @@ use anyhow::{Context as _, bail};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::class;
+use super::class::{self, WORK};
 use crate::class::matching::{Match, find};
 use crate::class::overrides::{Applied, Subject};
 use crate::class::pins::Change;
@@ -24,9 +24,6 @@ use crate::rubric::Grade;
 
 /// The file of [`Found`], in the instructor's folder.
 const FILE: &str = "batch.json";
-
-/// The folder of what tasks of a partition found, in the instructor's folder.
-pub const WORK: &str = "work";
 
 /// What a grade says of a submission that was judged in another way than the others of its class.
 const OTHER_CONDITIONS: &str = "graded before with other scenes, limits or another version of Umbra: \

@@ -13,8 +13,8 @@ use unicode_normalization::UnicodeNormalization as _;
 use super::finding::{Finding, Findings};
 use super::limits::{Limits, mib};
 use super::name::safe_path;
+use super::submission::{Format, IntakeError, Refusal, Submission, SubmittedFile, archive_magic};
 use super::tree::{CONFIG_FILE, TreeSpec};
-use super::unpack::{Format, IntakeError, Refusal, Submission, SubmittedFile, archive_magic};
 use crate::files::hex;
 use crate::harmless::printable;
 

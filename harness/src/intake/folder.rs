@@ -11,7 +11,7 @@ use std::path::Path;
 
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::Finding;
-use super::unpack::IntakeError;
+use super::submission::IntakeError;
 use crate::harmless::printable_bytes;
 use open::Folder;
 

@@ -7,11 +7,11 @@ use flate2::bufread::GzDecoder;
 use super::copy::{PrivateCopy, Stop};
 use super::finding::Finding;
 use super::limits::{Limits, mib};
-use super::tar::{self, AGAIN, BLOCK, PADDING};
-use crate::harmless::printable;
+use super::tar::{self, AGAIN, BLOCK, PADDING, Refused};
 
 /// Members of gzip data; programs that pack in pieces take 64 KiB or more for each.
 const MAX_MEMBERS: u64 = 1 << 14;
+const FEWER: &str = "submit only the files of the tree";
 /// How a member begins: deflate is gzip's only method.
 const MEMBER: &[u8] = b"\x1f\x8b\x08";
 
@@ -90,57 +90,36 @@ impl Read for Gz<'_> {
             self.members += 1;
             // Each costs more than it weighs.
             if self.members > MAX_MEMBERS {
-                return Err(io::Error::other(GzLimit::Members));
+                return Err(refused(
+                    "limit_members",
+                    format!("more than {MAX_MEMBERS} pieces of gzip data"),
+                    AGAIN,
+                ));
             }
             self.member = GzDecoder::new(rest);
         };
         self.unpacked += n as u64;
         let consumed = self.packed - self.member.get_ref().len();
         if self.limits.ratio_exceeded(self.unpacked, consumed as u64) {
-            return Err(io::Error::other(GzLimit::Ratio));
+            return Err(refused(
+                "limit_ratio",
+                format!("unpacks to more than {} times its packed size", self.limits.max_ratio),
+                FEWER,
+            ));
         }
         // Headers and padding come on top of the contents: at most two blocks an entry.
         let overhead = self.limits.max_entries.saturating_mul(2 * BLOCK as u64) + 2 * PADDING;
         if self.unpacked > mib(self.limits.max_total_mib).saturating_add(overhead) {
-            return Err(io::Error::other(GzLimit::Total));
+            return Err(refused(
+                "limit_total",
+                format!("unpacks to more than the limit of {} MiB", self.limits.max_total_mib),
+                FEWER,
+            ));
         }
         Ok(n)
     }
 }
 
-/// A limit that gzip data exceed, on its way through an [`io::Error`].
-#[derive(Debug, thiserror::Error)]
-enum GzLimit {
-    #[error("ratio limit")]
-    Ratio,
-    #[error("total limit")]
-    Total,
-    #[error("members limit")]
-    Members,
-}
-
-/// What a reading error means.
-pub(super) fn unreadable(error: &io::Error, limits: &Limits) -> Finding {
-    const HINT: &str = "submit only the files of the tree";
-    match error.get_ref().and_then(|inner| inner.downcast_ref()) {
-        Some(GzLimit::Ratio) => {
-            let message =
-                format!("unpacks to more than {} times its packed size", limits.max_ratio);
-            Finding::error("limit_ratio", message).hint(HINT)
-        }
-        Some(GzLimit::Total) => {
-            let message = format!("unpacks to more than the limit of {} MiB", limits.max_total_mib);
-            Finding::error("limit_total", message).hint(HINT)
-        }
-        Some(GzLimit::Members) => {
-            let message = format!("more than {MAX_MEMBERS} pieces of gzip data");
-            Finding::error("limit_members", message).hint(AGAIN)
-        }
-        None => {
-            let message =
-                format!("the compressed data cannot be read: {}", printable(&error.to_string()));
-            Finding::error("gz_corrupt", message)
-                .hint("the upload may have been cut off; submit it again")
-        }
-    }
+fn refused(code: &'static str, message: String, hint: &str) -> io::Error {
+    io::Error::other(Refused(Finding::error(code, message).hint(hint)))
 }

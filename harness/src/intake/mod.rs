@@ -24,6 +24,7 @@ mod limits;
 mod name;
 mod pack;
 mod source_rules;
+mod submission;
 mod submitted_config;
 mod tar;
 mod tar_sparse;
@@ -40,12 +41,11 @@ pub use finding::{Excerpt, Finding, Severity};
 pub use limits::Limits;
 pub use pack::{Packed, archive_name, fix, mends, pack};
 pub use source_rules::{scan_source, scan_text};
+pub use submission::{Format, IntakeError, Refusal, Submission, SubmittedFile};
 pub use submitted_config::{Field, ListedRender, SubmittedConfig};
 pub(crate) use tree::CONFIG_FILE;
 pub use tree::{TreeFile, TreeSpec};
 pub use tree_match::{Mark, TreeLine};
-pub use unpack::{
-    Format, IntakeError, Refusal, Submission, SubmittedFile, format_of_bytes, unpack, unpack_bytes,
-};
 pub(crate) use unpack::{copy_unpacked, name_of, read_archive};
+pub use unpack::{format_of_bytes, unpack, unpack_bytes};
 pub use validate::{Validation, validate_refusal, validate_submission};

@@ -2,7 +2,7 @@
 
 use super::finding::Finding;
 use super::limits::Limits;
-use crate::harmless::printable_bytes;
+use crate::harmless::{printable_bytes, reorders};
 
 /// A checked path, relative, with `/` between plain components.
 #[derive(Debug, PartialEq, Eq)]
@@ -89,11 +89,6 @@ pub(super) fn safe_path(raw: &[u8], limits: &Limits) -> Result<SafePath, Finding
         return refuse("limit_depth", &found, "put the folders nearer to the root");
     }
     Ok(SafePath { path: components.join("/"), replaced })
-}
-
-/// Whether a character turns round the text after it: bidirectional overrides and isolates.
-pub(super) fn reorders(c: char) -> bool {
-    matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// UTF-8 text of `raw`, with every other byte written as `_xHH`.

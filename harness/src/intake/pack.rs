@@ -12,10 +12,11 @@ use serde::{Deserialize, Serialize};
 use super::copy::Kind;
 use super::finding::Finding;
 use super::limits::Limits;
+use super::submission::{IntakeError, Refusal, Submission};
 use super::submitted_config::{Field, SubmittedConfig};
 use super::tree::TreeSpec;
 use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
-use super::unpack::{IntakeError, Refusal, Submission, copy_folder, unpack_bytes};
+use super::unpack::{copy_folder, unpack_bytes};
 use super::validate::{Validation, validate_submission};
 
 /// An archive that was written.

@@ -6,7 +6,7 @@ use std::fs;
 
 use super::finding::{Finding, Findings};
 use super::lexer::{Token, TokenKind, tokens};
-use super::unpack::{IntakeError, Submission};
+use super::submission::{IntakeError, Submission};
 use crate::harmless::printable;
 
 /// Findings of one kind that are listed per file.

@@ -10,9 +10,8 @@ use tar::{EntryType, Header};
 
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::Finding;
-use super::gz::unreadable;
+use super::submission::IntakeError;
 use super::tar_sparse::{Map, Records, gnu_map};
-use super::unpack::IntakeError;
 use crate::harmless::{printable, printable_bytes};
 
 pub(super) const BLOCK: usize = 512;
@@ -150,7 +149,7 @@ fn next_block(
             Ok(0) => return Err(copy.refuse(truncated("the last block is not whole"))),
             Ok(n) => filled += n,
             Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits))),
+            Err(e) => return Err(copy.refuse(unreadable(&e))),
         }
     }
     Ok(Some(block))
@@ -174,7 +173,7 @@ fn check_padding(reader: &mut impl Read, copy: &mut PrivateCopy<'_>) -> Result<(
         match reader.by_ref().take(BLOCK as u64).read_to_end(&mut block) {
             Ok(0) => break,
             Ok(n) => padding += n as u64,
-            Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits))),
+            Err(e) => return Err(copy.refuse(unreadable(&e))),
         }
         if padding > PADDING {
             copy.count_bytes(block.len() as u64, "what follows the end")?;
@@ -210,7 +209,7 @@ fn read_extended(
     match reader.take(padded(size)).read_to_end(&mut data) {
         Ok(n) if n as u64 == padded(size) => {}
         Ok(_) => return Err(copy.refuse(truncated("an extended header is cut off"))),
-        Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits))),
+        Err(e) => return Err(copy.refuse(unreadable(&e))),
     }
     data.truncate(size as usize);
     Ok(data)
@@ -328,7 +327,7 @@ fn read_entry(
                     let finding = Finding::error("tar_sparse", message).at(path);
                     return Err(copy.refuse(finding.hint("make the archive without --sparse")));
                 }
-                Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits).at(path))),
+                Err(e) => return Err(copy.refuse(unreadable(&e).at(path))),
             };
             let whole = map.size;
             let mut data = map.expand(reader.by_ref().take(size - read));
@@ -338,7 +337,7 @@ fn read_entry(
                     let message = format!("expected {whole} bytes, found {}", written.bytes);
                     return Err(copy.refuse(truncated(&message).at(path)));
                 }
-                Err(e) => return Err(copy.refuse(unreadable(&e, copy.limits).at(path))),
+                Err(e) => return Err(copy.refuse(unreadable(&e).at(path))),
             }
             skip(reader, padded(size) - size, &name, copy)
         }
@@ -454,9 +453,23 @@ fn skip(
             }
             Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
             Err(e) => {
-                return Err(copy.refuse(unreadable(&e, copy.limits).at(printable_bytes(name))));
+                return Err(copy.refuse(unreadable(&e).at(printable_bytes(name))));
             }
         }
     }
     Ok(())
+}
+
+/// What a reader has against what it reads, on its way through an [`io::Error`].
+#[derive(Debug, thiserror::Error)]
+#[error("{}", .0)]
+pub(super) struct Refused(pub Finding);
+
+/// What a reading error means.
+fn unreadable(error: &io::Error) -> Finding {
+    if let Some(Refused(finding)) = error.get_ref().and_then(|inner| inner.downcast_ref()) {
+        return finding.clone();
+    }
+    let message = format!("the compressed data cannot be read: {}", printable(&error.to_string()));
+    Finding::error("gz_corrupt", message).hint("the upload may have been cut off; submit it again")
 }

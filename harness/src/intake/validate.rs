@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 use super::check_config::check_config;
 use super::finding::{Finding, Findings, Severity};
 use super::json_lines::text_of;
+use super::submission::{Format, IntakeError, Refusal, Submission};
 use super::submitted_config::SubmittedConfig;
 use super::tree::{CONFIG_FILE, TreeSpec};
 use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
-use super::unpack::{Format, IntakeError, Refusal, Submission};
 
 /// What `validate` found.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

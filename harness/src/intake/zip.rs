@@ -17,7 +17,7 @@ use flate2::read::DeflateDecoder;
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::Finding;
 use super::zip_headers::{
-    CENTRAL, Central, Entry, LOCAL, ZIP64, check_entry, u16_at, u32_at, u64_at,
+    AGAIN, CENTRAL, Central, Entry, LOCAL, ZIP64, check_entry, u16_at, u32_at, u64_at,
 };
 use crate::harmless::printable_bytes;
 
@@ -25,8 +25,6 @@ const END: &[u8] = b"PK\x05\x06";
 const ZIP64_END: &[u8] = b"PK\x06\x06";
 const ZIP64_LOCATOR: &[u8] = b"PK\x06\x07";
 
-pub(super) const AGAIN: &str =
-    "make the archive again with your system's own zip program, or with umbra pack";
 const END_SIZE: usize = 22;
 const ZIP64_END_SIZE: usize = 56;
 const ZIP64_LOCATOR_SIZE: usize = 20;

@@ -3,9 +3,11 @@
 use flate2::Crc;
 
 use super::finding::Finding;
-use super::zip::AGAIN;
 use crate::harmless::printable_bytes;
 
+/// What to do about an archive that is not as it should be.
+pub(super) const AGAIN: &str =
+    "make the archive again with your system's own zip program, or with umbra pack";
 pub(super) const LOCAL: &[u8] = b"PK\x03\x04";
 pub(super) const CENTRAL: &[u8] = b"PK\x01\x02";
 const DESCRIPTOR: &[u8] = b"PK\x07\x08";

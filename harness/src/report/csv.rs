@@ -1,7 +1,8 @@
 //! `grades.csv`: one row a submission, for a grade book.
 
 use super::number::{is_range, of_part, points, range};
-use super::{BatchReport, ReportError, SubmissionReport, harmless};
+use super::{BatchReport, ReportError, SubmissionReport};
+use crate::harmless::csv_cell;
 
 /// The grades as CSV (UTF-8, comma, `\n`). The columns are student id, last and first name, name of
 /// the submission, the parts, total, what it is out of, lowest and highest, unconfirmed, time, total before lateness, remarks.
@@ -24,10 +25,10 @@ pub fn grades(report: &BatchReport) -> Result<String, ReportError> {
     head.extend(report.rules.parts.iter().map(|part| part.id.as_str()));
     head.extend(["total", "out_of", "lowest", "highest", "unconfirmed"]);
     head.extend(["submitted", "before_late", "remarks"]);
-    let head = head.into_iter().map(cell);
+    let head = head.into_iter().map(csv_cell);
     writer.write_record(head).map_err(|error| format(error.to_string()))?;
     for entry in &report.entries {
-        let row = row(report, entry).into_iter().map(|text| cell(&text));
+        let row = row(report, entry).into_iter().map(|text| csv_cell(&text));
         writer.write_record(row).map_err(|error| format(error.to_string()))?;
     }
     let bytes = writer.into_inner().map_err(|error| format(error.to_string()))?;
@@ -55,21 +56,6 @@ fn row(report: &BatchReport, entry: &SubmissionReport) -> Vec<String> {
     row.push(charged.map(|late| range(late.before[0], late.before[1])).unwrap_or_default());
     row.push(grade.remarks.join("; "));
     row
-}
-
-/// A cell that no spreadsheet takes for a formula: one that begins like it gets an apostrophe.
-pub fn cell(text: &str) -> String {
-    let begins_as_formula = text.trim_start_matches(' ').starts_with([
-        '=', '+', '-', '@', '\t', '\r', '\n', '\u{ff1d}', '\u{ff0b}', '\u{ff0d}', '\u{ff20}',
-    ]);
-    let clean = harmless(text);
-    if begins_as_formula && !is_number(text) { format!("'{clean}") } else { clean }
-}
-
-/// `-12.5` and the like; nothing that a spreadsheet could read in another way.
-fn is_number(text: &str) -> bool {
-    let digits = text.strip_prefix(['+', '-']).unwrap_or(text);
-    digits.chars().all(|c| c.is_ascii_digit() || c == '.') && text.parse::<f64>().is_ok()
 }
 
 #[cfg(test)]
@@ -110,7 +96,7 @@ student_id,last_name,first_name,submission,1.1,1.2,1.3,1.4,2.4,2.5,total,out_of,
             ("007", "007"),
             ("a=b", "a=b"),
         ] {
-            assert_eq!(cell(text), expected);
+            assert_eq!(csv_cell(text), expected);
         }
     }
 

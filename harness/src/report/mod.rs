@@ -29,7 +29,7 @@ use std::path::{Component, Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-pub use self::csv::{cell as csv_cell, grades as csv_grades};
+pub use self::csv::grades as csv_grades;
 pub use self::html::{
     Reader, batch as html_batch, submission as html_submission, viewer as html_viewer,
 };
@@ -38,6 +38,7 @@ pub use self::text::{
     Closing, Look, closing as text_closing, detail as text_detail, explain, explain_all, in_a_line,
     table as text_table,
 };
+pub use crate::harmless::csv_cell;
 pub use crate::harmless::harmless;
 
 use crate::assignment::Assignment;
