@@ -22,6 +22,9 @@ pub struct Arguments {
     /// Print the table only, do not write docs/performance.md
     #[arg(long)]
     dry: bool,
+    /// Leave out images of 8K, which take most of the time, and 2 GB of disk
+    #[arg(long)]
+    without_8k: bool,
     /// Only what has this in its name: compare, rays, renders, objects, workers
     only: Option<String>,
 }
@@ -33,6 +36,7 @@ struct Bench {
     folder: PathBuf,
     umbra: PathBuf,
     rounds: usize,
+    without_8k: bool,
 }
 
 impl Bench {
@@ -50,7 +54,8 @@ pub fn run(root: &Path, arguments: &Arguments) -> anyhow::Result<String> {
     let folder = root.join("target/umbra/bench");
     std::fs::create_dir_all(&folder)?;
     let umbra = root.join("target/release/umbra");
-    let bench = Bench { root: root.to_owned(), folder, umbra, rounds: arguments.rounds };
+    let Arguments { rounds, without_8k, .. } = *arguments;
+    let bench = Bench { root: root.to_owned(), folder, umbra, rounds, without_8k };
     let wanted = |name: &str| arguments.only.as_deref().is_none_or(|only| name.contains(only));
     let (mut lines, mut plots) = (Vec::new(), Vec::new());
     if wanted("compare") {

@@ -15,9 +15,9 @@ struct Sources(BTreeMap<Module, String>);
 impl Sources {
     fn read(src: &Path) -> Self {
         let mut sources = BTreeMap::new();
-        for file in umbra::files::files_below(src).unwrap() {
+        for file in umbra::files::files_below(src).expect("a folder of sources") {
             let text = std::fs::read_to_string(&file).unwrap_or_default();
-            let below = file.strip_prefix(src).unwrap().with_extension("");
+            let below = file.strip_prefix(src).expect("below it").with_extension("");
             let mut module: Module =
                 below.iter().map(|part| part.to_string_lossy().into_owned()).collect();
             let is_rust = file.extension().is_some_and(|extension| extension == "rs");

@@ -257,12 +257,12 @@ impl SubmittedConfig {
                 }
                 // `["Teapot", "offline/teapot.exr"]`
                 Value::List(pair) => {
-                    let texts = pair.iter().filter_map(|node| match &node.value {
+                    let mut texts = pair.iter().filter_map(|node| match &node.value {
                         Value::Text(text) => Some((text.clone(), node.line)),
                         _ => None,
                     });
                     let is_path = |(text, _): &(String, u32)| text.to_lowercase().ends_with(".exr");
-                    (String::new(), texts.filter(is_path).next_back())
+                    (String::new(), texts.rfind(is_path))
                 }
                 _ => (String::new(), None),
             };

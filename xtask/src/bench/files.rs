@@ -46,6 +46,9 @@ pub fn compare(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
     let names = ["Umbra, uncompressed", "Umbra, ZIP", "idiff, uncompressed", "idiff, ZIP"];
     let mut curves = names.map(Curve::new);
     for (name, width, height) in SIZES {
+        if bench.without_8k && name == "8K" {
+            continue;
+        }
         for (zip, kind) in [(false, "uncompressed"), (true, "ZIP")] {
             let [a, b] = pair(&bench.folder, width, height, zip)?;
             let (mut ours, mut theirs) = (Costs::default(), Costs::default());
