@@ -11,7 +11,7 @@ use basecode::scene::MeshFile;
 use basecode::{Image, Sampler, Vec3};
 
 use super::child::{Cost, compile, measure};
-use super::figures::{Line, Samples, seconds};
+use super::figures::{Line, Samples};
 use super::page::Curve;
 use super::{Bench, knot};
 
@@ -32,11 +32,6 @@ impl Costs {
         self.wall.push(cost.wall);
         self.cpu.push(cost.cpu);
         self.memory.push(cost.memory);
-    }
-
-    fn told(&self) -> String {
-        let (wall, cpu) = (seconds(self.wall.median()), seconds(self.cpu.median()));
-        format!("{wall}, CPU {cpu}, {:.0} MiB", self.memory.median())
     }
 }
 
@@ -63,16 +58,15 @@ pub fn compare(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
             let pixels = (width * height) as f64 / 1e6;
             curves[usize::from(zip)].push(pixels, ours.wall.median());
             curves[2 + usize::from(zip)].push(pixels, theirs.wall.median());
+            let work = |what: &str| format!("compare {name}, {kind}, {what}");
+            lines.push(Line::of_times(work("wall"), "idiff", &theirs.wall, &ours.wall));
+            lines.push(Line::of_times(work("CPU"), "idiff", &theirs.cpu, &ours.cpu));
             lines.push(Line {
-                work: format!("compare {name}, {kind}"),
+                work: work("memory"),
                 anchor: "idiff".into(),
-                theirs: theirs.told(),
-                ours: ours.told(),
-                ratio: format!(
-                    "wall {}, CPU {}",
-                    ours.wall.faster_than(&theirs.wall).ratio(),
-                    ours.cpu.faster_than(&theirs.cpu).ratio()
-                ),
+                theirs: format!("{:.0} MiB", theirs.memory.median()),
+                ours: format!("{:.0} MiB", ours.memory.median()),
+                ratio: ours.memory.faster_than(&theirs.memory).ratio(),
             });
         }
     }

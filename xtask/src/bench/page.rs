@@ -10,7 +10,7 @@ const HEIGHT: f64 = 300.0;
 /// Room for the axes' words, and for the legend.
 const LEFT: f64 = 56.0;
 const RIGHT: f64 = 200.0;
-const TOP: f64 = 16.0;
+const TOP: f64 = 24.0;
 const BOTTOM: f64 = 40.0;
 /// Wong's palette for all kinds of sight (Nature Methods 8, 2011).
 const COLORS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#56b4e9", "#e69f00", "#cc79a7"];
@@ -41,7 +41,7 @@ pub fn write(
     plots: &[(&str, &str, [&str; 2], Vec<Curve>)],
 ) -> anyhow::Result<()> {
     let mut page = include_str!("page.md").replace("ABOUT", about);
-    page += "\n## The table\n| work | anchor | anchor's figure | Umbra's | times as fast |\n|---|---|---|---|---|\n";
+    page += "\n## The table\n| work | anchor | anchor's figure | Umbra's | ratio |\n|---|---|---|---|---|\n";
     for Line { work, anchor, theirs, ours, ratio } in lines {
         writeln!(page, "| {work} | {anchor} | {theirs} | {ours} | {ratio} |")?;
     }

@@ -86,7 +86,7 @@ impl Cast {
         let view = Camera::new(camera, WIDTH, HEIGHT)?;
         let at = |i: usize| view.ray((i % WIDTH) as f32 + 0.5, (i / WIDTH) as f32 + 0.5);
         let corners = knot(triangles).corners();
-        let name = format!("knot of {} triangles", thousands(corners.len()));
+        let name = format!("knot of {}", thousands(corners.len()));
         let rays = (0..WIDTH * HEIGHT).map(at).collect();
         Ok(Self::new(&name, corners, rays, vec3(4.0, 6.0, 8.0)))
     }
