@@ -15,6 +15,7 @@ mod diagnosis;
 mod downloads;
 mod expected;
 mod full_disk;
+mod gradescope;
 mod intake;
 mod intake_properties;
 mod isolation;

@@ -11,6 +11,7 @@
 pub mod collect;
 mod download;
 pub mod export;
+pub mod feedback;
 pub mod late;
 pub mod layout;
 pub mod matching;

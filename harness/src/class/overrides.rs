@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use anyhow::bail;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use toml::Spanned;
@@ -18,7 +19,7 @@ use crate::rubric::{Grade, PartGrade};
 pub const OVERRIDES: &str = "overrides.toml";
 
 /// One decision.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Decision {
     /// Student number, or the submission's folder in the report.
@@ -56,7 +57,7 @@ struct File {
 }
 
 /// A decision as it was applied.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Applied {
     /// The decision.
     pub decision: Decision,

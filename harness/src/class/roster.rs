@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::layout::Kind;
@@ -24,8 +25,9 @@ pub struct Roster {
 }
 
 /// A student of a class list. A text is empty where the list does not say it.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
+#[schemars(rename = "ListedStudent")]
 pub struct Student {
     /// Line in the file, from 1.
     pub line: usize,

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::late::{Late, Policy};
@@ -41,7 +42,7 @@ pub struct Deciding<'a> {
 }
 
 /// What is known of a submission beside what is in it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Standing {
     /// What the platform says.
@@ -61,7 +62,7 @@ pub struct Standing {
 }
 
 /// What is known of the class as a whole.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Class {
     /// Where the submissions come from.
@@ -81,7 +82,7 @@ pub struct Class {
 }
 
 /// A student without a submission that counts.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Missing {
     /// Who.
     pub student: Student,
@@ -90,7 +91,7 @@ pub struct Missing {
 }
 
 /// A submission that the instructor must decide on, in `matches.toml`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Undecided {
     /// What reports call it.
     pub submission: String,

@@ -113,7 +113,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     };
     let begun = Instant::now();
     let Ended::Report(report, _) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
-    let entry = &report.entries[0].for_student(&report.rules);
+    let entry = &report.entries[0].for_student(&report.rules, false);
     let width = terminal::width().min(READABLE_COLUMNS);
     let look = Look { width, colours: terminal::colours() };
     print!("{}", report::text_detail(&report, entry, look, arguments.verbose));

@@ -1,11 +1,13 @@
 //! `report.json` of an earlier run, as far as commands need it.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::Context as _;
 use serde::Deserialize;
 
 use crate::class::{Class, Standing};
+use crate::grading::StageCost;
 use crate::report;
 use crate::rubric::{PartGrade, Rules};
 
@@ -15,11 +17,13 @@ pub struct Report {
     pub assignment: About,
     pub submissions: Vec<Row>,
     pub class: Option<Class>,
+    pub timings: BTreeMap<String, Vec<StageCost>>,
 }
 
 /// What it is a report of.
 #[derive(Deserialize)]
 pub struct About {
+    pub name: String,
     pub title: String,
     pub rules: Rules,
 }

@@ -1,4 +1,6 @@
-//! `umbra export`: the grades of a report as other programs take them.
+//! `umbra export` and `umbra grade --export`: the grades of a report as other programs take them.
+
+mod junit;
 
 use std::path::{Path, PathBuf};
 
@@ -6,28 +8,60 @@ use anyhow::{Context as _, bail, ensure};
 use serde_json::json;
 
 use super::class;
-use super::context::Context;
 use super::earlier::{Report, Row};
-use crate::class::Kind;
 use crate::class::export::{Points, grade_book};
+use crate::class::feedback::{self, Feedback};
+use crate::class::{Kind, Roster};
 use crate::columns::count;
 use crate::files::write_whole;
 use crate::report::{self, harmless};
-use crate::rubric::{PartGrade, Rules};
+use crate::rubric::Rules;
 
 /// What takes the grades.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
+pub enum Format {
     /// The grade book of Brightspace (D2L), as it was exported
     Brightspace,
     /// The grade book of Canvas, as it was exported
     Canvas,
     /// The grading worksheet of a Moodle assignment, as it was downloaded
     Moodle,
+    /// A zip of what each student may read, in the layout that the platform of the download takes back
+    Feedback,
     /// `results.json` of Gradescope, for one submission
     Gradescope,
     /// JUnit XML, one test case for each part
     Junit,
+    /// `grades.csv`, for a spreadsheet
+    Csv,
+    /// `report.json`, for programs
+    Json,
+}
+
+impl Format {
+    /// The file that `umbra grade --export` writes into the report.
+    fn file(self) -> &'static str {
+        match self {
+            Self::Brightspace => "brightspace.csv",
+            Self::Canvas => "canvas.csv",
+            Self::Moodle => "moodle.csv",
+            Self::Feedback => "feedback.zip",
+            Self::Gradescope => "results.json",
+            Self::Junit => "junit.xml",
+            Self::Csv => report::CSV_FILE,
+            Self::Json => report::JSON_FILE,
+        }
+    }
+
+    /// The platform whose grade book it fills, if it does.
+    fn platform(self) -> Option<Kind> {
+        match self {
+            Self::Brightspace => Some(Kind::Brightspace),
+            Self::Canvas => Some(Kind::Canvas),
+            Self::Moodle => Some(Kind::Moodle),
+            _ => None,
+        }
+    }
 }
 
 /// Options of `umbra export`.
@@ -41,70 +75,172 @@ pub struct ExportArguments {
     /// The report's folder
     #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
     output: PathBuf,
-    /// What the platform calls the assignment [default: its name in config.json]
-    #[arg(long, value_name = "NAME")]
-    item: Option<String>,
+    #[command(flatten)]
+    item: Item,
     /// Only this submission: the name of its folder in the report
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
 }
 
+/// The column of a grade book.
+#[derive(clap::Args, Clone, Debug)]
+pub struct Item {
+    /// What the platform calls the assignment in its grade book [default: its name in config.json]
+    #[arg(long, value_name = "NAME")]
+    item: Option<String>,
+}
+
 /// Writes the grades and says who is not in them.
-pub fn export(arguments: &ExportArguments, root: Option<&Path>) -> anyhow::Result<u8> {
-    let mut report = Report::read(&arguments.output)?;
-    if let Some(only) = &arguments.only {
+pub fn export(arguments: &ExportArguments) -> anyhow::Result<u8> {
+    let ExportArguments { file, format, output, item, only } = arguments;
+    let mut report = Report::read(output)?;
+    if let Some(only) = only {
+        ensure!(
+            !matches!(format, Format::Csv | Format::Json),
+            "--only: expected a format that can hold one submission, such as gradescope or junit"
+        );
         report.submissions.retain(|row| row.slug == *only);
         ensure!(
             !report.submissions.is_empty(),
             "{} has no submission \"{only}\"",
-            arguments.output.display()
+            output.display()
         );
     }
-    let text = match arguments.format {
-        Format::Brightspace => book(arguments, root, &report, Kind::Brightspace)?,
-        Format::Canvas => book(arguments, root, &report, Kind::Canvas)?,
-        Format::Moodle => book(arguments, root, &report, Kind::Moodle)?,
-        Format::Gradescope => gradescope(&report)?,
-        Format::Junit => junit(&report),
-    };
-    write_whole(&arguments.file, text.as_bytes())
-        .with_context(|| format!("cannot write {}", arguments.file.display()))?;
+    write(*format, file, output, item, &report)?;
     Ok(super::EXIT_OK)
 }
 
-/// The class list's own columns with the points in one of them.
-fn book(
-    arguments: &ExportArguments,
-    root: Option<&Path>,
+/// Makes sure, before any work, that a report can be exported in some formats. `list` is the class list, where one is
+/// given.
+///
+/// # Errors
+/// When there is no class list, or it is another platform's.
+pub fn check(formats: &[Format], output: &Path, list: Option<&Path>) -> anyhow::Result<()> {
+    for kind in formats.iter().filter_map(|format| format.platform()) {
+        let roster = match list {
+            Some(list) => Some(Roster::read(list)?),
+            None => class::roster(None, output)?,
+        };
+        of_platform(roster, kind, output)?;
+    }
+    Ok(())
+}
+
+/// Writes a report that was just made in some formats, into its folder.
+///
+/// # Errors
+/// As [`export`].
+pub fn beside(formats: &[Format], output: &Path, item: &Item) -> anyhow::Result<()> {
+    for format in formats {
+        let report = Report::read(output)?;
+        write(*format, &output.join(format.file()), output, item, &report)
+            .with_context(|| format!("the report is there, but cannot be exported to {}", format.file()))?;
+    }
+    Ok(())
+}
+
+fn write(
+    format: Format,
+    file: &Path,
+    output: &Path,
+    item: &Item,
     report: &Report,
-    kind: Kind,
-) -> anyhow::Result<String> {
-    let Some(roster) = class::roster(None, &arguments.output)? else {
+) -> anyhow::Result<()> {
+    let bytes = match format {
+        Format::Brightspace | Format::Canvas | Format::Moodle => {
+            let kind = format.platform().unwrap_or_default();
+            book(file, output, item, report, kind)?.into_bytes()
+        }
+        Format::Feedback => feedback_archive(file, output, report)?,
+        Format::Gradescope => gradescope(report)?.into_bytes(),
+        Format::Junit => junit::junit(report, output).into_bytes(),
+        Format::Csv | Format::Json => {
+            let own = output.join(format.file());
+            if own == file {
+                return Ok(());
+            }
+            std::fs::read(&own).with_context(|| format!("cannot read {}", own.display()))?
+        }
+    };
+    write_whole(file, &bytes).with_context(|| format!("cannot write {}", file.display()))
+}
+
+/// The class list, where it is this platform's.
+fn of_platform(roster: Option<Roster>, kind: Kind, output: &Path) -> anyhow::Result<Roster> {
+    let Some(roster) = roster else {
         bail!(
             "{} has no class list; hint: grade with --class LIST.csv, the file that {} exports",
-            arguments.output.display(),
+            output.display(),
             kind.title()
         );
     };
     ensure!(
         roster.kind == kind,
-        "{}: expected the export of {}, found that of {}; hint: --format {}",
+        "{}: expected the export of {}, found that of {}; hint: the format {}",
         roster.path.display(),
         kind.title(),
         roster.kind.title(),
         roster.kind.title().to_lowercase()
     );
-    let undecided =
-        report.class.as_ref().map(|class| class.undecided.as_slice()).unwrap_or_default();
+    Ok(roster)
+}
+
+/// Why a submission is not handed back yet, if it is not.
+fn waits(row: &Row, report: &Report) -> Option<&'static str> {
+    let undecided = report.class.as_ref().map(|class| class.undecided.as_slice());
+    if undecided.unwrap_or_default().iter().any(|own| own.submission == row.name) {
+        return Some("not decided yet");
+    }
+    (row.points < row.points_max).then_some("not wholly judged")
+}
+
+/// What each student may read.
+fn feedback_archive(file: &Path, output: &Path, report: &Report) -> anyhow::Result<Vec<u8>> {
+    let (mut all, mut left) = (Vec::new(), Vec::new());
+    let folders: Vec<PathBuf> =
+        report.submissions.iter().map(|row| output.join(&row.slug)).collect();
+    for (row, folder) in report.submissions.iter().zip(&folders) {
+        match waits(row, report) {
+            Some(why) => left.push(format!("{}: {why}", row.name)),
+            None => all.push(Feedback {
+                label: row.standing.label.as_ref(),
+                name: &row.name,
+                slug: &row.slug,
+                folder,
+            }),
+        }
+    }
+    ensure!(!all.is_empty(), "no feedback to export: {}", harmless(&left.join("; ")));
+    let bytes = feedback::archive(&all)
+        .with_context(|| format!("cannot pack the pages in {}", output.display()))?;
+    println!("{}: feedback on {}", file.display(), count(all.len(), "submission"));
+    say_left(&left);
+    Ok(bytes)
+}
+
+fn say_left(left: &[String]) {
+    for line in left {
+        println!("left out: {}", harmless(line));
+    }
+}
+
+/// The class list's own columns with the points in one of them.
+fn book(
+    file: &Path,
+    output: &Path,
+    item: &Item,
+    report: &Report,
+    kind: Kind,
+) -> anyhow::Result<String> {
+    let roster = of_platform(class::roster(None, output)?, kind, output)?;
     let (mut graded, mut left, mut over) = (Vec::new(), Vec::new(), Vec::new());
     for row in &report.submissions {
         let student = row.standing.student.as_ref();
         let student = student.and_then(|own| roster.students.iter().find(|other| *other == own));
-        let why = match student {
-            None => "nobody of the class list",
-            Some(_) if undecided.iter().any(|own| own.submission == row.name) => "not decided yet",
-            Some(_) if row.points < row.points_max => "not wholly judged",
-            Some(student) => {
+        let why = match (student, waits(row, report)) {
+            (None, _) => "nobody of the class list",
+            (_, Some(why)) => why,
+            (Some(student), None) => {
                 if row.points > row.out_of {
                     over.push(student.who());
                 }
@@ -115,21 +251,16 @@ fn book(
         left.push(format!("{}: {why}", row.name));
     }
     ensure!(!graded.is_empty(), "no grade to export: {}", harmless(&left.join("; ")));
-    let item = match &arguments.item {
-        Some(item) => item.clone(),
-        None => Context::assignment(root)?.name,
-    };
-    let text = grade_book(&roster, &item, &graded).map_err(anyhow::Error::msg)?;
-    println!("{}: {} for {}", arguments.file.display(), count(graded.len(), "grade"), kind.title());
+    let item = item.item.as_ref().unwrap_or(&report.assignment.name);
+    let text = grade_book(&roster, item, &graded).map_err(anyhow::Error::msg)?;
+    println!("{}: {} for {}", file.display(), count(graded.len(), "grade"), kind.title());
     if !over.is_empty() {
         println!(
             "warning: more than the maximum, which the platform may cut (Brightspace: turn on \"Can Exceed\"): {}",
             harmless(&over.join(", "))
         );
     }
-    for line in &left {
-        println!("left out: {}", harmless(line));
-    }
+    say_left(&left);
     Ok(text)
 }
 
@@ -149,63 +280,30 @@ fn gradescope(report: &Report) -> anyhow::Result<String> {
     };
     let tests = row.parts.iter().map(|part| {
         let bonus = if part.bonus { " (bonus)" } else { "" };
+        let reason = harmless(&part.reason);
         json!({
             "number": part.id,
             "name": format!("{}{bonus}", part.title),
             "score": part.points,
             "max_score": part.out_of,
             "status": if part.points < part.out_of && !part.bonus { "failed" } else { "passed" },
-            "output": harmless(&part.reason),
+            "output": if part.points < part.points_max {
+                format!("not run here, worth {} to {} points: {reason}", part.points, part.points_max)
+            } else {
+                reason
+            },
             "output_format": "text",
             "visibility": "visible",
         })
     });
+    let stages = report.timings.get(&row.slug).into_iter().flatten();
+    let wall_s = (stages.map(|stage| stage.wall_s).sum::<f64>() * 100.0).round() / 100.0;
     let results = json!({
         "score": row.points,
+        "execution_time": wall_s,
         "output": remarks(row, &report.assignment.rules),
         "output_format": "text",
         "tests": tests.collect::<Vec<_>>(),
     });
     Ok(serde_json::to_string_pretty(&results)? + "\n")
-}
-
-/// A test suite for each submission, a test case for each part.
-fn junit(report: &Report) -> String {
-    let quoted = |text: &str| {
-        let text = harmless(text);
-        [('&', "&amp;"), ('<', "&lt;"), ('>', "&gt;"), ('"', "&quot;")]
-            .iter()
-            .fold(text, |text, (sign, name)| text.replace(*sign, name))
-    };
-    let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-    xml += &format!("<testsuites name=\"{}\">\n", quoted(&report.assignment.title));
-    for row in &report.submissions {
-        let open = |part: &&PartGrade| part.points < part.points_max;
-        let lost = |part: &&PartGrade| part.points < part.out_of && !part.bonus && !open(part);
-        let number = |which: &dyn Fn(&&PartGrade) -> bool| row.parts.iter().filter(which).count();
-        xml += &format!(
-            "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\">\n",
-            quoted(&row.slug),
-            row.parts.len(),
-            number(&lost),
-            number(&open)
-        );
-        for part in &row.parts {
-            let name = quoted(&format!("{} {}", part.id, part.title));
-            let points = format!("{} of {} points", part.points, part.out_of);
-            let said = quoted(&format!("{points}: {}", part.reason));
-            xml += &format!("    <testcase classname=\"{}\" name=\"{name}\"", quoted(&row.slug));
-            xml += &match part {
-                part if open(&part) => format!("><error message=\"{said}\"/></testcase>\n"),
-                part if lost(&part) => format!("><failure message=\"{said}\"/></testcase>\n"),
-                _ => "/>\n".to_owned(),
-            };
-        }
-        let remarks = remarks(row, &report.assignment.rules);
-        if !remarks.is_empty() {
-            xml += &format!("    <system-out>{}</system-out>\n", quoted(&remarks));
-        }
-        xml += "  </testsuite>\n";
-    }
-    xml + "</testsuites>\n"
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::batch::{Batch, Ended};
 use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::context::cores;
+use super::export::{self, Format, Item};
 use super::render::AdapterChoice;
 use super::terminal;
 use crate::class::{Attempt, Kind, MATCHES};
@@ -66,10 +67,16 @@ pub struct GradeArguments {
     /// Print what each stage cost
     #[arg(long)]
     timings: bool,
+    /// Also write the grades as `umbra export` does, into --output; may be repeated
+    #[arg(long, value_enum, value_name = "FORMAT", conflicts_with = "partition")]
+    export: Vec<Format>,
+    #[command(flatten)]
+    item: Item,
 }
 
 /// Grades submissions and prints the table; exit 0 when all could be graded, whatever their points.
 pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+    export::check(&arguments.export, &arguments.output, arguments.class.as_deref())?;
     let batch = Batch {
         paths: arguments.submissions.clone(),
         output: &arguments.output,
@@ -100,6 +107,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
             return Ok(exit_code(&entries));
         }
     };
+    export::beside(&arguments.export, &arguments.output, &arguments.item)?;
     shown(&report, &arguments.output, collected.skipped())
 }
 

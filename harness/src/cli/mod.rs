@@ -16,6 +16,7 @@ mod explain;
 mod export;
 mod grade;
 mod join;
+mod gradescope_pack;
 mod merge;
 mod regrade;
 mod render;
@@ -90,9 +91,11 @@ enum Command {
     Regrade(regrade::RegradeArguments),
     /// List what a report still leaves to the instructor; exits with 0 when nothing waits, 1 when something does
     Status(decide::StatusArguments),
-    /// Write the grades of a report as another program takes them: a learning platform's grade book,
-    /// Gradescope's results, JUnit
+    /// Write the grades of a report as another program takes them: a learning platform's grade book, feedback for each
+    /// student, Gradescope's results, JUnit
     Export(export::ExportArguments),
+    /// Write an autograder for Gradescope: a zip that installs and builds Umbra there and grades each submission
+    GradescopePack(gradescope_pack::PackArguments),
     /// Check the tree of submissions against the handout's; exits with 0 when all conform, 1 when not
     Validate(tree::ValidateArguments),
     /// Pack a working folder into an archive that conforms to the handout
@@ -256,7 +259,8 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Confirm(arguments) => decide::confirm(&arguments),
         Command::Regrade(arguments) => regrade::regrade(&arguments, root),
         Command::Status(arguments) => decide::status(&arguments),
-        Command::Export(arguments) => export::export(&arguments, root),
+        Command::Export(arguments) => export::export(&arguments),
+        Command::GradescopePack(arguments) => gradescope_pack::run(&arguments, root),
         Command::Validate(arguments) => tree::validate(&arguments, root),
         Command::Pack(arguments) => tree::pack(&arguments, root),
         Command::Render(arguments) => render::run(&arguments, root),

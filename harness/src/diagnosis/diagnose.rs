@@ -1,5 +1,6 @@
 //! From the parts that fail to what each looks like. Decides nothing: points are given without it.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::catalogue::{Catalogue, KnownMistake};
@@ -14,7 +15,7 @@ use crate::evidence::{CheckId, Evidence, Picture, Verdict};
 use crate::imaging::ratio::ratio_name;
 
 /// What one failing part looks like.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Diagnosis {
     /// The part, such as `1.3`; empty for a finding that costs nothing.
     pub part: String,

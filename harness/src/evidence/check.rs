@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::registry::{CheckId, RuleId};
@@ -14,7 +15,7 @@ pub struct Evidence {
 }
 
 /// One question that was put to a submission, and its answer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Check {
     /// Which question.
     pub id: CheckId,
@@ -59,7 +60,7 @@ pub struct Check {
 }
 
 /// The answer to a check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Right within the tolerance.
@@ -76,7 +77,7 @@ pub enum Verdict {
 }
 
 /// One value against its bound.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Measure {
     /// The rule that it is judged by; nothing when it only informs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -94,7 +95,7 @@ pub struct Measure {
 }
 
 /// A picture in a file beside the report.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Picture {
     /// What it shows: actual, expected, difference...
     pub title: String,
@@ -110,7 +111,7 @@ pub struct Picture {
 }
 
 /// A BSDF along the plane of `wo` and the normal: what is right and what was answered.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Lobe {
     /// The material, in words.
     pub material: String,

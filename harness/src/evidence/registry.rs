@@ -8,6 +8,7 @@ mod info;
 use std::fmt;
 use std::str::FromStr;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use info::CheckInfo;
@@ -16,7 +17,7 @@ pub use info::CheckInfo;
 macro_rules! named {
     ($(#[$doc:meta])* $type:ident, $what:literal, $($(#[$entry:meta])* $variant:ident = $name:literal,)+) => {
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
         #[serde(try_from = "String", into = "&'static str")]
         pub enum $type {
             $($(#[$entry])* $variant,)+
@@ -179,6 +180,8 @@ named! {
     SubmissionConfig = "submission.config",
     /// One student number, two names.
     SubmissionNumber = "submission.number",
+    /// Source that is another submission's, too.
+    SubmissionLikeness = "submission.likeness",
     /// The build.
     SubmissionBuild = "submission.build",
     /// Files replaced by the template's.

@@ -175,6 +175,11 @@ impl RecordCache {
         Ok(Some(file))
     }
 
+    /// When the record in an instructor's folder was kept.
+    pub fn when(instructor: &Path) -> Option<std::time::SystemTime> {
+        fs::metadata(instructor.join(FILE)).ok()?.modified().ok()
+    }
+
     /// Whose record an earlier run kept in an instructor's folder.
     pub fn student(instructor: &Path) -> Option<Student> {
         let bytes = fs::read(instructor.join(FILE)).ok()?;

@@ -18,7 +18,7 @@ use super::prepared_scene::PreparedScene;
 use super::record::{Conditions, Folders, Record, StageCost, Student};
 use super::session::Session;
 use super::stages::Stages;
-use super::{draw, isolate, mend, realtime, sampler, submitted, uploads};
+use super::{draw, isolate, likeness, mend, realtime, sampler, submitted, uploads};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
@@ -267,6 +267,8 @@ impl<'a> Grading<'a> {
         record.student = Student::of(&config);
         record.findings.clone_from(&validation.findings);
         record.findings.extend(source);
+        record.sources = likeness::digests(&submission, &self.assignment.template())
+            .context("cannot read the source")?;
         let mut checks = vec![tree_check(&validation, &submission, tree, mode)];
         checks.extend(config_check(&validation));
         let key = self.cache.as_ref().map(|cache| cache.key(&record, &checks)).transpose()?;
@@ -370,6 +372,7 @@ impl<'a> Grading<'a> {
             diagnoses: Vec::new(),
             views: Vec::new(),
             images: Vec::new(),
+            sources: Vec::new(),
             stages: Vec::new(),
             conditions: self.conditions(),
         }

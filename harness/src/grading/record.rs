@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::image_digest::ImageDigest;
+use super::likeness::SourceDigest;
 use crate::diagnosis::Diagnosis;
 use crate::evidence::Evidence;
 use crate::intake::{Field, Finding, SubmittedConfig};
@@ -45,6 +47,9 @@ pub struct Record {
     /// The images submitted whose noise tells them from anybody else's.
     #[serde(default)]
     pub images: Vec<ImageDigest>,
+    /// The files of the source that hold enough of the student's own to be found again.
+    #[serde(default)]
+    pub sources: Vec<SourceDigest>,
     /// What each stage cost, in order.
     pub stages: Vec<StageCost>,
     /// Under which conditions.
@@ -52,7 +57,7 @@ pub struct Record {
 }
 
 /// Credentials, as the submission states them.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Student {
     /// First name; empty when it is not said.
     pub first_name: String,
@@ -63,7 +68,7 @@ pub struct Student {
 }
 
 /// What one stage cost.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StageCost {
     /// Which stage: `intake`, `build`, `offline`...
     pub name: String,
@@ -74,7 +79,7 @@ pub struct StageCost {
 }
 
 /// Under which conditions a submission was graded: records made under others are not comparable.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Conditions {
     /// Version of Umbra.
     pub umbra: String,

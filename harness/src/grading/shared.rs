@@ -1,8 +1,9 @@
-//! What two submissions of a batch have in common that they should not: images, or a student number.
+//! What two submissions of a batch have in common that they should not: images, sources, or a student number.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::image_digest::ImageDigest;
+use super::likeness::SourceDigest;
 use super::record::Record;
 use crate::evidence::{Check, CheckId, Verdict};
 
@@ -11,7 +12,10 @@ const SHARED: CheckId = CheckId::SubmittedShared;
 /// The check of student numbers.
 const NUMBER: CheckId = CheckId::SubmissionNumber;
 
-/// Adds to every record which of its images another person of the batch submitted too, and whether its
+/// The check of sources.
+const LIKENESS: CheckId = CheckId::SubmissionLikeness;
+
+/// Adds to every record which of its images and sources another person of the batch submitted too, and whether its
 /// student number is another person's. Depends on nothing but the set of the records; doing it again
 /// changes nothing. Names of other submissions are private.
 ///
@@ -21,7 +25,12 @@ const NUMBER: CheckId = CheckId::SubmissionNumber;
 pub fn judge_shared(records: &mut [Record]) {
     let mut owners: BTreeMap<String, BTreeSet<(String, String)>> = BTreeMap::new();
     let mut names: BTreeMap<String, BTreeSet<(String, String)>> = BTreeMap::new();
+    let mut authors: BTreeMap<String, BTreeSet<(String, String)>> = BTreeMap::new();
     for record in records.iter() {
+        for source in &record.sources {
+            let author = (person(record), format!("{}: {}", record.slug, source.path));
+            authors.entry(source.sha256.clone()).or_default().insert(author);
+        }
         for image in &record.images {
             let owner = (person(record), record.slug.clone());
             owners.entry(image.sha256.clone()).or_default().insert(owner);
@@ -32,7 +41,7 @@ pub fn judge_shared(records: &mut [Record]) {
     }
     for record in records {
         let person = person(record);
-        record.evidence.checks.retain(|check| ![SHARED, NUMBER].contains(&check.id));
+        record.evidence.checks.retain(|check| ![SHARED, NUMBER, LIKENESS].contains(&check.id));
         let mut found = Vec::new();
         for ImageDigest { scene, path, sha256 } in &record.images {
             let others = others(&owners[sha256], &person);
@@ -56,8 +65,32 @@ pub fn judge_shared(records: &mut [Record]) {
                 found.push(Check { private, ..check });
             }
         }
+        found.extend(like(record, &authors, &person));
         record.evidence.checks.extend(found);
     }
+}
+
+/// Which files of a source are others', too. Nobody loses points by it.
+fn like(
+    record: &Record,
+    authors: &BTreeMap<String, BTreeSet<(String, String)>>,
+    person: &str,
+) -> Option<Check> {
+    let shared = record.sources.iter().filter_map(|source| {
+        let others = others(&authors[&source.sha256], person);
+        let SourceDigest { path, signs, .. } = source;
+        (!others.is_empty()).then(|| format!("{path} ({signs} signs of its own) is {others}"))
+    });
+    let shared: Vec<String> = shared.collect();
+    (!shared.is_empty()).then(|| {
+        let summary = format!(
+            "{} of {} files with a text of their own are another submission's too, but for comments and blanks",
+            shared.len(),
+            record.sources.len()
+        );
+        let check = Check::new(LIKENESS, "", Verdict::Fail, summary);
+        Check { private: shared.join("; "), ..check }
+    })
 }
 
 /// The submissions of others than `own`.
@@ -113,6 +146,7 @@ mod tests {
             diagnoses: Vec::new(),
             views: Vec::new(),
             images: vec![image],
+            sources: Vec::new(),
             stages: Vec::new(),
             conditions: Conditions::default(),
         }
@@ -157,6 +191,37 @@ mod tests {
         assert!(found["ada"].ends_with("in eve") && found["ada-again"].ends_with("in eve"));
         assert!(found["eve"].ends_with("in ada, ada-again"), "{found:?}");
         assert_eq!((found["bob"].as_str(), found["nameless"].as_str()), ("", ""));
+        let again = batch.clone();
+        judge_shared(&mut batch);
+        assert_eq!(again, batch);
+    }
+
+    #[test]
+    fn the_same_source_is_said_of_both_and_is_private() {
+        let with = |slug: &str, id: &str, sources: &[(&str, &str)]| {
+            let mut record = record(slug, id, slug);
+            let digest = |(path, sha256): &(&str, &str)| SourceDigest {
+                path: (*path).into(),
+                signs: 300,
+                sha256: (*sha256).into(),
+            };
+            record.sources = sources.iter().map(digest).collect();
+            record
+        };
+        let mut batch = vec![
+            with("ada", "1", &[("src/a.rs", "A"), ("src/b.rs", "B")]),
+            with("ada-again", "1", &[("src/a.rs", "A")]),
+            with("bob", "2", &[("src/mine.rs", "A"), ("src/b.rs", "C")]),
+            with("eve", "3", &[("src/a.rs", "E")]),
+        ];
+        judge_shared(&mut batch);
+        let found = failed(&batch, LIKENESS);
+        assert_eq!(found["ada"], "src/a.rs (300 signs of its own) is bob: src/mine.rs");
+        assert_eq!(
+            found["bob"],
+            "src/mine.rs (300 signs of its own) is ada: src/a.rs, ada-again: src/a.rs"
+        );
+        assert_eq!(found["eve"], "");
         let again = batch.clone();
         judge_shared(&mut batch);
         assert_eq!(again, batch);

@@ -15,6 +15,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -30,10 +31,11 @@ use preview::ScenePreview;
 const TRIES: u32 = 100;
 
 /// What a batch has held back. The seed tells all of it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldBack {
     /// The seed; a string in files, because many programs read numbers as doubles.
     #[serde(with = "as_text")]
+    #[schemars(with = "String")]
     pub seed: u64,
     /// Names of the scenes, each with that of the scene that it is a copy of.
     pub scenes: Vec<(String, String)>,

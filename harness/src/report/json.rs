@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::io;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::ser::{CharEscape, Formatter, PrettyFormatter};
 
@@ -25,9 +26,12 @@ pub const VERSION: u32 = 1;
 /// depend on its order, do not show.
 const DIGITS: usize = 6;
 
-#[derive(Serialize)]
-struct Report<'a> {
+/// The report of a batch.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Report<'a> {
+    /// `umbra.report`.
     schema: &'static str,
+    /// Rises when a key changes its meaning or goes away.
     version: u32,
     assignment: About<'a>,
     /// Every set of conditions that occurs; a submission names its own by index.
@@ -41,7 +45,8 @@ struct Report<'a> {
     timings: BTreeMap<&'a str, &'a [StageCost]>,
 }
 
-#[derive(Serialize)]
+/// What was graded, and by which rules.
+#[derive(Serialize, JsonSchema)]
 struct About<'a> {
     name: &'a str,
     title: &'a str,
@@ -52,7 +57,8 @@ struct About<'a> {
     checks: BTreeMap<&'static str, CheckInfo>,
 }
 
-#[derive(Serialize)]
+/// A submission with its points and their evidence.
+#[derive(Serialize, JsonSchema)]
 struct Submission<'a> {
     name: &'a str,
     slug: &'a str,

@@ -19,6 +19,7 @@ mod json;
 mod number;
 #[cfg(test)]
 pub(crate) mod sample;
+mod schema;
 mod text;
 #[cfg(test)]
 mod write_tests;
@@ -34,6 +35,7 @@ pub use self::html::{
     Reader, batch as html_batch, submission as html_submission, viewer as html_viewer,
 };
 pub use self::json::{SCHEMA, VERSION, report_json};
+pub use self::schema::report_schema;
 pub use self::text::{
     Closing, Look, closing as text_closing, detail as text_detail, explain, explain_all, in_a_line,
     table as text_table,
@@ -43,7 +45,7 @@ pub use crate::harmless::harmless;
 
 use crate::assignment::Assignment;
 use crate::class::{Class, Standing, Stated};
-use crate::evidence::Check;
+use crate::evidence::{Check, CheckId};
 use crate::files::write_whole;
 use crate::grading::{Record, Student};
 use crate::held_back::HeldBack;
@@ -107,6 +109,9 @@ pub struct BatchReport {
     /// What is known of the class as a whole; nothing where one submission is checked.
     #[serde(default)]
     pub class: Option<Class>,
+    /// Whether students may see what was held back.
+    #[serde(default)]
+    pub released: bool,
 }
 
 impl SubmissionReport {
@@ -128,11 +133,17 @@ impl SubmissionReport {
         report.entries.len() > 1 || self.has_private(&report.rules)
     }
 
-    /// The entry as its student may read it.
-    pub fn for_student(&self, rules: &Rules) -> Self {
+    /// The entry as its student may read it; `released` where that includes held-back scenes.
+    pub fn for_student(&self, rules: &Rules, released: bool) -> Self {
         let mut entry = self.clone();
+        // A likeness is for the instructor to look at, and no verdict.
+        entry.record.evidence.checks.retain(|check| check.id != CheckId::SubmissionLikeness);
         for check in &mut entry.record.evidence.checks {
-            *check = check.for_student();
+            *check = if released {
+                Check { private: String::new(), ..check.clone() }
+            } else {
+                check.for_student()
+            };
         }
         entry.grade.remarks.retain(|remark| !is_private(remark, rules));
         entry.record.views.retain(|view| !view.held_back);
@@ -197,6 +208,7 @@ impl BatchReport {
             held_back,
             entries,
             class: None,
+            released: false,
         }
     }
 
@@ -208,7 +220,8 @@ impl BatchReport {
         class: Class,
     ) -> Self {
         let Stated { name: assignment, title, course, due, rules, .. } = stated;
-        Self { assignment, title, course, due, rules, held_back, entries, class: Some(class) }
+        let class = Some(class);
+        Self { assignment, title, course, due, rules, held_back, entries, class, released: false }
     }
 
     fn check(&self) -> Result<(), ReportError> {
@@ -248,6 +261,9 @@ pub fn write(out: &Path, report: &BatchReport) -> Result<(), ReportError> {
     for entry in &report.entries {
         let slug = &entry.record.slug;
         let page = html_submission(report, entry, Reader::Student);
+        if report.released {
+            release_pictures(entry, &out.join(INSTRUCTOR).join(slug), &out.join(slug))?;
+        }
         put(&out.join(slug), HTML_FILE, page.as_bytes())?;
         view(&out.join(slug), report, entry, false)?;
         if entry.has_instructor_page(report) {
@@ -260,6 +276,21 @@ pub fn write(out: &Path, report: &BatchReport) -> Result<(), ReportError> {
     put(out, CSV_FILE, csv_grades(report)?.as_bytes())?;
     put(out, JSON_FILE, report_json(report)?.as_bytes())?;
     put(out, HTML_FILE, html_batch(report)?.as_bytes())
+}
+
+/// Copies the pictures of held-back scenes from the instructor's folder to the student's.
+fn release_pictures(
+    entry: &SubmissionReport,
+    instructor: &Path,
+    student: &Path,
+) -> Result<(), ReportError> {
+    let held_back = entry.record.evidence.checks.iter().filter(|check| check.held_back);
+    for picture in held_back.flat_map(|check| &check.pictures) {
+        let path = instructor.join(&picture.file);
+        let bytes = std::fs::read(&path).map_err(|source| ReportError::Write { path, source })?;
+        put(student, &picture.file, &bytes)?;
+    }
+    Ok(())
 }
 
 /// Writes the viewer's page of a submission's public or held-back scenes, if there is something to see.

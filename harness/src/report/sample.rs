@@ -24,6 +24,7 @@ pub(crate) fn report() -> BatchReport {
         }),
         entries: vec![perfect(), two_cosines(), does_not_build()],
         class: None,
+        released: false,
     }
 }
 
@@ -62,6 +63,7 @@ fn entry(name: &str, slug: &str, student: [&str; 3], conditions: Conditions) -> 
         diagnoses: Vec::new(),
         views: Vec::new(),
         images: Vec::new(),
+        sources: Vec::new(),
         stages: vec![
             StageCost { name: "intake".into(), wall_s: 0.021, cpu_s: 0.0 },
             StageCost { name: "build".into(), wall_s: 1.534, cpu_s: 1.49 },

@@ -184,3 +184,30 @@ fn a_student_folder_names_nobody_else_has_no_note_for_instructors_and_leads_nowh
         assert!(page.contains("for the instructor: another submission holds the same image"));
     }
 }
+
+#[test]
+fn released_scenes_come_to_the_student_with_their_pictures_and_nothing_private() {
+    let out = tempfile::tempdir().unwrap();
+    let mut report = sample::report();
+    let check = &mut report.entries[1].record.evidence.checks[2];
+    check.held_back = true;
+    check.private = "SECRET".into();
+    check.summary = "too dark".into();
+    check.pictures[0].file = "held-back-1.png".into();
+    let instructor = out.path().join("instructor/two_cosines");
+    fs::create_dir_all(&instructor).unwrap();
+    fs::write(instructor.join("held-back-1.png"), "png").unwrap();
+    let page = |report: &BatchReport| {
+        write(out.path(), report).unwrap();
+        fs::read_to_string(out.path().join("two_cosines/report.html")).unwrap()
+    };
+    let picture = out.path().join("two_cosines/held-back-1.png");
+    let before = page(&report);
+    assert!(!before.contains("too dark") && !before.contains("held-back-1") && !picture.exists());
+    report.released = true;
+    let after = page(&report);
+    assert!(after.contains("are released, each a changed copy: held-back-1 (cbox)"), "{after}");
+    assert!(after.contains("too dark") && after.contains("src=\"./held-back-1.png\""));
+    assert!(!after.contains("SECRET"));
+    assert_eq!(fs::read(&picture).unwrap(), b"png");
+}

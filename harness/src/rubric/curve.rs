@@ -1,12 +1,13 @@
 //! The published curve from error to the fraction of points that is left.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A piecewise-linear curve through (error, fraction) points: errors rise, fractions fall.
 ///
 /// It applies to failed checks only; one that passes is worth everything, so that the first
 /// fraction is the most that a failed check can keep.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Vec<[f64; 2]>", into = "Vec<[f64; 2]>")]
 pub struct Curve(Vec<[f64; 2]>);
 

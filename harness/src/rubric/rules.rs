@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Curve;
 use crate::evidence::CheckId;
 
 /// How evidence becomes points.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rules {
     /// Error to fraction of points, for failed checks.
@@ -28,7 +29,7 @@ pub struct Rules {
 }
 
 /// A check that shows who drew an image.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trust {
     /// The check: where all of this name pass, one at least, the images of a part that names it among its
@@ -39,7 +40,7 @@ pub struct Trust {
 }
 
 /// A condition on the whole submission.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gate {
     /// The check that must not fail.
@@ -54,7 +55,7 @@ pub struct Gate {
 }
 
 /// One half of the assignment.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PathRule {
     /// The check that, passed on every scene, earns all parts of this path in full.
@@ -67,7 +68,7 @@ pub struct PathRule {
 }
 
 /// One part of the assignment.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
     /// The handout's number, such as `1.1`.

@@ -126,6 +126,7 @@ fn record(name: &str, evidence: Evidence) -> Record {
         evidence,
         diagnoses: Vec::new(),
         images: Vec::new(),
+        sources: Vec::new(),
         views: Vec::new(),
         stages: Vec::new(),
         conditions: Conditions::default(),

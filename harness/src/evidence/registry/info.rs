@@ -1,11 +1,12 @@
 //! What each check asks, what its error means and where its bound lies: the text of `docs/evidence.md`.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CheckId, RuleId};
 
 /// What is known about a check before any submission is judged.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct CheckInfo {
     /// What it asks.
     pub question: &'static str,
@@ -231,6 +232,13 @@ impl CheckId {
             Self::SubmissionNumber => {
                 info("Does the student number stand under another name in the batch?", "", "", &[])
             }
+            Self::SubmissionLikeness => info(
+                "Appears only where a file of the source is another submission's too, but for comments, blanks and \
+                 what the template says: names both to the instructor.",
+                "",
+                "",
+                &[],
+            ),
             Self::SubmissionBuild => info(
                 "Does the source build, with files of the template for broken ones if need be?",
                 "",

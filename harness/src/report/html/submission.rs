@@ -25,7 +25,7 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     let entry = match reader {
         Reader::Instructor => entry,
         Reader::Student => {
-            known = entry.for_student(&report.rules);
+            known = entry.for_student(&report.rules, report.released);
             &known
         }
     };
@@ -53,6 +53,7 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     html.text(&points(grade.out_of)).raw(" points");
     html.bar(grade.points, grade.points_max, grade.out_of).raw("</p>\n");
     notices(&mut html, entry, reader);
+    released(&mut html, report);
     html.raw("</header>\n<main>\n");
     let public = match reader {
         Reader::Student => String::new(),
@@ -133,6 +134,15 @@ fn notices(html: &mut Html, entry: &SubmissionReport, reader: Reader) {
         html.raw("The student gets <a href=\"");
         html.address(&format!("{ROOT}/{}/{HTML_FILE}", record.slug)).raw("\">another</a>.</p>\n");
     }
+}
+
+/// Which scenes are no longer held back.
+fn released(html: &mut Html, report: &BatchReport) {
+    let Some(held_back) = report.held_back.as_ref().filter(|_| report.released) else { return };
+    let scenes: Vec<String> =
+        held_back.scenes.iter().map(|(name, original)| format!("{name} ({original})")).collect();
+    html.raw("<p class=\"notice\">The scenes that were held back are released, each a changed copy: ");
+    html.text(&scenes.join(", ")).raw("</p>\n");
 }
 
 /// The parts that earned everything, and a bonus that nobody tried for.
