@@ -23,5 +23,6 @@ target/release/umbra grade student_template --isolation reduced --jobs 1 \
     --perturb "$(cat "$source_dir/held-back-seed.txt")" --output /tmp/umbra-first
 rm -rf /tmp/umbra-first
 
-# Students' code, which runs as another user where the container allows it, cannot read the autograder.
-chmod -R o= "$source_dir"
+# Students' code runs as another user, and need not read right answers, the grader, or the seed. Programs, scenes and the
+# compiler stay readable: that user runs them.
+chmod -R o= "$source_dir"/held-back-seed.txt expected harness reference_impl

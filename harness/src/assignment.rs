@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::class::mending::Mend;
 use crate::class::{Policy, Stated};
 use crate::files::Scratch;
 use crate::imaging::evidence::Tolerances;
@@ -26,6 +27,9 @@ pub struct Assignment {
     /// What a late submission costs; nothing when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub late: Option<Policy>,
+    /// What an instructor may mend in a submission; nothing when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mend: Option<Mend>,
     /// The scenes, the submission's own first.
     pub scenes: Vec<SceneEntry>,
     /// The offline TOML file of a scene that does not vary over rows, for findings on samplers.
@@ -198,6 +202,9 @@ impl Assignment {
             return Some(problem);
         }
         if let Some(problem) = self.late.as_ref().and_then(Policy::problem) {
+            return Some(problem);
+        }
+        if let Some(problem) = self.mend.as_ref().and_then(Mend::problem) {
             return Some(problem);
         }
         for (index, scene) in self.scenes.iter().enumerate() {

@@ -178,8 +178,31 @@ fn grades_go_back_where_the_class_list_came_from() {
         files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
     place.put("Lab 02 Download Oct 9, 2019 905 AM.zip", &zip(&entries));
     place.put("list.csv", LIST.as_bytes());
-    place.grade(&root, &["Lab 02 Download Oct 9, 2019 905 AM.zip", "--class", "list.csv"]);
+    let download = "Lab 02 Download Oct 9, 2019 905 AM.zip";
+    let also = ["--class", "list.csv", "--export", "feedback", "--export", "brightspace"];
+    place.grade(&root, &[&[download][..], &also].concat());
+    let book = fs::read_to_string(place.at("out/brightspace.csv")).unwrap();
+    assert!(book.starts_with("OrgDefinedId,Username,a2 Points Grade,End-of-Line"), "{book}");
     let root = root.to_str().unwrap().to_owned();
+    // What cannot be exported is said before any work.
+    let other = ["grade", download, "--root", &root, "--class", "list.csv", "--export", "canvas"];
+    let (code, _, errors) = place.run(&[&other[..], &["--output", "other"]].concat());
+    assert_eq!(code, Some(2), "{errors}");
+    assert!(errors.contains("expected the export of Canvas"), "{errors}");
+    assert!(!place.at("other").exists());
+    // Feedback in the folders of the download: each student's own page, and nothing else.
+    let open = |bytes: Vec<u8>| zip::ZipArchive::new(std::io::Cursor::new(bytes)).unwrap();
+    let mut feedback = open(fs::read(place.at("out/feedback.zip")).unwrap());
+    let names: Vec<String> = feedback.file_names().map(|name| name.unwrap().into_owned()).collect();
+    assert_eq!(names.len(), 5, "{names:?}");
+    let own = "101-5150 - Zoë O'Neil - Oct 6, 2019 1158 PM/feedback.zip";
+    assert!(names.iter().any(|name| name == own), "{names:?}");
+    assert!(!names.iter().any(|name| name.contains("Max Other")), "{names:?}");
+    let mut bytes = Vec::new();
+    std::io::Read::read_to_end(&mut feedback.by_name(own).unwrap(), &mut bytes).unwrap();
+    let inner = open(bytes);
+    let names: Vec<String> = inner.file_names().map(|name| name.unwrap().into_owned()).collect();
+    assert_eq!(names, ["report.html"]);
     let export = |format: &str, more: &[&str]| {
         let mut all =
             vec!["export", "grades", "--output", "out", "--root", &root, "--format", format];

@@ -81,5 +81,8 @@ fn the_autograder_grades_and_always_leaves_results() {
     assert!(results["execution_time"].as_f64().is_some_and(|time| time > 0.0), "{results}");
     // Nothing to grade.
     let results = run(&[("notes.txt", "sorry")]);
-    assert!(results["output"].as_str().unwrap().contains("was not graded (exit code 2)"), "{results}");
+    assert!(
+        results["output"].as_str().unwrap().contains("was not graded (exit code 2)"),
+        "{results}"
+    );
 }

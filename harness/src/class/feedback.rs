@@ -102,12 +102,8 @@ mod tests {
     fn each_platform_finds_its_own_names() {
         let packed = |kind: Kind, component: &str, name: &str| {
             let label = label_of(kind, component).unwrap();
-            let feedback = Feedback {
-                label: Some(&label),
-                name,
-                slug: "slug",
-                folder: Path::new("."),
-            };
+            let feedback =
+                Feedback { label: Some(&label), name, slug: "slug", folder: Path::new(".") };
             match feedback.place() {
                 Place::Packed(path) => path,
                 Place::Folder(path) => format!("{path}/"),

@@ -242,6 +242,23 @@ impl Policy {
     }
 }
 
+/// From when on nobody submits any more: the due date, the cut-off and the last extension, with late days and grace.
+/// None where the due date says no time.
+pub fn end(due: &str, policy: Option<&Policy>) -> Option<Timestamp> {
+    let class_due: Timestamp = due.parse().ok()?;
+    let Some(policy) = policy else { return Some(class_due) };
+    let after = |due: Timestamp, days: u32| {
+        let late = SignedDuration::from_hours(24 * i64::from(days));
+        due.checked_add(late.max(SignedDuration::from_mins(i64::from(policy.grace_min)))).ok()
+    };
+    let own = policy.extensions.iter().filter_map(|own| {
+        let due = own.due.as_ref().map_or(Some(class_due), |due| due.parse().ok())?;
+        after(due, own.late_days.unwrap_or(policy.late_days))
+    });
+    let cut_off = policy.cut_off.as_ref().and_then(|at| at.parse().ok());
+    after(class_due, policy.late_days).into_iter().chain(own).chain(cut_off).max()
+}
+
 /// `1 d 2 h 3 min`, its first two units.
 fn span(seconds: i64) -> String {
     let minutes = (seconds + 59) / 60;
@@ -358,6 +375,27 @@ mod tests {
         policy.charge(&mut late, &mut own);
         assert_eq!((own.points, own.points_max), (40.0, 80.0));
         assert!(policy.judge("2019-11-02T23:59:00-04:00", "", |_| false).is_none());
+    }
+
+    #[test]
+    fn the_last_of_all_dates_is_the_end() {
+        let end = |text: &str| super::end(DUE, Some(&policy(text))).unwrap().to_string();
+        let plain = r#""penalty": 1, "unit": "points", "per": "day""#;
+        assert_eq!(super::end(DUE, None).unwrap().to_string(), "2019-10-07T03:59:00Z");
+        for (more, expected) in [
+            ("", "2019-10-07T03:59:00Z"),
+            (r#", "grace_min": 15"#, "2019-10-07T04:14:00Z"),
+            (r#", "grace_min": 15, "late_days": 2"#, "2019-10-09T03:59:00Z"),
+            (r#", "late_days": 2, "cut_off": "2019-10-12T00:00:00Z""#, "2019-10-12T00:00:00Z"),
+            (
+                r#", "cut_off": "2019-10-12T00:00:00Z",
+                    "extensions": [{"student": "1", "due": "2019-10-20T00:00:00Z", "late_days": 1}, {"student": "2"}]"#,
+                "2019-10-21T00:00:00Z",
+            ),
+        ] {
+            assert_eq!(end(&format!("{{{plain}{more}}}")), expected, "{more}");
+        }
+        assert_eq!(super::end("some day", None), None);
     }
 
     #[test]

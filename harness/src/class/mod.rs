@@ -15,6 +15,7 @@ pub mod feedback;
 pub mod late;
 pub mod layout;
 pub mod matching;
+pub mod mending;
 pub mod names;
 pub mod overrides;
 pub mod pins;

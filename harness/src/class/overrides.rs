@@ -30,6 +30,12 @@ pub struct Decision {
     /// Points of the part.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points: Option<f64>,
+    /// The fix as a unified diff, where the submission is mended.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub patch: Option<String>,
+    /// What the fix costs [points].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub penalty: Option<f64>,
     /// Why; the student reads it.
     pub reason: String,
     /// Who decided.
@@ -54,6 +60,8 @@ struct File {
     overrides: Vec<Spanned<Decision>>,
     #[serde(default, rename = "confirm")]
     confirmed: Vec<Spanned<Decision>>,
+    #[serde(default, rename = "mend")]
+    mended: Vec<Spanned<Decision>>,
 }
 
 /// A decision as it was applied.
@@ -93,23 +101,32 @@ impl Overrides {
             anyhow::anyhow!("{place}: {}", error.message())
         })?;
         let mut decisions = Vec::new();
-        for (entry, sets) in file
-            .overrides
-            .into_iter()
-            .map(|entry| (entry, true))
-            .chain(file.confirmed.into_iter().map(|entry| (entry, false)))
+        let of = |kind: &'static str, entries: Vec<Spanned<Decision>>| {
+            entries.into_iter().map(move |entry| (entry, kind))
+        };
+        for (entry, kind) in of("override", file.overrides)
+            .chain(of("confirm", file.confirmed))
+            .chain(of("mend", file.mended))
         {
             let at = entry.span().start;
             let decision = entry.into_inner();
             let place = place(at);
             let points = decision.points;
+            let sets = kind == "override";
             if sets && (decision.part.is_none() || points.is_none()) {
                 bail!("{place}: an override needs part = \"1.3\" and points = 15");
             }
             if !sets && (decision.part.is_some() || points.is_some()) {
                 bail!("{place}: a confirmation has neither part nor points; use [[override]]");
             }
-            if points.is_some_and(|points| !(points.is_finite() && points >= 0.0)) {
+            let mends = [decision.patch.is_some(), decision.penalty.is_some()];
+            if mends != [kind == "mend"; 2] {
+                bail!("{place}: patch and penalty belong to [[mend]], and both of them");
+            }
+            if points
+                .or(decision.penalty)
+                .is_some_and(|points| !(points.is_finite() && points >= 0.0))
+            {
                 bail!("{place}: expected points of 0 or more");
             }
             if decision.reason.trim().is_empty() {
@@ -142,10 +159,17 @@ impl Overrides {
         unused.collect()
     }
 
-    /// Applies to a grade what was decided on its submission, and notes it in the remarks.
+    /// The last fix of a submission, if there is one.
+    pub fn mend(&self, subject: &Subject) -> Option<&Decision> {
+        let mut own = self.0.iter().map(|(decision, _)| decision);
+        own.rfind(|own| own.patch.is_some() && subject.is(own))
+    }
+
+    /// Applies to a grade what was decided on its submission, and notes it in the remarks. Fixes are no matter of points.
     pub fn apply(&self, subject: &Subject, grade: &mut Grade) -> Vec<Applied> {
+        let decisions = self.0.iter().map(|(decision, _)| decision);
         let own: Vec<&Decision> =
-            self.0.iter().map(|(decision, _)| decision).filter(|own| subject.is(own)).collect();
+            decisions.filter(|own| own.patch.is_none() && subject.is(own)).collect();
         let last = own
             .iter()
             .enumerate()
@@ -213,14 +237,21 @@ impl Subject<'_> {
     }
 }
 
+impl Decision {
+    /// By whom and when, in brackets.
+    pub fn who(&self) -> String {
+        let day = self.when.get(..10).unwrap_or_default();
+        let who = [self.by.as_str(), day].into_iter().filter(|text| !text.is_empty());
+        let who = who.collect::<Vec<_>>().join(", ");
+        if who.is_empty() { who } else { format!(" ({who})") }
+    }
+}
+
 impl Applied {
     /// The decision in a sentence, for both reports.
     pub fn words(&self) -> String {
-        let Decision { part, reason, by, when, .. } = &self.decision;
-        let day = when.get(..10).unwrap_or_default();
-        let who = [by.as_str(), day].into_iter().filter(|text| !text.is_empty());
-        let who = who.collect::<Vec<_>>().join(", ");
-        let who = if who.is_empty() { who } else { format!(" ({who})") };
+        let Decision { part, reason, .. } = &self.decision;
+        let who = self.decision.who();
         let range = |[least, most]: [f64; 2]| {
             if least == most { format!("{least}") } else { format!("{least}..{most}") }
         };
@@ -277,7 +308,11 @@ pub fn fingerprint(subject: &Subject, parts: &[PartGrade]) -> String {
 /// # Errors
 /// When a text cannot be written as TOML.
 pub fn entry(decision: &Decision) -> anyhow::Result<String> {
-    let name = if decision.part.is_some() { "override" } else { "confirm" };
+    let name = match (&decision.part, &decision.patch) {
+        (_, Some(_)) => "mend",
+        (Some(_), None) => "override",
+        (None, None) => "confirm",
+    };
     Ok(format!("\n[[{name}]]\n{}", toml::to_string(decision)?))
 }
 

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::late::{Late, Policy};
 use super::layout::{Kind, Label};
 use super::matching::{Claim, Match, Matches, find};
+use super::mending::Mended;
 use super::overrides::Applied;
 use super::roster::{Roster, Student};
 use super::{names, stamps};
@@ -55,6 +56,9 @@ pub struct Standing {
     pub set_aside: Vec<String>,
     /// What the instructor decided on its points.
     pub decisions: Vec<Applied>,
+    /// What the instructor mended, if anything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mended: Option<Mended>,
     /// Whether there is a policy on lateness, and no time stamp to judge by.
     pub time_unknown: bool,
     /// How late it is; nothing where there is no policy, or no time stamp.

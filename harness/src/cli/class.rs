@@ -11,7 +11,7 @@ use super::context::Context;
 use crate::class::{self, Claim, Label, MATCHES, Roster};
 use crate::columns::count;
 use crate::files::write_whole;
-use crate::grading::{Folders, Record, RecordCache, Student};
+use crate::grading::{Earlier, Folders, Record, RecordCache, Student};
 use crate::report;
 
 /// The file that says where a submission lay, in its instructor's folder.
@@ -153,6 +153,31 @@ pub fn note_source(out: &Folders, source: &Source) -> anyhow::Result<()> {
         write_whole(&file, &bytes).with_context(|| format!("cannot write {}", file.display()))?;
     }
     Ok(())
+}
+
+/// Where a submission lay when it was graded, as it was noted.
+pub fn place_of(output: &Path, slug: &str) -> Option<String> {
+    fs::read_to_string(output.join(report::INSTRUCTOR).join(slug).join(SOURCE)).ok()
+}
+
+/// The report of a mended submission, in the instructor's folder of the submission.
+pub fn mended(output: &Path, slug: &str) -> PathBuf {
+    output.join(report::INSTRUCTOR).join(slug).join(report::MENDED)
+}
+
+/// The record of a mended submission, if it is mended.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn mended_record(output: &Path, slug: &str) -> anyhow::Result<Option<Record>> {
+    let folder = mended(output, slug);
+    for slug in folders(&folder) {
+        let instructor = folder.join(report::INSTRUCTOR).join(slug);
+        if let Some(Earlier { record, .. }) = RecordCache::earlier(&instructor, "")? {
+            return Ok(Some(record));
+        }
+    }
+    Ok(None)
 }
 
 /// What a graded submission says of whose it is.

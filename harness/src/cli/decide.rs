@@ -33,9 +33,9 @@ pub struct ConfirmArguments {
     decision: DecisionArguments,
 }
 
-/// What both say.
+/// What every decision says.
 #[derive(clap::Args)]
-struct DecisionArguments {
+pub struct DecisionArguments {
     /// Why; both reports show it
     #[arg(long, value_name = "TEXT")]
     reason: String,
@@ -44,7 +44,7 @@ struct DecisionArguments {
     by: Option<String>,
     /// The report's folder
     #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
-    output: PathBuf,
+    pub output: PathBuf,
 }
 
 /// Options of `umbra status`.
@@ -56,8 +56,9 @@ pub struct StatusArguments {
 }
 
 /// A submission of a report, as it was kept.
-struct Graded {
-    entry: SubmissionReport,
+pub struct Graded {
+    /// What it is worth before anything is decided.
+    pub entry: SubmissionReport,
     numbers: Vec<String>,
 }
 
@@ -92,7 +93,8 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
     let own = own.map(|at| &graded.entry.grade.parts[at..=at]).unwrap_or_default();
     let evidence = fingerprint(&graded.subject(), own);
     let before = own.first().map(|own| own.points).unwrap_or_default();
-    decision.add(kept, &graded, Some((part, *points)), evidence)?;
+    let made = decision.of(&graded, evidence)?;
+    decision.add(kept, &Decision { part: Some(part.clone()), points: Some(*points), ..made })?;
     println!(
         "{}: part {part} has {points} points from now on, the evidence says {before}",
         harmless(&graded.entry.who())
@@ -107,7 +109,7 @@ pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     let graded = one(student, &decision.output, &kept)?;
     let grade = &graded.entry.grade;
     let evidence = fingerprint(&graded.subject(), &grade.parts);
-    decision.add(kept, &graded, None, evidence)?;
+    decision.add(kept, &decision.of(&graded, evidence)?)?;
     let name = harmless(&graded.entry.who());
     match grade.unconfirmed {
         0.0 => println!("{name}: confirmed, no points hang on it"),
@@ -116,7 +118,8 @@ pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     said(&decision.output)
 }
 
-fn said(output: &Path) -> anyhow::Result<u8> {
+/// Says where a decision is kept.
+pub fn said(output: &Path) -> anyhow::Result<u8> {
     println!(
         "kept in {}; the reports show it; `umbra regrade --undo` takes it back",
         output.join(OVERRIDES).display()
@@ -125,26 +128,47 @@ fn said(output: &Path) -> anyhow::Result<u8> {
 }
 
 impl DecisionArguments {
-    /// Adds a decision to the file, and writes the reports by it.
-    fn add(
-        &self,
-        mut kept: Kept,
-        graded: &Graded,
-        part: Option<(&String, f64)>,
-        evidence: String,
-    ) -> anyhow::Result<()> {
+    /// Makes sure, before any work, that there is a reason.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn check(&self) -> anyhow::Result<()> {
         ensure!(!self.reason.trim().is_empty(), "--reason: expected a reason, found nothing");
+        Ok(())
+    }
+
+    /// A fix of a submission, which hangs on its very files.
+    ///
+    /// # Errors
+    /// When there is no reason.
+    pub fn mend(&self, graded: &Graded, patch: String, penalty: f64) -> anyhow::Result<Decision> {
+        let made = self.of(graded, graded.entry.record.digest.clone())?;
+        Ok(Decision { patch: Some(patch), penalty: Some(penalty), ..made })
+    }
+
+    /// A decision on a submission as a whole.
+    fn of(&self, graded: &Graded, evidence: String) -> anyhow::Result<Decision> {
+        self.check()?;
         let account = || std::env::var("USER").or_else(|_| std::env::var("USERNAME")).ok();
         let number = graded.numbers.first().cloned();
-        let decision = Decision {
+        Ok(Decision {
             student: number.unwrap_or_else(|| graded.entry.record.slug.clone()),
-            part: part.map(|(part, _)| part.clone()),
-            points: part.map(|(_, points)| points),
+            part: None,
+            points: None,
+            patch: None,
+            penalty: None,
             reason: self.reason.trim().to_owned(),
             by: self.by.clone().or_else(account).unwrap_or_default(),
             when: jiff::Timestamp::now().round(jiff::Unit::Second)?.to_string(),
             evidence,
-        };
+        })
+    }
+
+    /// Adds a decision to the file, and writes the reports by it.
+    ///
+    /// # Errors
+    /// When the file says what means nothing, or something cannot be written.
+    pub fn add(&self, mut kept: Kept, decision: &Decision) -> anyhow::Result<Kept> {
         let file = self.output.join(OVERRIDES);
         // What is there must be right before anything is added to it.
         let current = kept.decided()?.clone();
@@ -156,15 +180,19 @@ impl DecisionArguments {
                  # something counts. Delete one to take it back, and run `umbra regrade`.\n",
             );
         }
-        decided.overrides += &entry(&decision)?;
+        decided.overrides += &entry(decision)?;
         write_whole(&file, decided.overrides.as_bytes())
             .with_context(|| format!("cannot write {}", file.display()))?;
-        kept.apply(&self.output, decided, &decision.reason, false)
+        kept.apply(&self.output, decided, &decision.reason, false)?;
+        Ok(kept)
     }
 }
 
 /// The one submission of a student in a report.
-fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
+///
+/// # Errors
+/// When there is none, or several.
+pub fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
     let mut found: Vec<Graded> = Vec::new();
     let mut names = Vec::new();
     for (entry, numbers) in kept.graded(output)? {

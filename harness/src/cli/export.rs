@@ -133,8 +133,9 @@ pub fn check(formats: &[Format], output: &Path, list: Option<&Path>) -> anyhow::
 pub fn beside(formats: &[Format], output: &Path, item: &Item) -> anyhow::Result<()> {
     for format in formats {
         let report = Report::read(output)?;
-        write(*format, &output.join(format.file()), output, item, &report)
-            .with_context(|| format!("the report is there, but cannot be exported to {}", format.file()))?;
+        write(*format, &output.join(format.file()), output, item, &report).with_context(|| {
+            format!("the report is there, but cannot be exported to {}", format.file())
+        })?;
     }
     Ok(())
 }

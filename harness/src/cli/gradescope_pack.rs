@@ -82,8 +82,8 @@ fn write(root: &Path, seed: u64, out: &Path) -> anyhow::Result<usize> {
     }
     put("held-back-seed.txt", format!("{seed}\n").as_bytes(), false)?;
     for path in content(root)? {
-        let bytes = std::fs::read(&path)
-            .with_context(|| format!("cannot read {}", path.display()))?;
+        let bytes =
+            std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let below = path.strip_prefix(root).unwrap_or(&path);
         let bytes = if below == Path::new("config.json") { without_late(&bytes)? } else { bytes };
         let names: Vec<_> = below.iter().map(OsStr::to_string_lossy).collect();

@@ -9,16 +9,19 @@ mod class;
 mod compare;
 mod context;
 mod decide;
+mod defend;
 #[cfg(target_os = "linux")]
 mod doctor;
 mod earlier;
 mod explain;
 mod export;
 mod grade;
-mod join;
 mod gradescope_pack;
+mod join;
+mod mend;
 mod merge;
 mod regrade;
+mod release;
 mod render;
 mod settling;
 mod terminal;
@@ -87,6 +90,12 @@ enum Command {
     Override(decide::OverrideArguments),
     /// Confirm what a report leaves to the instructor, such as images without code
     Confirm(decide::ConfirmArguments),
+    /// Grade a submission with a fix of a few lines by the instructor, for a penalty; never less than without it
+    Mend(mend::MendArguments),
+    /// Print why a part has its points: evidence, bounds, how to reproduce it, what a fix would earn
+    Defend(defend::DefendArguments),
+    /// Give students the held-back scenes and what went wrong on them, when nobody can submit any more
+    Release(release::ReleaseArguments),
     /// Show what other rules, policies, matches or overrides make of a graded class; --apply writes it. Nothing is rendered
     Regrade(regrade::RegradeArguments),
     /// List what a report still leaves to the instructor; exits with 0 when nothing waits, 1 when something does
@@ -257,6 +266,9 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Merge(arguments) => merge::merge(&arguments, root),
         Command::Override(arguments) => decide::override_part(&arguments),
         Command::Confirm(arguments) => decide::confirm(&arguments),
+        Command::Mend(arguments) => mend::run(&arguments, root),
+        Command::Defend(arguments) => defend::run(&arguments, root),
+        Command::Release(arguments) => release::run(&arguments, root),
         Command::Regrade(arguments) => regrade::regrade(&arguments, root),
         Command::Status(arguments) => decide::status(&arguments),
         Command::Export(arguments) => export::export(&arguments),

@@ -10,6 +10,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::class::{self, WORK};
 use crate::class::matching::{Match, find};
+use crate::class::mending;
 use crate::class::overrides::{Applied, Subject};
 use crate::class::pins::Change;
 use crate::class::{
@@ -21,6 +22,9 @@ use crate::held_back::HeldBack;
 use crate::program::graded;
 use crate::report::{self, BatchReport, SubmissionReport};
 use crate::rubric::Grade;
+
+/// The file that is there once held-back scenes are released, in the instructor's folder.
+pub const RELEASED: &str = "released.txt";
 
 /// The file of [`Found`], in the instructor's folder.
 const FILE: &str = "batch.json";
@@ -214,6 +218,11 @@ impl Kept {
         Ok(Self { pins, found, roster, records })
     }
 
+    /// What is held back, if anything.
+    pub fn held_back(&self) -> Option<&HeldBack> {
+        self.found.held_back.as_ref()
+    }
+
     /// What is pinned.
     pub fn decided(&self) -> anyhow::Result<&Decided> {
         Ok(&self.pins.current().context("nothing is pinned")?.decided)
@@ -355,11 +364,26 @@ pub fn settled(
             evidence: &record.evidence,
         })
         .collect();
-    let decisions: Vec<Vec<Applied>> = subjects
-        .iter()
-        .zip(&mut grades)
-        .map(|(subject, grade)| overrides.apply(subject, grade))
-        .collect();
+    let mut decisions: Vec<Vec<Applied>> = Vec::new();
+    let mut mends = Vec::new();
+    for (subject, grade) in subjects.iter().zip(&mut grades) {
+        let original = grade.clone();
+        decisions.push(overrides.apply(subject, grade));
+        let record = class::mended_record(output, subject.slug)?;
+        mends.push(match (overrides.mend(subject), record) {
+            (Some(decision), Some(record)) if decision.evidence == subject.digest => {
+                let mut mended = graded(record, &stated.rules).grade;
+                // What the instructor is to look at in the submission itself.
+                let private = original.remarks.into_iter();
+                let private = private.filter(|own| report::is_private(own, &stated.rules));
+                mended.remarks.extend(private);
+                overrides.apply(subject, &mut mended);
+                mending::choose(decision, grade, mended).map(Ok)
+            }
+            (Some(decision), _) => Some(Err(mending::stale(decision))),
+            (None, _) => None,
+        });
+    }
     let parts: Vec<&str> = stated.rules.parts.iter().map(|part| part.id.as_str()).collect();
     let unused = overrides.unused(&subjects, &parts);
     let is_graded = |seen: &Seen| claims.iter().any(|claim| claim.slug == seen.slug);
@@ -387,11 +411,18 @@ pub fn settled(
         let stale = decisions[at].iter().filter(|own| own.stale);
         class.stale.extend(stale.map(|own| format!("{}: {}", claims[at].name, own.words())));
         standing.decisions.clone_from(&decisions[at]);
+        match &mends[at] {
+            Some(Ok(mended)) => standing.mended = Some(mended.clone()),
+            Some(Err(words)) => class.stale.push(format!("{}: {words}", claims[at].name)),
+            None => {}
+        }
         let grade = grades[at].clone();
         counting.push(SubmissionReport { record: entries[at].record.clone(), grade, standing });
     }
     let held_back = found.held_back.clone();
-    Ok(BatchReport::settled(stated.clone(), held_back, counting, class))
+    let released = output.join(report::INSTRUCTOR).join(RELEASED).is_file();
+    let settled = BatchReport::settled(stated.clone(), held_back, counting, class);
+    Ok(BatchReport { released, ..settled })
 }
 
 /// Points that are others in `after`, by submission and part.

@@ -38,9 +38,8 @@ pub fn digests(submission: &Submission, template: &Path) -> io::Result<Vec<Sourc
     for file in files_below(template)? {
         given.extend(code(&String::from_utf8_lossy(&fs::read(file)?)));
     }
-    let is_source = |path: &str| {
-        path.starts_with("src/") && (path.ends_with(".rs") || path.ends_with(".wgsl"))
-    };
+    let is_source =
+        |path: &str| path.starts_with("src/") && (path.ends_with(".rs") || path.ends_with(".wgsl"));
     let files = submission.files.iter();
     let mut digests = Vec::new();
     for file in files.filter(|file| is_source(&file.path) && file.bytes <= MAX_BYTES) {
@@ -75,9 +74,7 @@ fn code(text: &str) -> Vec<String> {
                 depth -= 1;
             }
             _ if depth > 0 => {}
-            ('/', Some('/')) if !quoted => {
-                while signs.next_if(|sign| *sign != '\n').is_some() {}
-            }
+            ('/', Some('/')) if !quoted => while signs.next_if(|sign| *sign != '\n').is_some() {},
             ('\\', Some(_)) if quoted => {
                 line.push(sign);
                 line.extend(signs.next_if(|sign| *sign != '\n'));

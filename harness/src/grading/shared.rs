@@ -219,7 +219,7 @@ mod tests {
         assert_eq!(found["ada"], "src/a.rs (300 signs of its own) is bob: src/mine.rs");
         assert_eq!(
             found["bob"],
-            "src/mine.rs (300 signs of its own) is ada: src/a.rs, ada-again: src/a.rs"
+            "src/mine.rs (300 signs of its own) is ada-again: src/a.rs, ada: src/a.rs"
         );
         assert_eq!(found["eve"], "");
         let again = batch.clone();

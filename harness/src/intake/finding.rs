@@ -9,7 +9,9 @@ use unicode_width::UnicodeWidthStr as _;
 use crate::harmless::reorders;
 
 /// How much a finding weighs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// The submission is refused, or does not conform.
@@ -56,7 +58,7 @@ pub struct Finding {
 }
 
 /// A line, or what stands around a place of a long one.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Excerpt {
     /// The text, without control characters.
     pub text: String,

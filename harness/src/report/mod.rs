@@ -37,8 +37,8 @@ pub use self::html::{
 pub use self::json::{SCHEMA, VERSION, report_json};
 pub use self::schema::report_schema;
 pub use self::text::{
-    Closing, Look, closing as text_closing, detail as text_detail, explain, explain_all, in_a_line,
-    table as text_table,
+    Closing, Look, closing as text_closing, defend, detail as text_detail, explain, explain_all,
+    in_a_line, table as text_table,
 };
 pub use crate::harmless::csv_cell;
 pub use crate::harmless::harmless;
@@ -59,6 +59,10 @@ pub const CSV_FILE: &str = "grades.csv";
 pub const HTML_FILE: &str = "report.html";
 /// The page of the viewer, beside a submission's page.
 pub const VIEW_FILE: &str = "view.html";
+/// The folder of a mended submission: a report of its own, in the instructor's folder of the submission.
+pub const MENDED: &str = "mended";
+/// The mended submission itself, in that folder.
+pub const MENDED_SOURCE: &str = "submission";
 /// The folder in the batch's folder that holds what students must not see.
 pub const INSTRUCTOR: &str = "instructor";
 

@@ -64,9 +64,7 @@ mod tests {
             Value::Array(_) => "array",
             Value::Object(_) => "object",
         };
-        let allows = |wanted: &Value| {
-            wanted == kind || (wanted == "number" && kind == "integer")
-        };
+        let allows = |wanted: &Value| wanted == kind || (wanted == "number" && kind == "integer");
         let is_allowed = match &schema["type"] {
             Value::Array(all) => all.iter().any(allows),
             Value::Null => true,
@@ -134,7 +132,9 @@ mod tests {
         report["class"]["more"] = json!(1);
         report["assignment"].as_object_mut().unwrap().remove("due");
         let wrong = breaks(&report, &schema, &schema, "").join("\n");
-        for at in [".points: ", ".bonus: ", ".verdict: ", ".kind: ", ".more: ", "\"due\" is missing"] {
+        for at in
+            [".points: ", ".bonus: ", ".verdict: ", ".kind: ", ".more: ", "\"due\" is missing"]
+        {
             assert!(wrong.contains(at), "{at}: {wrong}");
         }
     }

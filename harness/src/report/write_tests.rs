@@ -193,6 +193,7 @@ fn released_scenes_come_to_the_student_with_their_pictures_and_nothing_private()
     check.held_back = true;
     check.private = "SECRET".into();
     check.summary = "too dark".into();
+    check.pictures.truncate(1);
     check.pictures[0].file = "held-back-1.png".into();
     let instructor = out.path().join("instructor/two_cosines");
     fs::create_dir_all(&instructor).unwrap();

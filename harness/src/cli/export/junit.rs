@@ -125,7 +125,10 @@ mod tests {
             "<testsuites name=\"Assignment 2: Point Lights &amp; Shadows\" tests=\"18\" failures=\"6\" errors=\"1\" \
              skipped=\"1\" time=\"11.415\">"
         );
-        assert!(xml.contains("<testsuite name=\"two_cosines\" tests=\"6\" failures=\"1\" errors=\"1\""), "{xml}");
+        assert!(
+            xml.contains("<testsuite name=\"two_cosines\" tests=\"6\" failures=\"1\" errors=\"1\""),
+            "{xml}"
+        );
         assert!(xml.contains("><error message=\"0 of 20 points: "), "{xml}");
         assert!(xml.contains("><failure message=\"9.85 of 20 points: "), "{xml}");
         assert!(xml.contains("><skipped message=\"0 of 20 points: "), "{xml}");

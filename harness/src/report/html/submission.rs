@@ -7,6 +7,7 @@ use super::lost::{Lost, is_lost};
 use super::markup::Html;
 use super::pictures::Places;
 use super::{Reader, begin, class, end, part_class};
+use crate::class::mending::Mended;
 use crate::columns::count;
 use crate::evidence::{Check, Verdict};
 use crate::grading::{Conditions, StageCost};
@@ -74,6 +75,7 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     for words in looks_like("", &record.diagnoses) {
         html.raw("<p class=\"hint\"><b>Also looks like</b> ").text(&words).raw("</p>\n");
     }
+    mended(&mut html, entry.standing.mended.as_ref());
     findings(&mut html, &record.findings);
     html.raw("<section>\n<h2>Everything else</h2>\n");
     right(&mut html, &grade.parts);
@@ -136,12 +138,25 @@ fn notices(html: &mut Html, entry: &SubmissionReport, reader: Reader) {
     }
 }
 
+/// What the instructor mended.
+fn mended(html: &mut Html, mended: Option<&Mended>) {
+    let Some(mended) = mended else { return };
+    html.raw("<section>\n<h2>Mended by the instructor</h2>\n<p>").text(&mended.words);
+    html.raw("</p>\n<pre tabindex=\"0\">");
+    for line in harmless_lines(&mended.patch, DIAGNOSTIC_LINES) {
+        html.text(&line).raw("\n");
+    }
+    html.raw("</pre>\n</section>\n");
+}
+
 /// Which scenes are no longer held back.
 fn released(html: &mut Html, report: &BatchReport) {
     let Some(held_back) = report.held_back.as_ref().filter(|_| report.released) else { return };
     let scenes: Vec<String> =
         held_back.scenes.iter().map(|(name, original)| format!("{name} ({original})")).collect();
-    html.raw("<p class=\"notice\">The scenes that were held back are released, each a changed copy: ");
+    html.raw(
+        "<p class=\"notice\">The scenes that were held back are released, each a changed copy: ",
+    );
     html.text(&scenes.join(", ")).raw("</p>\n");
 }
 

@@ -2,12 +2,14 @@
 
 mod class;
 mod closing;
+mod defend;
 mod detail;
 mod explain;
 mod page;
 mod table;
 
 pub use closing::{Closing, closing};
+pub use defend::defend;
 pub use detail::detail;
 pub use explain::{explain, explain_all};
 pub use page::Look;
