@@ -11,7 +11,7 @@ use crate::expected::scene_digest;
 use crate::files::files_below;
 
 impl Grading<'_> {
-    /// For the records that this makes; `force` finds none again.
+    /// Keeps the records that this makes; `force` finds none again.
     ///
     /// # Errors
     /// When something that they depend on cannot be read.
