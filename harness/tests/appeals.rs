@@ -118,7 +118,7 @@ fn a_grade_is_defended_mended_and_what_was_held_back_released() {
     let (code, said) = place.run(&["defend", "260181512", "1.3"]);
     assert_eq!(code, Some(0), "{said}");
     assert!(
-        said.starts_with("1.1 Diffuse reflectance model: 0 of 5 points\nAda Lampglow"),
+        said.starts_with("1.3 Unshadowed direct illumination: 0 of 20 points\nAda Lampglow"),
         "{said}"
     );
     for words in [
