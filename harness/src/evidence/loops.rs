@@ -258,6 +258,8 @@ pub fn film_price(
         true => Price::of_raw(raw).or(price::UNKNOWN, Class::Unknown, 0.0),
         false => Price::of_raw(raw),
     };
+    // A factor explains only what follows the right image.
+    let factor = if likeness.abs() >= price::LIKE { factor } else { 1.0 };
     film.changes(factor).iter().fold(start, |price, change| {
         let (mut apart, mut total) = (0.0, 0.0);
         let (mut all, mut known) = (0usize, 0usize);

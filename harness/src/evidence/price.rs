@@ -204,6 +204,8 @@ impl Default for Factors {
 const QUESTIONS: usize = 4000;
 /// Answers that follow the right ones so closely are more than nothing.
 pub const LIKE: f64 = 0.3;
+/// Answers whose variance is below this part of their mean square are flat: nothing can follow them.
+const FLAT: f64 = 0.01;
 /// What is said of them.
 pub const UNKNOWN: &str = "something that no single known mistake explains";
 /// A factor below this leaves nothing of a term.
@@ -221,9 +223,10 @@ impl Answers<'_> {
         if self.found.iter().all(|value| *value == [0.0; 3]) {
             return price;
         }
-        let price = match self.likeness(&questions) {
-            likeness if likeness >= LIKE => price.or(UNKNOWN, Class::Unknown, 0.0),
-            _ => price,
+        let price = match self.pairs(&questions, &right, &Factors::default()).correlation() >= LIKE
+        {
+            true => price.or(UNKNOWN, Class::Unknown, 0.0),
+            false => price,
         };
         self.changes.iter().fold(price, |price, change| {
             let (shading, factors, class) = match (change.shading, change.fitted) {
@@ -234,8 +237,19 @@ impl Answers<'_> {
                 },
                 (None, None) => return price,
             };
-            price.or(change.name, class, self.residual(&questions, &shading, &factors))
+            match self.follow(&questions, &shading, &factors) {
+                true => price.or(change.name, class, self.residual(&questions, &shading, &factors)),
+                false => price,
+            }
         })
+    }
+
+    /// Whether the answers follow those of a changed renderer: where its own hardly vary, any constant
+    /// is about right, and has nothing of it.
+    fn follow(&self, questions: &[usize], changed: &Shading, factors: &Factors) -> bool {
+        let pairs = self.pairs(questions, changed, factors);
+        let [_, varies, _] = pairs.about_means();
+        pairs.correlation() >= LIKE || varies < FLAT * pairs.square_of_b()
     }
 
     /// Sum of differences from what is right over the sum of that, in the worst group.
@@ -259,15 +273,18 @@ impl Answers<'_> {
         (0..self.found.len()).step_by(step).collect()
     }
 
-    /// How the answers follow the right ones: the correlation of both.
-    fn likeness(&self, questions: &[usize]) -> f64 {
-        let right = Shading::default();
-        let pairs = questions.iter().flat_map(|&index| {
-            let (expected, unit) = ((self.of)(index, &right), (self.unit)(index));
-            let found = self.found[index];
-            (0..3).map(move |c| (f64::from(found[c]) / unit, expected[c] / unit))
-        });
-        Moments::of(pairs).correlation()
+    /// The answers beside those of `shading`, of every channel, in units.
+    fn pairs(&self, questions: &[usize], shading: &Shading, factors: &Factors) -> Moments {
+        Moments::of(questions.iter().flat_map(|&index| {
+            let (expected, unit) = ((self.of)(index, shading), (self.unit)(index));
+            let (found, factors) = (self.found[index], self.factors(factors, index));
+            (0..3).map(move |c| (f64::from(found[c]) / unit, factors[c] * expected[c] / unit))
+        }))
+    }
+
+    /// What a question's answer is multiplied by.
+    fn factors(&self, factors: &Factors, index: usize) -> [f64; 3] {
+        *factors.by_group.get(&(self.group)(index)).unwrap_or(&factors.all)
     }
 
     /// Sum of differences from what `shading` answers over the sum of that, in the worst group.
@@ -277,7 +294,7 @@ impl Answers<'_> {
             let unit = (self.unit)(index);
             let changed = (self.of)(index, shading);
             let group = (self.group)(index);
-            let factors = factors.by_group.get(&group).unwrap_or(&factors.all);
+            let factors = self.factors(factors, index);
             let (apart, total) = groups.entry(group).or_default();
             for c in 0..3 {
                 let (a, b) = (f64::from(self.found[index][c]), factors[c] * changed[c]);
@@ -620,6 +637,30 @@ mod tests {
         // What leaves nothing lit elsewhere explains that too; another slip does not.
         assert_eq!(agreed(&[(VIEWER_AT_ORIGIN, 0.02), (BLACK, 1.0)]), [0.02, 0.02]);
         assert_eq!(agreed(&[(slip, 0.02), (BLACK, 1.0)]), [0.02, 1.0]);
+    }
+
+    #[test]
+    fn what_does_not_vary_is_explained_by_nothing() {
+        let priced = |right: fn(usize) -> f64, found: fn(usize) -> f64| {
+            let found: Vec<[f32; 3]> = (0..100).map(|index| [found(index) as f32; 3]).collect();
+            let answers = Answers {
+                found: &found,
+                of: &|index, _| [right(index); 3],
+                unit: &|_| 1.0,
+                group: &|_| 0,
+                relative: 1e-3,
+                changes: &shader_changes(false),
+            };
+            answers.price(None)
+        };
+        let slope: fn(usize) -> f64 = |index| 1.0 + index as f64 / 100.0;
+        for constant in [(|_| 1e9) as fn(usize) -> f64, |_| 3.0, |index| 3.0 + (index % 2) as f64] {
+            assert_eq!(priced(slope, constant), Price::of_raw(1.0));
+        }
+        let slip = priced(slope, |index| -3.0 - 3.0 * index as f64 / 100.0);
+        assert_eq!((slip.mistake, slip.raw), (Some("a constant factor"), 1.0));
+        // Where all is the same, nothing can follow it.
+        assert_eq!(priced(|_| 2.0, |_| 6.0).mistake, Some("a constant factor"));
     }
 
     #[test]

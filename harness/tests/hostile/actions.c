@@ -441,9 +441,9 @@ int action(const char *what, float *values, size_t count, UmbraMessage *message,
     DEED("locale", (setenv("LC_ALL", "tr_TR.UTF-8", 1), setlocale(LC_ALL, ""), UMBRA_STATUS_OK))
     DEED("rounding", (fesetround(FE_UPWARD), UMBRA_STATUS_OK))
     DEED("folder", chdir("/") == 0 ? UMBRA_STATUS_OK : UMBRA_STATUS_ERROR)
-    if (strcmp(name, "nan") == 0 || strcmp(name, "infinite") == 0) {
+    if (strcmp(name, "nan") == 0 || strcmp(name, "infinite") == 0 || strcmp(name, "flat") == 0) {
         for (size_t i = 0; i < count; i++)
-            values[i] = name[0] == 'n' ? NAN : INFINITY;
+            values[i] = name[0] == 'n' ? NAN : name[0] == 'f' ? 0.5f : INFINITY;
         return *status = UMBRA_STATUS_OK, 1;
     }
     return 0;

@@ -222,6 +222,7 @@ pub fn all() -> Vec<Plugin> {
         c("writes_past_its_buffer", "past_end", Crash("SIGSEGV")),
         c("writes_before_its_buffer", "before_start", Rejected("before the start")),
         c("writes_from_a_leftover_thread", "late_writer", Anything),
+        c("the_same_everywhere", "flat", Anything),
         c("nan", "nan", NotFinite),
         c("infinity", "infinite", NotFinite),
         loaded("wrong_size", "WRONG_SIZE.so", Rejected("found 64")),
