@@ -55,6 +55,14 @@ fn a_recording_is_made_once_and_stages_nothing_but_the_closure() {
 }
 
 #[test]
+#[cfg(unix)]
+fn an_assignment_of_links_is_built_where_the_template_is() {
+    let dir = tempfile::tempdir().unwrap();
+    let own = crate::support::one_scene(&dir.path().join("own"), |_| ());
+    assert_eq!(Recording::obtain(&own, umbra()).unwrap(), *recording());
+}
+
+#[test]
 fn cargo_and_the_replay_build_renderers_that_draw_the_same() {
     let cargo: PathBuf = workspace().join("target/release/libreference_impl.so");
     assert!(cargo.is_file(), "run `cargo build --release --workspace` first");

@@ -48,9 +48,12 @@ fn the_autograder_grades_and_always_leaves_results() {
     let config = fs::read_to_string(source.join("umbra/config.json")).unwrap();
     assert!(!config.contains("late\"") && !config.contains("260000001"));
 
-    // What setup.sh builds there is here already.
-    symlink(Path::new(env!("CARGO_MANIFEST_DIR")).join("../target"), source.join("umbra/target"))
-        .unwrap();
+    // What setup.sh builds there is here already, for the template that is here.
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap();
+    fs::remove_dir_all(source.join("umbra/student_template")).unwrap();
+    for shared in ["target", "student_template"] {
+        symlink(own.join(shared), source.join("umbra").join(shared)).unwrap();
+    }
     let run = |submission: &[(&str, &str)]| -> Value {
         let folder = at("autograder/submission");
         let _ = fs::remove_dir_all(&folder);

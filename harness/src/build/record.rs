@@ -131,6 +131,9 @@ impl Recording {
     /// letting cargo build the template with `umbra` (this program) as compiler wrapper. Several
     /// processes may ask at once. The template itself need not compile: students work in it.
     ///
+    /// Where the template is a link, the workspace is the one that it leads to: an assignment may be a `config.json` of
+    /// its own beside links, and nothing is compiled for it again.
+    ///
     /// # Errors
     /// When the workspace cannot be read or cargo fails.
     pub fn obtain(workspace: &Path, umbra: &Path) -> Result<Self, RecordError> {
@@ -147,6 +150,7 @@ impl Recording {
         umbra: &Path,
         progress: &dyn Fn(Compiling),
     ) -> Result<Self, RecordError> {
+        let workspace = &workspace_of_template(workspace)?;
         let sysroot = run(Command::new("rustc").args(["--print", "sysroot"]), workspace)?;
         let sysroot = PathBuf::from(sysroot.trim());
         let rustc = sysroot.join("bin").join(format!("rustc{}", std::env::consts::EXE_SUFFIX));
@@ -182,6 +186,16 @@ impl Recording {
         fs::write(&stored, bytes).map_err(at(&stored))?;
         Ok(recording)
     }
+}
+
+/// The workspace in which the template lies.
+fn workspace_of_template(root: &Path) -> Result<PathBuf, RecordError> {
+    let template = root.join(TEMPLATE);
+    if !template.is_symlink() {
+        return Ok(root.to_owned());
+    }
+    let real = fs::canonicalize(&template).map_err(at(&template))?;
+    Ok(real.parent().unwrap_or(root).to_owned())
 }
 
 /// Lets cargo build the template once more and answers its compiler call and cargo's messages.
