@@ -1,4 +1,5 @@
-//! `umbra watch` in a real browser: a save, a compiler error, a panic, a hang, and the recovery from each.
+//! `umbra watch` in a real browser: a save, a compiler error, a shader error, a panic, a hang, and the recovery from
+//! each, in the report and in the live view.
 
 #![cfg(unix)]
 
@@ -10,7 +11,7 @@ use std::process::{Child, Command, Stdio};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
-use crate::support::chromium::Chromium;
+use crate::support::chromium::{Chromium, SHIFT};
 use crate::support::one_scene;
 
 /// The watch, ended as Ctrl-C does.
@@ -33,6 +34,80 @@ fn copy(from: &Path, to: &Path) {
             fs::copy(entry.path(), target).unwrap();
         }
     }
+}
+
+/// Waits until the live view shows a picture of what was saved last, in both frames.
+fn until_drawn(browser: &mut Chromium) {
+    for path in ["realtime", "offline"] {
+        browser.until(&format!(
+            "(({{ problem, picture, figure }}) => problem.hidden && picture && !figure.classList.contains('earlier'))(live.views.{path})"
+        ));
+    }
+    browser.until("live.views.offline.figure.dataset.spp === '16' && !live.views.realtime.under");
+}
+
+/// What a frame shows.
+fn picture(browser: &mut Chromium, path: &str) -> String {
+    let url = format!("live.views.{path}.canvas.toDataURL()");
+    browser.value(&url).as_str().unwrap().to_owned()
+}
+
+/// What is said in the place of a picture.
+fn problem(path: &str, words: &str) -> String {
+    format!(
+        "((view) => !view.problem.hidden && view.problem.textContent.includes('{words}'))(live.views.{path})"
+    )
+}
+
+/// Turns the camera, moves it and comes nearer; then goes back to where it was.
+fn looks_around(browser: &mut Chromium) {
+    let [realtime, offline] = ["realtime", "offline"].map(|path| picture(browser, path));
+    let middle = browser.value(
+        "(({ left, top, width, height }) => [left + width / 2, top + height / 2])(live.views.realtime.canvas.getBoundingClientRect())",
+    );
+    let [x, y] = [0, 1].map(|axis| middle[axis].as_f64().unwrap());
+    let differs = |path: &str, from: &str| {
+        format!("live.views.{path}.canvas.toDataURL() !== '{from}' && !live.views.realtime.under")
+    };
+    let distance = "Math.hypot(...sub(live.camera.eye, live.camera.at))";
+    let far = browser.value(distance).as_f64().unwrap();
+    let at = browser.value("live.camera.at");
+
+    browser.mouse("mousePressed", x, y);
+    browser.mouse("mouseMoved", x + 40.0, y + 25.0);
+    browser.mouse("mouseReleased", x + 40.0, y + 25.0);
+    browser.until(&differs("realtime", &realtime));
+    browser.until(&differs("offline", &offline));
+    assert_eq!(browser.value("live.camera.at"), at, "the target stays");
+    assert!((browser.value(distance).as_f64().unwrap() / far - 1.0).abs() < 1e-6);
+
+    let turned = picture(browser, "realtime");
+    browser.wheel(x, y, -200.0);
+    assert!(browser.value(distance).as_f64().unwrap() < 0.9 * far);
+    browser.until(&differs("realtime", &turned));
+    browser.value("live.views.realtime.canvas.focus()");
+    let near = picture(browser, "realtime");
+    browser.key("ArrowLeft", SHIFT);
+    assert_ne!(browser.value("live.camera.at"), at, "moved");
+    browser.until(&differs("realtime", &near));
+
+    // From the same place everything looks the same.
+    browser.key("r", 0);
+    for (path, was) in [("realtime", &realtime), ("offline", &offline)] {
+        browser.until(&format!("live.views.{path}.canvas.toDataURL() === '{was}'"));
+    }
+
+    // Exposure asks nobody.
+    let asked = browser.value("live.views.realtime.asked");
+    browser.value(
+        "control('exposure').value = 2, control('exposure').dispatchEvent(new Event('input'))",
+    );
+    assert_ne!(picture(browser, "realtime"), realtime);
+    browser.value(
+        "control('exposure').value = 0, control('exposure').dispatchEvent(new Event('input'))",
+    );
+    assert_eq!(picture(browser, "realtime"), realtime);
+    assert_eq!(browser.value("live.views.realtime.asked"), asked);
 }
 
 #[test]
@@ -69,6 +144,9 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     let points = format!("{report}.querySelector('.sum strong').textContent === '5'");
     browser.until(&points);
 
+    until_drawn(&mut browser);
+    looks_around(&mut browser);
+
     let file = work.join("src/bsdfs/diffuse.rs");
     let right = fs::read_to_string(&file).unwrap();
     fs::write(&file, format!("{right}\nfn broken() -> f32 {{ \"words\" }}\n")).unwrap();
@@ -78,17 +156,43 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     assert_eq!(browser.value("document.body.className"), "done");
     let shown = browser.value(&format!("{report}.querySelector('main h2').textContent"));
     assert_eq!(shown, "The compiler says", "the error comes first");
+    browser.until("live.views.realtime.figure.classList.contains('earlier')");
 
     // A panic is shown in its own words.
     let eval = "-> Vec3 {";
     assert_eq!(right.matches(eval).count(), 1);
+    let pass = work.join("src/renderpasses/simple.rs");
+    let right_pass = fs::read_to_string(&pass).unwrap();
+    let draw = "let mut frame = FrameUniforms::new(camera);";
+    assert_eq!(right_pass.matches(draw).count(), 1);
+    fs::write(&pass, right_pass.replace(draw, &format!("panic!(\"in a frame\"); {draw}"))).unwrap();
     fs::write(&file, right.replace(eval, "-> Vec3 { panic!(\"on purpose\");")).unwrap();
+    browser.until(&problem("realtime", "the renderer panicked: in a frame"));
     browser.until(&format!("{report}.body.textContent.includes('on purpose')"));
 
-    // One that hangs is ended by the next save.
+    // One that hangs is ended by the next save; a frame that hangs, after a while.
+    let second = "static DRAWN: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false); \
+                  if DRAWN.swap(true, std::sync::atomic::Ordering::Relaxed) { loop {} }";
+    fs::write(&pass, right_pass.replace(draw, &format!("{second} {draw}"))).unwrap();
     fs::write(&file, right.replace(eval, "-> Vec3 { loop {}")).unwrap();
     browser.until("document.getElementById('status').textContent.includes('rendering offline')");
+    browser.until("live.views.realtime.problem.hidden && !live.views.realtime.under");
+    browser.value("orbit(0.1, 0)");
+    browser.until(&problem("realtime", "no answer within 2 s of CPU time"));
+
+    // A shader error, at its line.
+    let shader = work.join("src/shaders/phong.fs.wgsl");
+    let right_shader = fs::read_to_string(&shader).unwrap();
+    let line = right_shader.lines().count() + 2;
+    fs::write(&shader, format!("{right_shader}\nfn broken() -> f32 {{ return words; }}\n"))
+        .unwrap();
+    fs::write(&pass, &right_pass).unwrap();
     fs::write(&file, right).unwrap();
+    browser.until(&problem("realtime", &format!("src/shaders/phong.fs.wgsl:{line}:")));
+    browser.until(&points);
+
+    fs::write(&shader, right_shader).unwrap();
+    until_drawn(&mut browser);
     browser.until(&points);
     assert!(browser.value(&format!("{report}.querySelector('pre')")).is_null());
 

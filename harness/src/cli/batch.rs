@@ -64,6 +64,8 @@ pub struct Batch<'a> {
     pub attempt: Option<Attempt>,
     /// Whether what was found out before is found out anew.
     pub force: bool,
+    /// Where the library of what compiled is left, if anywhere.
+    pub keeps_plugin: Option<&'a Path>,
     /// Whether to print what each stage cost.
     pub timings: bool,
 }
@@ -163,6 +165,7 @@ impl Batch<'_> {
             if self.slice.is_some() {
                 found.begin(self.output)?;
             }
+            grading.keeps_plugin = self.keeps_plugin.map(Path::to_owned);
             if self.budget == BudgetChoice::None {
                 grading.budget = None;
             }

@@ -54,6 +54,9 @@ pub struct CheckArguments {
     /// Open the report in the browser
     #[arg(long)]
     open: bool,
+    /// Leave the library of what compiled in this file, for the live view of `umbra watch`
+    #[arg(long, value_name = "FILE", hide = true)]
+    keep_plugin: Option<PathBuf>,
 }
 
 /// What the last check found.
@@ -109,6 +112,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         list: None,
         attempt: None,
         force: false,
+        keeps_plugin: arguments.keep_plugin.as_deref(),
         timings: arguments.timings,
     };
     let begun = Instant::now();

@@ -93,6 +93,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         list: arguments.class.as_deref(),
         attempt: arguments.attempt,
         force: arguments.force,
+        keeps_plugin: None,
         timings: arguments.timings,
     };
     let (report, collected) = match batch.run(root)? {

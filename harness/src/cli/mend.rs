@@ -81,6 +81,7 @@ pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8>
         list: None,
         attempt: None,
         force: false,
+        keeps_plugin: None,
         timings: false,
     };
     let Ended::Report(..) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };

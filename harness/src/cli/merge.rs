@@ -201,6 +201,7 @@ fn compare(
         list: None,
         attempt: None,
         force: false,
+        keeps_plugin: None,
         timings: false,
     };
     eprintln!("umbra: {} graded again on this machine", count(samples.len(), "submission"));

@@ -24,6 +24,7 @@ use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
 use crate::diagnosis::{Diagnosis, Stored};
 use crate::evidence::{Check, CheckId, Evidence, Verdict, loops, price, rays, shadow_map};
+use crate::files::write_whole;
 use crate::held_back::{self, HeldBack};
 use crate::intake::{self, IntakeError, Submission, TreeSpec, Validation};
 use crate::process::Exit;
@@ -72,6 +73,8 @@ pub struct Grading<'a> {
     pub compares_submitted: bool,
     /// Records made before and to be made, if they are kept.
     pub cache: Option<RecordCache>,
+    /// Where the library of what compiled is left for others, if anywhere.
+    pub keeps_plugin: Option<PathBuf>,
     /// What a submission may use on each path, if that is limited.
     pub budget: Option<Budget>,
     /// What the reference renderer takes, as far as it was needed.
@@ -147,6 +150,7 @@ impl<'a> Grading<'a> {
             paths: RenderPath::ALL.to_vec(),
             compares_submitted: true,
             cache: None,
+            keeps_plugin: None,
             budget: Some(assignment.limits.budget.clone()),
             reference_costs: ReferenceCosts::default(),
             stored: OnceLock::new(),
@@ -453,6 +457,12 @@ impl<'a> Grading<'a> {
         };
         let verdict = if plugin.is_some() { Verdict::Pass } else { Verdict::Fail };
         checks.push(Check::new(BUILD, "", verdict, summary).with_hint(hint));
+        // With files of the template in it, it is not what its author wants to see.
+        let own = plugin.as_ref().filter(|_| built.replaced.is_empty());
+        if let (Some(keep), Some(library)) = (&self.keeps_plugin, own) {
+            write_whole(keep, &std::fs::read(library)?)
+                .with_context(|| format!("cannot write {}", keep.display()))?;
+        }
         Ok(plugin.map(|library| (library, built)))
     }
 

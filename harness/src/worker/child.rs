@@ -1,5 +1,7 @@
 //! The worker itself: the program `umbra-worker DIR`.
 
+use std::fs::File;
+use std::io::{Read as _, Write as _};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -12,7 +14,7 @@ use super::neutral_pass::Neutral;
 use super::shaders;
 use super::shared_memory::{Input, Output, Table};
 use super::table::{Record, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE};
-use super::wire::{Folder, WireJob, WireRequest, queries, rays, words};
+use super::wire::{self, CAMERA_BYTES, Folder, WireJob, WireRequest, queries, rays, words};
 use crate::plugin::{
     CallError, CallErrorKind, HostPlugin, LoadedScene, OfflineJob, RealtimeJob, Witness,
     WitnessState,
@@ -46,6 +48,9 @@ fn work(dir: &Path) -> std::io::Result<()> {
     let name = plugin.as_ref().map(HostPlugin::name).unwrap_or_default();
     loading.answer(api::STATUS_OK, &name, 0.0);
     shaders::take(dir);
+    if let (true, Some(plugin), [request]) = (job.live, &plugin, &*job.requests) {
+        return answer_frames(plugin, request, &folder, table.request(0));
+    }
     let (mut scene, mut neutral) = (None, Neutral::default());
     for (index, request) in job.requests.iter().enumerate() {
         let record = table.request(index);
@@ -66,6 +71,52 @@ fn work(dir: &Path) -> std::io::Result<()> {
     shaders::leave(dir);
     // Scenes are left to the end of the process: unloading is foreign code with nothing to give.
     std::mem::forget(scene);
+    Ok(())
+}
+
+/// Draws a frame for each camera that comes, until none comes or one fails.
+fn answer_frames(
+    plugin: &HostPlugin,
+    wired: &WireRequest,
+    folder: &Folder,
+    record: &Record,
+) -> std::io::Result<()> {
+    let mut cameras = File::open(folder.cameras())?;
+    let mut answered = File::options().write(true).open(folder.frames())?;
+    let mut output = Output::open(&folder.output(), wired.output)?;
+    let Request::RenderRealtime { scene, width, height, shadow_map, adapter, .. } = &wired.request
+    else {
+        return Err(std::io::Error::other("only realtime frames are drawn live"));
+    };
+    let mut current = None;
+    let mut draw = || -> Result<(), CallError> {
+        record.start();
+        let scene = load(plugin, &mut current, scene)?;
+        let mut pass = scene.open_realtime(&RealtimeJob {
+            width: *width,
+            height: *height,
+            shadow_map: *shadow_map,
+            adapter_kind: adapter.kind.as_api(),
+            adapter_name: &adapter.name,
+            stages: &[],
+        })?;
+        let mut camera = [0; CAMERA_BYTES];
+        while cameras.read_exact(&mut camera).is_ok() {
+            record.start();
+            let begin = Instant::now();
+            pass.frame(&wire::camera(&camera), output.floats())?;
+            record.answer(api::STATUS_OK, "", begin.elapsed().as_secs_f64());
+            // Nobody listens when the parent is gone.
+            let _ = answered.write_all(&[0]);
+        }
+        Ok(())
+    };
+    let drawn = draw();
+    if let Err(error) = &drawn {
+        record.answer(status(error.kind), &error.message, 0.0);
+        answered.write_all(&[0])?;
+    }
+    std::mem::forget(current);
     Ok(())
 }
 

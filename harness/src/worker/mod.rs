@@ -10,6 +10,8 @@
 mod child;
 mod command;
 mod job;
+#[cfg_attr(not(unix), path = "live_fallback.rs")]
+mod live;
 mod mounts;
 mod neutral_pass;
 mod outcome;
@@ -25,6 +27,7 @@ pub use job::{
     Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, Matrices, RayQuery, Request,
     STAGES, SceneRef, Stage,
 };
+pub use live::LiveWorker;
 pub use mounts::as_given;
 pub use outcome::{Answer, Fault, JobReport, Late, Outcome, WitnessUse, WorkerRun};
 pub use retry_budget::{Budget, Reference, RetryBudget, is_environment_failure};

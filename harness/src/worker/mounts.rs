@@ -70,6 +70,13 @@ impl Mounts {
 }
 
 impl Mounts {
+    /// Gives it the pipes of a live worker; they must be there.
+    pub fn live(&mut self, dir: &Path) {
+        let (folder, inside) = (Folder(dir), Folder(Path::new(JOB)));
+        self.policy.read_only.push(Bind::new(folder.cameras(), inside.cameras()));
+        self.policy.read_write.push(Bind::new(folder.frames(), inside.frames()));
+    }
+
     /// Gives it compiled shaders where it draws, and lets it leave its own in `leaves`.
     pub fn shaders(&mut self, requests: &[&Request], given: &[PathBuf], leaves: Option<&Path>) {
         // Without a mount namespace there is no place for them.

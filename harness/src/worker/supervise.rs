@@ -4,11 +4,13 @@ use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 use std::time::{Duration, Instant};
 
 use renderer_api as api;
+use tempfile::TempDir;
 
 use super::command::{Program, command, program_beside, software_driver};
 use super::job::{Job, Request};
@@ -219,6 +221,38 @@ impl Supervisor {
         report
     }
 
+    /// A folder for one worker's files.
+    pub(super) fn private_folder(&self) -> io::Result<TempDir> {
+        tempfile::Builder::new().prefix("umbra-worker-").tempdir_in(&self.scratch)
+    }
+
+    /// Prepares the files of a worker in its private folder, and how it is started. A `live` one draws
+    /// frames as long as it is asked for them.
+    pub(super) fn ready(
+        &self,
+        private: &Path,
+        job: &Job,
+        requests: &[&Request],
+        limits: &Limits,
+        live: bool,
+    ) -> io::Result<Ready> {
+        fs::create_dir(Folder(private).scratch())?;
+        let mut mounts = Mounts::new(private, job, requests, self.isolation)?;
+        mounts.shaders(requests, &self.shaders, self.leaves_shaders.as_deref());
+        if live {
+            mounts.live(private);
+        }
+        let files = Files::prepare(private, &mounts, requests, live)?;
+        let program = Program::open(&program_beside(&self.umbra))?;
+        let driver = software_driver();
+        let elsewhere = |driver: &PathBuf| !driver.starts_with("/usr/share/vulkan");
+        let command = command(&program, private, &mounts, requests, limits, driver.as_deref());
+        let mut policy = mounts.policy;
+        policy.read_only.extend(driver.filter(elsewhere).map(Bind::same));
+        let lock = Confinement::new(limits, policy);
+        Ok(Ready { files, command, lock, _program: program })
+    }
+
     fn run_worker(
         &self,
         job: &Job,
@@ -227,21 +261,10 @@ impl Supervisor {
         cancel: &AtomicBool,
         progress: &mut dyn FnMut(usize, (u32, u32)),
     ) -> io::Result<Run> {
-        let limits = &allowed.limits;
-        let private = tempfile::Builder::new().prefix("umbra-worker-").tempdir_in(&self.scratch)?;
+        let private = self.private_folder()?;
         let requests: Vec<_> = pending.iter().map(|&index| &job.requests[index]).collect();
-        fs::create_dir(Folder(private.path()).scratch())?;
-        let mut mounts = Mounts::new(private.path(), job, &requests, self.isolation)?;
-        mounts.shaders(&requests, &self.shaders, self.leaves_shaders.as_deref());
-        let mut files = Files::prepare(private.path(), &mounts, &requests)?;
-        let program = Program::open(&program_beside(&self.umbra))?;
-        let driver = software_driver();
-        let elsewhere = |driver: &PathBuf| !driver.starts_with("/usr/share/vulkan");
-        let command =
-            command(&program, private.path(), &mounts, &requests, limits, driver.as_deref());
-        let mut policy = mounts.policy;
-        policy.read_only.extend(driver.filter(elsewhere).map(Bind::same));
-        let lock = Confinement::new(limits, policy);
+        let ready = self.ready(private.path(), job, &requests, &allowed.limits, false)?;
+        let Ready { mut files, command, lock, .. } = ready;
         let mut last = Instant::now();
         // The question that is being worked at, and the CPU time at its beginning. Both are the worker's
         // word; the kernel limits them all together.
@@ -311,16 +334,25 @@ struct Run {
     ended: ChildOutcome,
 }
 
+/// A worker that is ready to be started.
+pub(super) struct Ready {
+    pub files: Files,
+    pub command: Command,
+    pub lock: Confinement,
+    /// To be held until it has started.
+    pub _program: Program,
+}
+
 /// The files of a worker, as the parent holds them: opened before it began, read only by plain
 /// reads. (A mapping could be pulled away from under us by whoever truncates the file.)
-struct Files {
+pub(super) struct Files {
     table: File,
     output: File,
     places: Vec<Place>,
 }
 
 impl Files {
-    fn prepare(dir: &Path, mounts: &Mounts, requests: &[&Request]) -> io::Result<Self> {
+    fn prepare(dir: &Path, mounts: &Mounts, requests: &[&Request], live: bool) -> io::Result<Self> {
         let folder = Folder(dir);
         let new = |path| File::options().create_new(true).read(true).write(true).open(path);
         let (mut input, mut output) = (new(folder.input())?, new(folder.output())?);
@@ -344,7 +376,7 @@ impl Files {
         let mut table = new(folder.table())?;
         table.write_all(&vec![0; SLOT_BYTES * (1 + requests.len())])?;
         let places = wired.iter().map(|request| request.output).collect();
-        let wired = WireJob { plugin: mounts.plugin.clone(), requests: wired };
+        let wired = WireJob { plugin: mounts.plugin.clone(), requests: wired, live };
         fs::write(folder.job(), serde_json::to_vec(&wired)?)?;
         // As root, the worker is another user; the folder above lets nobody else in.
         #[cfg(unix)]
@@ -356,7 +388,7 @@ impl Files {
     }
 
     /// All records; what is missing at the end of the file was not started.
-    fn records(&mut self) -> io::Result<Vec<SlotState>> {
+    pub fn records(&mut self) -> io::Result<Vec<SlotState>> {
         let size = SLOT_BYTES * (1 + self.places.len());
         let mut bytes = read_at(&mut self.table, 0, size)?;
         bytes.resize(size, 0);
@@ -364,7 +396,7 @@ impl Files {
         Ok(records.iter().map(SlotState::parse).collect())
     }
 
-    fn outcome(
+    pub fn outcome(
         &mut self,
         index: usize,
         request: &Request,
@@ -446,7 +478,7 @@ fn how_far(records: &[SlotState]) -> (usize, (u32, u32)) {
 }
 
 /// What it means that the worker did not even come to loading its plugin.
-fn not_started(ended: &ChildOutcome) -> Outcome {
+pub(super) fn not_started(ended: &ChildOutcome) -> Outcome {
     let (reason, fault) = match ended.exit {
         Exit::Cancelled => ("cancelled".to_owned(), Fault::Environment),
         exit if exit.is_out_of_time() => {
@@ -465,7 +497,7 @@ fn starved() -> Outcome {
 }
 
 /// The outcome of the request at which a worker ended, the one with this index among its own.
-fn death(ended: &ChildOutcome, allowed: &Allowed, index: usize) -> Outcome {
+pub(super) fn death(ended: &ChildOutcome, allowed: &Allowed, index: usize) -> Outcome {
     let limits = &allowed.limits;
     let late =
         |computing, limit_s| Outcome::TimedOut(Late { computing, limit_s, reference_s: None });

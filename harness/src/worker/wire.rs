@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use renderer_api as api;
 use serde::{Deserialize, Serialize};
 
-use super::job::{BsdfQuery, BsdfSource, Request};
+use super::job::{BsdfQuery, BsdfSource, CameraValue, Request};
 
 /// Outputs begin at multiples of this in their file: a multiple of every system's page size.
 pub const ALIGN: usize = 64 << 10;
@@ -18,6 +18,8 @@ pub struct WireJob {
     pub plugin: Option<PathBuf>,
     /// The requests, in order.
     pub requests: Vec<WireRequest>,
+    /// Whether frames of the one request are drawn as they are asked for, until nobody asks any more.
+    pub live: bool,
 }
 
 /// A request whose arrays lie in the input file.
@@ -74,6 +76,14 @@ impl Folder<'_> {
     /// Records: one for the plugin's loading, then one for each request.
     pub fn table(&self) -> PathBuf {
         self.0.join("table")
+    }
+    /// A pipe to a live worker: the cameras of frames.
+    pub fn cameras(&self) -> PathBuf {
+        self.0.join("cameras")
+    }
+    /// A pipe from a live worker: a byte for each frame that is answered.
+    pub fn frames(&self) -> PathBuf {
+        self.0.join("frames")
     }
     /// The worker's current folder.
     pub fn scratch(&self) -> PathBuf {
@@ -170,6 +180,31 @@ fn floats<const N: usize>(words: &[u32], at: usize) -> [f32; N] {
     std::array::from_fn(|i| f32::from_bits(words[at + i]))
 }
 
+/// Size of a camera in bytes.
+pub const CAMERA_BYTES: usize = 40;
+
+/// A camera as it goes to a live worker.
+pub fn camera_bytes(camera: &CameraValue) -> [u8; CAMERA_BYTES] {
+    let CameraValue { eye, at, up, fov_y_deg, .. } = camera;
+    let mut bytes = [0; CAMERA_BYTES];
+    let values = [eye, at, up].into_iter().flatten().chain([fov_y_deg]);
+    for (to, value) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(values) {
+        *to = value.to_ne_bytes();
+    }
+    bytes
+}
+
+/// Reads a camera back.
+pub fn camera(bytes: &[u8; CAMERA_BYTES]) -> api::CameraValue {
+    let words = words(bytes);
+    api::CameraValue {
+        eye: floats(&words, 0),
+        at: floats(&words, 3),
+        up: floats(&words, 6),
+        fov_y_deg: f32::from_bits(words[9]),
+    }
+}
+
 /// Words of mapped bytes; a rest that is no whole word is left out.
 pub fn words(bytes: &[u8]) -> Vec<u32> {
     let word = |word: &[u8]| u32::from_ne_bytes([word[0], word[1], word[2], word[3]]);
@@ -225,6 +260,15 @@ mod tests {
         assert!(matches!(rest, Request::Radiance { rays, seed: 5, .. } if rays.is_empty()));
         let json = serde_json::to_string(&request).unwrap();
         assert_eq!(serde_json::from_str::<Request>(&json).unwrap(), request);
+    }
+
+    #[test]
+    fn a_camera_arrives_as_it_left() {
+        let (eye, at, up) = ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]);
+        let matrices = super::super::job::Matrices::Usual;
+        let sent = CameraValue { eye, at, up, fov_y_deg: 10.0, matrices };
+        let read = camera(&camera_bytes(&sent));
+        assert_eq!((read.eye, read.at, read.up, read.fov_y_deg), (eye, at, up, 10.0));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! A first look asks one small scene and is there soon; then everything is asked. Each check is a program of its own, `umbra check`, so that nothing that a renderer does ends the watch. A newer save
 //! ends the check that runs. The page is served on this machine alone, under an address that nobody can guess.
 
+mod live;
 mod page;
 mod server;
 
@@ -18,8 +19,10 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use notify::{EventKind, RecursiveMode, Watcher as _};
 
+use self::live::LiveView;
 use self::server::{Board, Look, Server, Stage};
-use super::context::INTERRUPTED;
+use super::context::{Context, INTERRUPTED};
+use crate::assignment::SceneEntry;
 
 /// An editor writes several files, and one in several steps: a save is over after so long without another change.
 const QUIET: Duration = Duration::from_millis(150);
@@ -54,7 +57,8 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     anyhow::ensure!(folder.is_dir(), "{}: expected a folder", arguments.folder.display());
     std::fs::create_dir_all(&arguments.output)?;
     let output = arguments.output.canonicalize()?;
-    super::context::catch_interrupts();
+    let context = Context::new(root)?;
+    let live = Arc::new(LiveView::new(&context.assignment, &context.supervisor, &arguments.scene)?);
 
     let (changed, changes) = channel();
     let (watched, written) = (folder.clone(), output.clone());
@@ -76,7 +80,7 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
         let slug = super::class::sources(&given, &output).remove(0).slug;
         (output.join(slug), output)
     });
-    let server = Server::start([first.0, whole.0], Arc::clone(&board))?;
+    let server = Server::start([first.0, whole.0], Arc::clone(&board), Arc::clone(&live))?;
     let door = server.door()?;
     println!("{}", door.path().display());
     eprintln!(
@@ -85,13 +89,15 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     );
     super::view::open_page(&door.path());
 
-    let scene = if arguments.scene.is_empty() { smallest_scene(root)? } else { None };
+    let smallest = || smallest_scene(&context.assignment.scenes);
+    let scene = if arguments.scene.is_empty() { smallest() } else { None };
     let check = Check {
         folder: &folder,
         outputs: [first.1, whole.1],
         arguments,
         root,
         board: &board,
+        live: &live,
         scene,
     };
     let mut running = Some(check.start()?);
@@ -112,6 +118,7 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
                 if let Some(last) = running.take() {
                     last.end();
                 }
+                live.end();
                 return Ok(super::EXIT_OK);
             }
         }
@@ -119,11 +126,10 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
 }
 
 /// The scene with the smallest film, for a first look; none where they are all of one size.
-fn smallest_scene(root: Option<&Path>) -> anyhow::Result<Option<String>> {
-    let scenes = super::context::Context::assignment(root)?.scenes;
+fn smallest_scene(scenes: &[SceneEntry]) -> Option<String> {
     let small = scenes.iter().filter_map(|scene| Some((scene.film?, &scene.name)));
     let smallest = small.min_by_key(|([width, height], _)| width * height);
-    Ok(smallest.filter(|_| scenes.len() > 1).map(|(_, name)| name.clone()))
+    smallest.filter(|_| scenes.len() > 1).map(|(_, name)| name.clone())
 }
 
 /// Whether a change of a file can change what a check finds.
@@ -205,6 +211,7 @@ struct Check<'a> {
     arguments: &'a WatchArguments,
     root: Option<&'a Path>,
     board: &'a Arc<Board>,
+    live: &'a Arc<LiveView>,
     /// The scene of the first look.
     scene: Option<String>,
 }
@@ -213,6 +220,11 @@ impl Check<'_> {
     /// Checks what was saved: one small scene first, where there is one.
     fn start(&self) -> anyhow::Result<Running> {
         self.run(if self.scene.is_some() { Look::First } else { Look::Whole })
+    }
+
+    /// Whether a look is the first at a save.
+    fn is_first(&self, look: Look) -> bool {
+        look == Look::First || self.scene.is_none()
     }
 
     /// Shows how a check ended, and starts the next one, if any.
@@ -257,15 +269,21 @@ impl Check<'_> {
         command.stdin(Stdio::null()).stderr(Stdio::piped());
         if look == Look::First {
             command.stdout(Stdio::null());
-            self.board.show(Stage::Running, "starting");
+        }
+        if self.is_first(look) {
+            command.arg("--keep-plugin").arg(self.live.library());
+            self.board.saved();
         }
         let mut child = command.spawn().context("cannot start umbra check")?;
         let said = child.stderr.take().map(|said| {
-            let board = Arc::clone(self.board);
+            let (board, live) = (Arc::clone(self.board), Arc::clone(self.live));
             std::thread::spawn(move || {
                 for line in BufReader::new(said).lines().map_while(Result::ok) {
                     let line = line.strip_prefix("umbra: ").unwrap_or(&line);
                     board.show(Stage::Running, line);
+                    if live.has_new_library() {
+                        board.compiled();
+                    }
                     let _ = writeln!(std::io::stderr(), "umbra: {line}");
                 }
             })
@@ -281,8 +299,8 @@ mod tests {
     #[test]
     fn the_first_look_is_at_the_smallest_film() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let name = smallest_scene(Some(&root)).unwrap().unwrap();
         let scenes = crate::assignment::Assignment::load(&root).unwrap().scenes;
+        let name = smallest_scene(&scenes).unwrap();
         let area = |[width, height]: [u32; 2]| width * height;
         let own = scenes.iter().find(|scene| scene.name == name).unwrap().film.map(area).unwrap();
         assert!(scenes.iter().all(|scene| scene.film.is_none_or(|film| area(film) >= own)));

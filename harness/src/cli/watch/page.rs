@@ -4,7 +4,9 @@ use base64::Engine as _;
 use sha2::Digest as _;
 
 const STYLE: &str = include_str!("watch.css");
-const SCRIPT: &str = include_str!("watch.js");
+/// Alone in the one script element: the live view first, which the other tells of news.
+const SCRIPT: &str = concat!(include_str!("live.js"), include_str!("watch.js"));
+const LIVE: &str = include_str!("live.html");
 
 /// The page, which shows `report`, a page of the folder `first` or `whole`, whichever is the newest. Nothing that anybody
 /// wrote is in it; what goes on reaches it as text, by its script.
@@ -20,7 +22,7 @@ pub fn page(report: &'static str) -> String {
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>Umbra watches</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <p id=\"status\" role=\"status\">Checking</p>\n\
-         <iframe id=\"report\" title=\"Report\" data-page=\"{report}\"></iframe>\n\
+         {LIVE}<iframe id=\"report\" title=\"Report\" data-page=\"{report}\"></iframe>\n\
          <script>{SCRIPT}</script>\n</body>\n</html>\n"
     )
 }

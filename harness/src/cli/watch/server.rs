@@ -14,6 +14,7 @@ use serde::Serialize;
 use tempfile::TempDir;
 use tiny_http::{Header, Method, Request, Response};
 
+use super::live::{LiveView, Question};
 use super::page::page as watch_page;
 use crate::report::HTML_FILE;
 
@@ -57,6 +58,10 @@ struct Shown {
     look: Look,
     /// How many reports there were: the page loads the newest when this rises.
     reports: u64,
+    /// How many libraries there were for the live view, which asks again when this rises.
+    libraries: u64,
+    /// Whether the last of them is that of the last save.
+    fresh: bool,
 }
 
 /// Where the watch tells its browsers what it does.
@@ -77,6 +82,19 @@ impl Board {
         self.change(stage, message, |shown| {
             shown.look = look;
             shown.reports += 1;
+        });
+    }
+
+    /// Shows that a save is being checked.
+    pub fn saved(&self) {
+        self.change(Stage::Running, "starting", |shown| shown.fresh = false);
+    }
+
+    /// Shows that it compiled.
+    pub fn compiled(&self) {
+        self.change(Stage::Running, "", |shown| {
+            shown.libraries += 1;
+            shown.fresh = true;
         });
     }
 
@@ -125,7 +143,11 @@ impl Server {
     ///
     /// # Errors
     /// When no port can be had.
-    pub fn start(folders: [PathBuf; 2], board: Arc<Board>) -> anyhow::Result<Self> {
+    pub fn start(
+        folders: [PathBuf; 2],
+        board: Arc<Board>,
+        live: Arc<LiveView>,
+    ) -> anyhow::Result<Self> {
         let server = tiny_http::Server::http("127.0.0.1:0").map_err(anyhow::Error::from_boxed)?;
         let address = server.server_addr().to_ip().context("a port of this machine")?;
         let mut secret = [0; SECRET_BYTES];
@@ -137,8 +159,9 @@ impl Server {
             for request in server.incoming_requests() {
                 let asked = Asked::of(&request, &host, &secret);
                 let (folders, board) = (folders.clone(), Arc::clone(&board));
+                let live = Arc::clone(&live);
                 // One that only waits must not hold up the others.
-                std::thread::spawn(move || answer(request, asked, &folders, &board));
+                std::thread::spawn(move || answer(request, asked, &folders, &board, &live));
             }
         });
         Ok(own)
@@ -171,6 +194,10 @@ impl Server {
 enum Asked {
     Page,
     Events,
+    /// The scenes of the live view.
+    Scenes,
+    /// A picture of one.
+    Frame(Question),
     /// A file of a report, by a path of plain names.
     File(Look, PathBuf),
     /// Refused, with the status.
@@ -212,6 +239,11 @@ impl Asked {
         match rest {
             "" => Self::Page,
             "events" => Self::Events,
+            "scenes" => Self::Scenes,
+            "frame" => url
+                .split_once('?')
+                .and_then(|(_, query)| Question::parse(query))
+                .map_or(Self::Nothing(400), Self::Frame),
             _ => {
                 let look = [(Look::First, "first/"), (Look::Whole, "whole/")];
                 let mut file = look.into_iter().filter_map(|(look, name)| {
@@ -251,13 +283,22 @@ fn plain_path(text: &str) -> Option<PathBuf> {
     (!odd && path.components().count() > 0 && path.components().all(plain)).then_some(path)
 }
 
-fn answer(request: Request, asked: Asked, folders: &[PathBuf; 2], board: &Board) {
+fn answer(request: Request, asked: Asked, folders: &[PathBuf; 2], board: &Board, live: &LiveView) {
     // A browser that goes away is no error.
     let _ = match asked {
         Asked::Page => {
             request.respond(page("text/html; charset=utf-8", watch_page(HTML_FILE).into_bytes()))
         }
         Asked::Events => events(request, board),
+        Asked::Scenes => request.respond(page("application/json", live.scenes().into_bytes())),
+        Asked::Frame(question) => match live.picture(&question) {
+            Ok(bytes) => request.respond(page("application/octet-stream", bytes)),
+            Err(words) => {
+                let lines: Vec<String> = words.lines().map(crate::report::harmless).collect();
+                let words = lines.join("\n").into_bytes();
+                request.respond(page("text/plain; charset=utf-8", words).with_status_code(409))
+            }
+        },
         Asked::File(look, path) => match file(&folders[look as usize], &path) {
             Some((kind, bytes)) => request.respond(page(kind, bytes)),
             None => request.respond(refused(404)),
@@ -337,6 +378,10 @@ mod tests {
         let ask = |url: &str, asked, origin| Asked::of_parts(url, asked, origin, host, secret);
         let own = Some(host);
         assert_eq!(ask("/abcdef/", own, None), Asked::Page);
+        assert_eq!(ask("/abcdef/frame?path=offline", own, None), Asked::Nothing(400));
+        let frame = "path=offline&scene=a&shadows=1&spp=4&camera=1,2,3,4,5,6,0,1,0,30";
+        let question = Question::parse(frame).unwrap();
+        assert_eq!(ask(&format!("/abcdef/frame?{frame}"), own, None), Asked::Frame(question));
         assert_eq!(ask("/abcdef/events?x", own, Some("http://127.0.0.1:4000")), Asked::Events);
         let file = |path: &str| Asked::File(Look::Whole, path.into());
         assert_eq!(ask("/abcdef/whole/report.html", own, None), file("report.html"));
@@ -387,8 +432,12 @@ mod tests {
         std::os::unix::fs::symlink(place.path().join("secret.html"), folder.join("link.html"))
             .unwrap();
         let board = Arc::new(Board::default());
-        let server =
-            Server::start([place.path().join("none"), folder], Arc::clone(&board)).unwrap();
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let assignment = crate::assignment::Assignment::load(&root).unwrap();
+        let supervisor = crate::worker::Supervisor::new("none".into(), place.path().to_owned());
+        let live = Arc::new(LiveView::new(&assignment, &supervisor, &[]).unwrap());
+        let folders = [place.path().join("none"), folder];
+        let server = Server::start(folders, Arc::clone(&board), live).unwrap();
         let (host, secret) = (server.host.clone(), server.secret.clone());
         let ask = |path: &str, more: &str| {
             let mut stream = TcpStream::connect(&host).unwrap();

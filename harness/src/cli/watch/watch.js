@@ -5,9 +5,10 @@ const status = document.getElementById("status");
 const NAMES = { running: "Checking", done: "Done", failed: "No report" };
 let reports = -1;
 
-function show({ stage, message, look, reports: count }) {
+function show({ stage, message, look, reports: count, libraries, fresh }) {
   document.body.className = stage;
   status.textContent = `${NAMES[stage]}: ${message}`;
+  tellLive({ libraries, fresh });
   if (count === reports) return;
   reports = count;
   if (count > 0) reload(look);
