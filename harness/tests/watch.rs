@@ -192,7 +192,12 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     browser.until(&points);
 
     fs::write(&shader, right_shader).unwrap();
+    // What was found offline stays, marked, until it was run again.
+    browser.until(
+        "mark.textContent.includes('offline results hold') && !mark.hidden && !frames.whole.hidden",
+    );
     until_drawn(&mut browser);
+    browser.until("mark.hidden && document.body.className === 'done'");
     browser.until(&points);
     assert!(browser.value(&format!("{report}.querySelector('pre')")).is_null());
 

@@ -64,12 +64,13 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     let (watched, written) = (folder.clone(), output.clone());
     let mut watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
         // What cannot be told counts as a change.
-        let counts = event.map_or(true, |event| {
-            !matches!(event.kind, EventKind::Access(_))
-                && event.paths.iter().any(|path| is_source(path, &watched, &written))
-        });
-        if counts {
-            let _ = changed.send(());
+        let paths = match event {
+            Ok(event) if matches!(event.kind, EventKind::Access(_)) => return,
+            Ok(event) => event.paths,
+            Err(_) => vec![watched.clone()],
+        };
+        for path in paths.iter().filter(|path| is_source(path, &watched, &written)) {
+            let _ = changed.send(if is_shader(path) { Change::Shader } else { Change::Other });
         }
     })?;
     watcher.watch(&folder, RecursiveMode::Recursive).with_context(name)?;
@@ -91,6 +92,7 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
 
     let smallest = || smallest_scene(&context.assignment.scenes);
     let scene = if arguments.scene.is_empty() { smallest() } else { None };
+    let parts = context.assignment.rules.parts.iter().filter(|part| part.path == "realtime");
     let check = Check {
         folder: &folder,
         outputs: [first.1, whole.1],
@@ -99,18 +101,27 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
         board: &board,
         live: &live,
         scene,
+        realtime: parts.map(|part| part.id.clone()).collect(),
     };
-    let mut running = Some(check.start()?);
+    let mut running = Some(check.start(Change::Other)?);
+    // Whether the last whole report tells how the offline half of the source is now.
+    let mut offline_holds = false;
     loop {
         match wait(&changes, running.as_mut()) {
-            Happened::Saved => {
+            Happened::Saved(change) => {
                 if let Some(older) = running.take() {
                     older.end();
                 }
-                running = Some(check.start()?);
+                offline_holds &= change == Change::Shader;
+                running = Some(check.start(if offline_holds {
+                    Change::Shader
+                } else {
+                    Change::Other
+                })?);
             }
             Happened::Ended(status) => {
                 if let Some(ended) = running.take() {
+                    offline_holds |= ended.look == Look::Whole && is_judged(status);
                     running = check.go_on(ended, status)?;
                 }
             }
@@ -142,14 +153,27 @@ fn is_source(path: &Path, watched: &Path, written: &Path) -> bool {
     !path.starts_with(written) && !inside.components().any(hidden)
 }
 
+/// Whether a file can change nothing but the realtime half of what a check finds.
+fn is_shader(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "wgsl")
+}
+
+/// What was saved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Change {
+    /// WGSL alone: what was found offline still holds.
+    Shader,
+    Other,
+}
+
 /// What a watch waits for.
 enum Happened {
-    Saved,
+    Saved(Change),
     Ended(ExitStatus),
     Interrupted,
 }
 
-fn wait(changes: &Receiver<()>, mut running: Option<&mut Running>) -> Happened {
+fn wait(changes: &Receiver<Change>, mut running: Option<&mut Running>) -> Happened {
     // While a check runs its end is looked for, else only Ctrl-C.
     let tick = if running.is_some() { QUIET } else { TICK };
     loop {
@@ -157,9 +181,13 @@ fn wait(changes: &Receiver<()>, mut running: Option<&mut Running>) -> Happened {
             return Happened::Interrupted;
         }
         match changes.recv_timeout(tick) {
-            Ok(()) => {
-                while changes.recv_timeout(QUIET).is_ok() {}
-                return Happened::Saved;
+            Ok(mut all) => {
+                while let Ok(next) = changes.recv_timeout(QUIET) {
+                    if next == Change::Other {
+                        all = next;
+                    }
+                }
+                return Happened::Saved(all);
             }
             Err(RecvTimeoutError::Disconnected) => return Happened::Interrupted,
             Err(RecvTimeoutError::Timeout) => {}
@@ -214,12 +242,20 @@ struct Check<'a> {
     live: &'a Arc<LiveView>,
     /// The scene of the first look.
     scene: Option<String>,
+    /// The parts of the realtime half.
+    realtime: Vec<String>,
+}
+
+/// Whether a check came to a report.
+fn is_judged(status: ExitStatus) -> bool {
+    matches!(status.code(), Some(0 | 1))
 }
 
 impl Check<'_> {
     /// Checks what was saved: one small scene first, where there is one.
-    fn start(&self) -> anyhow::Result<Running> {
-        self.run(if self.scene.is_some() { Look::First } else { Look::Whole })
+    fn start(&self, change: Change) -> anyhow::Result<Running> {
+        self.board.saved(change == Change::Shader);
+        self.run(if self.scene.is_some() { Look::First } else { Look::Whole }, change)
     }
 
     /// Whether a look is the first at a save.
@@ -230,12 +266,12 @@ impl Check<'_> {
     /// Shows how a check ended, and starts the next one, if any.
     fn go_on(&self, mut ended: Running, status: ExitStatus) -> anyhow::Result<Option<Running>> {
         ended.hear_out();
-        let judged = matches!(status.code(), Some(0 | 1));
+        let judged = is_judged(status);
         match (ended.look, &self.scene) {
             (Look::First, Some(scene)) if judged => {
                 let words = format!("first look, on {scene} alone; the rest is being checked");
                 self.board.report(Look::First, Stage::Running, &words);
-                return self.run(Look::Whole).map(Some);
+                return self.run(Look::Whole, Change::Other).map(Some);
             }
             _ if judged => {
                 self.board.report(
@@ -250,10 +286,16 @@ impl Check<'_> {
         Ok(None)
     }
 
-    fn run(&self, look: Look) -> anyhow::Result<Running> {
+    fn run(&self, look: Look, change: Change) -> anyhow::Result<Running> {
         let mut command = Command::new(std::env::current_exe()?);
         command.arg("check").arg(self.folder).arg("--output").arg(&self.outputs[look as usize]);
-        for part in &self.arguments.part {
+        let parts = &self.arguments.part;
+        // A first look at a shader asks what can have changed.
+        let realtime = self
+            .realtime
+            .iter()
+            .filter(|_| parts.is_empty() && look == Look::First && change == Change::Shader);
+        for part in parts.iter().chain(realtime) {
             command.arg("--part").arg(part);
         }
         let first = self.scene.iter().filter(|_| look == Look::First);
@@ -272,7 +314,6 @@ impl Check<'_> {
         }
         if self.is_first(look) {
             command.arg("--keep-plugin").arg(self.live.library());
-            self.board.saved();
         }
         let mut child = command.spawn().context("cannot start umbra check")?;
         let said = child.stderr.take().map(|said| {
@@ -321,6 +362,25 @@ mod tests {
             ("/home/a/other/src/lib.rs", false),
         ] {
             assert_eq!(is_source(Path::new(path), watched, written), counts, "{path}");
+        }
+        assert!(is_shader(Path::new("/home/a/work/src/shaders/phong.fs.wgsl")));
+        assert!(!is_shader(Path::new("/home/a/work/src/shaders/phong.rs")));
+    }
+
+    #[test]
+    fn a_save_of_shaders_alone_is_told_from_others() {
+        for (saved, told) in [
+            (vec![Change::Shader], Change::Shader),
+            (vec![Change::Shader, Change::Shader], Change::Shader),
+            (vec![Change::Shader, Change::Other, Change::Shader], Change::Other),
+            (vec![Change::Other, Change::Shader], Change::Other),
+        ] {
+            let (changed, changes) = channel();
+            saved.iter().for_each(|&change| changed.send(change).unwrap());
+            assert!(
+                matches!(wait(&changes, None), Happened::Saved(all) if all == told),
+                "{saved:?}"
+            );
         }
     }
 }

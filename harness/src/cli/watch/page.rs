@@ -22,7 +22,9 @@ pub fn page(report: &'static str) -> String {
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>Umbra watches</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <p id=\"status\" role=\"status\">Checking</p>\n\
-         {LIVE}<iframe id=\"report\" title=\"Report\" data-page=\"{report}\"></iframe>\n\
+         {LIVE}<iframe id=\"first\" title=\"First look at what was saved\" hidden></iframe>\n\
+         <p id=\"mark\" role=\"status\" hidden></p>\n\
+         <iframe id=\"report\" title=\"Report\" data-page=\"{report}\"></iframe>\n\
          <script>{SCRIPT}</script>\n</body>\n</html>\n"
     )
 }

@@ -47,6 +47,19 @@ pub enum Look {
     Whole,
 }
 
+/// What the last whole report is worth after the last save.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Whole {
+    /// There is none, or nothing of it need hold any more.
+    #[default]
+    Past,
+    /// What it says of the offline half still holds.
+    Offline,
+    /// It is that of the last save.
+    Now,
+}
+
 /// What the page shows beside the report.
 #[derive(Clone, Debug, Default, Serialize)]
 struct Shown {
@@ -62,6 +75,8 @@ struct Shown {
     libraries: u64,
     /// Whether the last of them is that of the last save.
     fresh: bool,
+    /// What the last whole report is worth.
+    whole: Whole,
 }
 
 /// Where the watch tells its browsers what it does.
@@ -81,13 +96,19 @@ impl Board {
     pub fn report(&self, look: Look, stage: Stage, message: &str) {
         self.change(stage, message, |shown| {
             shown.look = look;
+            if look == Look::Whole {
+                shown.whole = Whole::Now;
+            }
             shown.reports += 1;
         });
     }
 
-    /// Shows that a save is being checked.
-    pub fn saved(&self) {
-        self.change(Stage::Running, "starting", |shown| shown.fresh = false);
+    /// Shows that a save is being checked, and whether what was found offline still holds.
+    pub fn saved(&self, offline_holds: bool) {
+        self.change(Stage::Running, "starting", |shown| {
+            shown.fresh = false;
+            shown.whole = if offline_holds { Whole::Offline } else { Whole::Past };
+        });
     }
 
     /// Shows that it compiled.
@@ -483,6 +504,9 @@ mod tests {
         board.report(Look::Whole, Stage::Done, "");
         until("\"stage\":\"done\",\"message\":\"compiling");
         until("\"look\":\"whole\",\"reports\":1");
+        until("\"whole\":\"now\"");
+        board.saved(true);
+        until("\"whole\":\"offline\"");
 
         let door = server.door().unwrap();
         let text = std::fs::read_to_string(door.path()).unwrap();
