@@ -50,7 +50,7 @@ pub struct Recipe {
     omit: Vec<String>,
     /// Whether grading it takes longer than the others: it waits for time limits.
     #[serde(default)]
-    slow: bool,
+    pub slow: bool,
     /// Whose code draws its images: `own`, `none`, `from:<sample>`, or `of:<sample>` with that
     /// student's seed.
     images: String,
@@ -67,7 +67,7 @@ pub struct Recipe {
     #[serde(default)]
     moves: Vec<(String, String)>,
     /// What it is worth.
-    expect: Expect,
+    pub expect: Expect,
 }
 
 /// A packed sample.
@@ -78,8 +78,6 @@ pub struct Sample {
     pub archive: PathBuf,
     /// What it is worth.
     pub expect: Expect,
-    /// Whether grading it waits for time limits.
-    pub slow: bool,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -94,8 +92,8 @@ fn template() -> String {
     "template".to_owned()
 }
 
-/// Which samples are wanted, by name and expectation.
-pub type Wanted<'a> = &'a (dyn Fn(&str, &Expect) -> bool + Sync);
+/// Which samples are wanted, by name and recipe.
+pub type Wanted<'a> = &'a (dyn Fn(&str, &Recipe) -> bool + Sync);
 
 /// Packs the samples that are wanted where the archive is missing or older than its sources,
 /// as many at a time as there are cores.
@@ -104,7 +102,7 @@ pub type Wanted<'a> = &'a (dyn Fn(&str, &Expect) -> bool + Sync);
 /// When a sample contradicts itself or cannot be drawn; names it.
 pub fn pack(root: &Path, wanted: Wanted) -> Result<Vec<Sample>> {
     let packer = Packer::new(root)?;
-    let recipes = packer.recipes.iter().filter(|(name, recipe)| wanted(name, &recipe.expect));
+    let recipes = packer.recipes.iter().filter(|(name, recipe)| wanted(name, recipe));
     let names: Vec<&String> = recipes.map(|(name, _)| name).collect();
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     parallel::each(&names, cores, |_, name| {
@@ -178,8 +176,7 @@ impl Packer {
     fn pack(&self, name: &str) -> Result<Sample> {
         let recipe = &self.recipes[name];
         let archive = self.out.join(format!("{name}.{}", recipe.format));
-        let (expect, slow) = (recipe.expect.clone(), recipe.slow);
-        let sample = Sample { name: name.to_owned(), archive, expect, slow };
+        let sample = Sample { name: name.to_owned(), archive, expect: recipe.expect.clone() };
         let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
         let source = self.source(name)?;
         for (path, bytes) in &source {

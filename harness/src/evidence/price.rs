@@ -138,7 +138,8 @@ impl Check {
 
 /// Where one mistake explains a check on most scenes, and nothing known explains it on the others, it
 /// costs what it costs on most of them: on one a seam or an edge may leave more unexplained. Where it
-/// leaves nothing lit (`DARKENING`) that is no worse.
+/// leaves nothing lit (`DARKENING`) that is no worse. And what is explained, or follows the right
+/// answers, on most scenes is more than nothing on the others.
 pub fn agree(checks: &mut [Check]) {
     let mut of_id: BTreeMap<(CheckId, String), Vec<usize>> = BTreeMap::new();
     for (index, check) in checks.iter().enumerate() {
@@ -148,6 +149,13 @@ pub fn agree(checks: &mut [Check]) {
         }
     }
     for own in of_id.into_values() {
+        let (nothing, others): (Vec<usize>, Vec<usize>) =
+            own.iter().partition(|&&index| checks[index].mistake.is_empty());
+        if others.iter().filter(|&&index| checks[index].mistake != BLACK).count() >= nothing.len() {
+            for index in nothing {
+                checks[index].error = checks[index].error.min(Class::Unknown.price());
+            }
+        }
         let unknown = |index: &usize| ["", UNKNOWN, BLACK].contains(&&*checks[*index].mistake);
         let (others, told): (Vec<usize>, Vec<usize>) = own.into_iter().partition(unknown);
         let Some(name) = told.first().map(|&index| checks[index].mistake.clone()) else { continue };
@@ -637,6 +645,10 @@ mod tests {
         // What leaves nothing lit elsewhere explains that too; another slip does not.
         assert_eq!(agreed(&[(VIEWER_AT_ORIGIN, 0.02), (BLACK, 1.0)]), [0.02, 0.02]);
         assert_eq!(agreed(&[(slip, 0.02), (BLACK, 1.0)]), [0.02, 1.0]);
+        // What follows the right answers on most scenes is more than nothing on the others.
+        assert_eq!(agreed(&[(UNKNOWN, 0.4), (UNKNOWN, 0.4), ("", 1.0)]), [0.4, 0.4, 0.4]);
+        assert_eq!(agreed(&[(UNKNOWN, 0.4), ("", 0.3), ("", 1.0)]), [0.4, 0.3, 1.0]);
+        assert_eq!(agreed(&[(UNKNOWN, 0.4), (BLACK, 1.0)]), [0.4, 1.0]);
     }
 
     #[test]

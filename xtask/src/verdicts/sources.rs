@@ -11,7 +11,7 @@ use umbra::rubric::Rules;
 
 use super::Arguments;
 use super::figures::Figure;
-use crate::samples::{self, Expect};
+use crate::samples::{self, Recipe};
 
 /// Seed of the held-back scenes: the same in every run.
 const PERTURB: &str = "20191006";
@@ -28,11 +28,11 @@ pub fn grade(
     wanted: &(dyn Fn(&str) -> bool + Sync),
     arguments: &Arguments,
 ) -> Result<Option<Figure>> {
-    let quick = arguments.quick;
-    let wanted =
-        |name: &str, expect: &Expect| wanted(name) && !(quick && expect.is_known_mistake());
-    let mut samples = samples::pack(root, &wanted)?;
-    samples.retain(|sample| arguments.full || !sample.slow);
+    let wanted = |name: &str, recipe: &Recipe| {
+        let left_out = arguments.quick && recipe.expect.is_known_mistake();
+        wanted(name) && !left_out && (arguments.full || !recipe.slow)
+    };
+    let samples = samples::pack(root, &wanted)?;
     if samples.is_empty() {
         return Ok(None);
     }
