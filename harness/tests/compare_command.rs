@@ -6,7 +6,7 @@ use std::process::Command;
 use basecode::exr_io::{
     ExrLayers, ExrRows, Precision, read_exr, write_exr, write_exr_channels, write_exr_layers,
 };
-use basecode::{Image, Vec3};
+use basecode::{Image, Sampler, Vec3};
 use serde_json::Value;
 use umbra::imaging::difference::{Count, Differences, Different, Odd};
 use umbra::imaging::rows::{Channels, Row, visit_rows};
@@ -194,14 +194,13 @@ fn ssim_and_flip_come_only_when_asked_for() {
 }
 
 /// A float that is often one of those that are not like others.
-fn any_float(state: &mut u64) -> f32 {
-    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    let random = (*state >> 33) as u32;
+fn any_float(sampler: &Sampler) -> f32 {
+    let random = (sampler.next_1d() * 16.0) as usize;
     let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0, 0.0, 1e-45, -1.0, f32::MAX];
-    match random % 16 {
-        i @ 0..8 => odd[i as usize],
+    match random {
+        0..8 => odd[random],
         8..13 => 0.5,
-        _ => (random >> 8) as f32 / 65536.0,
+        _ => 256.0 * sampler.next_1d(),
     }
 }
 
@@ -209,18 +208,18 @@ fn any_float(state: &mut u64) -> f32 {
 #[test]
 fn one_pass_finds_what_a_plain_loop_finds() {
     let folder = tempfile::tempdir().unwrap();
-    let mut state = 1;
+    let sampler = Sampler::new(1);
     for (round, (width, height)) in
         [(1, 1), (3, 2), (5, 700), (130, 33), (1000, 300)].into_iter().enumerate()
     {
         let [a, b] = ["a.exr", "b.exr"].map(|name| {
             let mut image = Image::new(width, height);
-            image.pixels.fill_with(|| Vec3::from_array([0; 3].map(|_| any_float(&mut state))));
+            image.pixels.fill_with(|| Vec3::from_array([0; 3].map(|_| any_float(&sampler))));
             if round % 2 == 1 {
                 // Most pixels are equal, as of two versions of an image.
-                let mut other = 7;
+                let other = Sampler::new(7);
                 for (i, pixel) in image.pixels.iter_mut().enumerate() {
-                    let same = Vec3::from_array([0; 3].map(|_| any_float(&mut other)));
+                    let same = Vec3::from_array([0; 3].map(|_| any_float(&other)));
                     *pixel = if i % 11 == 0 { *pixel } else { same };
                 }
             }

@@ -52,10 +52,8 @@ impl Cast {
             let anywhere = Vec3::new(sampler.next_1d(), sampler.next_1d(), sampler.next_1d());
             bounces.push(Ray::new(hit.p, (2.0 * anywhere - 1.0).normalize_or(Vec3::X)));
         }
-        let mut state = 1usize;
         for i in (1..bounces.len()).rev() {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            bounces.swap(i, (state >> 33) % (i + 1));
+            bounces.swap(i, (sampler.next_1d() * (i + 1) as f32) as usize);
         }
         Self { scene, camera, shadow, bounces }
     }
