@@ -1,7 +1,7 @@
 //! Files that are there whole or not at all, folders that do not stay, digests as text.
 
 use std::fs::File;
-use std::io::{self, Write as _};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::{NamedTempFile, TempDir};
@@ -58,7 +58,18 @@ impl Scratch {
 /// # Errors
 /// When it cannot be written; the old content is still there then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let file = draft(path, bytes)?;
+    write_whole_by(path, |file| file.write_all(bytes))
+}
+
+/// The same for what is too long to be held: `write` writes it.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_whole_by(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let file = draft(path, write)?;
     end_at(path, "written");
     file.persist(path)?;
     end_at(path, "named");
@@ -70,18 +81,23 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// # Errors
 /// When it is there (`AlreadyExists`), or cannot be written.
 pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let file = draft(path, bytes)?;
+    let file = draft(path, |file| file.write_all(bytes))?;
     end_at(path, "written");
     file.persist_noclobber(path)?;
     end_at(path, "named");
     Ok(())
 }
 
-/// For tests of what an ended process leaves: with `UMBRA_KILL_AT=record.json:written` in its environment this process
-/// ends itself before the file has its name, with `record.json:named` after.
 fn end_at(path: &Path, stage: &str) {
-    let Some(at) = std::env::var_os("UMBRA_KILL_AT") else { return };
     let name = path.file_name().unwrap_or_default().to_string_lossy();
+    step(&name, stage);
+}
+
+/// For tests of what an ended process leaves: with `UMBRA_KILL_AT=record.json:written` in its environment this process
+/// ends itself before the file has its name, with `record.json:named` after; with `submission:copied` and the like once
+/// that is done.
+pub fn step(name: &str, stage: &str) {
+    let Some(at) = std::env::var_os("UMBRA_KILL_AT") else { return };
     if at.to_str() == Some(format!("{name}:{stage}").as_str()) {
         #[cfg(unix)]
         let _ = nix::sys::signal::raise(nix::sys::signal::Signal::SIGKILL);
@@ -90,7 +106,10 @@ fn end_at(path: &Path, stage: &str) {
 }
 
 /// A whole file under another name, synced; it is gone unless it is renamed.
-fn draft(path: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
+fn draft(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<NamedTempFile> {
     let folder = path.parent().unwrap_or(Path::new(""));
     std::fs::create_dir_all(folder)?;
     let mut builder = tempfile::Builder::new();
@@ -99,7 +118,10 @@ fn draft(path: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut file = builder.tempfile_in(folder)?;
-    file.write_all(bytes)?;
+    let mut buffered = BufWriter::new(&mut file);
+    write(&mut buffered)?;
+    buffered.flush()?;
+    drop(buffered);
     file.as_file().sync_all()?;
     Ok(file)
 }

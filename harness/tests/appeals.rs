@@ -10,7 +10,7 @@ use std::process::Command;
 use serde_json::Value;
 use similar_asserts::assert_eq;
 
-use crate::support::one_scene;
+use crate::support::{copy_folder, one_scene};
 
 /// A forgotten semicolon costs two parts: the file does not compile.
 const RIGHT: &str =
@@ -33,7 +33,7 @@ impl Place {
         let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let submission = folder.path().join("class/a2_ada");
         for source in ["student_template/src", "samples/perfect/src"] {
-            copy(&own.join(source), &submission.join("src"));
+            copy_folder(&own.join(source), &submission.join("src"));
         }
         let path = submission.join("src/integrators/simple.rs");
         let text = fs::read_to_string(&path).unwrap();
@@ -86,18 +86,6 @@ impl Place {
     fn row(&self) -> Value {
         let report: Value = serde_json::from_str(&self.read("out/report.json")).unwrap();
         report["submissions"][0].clone()
-    }
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in from.read_dir().unwrap() {
-        let (path, name) = entry.map(|entry| (entry.path(), entry.file_name())).unwrap();
-        if path.is_dir() {
-            copy(&path, &to.join(name));
-        } else {
-            fs::copy(path, to.join(name)).unwrap();
-        }
     }
 }
 
@@ -163,7 +151,12 @@ fn a_grade_is_defended_mended_and_what_was_held_back_released() {
         let page = place.read(page);
         assert!(page.contains(words) && page.contains("a semicolon (Eve, 2"), "{page}");
         assert!(page.contains("to_light.length_squared()\n+"), "{page}");
+        assert!(page.contains("is of the source as it was submitted"), "{page}");
     }
+    let page = place.read("out/instructor/a2_ada/report.html");
+    assert!(page.contains("href=\"mended/report.html\""), "{page}");
+    assert!(place.read("out/instructor/a2_ada/mended/report.html").contains("Lampglow"));
+    assert!(!place.read("out/a2_ada/report.html").contains("mended/report.html"));
     // Graded again the fix is there; another submission makes it stale.
     let (code, said) = place.run(&["grade", "class", "--isolation", "reduced"]);
     assert_eq!((code, &place.row()), (Some(3), &after), "{said}");

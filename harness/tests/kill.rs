@@ -12,9 +12,21 @@ use std::time::{Duration, Instant};
 
 use similar_asserts::assert_eq;
 
-use crate::batch::{Batch, WRONG};
+use crate::batch::{Batch, WRONG, root};
+use crate::support::copy_folder;
 
+/// Nobody's source builds: a run takes a second.
 const CLASS: [(&str, &str); 3] = [("ada", WRONG), ("bob", "what?"), ("eve", WRONG)];
+
+/// The same, but the last one builds and is run.
+fn with_one_that_runs() -> Batch {
+    let batch = Batch::new(&CLASS);
+    let src = batch.submissions().join("eve/src");
+    for source in ["student_template/src", "samples/perfect/src"] {
+        copy_folder(&root().join(source), &src);
+    }
+    batch
+}
 
 /// What a batch leaves that counts, but for what it cost: `report.json`, the grade book, and what students get.
 fn results(batch: &Batch) -> BTreeMap<PathBuf, String> {
@@ -62,40 +74,38 @@ fn kill(mut child: Child) -> bool {
 
 #[test]
 fn ended_at_every_step_that_lasts_a_batch_goes_on_from_there() {
-    let undisturbed = Batch::new(&CLASS);
-    assert_eq!(undisturbed.grade().0, Some(0));
-    let batch = Batch::new(&CLASS);
+    let undisturbed = with_one_that_runs();
+    let (code, said) = undisturbed.grade();
+    assert_eq!(code, Some(0), "{said}");
+    let batch = with_one_that_runs();
     let seed = batch.instructor("held-back-seed.txt");
     let known = fs::read_to_string(&seed).unwrap();
     fs::remove_file(&seed).unwrap();
-    let files = [
-        "held-back-seed.txt",
-        "0001.json",
-        "source.txt",
-        "label.json",
-        "record.json",
-        "batch.json",
-        "report.html",
-        "grades.csv",
-        "report.json",
+    // Of a file before and after it has its name. The pin comes before the seed. Of the first submission all but what
+    // comes of a build, which is the last one's; at the end of that its record is there.
+    let files = |names: &[&str]| -> Vec<String> {
+        let both = |name: &&str| ["written", "named"].map(|stage| format!("{name}:{stage}"));
+        names.iter().flat_map(both).collect()
+    };
+    let steps = [
+        files(&["0001.json", "held-back-seed.txt", "source.txt", "label.json"]),
+        vec!["submission:copied".into()],
+        files(&["record.json"]),
+        vec!["submission:built".into(), "record.json:named".into()],
+        files(&["batch.json", "report.html", "grades.csv", "report.json"]),
     ];
-    // The pin comes before the seed.
-    let files = [files[1], files[0]].into_iter().chain(files[2..].iter().copied());
-    for file in files {
-        for stage in ["written", "named"] {
-            let at = format!("{file}:{stage}");
-            let mut umbra = batch.command(&[batch.submissions()], &[]);
-            let child = umbra.env("UMBRA_KILL_AT", &at).spawn().unwrap();
-            let pid = child.id();
-            let ended = child.wait_with_output().unwrap();
-            assert_eq!(ended.status.signal(), Some(9), "{at}: it was never there");
-            nobody_is_left_of(pid);
-            if at == "held-back-seed.txt:named" {
-                let made: u64 = fs::read_to_string(&seed).unwrap().trim().parse().unwrap();
-                assert_ne!(made, 20191006);
-                // That of the undisturbed run, for the same scenes.
-                fs::write(&seed, &known).unwrap();
-            }
+    for at in steps.into_iter().flatten() {
+        let mut umbra = batch.command(&[batch.submissions()], &[]);
+        let child = umbra.env("UMBRA_KILL_AT", &at).spawn().unwrap();
+        let pid = child.id();
+        let ended = child.wait_with_output().unwrap();
+        assert_eq!(ended.status.signal(), Some(9), "{at}: it was never there");
+        nobody_is_left_of(pid);
+        if at == "held-back-seed.txt:named" {
+            let made: u64 = fs::read_to_string(&seed).unwrap().trim().parse().unwrap();
+            assert_ne!(made, 20191006);
+            // That of the undisturbed run, for the same scenes.
+            fs::write(&seed, &known).unwrap();
         }
     }
     let (code, said) = batch.grade();
@@ -108,12 +118,25 @@ fn ended_at_every_step_that_lasts_a_batch_goes_on_from_there() {
 fn ended_at_any_moment_a_batch_goes_on_from_there() {
     let moments = std::env::var("UMBRA_KILL_MOMENTS").ok();
     let moments: usize = moments.map_or(50, |text| text.parse().unwrap());
-    let undisturbed = Batch::new(&CLASS);
+    end_at_moments(moments, &|| Batch::new(&CLASS));
+}
+
+#[test]
+#[ignore = "takes minutes: `./run kill` asks for it"]
+fn ended_at_any_moment_while_code_runs_a_batch_goes_on_from_there() {
+    let moments = std::env::var("UMBRA_KILL_MOMENTS").ok();
+    let moments: usize = moments.map_or(50, |text| text.parse().unwrap());
+    end_at_moments(moments.div_ceil(10), &with_one_that_runs);
+}
+
+/// Ends batches of a class at so many moments.
+fn end_at_moments(moments: usize, class: &dyn Fn() -> Batch) {
+    let undisturbed = class();
     let begun = Instant::now();
     assert_eq!(undisturbed.grade().0, Some(0));
     let whole = begun.elapsed();
     let expected = results(&undisturbed);
-    let mut batch = Batch::new(&CLASS);
+    let mut batch = class();
     let (mut killed, mut batches) = (0, 1);
     // A sequence that spreads evenly, whatever its length; where it met nobody alive, the next one counts.
     for moment in 0..4 * moments {
@@ -131,7 +154,7 @@ fn ended_at_any_moment_a_batch_goes_on_from_there() {
             let (code, said) = batch.grade();
             assert_eq!(code, Some(0), "{said}");
             assert_eq!(results(&batch), expected);
-            batch = Batch::new(&CLASS);
+            batch = class();
             batches += 1;
         }
     }

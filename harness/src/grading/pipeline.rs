@@ -24,7 +24,7 @@ use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
 use crate::diagnosis::{Diagnosis, Stored};
 use crate::evidence::{Check, CheckId, Evidence, Verdict, loops, price, rays, shadow_map};
-use crate::files::write_whole;
+use crate::files::{step, write_whole};
 use crate::held_back::{self, HeldBack};
 use crate::intake::{self, IntakeError, Submission, TreeSpec, Validation};
 use crate::process::Exit;
@@ -266,6 +266,7 @@ impl<'a> Grading<'a> {
                 }
                 Err(error) => return Err(error.into()),
             };
+        step("submission", "copied");
         record.digest.clone_from(&submission.digest);
         let config = validation.config.clone().unwrap_or_default();
         record.student = Student::of(&config);
@@ -287,6 +288,9 @@ impl<'a> Grading<'a> {
         say("compiling the source");
         let built =
             self.build(&submission, scratch.path(), &mut record, &mut checks, &mut costs)?;
+        if built.is_some() {
+            step("submission", "built");
+        }
         let seed = config.sampler_seed().unwrap_or_default();
         let mut drawn = Vec::new();
         // Lives as long as the session names it.

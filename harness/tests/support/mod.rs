@@ -11,6 +11,19 @@ pub mod zip_bytes;
 
 use std::path::{Path, PathBuf};
 
+/// Copies a folder with all that is in it; what is there stays, or is replaced.
+pub fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in from.read_dir().unwrap() {
+        let (path, name) = entry.map(|entry| (entry.path(), entry.file_name())).unwrap();
+        if path.is_dir() {
+            copy_folder(&path, &to.join(name));
+        } else {
+            std::fs::copy(path, to.join(name)).unwrap();
+        }
+    }
+}
+
 /// The repository's assignment in `folder`, on one scene: what is graded there starts fast. Its files are links, but
 /// for `config.json`, which is changed by `edit`.
 #[cfg(unix)]

@@ -1,7 +1,7 @@
 //! The page of one submission.
 
 use super::super::number::{is_failure, is_range, looks_like, of_part, points, range, seconds};
-use super::super::{BatchReport, HTML_FILE, INSTRUCTOR, SubmissionReport};
+use super::super::{BatchReport, HTML_FILE, INSTRUCTOR, MENDED, SubmissionReport};
 use super::checks::{self, Placed};
 use super::lost::{Lost, is_lost};
 use super::markup::Html;
@@ -75,7 +75,7 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     for words in looks_like("", &record.diagnoses) {
         html.raw("<p class=\"hint\"><b>Also looks like</b> ").text(&words).raw("</p>\n");
     }
-    mended(&mut html, entry.standing.mended.as_ref());
+    mended(&mut html, entry.standing.mended.as_ref(), reader);
     findings(&mut html, &record.findings);
     html.raw("<section>\n<h2>Everything else</h2>\n");
     right(&mut html, &grade.parts);
@@ -139,14 +139,25 @@ fn notices(html: &mut Html, entry: &SubmissionReport, reader: Reader) {
 }
 
 /// What the instructor mended.
-fn mended(html: &mut Html, mended: Option<&Mended>) {
+fn mended(html: &mut Html, mended: Option<&Mended>, reader: Reader) {
     let Some(mended) = mended else { return };
     html.raw("<section>\n<h2>Mended by the instructor</h2>\n<p>").text(&mended.words);
     html.raw("</p>\n<pre tabindex=\"0\">");
     for line in harmless_lines(&mended.patch, DIAGNOSTIC_LINES) {
         html.text(&line).raw("\n");
     }
-    html.raw("</pre>\n</section>\n");
+    html.raw("</pre>\n");
+    if mended.counts {
+        html.raw(
+            "<p>Points and reasons of the parts are those of the mended source. All else on this page, its checks, \
+             pictures and messages, is of the source as it was submitted.</p>\n",
+        );
+    }
+    if reader == Reader::Instructor {
+        html.raw("<p><a href=\"").raw(MENDED).raw("/").raw(HTML_FILE);
+        html.raw("\">The evidence of the mended source</a></p>\n");
+    }
+    html.raw("</section>\n");
 }
 
 /// Which scenes are no longer held back.
