@@ -455,6 +455,93 @@ fn downloads_of_other_platforms() {
     }
 }
 
+/// Names that break a naive import or grade book: signs of other scripts, a comma, an apostrophe, two of one name, zeros
+/// in front; an archive without a byte, and a submission of another course by somebody who is not on the list.
+#[test]
+fn odd_names_come_back_in_the_grade_books_of_canvas_and_moodle() {
+    let own = |first: &str, last: &str, number: &str| submission(&config(first, last, number));
+    let other = zip(&[("main.py".to_owned(), b"print()".as_slice())]);
+    let moodle =
+        |name: &str, bytes: Vec<u8>| (format!("{name}_assignsubmission_file/a2.zip"), bytes);
+    let canvas = |name: &str, bytes: Vec<u8>| (format!("{name}_a2.zip"), bytes);
+    let (hanako, jr) = (own("花子", "山田", "007"), own("Bo", "Smith, Jr", "260000002"));
+    let (ann, ann2) = (own("Ann", "Lee", "260000003"), own("Ann", "Lee", "260000004"));
+    let moodle_list = "Identifier,Full name,ID number,Grade,Maximum Grade,Last modified (grade)\n\
+                       Participant 1,花子 山田,007,,100,-\nParticipant 2,\"Bo Smith, Jr\",260000002,,100,-\n\
+                       Participant 3,Ann Lee,260000003,,100,-\nParticipant 4,Ann Lee,260000004,,100,-\n\
+                       Participant 5,Eve Sol,260000005,,100,-\nParticipant 6,Gil Tam,260000006,,100,-\n";
+    let canvas_list = "Student,ID,SIS User ID,SIS Login ID,Section,a2 (77)\n    Points Possible,,,,,100\n\
+                       \"山田, 花子\",1,007,hanako,1,\n\"Smith, Jr, Bo\",2,260000002,bo,1,\n\
+                       \"Lee, Ann\",3,260000003,al,1,\n\"Lee, Ann\",4,260000004,al2,1,\n\
+                       \"Sol, Eve\",5,260000005,es,1,\n\"Tam, Gil\",6,260000006,gt,1,\n";
+    for (format, list, files, book) in [
+        (
+            "moodle",
+            moodle_list,
+            [
+                moodle("花子 山田_1", hanako.clone()),
+                moodle("Bo Smith, Jr_2", jr.clone()),
+                moodle("Ann Lee_3", ann.clone()),
+                moodle("Ann Lee_4", ann2.clone()),
+                moodle("Eve Sol_5", Vec::new()),
+                moodle("Max Other_9", other.clone()),
+            ],
+            "Identifier,Full name,ID number,Maximum Grade,Last modified (grade),Grade\n\
+             Participant 1,花子 山田,007,100,-,0.00\nParticipant 2,\"Bo Smith, Jr\",260000002,100,-,0.00\n\
+             Participant 3,Ann Lee,260000003,100,-,0.00\nParticipant 4,Ann Lee,260000004,100,-,0.00\n\
+             Participant 5,Eve Sol,260000005,100,-,0.00\n",
+        ),
+        (
+            "canvas",
+            canvas_list,
+            [
+                canvas("山田花子_1_901", hanako),
+                canvas("smithjrbo_2_902", jr),
+                canvas("leeann_3_903", ann),
+                canvas("leeann_4_904", ann2),
+                canvas("soleve_5_905", Vec::new()),
+                canvas("othermax_9_909", other),
+            ],
+            "Student,ID,SIS User ID,SIS Login ID,Section,a2 (77)\n\"山田, 花子\",1,007,hanako,1,0.00\n\
+             \"Smith, Jr, Bo\",2,260000002,bo,1,0.00\n\"Lee, Ann\",3,260000003,al,1,0.00\n\
+             \"Lee, Ann\",4,260000004,al2,1,0.00\n\"Sol, Eve\",5,260000005,es,1,0.00\n",
+        ),
+    ] {
+        let place = Place::new();
+        let root = place.assignment(LATE);
+        place.put("list.csv", list.as_bytes());
+        let entries: Vec<(String, &[u8])> =
+            files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+        place.put("download.zip", &zip(&entries));
+        let (said, report) = place.grade(
+            &root,
+            &["download.zip", "--class", "list.csv", "--export", format, "--export", "feedback"],
+        );
+        let exported = fs::read_to_string(place.at(&format!("out/{format}.csv"))).unwrap();
+        let sorted = |text: &str| {
+            let (head, rows) = text.split_once('\n').unwrap();
+            let mut rows: Vec<String> = rows.lines().map(str::to_owned).collect();
+            rows.sort();
+            (head.to_owned(), rows)
+        };
+        assert_eq!(sorted(&exported), sorted(book), "{said}");
+        assert!(said.contains("nobody of the class list"), "{said}");
+        let missing = report["class"]["missing"].as_array().unwrap();
+        assert_eq!(missing.len(), 1, "{missing:?}");
+        assert_eq!(missing[0]["student"]["number"], "260000006");
+        // Feedback goes back under the names that the platform gave.
+        let feedback = fs::File::open(place.at("out/feedback.zip")).unwrap();
+        let feedback = zip::ZipArchive::new(feedback).unwrap();
+        let names: Vec<String> =
+            feedback.file_names().map(|name| name.unwrap().into_owned()).collect();
+        for (name, _) in &files {
+            let own = name.split("_a").next().unwrap();
+            let is_there = names.iter().any(|name| name.starts_with(own));
+            assert_eq!(is_there, !own.to_lowercase().contains("other"), "{own}: {names:?}");
+        }
+    }
+}
+
 #[test]
 fn one_who_dresses_up_an_archive_as_a_download_is_one_student() {
     let place = Place::new();
