@@ -196,10 +196,11 @@ impl Batch<'_> {
             return Ok(Ended::Interrupted);
         }
         let (results, held_back, cache) = result?;
-        let records = results.into_iter().collect::<anyhow::Result<Vec<Record>>>()?;
+        let mut records = results.into_iter().collect::<anyhow::Result<Vec<Earlier>>>()?;
         if self.slice.is_some() {
             let rules = &context.assignment.rules;
-            let entries = records.into_iter().map(|record| graded(record, rules)).collect();
+            let entry = |own: &Earlier| Ok(report::outline(graded(own.whole()?, rules)));
+            let entries = records.iter().map(entry).collect::<anyhow::Result<_>>()?;
             return Ok(Ended::Slice(entries, counting));
         }
         let report = match (&mut pins, cache) {
@@ -211,8 +212,6 @@ impl Batch<'_> {
                         chosen.len()
                     );
                 }
-                let new = |record| Earlier { record, comparable: true };
-                let mut records: Vec<Earlier> = records.into_iter().map(new).collect();
                 join(self.output, &found, &mut records);
                 settling::finish(self.output, pins, decided, found, records)?
             }
@@ -225,7 +224,7 @@ impl Batch<'_> {
                     }
                     entry
                 };
-                let mut records = records;
+                let mut records: Vec<Record> = records.into_iter().map(|own| own.record).collect();
                 judge_shared(&mut records);
                 let entries = records.into_iter().map(entry).collect();
                 let report = BatchReport::new(&context.assignment, held_back, entries);
@@ -299,7 +298,7 @@ impl Batch<'_> {
         grading: &Grading,
         sources: &[&Source],
         jobs: usize,
-    ) -> Vec<anyhow::Result<Record>> {
+    ) -> Vec<anyhow::Result<Earlier>> {
         let next = AtomicUsize::new(0);
         let results = Mutex::new(Vec::new());
         let batch = self.mode == Mode::Grade;
@@ -340,9 +339,11 @@ impl Batch<'_> {
                     (result, _) => result.with_context(|| path.display().to_string()),
                 };
                 let result = result.map(|record| Record { name: name.clone(), ..record });
+                let mut is_kept = false;
                 if let (Ok(record), Some(cache)) = (&result, &grading.cache) {
-                    if let Err(error) = cache.list(record, &out) {
-                        context.progress.note(&super::told_once(&error));
+                    match cache.list(record, &out) {
+                        Ok(()) => is_kept = true,
+                        Err(error) => context.progress.note(&super::told_once(&error)),
                     }
                     let grade = rubric::grade(&context.assignment.rules, &record.evidence);
                     let cost = if cache.was_found(slug) {
@@ -354,6 +355,10 @@ impl Batch<'_> {
                         .progress
                         .step(&format!("{}, {cost}", report::in_a_line(record, &grade)));
                 }
+                let result = result.map(|record| match is_kept {
+                    true => Earlier::kept(record, true, &out.instructor),
+                    false => Earlier::held(record),
+                });
                 let Ok(mut results) = results.lock() else { return };
                 results.push((index, result));
             }

@@ -11,7 +11,7 @@ use super::context::Context;
 use crate::class::{self, Claim, Label, MATCHES, Roster};
 use crate::columns::count;
 use crate::files::write_whole;
-use crate::grading::{Earlier, Folders, Record, RecordCache, Student};
+use crate::grading::{Folders, Record, RecordCache, Student};
 use crate::report;
 
 /// The file that says where a submission lay, in its instructor's folder.
@@ -173,7 +173,7 @@ pub fn mended_record(output: &Path, slug: &str) -> anyhow::Result<Option<Record>
     let folder = mended(output, slug);
     for slug in folders(&folder) {
         let instructor = folder.join(report::INSTRUCTOR).join(slug);
-        if let Some(Earlier { record, .. }) = RecordCache::earlier(&instructor, "")? {
+        if let Some(record) = RecordCache::record(&instructor)? {
             return Ok(Some(record));
         }
     }

@@ -193,29 +193,30 @@ impl DecisionArguments {
 /// # Errors
 /// When there is none, or several.
 pub fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
-    let mut found: Vec<Graded> = Vec::new();
+    let mut found: Vec<(&str, Vec<String>)> = Vec::new();
     let mut names = Vec::new();
-    for (entry, numbers) in kept.graded(output)? {
-        let full_name = entry.record.student.full_name();
+    for (record, numbers) in kept.known(output)? {
+        let full_name = record.student.full_name();
         let is_number = numbers.iter().any(|own| names::number(own) == names::number(wanted));
         let is_name = !full_name.is_empty() && names::words(&full_name) == names::words(wanted);
-        if entry.record.slug == wanted || is_number || is_name {
-            found.push(Graded { entry, numbers });
+        if record.slug == wanted || is_number || is_name {
+            found.push((&record.slug, numbers));
         } else {
-            names.push(entry.record.slug);
+            names.push(record.slug.as_str());
         }
     }
-    match found.len() {
-        1 => Ok(found.remove(0)),
-        0 => bail!(
+    match found.as_slice() {
+        [(slug, numbers)] => Ok(Graded { entry: kept.graded(slug)?, numbers: numbers.clone() }),
+        [] => bail!(
             "nobody in {} is \"{wanted}\"; expected a student number, a name, or a submission's folder such as {}",
             output.display(),
-            names.first().map_or("a2_ada_lampglow", String::as_str)
+            names.first().unwrap_or(&"a2_ada_lampglow")
         ),
         several => {
-            let slugs: Vec<&str> = found.iter().map(|own| own.entry.record.slug.as_str()).collect();
+            let slugs: Vec<&str> = several.iter().map(|(slug, _)| *slug).collect();
             bail!(
-                "{several} submissions are \"{wanted}\"; name the folder of one: {}",
+                "{} submissions are \"{wanted}\"; name the folder of one: {}",
+                slugs.len(),
                 slugs.join(", ")
             )
         }

@@ -28,12 +28,14 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
     let kept = Kept::read(output)?;
     let decided = kept.decided()?;
     let slug = one(student, output, &kept)?.entry.record.slug;
-    let report = kept.report(output, decided)?;
+    let settled = kept.report(output, decided)?;
+    let report = &settled.report;
     let entry = report.entries.iter().find(|entry| entry.record.slug == slug).with_context(|| {
         format!("the submission {slug} does not count; `umbra status` and report.html say which does")
     })?;
+    let entry = &settled.whole(entry)?;
     let look = Look { width: terminal::width(), colours: terminal::colours() };
-    let text = report::defend(&report, entry, part, look).map_err(anyhow::Error::msg)?;
+    let text = report::defend(report, entry, part, look).map_err(anyhow::Error::msg)?;
     print!("{text}");
     // How to see it again.
     println!("\nTo reproduce it");

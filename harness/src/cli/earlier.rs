@@ -49,13 +49,13 @@ impl Report {
     /// When there is none, or it is another version's.
     pub fn read(output: &Path) -> anyhow::Result<Self> {
         let file = output.join(report::JSON_FILE);
-        let bytes = std::fs::read(&file).with_context(|| {
+        let opened = std::fs::File::open(&file).with_context(|| {
             format!(
                 "cannot read {}: expected the --output of an earlier `umbra grade`",
                 file.display()
             )
         })?;
-        serde_json::from_slice(&bytes).with_context(|| {
+        serde_json::from_reader(std::io::BufReader::new(opened)).with_context(|| {
             format!("{}: not a report of this version of Umbra; grade again", file.display())
         })
     }

@@ -153,20 +153,21 @@ fn one(output: &Path, begun: Vec<(PathBuf, Found)>) -> anyhow::Result<Found> {
 }
 
 /// Records by the machine that made them.
-fn machines(records: &[Earlier]) -> Vec<(Conditions, Vec<Record>)> {
-    let mut machines: Vec<(Conditions, Vec<Record>)> = Vec::new();
-    for Earlier { record, .. } in records {
-        match machines.iter_mut().find(|(conditions, _)| *conditions == record.conditions) {
-            Some((_, own)) => own.push(record.clone()),
-            None => machines.push((record.conditions.clone(), vec![record.clone()])),
+fn machines(records: &[Earlier]) -> Vec<(Conditions, Vec<Earlier>)> {
+    let mut machines: Vec<(Conditions, Vec<Earlier>)> = Vec::new();
+    for earlier in records {
+        let conditions = &earlier.record.conditions;
+        match machines.iter_mut().find(|(own, _)| own == conditions) {
+            Some((_, own)) => own.push(earlier.clone()),
+            None => machines.push((conditions.clone(), vec![earlier.clone()])),
         }
     }
     machines
 }
 
-fn in_words((conditions, records): &(Conditions, Vec<Record>)) -> String {
+fn in_words((conditions, records): &(Conditions, Vec<Earlier>)) -> String {
     let Conditions { isolation, adapter, compiler, .. } = conditions;
-    let names: Vec<String> = records.iter().map(|record| record.name.clone()).collect();
+    let names: Vec<String> = records.iter().map(|own| own.record.name.clone()).collect();
     let compiler = compiler.get(..12).unwrap_or(compiler);
     harmless(&format!(
         "isolation {isolation}, adapter {adapter}, compiler {compiler}: {}",
@@ -179,10 +180,11 @@ fn compare(
     root: Option<&Path>,
     output: &Path,
     found: &Found,
-    machines: &[(Conditions, Vec<Record>)],
+    machines: &[(Conditions, Vec<Earlier>)],
 ) -> anyhow::Result<()> {
     let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
-    let samples: Vec<&Record> = machines.iter().filter_map(|(_, own)| own.first()).collect();
+    let samples = machines.iter().filter_map(|(_, own)| own.first()).map(Earlier::whole);
+    let samples = samples.collect::<anyhow::Result<Vec<Record>>>()?;
     let only: Vec<String> = samples.iter().map(|record| record.slug.clone()).collect();
     let again = scratch.path().join("again");
     let batch = Batch {
@@ -205,15 +207,15 @@ fn compare(
         timings: false,
     };
     eprintln!("umbra: {} graded again on this machine", count(samples.len(), "submission"));
-    let Ended::Report(report, _) = batch.run(root)? else { bail!("interrupted") };
+    let Ended::Report(made, _) = batch.run(root)? else { bail!("interrupted") };
     for record in samples {
-        let entry = report.entries.iter().find(|entry| entry.record.slug == record.slug);
-        let Some(entry) = entry else {
+        let folder = again.join(report::INSTRUCTOR).join(&record.slug);
+        let Some(here) = RecordCache::record(&folder)? else {
             println!("{}: not found again below {}", harmless(&record.name), output.display());
             continue;
         };
-        let there = rubric::settle(&report.rules, &record.evidence);
-        let differs = differing(&there, &entry.record.evidence);
+        let settled = |record: &Record| rubric::settle(&made.rules, &record.evidence);
+        let differs = differing(&settled(&record), &settled(&here));
         match differs.as_slice() {
             [] => println!("{}: the same verdicts on this machine", harmless(&record.name)),
             lines => println!("{}: {}", harmless(&record.name), harmless(&lines.join("; "))),

@@ -67,8 +67,8 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
     }
     println!("what differs: {}", differs.join(", "));
     let after = kept.report(output, &decided)?;
-    print!("{}", table(&changes(&before, &after)));
-    println!("{}", summary(&before, &after));
+    print!("{}", table(&changes(&before.report, &after.report)));
+    println!("{}", summary(&before.report, &after.report));
     if *undo {
         // The files first: a change that is applied without them would come back with the next run.
         for (name, text, old) in [

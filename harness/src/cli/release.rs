@@ -39,7 +39,8 @@ pub fn run(arguments: &ReleaseArguments, root: Option<&Path>) -> anyhow::Result<
         now >= end,
         "nothing is released before {end}: the due date, the cut-off, late days and the last extension come first"
     );
-    let mut report = kept.report(output, decided)?;
+    let mut settled = kept.report(output, decided)?;
+    let report = &mut settled.report;
     let Some(seed) = report.held_back.as_ref().map(|held_back| held_back.seed) else {
         bail!("{} holds nothing back: it was graded with --perturb off", output.display());
     };
@@ -71,7 +72,7 @@ pub fn run(arguments: &ReleaseArguments, root: Option<&Path>) -> anyhow::Result<
     write_whole(&flag, format!("{now}\n").as_bytes())
         .with_context(|| format!("cannot write {}", flag.display()))?;
     report.released = true;
-    settling::write(output, &report)?;
+    settling::write(output, &settled)?;
     println!(
         "{}: the {} that were held back, for all students; the page of each shows now what went wrong on them",
         scenes.display(),

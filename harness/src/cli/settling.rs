@@ -1,6 +1,7 @@
 //! A report from what its folder keeps: records, what the last run found beside them, and what is pinned. No
 //! submission is needed, and nothing is rendered.
 
+use std::borrow::Cow;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -17,11 +18,11 @@ use crate::class::{
     Claim, Collected, Decided, Deciding, Kind, Label, Matches, Pins, Roster, settle,
 };
 use crate::files::{files_below, hex, write_new, write_whole};
-use crate::grading::{Earlier, Record, RecordCache, judge_shared};
+use crate::grading::{Earlier, Record, RecordCache, Shared};
 use crate::held_back::HeldBack;
 use crate::program::graded;
-use crate::report::{self, BatchReport, SubmissionReport};
-use crate::rubric::Grade;
+use crate::report::{self, BatchReport, ReportError, SubmissionReport, outline};
+use crate::rubric::{self, Grade};
 
 /// The file that is there once held-back scenes are released, in the instructor's folder.
 pub const RELEASED: &str = "released.txt";
@@ -232,28 +233,31 @@ impl Kept {
     ///
     /// # Errors
     /// When a decision means nothing.
-    pub fn report(&self, output: &Path, decided: &Decided) -> anyhow::Result<BatchReport> {
-        let records = self.records.iter().map(Earlier::clone).collect();
-        settled(output, decided, &self.found, self.roster.as_ref(), records)
+    pub fn report(&self, output: &Path, decided: &Decided) -> anyhow::Result<Settled> {
+        settled(output, decided, &self.found, self.roster.as_ref(), self.records.clone())
     }
 
-    /// The submissions that are graded, with what they are worth before anything is decided, and the numbers that
-    /// each is known by.
+    /// The submissions that are graded, without what was found out about them, and the numbers that each is known by.
     ///
     /// # Errors
     /// When a decision means nothing.
-    pub fn graded(&self, output: &Path) -> anyhow::Result<Vec<(SubmissionReport, Vec<String>)>> {
-        let decided = self.decided()?;
-        let matches = decided.matches(output)?;
-        let mut records: Vec<Record> =
-            self.records.iter().map(|earlier| earlier.record.clone()).collect();
-        judge_shared(&mut records);
-        let entry = |record: Record| {
-            let claim = class::claim(output, &record);
-            let numbers = numbers(&claim, self.roster.as_ref(), &matches);
-            (graded(record, &decided.assignment.rules), numbers)
+    pub fn known(&self, output: &Path) -> anyhow::Result<Vec<(&Record, Vec<String>)>> {
+        let matches = self.decided()?.matches(output)?;
+        let known = |earlier: &'_ Earlier| {
+            let claim = class::claim(output, &earlier.record);
+            numbers(&claim, self.roster.as_ref(), &matches)
         };
-        Ok(records.into_iter().map(entry).collect())
+        Ok(self.records.iter().map(|own| (&own.record, known(own))).collect())
+    }
+
+    /// A submission with what it is worth before anything is decided.
+    ///
+    /// # Errors
+    /// When it is not there.
+    pub fn graded(&self, slug: &str) -> anyhow::Result<SubmissionReport> {
+        let mut record = whole(&self.records, slug)?;
+        Shared::of(self.records.iter().map(|own| &own.record)).judge(&mut record);
+        Ok(graded(record, &self.decided()?.assignment.rules))
     }
 
     /// Pins what is decided from now on and writes the report by it.
@@ -269,7 +273,8 @@ impl Kept {
     ) -> anyhow::Result<()> {
         let before = self.report(output, self.decided()?)?;
         let after = self.report(output, &decided)?;
-        self.pins.apply(decided, reason, changes(&before, &after), undoes)?;
+        let changes = changes(&before.report, &after.report);
+        self.pins.apply(decided, reason, changes, undoes)?;
         write(output, &after)
     }
 }
@@ -294,18 +299,52 @@ pub fn finish(
         pins.apply(decided.clone(), "graded", Vec::new(), false)?;
     }
     write(output, &settled)?;
-    Ok(settled)
+    Ok(settled.report)
 }
 
 /// Writes a report with the questions that it leaves open.
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn write(output: &Path, report: &BatchReport) -> anyhow::Result<()> {
-    if let Some(class) = &report.class {
+pub fn write(output: &Path, settled: &Settled) -> anyhow::Result<()> {
+    if let Some(class) = &settled.report.class {
         class::ask(class, output)?;
     }
-    Ok(report::write(output, report)?)
+    let written = report::write_outlined(output, &settled.report, &|entry| {
+        let slug = entry.record.slug.clone();
+        let failed =
+            |error: anyhow::Error| ReportError::Entry { slug, reason: format!("{error:#}") };
+        settled.whole(entry).map(Cow::Owned).map_err(failed)
+    });
+    Ok(written?)
+}
+
+/// The report of a class. Its entries are outlines: what was found out is in the files of records.
+pub struct Settled {
+    /// The report.
+    pub report: BatchReport,
+    records: Vec<Earlier>,
+    shared: Shared,
+}
+
+impl Settled {
+    /// The whole of an entry.
+    ///
+    /// # Errors
+    /// When its record cannot be read any more.
+    pub fn whole(&self, entry: &SubmissionReport) -> anyhow::Result<SubmissionReport> {
+        let mut record = whole(&self.records, &entry.record.slug)?;
+        self.shared.judge(&mut record);
+        record.evidence = rubric::settle(&self.report.rules, &record.evidence);
+        let SubmissionReport { grade, standing, .. } = entry.clone();
+        Ok(SubmissionReport { record, grade, standing })
+    }
+}
+
+/// The whole record of a submission.
+fn whole(records: &[Earlier], slug: &str) -> anyhow::Result<Record> {
+    let own = records.iter().find(|own| own.record.slug == slug);
+    own.with_context(|| format!("there is no submission {slug}"))?.whole()
 }
 
 /// The numbers that a submission is known by: its own, the platform's, the class list's.
@@ -329,7 +368,7 @@ pub fn settled(
     found: &Found,
     roster: Option<&Roster>,
     mut records: Vec<Earlier>,
-) -> anyhow::Result<BatchReport> {
+) -> anyhow::Result<Settled> {
     let stated = &decided.assignment;
     let (matches, overrides) = (decided.matches(output)?, decided.overrides(output)?);
     let deciding = Deciding {
@@ -342,18 +381,47 @@ pub fn settled(
     found.name(&mut records);
     // In an order that does not hang on who was graded when.
     records.sort_by_key(|earlier| earlier.record.slug.to_lowercase());
-    let comparable: Vec<bool> = records.iter().map(|earlier| earlier.comparable).collect();
-    let mut records: Vec<Record> = records.into_iter().map(|earlier| earlier.record).collect();
-    judge_shared(&mut records);
-    let claims: Vec<Claim> = records.iter().map(|record| class::claim(output, record)).collect();
-    let mut entries: Vec<SubmissionReport> =
-        records.into_iter().map(|record| graded(record, &stated.rules)).collect();
-    for (entry, comparable) in entries.iter_mut().zip(comparable) {
-        if !comparable {
-            entry.grade.remarks.push(OTHER_CONDITIONS.to_owned());
+    let shared = Shared::of(records.iter().map(|earlier| &earlier.record));
+    let claims: Vec<Claim> =
+        records.iter().map(|earlier| class::claim(output, &earlier.record)).collect();
+    let mut entries: Vec<SubmissionReport> = Vec::new();
+    let mut grades: Vec<Grade> = Vec::new();
+    let mut decisions: Vec<Vec<Applied>> = Vec::new();
+    let mut mends = Vec::new();
+    // One at a time is whole.
+    for (earlier, claim) in records.iter().zip(&claims) {
+        let mut record = earlier.whole()?;
+        shared.judge(&mut record);
+        let SubmissionReport { record, grade: mut original, standing } =
+            graded(record, &stated.rules);
+        if !earlier.comparable {
+            original.remarks.push(OTHER_CONDITIONS.to_owned());
         }
+        let mut grade = original.clone();
+        let subject = Subject {
+            slug: &record.slug,
+            numbers: numbers(claim, roster, &matches),
+            digest: &record.digest,
+            evidence: &record.evidence,
+        };
+        decisions.push(overrides.apply(&subject, &mut grade));
+        let mended = class::mended_record(output, subject.slug)?;
+        mends.push(match (overrides.mend(&subject), mended) {
+            (Some(decision), Some(record)) if decision.evidence == subject.digest => {
+                let mut mended = graded(record, &stated.rules).grade;
+                // What the instructor is to look at in the submission itself.
+                let private = original.remarks.iter();
+                let private = private.filter(|own| report::is_private(own, &stated.rules));
+                mended.remarks.extend(private.cloned());
+                overrides.apply(&subject, &mut mended);
+                mending::choose(decision, &mut grade, mended).map(Ok)
+            }
+            (Some(decision), _) => Some(Err(mending::stale(decision))),
+            (None, _) => None,
+        });
+        grades.push(grade);
+        entries.push(outline(SubmissionReport { record, grade: Grade::default(), standing }));
     }
-    let mut grades: Vec<Grade> = entries.iter().map(|entry| entry.grade.clone()).collect();
     let subjects: Vec<Subject> = entries
         .iter()
         .zip(&claims)
@@ -364,26 +432,6 @@ pub fn settled(
             evidence: &record.evidence,
         })
         .collect();
-    let mut decisions: Vec<Vec<Applied>> = Vec::new();
-    let mut mends = Vec::new();
-    for (subject, grade) in subjects.iter().zip(&mut grades) {
-        let original = grade.clone();
-        decisions.push(overrides.apply(subject, grade));
-        let record = class::mended_record(output, subject.slug)?;
-        mends.push(match (overrides.mend(subject), record) {
-            (Some(decision), Some(record)) if decision.evidence == subject.digest => {
-                let mut mended = graded(record, &stated.rules).grade;
-                // What the instructor is to look at in the submission itself.
-                let private = original.remarks.into_iter();
-                let private = private.filter(|own| report::is_private(own, &stated.rules));
-                mended.remarks.extend(private);
-                overrides.apply(subject, &mut mended);
-                mending::choose(decision, grade, mended).map(Ok)
-            }
-            (Some(decision), _) => Some(Err(mending::stale(decision))),
-            (None, _) => None,
-        });
-    }
     let parts: Vec<&str> = stated.rules.parts.iter().map(|part| part.id.as_str()).collect();
     let unused = overrides.unused(&subjects, &parts);
     let is_graded = |seen: &Seen| claims.iter().any(|claim| claim.slug == seen.slug);
@@ -399,6 +447,7 @@ pub fn settled(
     if !found.list.is_empty() {
         class.list.clone_from(&found.list);
     }
+    let mut entries: Vec<Option<SubmissionReport>> = entries.into_iter().map(Some).collect();
     let mut counting = Vec::new();
     for (at, mut standing) in standings {
         // Attempts that were not graded are told, too.
@@ -416,13 +465,14 @@ pub fn settled(
             Some(Err(words)) => class.stale.push(format!("{}: {words}", claims[at].name)),
             None => {}
         }
-        let grade = grades[at].clone();
-        counting.push(SubmissionReport { record: entries[at].record.clone(), grade, standing });
+        let Some(entry) = entries[at].take() else { continue };
+        let grade = std::mem::take(&mut grades[at]);
+        counting.push(SubmissionReport { grade, standing, ..entry });
     }
     let held_back = found.held_back.clone();
     let released = output.join(report::INSTRUCTOR).join(RELEASED).is_file();
     let settled = BatchReport::settled(stated.clone(), held_back, counting, class);
-    Ok(BatchReport { released, ..settled })
+    Ok(Settled { report: BatchReport { released, ..settled }, records, shared })
 }
 
 /// Points that are others in `after`, by submission and part.

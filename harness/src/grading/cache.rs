@@ -33,13 +33,46 @@ pub struct RecordCache {
     settled: Mutex<HashMap<String, bool>>,
 }
 
-/// A record with its place among others.
+/// A record with its place among others. A class may have hundreds: what is long stays in the file.
 #[derive(Clone)]
 pub struct Earlier {
-    /// The record.
+    /// The record, without what was found out where that is in its file.
     pub record: Record,
     /// Whether it was made with the same scenes, limits and program.
     pub comparable: bool,
+    /// The instructor's folder with its file; nothing where it could not be kept.
+    folder: Option<PathBuf>,
+}
+
+impl Earlier {
+    /// A record that is in its file, in an instructor's folder.
+    pub fn kept(record: Record, comparable: bool, instructor: &Path) -> Self {
+        let record = Record {
+            findings: Vec::new(),
+            diagnostics: String::new(),
+            evidence: Evidence::default(),
+            diagnoses: Vec::new(),
+            views: Vec::new(),
+            ..record
+        };
+        Self { record, comparable, folder: Some(instructor.to_owned()) }
+    }
+
+    /// A record of this run that has no file.
+    pub fn held(record: Record) -> Self {
+        Self { record, comparable: true, folder: None }
+    }
+
+    /// The whole record, under the name that it has here.
+    ///
+    /// # Errors
+    /// When its file is gone or cannot be read.
+    pub fn whole(&self) -> anyhow::Result<Record> {
+        let Some(folder) = &self.folder else { return Ok(self.record.clone()) };
+        let record = RecordCache::record(folder)?;
+        let record = record.with_context(|| format!("{} is gone", folder.join(FILE).display()))?;
+        Ok(Record { name: self.record.name.clone(), ..record })
+    }
 }
 
 /// What is in the file of a bug.
@@ -151,11 +184,17 @@ impl RecordCache {
     /// # Errors
     /// When it cannot be read.
     pub fn earlier(instructor: &Path, conditions: &str) -> anyhow::Result<Option<Earlier>> {
-        let earlier = |file: File<Record>| Earlier {
-            comparable: file.batch == conditions,
-            record: file.record,
-        };
+        let earlier =
+            |file: File<Record>| Earlier::kept(file.record, file.batch == conditions, instructor);
         Ok(Self::file(instructor)?.map(earlier))
+    }
+
+    /// The whole record that a run kept in an instructor's folder, if any.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn record(instructor: &Path) -> anyhow::Result<Option<Record>> {
+        Ok(Self::file(instructor)?.map(|file| file.record))
     }
 
     /// The conditions of the record in an instructor's folder, if there is one.

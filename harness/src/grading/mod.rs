@@ -37,5 +37,5 @@ pub use pipeline::{Grading, Mode, RenderPath, TREE};
 pub use prepared_scene::{PreparedScene, ProbeFilm};
 pub use record::{Conditions, Folders, Record, StageCost, Student};
 pub use sampler::{CORRELATED, row_correlation};
-pub use shared::judge_shared;
+pub use shared::{Shared, judge_shared};
 pub use stages::Stages;

@@ -15,36 +15,57 @@ const NUMBER: CheckId = CheckId::SubmissionNumber;
 /// The check of sources.
 const LIKENESS: CheckId = CheckId::SubmissionLikeness;
 
-/// Adds to every record which of its images and sources another person of the batch submitted too, and whether its
-/// student number is another person's. Depends on nothing but the set of the records; doing it again
-/// changes nothing. Names of other submissions are private.
+/// Images, sources and student numbers of a batch, each with those who submitted it.
 ///
 /// Only images with noise have digests, and every student's noise has the seed of the student's own
 /// number: two persons' images are equal when one is a copy of the other, or when neither
 /// was drawn with that seed. A number with two names may be a slip, or somebody who hides a copy.
+#[derive(Default)]
+pub struct Shared {
+    images: BTreeMap<String, Owners>,
+    numbers: BTreeMap<String, Owners>,
+    sources: BTreeMap<String, Owners>,
+}
+
+/// Who it is, and in which submission.
+type Owners = BTreeSet<(String, String)>;
+
+/// Adds to every record of a batch what it shares with others, see [`Shared::judge`].
 pub fn judge_shared(records: &mut [Record]) {
-    let mut owners: BTreeMap<String, BTreeSet<(String, String)>> = BTreeMap::new();
-    let mut names: BTreeMap<String, BTreeSet<(String, String)>> = BTreeMap::new();
-    let mut authors: BTreeMap<String, BTreeSet<(String, String)>> = BTreeMap::new();
-    for record in records.iter() {
-        for source in &record.sources {
-            let author = (person(record), format!("{}: {}", record.slug, source.path));
-            authors.entry(source.sha256.clone()).or_default().insert(author);
+    let shared = Shared::of(records.iter());
+    records.iter_mut().for_each(|record| shared.judge(record));
+}
+
+impl Shared {
+    /// What is in the records of a batch; their evidence does not matter.
+    pub fn of<'a>(records: impl Iterator<Item = &'a Record>) -> Self {
+        let mut shared = Self::default();
+        for record in records {
+            for source in &record.sources {
+                let author = (person(record), format!("{}: {}", record.slug, source.path));
+                shared.sources.entry(source.sha256.clone()).or_default().insert(author);
+            }
+            for image in &record.images {
+                let owner = (person(record), record.slug.clone());
+                shared.images.entry(image.sha256.clone()).or_default().insert(owner);
+            }
+            if let (Some(number), Some(name)) = (number(record), plain_name(record)) {
+                let owner = (name, record.slug.clone());
+                shared.numbers.entry(number).or_default().insert(owner);
+            }
         }
-        for image in &record.images {
-            let owner = (person(record), record.slug.clone());
-            owners.entry(image.sha256.clone()).or_default().insert(owner);
-        }
-        if let (Some(number), Some(name)) = (number(record), plain_name(record)) {
-            names.entry(number).or_default().insert((name, record.slug.clone()));
-        }
+        shared
     }
-    for record in records {
+
+    /// Adds to a record of the batch which of its images and sources another person submitted too, and whether its student
+    /// number is another person's. Depends on nothing but the set of the records; doing it again changes nothing. Names of
+    /// other submissions are private.
+    pub fn judge(&self, record: &mut Record) {
         let person = person(record);
         record.evidence.checks.retain(|check| ![SHARED, NUMBER, LIKENESS].contains(&check.id));
         let mut found = Vec::new();
         for ImageDigest { scene, path, sha256 } in &record.images {
-            let others = others(&owners[sha256], &person);
+            let others = others(&self.images[sha256], &person);
             found.push(if others.is_empty() {
                 let summary = format!("nobody else of this batch submitted {path}");
                 Check::new(SHARED, scene, Verdict::Pass, summary)
@@ -57,7 +78,7 @@ pub fn judge_shared(records: &mut [Record]) {
             });
         }
         if let (Some(number), Some(name)) = (number(record), plain_name(record)) {
-            let others = others(&names[&number], &name);
+            let others = others(&self.numbers[&number], &name);
             if !others.is_empty() {
                 let summary = format!("the student number {number} stands under two names");
                 let check = Check::new(NUMBER, "", Verdict::Fail, summary);
@@ -65,17 +86,13 @@ pub fn judge_shared(records: &mut [Record]) {
                 found.push(Check { private, ..check });
             }
         }
-        found.extend(like(record, &authors, &person));
+        found.extend(like(record, &self.sources, &person));
         record.evidence.checks.extend(found);
     }
 }
 
 /// Which files of a source are others', too. Nobody loses points by it.
-fn like(
-    record: &Record,
-    authors: &BTreeMap<String, BTreeSet<(String, String)>>,
-    person: &str,
-) -> Option<Check> {
+fn like(record: &Record, authors: &BTreeMap<String, Owners>, person: &str) -> Option<Check> {
     let shared = record.sources.iter().filter_map(|source| {
         let others = others(&authors[&source.sha256], person);
         let SourceDigest { path, signs, .. } = source;
@@ -94,7 +111,7 @@ fn like(
 }
 
 /// The submissions of others than `own`.
-fn others(all: &BTreeSet<(String, String)>, own: &str) -> String {
+fn others(all: &Owners, own: &str) -> String {
     let others = all.iter().filter(|(owner, _)| owner != own).map(|(_, slug)| slug.as_str());
     others.collect::<Vec<_>>().join(", ")
 }

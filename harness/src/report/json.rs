@@ -1,14 +1,16 @@
 //! `report.json`: the batch for programs.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::ser::{Error as _, SerializeSeq as _};
+use serde::{Serialize, Serializer};
 use serde_json::ser::{CharEscape, Formatter, PrettyFormatter};
 
 use super::number::significant;
-use super::{BatchReport, ReportError, SubmissionReport, harmless};
+use super::{BatchReport, ReportError, SubmissionReport, Whole, harmless};
 use crate::class::{Class, Standing};
 use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, CheckInfo};
@@ -38,7 +40,8 @@ pub(super) struct Report<'a> {
     conditions: Vec<&'a Conditions>,
     /// Seed and scenes; `null` when nothing was held back.
     held_back: Option<&'a HeldBack>,
-    submissions: Vec<Submission<'a>>,
+    #[schemars(with = "Vec<Submission<'a>>")]
+    submissions: Submissions<'a>,
     /// Who is missing, and what the instructor must decide; `null` where one submission was checked.
     class: Option<&'a Class>,
     /// By slug. Last, and the only thing that two runs over the same submissions do not share.
@@ -55,6 +58,25 @@ struct About<'a> {
     rules: &'a Rules,
     /// What each check that occurs asks, and what its error and bound mean.
     checks: BTreeMap<&'static str, CheckInfo>,
+}
+
+/// The submissions, of which one at a time is whole.
+struct Submissions<'a> {
+    report: &'a BatchReport,
+    conditions: Vec<&'a Conditions>,
+    whole: &'a Whole<'a>,
+}
+
+impl Serialize for Submissions<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self { report, conditions, whole } = self;
+        let mut all = serializer.serialize_seq(Some(report.entries.len()))?;
+        for entry in &report.entries {
+            let entry = whole(entry).map_err(S::Error::custom)?;
+            all.serialize_element(&submission(&entry, conditions))?;
+        }
+        all.end()
+    }
 }
 
 /// A submission with its points and their evidence.
@@ -90,13 +112,28 @@ pub fn report_json(report: &BatchReport) -> Result<String, ReportError> {
     if report.entries.is_empty() {
         return Err(ReportError::Empty);
     }
+    let format = |reason: String| ReportError::Format { file: super::JSON_FILE, reason };
+    let mut bytes = Vec::new();
+    write(report, &|entry| Ok(Cow::Borrowed(entry)), &mut bytes)
+        .map_err(|error| format(error.to_string()))?;
+    String::from_utf8(bytes).map_err(|error| format(error.to_string()))
+}
+
+/// Writes it, for a report whose entries may be outlines.
+///
+/// # Errors
+/// When an entry cannot be had, or `file` cannot be written.
+pub(super) fn write(
+    report: &BatchReport,
+    whole: &Whole,
+    mut file: impl io::Write,
+) -> io::Result<()> {
     let mut conditions: Vec<&Conditions> = Vec::new();
     for SubmissionReport { record, .. } in &report.entries {
         if !conditions.contains(&&record.conditions) {
             conditions.push(&record.conditions);
         }
     }
-    let submissions = report.entries.iter().map(|entry| submission(entry, &conditions)).collect();
     let timings = report
         .entries
         .iter()
@@ -115,19 +152,16 @@ pub fn report_json(report: &BatchReport) -> Result<String, ReportError> {
             rules: &report.rules,
             checks,
         },
-        conditions,
+        conditions: conditions.clone(),
         held_back: report.held_back.as_ref(),
-        submissions,
+        submissions: Submissions { report, conditions, whole },
         class: report.class.as_ref(),
         timings,
     };
-    let format = |reason: String| ReportError::Format { file: super::JSON_FILE, reason };
-    let mut bytes = Vec::new();
     let mut serializer =
-        serde_json::Serializer::with_formatter(&mut bytes, Harmless(PrettyFormatter::new()));
-    report.serialize(&mut serializer).map_err(|error| format(error.to_string()))?;
-    bytes.push(b'\n');
-    String::from_utf8(bytes).map_err(|error| format(error.to_string()))
+        serde_json::Serializer::with_formatter(&mut file, Harmless(PrettyFormatter::new()));
+    report.serialize(&mut serializer)?;
+    file.write_all(b"\n")
 }
 
 fn submission<'a>(

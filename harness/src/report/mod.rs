@@ -17,6 +17,7 @@ mod csv;
 mod html;
 mod json;
 mod number;
+mod outline;
 #[cfg(test)]
 pub(crate) mod sample;
 mod schema;
@@ -24,6 +25,7 @@ mod text;
 #[cfg(test)]
 mod write_tests;
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::{Component, Path, PathBuf};
 
@@ -35,6 +37,7 @@ pub use self::html::{
     Reader, batch as html_batch, submission as html_submission, viewer as html_viewer,
 };
 pub use self::json::{SCHEMA, VERSION, report_json};
+pub use self::outline::outline;
 pub use self::schema::report_schema;
 pub use self::text::{
     Closing, Look, closing as text_closing, defend, detail as text_detail, explain, explain_all,
@@ -46,7 +49,7 @@ pub use crate::harmless::harmless;
 use crate::assignment::Assignment;
 use crate::class::{Class, Standing, Stated};
 use crate::evidence::{Check, CheckId};
-use crate::files::write_whole;
+use crate::files::{write_whole, write_whole_by};
 use crate::grading::{Record, Student};
 use crate::held_back::HeldBack;
 use crate::rubric::{Grade, Rules};
@@ -186,6 +189,14 @@ pub enum ReportError {
         /// Why.
         source: std::io::Error,
     },
+    /// What was found out about a submission cannot be had.
+    #[error("{slug}: {reason}")]
+    Entry {
+        /// Its folder in the report.
+        slug: String,
+        /// Why.
+        reason: String,
+    },
     /// A value has no place in the format.
     #[error("{file}: cannot be made: {reason}")]
     Format {
@@ -261,8 +272,21 @@ impl BatchReport {
 /// # Errors
 /// When there is no submission, a slug is no plain unique name, or a file cannot be written.
 pub fn write(out: &Path, report: &BatchReport) -> Result<(), ReportError> {
+    write_outlined(out, report, &|entry| Ok(Cow::Borrowed(entry)))
+}
+
+/// Gives the whole of an entry of which a report holds the [`outline`] alone.
+pub type Whole<'a> =
+    dyn for<'b> Fn(&'b SubmissionReport) -> Result<Cow<'b, SubmissionReport>, ReportError> + 'a;
+
+/// The same for a class whose entries are outlines: one at a time is whole.
+///
+/// # Errors
+/// As [`write`], and when an entry cannot be had.
+pub fn write_outlined(out: &Path, report: &BatchReport, whole: &Whole) -> Result<(), ReportError> {
     report.check()?;
-    for entry in &report.entries {
+    for outlined in &report.entries {
+        let entry = &*whole(outlined)?;
         let slug = &entry.record.slug;
         let page = html_submission(report, entry, Reader::Student);
         if report.released {
@@ -278,7 +302,9 @@ pub fn write(out: &Path, report: &BatchReport) -> Result<(), ReportError> {
         }
     }
     put(out, CSV_FILE, csv_grades(report)?.as_bytes())?;
-    put(out, JSON_FILE, report_json(report)?.as_bytes())?;
+    let path = out.join(JSON_FILE);
+    write_whole_by(&path, |file| json::write(report, whole, file))
+        .map_err(|source| ReportError::Write { path, source })?;
     put(out, HTML_FILE, html_batch(report)?.as_bytes())
 }
 

@@ -12,7 +12,7 @@ use crate::evidence::{Check, CheckId, Evidence, Verdict};
 pub const BUILD: CheckId = CheckId::SubmissionBuild;
 
 /// The points of one submission.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Grade {
     /// The parts, in the handout's order.
     pub parts: Vec<PartGrade>,

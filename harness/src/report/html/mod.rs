@@ -18,6 +18,7 @@ use base64::Engine as _;
 use sha2::Digest as _;
 
 pub use batch::batch;
+pub use overview::is_read_by_class;
 pub use submission::submission;
 pub use viewer::viewer;
 

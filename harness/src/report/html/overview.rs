@@ -20,6 +20,14 @@ const UNDONE: &str = "not implemented";
 /// What a check says of a renderer or a compiler that was ended for its time.
 const OUT_OF_TIME: &str = "ran out of time";
 
+/// Whether the page of the class tells of a check.
+pub fn is_read_by_class(check: &Check) -> bool {
+    !check.private.is_empty()
+        || check.verdict == Verdict::NotImplemented
+        || (is_failure(check) && check.summary.contains(OUT_OF_TIME))
+        || IMAGES.contains(&check.id)
+}
+
 /// Who a submission is by, for lists.
 pub(super) fn who(entry: &SubmissionReport) -> String {
     let name = entry.student().full_name();
