@@ -124,17 +124,38 @@ fn grade(root: &Path, download: &Path, output: &Path, size: usize) -> anyhow::Re
     }
     let graded = timings.len();
     ensure!(graded == size, "{graded} of {size} students have a grade");
+    let mut largest_mib = 0.0f64;
+    for entry in output.read_dir()?.filter_map(Result::ok) {
+        if entry.path().is_dir() && entry.file_name() != "instructor" {
+            largest_mib = largest_mib.max(mib(&entry.path())?);
+        }
+    }
     let each: Vec<String> = stages
         .iter()
         .filter(|(_, cpu_s)| **cpu_s > 0.0)
         .map(|(name, cpu_s)| format!("{name} {:.2}", cpu_s / graded as f64))
         .collect();
     Ok(format!(
-        "{size} students: {:.1} submissions a minute; CPU seconds each: {}; the parent's peak memory {:.0} MiB",
+        "{size} students: {:.1} submissions a minute; CPU seconds each: {}; the parent's peak memory {:.0} MiB; the \
+         report {:.0} MiB, of it the largest student's {:.1} MiB and expected images {:.1} MiB",
         graded as f64 / took_s * 60.0,
         each.join(", "),
-        peak_kib as f64 / 1024.0
+        peak_kib as f64 / 1024.0,
+        mib(output)?,
+        largest_mib,
+        mib(&output.join("instructor/viewer"))?
     ))
+}
+
+/// The size of all files below a folder; 0 where it is not.
+fn mib(folder: &Path) -> anyhow::Result<f64> {
+    let mut bytes = 0;
+    if folder.is_dir() {
+        for file in umbra::files::files_below(folder)? {
+            bytes += fs::metadata(file)?.len();
+        }
+    }
+    Ok(bytes as f64 / f64::from(1 << 20))
 }
 
 /// `cargo build`, render, compare for some submissions, one after the other, with a shared target folder and without

@@ -202,6 +202,7 @@ fn pixels_modes_keys_and_addresses() {
     browser.key("Escape", 0);
     browser.key("0", 0);
     assert_eq!(browser.value("view().zoom"), 1);
+    assert_eq!(browser.serious_findings(), Vec::<String>::new());
 
     // Without WebGL the same, and a missing file is said.
     opened(browser, &page, "?plain");

@@ -201,6 +201,8 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     browser.until(&points);
     assert!(browser.value(&format!("{report}.querySelector('pre')")).is_null());
 
+    assert_eq!(browser.serious_findings(), Vec::<String>::new());
+
     drop(watch);
     browser.until("document.getElementById('status').textContent === 'umbra watch has ended'");
     assert!(!Path::new(&door).exists());

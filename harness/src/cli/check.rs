@@ -13,7 +13,7 @@ use super::batch::{Batch, Ended};
 use super::choices::{BudgetChoice, IsolationChoice, Perturb};
 use super::context::Context;
 use super::render::AdapterChoice;
-use super::{class, terminal};
+use super::{class, terminal, terminal_pictures};
 use crate::class::Source;
 use crate::files::{files_below, write_whole};
 use crate::grading::Mode;
@@ -54,6 +54,9 @@ pub struct CheckArguments {
     /// Open the report in the browser
     #[arg(long)]
     open: bool,
+    /// Show the pictures of what was lost, in a terminal that can
+    #[arg(long)]
+    pictures: bool,
     /// Leave the library of what compiled in this file, for the live view of `umbra watch`
     #[arg(long, value_name = "FILE", hide = true)]
     keep_plugin: Option<PathBuf>,
@@ -121,7 +124,11 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let width = terminal::width().min(READABLE_COLUMNS);
     let look = Look { width, colours: terminal::colours() };
     print!("{}", report::text_detail(&report, entry, look, arguments.verbose));
-    let page = arguments.output.join(&entry.record.slug).join(report::HTML_FILE);
+    let folder_of_page = arguments.output.join(&entry.record.slug);
+    if arguments.pictures {
+        print!("{}", terminal_pictures::pictures(entry, &report.rules, &folder_of_page));
+    }
+    let page = folder_of_page.join(report::HTML_FILE);
     let program = std::env::args().next().unwrap_or_else(|| "umbra".to_owned());
     let closing = Closing {
         folder: &folder.display().to_string(),

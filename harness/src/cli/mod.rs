@@ -25,6 +25,7 @@ mod release;
 mod render;
 mod settling;
 mod terminal;
+mod terminal_pictures;
 mod tree;
 mod view;
 mod watch;

@@ -40,7 +40,7 @@ pub use check_config::check_config;
 pub use finding::{Excerpt, Finding, Severity};
 pub use limits::Limits;
 pub use pack::{Packed, archive_name, fix, mends, pack};
-pub use source_rules::{scan_source, scan_text};
+pub use source_rules::{INCLUDE_INSIDE, scan_source, scan_text};
 pub use submission::{Format, IntakeError, Refusal, Submission, SubmittedFile};
 pub use submitted_config::{Field, ListedRender, SubmittedConfig};
 pub(crate) use tree::CONFIG_FILE;

@@ -47,6 +47,9 @@ pub fn scan_source(submission: &Submission) -> Result<Vec<Finding>, IntakeError>
     Ok(findings.into_vec())
 }
 
+/// The code of the note on a file that is included from `src/` itself, as the template does with its shaders.
+pub const INCLUDE_INSIDE: &str = "source_include_inside";
+
 /// Scans one Rust file; `path` is its path in the submission.
 pub fn scan_text(path: &str, source: &str) -> Vec<Finding> {
     let tokens = tokens(source);
@@ -60,7 +63,7 @@ pub fn scan_text(path: &str, source: &str) -> Vec<Finding> {
         let count = counts.entry(code).or_default();
         *count += 1;
         if *count <= SHOWN_PER_FILE {
-            let is_harmless = code == "source_include_inside";
+            let is_harmless = code == INCLUDE_INSIDE;
             let finding = if is_harmless {
                 Finding::note(code, message)
             } else {
@@ -204,7 +207,7 @@ fn include(path: &str, tokens: &[Token], at: usize, name: &str) -> (u32, &'stati
         }
     };
     let message = format!("{}! of \"{}\"", printable(name), printable(target));
-    let code = if stays_in_src(path, target) { "source_include_inside" } else { "source_include" };
+    let code = if stays_in_src(path, target) { INCLUDE_INSIDE } else { "source_include" };
     (line, code, message)
 }
 

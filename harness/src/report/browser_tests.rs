@@ -60,6 +60,22 @@ fn a_class_of_a_thousand_is_sorted_searched_and_filtered_at_once() {
 }
 
 #[test]
+fn nobody_is_shut_out() {
+    let Some(mut browser) = Chromium::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let report = sample::report();
+    let submission = |reader| {
+        html_submission(&report, &report.entries[1], reader).replace("<details", "<details open")
+    };
+    let pages =
+        [html_batch(&report).unwrap(), submission(Reader::Student), submission(Reader::Instructor)];
+    for page in pages {
+        open(&mut browser, folder.path(), &page);
+        assert_eq!(browser.serious_findings(), Vec::<String>::new());
+    }
+}
+
+#[test]
 fn a_submissions_page_is_short_and_runs_nothing() {
     let Some(mut browser) = Chromium::start() else { return };
     let folder = tempfile::tempdir().unwrap();

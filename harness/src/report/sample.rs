@@ -247,6 +247,10 @@ fn two_cosines() -> SubmissionReport {
     ];
     entry.record.findings = vec![
         Finding::warning("unsafe_code", "the source uses unsafe").at("src/lib.rs").on_line(12),
+        Finding::note(
+            crate::intake::INCLUDE_INSIDE,
+            "include_str! of \"../shaders/phong.fs.wgsl\"",
+        ),
         Finding::note("wrapped", "one wrapping folder was taken off: \"a2\""),
     ];
     entry

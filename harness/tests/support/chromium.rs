@@ -113,6 +113,50 @@ impl Chromium {
         self.call("Emulation.setDeviceMetricsOverride", metrics);
     }
 
+    /// Whether the page is asked for in dark colors.
+    pub fn dark(&mut self, dark: bool) {
+        let value = if dark { "dark" } else { "light" };
+        let features = json!([{"name": "prefers-color-scheme", "value": value}]);
+        self.call("Emulation.setEmulatedMedia", json!({ "features": features }));
+    }
+
+    /// What axe-core finds serious about the open page, or worse, wide and narrow, light and dark. Nothing where
+    /// `./run test` could not install axe-core.
+    pub fn serious_findings(&mut self) -> Vec<String> {
+        let axe =
+            concat!(env!("CARGO_MANIFEST_DIR"), "/../target/umbra/browser/package/axe.min.js");
+        let Ok(axe) = std::fs::read_to_string(axe) else {
+            eprintln!("not run here: there is no axe-core, which ./run test installs where npm is");
+            return Vec::new();
+        };
+        self.value(&format!("{axe};0"));
+        const RUN: &str = "axe.run(document, { iframes: false, resultTypes: ['violations'] }).then(({ violations }) => \
+            violations.filter(({ impact }) => impact === 'serious' || impact === 'critical') \
+            .map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target.join(' ')).slice(0, 4).join(', ')}`))";
+        let found = |browser: &mut Self| -> Vec<String> {
+            serde_json::from_value(browser.value(RUN)).unwrap()
+        };
+        // It sees what is there to be seen.
+        self.value("document.body.insertAdjacentHTML('beforeend', '<img id=\"wrong\" width=\"9\" height=\"9\">')");
+        assert!(
+            found(self).iter().any(|finding| finding.contains("#wrong")),
+            "axe-core finds nothing"
+        );
+        self.value("document.getElementById('wrong').remove()");
+        let mut all = Vec::new();
+        for (width, dark) in [(1200, false), (1200, true), (390, true), (390, false)] {
+            self.size(width, 800);
+            self.dark(dark);
+            self.frame();
+            let look = if dark { "dark" } else { "light" };
+            all.extend(
+                found(self).into_iter().map(|finding| format!("{width} px, {look}: {finding}")),
+            );
+        }
+        self.size(1200, 800);
+        all
+    }
+
     /// Opens a page of the file system; `suffix` is a query or fragment.
     pub fn open(&mut self, page: &Path, suffix: &str) {
         // A fragment alone would not load the page again.

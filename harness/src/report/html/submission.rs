@@ -12,7 +12,7 @@ use crate::columns::count;
 use crate::evidence::{Check, Verdict};
 use crate::grading::{Conditions, StageCost};
 use crate::harmless::harmless_lines;
-use crate::intake::{Finding, Severity};
+use crate::intake::{Finding, INCLUDE_INSIDE, Severity};
 use crate::rubric::PartGrade;
 
 /// So many lines of the compiler's are shown.
@@ -79,6 +79,7 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     findings(&mut html, &record.findings);
     html.raw("<section>\n<h2>Everything else</h2>\n");
     right(&mut html, &grade.parts);
+    notes(&mut html, &record.findings);
     let shown = std::mem::take(&mut lost.shown);
     rest(&mut html, &record.evidence.checks, &shown, &places);
     let marks: Vec<(f64, &str)> = grade.parts.iter().filter_map(|part| mark(part, entry)).collect();
@@ -244,18 +245,22 @@ fn diagnostics(html: &mut Html, diagnostics: &str) {
     html.raw("</pre>\n</section>\n");
 }
 
-/// Errors and warnings; what is only noted, folded: most submissions have notes.
+/// Errors and warnings.
 fn findings(html: &mut Html, findings: &[Finding]) {
-    let of = |noted: bool| -> Vec<&Finding> {
-        let is_note = |finding: &&Finding| (finding.severity == Severity::Note) == noted;
-        findings.iter().filter(is_note).collect()
-    };
-    let (serious, notes) = (of(false), of(true));
+    let is_serious = |finding: &&Finding| finding.severity != Severity::Note;
+    let serious: Vec<&Finding> = findings.iter().filter(is_serious).collect();
     if !serious.is_empty() {
         html.raw("<section>\n<h2>Findings</h2>\n");
         finding_list(html, &serious);
         html.raw("</section>\n");
     }
+}
+
+/// What is only noted, folded, but for what the template itself does: every submission has that. `report.json` has all.
+fn notes(html: &mut Html, findings: &[Finding]) {
+    let is_note =
+        |finding: &&Finding| finding.severity == Severity::Note && finding.code != INCLUDE_INSIDE;
+    let notes: Vec<&Finding> = findings.iter().filter(is_note).collect();
     if !notes.is_empty() {
         html.raw("<details>\n<summary>").text(&count(notes.len(), "note")).raw("</summary>\n");
         finding_list(html, &notes);

@@ -1,0 +1,172 @@
+//! `umbra watch` by the clock: from a save to the first image and to the whole judgement, beside `umbra check`; frames
+//! per second of the live view, and from a key to the picture; the size of what a student gets.
+//!
+//! ```sh
+//! cargo build --release --workspace && cargo run --release --example watching    # minutes; it needs Chromium
+//! ```
+#![cfg_attr(not(unix), allow(dead_code, unused_imports))]
+
+#[allow(dead_code, clippy::unwrap_used)] // of the tests, which use the rest
+#[path = "../tests/support/chromium.rs"]
+mod chromium;
+
+use std::fs;
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Instant;
+
+use anyhow::{Context as _, ensure};
+use chromium::Chromium;
+use serde_json::json;
+
+/// A live view is measured for so long [ms].
+const TURNED_MS: u32 = 4000;
+/// Keys of which the median time is told.
+const KEYS: u32 = 15;
+
+#[cfg(not(unix))]
+fn main() {
+    println!("the live view needs Linux or macOS");
+}
+
+#[cfg(unix)]
+fn main() -> anyhow::Result<()> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize()?;
+    let umbra = root.join("target/release/umbra");
+    ensure!(umbra.is_file(), "{}: hint: cargo build --release --workspace", umbra.display());
+    let place = tempfile::tempdir()?;
+    let work = place.path().join("work");
+    for source in ["student_template/src", "samples/perfect/src"] {
+        copy(&root.join(source), &work.join("src"))?;
+    }
+    let checked_s = {
+        let mut check = Command::new(&umbra);
+        check.arg("check").arg(&work).arg("--root").arg(&root);
+        check.arg("--output").arg(place.path().join("checked"));
+        check.stdout(Stdio::null()).stderr(Stdio::null());
+        // Once for what it makes and keeps, once by the clock.
+        check.status()?;
+        let begun = Instant::now();
+        check.status()?;
+        begun.elapsed().as_secs_f64()
+    };
+    println!("umbra check: {checked_s:.1} s");
+
+    let mut browser = Chromium::start().context("there is no Chromium on PATH")?;
+    let out = place.path().join("out");
+    let mut watch = Command::new(&umbra);
+    watch.arg("watch").arg(&work).arg("--root").arg(&root).arg("--output").arg(&out);
+    watch.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    let mut watch = Watch(watch.stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?);
+    let said = watch.0.stdout.take().context("its output")?;
+    // Open to the end: each check prints there.
+    let mut said = BufReader::new(said).lines();
+    let door = said.next().context("it says where its page is")??;
+    browser.call("Page.navigate", json!({"url": format!("file://{door}")}));
+    browser.until("location.protocol === 'http:' && live.scenes.length > 0");
+    until_checked(&mut browser);
+
+    for (what, file) in
+        [("Rust", "src/integrators/simple.rs"), ("a shader", "src/shaders/phong.fs.wgsl")]
+    {
+        let file = work.join(file);
+        let text = fs::read_to_string(&file)?;
+        browser.value("window.before = { libraries: live.libraries, reports, pictures: +live.views.realtime.figure.dataset.frames }");
+        let begun = Instant::now();
+        fs::write(&file, format!("{text}// saved\n"))?;
+        let mut after = |condition: &str| {
+            browser.until(condition);
+            begun.elapsed().as_secs_f64()
+        };
+        let image_s = after(
+            "live.libraries > before.libraries && +live.views.realtime.figure.dataset.frames > before.pictures",
+        );
+        let first_s = after("reports > before.reports");
+        until_checked(&mut browser);
+        let whole_s = begun.elapsed().as_secs_f64();
+        println!(
+            "a save of {what}: {image_s:.1} s to the first image, {first_s:.1} s to the first report, {whole_s:.1} s to \
+             the whole ({:.0} % of umbra check)",
+            100.0 * whole_s / checked_s
+        );
+    }
+
+    for scene in ["cbox", "teapot"] {
+        browser.value(&format!(
+            "(control('spp').value = 0, control('scene').value = '{scene}', control('scene').dispatchEvent(new Event('change')))"
+        ));
+        browser.until("live.views.realtime.picture?.width > 128 && !live.views.realtime.under && live.views.offline.figure.dataset.spp");
+        let frames = browser.value(&format!(
+            "new Promise((done) => {{ const view = live.views.realtime, first = +view.figure.dataset.frames, begun = performance.now(); \
+             const step = () => {{ orbit(0.01, 0); const ms = performance.now() - begun; \
+             if (ms < {TURNED_MS}) requestAnimationFrame(step); else done((+view.figure.dataset.frames - first) / ms * 1000); }}; step(); }})"
+        ));
+        browser.until("!live.views.realtime.under && !live.views.realtime.dirty");
+        let size = browser
+            .value("`${live.views.realtime.picture.width}x${live.views.realtime.picture.height}`");
+        let mut waits = Vec::new();
+        for _ in 0..KEYS {
+            let ms = browser.value(
+                "new Promise((done) => { const view = live.views.realtime, first = view.figure.dataset.frames, begun = performance.now(); \
+                 view.canvas.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowLeft' })); \
+                 const look = () => requestAnimationFrame(() => view.figure.dataset.frames > first ? requestAnimationFrame(() => done(performance.now() - begun)) : look()); look(); })",
+            );
+            waits.push(ms.as_f64().context("milliseconds")?);
+        }
+        waits.sort_by(f64::total_cmp);
+        println!(
+            "{scene} at {}: {:.0} frames a second; {:.0} ms from a key to the picture",
+            size.as_str().unwrap_or_default(),
+            frames.as_f64().context("a rate")?,
+            waits[waits.len() / 2]
+        );
+    }
+    println!("the student's folder, all right: {:.1} MiB", mib(&out)?);
+    Ok(())
+}
+
+/// Ended as Ctrl-C does.
+struct Watch(Child);
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        #[cfg(unix)]
+        if let Ok(id) = i32::try_from(self.0.id()) {
+            use nix::sys::signal::{Signal, kill};
+            let _ = kill(nix::unistd::Pid::from_raw(id), Signal::SIGTERM);
+        }
+        let _ = self.0.wait();
+    }
+}
+
+/// A whole check takes longer than a test may wait for anything.
+fn until_checked(browser: &mut Chromium) {
+    let done = "document.body.className === 'done' && mark.hidden";
+    while browser.value(done) != true {
+        assert_ne!(browser.value("document.body.className"), "failed", "there is no report");
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+}
+
+fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in from.read_dir()? {
+        let entry = entry?;
+        let to = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &to)?;
+        } else {
+            fs::copy(entry.path(), to)?;
+        }
+    }
+    Ok(())
+}
+
+fn mib(folder: &Path) -> std::io::Result<f64> {
+    let mut bytes = 0;
+    for file in umbra::files::files_below(folder)? {
+        bytes += fs::metadata(file)?.len();
+    }
+    Ok(bytes as f64 / f64::from(1 << 20))
+}
