@@ -29,7 +29,7 @@ pub struct Mended {
     pub patch: String,
     /// Lines that it changes, adds or removes.
     pub lines: usize,
-    /// What it costs [points].
+    /// What it costs, in points.
     pub penalty: f64,
     /// Points without it, least and most.
     pub before: [f64; 2],

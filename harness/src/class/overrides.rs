@@ -33,7 +33,7 @@ pub struct Decision {
     /// The fix as a unified diff, where the submission is mended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patch: Option<String>,
-    /// What the fix costs [points].
+    /// What the fix costs, in points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub penalty: Option<f64>,
     /// Why; the student reads it.

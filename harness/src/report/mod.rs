@@ -275,7 +275,7 @@ pub fn write(out: &Path, report: &BatchReport) -> Result<(), ReportError> {
     write_outlined(out, report, &|entry| Ok(Cow::Borrowed(entry)))
 }
 
-/// Gives the whole of an entry of which a report holds the [`outline`] alone.
+/// Gives the whole of an entry of which a report holds the outline alone.
 pub type Whole<'a> =
     dyn for<'b> Fn(&'b SubmissionReport) -> Result<Cow<'b, SubmissionReport>, ReportError> + 'a;
 
