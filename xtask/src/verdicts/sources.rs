@@ -6,6 +6,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 use clap::ValueEnum as _;
+use memchr::memmem;
 use serde_json::Value;
 use umbra::rubric::Rules;
 
@@ -99,7 +100,7 @@ fn names_another(out: &Path, own: &Value, all: &[Value]) -> String {
     });
     let found: Vec<String> = names
         .filter(|name| !name.is_empty())
-        .filter(|name| bytes.windows(name.len()).any(|window| window == name.as_bytes()))
+        .filter(|name| memmem::find(&bytes, name.as_bytes()).is_some())
         .collect();
     if found.is_empty() {
         String::new()
