@@ -71,26 +71,20 @@ fn svg([x_words, y_words]: [&str; 2], curves: &[Curve]) -> anyhow::Result<String
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" \
          font-family=\"sans-serif\" font-size=\"11\">\n<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"#fff\"/>\n"
     );
-    for power in x_range[0] as i32..=x_range[1] as i32 {
-        let (value, bottom) = (10f64.powi(power), HEIGHT - BOTTOM);
+    // One line of the grid for each power of ten, and its value beside it.
+    let powers = |[low, high]: [f64; 2]| (low as i32..=high as i32).map(|p| 10f64.powi(p));
+    let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
+    let upright = powers(x_range).map(|value| {
         let x = x(value);
-        writeln!(out, "<path d=\"M{x:.1} {TOP}V{bottom}\" stroke=\"#ddd\"/>")?;
-        writeln!(
-            out,
-            "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{value}</text>",
-            bottom + 14.0
-        )?;
-    }
-    for power in y_range[0] as i32..=y_range[1] as i32 {
-        let (value, right) = (10f64.powi(power), WIDTH - RIGHT);
+        (value, format!("M{x:.1} {TOP}V{bottom}"), "middle", x, bottom + 14.0)
+    });
+    let across = powers(y_range).map(|value| {
         let y = y(value);
-        writeln!(out, "<path d=\"M{LEFT} {y:.1}H{right}\" stroke=\"#ddd\"/>")?;
-        writeln!(
-            out,
-            "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{value}</text>",
-            LEFT - 6.0,
-            y + 4.0
-        )?;
+        (value, format!("M{LEFT} {y:.1}H{right}"), "end", LEFT - 6.0, y + 4.0)
+    });
+    for (value, path, anchor, x, y) in upright.chain(across) {
+        writeln!(out, "<path d=\"{path}\" stroke=\"#ddd\"/>")?;
+        writeln!(out, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{value}</text>")?;
     }
     for (i, curve) in curves.iter().enumerate() {
         let color = COLORS[i % COLORS.len()];
