@@ -4,7 +4,7 @@
 use glam::Vec4;
 
 /// Eight numbers in memory.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, bytemuck::Zeroable)]
 #[repr(align(32))]
 pub struct Eight(pub [f32; 8]);
 
@@ -85,7 +85,7 @@ impl Lanes for Portable {
 #[cfg(target_arch = "x86_64")]
 pub use avx2::{Avx2, has_avx2};
 
-/// The only `unsafe` code of ray casting.
+/// The only intrinsics of ray casting.
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
     use std::arch::x86_64::*;

@@ -198,3 +198,48 @@ fn of_equal_distances_the_lowest_index_counts() {
     let ray = Ray::new(vec3(0.2, 0.2, 1.0), -Vec3::Z);
     assert_eq!(bvh.closest_hit(&ray).map(|hit| hit.triangle), Some(0));
 }
+
+/// All that a hierarchy holds.
+fn content(bvh: &Bvh) -> Vec<u32> {
+    let nodes = bvh.nodes.iter().flat_map(|node| {
+        let bounds = node.bounds.iter().flatten().flat_map(|eight| eight.0.map(f32::to_bits));
+        bounds.chain(node.children).chain([node.present])
+    });
+    nodes.chain(bvh.leaves.iter().flat_map(Triangles::content)).collect()
+}
+
+#[test]
+fn any_number_of_threads_builds_the_same() {
+    let sampler = Sampler::new(4);
+    let mut triangles: Vec<_> = (0..50).flat_map(|_| odd_triangles(&sampler)).collect();
+    triangles[20_000..25_000].fill([Vec3::ZERO, Vec3::X, Vec3::Y]);
+    let blocks: Vec<bool> = (0..triangles.len()).map(|i| i % 3 != 0).collect();
+    let alone = content(&Bvh::on_threads(&triangles, &blocks, 1));
+    assert!(alone.len() > 12 * triangles.len());
+    for threads in [2, 3, 16] {
+        assert!(content(&Bvh::on_threads(&triangles, &blocks, threads)) == alone, "{threads}");
+    }
+}
+
+/// A tree that would be too deep for a ray's stack is built in halves. Where triangles cross, rounding of boxes may decide
+/// between two hits.
+#[test]
+fn a_tree_of_halves_hits_as_far_away() {
+    let sampler = Sampler::new(5);
+    let triangles = odd_triangles(&sampler);
+    let blocks: Vec<bool> = (0..triangles.len()).map(|i| i % 3 != 0).collect();
+    let usual = Bvh::new(&triangles, &blocks);
+    let Wide { nodes, leaves, pending } = fold(&triangles, &blocks, 1, 0);
+    assert!(pending < Stack::ROOM);
+    let halved = Bvh { nodes, leaves, ..Bvh::new(&triangles, &blocks) };
+    for number in 0..100_000 {
+        let [a, b, _] = triangles[number % triangles.len()];
+        let origin = 2.0 * random_vec3(&sampler);
+        let at = [a, (a + b) / 2.0, random_vec3(&sampler)][number % 3];
+        let ray = Ray::segment(origin, (at - origin).normalize_or(Vec3::X), 0.0, 10.0);
+        let [a, b] = [&usual, &halved].map(|bvh| bvh.closest_hit(&ray).map(|hit| hit.t));
+        assert_eq!(a.is_some(), b.is_some(), "{ray:?}");
+        assert!(a.zip(b).is_none_or(|(a, b)| (a - b).abs() < 1e-5), "{a:?} {b:?} {ray:?}");
+        assert_eq!(usual.any_hit(&ray), halved.any_hit(&ray), "{ray:?}");
+    }
+}
