@@ -3,9 +3,10 @@
 use basecode::Vec3;
 use renderer_api as api;
 
+use super::changes;
 use super::convention::Convention;
 use super::lobe::{self, Answer};
-use super::price::{self, Answers};
+use super::price::Answers;
 use super::shading::{ShadedPoint, Shading, energy_scale};
 use super::{Check, CheckId, Lobe, Measure, RuleId, Verdict};
 use crate::imaging::ratio::ratio_name;
@@ -287,8 +288,8 @@ pub fn judge(
             shading.radiance(&probe.point).map(|value| growth * value)
         };
         let changes = match kind {
-            BsdfKind::Diffuse => price::diffuse_changes(),
-            BsdfKind::Phong => price::phong_changes(),
+            BsdfKind::Diffuse => changes::diffuse_changes(),
+            BsdfKind::Phong => changes::phong_changes(),
         };
         let unit = |index: usize| probes[index].peak;
         let group = |index: usize| groups[index];

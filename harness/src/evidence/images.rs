@@ -3,7 +3,7 @@
 use basecode::Image;
 
 use super::price::Price;
-use super::{Check, CheckId, Measure, RuleId, Verdict, loops};
+use super::{Check, CheckId, Measure, RuleId, Verdict, film};
 use crate::expected::Expected;
 use crate::imaging::compare::{
     compare_offline, compare_realtime_linear, compare_srgb8, offline, realtime_linear, srgb8,
@@ -127,7 +127,7 @@ pub fn film_price(image: &Image, right: &Image, mask: &RegionMask, raw: f64) -> 
     if size != (right.width, right.height) {
         return Price::of_raw(raw);
     }
-    loops::film_price(size, &colours(image), &colours(right), &room, raw)
+    film::film_price(size, &colours(image), &colours(right), &room, raw)
 }
 
 /// Whether two images of one scene come from one renderer: equal within noise offline, within a

@@ -3,8 +3,10 @@
 //! Nothing here knows of processes, GPUs or libraries.
 
 pub mod bsdf;
+pub mod changes;
 mod check;
 pub mod convention;
+mod film;
 pub mod images;
 mod lobe;
 pub mod loops;

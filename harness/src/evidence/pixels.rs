@@ -3,7 +3,8 @@
 use basecode::{Camera, Frame, Image, MaterialModel, Scene, Vec3};
 use renderer_api as api;
 
-use super::price::{self, Answers, Class, Price, shader_changes};
+use super::changes::shader_changes;
+use super::price::{self, Answers, Class, Price};
 use super::shading::{ShadedPoint, Shading};
 use crate::expected::SurfacePoint;
 use crate::imaging::reference::{Region, RegionMask};

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use super::cache::RecordCache;
-use super::pipeline::{Grading, Mode};
+use super::pipeline::Grading;
 use super::record::{Folders, Record};
+use super::tree_checks::Mode;
 use crate::evidence::{Check, CheckId, Evidence, Verdict};
 use crate::panics::{self, Bug};
 

@@ -11,10 +11,10 @@ use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use crate::diagnosis::{self, Thumbnail, View};
 use crate::evidence::bsdf::{self, BsdfKind, BsdfProbe};
+use crate::evidence::changes;
 use crate::evidence::convention::{self, Convention, Conventional, Party};
 use crate::evidence::loops::Edges;
 use crate::evidence::physical::Probes;
-use crate::evidence::price;
 use crate::evidence::rays::{self, Unshadowed};
 use crate::evidence::shading::{ShadedPoint, Shading};
 use crate::evidence::{Check, CheckId};
@@ -251,10 +251,10 @@ impl LightAnswer<'_> {
             judge: Box::new(move |convention: &Convention| match &self.values {
                 Ok(values) => self.under(values, |answers| {
                     if self.own.is_empty() {
-                        let changes = price::integrator_changes();
+                        let changes = changes::integrator_changes();
                         return rays::judge_unshadowed(batch, answers, convention, &changes);
                     }
-                    let (handout, changes) = (Convention::default(), price::shader_changes(true));
+                    let (handout, changes) = (Convention::default(), changes::shader_changes(true));
                     rays::judge_unshadowed(batch, answers, &handout, &changes)
                 }),
                 Err(unanswered) => (**unanswered).clone(),

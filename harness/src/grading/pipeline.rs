@@ -1,7 +1,7 @@
 //! One submission through all stages: intake, build, offline, realtime, images.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, OnceLock};
 use std::time::Instant;
 
@@ -9,41 +9,29 @@ use anyhow::Context;
 use tempfile::TempDir;
 
 use super::cache::RecordCache;
-use super::conventions::Answers;
 use super::costs::ReferenceCosts;
-use super::draw::Frame;
-use super::offline::{self, Drawn, Run};
 use super::pictures::Images;
 use super::prepared_scene::PreparedScene;
 use super::record::{Conditions, Folders, Record, StageCost, Student};
 use super::session::Session;
 use super::stages::Stages;
-use super::{draw, isolate, likeness, mend, realtime, sampler, submitted, uploads};
+use super::tree_checks::{Mode, config_check, refused_checks, tree_check};
+use super::{draw, likeness, mend, submitted};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
 use crate::diagnosis::{Diagnosis, Stored};
-use crate::evidence::{Check, CheckId, Evidence, Verdict, loops, price, rays, shadow_map};
+use crate::evidence::{Check, CheckId, Evidence, Verdict};
 use crate::files::{step, write_whole};
 use crate::held_back::{self, HeldBack};
-use crate::intake::{self, IntakeError, Submission, TreeSpec, Validation};
+use crate::intake::{self, IntakeError, Submission};
 use crate::process::Exit;
 use crate::rubric::BUILD;
 use crate::store::Store;
 use crate::worker::{Adapter, Budget, Reference, RetryBudget, Supervisor};
 
-/// The check that says whether the submission follows the tree.
-pub const TREE: CheckId = CheckId::SubmissionTree;
-
-/// The check that says whether `config.json` is as it should be; it costs nothing.
-const CONFIG: CheckId = CheckId::SubmissionConfig;
-
 /// The check that fails nobody: it says that the machine did.
 const JUDGED: CheckId = CheckId::SubmissionJudged;
-
-/// By how much the standard error of a region's mean grows when its rows share their noise: the
-/// root of its height in pixels; the highlights that are judged apart are about 9 pixels high.
-const DEPENDENT_PIXELS: f64 = 3.0;
 
 /// Everything that is the same for all submissions of a batch.
 pub struct Grading<'a> {
@@ -52,7 +40,7 @@ pub struct Grading<'a> {
     /// Starts workers.
     pub supervisor: Supervisor,
     /// Keeps the compiled shaders that the supervisor gives to workers.
-    compiled: Option<TempDir>,
+    pub(super) compiled: Option<TempDir>,
     /// The template's compiler call.
     pub recording: Recording,
     /// The scenes, ready: the public ones first.
@@ -81,15 +69,6 @@ pub struct Grading<'a> {
     pub(super) reference_costs: ReferenceCosts,
     /// What known mistakes answer, read when it is first needed.
     pub(super) stored: OnceLock<Stored>,
-}
-
-/// How a submission is to be looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// To be graded: its tree counts.
-    Grade,
-    /// A working folder, before submitting: its tree is only remarked on.
-    Check,
 }
 
 /// A way from a scene to an image.
@@ -162,53 +141,6 @@ impl<'a> Grading<'a> {
         }
         grading.compile_shaders()?;
         Ok(grading)
-    }
-
-    /// Has the reference renderer draw once what every renderer is asked to, so that workers need not
-    /// compile the same shaders again and again.
-    fn compile_shaders(&mut self) -> anyhow::Result<()> {
-        let (Some(reference), Ok(_)) = (&self.reference, &self.adapter) else { return Ok(()) };
-        let Some(case) = self.cases.iter().find(|case| case.bonus.is_some()) else { return Ok(()) };
-        let plain = Frame::plain(case);
-        let toml = case.bonus.as_deref().unwrap_or(&case.realtime);
-        let mut frames = vec![plain.clone(), Frame { toml, shadow_map: true, ..plain }];
-        let shown = isolate::bound_values_shown();
-        frames.extend(shown.map(|stages| Frame::probe(case, stages)));
-        let folder = self.shaders_of(&mut self.session(""), Some(reference), frames)?;
-        self.supervisor.shaders.push(folder.path().to_owned());
-        self.compiled = Some(folder);
-        Ok(())
-    }
-
-    /// The same for the stages of a submission, by Umbra's own pass: no foreign code runs there. They are
-    /// given to the workers of `session` while the answer lives.
-    fn compile_own(
-        &self,
-        session: &mut Session,
-        stages: &Stages,
-    ) -> anyhow::Result<Option<TempDir>> {
-        let (Some(own), Some(case)) = (stages.all_own(), self.cases.first()) else {
-            return Ok(None);
-        };
-        let folder = self.shaders_of(session, None, vec![Frame::probe(case, own)])?;
-        session.supervisor.shaders.push(folder.path().to_owned());
-        Ok(Some(folder))
-    }
-
-    /// The shaders that some frames need, compiled.
-    fn shaders_of(
-        &self,
-        session: &mut Session,
-        renderer: Option<&Path>,
-        frames: Vec<Frame>,
-    ) -> anyhow::Result<TempDir> {
-        let builder =
-            tempfile::Builder::new().prefix("shaders-").tempdir_in(&self.supervisor.scratch);
-        let folder = builder?;
-        session.supervisor.leaves_shaders = Some(folder.path().to_owned());
-        draw::compile_shaders(session, renderer, frames);
-        session.supervisor.leaves_shaders = None;
-        Ok(folder)
     }
 
     pub(super) fn session(&self, options: &str) -> Session<'_> {
@@ -470,114 +402,6 @@ impl<'a> Grading<'a> {
         Ok(plugin.map(|library| (library, built)))
     }
 
-    pub(super) fn offline(
-        &self,
-        session: &Session,
-        plugin: &Path,
-        seed: u64,
-        checks: &mut Vec<Check>,
-        drawn: &mut Vec<Drawn>,
-    ) -> anyhow::Result<()> {
-        // Cheap questions first: what a slow submission is not asked any more is what costs most.
-        let probed = self.groups().map(|cases| {
-            let mut answers = Answers::default();
-            let checks = answers.probe_bsdfs(session, plugin, cases);
-            (answers, checks)
-        });
-        let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
-        let findings = sampler::judge(session, plugin, &scene)?;
-        let mut tolerances = self.assignment.tolerances.clone();
-        if findings
-            .iter()
-            .any(|found| found.id != CheckId::SamplerSeed && found.verdict == Verdict::Fail)
-        {
-            // Pixels are as noisy as they should be, but not independent, so that the mean of a
-            // region is noisier than they tell: a finding, no wrong image.
-            tolerances.bias_standard_errors *= DEPENDENT_PIXELS;
-        }
-        checks.extend(findings);
-        for (cases, (mut answers, probed)) in self.groups().into_iter().zip(probed) {
-            let begin = checks.len();
-            checks.extend(probed);
-            // One large image is drawn whole even if it is right: a public one, which can be shown.
-            let mut whole = cases.iter().all(|case| !case.held_back);
-            for case in cheap_first(cases) {
-                self.stop_if_interrupted()?;
-                let run = Run { seed, threads: self.threads, whole };
-                whole &= case.first.is_none();
-                let (found, image) =
-                    offline::judge_scene(session, plugin, case, run, &tolerances, &mut answers);
-                checks.extend(found);
-                drawn.extend(image);
-            }
-            checks.extend(answers.judge());
-            if cases.iter().any(|case| case.probe_film.sampled.is_some()) {
-                checks.push(loops::judge_edges(&answers.edges));
-            }
-            rays::set_apart(&mut checks[begin..]);
-            price::agree(&mut checks[begin..]);
-            mark(&mut checks[begin..], cases);
-        }
-        Ok(())
-    }
-
-    /// The public scenes and the held-back ones. No worker is asked about both, and neither's
-    /// verdicts hang on the other's: what a renderer learns of a held-back scene must not show in
-    /// an image of a public one.
-    fn groups(&self) -> [&[PreparedScene]; 2] {
-        let public = self.cases.iter().take_while(|case| !case.held_back).count();
-        self.cases.split_at(public).into()
-    }
-
-    pub(super) fn realtime(
-        &self,
-        session: &Session,
-        plugin: &Path,
-        stages: &Stages,
-        checks: &mut Vec<Check>,
-        drawn: &mut Vec<Drawn>,
-    ) -> anyhow::Result<()> {
-        let tolerances = &self.assignment.tolerances;
-        for cases in self.groups() {
-            let begin = checks.len();
-            let judged = realtime::judge_images(session, plugin, cases, stages, tolerances);
-            let fails = judged.iter().any(|judged| judged.fails);
-            let footprints: Vec<_> = judged.iter().map(|judged| judged.footprint).collect();
-            let uploaded = uploads::judge(session, plugin, cases, &footprints);
-            let nothing_draws = stages.nothing_draws().or(uploaded.nothing_draws);
-            checks.extend(uploaded.checks);
-            let mut wrong = Vec::new();
-            for (case, judged) in cases.iter().zip(judged) {
-                let mut found = judged.checks;
-                if let Some(why) = nothing_draws {
-                    found.iter_mut().for_each(|check| realtime::drawn_by_nobody(check, why));
-                }
-                let proof = |check: &Check| {
-                    check.id == CheckId::ImageRealtime && check.verdict != Verdict::Pass
-                };
-                if found.iter().any(proof) {
-                    wrong.push(case);
-                }
-                checks.extend(found);
-                drawn.extend(judged.drawn);
-            }
-            shadow_map::set_apart(&mut checks[begin..]);
-            self.stop_if_interrupted()?;
-            // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
-            if !wrong.is_empty() {
-                checks.extend(isolate::isolate(session, plugin, &wrong, stages, fails, tolerances));
-            }
-            price::agree(&mut checks[begin..]);
-            mark(&mut checks[begin..], cases);
-        }
-        self.stop_if_interrupted()
-    }
-
-    fn stop_if_interrupted(&self) -> anyhow::Result<()> {
-        anyhow::ensure!(!self.cancel.load(Ordering::Relaxed), "interrupted");
-        Ok(())
-    }
-
     fn conditions(&self) -> Conditions {
         Conditions {
             umbra: env!("CARGO_PKG_VERSION").to_owned(),
@@ -591,16 +415,6 @@ impl<'a> Grading<'a> {
     }
 }
 
-/// Scenes by what their images cost: where a submission uses up its time, the most expensive are not asked.
-fn cheap_first(cases: &[PreparedScene]) -> Vec<&PreparedScene> {
-    let mut order: Vec<&PreparedScene> = cases.iter().collect();
-    order.sort_by_key(|case| {
-        let (width, height) = case.film();
-        u64::from(width) * u64::from(height) * u64::from(case.spp)
-    });
-    order
-}
-
 /// Makes the held-back scenes of a batch ready.
 fn hold_back(store: &Store, seed: u64, cases: &mut Vec<PreparedScene>) -> anyhow::Result<HeldBack> {
     (store.progress)("making the held-back scenes");
@@ -612,18 +426,6 @@ fn hold_back(store: &Store, seed: u64, cases: &mut Vec<PreparedScene>) -> anyhow
         cases.push(PreparedScene { held_back: true, ..case });
     }
     Ok(held_back)
-}
-
-/// Notes in the checks on a group of scenes whether these are held back, and what they can cost.
-fn mark(checks: &mut [Check], cases: &[PreparedScene]) {
-    let held_back = cases.iter().any(|case| case.held_back);
-    for check in checks {
-        check.held_back = held_back;
-        let case = cases.iter().find(|case| case.entry.name == check.scene);
-        // Shadows where none belong are no matter of the scene.
-        let own = case.filter(|_| check.id != CheckId::BonusDefault);
-        check.weight = own.map_or(1.0, |case| case.entry.weight);
-    }
 }
 
 /// What the stages cost so far.
@@ -640,66 +442,4 @@ impl Costs {
         self.stages.push(StageCost { name: name.to_owned(), wall_s, cpu_s });
         self.stages.clone()
     }
-}
-
-/// What there is to say of a submission that was not unpacked: neither its tree nor its source was seen.
-fn refused_checks(validation: &Validation) -> Vec<Check> {
-    let error = validation.findings.iter().find(|f| f.severity == intake::Severity::Error);
-    let why = error.map(|finding| match &finding.path {
-        Some(path) => format!("{path}: {}", finding.message),
-        None => finding.message.clone(),
-    });
-    let summary = format!("it was not unpacked: {}", why.unwrap_or_default());
-    let hint = error.and_then(|finding| finding.hint.clone()).unwrap_or_default();
-    vec![
-        Check::new(TREE, "", Verdict::NotJudged, summary.clone()),
-        Check::new(BUILD, "", Verdict::Fail, summary).with_hint(hint),
-    ]
-}
-
-fn tree_check(
-    validation: &Validation,
-    submission: &Submission,
-    tree: &TreeSpec,
-    mode: Mode,
-) -> Check {
-    if validation.follows_tree() {
-        let summary = "the submission follows the tree of the handout";
-        return Check::new(TREE, "", Verdict::Pass, summary);
-    }
-    let error = validation.findings.iter().find(|f| f.severity == intake::Severity::Error);
-    let error = error.map(ToString::to_string).unwrap_or_default();
-    match mode {
-        Mode::Check => {
-            let summary = format!("not ready to submit: {error}");
-            Check::new(TREE, "", Verdict::NotJudged, summary)
-                .with_hint("umbra validate shows the whole tree")
-        }
-        Mode::Grade => {
-            let hint = match intake::mends(submission, tree) {
-                Some(mends) => format!("umbra validate --fix mends it: {mends}"),
-                None => format!("umbra validate shows the whole tree; {error}"),
-            };
-            Check::new(TREE, "", Verdict::Fail, error).with_hint(hint)
-        }
-    }
-}
-
-/// The first thing that is wrong with `config.json`, if anything: it costs nothing.
-fn config_check(validation: &Validation) -> Option<Check> {
-    let own = |f: &&intake::Finding| {
-        f.path.as_deref() == Some(intake::CONFIG_FILE) && f.severity != intake::Severity::Note
-    };
-    let slip = validation.findings.iter().find(|finding| own(finding) && finding.line.is_some());
-    // One under another name is read all the same, and said to be.
-    let misplaced = || validation.findings.iter().find(|finding| finding.is_misplaced_config());
-    let words = match slip {
-        Some(slip) => {
-            format!("{}:{}: {}", intake::CONFIG_FILE, slip.line.unwrap_or(1), slip.message)
-        }
-        None => misplaced().map(|slip| {
-            format!("{}: {}", slip.path.as_deref().unwrap_or_default(), slip.message)
-        })?,
-    };
-    Some(Check::new(CONFIG, "", Verdict::Fail, "config.json has a slip").with_hint(words))
 }

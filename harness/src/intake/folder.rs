@@ -17,7 +17,7 @@ use open::Folder;
 
 /// What lies under a name, not followed.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Look {
+enum Found {
     Folder(Id),
     File(Id),
     Link,
@@ -66,20 +66,20 @@ impl Walk<'_, '_> {
         names.sort();
         for name in names {
             let raw = [path, name.as_encoded_bytes()].concat();
-            let look = self.known("read", &raw, folder.look(&name))?;
-            let kind = if matches!(look, Look::Folder(_)) { Kind::Folder } else { Kind::File };
+            let found = self.known("read", &raw, folder.look(&name))?;
+            let kind = if matches!(found, Found::Folder(_)) { Kind::Folder } else { Kind::File };
             if !(self.is_wanted)(&String::from_utf8_lossy(&raw), kind) {
                 continue;
             }
-            match look {
-                Look::Folder(id) => {
+            match found {
+                Found::Folder(id) => {
                     if self.copy.accept(&raw, Kind::Folder) == EntryAction::Folder {
                         let inner = self.known("list", &raw, folder.folder(&name))?;
                         self.is_same(&raw, inner.id(), id)?;
                         self.folder(inner, &[raw.as_slice(), b"/"].concat())?;
                     }
                 }
-                Look::File(id) => {
+                Found::File(id) => {
                     if let EntryAction::File(admitted) = self.copy.accept(&raw, Kind::File) {
                         let opened = self.known("read", &raw, folder.file(&name))?;
                         let Some((mut file, opened)) = opened else {
@@ -90,9 +90,9 @@ impl Walk<'_, '_> {
                         self.known("read", &raw, written)?;
                     }
                 }
-                Look::Link | Look::Special if self.copy.is_ignored(&raw) => {}
-                Look::Link | Look::Special => {
-                    let finding = special(look).at(printable_bytes(&raw));
+                Found::Link | Found::Special if self.copy.is_ignored(&raw) => {}
+                Found::Link | Found::Special => {
+                    let finding = special(found).at(printable_bytes(&raw));
                     self.copy.findings.push(finding);
                 }
             }
@@ -134,8 +134,8 @@ fn changed(raw: &[u8]) -> Finding {
         .at(printable_bytes(raw))
 }
 
-fn special(look: Look) -> Finding {
-    if look == Look::Link {
+fn special(found: Found) -> Finding {
+    if found == Found::Link {
         Finding::error("link", "expected a file or folder, found a symbolic link")
             .hint("put the file itself there")
     } else {

@@ -15,6 +15,7 @@
 
 mod check_config;
 mod copy;
+mod encoding;
 mod finding;
 mod folder;
 mod gz;

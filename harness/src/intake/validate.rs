@@ -5,8 +5,8 @@ use std::fs;
 use serde::{Deserialize, Serialize};
 
 use super::check_config::check_config;
+use super::encoding::text_of;
 use super::finding::{Finding, Findings, Severity};
-use super::json_lines::text_of;
 use super::submission::{Format, IntakeError, Refusal, Submission};
 use super::submitted_config::SubmittedConfig;
 use super::tree::{CONFIG_FILE, TreeSpec};

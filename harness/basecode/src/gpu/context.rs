@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::message::readable;
-use super::watched::{Footprint, Look, Watch};
+use super::watched::{Footprint, Overrides, Watch};
 use super::{Device, EVERY_FRAGMENT, Layouts, OUTLINES, Queue, UNDRAWN_MAPS};
 use crate::{Error, Result};
 
@@ -156,7 +156,7 @@ impl Gpu {
     /// [`EVERY_FRAGMENT`], [`OUTLINES`] and [`UNDRAWN_MAPS`] change pipelines that are made from then on.
     pub fn replace_stages(&mut self, stages: Vec<(String, String)>) {
         let find = |wanted: &str| stages.iter().find(|(name, _)| name == wanted);
-        self.watch.set_look(Look {
+        self.watch.set_overrides(Overrides {
             shown: find(EVERY_FRAGMENT).map(|(_, text)| text.clone()),
             outlines: find(OUTLINES).is_some(),
             undrawn_maps: find(UNDRAWN_MAPS).is_some(),

@@ -87,7 +87,7 @@ impl fmt::Display for Footprint {
 
 /// How the host has pipelines made.
 #[derive(Clone, Default)]
-pub(super) struct Look {
+pub(super) struct Overrides {
     /// The text of [`EVERY_FRAGMENT`].
     pub shown: Option<String>,
     /// [`OUTLINES`].
@@ -104,14 +104,14 @@ pub(super) struct Watch {
     fed: AtomicU32,
     unfed: AtomicU32,
     maps: AtomicU32,
-    look: Mutex<Look>,
+    overrides: Mutex<Overrides>,
 }
 
 impl Watch {
     /// Has modules and pipelines made so, from the next one on.
-    pub(super) fn set_look(&self, look: Look) {
-        if let Ok(mut current) = self.look.lock() {
-            *current = look;
+    pub(super) fn set_overrides(&self, overrides: Overrides) {
+        if let Ok(mut current) = self.overrides.lock() {
+            *current = overrides;
         }
     }
 
@@ -130,8 +130,8 @@ impl Watch {
         self.uploaded.fetch_add(bytes, Relaxed);
     }
 
-    fn look(&self) -> Look {
-        self.look.lock().map(|look| look.clone()).unwrap_or_default()
+    fn overrides(&self) -> Overrides {
+        self.overrides.lock().map(|overrides| overrides.clone()).unwrap_or_default()
     }
 }
 
@@ -175,7 +175,7 @@ impl Device {
         let wgpu::ShaderModuleDescriptor { label, mut source } = desc;
         if let wgpu::ShaderSource::Wgsl(text) = &mut source {
             self.watch.upload((text.len() as u64).saturating_sub(LONG_WGSL));
-            if let Some(shown) = self.watch.look().shown {
+            if let Some(shown) = self.watch.overrides().shown {
                 *text = format!("{text}\n{shown}\n").into();
             }
         }
@@ -187,12 +187,12 @@ impl Device {
         &self,
         desc: &wgpu::RenderPipelineDescriptor,
     ) -> wgpu::RenderPipeline {
-        let look = self.watch.look();
+        let overrides = self.watch.overrides();
         let targets: Vec<Option<wgpu::ColorTargetState>>;
         let mut desc = desc.clone();
         if !draws_picture(&desc) {
             self.watch.maps.fetch_add(1, Relaxed);
-            if look.undrawn_maps {
+            if overrides.undrawn_maps {
                 if let Some(depth) = &mut desc.depth_stencil {
                     depth.depth_write_enabled = Some(false);
                     depth.depth_compare = Some(wgpu::CompareFunction::Never);
@@ -212,12 +212,12 @@ impl Device {
         let pipelines = if fed { &self.watch.fed } else { &self.watch.unfed };
         pipelines.fetch_add(1, Relaxed);
         let outlined = self.device.features().contains(wgpu::Features::POLYGON_MODE_LINE);
-        if look.outlines && outlined {
+        if overrides.outlines && outlined {
             desc.primitive.polygon_mode = wgpu::PolygonMode::Line;
         }
         if let Some(fragment) = &mut desc.fragment
-            && look.shown.is_some()
-            && (!look.outlines || outlined)
+            && overrides.shown.is_some()
+            && (!overrides.outlines || outlined)
         {
             fragment.entry_point = Some(SHOWN);
         }

@@ -2,6 +2,7 @@
 //! needed for a cosine too many. Pure: answers in, words out.
 
 mod deviation;
+mod forms;
 mod formula;
 mod linear;
 mod pass;

@@ -3,7 +3,7 @@ use basecode::Vec3;
 use super::shadows::judge_shadows;
 use super::*;
 use crate::evidence::convention::Convention;
-use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict, price};
+use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict, changes};
 use crate::expected::Visibility;
 
 /// Forty lit and twenty dark rays at various distances and angles.
@@ -57,7 +57,7 @@ fn unshadowed(factor: impl Fn(usize, &SurfacePoint) -> f64) -> Check {
     let of =
         |index: usize, shading: &Shading| batch.witnessed(index, shading, &|_, _| [1.0, 0.5, 0.25]);
     let answer = Unshadowed { witness: "constant", of: &of, values: &values, black_below: true };
-    judge_unshadowed(&batch, &[answer], &Convention::default(), &price::integrator_changes())
+    judge_unshadowed(&batch, &[answer], &Convention::default(), &changes::integrator_changes())
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::{Id, Look};
+use super::{Found, Id};
 
 /// A folder.
 pub(super) struct Folder(PathBuf);
@@ -21,16 +21,16 @@ impl Folder {
         self.0.read_dir()?.take(most).map(|entry| Ok(entry?.file_name())).collect()
     }
 
-    pub(super) fn look(&self, name: &OsStr) -> io::Result<Look> {
+    pub(super) fn look(&self, name: &OsStr) -> io::Result<Found> {
         let found = self.0.join(name).symlink_metadata()?;
         Ok(if found.is_dir() {
-            Look::Folder((0, 0))
+            Found::Folder((0, 0))
         } else if found.is_file() {
-            Look::File((0, 0))
+            Found::File((0, 0))
         } else if found.is_symlink() {
-            Look::Link
+            Found::Link
         } else {
-            Look::Special
+            Found::Special
         })
     }
 

@@ -12,7 +12,7 @@ use nix::errno::Errno;
 use nix::fcntl::{AtFlags, OFlag, openat};
 use nix::sys::stat::{FileStat, Mode, SFlag, fstat, fstatat};
 
-use super::{Id, Look};
+use super::{Found, Id};
 
 /// Nothing is followed, nothing waits (for a fifo's other end), nothing is left to children.
 const FLAGS: OFlag =
@@ -43,17 +43,17 @@ impl Folder {
         Ok(names)
     }
 
-    pub(super) fn look(&self, name: &OsStr) -> io::Result<Look> {
+    pub(super) fn look(&self, name: &OsStr) -> io::Result<Found> {
         let found = fstatat(&self.0, name, AtFlags::AT_SYMLINK_NOFOLLOW)?;
         let kind = SFlag::from_bits_truncate(found.st_mode) & SFlag::S_IFMT;
         Ok(if kind == SFlag::S_IFDIR {
-            Look::Folder(id(&found))
+            Found::Folder(id(&found))
         } else if kind == SFlag::S_IFREG {
-            Look::File(id(&found))
+            Found::File(id(&found))
         } else if kind == SFlag::S_IFLNK {
-            Look::Link
+            Found::Link
         } else {
-            Look::Special
+            Found::Special
         })
     }
 

@@ -1,0 +1,245 @@
+//! What an image costs that is not what it should be: slips in how a film is written and looked at.
+
+use super::price::{self, Class, Price};
+use super::rays::RELATIVE;
+use crate::imaging::correlation::Moments;
+use crate::imaging::srgb;
+
+/// A slip in how an image is written.
+struct Change<'a> {
+    name: &'static str,
+    /// The largest value that right noise is multiplied by.
+    noise: f32,
+    /// The least and the largest value that each pixel shows then; nothing where none is known.
+    value: Box<dyn Fn(usize) -> Option<[[f32; 3]; 2]> + 'a>,
+}
+
+/// What each pixel should be.
+#[derive(Clone, Copy)]
+struct Film<'a> {
+    width: usize,
+    height: usize,
+    pixels: &'a [[f32; 3]],
+    /// Whether an edge runs through a pixel: what lies between it and the next is not known.
+    edge: &'a dyn Fn(usize) -> bool,
+}
+
+impl<'a> Film<'a> {
+    fn at(&self, x: usize, y: usize) -> [f32; 3] {
+        self.pixels[y.min(self.height - 1) * self.width + x.min(self.width - 1)]
+    }
+
+    /// The least and the largest values of the pixels whose centres are nearest around a place
+    /// [pixels]: two each way. Nothing outside the film.
+    fn around(&self, x: f64, y: f64) -> Option<[[f32; 3]; 2]> {
+        let inside = |v: f64, size: usize| v > -1.0 && v < size as f64;
+        if !(inside(x, self.width) && inside(y, self.height)) {
+            return None;
+        }
+        let (mut least, mut most) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for dy in -1..=1 {
+            for dx in -1..=1 {
+                let near = |v: f64, d: i32| (v.round() + f64::from(d)).max(0.0);
+                let (px, py) = (near(x, dx), near(y, dy));
+                if (px - x).abs() > 1.0 || (py - y).abs() > 1.0 {
+                    continue;
+                }
+                let (px, py) = (px as usize, py as usize);
+                if (self.edge)(py.min(self.height - 1) * self.width + px.min(self.width - 1)) {
+                    return None;
+                }
+                let value = self.at(px, py);
+                for c in 0..3 {
+                    least[c] = least[c].min(value[c]);
+                    most[c] = most[c].max(value[c]);
+                }
+            }
+        }
+        // Between the pixels light may be a little brighter or darker than at each.
+        for c in 0..3 {
+            let more = BETWEEN * (most[c] - least[c]);
+            (least[c], most[c]) = (least[c] - more, most[c] + more);
+        }
+        Some([least, most])
+    }
+
+    /// Each pixel shows what belongs to another place: `from` of its column and row [pixels].
+    fn moved(self, name: &'static str, from: impl Fn(f64, f64) -> (f64, f64) + 'a) -> Change<'a> {
+        let value = move |index: usize| {
+            let (x, y) = from((index % self.width) as f64, (index / self.width) as f64);
+            self.around(x, y)
+        };
+        Change { name, noise: 1.0, value: Box::new(value) }
+    }
+
+    /// Each pixel shows a function of what it should be.
+    fn changed(
+        self,
+        name: &'static str,
+        noise: f32,
+        change: impl Fn([f32; 3]) -> [f32; 3] + 'a,
+    ) -> Change<'a> {
+        let value = move |index: usize| Some([change(self.pixels[index]); 2]);
+        Change { name, noise, value: Box::new(value) }
+    }
+
+    /// The slips that are looked for; `factor` is what most pixels are multiplied by.
+    fn changes(self, factor: f32) -> Vec<Change<'a>> {
+        let (width, height) = (self.width as f64, self.height as f64);
+        let (last_x, last_y) = (width - 1.0, height - 1.0);
+        let mut changes = vec![
+            self.changed("a constant factor", factor.abs().max(1.0), move |v| {
+                v.map(|v| factor * v)
+            }),
+            self.changed("clamped to 1", 1.0, |v| v.map(|v| v.clamp(0.0, 1.0))),
+            self.changed("gamma baked in", 1.0, |v| v.map(|v| v.max(0.0).powf(1.0 / 2.2))),
+            self.changed("sRGB baked in", 1.0, |v| v.map(|v| srgb::encode(f64::from(v)) as f32)),
+            self.changed("gamma taken out", 1.0, |v| v.map(|v| v.max(0.0).powf(2.2))),
+            self.changed("tone mapped", 1.0, |v| v.map(|v| v / (1.0 + v.max(0.0)))),
+            self.changed("tone mapped", 1.0, |v| v.map(|v| 1.0 - (-v).exp())),
+            self.changed("magnitude", 1.0, |v| v.map(f32::abs)),
+            self.moved("rows from bottom to top", move |x, y| (x, last_y - y)),
+            self.moved("columns from right to left", move |x, y| (last_x - x, y)),
+            self.moved("turned by half", move |x, y| (last_x - x, last_y - y)),
+            self.moved("turned by a quarter", move |x, y| (y, last_y - x)),
+            self.moved("turned by a quarter the other way", move |x, y| (last_x - y, x)),
+            self.moved("rows and columns exchanged", |x, y| (y, x)),
+            // Written as rows of the other length.
+            self.moved("rows and columns exchanged in memory", move |x, y| {
+                let index = y * width + x;
+                (index % height, (index / height).floor())
+            }),
+            self.moved("rows and columns exchanged in memory", move |x, y| {
+                let index = y * width + x;
+                ((index / height).floor(), index % height)
+            }),
+        ];
+        for [r, g, b] in [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]] {
+            changes.push(self.changed("channels exchanged", 1.0, move |v| [v[r], v[g], v[b]]));
+        }
+        for (dx, dy) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
+            changes.push(self.moved("a pixel beside", move |x, y| (x + dx, y + dy)));
+        }
+        for (dx, dy) in [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)] {
+            changes.push(self.moved("half a pixel beside", move |x, y| (x + dx, y + dy)));
+        }
+        let (centre_x, centre_y) = (0.5 * last_x, 0.5 * last_y);
+        let zoomed = |name, by_x: f64, by_y: f64| {
+            let from = move |x: f64, y: f64| {
+                (centre_x + by_x * (x - centre_x), centre_y + by_y * (y - centre_y))
+            };
+            self.moved(name, from)
+        };
+        let aspect = width / height;
+        for by in [aspect, 1.0 / aspect] {
+            changes.push(zoomed("the field of view is that of the other axis", by, by));
+            changes.push(zoomed("the aspect ratio is missing", by, 1.0));
+            changes.push(zoomed("the aspect ratio is missing", 1.0, by));
+        }
+        // Half an angle, a whole one, degrees of another: within an eighth of any.
+        changes.extend((-24..=24).filter(|step| *step != 0).map(|step: i32| {
+            let by = 2f64.powf(f64::from(step) / 16.0);
+            zoomed("another field of view", by, by)
+        }));
+        changes
+    }
+}
+
+/// By how much of what pixels around a place differ it may lie outside of them.
+const BETWEEN: f32 = 0.25;
+/// So much of the film, at least, must be known to tell a slip.
+const KNOWN: f64 = 0.1;
+
+/// So many pixels are looked at.
+const PRICED: usize = 6000;
+
+/// What an image costs that is not what it should be: a slip in how it is written explains it, or
+/// nothing. `room` is how far a pixel may be off, where it tells anything.
+pub fn film_price(
+    (width, height): (usize, usize),
+    image: &[[f32; 3]],
+    right: &[[f32; 3]],
+    room: &dyn Fn(usize) -> Option<f32>,
+    raw: f64,
+) -> Price {
+    // Nothing is drawn: no slip explains that.
+    let Some(factor) = factor(image, right) else { return Price::of_raw(raw) };
+    let edge = |index: usize| room(index).is_none();
+    let film = Film { width, height, pixels: right, edge: &edge };
+    let step = image.len().div_ceil(PRICED).max(1);
+    let pairs = image.iter().flatten().zip(right.iter().flatten()).step_by(step);
+    let pairs = pairs.map(|(a, b)| (f64::from(*a), f64::from(*b)));
+    let likeness = Moments::of(pairs).correlation();
+    let start = match likeness >= price::LIKE {
+        true => Price::of_raw(raw).or(price::UNKNOWN, Class::Unknown, 0.0),
+        false => Price::of_raw(raw),
+    };
+    film.changes(factor).iter().fold(start, |price, change| {
+        let (mut apart, mut total) = (0.0, 0.0);
+        let (mut all, mut known) = (0usize, 0usize);
+        let mut pairs = Moments::default();
+        for (index, a) in image.iter().enumerate().step_by(step) {
+            let Some(room) = room(index) else { continue };
+            all += 1;
+            let Some([least, most]) = (change.value)(index) else { continue };
+            known += 1;
+            for ((&a, least), most) in a.iter().zip(least).zip(most) {
+                if !(least.is_finite() && most.is_finite()) {
+                    continue;
+                }
+                pairs.add(1.0, f64::from(a), f64::from(least + most) / 2.0);
+                let size = f64::from(least.abs().max(most.abs()));
+                total += size;
+                let difference = match a.is_finite() {
+                    true => f64::from((least - a).max(a - most).max(0.0)),
+                    false => size,
+                };
+                let room = f64::from(change.noise * room) + RELATIVE * size;
+                apart += if difference > room { difference } else { 0.0 };
+            }
+        }
+        if (known as f64) < KNOWN * all as f64 || !price::follows(&pairs) {
+            return price;
+        }
+        price.or(change.name, Class::Slip, apart / total.max(f64::MIN_POSITIVE))
+    })
+}
+
+/// The factor that most values share.
+fn factor(image: &[[f32; 3]], expected: &[[f32; 3]]) -> Option<f32> {
+    let pairs = image.iter().flatten().zip(expected.iter().flatten());
+    let mut ratios: Vec<f32> = pairs
+        .filter(|(_, b)| **b > 0.0)
+        .map(|(a, b)| a / b)
+        .filter(|ratio| ratio.is_finite() && *ratio > 1e-3)
+        .collect();
+    ratios.sort_by(f32::total_cmp);
+    ratios.get(ratios.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_that_does_not_follow_the_right_one_is_explained_by_no_slip() {
+        let (width, height) = (40, 30);
+        let at = |x: f32, y: f32| 3.0 + 2.0 * (0.31 * x).sin() * (0.23 * y + 0.1 * x).cos();
+        let film = |of: &dyn Fn(f32, f32) -> f32| -> Vec<[f32; 3]> {
+            (0..width * height)
+                .map(|index| [of((index % width) as f32, (index / width) as f32); 3])
+                .collect()
+        };
+        let right = film(&at);
+        let price =
+            |image: &[[f32; 3]]| film_price((width, height), image, &right, &|_| Some(0.0), 0.9);
+        let doubled = film(&|x, y| 2.0 * at(x, y));
+        assert!((price(&doubled).error - Class::Slip.price()).abs() < 1e-6);
+        // As bright as the right image is on average, and one that has nothing to do with it.
+        let [flat, other] = [film(&|_, _| 3.0), film(&|x, _| 3.0 + 2.0 * (1.7 * x).sin())];
+        for (image, what) in [(flat, "flat"), (other, "another"), (film(&|_, _| 0.0), "black")] {
+            let price = price(&image);
+            assert!(price.error > 0.3, "{what}: {} {}", price.error, price.name());
+        }
+    }
+}

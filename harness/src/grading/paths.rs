@@ -1,0 +1,150 @@
+//! Both halves of the assignment, each scene by scene: what is found out about offline images, and about
+//! realtime ones.
+
+use std::path::Path;
+use std::sync::atomic::Ordering;
+
+use super::conventions::Answers;
+use super::offline::{self, Drawn, Run};
+use super::pipeline::Grading;
+use super::prepared_scene::PreparedScene;
+use super::session::Session;
+use super::stages::Stages;
+use super::{isolate, realtime, sampler, uploads};
+use crate::evidence::{Check, CheckId, Verdict, loops, price, rays, shadow_map};
+
+/// By how much the standard error of a region's mean grows when its rows share their noise: the
+/// root of its height in pixels; the highlights that are judged apart are about 9 pixels high.
+const DEPENDENT_PIXELS: f64 = 3.0;
+
+impl Grading<'_> {
+    pub(super) fn offline(
+        &self,
+        session: &Session,
+        plugin: &Path,
+        seed: u64,
+        checks: &mut Vec<Check>,
+        drawn: &mut Vec<Drawn>,
+    ) -> anyhow::Result<()> {
+        // Cheap questions first: what a slow submission is not asked any more is what costs most.
+        let probed = self.groups().map(|cases| {
+            let mut answers = Answers::default();
+            let checks = answers.probe_bsdfs(session, plugin, cases);
+            (answers, checks)
+        });
+        let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
+        let findings = sampler::judge(session, plugin, &scene)?;
+        let mut tolerances = self.assignment.tolerances.clone();
+        if findings
+            .iter()
+            .any(|found| found.id != CheckId::SamplerSeed && found.verdict == Verdict::Fail)
+        {
+            // Pixels are as noisy as they should be, but not independent, so that the mean of a
+            // region is noisier than they tell: a finding, no wrong image.
+            tolerances.bias_standard_errors *= DEPENDENT_PIXELS;
+        }
+        checks.extend(findings);
+        for (cases, (mut answers, probed)) in self.groups().into_iter().zip(probed) {
+            let begin = checks.len();
+            checks.extend(probed);
+            // One large image is drawn whole even if it is right: a public one, which can be shown.
+            let mut whole = cases.iter().all(|case| !case.held_back);
+            for case in cheap_first(cases) {
+                self.stop_if_interrupted()?;
+                let run = Run { seed, threads: self.threads, whole };
+                whole &= case.first.is_none();
+                let (found, image) =
+                    offline::judge_scene(session, plugin, case, run, &tolerances, &mut answers);
+                checks.extend(found);
+                drawn.extend(image);
+            }
+            checks.extend(answers.judge());
+            if cases.iter().any(|case| case.probe_film.sampled.is_some()) {
+                checks.push(loops::judge_edges(&answers.edges));
+            }
+            rays::set_apart(&mut checks[begin..]);
+            price::agree(&mut checks[begin..]);
+            mark(&mut checks[begin..], cases);
+        }
+        Ok(())
+    }
+
+    /// The public scenes and the held-back ones. No worker is asked about both, and neither's
+    /// verdicts hang on the other's: what a renderer learns of a held-back scene must not show in
+    /// an image of a public one.
+    fn groups(&self) -> [&[PreparedScene]; 2] {
+        let public = self.cases.iter().take_while(|case| !case.held_back).count();
+        self.cases.split_at(public).into()
+    }
+
+    pub(super) fn realtime(
+        &self,
+        session: &Session,
+        plugin: &Path,
+        stages: &Stages,
+        checks: &mut Vec<Check>,
+        drawn: &mut Vec<Drawn>,
+    ) -> anyhow::Result<()> {
+        let tolerances = &self.assignment.tolerances;
+        for cases in self.groups() {
+            let begin = checks.len();
+            let judged = realtime::judge_images(session, plugin, cases, stages, tolerances);
+            let fails = judged.iter().any(|judged| judged.fails);
+            let footprints: Vec<_> = judged.iter().map(|judged| judged.footprint).collect();
+            let uploaded = uploads::judge(session, plugin, cases, &footprints);
+            let nothing_draws = stages.nothing_draws().or(uploaded.nothing_draws);
+            checks.extend(uploaded.checks);
+            let mut wrong = Vec::new();
+            for (case, judged) in cases.iter().zip(judged) {
+                let mut found = judged.checks;
+                if let Some(why) = nothing_draws {
+                    found.iter_mut().for_each(|check| realtime::drawn_by_nobody(check, why));
+                }
+                let proof = |check: &Check| {
+                    check.id == CheckId::ImageRealtime && check.verdict != Verdict::Pass
+                };
+                if found.iter().any(proof) {
+                    wrong.push(case);
+                }
+                checks.extend(found);
+                drawn.extend(judged.drawn);
+            }
+            shadow_map::set_apart(&mut checks[begin..]);
+            self.stop_if_interrupted()?;
+            // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
+            if !wrong.is_empty() {
+                checks.extend(isolate::isolate(session, plugin, &wrong, stages, fails, tolerances));
+            }
+            price::agree(&mut checks[begin..]);
+            mark(&mut checks[begin..], cases);
+        }
+        self.stop_if_interrupted()
+    }
+
+    fn stop_if_interrupted(&self) -> anyhow::Result<()> {
+        anyhow::ensure!(!self.cancel.load(Ordering::Relaxed), "interrupted");
+        Ok(())
+    }
+}
+
+/// Scenes by what their images cost: where a submission uses up its time, the most expensive are not asked.
+fn cheap_first(cases: &[PreparedScene]) -> Vec<&PreparedScene> {
+    let mut order: Vec<&PreparedScene> = cases.iter().collect();
+    order.sort_by_key(|case| {
+        let (width, height) = case.film();
+        u64::from(width) * u64::from(height) * u64::from(case.spp)
+    });
+    order
+}
+
+/// Notes in the checks on a group of scenes whether these are held back, and what they can cost.
+fn mark(checks: &mut [Check], cases: &[PreparedScene]) {
+    let held_back = cases.iter().any(|case| case.held_back);
+    for check in checks {
+        check.held_back = held_back;
+        let case = cases.iter().find(|case| case.entry.name == check.scene);
+        // Shadows where none belong are no matter of the scene.
+        let own = case.filter(|_| check.id != CheckId::BonusDefault);
+        check.weight = own.map_or(1.0, |case| case.entry.weight);
+    }
+}

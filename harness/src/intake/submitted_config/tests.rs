@@ -1,0 +1,176 @@
+use super::*;
+
+fn names(text: &str) -> (String, String, Option<u64>) {
+    let (config, findings, _) = SubmittedConfig::parse(text.as_bytes());
+    for finding in findings {
+        assert_eq!(finding.severity, crate::intake::Severity::Warning, "{finding}");
+    }
+    let text = |f: &Option<Field>| f.as_ref().map(|f| f.text.clone()).unwrap_or_default();
+    (text(&config.first_name), text(&config.last_name), config.sampler_seed())
+}
+
+#[test]
+fn keys_of_other_languages_and_shapes_are_known() {
+    let ada = ("Ada".to_owned(), "Lampglow".to_owned(), Some(260_123_456));
+    for keys in [
+        "given,family,matricola",
+        "given names,surname,UID",
+        "pr\u{e9}nom,nom,matricule",
+        "Vorname,Nachname,Matrikelnummer",
+        "nombre,apellidos,matr\u{ed}cula",
+        "nome,cognome,no",
+        "your first name,your last name,your student id",
+        "fn,ln,student#",
+        "first,last,studentNum",
+        "preferredName,family name,Num\u{e9}ro d'\u{e9}tudiant",
+        "\u{540d},\u{59d3},\u{5b66}\u{53f7}",
+    ] {
+        let [first, last, id] = keys.split(',').collect::<Vec<_>>().try_into().unwrap();
+        let text = format!(r#"{{"{first}": "Ada", "{last}": "Lampglow", "{id}": 260123456}}"#);
+        assert_eq!(names(&text), ada, "{text}");
+    }
+    for text in [
+        r#"{"students": [{"firstName": "Ada", "lastName": "Lampglow", "id": 260123456}]}"#,
+        r#"{"name": ["Ada", "Lampglow"], "id": [260123456]}"#,
+        r#"{"group": ["Ada Lampglow", "Bob Byte"], "id": 260123456}"#,
+        r#"{"info": {"firstName": "Ada", "lastName": "Lampglow", "number": "260123456"}}"#,
+        r#"{"author": "Ada Lampglow <ada@example.org>", "student": 260123456}"#,
+        r#"{"firstName": {"value": "Ada"}, "lastName": ["Lampglow"], "id": {"is": "260123456"}}"#,
+        "{firstName: Ada, lastName: Lampglow, studentID: 260123456}",
+        // What is said by its own name counts.
+        r#"{"firstName": "Ada", "lastName": "Lampglow", "studentID": 260123456, "x": {"id": 7}}"#,
+    ] {
+        assert_eq!(names(text), ada, "{text}");
+    }
+    assert_eq!(names("{firstName: Ada Mary, lastName: van der Berg}").0, "Ada Mary");
+    assert_eq!(names("{firstName: Ada lastName: Lampglow}").1, "Lampglow");
+}
+
+#[test]
+fn numbers_are_found_among_other_signs_where_they_are_clear() {
+    for text in [
+        "260 123 456",
+        "260.123.456",
+        "260,123,456",
+        "#260123456",
+        "A260123456",
+        "ID 260123456",
+        "(260123456)",
+        "no. 260123456",
+        "<260123456>",
+        "+260123456",
+        "260123456.0",
+        "2.60123456e8",
+        "2.60123456E+08",
+        "260123456L",
+        "260123456 (McGill)",
+        "s260123456@mail",
+        "\u{ff12}60123456",
+    ] {
+        assert_eq!(number_in(text).as_deref(), Some("260123456"), "{text}");
+    }
+    for text in [
+        "26012345x",
+        "26O123456",
+        "-260123456",
+        "-1",
+        "+1",
+        "1.5",
+        "0xF8",
+        "260123456/260999999",
+        "1e3",
+        "two",
+        "",
+        "260.12.3456",
+        "nan",
+        "inf",
+        "1e300",
+    ] {
+        assert_eq!(number_in(text), None, "{text}");
+    }
+}
+
+fn codes(text: &str) -> Vec<String> {
+    let code = |f: &Finding| format!("{}@{}", f.code, f.line.unwrap_or(0));
+    SubmittedConfig::parse(text.as_bytes()).1.iter().map(code).collect()
+}
+
+#[test]
+fn reads_every_common_form() {
+    let ada = ("Ada".to_owned(), "Lampglow".to_owned(), Some(260_123_456));
+    for text in [
+        r#"{"firstName": "Ada", "lastName": "Lampglow", "studentID": "260123456"}"#,
+        r#"{"first_name": " Ada ", "last_name": "Lampglow", "student_id": 260123456}"#,
+        r#"{"name": "Ada Lampglow", "id": 260123456, "email": "a@b.c"}"#,
+        r#"{"firstlast": "Ada Lampglow", "studentID": 260123456}"#,
+        r#"{"firstlast": "Ada_Lampglow", "studentID": 260123456}"#,
+        r#"{"fullName": "Lampglow, Ada", "Student Number": "260123456"}"#,
+        r#"{"student": {"firstName": "Ada", "lastName": "Lampglow", "id": "260123456"}, "renders": []}"#,
+    ] {
+        assert_eq!(names(text), ada, "{text}");
+        assert_eq!(codes(text), [""; 0], "{text}");
+    }
+    assert_eq!(names(r#"{"id": "18446744073709551615"}"#).2, Some(u64::MAX));
+    assert_eq!(names(r#"{"id": "18446744073709551616"}"#).2, None);
+}
+
+#[test]
+fn slips_are_warnings_and_who_it_is_is_known() {
+    let ada = ("Ada".to_owned(), "Lampglow".to_owned(), Some(260_123_456));
+    let config = |id: &str| {
+        format!("{{\n\"firstName\": \"Ada\",\n\"lastName\": \"Lampglow\",\n\"studentID\": {id}\n}}")
+    };
+    for id in [
+        "\"260 123 456\"",
+        "\"260-123-456\"",
+        "\" 260\u{a0}123\u{a0}456\"",
+        "260 123 456",
+        "260-123-456",
+        "\"#260123456\"",
+        "\"260,123,456\"",
+        "\"260_123_456 \"",
+    ] {
+        assert_eq!(names(&config(id)), ada, "{id}");
+        assert!(codes(&config(id)).contains(&"config_student_id@4".to_owned()), "{id}");
+    }
+    for (text, code) in [
+        (r#"{"fristName": "Ada", "lastNmae": "Lampglow", "studnetID": 260123456}"#, "config_key@1"),
+        (r#"[{"firstName": "Ada", "lastName": "Lampglow", "id": 260123456}]"#, "config_shape@1"),
+        ("firstName: Ada\nlastName: Lampglow\nstudentID: 260123456\n", "json_syntax@1"),
+        ("firstName = \"Ada\"\nlastName = \"Lampglow\"\nstudentID = 260123456\n", "json_syntax@1"),
+        (
+            "{\"firstName\": \"Ada\", \"lastName\": \"Lampglow\"\n*\"studentID\": \"260123456\"",
+            "json_syntax@2",
+        ),
+        ("{\"firstlast\": \"Ada Lampglow\",\n* \"studentID\": \"260123456\"}", "json_syntax@2"),
+    ] {
+        assert_eq!(names(text), ada, "{text}");
+        assert!(codes(text).contains(&code.to_owned()), "{text}: {:?}", codes(text));
+    }
+    // Other keys are nobody's name.
+    assert_eq!(codes(r#"{"scenes": 1, "comment": "x", "username": 2, "lastImage": 3}"#), [""; 0]);
+}
+
+#[test]
+fn reads_renders_with_lines() {
+    let (config, findings, _) = SubmittedConfig::parse(
+        b"{\"renders\": [\n{\"scene\": \"T\", \"render\": \"a.exr\"},\n\"b.exr\",\n{\"scene\": \"x\"}\n]}",
+    );
+    let listed: Vec<_> = config.renders.iter().map(|r| (r.render.as_str(), r.line)).collect();
+    assert_eq!(listed, [("a.exr", 2), ("b.exr", 3)]);
+    assert_eq!((findings[0].code.as_str(), findings[0].line), ("config_renders", Some(4)));
+    assert_eq!(findings[0].path.as_deref(), Some("config.json"));
+}
+
+#[test]
+fn endless_lists_are_cut() {
+    let text = format!("{{\"renders\": [{}\"a\"]}}", "\"a\",".repeat(5000));
+    let (config, findings, _) = SubmittedConfig::parse(text.as_bytes());
+    assert_eq!((config.renders.len(), findings.len()), (100, 1));
+}
+
+#[test]
+fn two_answers_are_not_one() {
+    let (_, findings, _) = SubmittedConfig::parse(b"{\"id\": 1,\n\"studentID\": 2}");
+    assert_eq!((findings[0].code.as_str(), findings[0].line), ("config_twice", Some(2)));
+}
