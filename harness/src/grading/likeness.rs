@@ -1,5 +1,7 @@
 //! What of a source is a student's own, for finding it again in another submission: without comments, blanks, and
 //! what the template says already.
+//!
+//! This finds copies. What was renamed or moved about is JPlag's to find (`class/jplag.rs`).
 
 use std::collections::BTreeSet;
 use std::path::Path;
