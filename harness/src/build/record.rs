@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -166,6 +166,9 @@ impl Recording {
             && recording.key == key
             && recording.closure.is_dir()
         {
+            // It was asked for: see `forget_old`. That may fail on a disk that cannot be written, where nothing is forgotten.
+            let file = File::options().append(true).open(&stored);
+            let _ = file.and_then(|file| file.set_modified(SystemTime::now()));
             return Ok(recording);
         }
         let host = run(Command::new(&rustc).args(["--print", "host-tuple"]), workspace)?;
@@ -184,7 +187,29 @@ impl Recording {
         let bytes =
             serde_json::to_vec_pretty(&recording).map_err(io::Error::from).map_err(at(&stored))?;
         fs::write(&stored, bytes).map_err(at(&stored))?;
+        forget_old(&folder);
         Ok(recording)
+    }
+}
+
+/// A recording that nobody asked for in so long is removed: no class takes longer.
+const KEPT: Duration = Duration::from_secs(3 * 24 * 60 * 60);
+
+/// Removes recordings, with their closures of some hundred MB, that nobody has asked for in a while. What cannot be
+/// removed stays.
+fn forget_old(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let key = name.strip_prefix("record-").and_then(|rest| rest.strip_suffix(".json"));
+        let used = entry.metadata().and_then(|meta| meta.modified());
+        let age = used.ok().and_then(|used| used.elapsed().ok()).unwrap_or_default();
+        if let Some(key) = key.filter(|_| age > KEPT) {
+            // The closure first: one without a recording would stay for good.
+            let closure = folder.join(format!("closure-{key}"));
+            if !closure.exists() || fs::remove_dir_all(&closure).is_ok() {
+                let _ = fs::remove_file(entry.path());
+            }
+        }
     }
 }
 
@@ -362,4 +387,29 @@ fn failed_to(command: &Command, message: String) -> RecordError {
 fn at(path: &Path) -> impl Fn(io::Error) -> RecordError {
     let path = path.to_owned();
     move |error| RecordError::File { path: path.clone(), error }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_nobody_asked_for_in_days_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for (key, age) in [("old", 2 * KEPT), ("new", KEPT / 2), ("bare", 2 * KEPT)] {
+            let file = File::create(at(&format!("record-{key}.json"))).unwrap();
+            file.set_modified(SystemTime::now() - age).unwrap();
+        }
+        for key in ["old", "new"] {
+            fs::create_dir(at(&format!("closure-{key}"))).unwrap();
+            fs::write(at(&format!("closure-{key}/a.rlib")), "x").unwrap();
+        }
+        fs::write(at("record.lock"), "").unwrap();
+        forget_old(folder.path());
+        let left = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+        let mut left: Vec<_> = left.map(|name| name.into_string().unwrap()).collect();
+        left.sort();
+        assert_eq!(left, ["closure-new", "record-new.json", "record.lock"]);
+    }
 }
