@@ -26,6 +26,10 @@
 //! ARCHITECTURE.md is the map of the code. Data flows one way:
 //! `intake` -> `build` -> `worker` -> `evidence` -> `rubric` -> `report`.
 
+// Its macros are for all modules below.
+#[macro_use]
+mod output;
+
 #[doc(hidden)]
 pub mod assignment;
 #[doc(hidden)]

@@ -24,7 +24,7 @@ pub struct GradeOptions<'a> {
     pub root: &'a Path,
     /// The program `umbra`, as cargo built it: `umbra-worker` lies beside it.
     pub umbra: &'a Path,
-    /// Where the report is written, as `umbra grade --output` does. Made when missing.
+    /// Where the report is written, as `umbra grade --report` does. Made when missing.
     pub output: &'a Path,
     /// The seed of the held-back scenes. Without one the public scenes alone count, and no reference
     /// renderer is needed.

@@ -77,6 +77,17 @@ impl Place {
         (output.status.code(), text(&output.stdout), text(&output.stderr))
     }
 
+    /// Runs it as under `| head -0`, standard error included; the signal that it ends by.
+    pub fn run_unread(&self, arguments: &[&str]) -> Option<i32> {
+        use std::os::unix::process::ExitStatusExt as _;
+        let (reader, writer) = std::io::pipe().unwrap();
+        let mut umbra = Command::new(env!("CARGO_BIN_EXE_umbra"));
+        umbra.args(arguments).current_dir(self.folder.path());
+        umbra.stdout(writer.try_clone().unwrap()).stderr(writer);
+        drop(reader);
+        umbra.status().unwrap().signal()
+    }
+
     /// Grades into `out`, and answers what is said and `report.json`.
     pub fn grade(&self, root: &Path, arguments: &[&str]) -> (String, Value) {
         let fixed = ["--perturb", "off", "--isolation", "reduced", "--output", "out", "--root"];
@@ -710,4 +721,24 @@ fn what_the_instructor_decides_survives_and_is_flagged_when_the_evidence_changes
     let (code, said) = set("260000002", "1.3", "10");
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("overrides.toml:4: expected points of 0 or more"), "{said}");
+}
+
+#[test]
+fn no_report_is_lost_when_nobody_reads_what_is_printed() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    place.put("class/a2.zip", &submission(&config("Ann", "Lee", "0260000003")));
+    let root = root.to_str().unwrap();
+    let grade = ["grade", "class", "--perturb", "off", "--isolation", "reduced", "--output", "out"];
+    let pipe = Some(nix::sys::signal::Signal::SIGPIPE as i32);
+    assert_eq!(place.run_unread(&[&grade[..], &["--root", root]].concat()), pipe);
+    for file in ["report.json", "grades.csv", "report.html", "a2/report.html"] {
+        assert!(place.at("out").join(file).is_file(), "{file}");
+    }
+    let check = ["check", "class/a2.zip", "--output", "own", "--root", root];
+    assert_eq!(place.run_unread(&check), pipe);
+    for file in ["report.html", "a2/report.html", "a2/last-check.json"] {
+        assert!(place.at("own").join(file).is_file(), "{file}");
+    }
+    assert_eq!(place.run_unread(&["status", "--output", "out"]), pipe);
 }

@@ -22,6 +22,7 @@ mod intake_properties;
 mod isolation;
 mod kill;
 mod labelled;
+mod likeness;
 mod metrics;
 mod original_scene;
 mod program;

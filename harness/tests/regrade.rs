@@ -96,7 +96,7 @@ fn a_changed_policy_waits_until_it_is_applied_and_every_change_can_be_undone() {
     place.put(cy, &submission(&config("Cy", "Poe", "260000005")));
     let (said, report) = place.grade(&root, &["class"]);
     assert!(said.contains("config.json has other late than this report"), "{said}");
-    assert!(said.contains("`umbra regrade --output out` shows what would change"), "{said}");
+    assert!(said.contains("`umbra regrade --report out` shows what would change"), "{said}");
     assert_eq!(points(&place), [of("Ann", 0.0), of("Bo", 5.0), of("Cy", 0.0)]);
     assert!(!report["submissions"].to_string().contains(" 5 % of the maximum"));
 
@@ -182,5 +182,5 @@ fn changed_rules_regrade_by_the_evidence_that_is_kept() {
     fs::remove_dir_all(place.at("out")).unwrap();
     let (code, said) = regrade(&[]);
     assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("expected the --output of an earlier `umbra grade`"), "{said}");
+    assert!(said.contains("expected the --report of an earlier `umbra grade`"), "{said}");
 }

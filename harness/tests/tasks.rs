@@ -55,7 +55,7 @@ fn the_merged_report_is_that_of_one_machine_whatever_becomes_of_the_tasks() {
 
     let (code, text) = task(&batch, "slice:2/3", &[]);
     assert_eq!(code, Some(0), "{text}");
-    assert!(text.contains("2 submissions of 5 graded; `umbra merge --output "), "{text}");
+    assert!(text.contains("2 submissions of 5 graded; `umbra merge --report "), "{text}");
     assert_eq!(task(&batch, "slice:3/3", &[]).0, Some(0));
     let first = fs::read(batch.instructor("ada/record.json")).unwrap();
     assert_eq!(task(&batch, "slice:1/3", &[]).0, Some(0));

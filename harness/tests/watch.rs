@@ -24,6 +24,18 @@ impl Drop for Watch {
     }
 }
 
+/// How often any thread of it was woken so far; 0 where that is not told.
+fn wakes(watch: &Watch) -> u64 {
+    let tasks =
+        fs::read_dir(format!("/proc/{}/task", watch.0.id())).into_iter().flatten().flatten();
+    let status = tasks.filter_map(|task| fs::read_to_string(task.path().join("status")).ok());
+    let switches = |status: String| {
+        let lines = status.lines().filter(|line| line.contains("voluntary_ctxt_switches"));
+        lines.filter_map(|line| line.split('\t').nth(1)?.parse::<u64>().ok()).sum::<u64>()
+    };
+    status.map(switches).sum()
+}
+
 fn copy(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in from.read_dir().unwrap().map(Result::unwrap) {
@@ -123,7 +135,7 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     let mut watch = Command::new(env!("CARGO_BIN_EXE_umbra"))
         .arg("watch")
         .arg(&work)
-        .args(["--part", "1.1", "--output"])
+        .args(["--part", "1.1", "--part", "2.4", "--output"])
         .arg(place.path().join("out"))
         .arg("--root")
         .arg(assignment)
@@ -141,7 +153,7 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     browser.call("Page.navigate", serde_json::json!({"url": format!("file://{door}")}));
     browser.until("location.protocol === 'http:' && document.body.className === 'done'");
     let report = "document.getElementById('report').contentDocument";
-    let points = format!("{report}.querySelector('.sum strong').textContent === '5'");
+    let points = format!("{report}.querySelector('.sum strong').textContent === '30'");
     browser.until(&points);
 
     until_drawn(&mut browser);
@@ -188,8 +200,12 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
         .unwrap();
     fs::write(&pass, &right_pass).unwrap();
     fs::write(&file, right).unwrap();
-    browser.until(&problem("realtime", &format!("src/shaders/phong.fs.wgsl:{line}:")));
-    browser.until(&points);
+    let at = format!("src/shaders/phong.fs.wgsl:{line}:");
+    browser.until(&problem("realtime", &at));
+    // The report says the same, and what else is right.
+    browser.until(&format!(
+        "{report}.body.textContent.includes('{at}') && {report}.querySelector('.sum strong').textContent === '5'"
+    ));
 
     fs::write(&shader, right_shader).unwrap();
     // What was found offline stays, marked, until it was run again.
@@ -206,4 +222,41 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     drop(watch);
     browser.until("document.getElementById('status').textContent === 'umbra watch has ended'");
     assert!(!Path::new(&door).exists());
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn an_idle_watch_is_not_woken() {
+    let place = tempfile::tempdir().unwrap();
+    let work = place.path().join("work");
+    fs::create_dir_all(work.join("src")).unwrap();
+    fs::write(work.join("src/lib.rs"), "fn main() { not_rust }").unwrap();
+    let assignment = one_scene(&Path::new(env!("CARGO_TARGET_TMPDIR")).join("one-scene"), |_| ());
+    let mut watch = Command::new(env!("CARGO_BIN_EXE_umbra"))
+        .arg("watch")
+        .arg(&work)
+        .args(["--part", "1.1", "--report"])
+        .arg(place.path().join("out"))
+        .arg("--root")
+        .arg(assignment)
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let said = BufReader::new(watch.stdout.take().unwrap()).lines();
+    let watch = Watch(watch);
+    // A check ends with where its page is.
+    let page = "report.html";
+    let mut said = said.map_while(Result::ok).filter(|line| line.contains(page));
+    assert!(said.next().is_some());
+    // It has ended, and so have the threads that heard it.
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    let before = wakes(&watch);
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    assert_eq!(wakes(&watch), before);
+    // It still hears a save.
+    fs::write(work.join("src/lib.rs"), "fn main() { nothing_else }").unwrap();
+    assert!(said.next().is_some());
 }

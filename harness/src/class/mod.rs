@@ -12,6 +12,7 @@ pub mod collect;
 mod download;
 pub mod export;
 pub mod feedback;
+pub mod jplag;
 pub mod late;
 pub mod layout;
 pub mod matching;

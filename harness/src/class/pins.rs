@@ -173,7 +173,7 @@ impl Pins {
             };
             all.push(serde_json::from_slice(&bytes).with_context(|| {
                 format!(
-                    "{}: not of this version of Umbra; grade into another --output",
+                    "{}: not of this version of Umbra; grade into another --report",
                     path.display()
                 )
             })?);
@@ -255,7 +255,7 @@ impl Pins {
         let name = pins.current().map(|pin| &pin.decided.assignment.name);
         if let Some(name) = name.filter(|name| **name != decided.assignment.name) {
             bail!(
-                "{} is a report of assignment \"{name}\", not \"{}\"; grade into another --output",
+                "{} is a report of assignment \"{name}\", not \"{}\"; grade into another --report",
                 instructor.parent().unwrap_or(instructor).display(),
                 decided.assignment.name
             );

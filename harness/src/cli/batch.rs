@@ -80,7 +80,34 @@ pub enum Ended {
     Slice(Vec<SubmissionReport>, usize),
 }
 
-impl Batch<'_> {
+impl<'a> Batch<'a> {
+    /// Submissions as a command takes them that says nothing else, in the one mode or the other.
+    pub fn of(paths: Vec<PathBuf>, output: &'a Path, mode: Mode) -> Self {
+        let (jobs, isolation) = match mode {
+            Mode::Grade => (cores() as usize, IsolationChoice::Full),
+            Mode::Check => (1, IsolationChoice::Reduced),
+        };
+        Self {
+            paths,
+            output,
+            adapter: AdapterChoice::Software,
+            jobs,
+            mode,
+            isolation,
+            perturb: None,
+            budget: BudgetChoice::Config,
+            asked: None,
+            only: &[],
+            slice: None,
+            from: None,
+            list: None,
+            attempt: None,
+            force: false,
+            keeps_plugin: None,
+            timings: false,
+        }
+    }
+
     /// Grades all and writes the reports, or the records of a slice.
     pub fn run(&self, root: Option<&Path>) -> anyhow::Result<Ended> {
         for path in &self.paths {
@@ -262,7 +289,7 @@ impl Batch<'_> {
             if !differs.is_empty() {
                 eprintln!(
                     "umbra: config.json has other {} than this report, which keeps what it was settled by on {} for \
-                     all submissions; `umbra regrade --output {}` shows what would change",
+                     all submissions; `umbra regrade --report {}` shows what would change",
                     differs.join(", "),
                     pin.when,
                     self.output.display()

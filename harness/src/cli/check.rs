@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::asked::Asked;
 use super::batch::{Batch, Ended};
-use super::choices::{BudgetChoice, IsolationChoice, Perturb};
+use super::choices::Perturb;
 use super::context::Context;
 use super::render::AdapterChoice;
 use super::{class, terminal, terminal_pictures};
@@ -43,7 +43,13 @@ pub struct CheckArguments {
     #[arg(long, short)]
     verbose: bool,
     /// Where to write the report with its pictures
-    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
     output: PathBuf,
     /// Which adapter draws realtime scenes
     #[arg(long, value_enum, default_value_t = AdapterChoice::Auto)]
@@ -100,23 +106,12 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let what = asked.in_words();
     eprintln!("umbra: {}", plan(folder, &what, last.seconds.get(&what).copied()));
     let batch = Batch {
-        paths: vec![source],
-        output: &arguments.output,
         adapter: arguments.adapter,
-        jobs: 1,
-        mode: Mode::Check,
-        isolation: IsolationChoice::Reduced,
         perturb: Some(Perturb(None)),
-        budget: BudgetChoice::Config,
         asked: Some(&asked),
-        only: &[],
-        slice: None,
-        from: None,
-        list: None,
-        attempt: None,
-        force: false,
         keeps_plugin: arguments.keep_plugin.as_deref(),
         timings: arguments.timings,
+        ..Batch::of(vec![source], &arguments.output, Mode::Check)
     };
     let begun = Instant::now();
     let Ended::Report(report, _) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };

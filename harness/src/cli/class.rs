@@ -13,6 +13,7 @@ use crate::columns::count;
 use crate::files::write_whole;
 use crate::grading::{Folders, Record, RecordCache, Student};
 use crate::report;
+use crate::viewer;
 
 /// The file that says where a submission lay, in its instructor's folder.
 const SOURCE: &str = "source.txt";
@@ -88,7 +89,14 @@ pub fn ask(class: &class::Class, output: &Path) -> anyhow::Result<()> {
 /// else what their names allow, made unique.
 pub fn sources(given: &[class::Source], output: &Path) -> Vec<Source> {
     // Folders of the report's own.
-    let own = [report::INSTRUCTOR, class::pins::FOLDER, WORK];
+    let own = [
+        report::INSTRUCTOR,
+        class::pins::FOLDER,
+        WORK,
+        report::LIKENESS,
+        viewer::DATA_FOLDER,
+        report::ERRORS,
+    ];
     let mut taken = HashSet::from(own.map(str::to_owned));
     let mut known: HashMap<String, VecDeque<String>> = HashMap::new();
     for slug in folders(output) {

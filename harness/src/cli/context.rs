@@ -89,6 +89,33 @@ pub fn cores() -> u32 {
     std::thread::available_parallelism().map_or(1, |cores| cores.get() as u32)
 }
 
+/// Where a word goes when Ctrl-C came, if anybody waits for it.
+#[cfg(unix)]
+static WAITING: std::sync::atomic::AtomicI32 = std::sync::atomic::AtomicI32::new(-1);
+
+/// Calls `body` in a thread of its own when Ctrl-C has come, without looking for it until then.
+///
+/// # Errors
+/// When the system gives no pipe.
+pub fn on_interrupt(body: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::io::Read as _;
+        use std::os::fd::IntoRawFd as _;
+        let (mut told, tell) = std::io::pipe()?;
+        // Open as long as the program.
+        WAITING.store(tell.into_raw_fd(), Ordering::Relaxed);
+        std::thread::spawn(move || {
+            if told.read_exact(&mut [0]).is_ok() {
+                body();
+            }
+        });
+    }
+    #[cfg(not(unix))]
+    drop(body); // Ctrl-C ends the program there.
+    Ok(())
+}
+
 /// A second Ctrl-C ends the program at once.
 pub fn catch_interrupts() {
     #[cfg(unix)]
@@ -96,6 +123,11 @@ pub fn catch_interrupts() {
         extern "C" fn interrupted(_: i32) {
             if INTERRUPTED.swap(true, Ordering::Relaxed) {
                 crate::process::exit_now(i32::from(super::EXIT_INTERRUPTED));
+            }
+            let waiting = WAITING.load(Ordering::Relaxed);
+            if waiting >= 0 {
+                // SAFETY: `write` is allowed in a handler; the descriptor is never closed, the byte is there.
+                unsafe { nix::libc::write(waiting, [0u8].as_ptr().cast(), 1) };
             }
         }
         use nix::sys::signal::{SaFlags, SigAction, SigHandler, SigSet, Signal, sigaction};

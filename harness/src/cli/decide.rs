@@ -43,7 +43,13 @@ pub struct DecisionArguments {
     #[arg(long, value_name = "NAME")]
     by: Option<String>,
     /// The report's folder
-    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
     pub output: PathBuf,
 }
 
@@ -51,7 +57,13 @@ pub struct DecisionArguments {
 #[derive(clap::Args)]
 pub struct StatusArguments {
     /// The report's folder
-    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
     output: PathBuf,
 }
 
@@ -206,7 +218,9 @@ pub fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
         }
     }
     match found.as_slice() {
-        [(slug, numbers)] => Ok(Graded { entry: kept.graded(slug)?, numbers: numbers.clone() }),
+        [(slug, numbers)] => {
+            Ok(Graded { entry: kept.graded(output, slug)?, numbers: numbers.clone() })
+        }
         [] => bail!(
             "nobody in {} is \"{wanted}\"; expected a student number, a name, or a submission's folder such as {}",
             output.display(),

@@ -18,7 +18,13 @@ pub struct DefendArguments {
     /// The part, such as 1.3
     part: String,
     /// The report's folder
-    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
     output: PathBuf,
 }
 
@@ -43,7 +49,7 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
     let source = class::place_of(output, &slug).unwrap_or_else(|| "SUBMISSION".to_owned());
     let seed = report.held_back.as_ref().map_or("off".to_owned(), |own| own.seed.to_string());
     println!(
-        "  the instructor, on all:  umbra grade \"{source}\" --perturb {seed} --output ANOTHER"
+        "  the instructor, on all:  umbra grade \"{source}\" --perturb {seed} --report ANOTHER"
     );
     match (report.held_back.is_some(), report.released) {
         (false, _) => {}

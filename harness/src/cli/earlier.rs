@@ -51,7 +51,7 @@ impl Report {
         let file = output.join(report::JSON_FILE);
         let opened = std::fs::File::open(&file).with_context(|| {
             format!(
-                "cannot read {}: expected the --output of an earlier `umbra grade`",
+                "cannot read {}: expected the --report of an earlier `umbra grade`",
                 file.display()
             )
         })?;

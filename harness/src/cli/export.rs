@@ -73,7 +73,13 @@ pub struct ExportArguments {
     #[arg(long, value_enum)]
     format: Format,
     /// The report's folder
-    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
     output: PathBuf,
     #[command(flatten)]
     item: Item,

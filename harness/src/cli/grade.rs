@@ -25,16 +25,22 @@ pub struct GradeArguments {
     #[arg(long, value_enum, value_name = "KIND")]
     from: Option<Kind>,
     /// The class list: a CSV file as a learning platform exports it. Tells whose each submission is, and who is
-    /// missing; kept in --output for later runs
+    /// missing; kept in --report for later runs
     #[arg(long, value_name = "LIST.csv")]
     class: Option<PathBuf>,
-    /// Which of a student's attempts counts [default: as in earlier runs into --output, else latest]
+    /// Which of a student's attempts counts [default: as in earlier runs into --report, else latest]
     #[arg(long, value_enum)]
     attempt: Option<Attempt>,
     /// Where to write report.html, report.json, grades.csv and each submission's own report. Results
     /// are kept there too: the same command resumes an interrupted batch and grades what is new or has
     /// changed; other submissions join the class that is there
-    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
     output: PathBuf,
     /// Which adapter draws realtime scenes; software gives every machine the same pixels
     #[arg(long, value_enum, default_value_t = AdapterChoice::Software)]
@@ -47,14 +53,14 @@ pub struct GradeArguments {
     #[arg(long, value_enum, default_value_t = IsolationChoice::Full)]
     isolation: IsolationChoice,
     /// Seed of the held-back scenes, to reproduce a batch; off uses the public scenes alone [default:
-    /// the secret seed in --output, made when there is none]
+    /// the secret seed in --report, made when there is none]
     #[arg(long, value_name = "SEED|off", overrides_with = "perturb")]
     perturb: Option<Perturb>,
     /// Grade only this student's submission, by number, name or file name; the others keep their grades
     #[arg(long, value_name = "STUDENT")]
     only: Vec<String>,
     /// Grade only this share of the submissions, such as slice:2/4, and write no report: tasks on several machines share
-    /// --output, and `umbra merge` makes the reports
+    /// --report, and `umbra merge` makes the reports
     #[arg(long, value_name = "slice:K/N", conflicts_with = "only")]
     partition: Option<Slice>,
     /// Grade again what has not changed since it was graded
@@ -67,7 +73,7 @@ pub struct GradeArguments {
     /// Print what each stage cost
     #[arg(long)]
     timings: bool,
-    /// Also write the grades as `umbra export` does, into --output; may be repeated
+    /// Also write the grades as `umbra export` does, into --report; may be repeated
     #[arg(long, value_enum, value_name = "FORMAT", conflicts_with = "partition")]
     export: Vec<Format>,
     #[command(flatten)]
@@ -101,7 +107,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         Ended::Report(report, collected) => (report, collected),
         Ended::Slice(entries, all) => {
             println!(
-                "{} of {all} graded; `umbra merge --output {}` makes the reports when all tasks are done",
+                "{} of {all} graded; `umbra merge --report {}` makes the reports when all tasks are done",
                 count(entries.len(), "submission"),
                 arguments.output.display()
             );

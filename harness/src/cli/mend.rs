@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail, ensure};
 
 use super::batch::{Batch, Ended};
-use super::choices::{BudgetChoice, IsolationChoice, Perturb};
+use super::choices::{IsolationChoice, Perturb};
 use super::class;
-use super::context::{Context, cores};
+use super::context::Context;
 use super::decide::{DecisionArguments, one, said};
 use super::render::AdapterChoice;
 use super::settling::Kept;
@@ -66,23 +66,10 @@ pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8>
     let source = mended_source(arguments, root, &text, &record.slug, &record.digest)?;
     let seed = kept.held_back().map(|held_back| held_back.seed);
     let batch = Batch {
-        paths: vec![source],
-        output: &folder,
         adapter: arguments.adapter,
-        jobs: cores() as usize,
-        mode: Mode::Grade,
         isolation: arguments.isolation,
         perturb: Some(Perturb(seed)),
-        budget: BudgetChoice::Config,
-        asked: None,
-        only: &[],
-        slice: None,
-        from: None,
-        list: None,
-        attempt: None,
-        force: false,
-        keeps_plugin: None,
-        timings: false,
+        ..Batch::of(vec![source], &folder, Mode::Grade)
     };
     let Ended::Report(..) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
     let made = decision.mend(&graded, text, mend.penalty)?;

@@ -7,12 +7,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail, ensure};
 
 use super::batch::{Batch, Ended};
-use super::choices::{BudgetChoice, IsolationChoice, Perturb};
+use super::choices::{IsolationChoice, Perturb};
 use super::class::{self, some};
 use super::context::Context;
 use super::grade;
 use super::join::join;
-use super::render::AdapterChoice;
 use super::settling::{self, Found, Seen};
 use crate::class::{Decided, Pins, Stated};
 use crate::columns::count;
@@ -25,7 +24,13 @@ use crate::rubric;
 #[derive(clap::Args)]
 pub struct MergeArguments {
     /// The folder that all tasks graded into
-    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
     output: PathBuf,
     /// Merge records of machines that differ in isolation, graphics adapter or compiler: one submission of each other
     /// kind of machine is graded again on this one, and verdicts that differ are printed
@@ -97,7 +102,7 @@ fn one(output: &Path, begun: Vec<(PathBuf, Found)>) -> anyhow::Result<Found> {
     let instructor = output.join(report::INSTRUCTOR);
     ensure!(
         !begun.is_empty(),
-        "{}: nothing to merge; expected tasks that ran `umbra grade --partition slice:K/N --output {}`",
+        "{}: nothing to merge; expected tasks that ran `umbra grade --partition slice:K/N --report {}`",
         output.display(),
         output.display()
     );
@@ -188,23 +193,12 @@ fn compare(
     let only: Vec<String> = samples.iter().map(|record| record.slug.clone()).collect();
     let again = scratch.path().join("again");
     let batch = Batch {
-        paths: found.paths.clone(),
-        output: &again,
-        adapter: AdapterChoice::Software,
         jobs: 1,
-        mode: Mode::Grade,
         isolation: IsolationChoice::Reduced,
         perturb: Some(Perturb(found.held_back.as_ref().map(|held_back| held_back.seed))),
-        budget: BudgetChoice::Config,
-        asked: None,
         only: &only,
-        slice: None,
         from: Some(found.kind),
-        list: None,
-        attempt: None,
-        force: false,
-        keeps_plugin: None,
-        timings: false,
+        ..Batch::of(found.paths.clone(), &again, Mode::Grade)
     };
     eprintln!("umbra: {} graded again on this machine", count(samples.len(), "submission"));
     let Ended::Report(made, _) = batch.run(root)? else { bail!("interrupted") };

@@ -18,6 +18,7 @@ mod export;
 mod grade;
 mod gradescope_pack;
 mod join;
+mod likeness;
 mod mend;
 mod merge;
 mod regrade;
@@ -104,6 +105,8 @@ enum Command {
     /// Write the grades of a report as another program takes them: a learning platform's grade book, feedback for each
     /// student, Gradescope's results, JUnit
     Export(export::ExportArguments),
+    /// Show submissions whose sources are alike side by side; takes what JPlag found. Costs nobody points
+    Likeness(likeness::LikenessArguments),
     /// Write an autograder for Gradescope: a zip that installs and builds Umbra there and grades each submission
     GradescopePack(gradescope_pack::PackArguments),
     /// Check the tree of submissions against the handout's; exits with 0 when all conform, 1 when not
@@ -156,13 +159,6 @@ pub fn main() -> ExitCode {
         (Some("__exec"), Some(program)) => return crate::process::exec_main(program, &args[2..]),
         _ => {}
     }
-    // A reader that has seen enough (`umbra ... | head`) is no error and no panic.
-    #[cfg(unix)]
-    // SAFETY: the default action replaces an ignored signal; no handler runs.
-    let _ = unsafe {
-        use nix::sys::signal::{SigHandler, Signal, signal};
-        signal(Signal::SIGPIPE, SigHandler::SigDfl)
-    };
     panics::note();
     let Arguments { command, root } = Arguments::try_parse().unwrap_or_else(|error| {
         if error.kind() != clap::error::ErrorKind::DisplayHelp {
@@ -171,9 +167,12 @@ pub fn main() -> ExitCode {
         let help = error.render();
         let help = if terminal::colours() { help.ansi().to_string() } else { help.to_string() };
         print!("{}", wrapped(&help, terminal::width().min(HELP_COLUMNS)));
+        crate::output::end_of_closed_pipe();
         std::process::exit(i32::from(EXIT_OK))
     });
-    match panics::contain(|| run(command, root.as_deref())) {
+    let ended = panics::contain(|| run(command, root.as_deref()));
+    crate::output::end_of_closed_pipe();
+    match ended {
         Ok(Ok(code)) => ExitCode::from(code),
         Err(bug) => match bug.unprintable() {
             Some(error) => {
@@ -273,6 +272,7 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Regrade(arguments) => regrade::regrade(&arguments, root),
         Command::Status(arguments) => decide::status(&arguments),
         Command::Export(arguments) => export::export(&arguments),
+        Command::Likeness(arguments) => likeness::run(&arguments, root),
         Command::GradescopePack(arguments) => gradescope_pack::run(&arguments, root),
         Command::Validate(arguments) => tree::validate(&arguments, root),
         Command::Pack(arguments) => tree::pack(&arguments, root),

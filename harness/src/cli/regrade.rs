@@ -26,7 +26,13 @@ pub struct RegradeArguments {
     #[arg(long, value_name = "TEXT")]
     reason: Option<String>,
     /// The report's folder
-    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
     output: PathBuf,
 }
 

@@ -21,7 +21,13 @@ const SCENES: &str = "held-back-scenes.zip";
 #[derive(clap::Args)]
 pub struct ReleaseArguments {
     /// The report's folder
-    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
     output: PathBuf,
 }
 

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::class::{self, WORK};
+use crate::class::jplag;
 use crate::class::matching::{Match, find};
 use crate::class::mending;
 use crate::class::overrides::{Applied, Subject};
@@ -204,7 +205,7 @@ impl Kept {
         let pins = Pins::read(&instructor)?;
         let Some(found) = Found::read(output)?.filter(|_| pins.current().is_some()) else {
             bail!(
-                "{}: expected the --output of an earlier `umbra grade` of this version; hint: grade once more",
+                "{}: expected the --report of an earlier `umbra grade` of this version; hint: grade once more",
                 output.display()
             );
         };
@@ -222,6 +223,11 @@ impl Kept {
     /// What is held back, if anything.
     pub fn held_back(&self) -> Option<&HeldBack> {
         self.found.held_back.as_ref()
+    }
+
+    /// Where the submissions were looked for.
+    pub fn paths(&self) -> &[PathBuf] {
+        &self.found.paths
     }
 
     /// What is pinned.
@@ -254,9 +260,9 @@ impl Kept {
     ///
     /// # Errors
     /// When it is not there.
-    pub fn graded(&self, slug: &str) -> anyhow::Result<SubmissionReport> {
+    pub fn graded(&self, output: &Path, slug: &str) -> anyhow::Result<SubmissionReport> {
         let mut record = whole(&self.records, slug)?;
-        Shared::of(self.records.iter().map(|own| &own.record)).judge(&mut record);
+        shared(output, &self.records)?.judge(&mut record);
         Ok(graded(record, &self.decided()?.assignment.rules))
     }
 
@@ -341,6 +347,13 @@ impl Settled {
     }
 }
 
+/// What submissions have in common, also as JPlag says.
+fn shared(output: &Path, records: &[Earlier]) -> anyhow::Result<Shared> {
+    let near = jplag::kept(&output.join(report::INSTRUCTOR).join(report::LIKENESS))?;
+    let near = near.iter().map(|pair| (&pair.who, pair.similarity));
+    Ok(Shared::of(records.iter().map(|earlier| &earlier.record)).with_near(near))
+}
+
 /// The whole record of a submission.
 fn whole(records: &[Earlier], slug: &str) -> anyhow::Result<Record> {
     let own = records.iter().find(|own| own.record.slug == slug);
@@ -381,7 +394,7 @@ pub fn settled(
     found.name(&mut records);
     // In an order that does not hang on who was graded when.
     records.sort_by_key(|earlier| earlier.record.slug.to_lowercase());
-    let shared = Shared::of(records.iter().map(|earlier| &earlier.record));
+    let shared = shared(output, &records)?;
     let claims: Vec<Claim> =
         records.iter().map(|earlier| class::claim(output, &earlier.record)).collect();
     let mut entries: Vec<SubmissionReport> = Vec::new();
@@ -472,7 +485,9 @@ pub fn settled(
     let held_back = found.held_back.clone();
     let released = output.join(report::INSTRUCTOR).join(RELEASED).is_file();
     let settled = BatchReport::settled(stated.clone(), held_back, counting, class);
-    Ok(Settled { report: BatchReport { released, ..settled }, records, shared })
+    let alike = output.join(report::INSTRUCTOR).join(report::LIKENESS);
+    let has_alike = alike.join(report::HTML_FILE).is_file();
+    Ok(Settled { report: BatchReport { released, has_alike, ..settled }, records, shared })
 }
 
 /// Points that are others in `after`, by submission and part.

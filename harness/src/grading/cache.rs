@@ -53,6 +53,7 @@ impl Earlier {
             evidence: Evidence::default(),
             diagnoses: Vec::new(),
             views: Vec::new(),
+            error_maps: Vec::new(),
             ..record
         };
         Self { record, comparable, folder: Some(instructor.to_owned()) }

@@ -7,14 +7,16 @@ use basecode::Image;
 
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
-use super::record::Folders;
+use super::record::{Folders, SceneErrors};
 use super::submitted::SubmittedImage;
 use crate::evidence::images::{Kind, compare_pixels, reference_of};
 use crate::evidence::{Check, CheckId, Picture, Verdict};
+use crate::imaging::error_map::ErrorMap;
 use crate::imaging::evidence::Tolerances;
 use crate::imaging::pictures::{self, full_scale, signed_error, tone_mapped};
 use crate::viewer::{
-    Layer, LayerKind, ViewedCase, remove_others, write_excess, write_image, write_mask,
+    ImageFile, Layer, LayerKind, ViewedCase, remove_others, write_excess, write_image, write_mask,
+    write_shared,
 };
 
 /// What the values of renders are.
@@ -55,6 +57,22 @@ impl Images<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Where the errors lie of those that the code drew wrongly.
+    pub fn error_maps(&self, checks: &[Check]) -> Vec<SceneErrors> {
+        let failed = checks.iter().filter(|check| check.verdict == Verdict::Fail);
+        let map = |check: &Check| {
+            let case = self.case_of(check)?;
+            let (kind, actual) = self.image_of(check, case)?;
+            let own = [Kind::Realtime, Kind::RealtimeShadows].contains(&kind)
+                || check.id == CheckId::ImageOffline;
+            let (reference, mask) = reference_of(kind, &case.expected);
+            let map = ErrorMap::of(actual, reference, mask, case.expected.offline.median_lit)?;
+            let (scene, held_back) = (check.scene.clone(), check.held_back);
+            own.then_some(SceneErrors { check: check.id, scene, held_back, map })
+        };
+        failed.filter_map(map).collect()
     }
 
     /// Writes the images of each kind of check that failed, on its worst scene, public and held back, for the viewer.
@@ -195,14 +213,28 @@ fn view(
     let Ok((found, excess)) = compare_pixels(kind, actual, expected, tolerances) else {
         return Ok(view);
     };
-    let right = write_image(folder, reference)?;
+    // A student's folder is whole by itself; the instructor's have what all are compared with once.
+    let write = |image: &dyn Fn(&Path) -> std::io::Result<ImageFile>| match check.held_back {
+        true => write_shared(folder, image),
+        false => image(folder),
+    };
+    let right = write(&|folder| write_image(folder, reference))?;
     view.layers.push(Layer::image("expected", &right));
     view.layers.push(Layer::difference("difference", &mine, &right));
     let size = (actual.width, actual.height);
-    let layer = |name: &str, kind, image| Layer { name: name.into(), kind, image, against: None };
+    let layer = |name: &str, kind, image: ImageFile| Layer {
+        name: name.into(),
+        kind,
+        image,
+        against: None,
+    };
     let excess = write_excess(folder, size, &excess)?;
     view.layers.push(layer("difference over bound", LayerKind::Excess, excess));
-    view.layers.push(layer("regions", LayerKind::Regions, write_mask(folder, mask)?));
+    view.layers.push(layer(
+        "regions",
+        LayerKind::Regions,
+        write(&|folder| write_mask(folder, mask))?,
+    ));
     view.regions = mask.regions.iter().map(|region| region.name.clone()).collect();
     view.worst = found.worst.map(|worst| [worst.x, worst.y]);
     view.area = found.largest_failing.map(|area| [area.x, area.y, area.width, area.height]);

@@ -277,6 +277,7 @@ impl<'a> Grading<'a> {
         }
         let images = Images { cases: &self.cases, drawn: &drawn, submitted: &submitted };
         images.draw(&mut checks, out)?;
+        record.error_maps = images.error_maps(&checks);
         record.views = images.view(&checks, &self.assignment.tolerances, out)?;
         costs.end("pictures", 0.0);
         record.evidence = Evidence { checks };
@@ -311,6 +312,7 @@ impl<'a> Grading<'a> {
             evidence: Evidence::default(),
             diagnoses: Vec::new(),
             views: Vec::new(),
+            error_maps: Vec::new(),
             images: Vec::new(),
             sources: Vec::new(),
             stages: Vec::new(),

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::image_digest::ImageDigest;
 use super::likeness::SourceDigest;
 use crate::diagnosis::Diagnosis;
-use crate::evidence::Evidence;
+use crate::evidence::{CheckId, Evidence};
+use crate::imaging::error_map::ErrorMap;
 use crate::intake::{Field, Finding, SubmittedConfig};
 use crate::viewer::ViewedCase;
 
@@ -44,6 +45,9 @@ pub struct Record {
     /// The images that the viewer shows: of each check of images that failed, the worst scene.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub views: Vec<ViewedCase>,
+    /// Where the errors of its images lie, for the page of the class.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub error_maps: Vec<SceneErrors>,
     /// The images submitted whose noise tells them from anybody else's.
     #[serde(default)]
     pub images: Vec<ImageDigest>,
@@ -54,6 +58,19 @@ pub struct Record {
     pub stages: Vec<StageCost>,
     /// Under which conditions.
     pub conditions: Conditions,
+}
+
+/// Where the errors of an image lie.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SceneErrors {
+    /// The check that it failed.
+    pub check: CheckId,
+    /// Its scene.
+    pub scene: String,
+    /// Whether that is held back from students.
+    pub held_back: bool,
+    /// The error.
+    pub map: ErrorMap,
 }
 
 /// Credentials, as the submission states them.

@@ -12,6 +12,10 @@ const SHARED: CheckId = CheckId::SubmittedShared;
 /// The check of student numbers.
 const NUMBER: CheckId = CheckId::SubmissionNumber;
 
+/// Sources are much alike from this share of matching tokens on. It says only whom to look at: renderers of one handout
+/// are alike in much, and nobody loses points by it.
+pub const ALIKE: f64 = 0.8;
+
 /// The check of sources.
 const LIKENESS: CheckId = CheckId::SubmissionLikeness;
 
@@ -24,11 +28,32 @@ const LIKENESS: CheckId = CheckId::SubmissionLikeness;
 pub struct Shared {
     images: BTreeMap<String, Owners>,
     numbers: BTreeMap<String, Owners>,
-    sources: BTreeMap<String, Owners>,
+    sources: BTreeMap<String, BTreeSet<Author>>,
+    /// Whose a submission is.
+    persons: BTreeMap<String, String>,
+    /// What is much like a submission, and how much in [0, 1].
+    near: BTreeMap<String, Vec<(String, f64)>>,
 }
 
 /// Who it is, and in which submission.
 type Owners = BTreeSet<(String, String)>;
+
+/// Who wrote a file.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Author {
+    person: String,
+    slug: String,
+    path: String,
+}
+
+/// Two submissions with files that are the same but for comments, blanks and the template.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SameFiles {
+    /// Their folders in the report.
+    pub who: [String; 2],
+    /// The paths of each file in the two.
+    pub paths: Vec<[String; 2]>,
+}
 
 /// Adds to every record of a batch what it shares with others, see [`Shared::judge`].
 pub fn judge_shared(records: &mut [Record]) {
@@ -41,8 +66,10 @@ impl Shared {
     pub fn of<'a>(records: impl Iterator<Item = &'a Record>) -> Self {
         let mut shared = Self::default();
         for record in records {
+            shared.persons.insert(record.slug.clone(), person(record));
             for source in &record.sources {
-                let author = (person(record), format!("{}: {}", record.slug, source.path));
+                let (slug, path) = (record.slug.clone(), source.path.clone());
+                let author = Author { person: person(record), slug, path };
                 shared.sources.entry(source.sha256.clone()).or_default().insert(author);
             }
             for image in &record.images {
@@ -55,6 +82,53 @@ impl Shared {
             }
         }
         shared
+    }
+
+    /// With pairs of submissions, by their folders, whose sources something else found alike, and how much in [0, 1].
+    /// Those of one person and those below [`ALIKE`] are left out.
+    #[must_use]
+    pub fn with_near<'a>(
+        mut self,
+        pairs: impl IntoIterator<Item = (&'a [String; 2], f64)>,
+    ) -> Self {
+        for (who, similarity) in pairs {
+            let [first, second] = who.each_ref().map(|slug| self.persons.get(slug));
+            if similarity < ALIKE || first.is_none() || second.is_none() || first == second {
+                continue;
+            }
+            for [own, other] in [[0, 1], [1, 0]] {
+                let near = self.near.entry(who[own].clone()).or_default();
+                near.push((who[other].clone(), similarity));
+            }
+        }
+        self
+    }
+
+    /// Whether two submissions, by their folders, are one person's.
+    pub fn is_one_person(&self, who: &[String; 2]) -> bool {
+        let [first, second] = who.each_ref().map(|slug| self.persons.get(slug));
+        first.is_some() && first == second
+    }
+
+    /// Which submissions of two persons share files, in the order of their folders.
+    pub fn same_files(&self) -> Vec<SameFiles> {
+        let mut pairs: BTreeMap<[&str; 2], Vec<[String; 2]>> = BTreeMap::new();
+        for authors in self.sources.values() {
+            let authors: Vec<&Author> = authors.iter().collect();
+            for (at, first) in authors.iter().enumerate() {
+                for second in authors[at + 1..].iter().filter(|own| own.person != first.person) {
+                    let mut pair = [first, second];
+                    pair.sort_by_key(|author| &author.slug);
+                    let paths = pair.map(|author| author.path.clone());
+                    pairs.entry(pair.map(|author| author.slug.as_str())).or_default().push(paths);
+                }
+            }
+        }
+        let pairs = pairs.into_iter().map(|(who, mut paths)| {
+            paths.sort();
+            SameFiles { who: who.map(str::to_owned), paths }
+        });
+        pairs.collect()
     }
 
     /// Adds to a record of the batch which of its images and sources another person submitted too, and whether its student
@@ -86,28 +160,39 @@ impl Shared {
                 found.push(Check { private, ..check });
             }
         }
-        found.extend(like(record, &self.sources, &person));
+        found.extend(self.like(record, &person));
         record.evidence.checks.extend(found);
     }
-}
 
-/// Which files of a source are others', too. Nobody loses points by it.
-fn like(record: &Record, authors: &BTreeMap<String, Owners>, person: &str) -> Option<Check> {
-    let shared = record.sources.iter().filter_map(|source| {
-        let others = others(&authors[&source.sha256], person);
-        let SourceDigest { path, signs, .. } = source;
-        (!others.is_empty()).then(|| format!("{path} ({signs} signs of its own) is {others}"))
-    });
-    let shared: Vec<String> = shared.collect();
-    (!shared.is_empty()).then(|| {
-        let summary = format!(
-            "{} of {} files with a text of their own are another submission's too, but for comments and blanks",
-            shared.len(),
-            record.sources.len()
-        );
+    /// Which files of a source are others', too, and whose source is much like it. Nobody loses points by it.
+    fn like(&self, record: &Record, person: &str) -> Option<Check> {
+        let mut same = Vec::new();
+        for SourceDigest { path, signs, sha256 } in &record.sources {
+            let others = self.sources[sha256].iter().filter(|author| author.person != person);
+            let others: Vec<_> =
+                others.map(|Author { slug, path, .. }| format!("{slug}: {path}")).collect();
+            if !others.is_empty() {
+                let others = others.join(", ");
+                same.push(format!("{path} ({signs} signs of its own) is {others}"));
+            }
+        }
+        let near = self.near.get(&record.slug).map(Vec::as_slice).unwrap_or_default();
+        let summary = match (same.len(), near.len()) {
+            (0, 0) => return None,
+            (0, near) => format!("much like {near} other submission(s)"),
+            (same, _) => format!(
+                "{same} of {} files with a text of their own are another submission's too, but for comments and \
+                 blanks",
+                record.sources.len()
+            ),
+        };
+        let near = near.iter().map(|(slug, similarity)| {
+            format!("{:.0} % of the tokens match {slug} (JPlag)", 100.0 * similarity)
+        });
+        same.extend(near);
         let check = Check::new(LIKENESS, "", Verdict::Fail, summary);
-        Check { private: shared.join("; "), ..check }
-    })
+        Some(Check { private: same.join("; "), ..check })
+    }
 }
 
 /// The submissions of others than `own`.
@@ -162,6 +247,7 @@ mod tests {
             },
             diagnoses: Vec::new(),
             views: Vec::new(),
+            error_maps: Vec::new(),
             images: vec![image],
             sources: Vec::new(),
             stages: Vec::new(),
@@ -236,7 +322,7 @@ mod tests {
         assert_eq!(found["ada"], "src/a.rs (300 signs of its own) is bob: src/mine.rs");
         assert_eq!(
             found["bob"],
-            "src/mine.rs (300 signs of its own) is ada-again: src/a.rs, ada: src/a.rs"
+            "src/mine.rs (300 signs of its own) is ada: src/a.rs, ada-again: src/a.rs"
         );
         assert_eq!(found["eve"], "");
         let again = batch.clone();

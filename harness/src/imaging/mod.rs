@@ -7,6 +7,7 @@ pub mod blob;
 pub mod compare;
 pub mod correlation;
 pub mod difference;
+pub mod error_map;
 pub mod evidence;
 pub mod flip;
 pub mod likeness;

@@ -22,7 +22,7 @@ const MIDDLE: f32 = 0.25;
 /// This linear value becomes white.
 const WHITE: f32 = 8.0;
 /// Errors are relative to the expected value, but to no less than this fraction of the median lit value.
-const DARKEST: f32 = 0.05;
+pub(super) const DARKEST: f32 = 0.05;
 /// The largest side of an enlarged detail in pixels.
 const DETAIL_SIDE: usize = 384;
 

@@ -29,7 +29,7 @@ fn a_class_of_a_thousand_is_sorted_searched_and_filtered_at_once() {
         report.entries.push(entry);
     }
     let browser = &mut browser;
-    open(browser, folder.path(), &html_batch(&report).unwrap());
+    open(browser, folder.path(), &html_batch(&report, &[]).unwrap());
     assert_eq!(browser.value("document.querySelectorAll('.grades tbody tr').length"), 1000);
     // One action and the layout after it; the bound is for a busy machine.
     let mut takes = |action: &str| {
@@ -67,8 +67,11 @@ fn nobody_is_shut_out() {
     let submission = |reader| {
         html_submission(&report, &report.entries[1], reader).replace("<details", "<details open")
     };
-    let pages =
-        [html_batch(&report).unwrap(), submission(Reader::Student), submission(Reader::Instructor)];
+    let pages = [
+        html_batch(&report, &[]).unwrap(),
+        submission(Reader::Student),
+        submission(Reader::Instructor),
+    ];
     for page in pages {
         open(&mut browser, folder.path(), &page);
         assert_eq!(browser.serious_findings(), Vec::<String>::new());

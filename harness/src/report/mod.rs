@@ -14,6 +14,7 @@ mod browser_tests;
 #[path = "../../tests/support/chromium.rs"]
 mod chromium;
 mod csv;
+mod errors;
 mod html;
 mod json;
 mod number;
@@ -33,8 +34,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use self::csv::grades as csv_grades;
+pub use self::errors::{ClassErrors, ERRORS, ErrorPicture};
 pub use self::html::{
-    Reader, batch as html_batch, submission as html_submission, viewer as html_viewer,
+    Alike, AlikePage, LIKENESS, Reader, batch as html_batch, submission as html_submission,
+    viewer as html_viewer, write_alike,
 };
 pub use self::json::{SCHEMA, VERSION, report_json};
 pub use self::outline::outline;
@@ -119,6 +122,9 @@ pub struct BatchReport {
     /// Whether students may see what was held back.
     #[serde(default)]
     pub released: bool,
+    /// Whether there are pages that show pairs of submissions which are alike.
+    #[serde(default)]
+    pub has_alike: bool,
 }
 
 impl SubmissionReport {
@@ -224,6 +230,7 @@ impl BatchReport {
             entries,
             class: None,
             released: false,
+            has_alike: false,
         }
     }
 
@@ -236,7 +243,18 @@ impl BatchReport {
     ) -> Self {
         let Stated { name: assignment, title, course, due, rules, .. } = stated;
         let class = Some(class);
-        Self { assignment, title, course, due, rules, held_back, entries, class, released: false }
+        Self {
+            assignment,
+            title,
+            course,
+            due,
+            rules,
+            held_back,
+            entries,
+            class,
+            released: false,
+            has_alike: false,
+        }
     }
 
     fn check(&self) -> Result<(), ReportError> {
@@ -285,8 +303,10 @@ pub type Whole<'a> =
 /// As [`write`], and when an entry cannot be had.
 pub fn write_outlined(out: &Path, report: &BatchReport, whole: &Whole) -> Result<(), ReportError> {
     report.check()?;
+    let mut errors = ClassErrors::default();
     for outlined in &report.entries {
         let entry = &*whole(outlined)?;
+        errors.add(&entry.record);
         let slug = &entry.record.slug;
         let page = html_submission(report, entry, Reader::Student);
         if report.released {
@@ -305,7 +325,12 @@ pub fn write_outlined(out: &Path, report: &BatchReport, whole: &Whole) -> Result
     let path = out.join(JSON_FILE);
     write_whole_by(&path, |file| json::write(report, whole, file))
         .map_err(|source| ReportError::Write { path, source })?;
-    put(out, HTML_FILE, html_batch(report)?.as_bytes())
+    // A class of one has its own page for that.
+    let errors = match report.entries.len() {
+        1 => Vec::new(),
+        _ => errors.write(&out.join(INSTRUCTOR).join(ERRORS))?,
+    };
+    put(out, HTML_FILE, html_batch(report, &errors)?.as_bytes())
 }
 
 /// Copies the pictures of held-back scenes from the instructor's folder to the student's.

@@ -31,6 +31,7 @@ pub fn outline(mut entry: SubmissionReport) -> SubmissionReport {
     record.diagnoses = diagnoses.map(|found| Diagnosis { pictures: Vec::new(), ..found }).collect();
     record.diagnostics = String::new();
     record.views = Vec::new();
+    record.error_maps = Vec::new();
     record.sources = Vec::new();
     record.images = Vec::new();
     entry
@@ -93,7 +94,7 @@ mod tests {
         let outlined = BatchReport { entries, ..whole.clone() };
         let pages = |report: &BatchReport| {
             [
-                html_batch(report).unwrap(),
+                html_batch(report, &[]).unwrap(),
                 csv_grades(report).unwrap(),
                 text_table(report, 100, false).unwrap(),
             ]

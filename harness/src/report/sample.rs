@@ -25,6 +25,7 @@ pub(crate) fn report() -> BatchReport {
         entries: vec![perfect(), two_cosines(), does_not_build()],
         class: None,
         released: false,
+        has_alike: false,
     }
 }
 
@@ -62,6 +63,7 @@ fn entry(name: &str, slug: &str, student: [&str; 3], conditions: Conditions) -> 
         evidence: Evidence::default(),
         diagnoses: Vec::new(),
         views: Vec::new(),
+        error_maps: Vec::new(),
         images: Vec::new(),
         sources: Vec::new(),
         stages: vec![

@@ -5,7 +5,7 @@ mod pack;
 
 use serde::{Deserialize, Serialize};
 
-pub use pack::{remove_others, write_excess, write_image, write_mask};
+pub use pack::{remove_others, write_excess, write_image, write_mask, write_shared};
 
 /// The folder of the data files, beside the page.
 pub const DATA_FOLDER: &str = "viewer";
@@ -76,7 +76,7 @@ pub enum LayerKind {
 /// A data file, and what is needed to read it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ImageFile {
-    /// Its path from the page.
+    /// Its path from the page's folder: below it, or below the one above where several pages share it.
     pub file: String,
     /// Width in pixels.
     pub width: usize,

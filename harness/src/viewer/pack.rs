@@ -16,6 +16,8 @@ use crate::imaging::reference::RegionMask;
 
 /// Level of zlib: higher ones take three times as long for 2 % of the bytes, since most bits are noise.
 const LEVEL: u32 = 3;
+/// What the path of a shared file begins with.
+const ABOVE: &str = "../";
 /// Hexadecimal digits of a digest in a file's name.
 const DIGITS: usize = 20;
 
@@ -34,6 +36,20 @@ pub fn write_image(folder: &Path, image: &Image) -> io::Result<ImageFile> {
     };
     let about = (image.width, image.height, 3, samples);
     write(folder, about, &planes)
+}
+
+/// Writes what `write` does into the folder above, which the pages in several folders share: of a class, each image that
+/// all are compared with is there once.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_shared(
+    folder: &Path,
+    write: impl FnOnce(&Path) -> io::Result<ImageFile>,
+) -> io::Result<ImageFile> {
+    let above = folder.parent().ok_or(io::ErrorKind::NotFound)?;
+    let image = write(above)?;
+    Ok(ImageFile { file: format!("{ABOVE}{}", image.file), ..image })
 }
 
 /// Writes how far each pixel lies off, over what is allowed there: above 1 it fails. Rounded to halves, but never
@@ -198,6 +214,26 @@ mod tests {
         assert_ne!(write_image(folder.path(), &image).unwrap().file, file.file);
         // The same zeros in another shape are another image.
         assert_ne!(write_image(folder.path(), &Image::new(3, 5)).unwrap().file, file.file);
+    }
+
+    #[test]
+    fn a_shared_image_is_one_file_for_all_folders_beside_it() {
+        let place = tempfile::tempdir().unwrap();
+        let [ann, bob] = ["ann", "bob"].map(|name| {
+            let folder = place.path().join(name);
+            let file =
+                write_shared(&folder, |above| write_image(above, &Image::new(5, 3))).unwrap();
+            assert!(folder.join("x").parent().is_some() && !folder.join(DATA_FOLDER).exists());
+            file
+        });
+        assert_eq!(ann, bob);
+        let name = ann.file.strip_prefix("../viewer/").unwrap();
+        let files = files_below(place.path()).unwrap();
+        assert_eq!(files, [place.path().join(DATA_FOLDER).join(name)]);
+        // A folder of one's own takes away none of them.
+        std::fs::create_dir_all(place.path().join("ann").join(DATA_FOLDER)).unwrap();
+        remove_others(&place.path().join("ann"), &[]).unwrap();
+        assert!(files[0].is_file());
     }
 
     #[test]

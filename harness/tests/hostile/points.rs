@@ -128,6 +128,7 @@ fn record(name: &str, evidence: Evidence) -> Record {
         images: Vec::new(),
         sources: Vec::new(),
         views: Vec::new(),
+        error_maps: Vec::new(),
         stages: Vec::new(),
         conditions: Conditions::default(),
     }

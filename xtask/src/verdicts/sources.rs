@@ -44,7 +44,7 @@ pub fn grade(
     }
     let mut command = Command::new(umbra);
     command.arg("grade").args(samples.iter().map(|sample| &sample.archive));
-    command.arg("--output").arg(&out).arg("--root").arg(root);
+    command.arg("--report").arg(&out).arg("--root").arg(root);
     command.args(["--perturb", PERTURB]);
     if let Some(adapter) = arguments.adapter.to_possible_value() {
         command.args(["--adapter", adapter.get_name()]);

@@ -7,12 +7,11 @@ mod live;
 mod page;
 mod server;
 
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -21,13 +20,11 @@ use notify::{EventKind, RecursiveMode, Watcher as _};
 
 use self::live::LiveView;
 use self::server::{Board, Look, Server, Stage};
-use super::context::{Context, INTERRUPTED};
+use super::context::{Context, on_interrupt};
 use crate::assignment::SceneEntry;
 
 /// An editor writes several files, and one in several steps: a save is over after so long without another change.
 const QUIET: Duration = Duration::from_millis(150);
-/// Ctrl-C is looked for so often.
-const TICK: Duration = Duration::from_millis(500);
 /// A check that was told to end has so long to do so.
 const GRACE: Duration = Duration::from_secs(10);
 
@@ -46,7 +43,13 @@ pub struct WatchArguments {
     #[arg(long, value_name = "NAME")]
     scene: Vec<String>,
     /// Where to write the report with its pictures
-    #[arg(long, short, value_name = "DIR", default_value = "umbra-report")]
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
     output: PathBuf,
 }
 
@@ -60,7 +63,12 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     let context = Context::new(root)?;
     let live = Arc::new(LiveView::new(&context.assignment, &context.supervisor, &arguments.scene)?);
 
-    let (changed, changes) = channel();
+    let (happened, happens) = channel();
+    let interrupted = happened.clone();
+    on_interrupt(move || {
+        let _ = interrupted.send(Happened::Interrupted);
+    })?;
+    let changed = happened.clone();
     let (watched, written) = (folder.clone(), output.clone());
     let mut watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
         // What cannot be told counts as a change.
@@ -70,7 +78,8 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
             Err(_) => vec![watched.clone()],
         };
         for path in paths.iter().filter(|path| is_source(path, &watched, &written)) {
-            let _ = changed.send(if is_shader(path) { Change::Shader } else { Change::Other });
+            let change = if is_shader(path) { Change::Shader } else { Change::Other };
+            let _ = changed.send(Happened::Saved(change));
         }
     })?;
     watcher.watch(&folder, RecursiveMode::Recursive).with_context(name)?;
@@ -100,29 +109,30 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
         root,
         board: &board,
         live: &live,
+        happened,
         scene,
         realtime: parts.map(|part| part.id.clone()).collect(),
     };
-    let mut running = Some(check.start(Change::Other)?);
+    let mut begun = 0;
+    let mut running = Some(check.start(Change::Other, &mut begun)?);
     // Whether the last whole report tells how the offline half of the source is now.
     let mut offline_holds = false;
     loop {
-        match wait(&changes, running.as_mut()) {
+        match wait(&happens) {
             Happened::Saved(change) => {
                 if let Some(older) = running.take() {
                     older.end();
                 }
                 offline_holds &= change == Change::Shader;
-                running = Some(check.start(if offline_holds {
-                    Change::Shader
-                } else {
-                    Change::Other
-                })?);
+                let change = if offline_holds { Change::Shader } else { Change::Other };
+                running = Some(check.start(change, &mut begun)?);
             }
-            Happened::Ended(status) => {
-                if let Some(ended) = running.take() {
+            Happened::Ended(number) => {
+                // An older one was ended by a save.
+                if let Some(mut ended) = running.take_if(|running| running.number == number) {
+                    let status = ended.child.wait()?;
                     offline_holds |= ended.look == Look::Whole && is_judged(status);
-                    running = check.go_on(ended, status)?;
+                    running = check.go_on(ended, status, &mut begun)?;
                 }
             }
             Happened::Interrupted => {
@@ -167,39 +177,33 @@ enum Change {
 }
 
 /// What a watch waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Happened {
     Saved(Change),
-    Ended(ExitStatus),
+    /// The check with this number.
+    Ended(usize),
     Interrupted,
 }
 
-fn wait(changes: &Receiver<Change>, mut running: Option<&mut Running>) -> Happened {
-    // While a check runs its end is looked for, else only Ctrl-C.
-    let tick = if running.is_some() { QUIET } else { TICK };
-    loop {
-        if INTERRUPTED.load(Ordering::Relaxed) {
-            return Happened::Interrupted;
-        }
-        match changes.recv_timeout(tick) {
-            Ok(mut all) => {
-                while let Ok(next) = changes.recv_timeout(QUIET) {
-                    if next == Change::Other {
-                        all = next;
-                    }
-                }
-                return Happened::Saved(all);
-            }
-            Err(RecvTimeoutError::Disconnected) => return Happened::Interrupted,
-            Err(RecvTimeoutError::Timeout) => {}
-        }
-        if let Some(status) = running.as_mut().and_then(|run| run.child.try_wait().ok().flatten()) {
-            return Happened::Ended(status);
+/// What happens next; of a save, all that belongs to it. Nothing is looked at until then: an idle watch costs nothing.
+fn wait(happens: &Receiver<Happened>) -> Happened {
+    let Ok(first) = happens.recv() else { return Happened::Interrupted };
+    let Happened::Saved(mut all) = first else { return first };
+    while let Ok(next) = happens.recv_timeout(QUIET) {
+        match next {
+            Happened::Saved(change) if change == Change::Other => all = change,
+            // What ended is about the save before.
+            Happened::Saved(_) | Happened::Ended(_) => {}
+            Happened::Interrupted => return next,
         }
     }
+    Happened::Saved(all)
 }
 
 /// A check that runs.
 struct Running {
+    /// Tells it from others.
+    number: usize,
     child: Child,
     /// Puts what it says on the board.
     said: Option<JoinHandle<()>>,
@@ -240,6 +244,8 @@ struct Check<'a> {
     root: Option<&'a Path>,
     board: &'a Arc<Board>,
     live: &'a Arc<LiveView>,
+    /// Where it is told that a check has ended.
+    happened: Sender<Happened>,
     /// The scene of the first look.
     scene: Option<String>,
     /// The parts of the realtime half.
@@ -253,9 +259,9 @@ fn is_judged(status: ExitStatus) -> bool {
 
 impl Check<'_> {
     /// Checks what was saved: one small scene first, where there is one.
-    fn start(&self, change: Change) -> anyhow::Result<Running> {
+    fn start(&self, change: Change, begun: &mut usize) -> anyhow::Result<Running> {
         self.board.saved(change == Change::Shader);
-        self.run(if self.scene.is_some() { Look::First } else { Look::Whole }, change)
+        self.run(if self.scene.is_some() { Look::First } else { Look::Whole }, change, begun)
     }
 
     /// Whether a look is the first at a save.
@@ -264,14 +270,19 @@ impl Check<'_> {
     }
 
     /// Shows how a check ended, and starts the next one, if any.
-    fn go_on(&self, mut ended: Running, status: ExitStatus) -> anyhow::Result<Option<Running>> {
+    fn go_on(
+        &self,
+        mut ended: Running,
+        status: ExitStatus,
+        begun: &mut usize,
+    ) -> anyhow::Result<Option<Running>> {
         ended.hear_out();
         let judged = is_judged(status);
         match (ended.look, &self.scene) {
             (Look::First, Some(scene)) if judged => {
                 let words = format!("first look, on {scene} alone; the rest is being checked");
                 self.board.report(Look::First, Stage::Running, &words);
-                return self.run(Look::Whole, Change::Other).map(Some);
+                return self.run(Look::Whole, Change::Other, begun).map(Some);
             }
             _ if judged => {
                 self.board.report(
@@ -286,9 +297,11 @@ impl Check<'_> {
         Ok(None)
     }
 
-    fn run(&self, look: Look, change: Change) -> anyhow::Result<Running> {
+    fn run(&self, look: Look, change: Change, begun: &mut usize) -> anyhow::Result<Running> {
+        *begun += 1;
+        let number = *begun;
         let mut command = Command::new(std::env::current_exe()?);
-        command.arg("check").arg(self.folder).arg("--output").arg(&self.outputs[look as usize]);
+        command.arg("check").arg(self.folder).arg("--report").arg(&self.outputs[look as usize]);
         let parts = &self.arguments.part;
         // A first look at a shader asks what can have changed.
         let realtime = self
@@ -318,6 +331,7 @@ impl Check<'_> {
         let mut child = command.spawn().context("cannot start umbra check")?;
         let said = child.stderr.take().map(|said| {
             let (board, live) = (Arc::clone(self.board), Arc::clone(self.live));
+            let happened = self.happened.clone();
             std::thread::spawn(move || {
                 for line in BufReader::new(said).lines().map_while(Result::ok) {
                     let line = line.strip_prefix("umbra: ").unwrap_or(&line);
@@ -325,11 +339,13 @@ impl Check<'_> {
                     if live.has_new_library() {
                         board.compiled();
                     }
-                    let _ = writeln!(std::io::stderr(), "umbra: {line}");
+                    eprintln!("umbra: {line}");
                 }
+                // It says nothing more: it has ended, or is about to.
+                let _ = happened.send(Happened::Ended(number));
             })
         });
-        Ok(Running { child, said, look })
+        Ok(Running { number, child, said, look })
     }
 }
 
@@ -375,12 +391,16 @@ mod tests {
             (vec![Change::Shader, Change::Other, Change::Shader], Change::Other),
             (vec![Change::Other, Change::Shader], Change::Other),
         ] {
-            let (changed, changes) = channel();
-            saved.iter().for_each(|&change| changed.send(change).unwrap());
-            assert!(
-                matches!(wait(&changes, None), Happened::Saved(all) if all == told),
-                "{saved:?}"
-            );
+            let (happened, happens) = channel();
+            saved.iter().for_each(|&change| happened.send(Happened::Saved(change)).unwrap());
+            // What ends meanwhile was about the save before.
+            happened.send(Happened::Ended(7)).unwrap();
+            assert_eq!(wait(&happens), Happened::Saved(told), "{saved:?}");
+            happened.send(Happened::Ended(8)).unwrap();
+            assert_eq!(wait(&happens), Happened::Ended(8));
+            happened.send(Happened::Saved(Change::Other)).unwrap();
+            happened.send(Happened::Interrupted).unwrap();
+            assert_eq!(wait(&happens), Happened::Interrupted);
         }
     }
 }

@@ -234,7 +234,7 @@ impl CheckId {
             }
             Self::SubmissionLikeness => info(
                 "Appears only where a file of the source is another submission's too, but for comments, blanks and \
-                 what the template says: names both to the instructor.",
+                 what the template says: names both to the instructor. So it does with what JPlag found much alike.",
                 "",
                 "",
                 &[],

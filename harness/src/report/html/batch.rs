@@ -1,7 +1,7 @@
 //! The page of the batch.
 
 use super::super::number::{due, is_range, of_part, points, range};
-use super::super::{BatchReport, INSTRUCTOR, ReportError, SubmissionReport};
+use super::super::{BatchReport, ErrorPicture, INSTRUCTOR, ReportError, SubmissionReport};
 use super::lost::is_lost;
 use super::markup::Html;
 use super::{CLASS, begin, class, end, overview, part_class};
@@ -11,11 +11,11 @@ use crate::evidence::CheckId;
 use crate::grading::Conditions;
 use crate::intake::Severity;
 
-/// The page of the batch: one row for each submission, which leads to its own page.
+/// The page of the batch: one row for each submission, which leads to its own page; `errors` shows where errors lie.
 ///
 /// # Errors
 /// When there is no submission.
-pub fn batch(report: &BatchReport) -> Result<String, ReportError> {
+pub fn batch(report: &BatchReport, errors: &[ErrorPicture]) -> Result<String, ReportError> {
     if report.entries.is_empty() {
         return Err(ReportError::Empty);
     }
@@ -36,7 +36,7 @@ pub fn batch(report: &BatchReport) -> Result<String, ReportError> {
     if report.entries.len() > 1 {
         overview::mistakes(&mut html, report);
         overview::distribution(&mut html, report);
-        overview::errors(&mut html, report);
+        overview::errors(&mut html, report, errors);
     }
     if let Some(class) = &report.class {
         about(&mut html, report, class);

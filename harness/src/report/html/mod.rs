@@ -4,6 +4,7 @@
 mod batch;
 mod checks;
 mod curve;
+mod likeness;
 mod lobe;
 mod lost;
 mod markup;
@@ -18,6 +19,7 @@ use base64::Engine as _;
 use sha2::Digest as _;
 
 pub use batch::batch;
+pub use likeness::{Alike, AlikePage, LIKENESS, write_alike};
 pub use overview::is_read_by_class;
 pub use submission::submission;
 pub use viewer::viewer;

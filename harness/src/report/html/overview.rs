@@ -4,7 +4,10 @@
 use std::collections::BTreeMap;
 
 use super::super::number::{is_failure, is_range, percent, points, range, value};
-use super::super::{BatchReport, HTML_FILE, INSTRUCTOR, SubmissionReport, is_private};
+use super::super::{
+    BatchReport, ERRORS, ErrorPicture, HTML_FILE, INSTRUCTOR, SubmissionReport, is_private,
+};
+use super::likeness::LIKENESS;
 use super::markup::Html;
 use crate::columns::count;
 use crate::evidence::{Check, CheckId, Verdict};
@@ -14,6 +17,9 @@ use crate::rubric::Part;
 const NAMES: usize = 12;
 /// Bins of a distribution, and one for all points.
 const BINS: usize = 10;
+
+/// What is said of submissions that have something in common.
+const SHARE: &str = "share something with another: see their pages";
 
 /// What a part that nobody began looks like.
 const UNDONE: &str = "not implemented";
@@ -67,7 +73,7 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
         let mut private = entry.grade.remarks.iter().filter(|r| is_private(r, &report.rules));
         private.next().cloned()
     });
-    add("share something with another: see their pages", &|entry| {
+    add(SHARE, &|entry| {
         let mut told =
             entry.record.evidence.checks.iter().filter(|check| !check.private.is_empty());
         told.next().map(|check| check.private.clone())
@@ -87,7 +93,12 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
         html.raw("<details class=\"waiting\"><summary>")
             .text(&count(found.len(), "submission"))
             .raw(": ");
-        html.text(kind).raw("</summary>\n<ul class=\"names\">\n");
+        html.text(kind).raw("</summary>\n");
+        if kind == SHARE && report.has_alike {
+            html.raw("<p><a href=\"").address(&format!("{INSTRUCTOR}/{LIKENESS}/{HTML_FILE}"));
+            html.raw("\">Sources side by side</a></p>\n");
+        }
+        html.raw("<ul class=\"names\">\n");
         for (entry, why) in found {
             html.raw("<li>");
             link(html, report, entry, "");
@@ -216,7 +227,7 @@ const IMAGES: [CheckId; 4] =
     [CheckId::ImageOffline, CheckId::ImageRealtime, CheckId::BonusImage, CheckId::ShadowRays];
 
 /// The mean error of images and shadows by scene: which scenes tell mistakes apart.
-pub(super) fn errors(html: &mut Html, report: &BatchReport) {
+pub(super) fn errors(html: &mut Html, report: &BatchReport, pictures: &[ErrorPicture]) {
     /// Sum of errors and how many there are.
     type Sum = (f64, usize);
     let mut scenes: BTreeMap<(bool, &str), [Sum; IMAGES.len()]> = BTreeMap::new();
@@ -233,7 +244,7 @@ pub(super) fn errors(html: &mut Html, report: &BatchReport) {
     if scenes.is_empty() {
         return;
     }
-    html.raw("<details>\n<summary>Mean error by scene</summary>\n<div class=\"scroll\" role=\"region\" aria-label=\"Mean error by scene\" tabindex=\"0\">\n");
+    html.raw("<details>\n<summary>Mean error by scene, and where it lies</summary>\n<div class=\"scroll\" role=\"region\" aria-label=\"Mean error by scene\" tabindex=\"0\">\n");
     html.raw("<table class=\"heat\">\n<thead><tr><th scope=\"col\">Scene</th>");
     for id in IMAGES {
         html.raw("<th scope=\"col\" class=\"number\">").text(id.name()).raw("</th>");
@@ -253,7 +264,20 @@ pub(super) fn errors(html: &mut Html, report: &BatchReport) {
         }
         html.raw("</tr>\n");
     }
-    html.raw("</tbody>\n</table>\n</div>\n</details>\n");
+    html.raw("</tbody>\n</table>\n</div>\n");
+    if !pictures.is_empty() {
+        html.raw("<div class=\"pictures\">\n");
+    }
+    for ErrorPicture { scene, held_back, check, file, width, height, caption } in pictures {
+        let back = if *held_back { " (held back)" } else { "" };
+        let title = format!("{}, {scene}{back}", check.name());
+        html.raw("<figure><img loading=\"lazy\" alt=\"").text(&format!("{title}: {caption}"));
+        html.raw("\" src=\"").address(&format!("{INSTRUCTOR}/{ERRORS}/{file}"));
+        html.raw("\" width=\"").show(width).raw("\" height=\"").show(height);
+        html.raw("\"><figcaption><b>").text(&title).raw("</b><br>").text(caption);
+        html.raw("</figcaption></figure>\n");
+    }
+    html.raw(if pictures.is_empty() { "</details>\n" } else { "</div>\n</details>\n" });
 }
 
 /// The class of a mean error: how dark its cell is.

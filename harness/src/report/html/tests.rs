@@ -4,7 +4,7 @@ use super::*;
 #[test]
 fn pages_say_what_matters() {
     let report = sample::report();
-    let page = batch(&report).unwrap();
+    let page = batch(&report, &[]).unwrap();
     for words in [
         "<a href=\"./instructor/two_cosines/report.html\">Jörg Müller</a><small>two_cosines.tar.gz</small>",
         "<td class=\"number total open\" data-sort=\"64.85\">64.85..84.85</td>",
@@ -122,7 +122,7 @@ fn hostile_words_stay_words() {
             part.reason = evil.into();
         }
     }
-    let mut pages = vec![(batch(&plain).unwrap(), batch(&report).unwrap())];
+    let mut pages = vec![(batch(&plain, &[]).unwrap(), batch(&report, &[]).unwrap())];
     for (plain_entry, entry) in plain.entries.iter().zip(&report.entries) {
         for reader in [Reader::Student, Reader::Instructor] {
             pages.push((
@@ -142,7 +142,7 @@ fn hostile_words_stay_words() {
 #[test]
 fn pages_load_nothing_from_elsewhere() {
     let report = sample::report();
-    let mut pages = vec![batch(&report).unwrap()];
+    let mut pages = vec![batch(&report, &[]).unwrap()];
     for reader in [Reader::Student, Reader::Instructor] {
         pages.extend(report.entries.iter().map(|entry| submission(&report, entry, reader)));
     }
@@ -155,7 +155,7 @@ fn pages_load_nothing_from_elsewhere() {
 #[test]
 fn an_empty_batch_is_an_error() {
     let report = BatchReport { entries: Vec::new(), ..sample::report() };
-    assert!(matches!(batch(&report), Err(ReportError::Empty)));
+    assert!(matches!(batch(&report, &[]), Err(ReportError::Empty)));
 }
 
 /// Writes pages to look at: `UMBRA_LOOK=DIR cargo test --release -p umbra --lib look -- --ignored`.

@@ -4,12 +4,15 @@
  * opened from the file system may load scripts but read no files. docs/decisions tells of the packing.
  */
 
-/** What waits for a data file, by the file's name. */
+/** What waits for a data file, by the file's own name. */
 const waiting = new Map();
 /** Images that were asked for, by the file's name: a promise of each. */
 const images = new Map();
 
-window.umbraImage = (file, packed) => waiting.get(file)?.(packed);
+/** A data file's own name: a shared one lies in another folder than it says. */
+const nameOf = (file) => file.split("/").pop();
+
+window.umbraImage = (file, packed) => waiting.get(nameOf(file))?.(packed);
 
 /** The image of a description (`ImageFile` in harness/src/viewer); loaded and unpacked once. */
 function loadImage(about) {
@@ -23,13 +26,13 @@ function loadScript(file) {
   return new Promise((resolve, reject) => {
     const script = document.createElement("script");
     const end = (how, what) => {
-      waiting.delete(file);
+      waiting.delete(nameOf(file));
       script.remove();
       how(what);
     };
-    waiting.set(file, (packed) => end(resolve, packed));
+    waiting.set(nameOf(file), (packed) => end(resolve, packed));
     script.addEventListener("error", () => end(reject, new Error(`${file} is missing beside this page`)));
-    script.addEventListener("load", () => waiting.has(file) && end(reject, new Error(`${file} holds no image`)));
+    script.addEventListener("load", () => waiting.has(nameOf(file)) && end(reject, new Error(`${file} holds no image`)));
     script.src = file.split("/").map(encodeURIComponent).join("/");
     document.head.append(script);
   });

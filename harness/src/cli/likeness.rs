@@ -1,0 +1,265 @@
+//! `umbra likeness`: submissions whose sources are alike, side by side. What is the same but for comments and blanks is
+//! found by Umbra, what was renamed or moved about by JPlag, from the folder that is written for it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, ensure};
+
+use super::class;
+use super::context::{Context, INTERRUPTED};
+use super::settling::{self, Kept};
+use crate::class::jplag::{self, Match, Pair, Place};
+use crate::class::{Wanted, collect};
+use crate::columns::count;
+use crate::files::{files_below, write_whole};
+use crate::grading::{ALIKE, Shared};
+use crate::harmless::harmless;
+use crate::report::{self, Alike, AlikePage};
+
+/// A folder of sources for each submission, in [`report::LIKENESS`].
+const SUBMISSIONS: &str = "submissions";
+/// What all began from, in that folder.
+const TEMPLATE: &str = "template";
+/// So many pairs of JPlag's are shown: who looks at more will not find more.
+const SHOWN: usize = 100;
+
+/// Options of `umbra likeness`.
+#[derive(clap::Args)]
+pub struct LikenessArguments {
+    /// The result of JPlag; without one, sources are written for JPlag and pairs of equal files shown
+    result: Option<PathBuf>,
+    /// The report's folder
+    #[arg(
+        long = "report",
+        alias = "output",
+        short_alias = 'o',
+        value_name = "DIR",
+        default_value = "umbra-report"
+    )]
+    output: PathBuf,
+}
+
+/// Writes sources for JPlag or takes its result, and shows all pairs.
+pub fn run(arguments: &LikenessArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+    let output = &arguments.output;
+    let kept = Kept::read(output)?;
+    let folder = output.join(report::INSTRUCTOR).join(report::LIKENESS);
+    match &arguments.result {
+        Some(result) => take(result, &folder)?,
+        None => write_sources(&kept, output, root, &folder)?,
+    }
+    show(&kept, output, &folder)?;
+    // The reports name what is alike.
+    settling::write(output, &kept.report(output, kept.decided()?)?)?;
+    Ok(super::EXIT_OK)
+}
+
+/// Reads a result and keeps its pairs.
+fn take(result: &Path, folder: &Path) -> anyhow::Result<()> {
+    let bytes = fs::read(result).with_context(|| format!("cannot read {}", result.display()))?;
+    let pairs = jplag::read(&bytes).with_context(|| result.display().to_string())?;
+    let known = submissions(folder)?;
+    ensure!(
+        !known.is_empty(),
+        "no sources were written for JPlag yet; hint: run this without a result first"
+    );
+    let whose = pairs.iter().flat_map(|pair| &pair.who);
+    let unknown: BTreeSet<&String> = whose.filter(|who| !known.contains(*who)).collect();
+    ensure!(
+        unknown.is_empty(),
+        "{}: compares {}, expected the folders of {}; hint: run JPlag with that folder",
+        result.display(),
+        harmless(&unknown.into_iter().cloned().collect::<Vec<_>>().join(", ")),
+        folder.join(SUBMISSIONS).display()
+    );
+    jplag::keep(folder, &pairs)
+}
+
+/// The submissions whose sources are in the folder.
+fn submissions(folder: &Path) -> anyhow::Result<BTreeSet<String>> {
+    let folder = folder.join(SUBMISSIONS);
+    if !folder.is_dir() {
+        return Ok(BTreeSet::new());
+    }
+    let entries =
+        fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    Ok(entries.flatten().filter_map(|entry| entry.file_name().into_string().ok()).collect())
+}
+
+/// Writes the sources of all submissions, and of the template, as JPlag reads them. What JPlag found earlier holds for
+/// those that did not change.
+fn write_sources(
+    kept: &Kept,
+    output: &Path,
+    root: Option<&Path>,
+    folder: &Path,
+) -> anyhow::Result<()> {
+    let context = Context::new(root)?;
+    let scratch = tempfile::tempdir_in(&context.supervisor.scratch)?;
+    let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
+    let wanted = Wanted { tree, limits, from: None, output: Some(output), scratch: scratch.path() };
+    let there: Vec<PathBuf> = kept.paths().iter().filter(|path| path.exists()).cloned().collect();
+    let collected = collect(&there, &wanted)?;
+    let sources = class::sources(&collected.sources, output);
+    let path_of = |slug: &str| {
+        let found = sources.iter().find(|source| source.slug == slug);
+        let place = || class::place_of(output, slug).map(PathBuf::from);
+        found.map(|source| source.path.clone()).or_else(place).filter(|path| path.exists())
+    };
+    let (mut changed, mut missing) = (BTreeSet::new(), Vec::new());
+    let copies = tempfile::tempdir_in(&context.supervisor.scratch)?;
+    for (record, _) in kept.known(output)? {
+        let slug = &record.slug;
+        // What could not be unpacked has no sources.
+        if record.digest.is_empty() {
+            continue;
+        }
+        context.say(&format!("sources of {slug}"));
+        let copy = copies.path().join(slug);
+        fs::create_dir(&copy)?;
+        let received = match path_of(slug) {
+            Some(path) => Some(context.decoder().receive(&path, &copy, tree, limits)?),
+            None => None,
+        };
+        ensure!(!INTERRUPTED.load(std::sync::atomic::Ordering::Relaxed), "interrupted");
+        let received = received.filter(|own| own.submission.digest == record.digest);
+        let Some(received) = received else {
+            missing.push(slug.clone());
+            continue;
+        };
+        let from = received.submission.root.join("src");
+        if copy_sources(&from, &folder.join(SUBMISSIONS).join(slug).join("src"))? {
+            changed.insert(slug.clone());
+        }
+        let _ = fs::remove_dir_all(&copy);
+    }
+    context.progress.end();
+    copy_sources(&context.assignment.template(), &folder.join(TEMPLATE).join("src"))?;
+    let mut pairs = jplag::kept(folder)?;
+    pairs.retain(|pair| !pair.who.iter().any(|who| changed.contains(who)));
+    jplag::keep(folder, &pairs)?;
+    if !missing.is_empty() {
+        println!(
+            "without sources, since they do not lie any more where they were graded from: {}",
+            harmless(&missing.join(", "))
+        );
+    }
+    println!(
+        "{}: the sources of {} for JPlag, which finds what was renamed or moved about:\n  \
+         java -jar jplag.jar -l rust -bc {} -r {} {}\n  \
+         umbra likeness {} --report {}\n(JPlag before version 6 writes a .zip)",
+        folder.display(),
+        count(submissions(folder)?.len(), "submission"),
+        folder.join(TEMPLATE).display(),
+        folder.join("result").display(),
+        folder.join(SUBMISSIONS).display(),
+        folder.join("result.jplag").display(),
+        output.display()
+    );
+    Ok(())
+}
+
+/// Replaces the sources in `to` by those in `from`; whether any is another.
+fn copy_sources(from: &Path, to: &Path) -> anyhow::Result<bool> {
+    let read = |folder: &Path| -> anyhow::Result<BTreeMap<PathBuf, Vec<u8>>> {
+        let mut texts = BTreeMap::new();
+        for file in if folder.is_dir() { files_below(folder)? } else { Vec::new() } {
+            let ending = file.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+            if ["rs", "wgsl"].contains(&ending) {
+                let below = file.strip_prefix(folder).unwrap_or(&file).to_owned();
+                texts.insert(below, fs::read(&file)?);
+            }
+        }
+        Ok(texts)
+    };
+    let (new, old) = (read(from)?, read(to)?);
+    if new == old && to.is_dir() {
+        return Ok(false);
+    }
+    if to.exists() {
+        fs::remove_dir_all(to).with_context(|| format!("cannot replace {}", to.display()))?;
+    }
+    fs::create_dir_all(to).with_context(|| format!("cannot write {}", to.display()))?;
+    for (below, bytes) in new {
+        let file = to.join(below);
+        write_whole(&file, &bytes).with_context(|| format!("cannot write {}", file.display()))?;
+    }
+    Ok(true)
+}
+
+/// Writes the pages, and says what is alike.
+fn show(kept: &Kept, output: &Path, folder: &Path) -> anyhow::Result<()> {
+    let known = kept.known(output)?;
+    let shared = Shared::of(known.iter().map(|(record, _)| *record));
+    let near = jplag::kept(folder)?;
+    let mut all: BTreeMap<[String; 2], Alike> = BTreeMap::new();
+    let name = |slug: &String| {
+        let record = known.iter().find(|(record, _)| record.slug == *slug);
+        record.map(|(record, _)| record.student.full_name()).unwrap_or_default()
+    };
+    let alike = |who: &[String; 2]| Alike {
+        who: who.clone(),
+        names: who.each_ref().map(name),
+        ..Alike::default()
+    };
+    let other = |pair: &&Pair| !shared.is_one_person(&pair.who);
+    for pair in near.iter().filter(other).take(SHOWN) {
+        let mut pair = pair.clone();
+        if pair.who[0] > pair.who[1] {
+            pair.who.reverse();
+            pair.matches.iter_mut().for_each(|own| own.places.reverse());
+        }
+        let own = all.entry(pair.who.clone()).or_insert_with(|| alike(&pair.who));
+        own.similarity = Some(pair.similarity);
+        own.matches = pair.matches;
+    }
+    for same in shared.same_files() {
+        let own = all.entry(same.who.clone()).or_insert_with(|| alike(&same.who));
+        own.same_files = same.paths.len();
+        for paths in same.paths {
+            // A passage of JPlag's is smaller than its file.
+            own.matches.retain(|passage| passage.places[0].path != paths[0]);
+            let places = paths.map(|path| Place { path, lines: [1, usize::MAX] });
+            own.matches.push(Match { places, tokens: 0 });
+        }
+    }
+    let mut all: Vec<Alike> = all.into_values().collect();
+    for pair in &mut all {
+        let texts = |who: &String| sources_of(&folder.join(SUBMISSIONS).join(who));
+        let [first, second] = pair.who.each_ref().map(texts);
+        pair.texts = [first?, second?];
+    }
+    all.sort_by(|a, b| {
+        let key = |own: &Alike| (own.same_files, own.similarity.unwrap_or_default());
+        let (a, b) = (key(a), key(b));
+        b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+    });
+    let page = AlikePage {
+        title: kept.decided()?.assignment.title.clone(),
+        compared: near.len(),
+        median: near.get(near.len() / 2).map(|pair| pair.similarity),
+        pairs: all,
+    };
+    report::write_alike(folder, &page)?;
+    let clear = |own: &&Alike| own.same_files > 0 || own.similarity >= Some(ALIKE);
+    println!(
+        "{}: {} side by side, {} of them to be looked at; it costs nobody anything",
+        folder.join(report::HTML_FILE).display(),
+        count(page.pairs.len(), "pair"),
+        page.pairs.iter().filter(clear).count()
+    );
+    Ok(())
+}
+
+/// The sources of a submission, by path.
+fn sources_of(folder: &Path) -> anyhow::Result<BTreeMap<String, String>> {
+    let mut texts = BTreeMap::new();
+    for file in if folder.is_dir() { files_below(folder)? } else { Vec::new() } {
+        let below: Vec<_> = file.strip_prefix(folder).unwrap_or(&file).iter().collect();
+        let below: Vec<_> = below.iter().map(|name| name.to_string_lossy()).collect();
+        texts.insert(below.join("/"), String::from_utf8_lossy(&fs::read(&file)?).into_owned());
+    }
+    Ok(texts)
+}

@@ -1,0 +1,59 @@
+//! What is printed. Who reads it may have seen enough (`umbra check | head`): then nothing more is printed, and
+//! everything else is done all the same, so that no report is lost. [`end_of_closed_pipe`] ends the program as other
+//! programs end that write into a closed pipe.
+//!
+//! The macros take the place of the standard library's, which panic.
+
+use std::fmt;
+use std::io::{ErrorKind, Write as _};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether nobody reads standard output any more.
+static CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// Prints to standard output.
+///
+/// # Panics
+/// When it cannot be written for another reason than that nobody reads it; `Bug::unprintable` knows the words.
+pub fn print(text: fmt::Arguments) {
+    if CLOSED.load(Ordering::Relaxed) {
+        return;
+    }
+    match std::io::stdout().lock().write_fmt(text) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => {
+            CLOSED.store(true, Ordering::Relaxed);
+        }
+        Err(error) => panic!("failed printing to stdout: {error}"),
+        Ok(()) => {}
+    }
+}
+
+/// Prints to standard error, where that can be written.
+pub fn eprint(text: fmt::Arguments) {
+    let _ = std::io::stderr().lock().write_fmt(text);
+}
+
+/// Ends the program by the signal of a closed pipe, if standard output was one.
+pub fn end_of_closed_pipe() {
+    #[cfg(unix)]
+    if CLOSED.load(Ordering::Relaxed) {
+        use nix::sys::signal::{SigHandler, Signal, raise, signal};
+        // SAFETY: the default action replaces an ignored signal; no handler runs.
+        let _ = unsafe { signal(Signal::SIGPIPE, SigHandler::SigDfl) };
+        let _ = raise(Signal::SIGPIPE);
+    }
+}
+
+macro_rules! print {
+    ($($text:tt)*) => { $crate::output::print(format_args!($($text)*)) };
+}
+macro_rules! println {
+    () => { $crate::output::print(format_args!("\n")) };
+    ($($text:tt)*) => { $crate::output::print(format_args!("{}\n", format_args!($($text)*))) };
+}
+macro_rules! eprintln {
+    ($($text:tt)*) => { $crate::output::eprint(format_args!("{}\n", format_args!($($text)*))) };
+}
+macro_rules! eprint {
+    ($($text:tt)*) => { $crate::output::eprint(format_args!($($text)*)) };
+}
