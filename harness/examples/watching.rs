@@ -110,7 +110,7 @@ fn main() -> anyhow::Result<()> {
             let ms = browser.value(
                 "new Promise((done) => { const view = live.views.realtime, first = view.figure.dataset.frames, begun = performance.now(); \
                  view.canvas.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowLeft' })); \
-                 const look = () => requestAnimationFrame(() => view.figure.dataset.frames > first ? requestAnimationFrame(() => done(performance.now() - begun)) : look()); look(); })",
+                 const look = () => requestAnimationFrame(() => +view.figure.dataset.frames > +first ? requestAnimationFrame(() => done(performance.now() - begun)) : look()); look(); })",
             );
             waits.push(ms.as_f64().context("milliseconds")?);
         }
