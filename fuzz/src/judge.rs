@@ -53,8 +53,7 @@ static CASE: LazyLock<PreparedScene> = LazyLock::new(|| {
     }
     let toml = folder.path().join("a.toml");
     let scene = load_scene(&toml).expect("a scene of ours");
-    let mask = |shadows| regions(&scene, WIDTH, HEIGHT, shadows).expect("a camera");
-    let (shadowed, unshadowed_mask) = (mask(true), mask(false));
+    let [shadowed, unshadowed_mask] = regions(&scene, WIDTH, HEIGHT).expect("a camera");
     let mean = right(&shadowed);
     let noisy = |flags: &u16| Vec3::splat(if flags & RegionMask::EDGE == 0 { 1e-4 } else { 0.2 });
     let variance = shadowed.pixels.iter().map(noisy).collect();

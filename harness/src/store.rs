@@ -89,25 +89,33 @@ impl Store<'_> {
             (mean, variance, BATCHES * CACHED_SPP, centre)
         };
         let unshadowed = self.unshadowed(&toml, width, height)?;
-        let file = self.cached(&toml, width, height, "masks")?;
-        let masks = self.layers(&file, &["shadowed", "unshadowed"], || {
-            let image = |shadows| {
-                Ok::<_, anyhow::Error>(as_image(&regions(
-                    &scene,
-                    width as usize,
-                    height as usize,
-                    shadows,
-                )?))
-            };
-            let layers = [("shadowed".into(), image(true)?), ("unshadowed".into(), image(false)?)];
-            Ok(ExrLayers { layers: layers.into(), ..Default::default() })
-        })?;
-        let [mask, unshadowed_mask] = masks.map(|image| as_mask(&scene, &image));
+        let [mask, unshadowed_mask] = self.masks(&toml, &scene, width, height)?;
         let offline = ReferenceImage::new(mean, variance, n, centre, mask)
             .with_context(|| format!("scene \"{}\"", entry.name))?;
         let realtime = self.assignment.root.join(&entry.realtime);
         let raw_normals = self.raw_normals(&realtime, width, height)?;
         Ok(Expected { scene, offline, unshadowed, unshadowed_mask, raw_normals })
+    }
+
+    /// The regions of a scene, as [`regions`].
+    ///
+    /// # Errors
+    /// When the scene's camera has no frame, or the cache cannot be used.
+    pub fn masks(
+        &self,
+        toml: &Path,
+        scene: &Scene,
+        width: u32,
+        height: u32,
+    ) -> anyhow::Result<[RegionMask; 2]> {
+        let file = self.cached(toml, width, height, "masks")?;
+        let masks = self.layers(&file, &["shadowed", "unshadowed"], || {
+            let [with, without] = regions(scene, width as usize, height as usize)?;
+            let layers =
+                [("shadowed".into(), as_image(&with)), ("unshadowed".into(), as_image(&without))];
+            Ok(ExrLayers { layers: layers.into(), ..Default::default() })
+        })?;
+        Ok(masks.map(|image| as_mask(scene, &image)))
     }
 
     /// The pixel-centre image of a scene without shadows.

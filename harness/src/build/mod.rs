@@ -3,14 +3,16 @@
 //!
 //! [`Recording::obtain`] records that call once for a state of the base code; [`compile`] replays
 //! it. The compiler sees a staged folder with the base code's closure and nothing else of
-//! `target/`.
+//! `target/`. [`Kept`] remembers what was built.
 
 mod closure;
 mod diagnostics;
+mod kept;
 mod record;
 mod replay;
 
 pub use diagnostics::{Diagnostic, Place};
+pub use kept::Kept;
 pub use record::{Compiling, RecordError, Recording, wrapper_main};
 pub use replay::{BuildOutcome, BuildReport, compile, default_limits};
 

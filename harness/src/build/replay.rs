@@ -170,7 +170,7 @@ fn compile_once(
 
 /// An empty file to be written over with what the sandbox collects. Whoever loads it later may be
 /// another user.
-fn make_empty(library: &Path) -> io::Result<()> {
+pub(super) fn make_empty(library: &Path) -> io::Result<()> {
     fs::File::create(library)?;
     #[cfg(unix)]
     {

@@ -125,6 +125,21 @@ pub struct LoopSeen {
 }
 
 impl Observations {
+    /// Adds what was answered elsewhere, after what is here.
+    pub fn absorb(&mut self, other: Self) {
+        let Self { tiles, loops, shaded, shadow_rays, bound, vertices } = other;
+        for (view, tile) in tiles {
+            self.record(view, tile);
+        }
+        self.loops.extend(loops);
+        for (part, samples) in shaded {
+            self.shaded.entry(part).or_default().extend(samples);
+        }
+        self.shadow_rays.extend(shadow_rays);
+        self.bound.extend(bound);
+        self.vertices.extend(vertices);
+    }
+
     /// Keeps an answer. Answers to the same question fill each other's gaps.
     pub fn record(&mut self, view: View, tile: Thumbnail) {
         if tile.is_empty() {

@@ -10,16 +10,26 @@ const HIGHLIGHT: f32 = 0.1;
 /// Within this cosine of the contour where a direction grazes the surface, pixels are edges.
 const GRAZING: f32 = 1e-3;
 
-/// The regions of a scene's image of `width` x `height` pixels, with or without shadows.
+/// The regions of a scene's image of `width` x `height` pixels: with shadows, and without.
 ///
 /// A pixel is an edge when the nine points on its centre, edges and corners, or those of a
 /// neighbour, do not see the same shape in the same light.
 ///
 /// # Errors
 /// When the film is empty or the scene's camera has no frame.
-pub fn regions(scene: &Scene, width: usize, height: usize, shadows: bool) -> Result<RegionMask> {
+pub fn regions(scene: &Scene, width: usize, height: usize) -> Result<[RegionMask; 2]> {
     let camera = scene.camera(width, height)?;
     let lattice = Lattice::new(scene, &camera, width, height);
+    Ok([true, false].map(|shadows| mask(scene, &lattice, width, height, shadows)))
+}
+
+fn mask(
+    scene: &Scene,
+    lattice: &Lattice,
+    width: usize,
+    height: usize,
+    shadows: bool,
+) -> RegionMask {
     let mut mask = table(scene, width, height);
     let mut edges = vec![false; width * height];
     for y in 0..height {
@@ -46,7 +56,7 @@ pub fn regions(scene: &Scene, width: usize, height: usize, shadows: bool) -> Res
             }
         }
     }
-    Ok(mask)
+    mask
 }
 
 /// A mask that is background everywhere, with the regions of a scene: two for each material.

@@ -25,6 +25,7 @@ mod sampler;
 mod session;
 mod shaders;
 mod shared;
+mod side_by_side;
 mod stages;
 pub mod submitted;
 mod tree_checks;

@@ -27,6 +27,7 @@ use crate::held_back::{self, HeldBack};
 use crate::intake::{self, IntakeError, Submission};
 use crate::process::Exit;
 use crate::rubric::BUILD;
+use crate::sandbox::Isolation;
 use crate::store::Store;
 use crate::worker::{Adapter, Budget, Reference, RetryBudget, Supervisor};
 
@@ -108,12 +109,7 @@ impl<'a> Grading<'a> {
             Recording::obtain_telling(&assignment.root, &store.supervisor.umbra, &|compiling| {
                 (store.progress)(&compiling.in_words(begun.elapsed()));
             })?;
-        let mut cases = Vec::new();
-        for entry in &assignment.scenes {
-            (store.progress)(&format!("preparing scene {}", entry.name));
-            let case = PreparedScene::new(store, entry);
-            cases.push(case.with_context(|| format!("scene \"{}\" cannot be used", entry.name))?);
-        }
+        let mut cases = PreparedScene::all(store, &assignment.scenes)?;
         let held_back = perturb.map(|seed| hold_back(store, seed, &mut cases)).transpose()?;
         let mut grading = Self {
             assignment,
@@ -176,7 +172,7 @@ impl<'a> Grading<'a> {
         mode: Mode,
         say: &dyn Fn(&str),
     ) -> anyhow::Result<Record> {
-        let mut session = self.session("");
+        let session = self.session("");
         let decoder = Decoder::new(&self.supervisor, &self.assignment.limits.decode, self.cancel);
         let mut costs = Costs { since: Instant::now(), stages: Vec::new() };
         let scratch =
@@ -219,33 +215,25 @@ impl<'a> Grading<'a> {
 
         say("compiling the source");
         let built =
-            self.build(&submission, scratch.path(), &mut record, &mut checks, &mut costs)?;
+            self.build(&submission, scratch.path(), mode, &mut record, &mut checks, &mut costs)?;
         if built.is_some() {
             step("submission", "built");
         }
         let seed = config.sampler_seed().unwrap_or_default();
         let mut drawn = Vec::new();
-        // Lives as long as the session names it.
-        let mut _compiled = None;
-        let asks = |path| self.paths.contains(&path);
-        if let Some((plugin, _)) = built.as_ref().filter(|_| asks(RenderPath::Offline)) {
-            say("rendering offline");
-            self.offline(&session, plugin, seed, &mut checks, &mut drawn)?;
-            checks.extend(session.used_up());
-            costs.end("offline", session.end_path());
-        }
-        if let Some((plugin, built)) = built.as_ref().filter(|_| asks(RenderPath::Realtime)) {
-            say("drawing realtime");
+        if let Some((plugin, built)) = &built {
             let stages = Stages::read(&built.src, &self.assignment.template());
-            record.findings.extend(stages.findings());
-            _compiled = self.compile_own(&mut session, &stages)?;
-            self.realtime(&session, plugin, &stages, &mut checks, &mut drawn)?;
-            checks.extend(session.used_up());
-            checks.extend(session.printed_much());
-            costs.end("realtime", session.end_path());
-            let said = [std::mem::take(&mut record.diagnostics), session.quoted()];
-            record.diagnostics =
-                said.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("\n");
+            let both = self.both_paths(&session, plugin, &stages, seed, say, &mut costs)?;
+            if let Some(realtime) = &both.realtime {
+                record.findings.extend(stages.findings());
+                let said = [std::mem::take(&mut record.diagnostics), realtime.quoted.clone()];
+                record.diagnostics =
+                    said.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("\n");
+            }
+            for path in [both.offline, both.realtime].into_iter().flatten() {
+                checks.extend(path.checks);
+                drawn.extend(path.drawn);
+            }
         }
         let compared: &[PreparedScene] = if self.compares_submitted { &self.cases } else { &[] };
         if self.compares_submitted {
@@ -355,6 +343,7 @@ impl<'a> Grading<'a> {
         &self,
         submission: &Submission,
         scratch: &Path,
+        mode: Mode,
         record: &mut Record,
         checks: &mut Vec<Check>,
         costs: &mut Costs,
@@ -367,8 +356,18 @@ impl<'a> Grading<'a> {
         let out = scratch.join("out");
         std::fs::create_dir(&out)?;
         let limits = &self.assignment.limits.build;
+        // Whoever checks their own work runs nobody else's.
+        let trusted =
+            mode == Mode::Check || self.supervisor.isolation.isolation() == Isolation::Full;
+        let kept = build::Kept::new(self.assignment.cache().join("built"), trusted);
         let compile = |src: &Path| {
-            build::compile(&self.recording, &self.supervisor, src, &out, limits, self.cancel)
+            let compile = || {
+                build::compile(&self.recording, &self.supervisor, src, &out, limits, self.cancel)
+            };
+            match &kept {
+                Some(kept) => kept.or_compile(&self.recording, src, &out, compile),
+                None => compile(),
+            }
         };
         let template = self.assignment.template();
         let built = mend::build(&compile, &src, &template, &scratch.join("mended"))?;
@@ -421,22 +420,24 @@ impl<'a> Grading<'a> {
 fn hold_back(store: &Store, seed: u64, cases: &mut Vec<PreparedScene>) -> anyhow::Result<HeldBack> {
     (store.progress)("making the held-back scenes");
     let (held_back, entries) = held_back::make(store.assignment, seed)?;
-    for entry in &entries {
-        (store.progress)(&format!("preparing scene {}", entry.name));
-        let case = PreparedScene::new(store, entry);
-        let case = case.with_context(|| format!("seed {seed}: {} cannot be used", entry.name))?;
-        cases.push(PreparedScene { held_back: true, ..case });
-    }
+    let made = PreparedScene::all(store, &entries).with_context(|| format!("seed {seed}"))?;
+    cases.extend(made.into_iter().map(|case| PreparedScene { held_back: true, ..case }));
     Ok(held_back)
 }
 
 /// What the stages cost so far.
-struct Costs {
+pub(super) struct Costs {
     since: Instant,
     stages: Vec<StageCost>,
 }
 
 impl Costs {
+    /// Adds a stage that was measured by itself.
+    pub(super) fn push(&mut self, name: &str, wall_s: f64, cpu_s: f64) {
+        self.since = Instant::now();
+        self.stages.push(StageCost { name: name.to_owned(), wall_s, cpu_s });
+    }
+
     /// Ends a stage; answers all so far.
     fn end(&mut self, name: &str, cpu_s: f64) -> Vec<StageCost> {
         let now = Instant::now();

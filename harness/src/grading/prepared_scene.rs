@@ -2,13 +2,15 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use basecode::scene::SceneConfig;
 use basecode::{Image, MaterialModel, Scene};
+use rayon::prelude::*;
 
 use crate::assignment::SceneEntry;
 use crate::evidence::loops::{RAYS, SAMPLED_WIDTH, SampledFilm};
 use crate::evidence::rays::RayBatch;
-use crate::expected::{Expected, SurfaceBuffer, regions};
+use crate::expected::{Expected, SurfaceBuffer};
 use crate::imaging::reference::RegionMask;
 use crate::store::Store;
 use crate::worker::{CameraValue, RayQuery};
@@ -116,6 +118,20 @@ fn without_mirrors(scene: &Scene, surface: &SurfaceBuffer, mask: &RegionMask) ->
 }
 
 impl PreparedScene {
+    /// Makes scenes ready, several at once.
+    ///
+    /// # Errors
+    /// Of the first that cannot be loaded, or whose expected images cannot be had.
+    pub fn all(store: &Store, entries: &[SceneEntry]) -> anyhow::Result<Vec<Self>> {
+        let prepare = |entry: &SceneEntry| {
+            (store.progress)(&format!("preparing scene {}", entry.name));
+            Self::new(store, entry)
+        };
+        let ready: Vec<_> = entries.par_iter().map(prepare).collect();
+        let cannot = |entry: &SceneEntry| format!("scene \"{}\" cannot be used", entry.name);
+        ready.into_iter().zip(entries).map(|(case, of)| case.with_context(|| cannot(of))).collect()
+    }
+
     /// Makes a scene ready.
     ///
     /// # Errors
@@ -133,7 +149,7 @@ impl PreparedScene {
         let (w, h) = (width as usize, height as usize);
         let scene = &expected.scene;
         let surface = SurfaceBuffer::new(scene, w, h)?;
-        let mask = regions(scene, w, h, true)?;
+        let [mask, unshadowed_mask] = store.masks(&offline, scene, width, height)?;
         let asked = without_mirrors(scene, &surface, &mask);
         let fine = SurfaceBuffer::new(scene, FINE * w, FINE * h)?;
         let batch = RayBatch::new(&entry.name, scene, &surface, &asked);
@@ -141,7 +157,7 @@ impl PreparedScene {
         let probe_film = ProbeFilm {
             width,
             height,
-            unshadowed_mask: regions(scene, w, h, false)?,
+            unshadowed_mask,
             unshadowed: store.unshadowed(&offline, width, height)?,
             raw_normals: store.raw_normals(&realtime, width, height)?,
             // The loop is the same on every scene: those that have most to show are enough.

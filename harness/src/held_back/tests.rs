@@ -130,8 +130,7 @@ fn accepted_scenes_have_enough_pixels_away_from_edges() {
             let folder = write(out.path(), &scene_files(&root, &entry, seed).unwrap()).unwrap();
             let changed = load_scene(&folder.join(files::below(&entry.offline).unwrap())).unwrap();
             let (width, height) = (changed.config().width, changed.config().height);
-            let mask = |shadows| regions(&changed, width, height, shadows).unwrap();
-            let (with, without) = (mask(true), mask(false));
+            let [with, without] = regions(&changed, width, height).unwrap();
             let clear = |value: u16| value & (RegionMask::EDGE | RegionMask::EMITTER) == 0;
             let both = || with.pixels.iter().zip(&without.pixels);
             let lit = both().filter(|(a, _)| with.is_lit_interior(**a)).count();

@@ -22,7 +22,7 @@ impl Fixture {
         let scene = scene.unwrap();
         let (width, height) = FILM;
         let surface = SurfaceBuffer::new(&scene, width, height).unwrap();
-        let mask = regions(&scene, width, height, false).unwrap();
+        let [_, mask] = regions(&scene, width, height).unwrap();
         let image = |value: &dyn Fn(&SurfacePoint) -> Vec3| {
             let of =
                 |(_, point): &(Ray, Option<SurfacePoint>)| point.as_ref().map_or(Vec3::ZERO, value);
