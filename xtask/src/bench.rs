@@ -6,6 +6,7 @@ mod files;
 mod page;
 mod rays;
 mod renders;
+mod submissions;
 mod workers;
 
 use std::path::{Path, PathBuf};
@@ -25,7 +26,7 @@ pub struct Arguments {
     /// Leave out images of 8K, which take most of the time, and 2 GB of disk
     #[arg(long)]
     without_8k: bool,
-    /// Only what has this in its name: compare, rays, renders, objects, workers
+    /// Only what has this in its name: compare, rays, renders, objects, workers, submissions
     only: Option<String>,
 }
 
@@ -83,6 +84,13 @@ pub fn run(root: &Path, arguments: &Arguments) -> anyhow::Result<String> {
     if wanted("workers") {
         eprintln!("worker start ...");
         lines.extend(workers::run(&bench)?);
+    }
+    if wanted("submissions") {
+        eprintln!("submissions beside what they take by hand ...");
+        let (table, curves) = submissions::run(&bench)?;
+        lines.extend(table);
+        let words = "CPU time of a batch against its submissions:";
+        plots.push(("batch", words, ["submissions", "seconds, CPU"], curves));
     }
     let table: Vec<String> = lines
         .iter()
