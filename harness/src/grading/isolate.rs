@@ -41,7 +41,7 @@ pub fn bound_values_shown() -> [Vec<Stage>; BoundValue::ALL.len()] {
 pub fn isolate(
     session: &Session,
     plugin: &Path,
-    cases: &[&PreparedScene],
+    cases: &[PreparedScene],
     stages: &Stages,
     fails: bool,
     tolerances: &Tolerances,
@@ -49,7 +49,7 @@ pub fn isolate(
     let bound_values_shown = bound_values_shown();
     let (swaps, sets) = swaps(stages);
     let is_right =
-        |index, frames: &[Outcome]| pass_check(cases[index], frames).verdict == Verdict::Pass;
+        |index, frames: &[Outcome]| pass_check(&cases[index], frames).verdict == Verdict::Pass;
     let passes = draw_scenes(session, plugin, &under(cases, &bound_values_shown), &is_right);
     let mut frames = under(cases, &sets).concat();
     for frame in &mut frames {
@@ -59,7 +59,7 @@ pub fn isolate(
     let mut swapped = draw_each(session, None, &frames).into_iter();
     let mut shown = Shown::default();
     let mut checks = Vec::new();
-    for (&case, pass) in cases.iter().zip(passes) {
+    for (case, pass) in cases.iter().zip(passes) {
         let swapped: Vec<Outcome> = swapped.by_ref().take(sets.len()).collect();
         let pass = match bound_values(case, &pass) {
             Ok(frames) => {
@@ -173,9 +173,9 @@ impl Shown<'_> {
 }
 
 /// The frames of each scene under all sets of stages.
-fn under<'a>(cases: &[&'a PreparedScene], sets: &[Vec<Stage>]) -> Vec<Vec<Frame<'a>>> {
+fn under<'a>(cases: &'a [PreparedScene], sets: &[Vec<Stage>]) -> Vec<Vec<Frame<'a>>> {
     let frames =
-        |case: &&'a PreparedScene| sets.iter().map(|set| Frame::probe(case, set.clone())).collect();
+        |case: &'a PreparedScene| sets.iter().map(|set| Frame::probe(case, set.clone())).collect();
     cases.iter().map(frames).collect()
 }
 

@@ -94,8 +94,8 @@ impl Grading<'_> {
             let uploaded = uploads::judge(session, plugin, cases, &footprints);
             let nothing_draws = stages.nothing_draws().or(uploaded.nothing_draws);
             checks.extend(uploaded.checks);
-            let mut wrong = Vec::new();
-            for (case, judged) in cases.iter().zip(judged) {
+            let mut is_right = true;
+            for judged in judged {
                 let mut found = judged.checks;
                 if let Some(why) = nothing_draws {
                     found.iter_mut().for_each(|check| realtime::drawn_by_nobody(check, why));
@@ -103,17 +103,16 @@ impl Grading<'_> {
                 let proof = |check: &Check| {
                     check.id == CheckId::ImageRealtime && check.verdict != Verdict::Pass
                 };
-                if found.iter().any(proof) {
-                    wrong.push(case);
-                }
+                is_right &= !found.iter().any(proof);
                 checks.extend(found);
                 drawn.extend(judged.drawn);
             }
             shadow_map::set_apart(&mut checks[begin..]);
             self.stop_if_interrupted()?;
-            // Right end to end is enough: pass and stages are taken apart only where an image is wrong.
-            if !wrong.is_empty() {
-                checks.extend(isolate::isolate(session, plugin, &wrong, stages, fails, tolerances));
+            // Right end to end is enough. Where an image is wrong, pass and stages are taken apart on all scenes:
+            // what a stage does not test may show only on a scene that a wrong pass draws right.
+            if !is_right {
+                checks.extend(isolate::isolate(session, plugin, cases, stages, fails, tolerances));
             }
             price::agree(&mut checks[begin..]);
             mark(&mut checks[begin..], cases);
