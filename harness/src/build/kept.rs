@@ -2,7 +2,8 @@
 //!
 //! Only the parent writes here, what the compiler's sandbox gave it for a source, under a name that holds all of the
 //! source's bytes and the compiler call. So a submission can at most change what is kept for itself. Where children are
-//! not kept from the machine's files, a plugin could write here: see [`Kept::new`].
+//! not kept from the machine's files, a plugin could write here, and the compiler could read what the name does not
+//! hold (`include_str!("../config.json")`): nothing is kept there, see [`Kept::new`].
 
 use std::fs;
 use std::io;
@@ -30,7 +31,7 @@ struct Note {
 }
 
 impl Kept {
-    /// Keeps libraries in `folder`. `trusted`: no foreign code can write there, or none but its user's own is run.
+    /// Keeps libraries in `folder`. `trusted`: the compiler sees nothing but the source, and no plugin can write there.
     pub fn new(folder: PathBuf, trusted: bool) -> Option<Self> {
         trusted.then_some(Self(folder))
     }

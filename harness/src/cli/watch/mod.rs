@@ -19,7 +19,7 @@ use anyhow::Context as _;
 use notify::{EventKind, RecursiveMode, Watcher as _};
 
 use self::live::LiveView;
-use self::server::{Board, Look, Server, Stage};
+use self::server::{Board, Extent, Server, Stage};
 use super::context::{Context, on_interrupt};
 use crate::assignment::SceneEntry;
 
@@ -131,7 +131,7 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
                 // An older one was ended by a save.
                 if let Some(mut ended) = running.take_if(|running| running.number == number) {
                     let status = ended.child.wait()?;
-                    offline_holds |= ended.look == Look::Whole && is_judged(status);
+                    offline_holds |= ended.look == Extent::Whole && is_judged(status);
                     running = check.go_on(ended, status, &mut begun)?;
                 }
             }
@@ -207,7 +207,7 @@ struct Running {
     child: Child,
     /// Puts what it says on the board.
     said: Option<JoinHandle<()>>,
-    look: Look,
+    look: Extent,
 }
 
 impl Running {
@@ -261,12 +261,12 @@ impl Check<'_> {
     /// Checks what was saved: one small scene first, where there is one.
     fn start(&self, change: Change, begun: &mut usize) -> anyhow::Result<Running> {
         self.board.saved(change == Change::Shader);
-        self.run(if self.scene.is_some() { Look::First } else { Look::Whole }, change, begun)
+        self.run(if self.scene.is_some() { Extent::First } else { Extent::Whole }, change, begun)
     }
 
     /// Whether a look is the first at a save.
-    fn is_first(&self, look: Look) -> bool {
-        look == Look::First || self.scene.is_none()
+    fn is_first(&self, look: Extent) -> bool {
+        look == Extent::First || self.scene.is_none()
     }
 
     /// Shows how a check ended, and starts the next one, if any.
@@ -279,14 +279,14 @@ impl Check<'_> {
         ended.hear_out();
         let judged = is_judged(status);
         match (ended.look, &self.scene) {
-            (Look::First, Some(scene)) if judged => {
+            (Extent::First, Some(scene)) if judged => {
                 let words = format!("first look, on {scene} alone; the rest is being checked");
-                self.board.report(Look::First, Stage::Running, &words);
-                return self.run(Look::Whole, Change::Other, begun).map(Some);
+                self.board.report(Extent::First, Stage::Running, &words);
+                return self.run(Extent::Whole, Change::Other, begun).map(Some);
             }
             _ if judged => {
                 self.board.report(
-                    Look::Whole,
+                    Extent::Whole,
                     Stage::Done,
                     "everything that was asked is on the page",
                 );
@@ -297,7 +297,7 @@ impl Check<'_> {
         Ok(None)
     }
 
-    fn run(&self, look: Look, change: Change, begun: &mut usize) -> anyhow::Result<Running> {
+    fn run(&self, look: Extent, change: Change, begun: &mut usize) -> anyhow::Result<Running> {
         *begun += 1;
         let number = *begun;
         let mut command = Command::new(std::env::current_exe()?);
@@ -307,11 +307,11 @@ impl Check<'_> {
         let realtime = self
             .realtime
             .iter()
-            .filter(|_| parts.is_empty() && look == Look::First && change == Change::Shader);
+            .filter(|_| parts.is_empty() && look == Extent::First && change == Change::Shader);
         for part in parts.iter().chain(realtime) {
             command.arg("--part").arg(part);
         }
-        let first = self.scene.iter().filter(|_| look == Look::First);
+        let first = self.scene.iter().filter(|_| look == Extent::First);
         for scene in self.arguments.scene.iter().chain(first) {
             command.arg("--scene").arg(scene);
         }
@@ -322,7 +322,7 @@ impl Check<'_> {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         command.stdin(Stdio::null()).stderr(Stdio::piped());
-        if look == Look::First {
+        if look == Extent::First {
             command.stdout(Stdio::null());
         }
         if self.is_first(look) {

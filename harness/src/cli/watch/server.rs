@@ -36,10 +36,10 @@ pub enum Stage {
     Failed,
 }
 
-/// What a report is about.
+/// How much a report covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Look {
+pub enum Extent {
     /// One small scene.
     First,
     /// Everything that was asked.
@@ -68,7 +68,7 @@ struct Shown {
     stage: Stage,
     message: String,
     /// Which report is the newest.
-    look: Look,
+    look: Extent,
     /// How many reports there were: the page loads the newest when this rises.
     reports: u64,
     /// How many libraries there were for the live view, which asks again when this rises.
@@ -93,10 +93,10 @@ impl Board {
     }
 
     /// The same, and a new report.
-    pub fn report(&self, look: Look, stage: Stage, message: &str) {
+    pub fn report(&self, look: Extent, stage: Stage, message: &str) {
         self.change(stage, message, |shown| {
             shown.look = look;
-            if look == Look::Whole {
+            if look == Extent::Whole {
                 shown.whole = Whole::Now;
             }
             shown.reports += 1;
@@ -220,7 +220,7 @@ enum Asked {
     /// A picture of one.
     Frame(Question),
     /// A file of a report, by a path of plain names.
-    File(Look, PathBuf),
+    File(Extent, PathBuf),
     /// Refused, with the status.
     Nothing(u16),
 }
@@ -266,7 +266,7 @@ impl Asked {
                 .and_then(|(_, query)| Question::parse(query))
                 .map_or(Self::Nothing(400), Self::Frame),
             _ => {
-                let look = [(Look::First, "first/"), (Look::Whole, "whole/")];
+                let look = [(Extent::First, "first/"), (Extent::Whole, "whole/")];
                 let mut file = look.into_iter().filter_map(|(look, name)| {
                     Some(Self::File(look, plain_path(rest.strip_prefix(name)?)?))
                 });
@@ -404,7 +404,7 @@ mod tests {
         let question = Question::parse(frame).unwrap();
         assert_eq!(ask(&format!("/abcdef/frame?{frame}"), own, None), Asked::Frame(question));
         assert_eq!(ask("/abcdef/events?x", own, Some("http://127.0.0.1:4000")), Asked::Events);
-        let file = |path: &str| Asked::File(Look::Whole, path.into());
+        let file = |path: &str| Asked::File(Extent::Whole, path.into());
         assert_eq!(ask("/abcdef/whole/report.html", own, None), file("report.html"));
         assert_eq!(ask("/abcdef/whole/viewer/a%20b.js", own, None), file("viewer/a b.js"));
         // Another name for this machine, another origin, another secret.
@@ -501,7 +501,7 @@ mod tests {
         };
         board.show(Stage::Running, "compiling\u{1b}[2J");
         until("\"message\":\"compiling\\\\u{1b}[2J\"");
-        board.report(Look::Whole, Stage::Done, "");
+        board.report(Extent::Whole, Stage::Done, "");
         until("\"stage\":\"done\",\"message\":\"compiling");
         until("\"look\":\"whole\",\"reports\":1");
         until("\"whole\":\"now\"");
