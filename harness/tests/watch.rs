@@ -122,6 +122,22 @@ fn looks_around(browser: &mut Chromium) {
     assert_eq!(browser.value("live.views.realtime.asked"), asked);
 }
 
+/// A watch of a folder, for some parts on one scene, and the lines that it prints.
+fn watching(
+    work: &Path,
+    parts: &[&str],
+    out: &Path,
+) -> (Watch, std::io::Lines<BufReader<std::process::ChildStdout>>) {
+    let assignment = one_scene(&Path::new(env!("CARGO_TARGET_TMPDIR")).join("one-scene"), |_| ());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_umbra"));
+    command.arg("watch").arg(work).args(parts.iter().flat_map(|part| ["--part", part]));
+    command.arg("--report").arg(out).arg("--root").arg(assignment);
+    command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    let mut watch = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let said = BufReader::new(watch.stdout.take().unwrap()).lines();
+    (Watch(watch), said)
+}
+
 #[test]
 fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     let Some(mut browser) = Chromium::start() else { return };
@@ -131,22 +147,7 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     for source in ["student_template/src", "samples/perfect/src"] {
         copy(&root.join(source), &work.join("src"));
     }
-    let assignment = one_scene(&Path::new(env!("CARGO_TARGET_TMPDIR")).join("one-scene"), |_| ());
-    let mut watch = Command::new(env!("CARGO_BIN_EXE_umbra"))
-        .arg("watch")
-        .arg(&work)
-        .args(["--part", "1.1", "--part", "2.4", "--output"])
-        .arg(place.path().join("out"))
-        .arg("--root")
-        .arg(assignment)
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let mut said = BufReader::new(watch.stdout.take().unwrap()).lines();
-    let watch = Watch(watch);
+    let (watch, mut said) = watching(&work, &["1.1", "2.4"], &place.path().join("out"));
     let door = said.next().unwrap().unwrap();
 
     // The file leads to the page; no address with the secret was in a command line.
@@ -231,22 +232,7 @@ fn an_idle_watch_is_not_woken() {
     let work = place.path().join("work");
     fs::create_dir_all(work.join("src")).unwrap();
     fs::write(work.join("src/lib.rs"), "fn main() { not_rust }").unwrap();
-    let assignment = one_scene(&Path::new(env!("CARGO_TARGET_TMPDIR")).join("one-scene"), |_| ());
-    let mut watch = Command::new(env!("CARGO_BIN_EXE_umbra"))
-        .arg("watch")
-        .arg(&work)
-        .args(["--part", "1.1", "--report"])
-        .arg(place.path().join("out"))
-        .arg("--root")
-        .arg(assignment)
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let said = BufReader::new(watch.stdout.take().unwrap()).lines();
-    let watch = Watch(watch);
+    let (watch, said) = watching(&work, &["1.1"], &place.path().join("out"));
     // A check ends with where its page is.
     let page = "report.html";
     let mut said = said.map_while(Result::ok).filter(|line| line.contains(page));

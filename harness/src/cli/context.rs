@@ -104,9 +104,10 @@ pub fn on_interrupt(body: impl FnOnce() + Send + 'static) -> std::io::Result<()>
         use std::os::fd::IntoRawFd as _;
         let (mut told, tell) = std::io::pipe()?;
         // Open as long as the program.
-        WAITING.store(tell.into_raw_fd(), Ordering::Relaxed);
+        WAITING.store(tell.into_raw_fd(), Ordering::SeqCst);
         std::thread::spawn(move || {
-            if told.read_exact(&mut [0]).is_ok() {
+            // It may have come before anybody waited.
+            if INTERRUPTED.load(Ordering::SeqCst) || told.read_exact(&mut [0]).is_ok() {
                 body();
             }
         });
@@ -121,10 +122,10 @@ pub fn catch_interrupts() {
     #[cfg(unix)]
     {
         extern "C" fn interrupted(_: i32) {
-            if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            if INTERRUPTED.swap(true, Ordering::SeqCst) {
                 crate::process::exit_now(i32::from(super::EXIT_INTERRUPTED));
             }
-            let waiting = WAITING.load(Ordering::Relaxed);
+            let waiting = WAITING.load(Ordering::SeqCst);
             if waiting >= 0 {
                 // SAFETY: `write` is allowed in a handler; the descriptor is never closed, the byte is there.
                 unsafe { nix::libc::write(waiting, [0u8].as_ptr().cast(), 1) };

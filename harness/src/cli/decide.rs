@@ -1,10 +1,11 @@
 //! `umbra override`, `umbra confirm` and `umbra status`: what a report leaves to the instructor.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context as _, bail, ensure};
 
 use super::earlier::{Report, Row};
+use super::report_folder::ReportFolder;
 use super::settling::Kept;
 use crate::class::overrides::{Decision, OVERRIDES, Subject, entry, fingerprint};
 use crate::class::{Decided, names};
@@ -42,29 +43,15 @@ pub struct DecisionArguments {
     /// Who decides [default: the name of this account]
     #[arg(long, value_name = "NAME")]
     by: Option<String>,
-    /// The report's folder
-    #[arg(
-        long = "report",
-        alias = "output",
-        short_alias = 'o',
-        value_name = "DIR",
-        default_value = "umbra-report"
-    )]
-    pub output: PathBuf,
+    #[command(flatten)]
+    pub report: ReportFolder,
 }
 
 /// Options of `umbra status`.
 #[derive(clap::Args)]
 pub struct StatusArguments {
-    /// The report's folder
-    #[arg(
-        long = "report",
-        alias = "output",
-        short_alias = 'o',
-        value_name = "DIR",
-        default_value = "umbra-report"
-    )]
-    output: PathBuf,
+    #[command(flatten)]
+    report: ReportFolder,
 }
 
 /// A submission of a report, as it was kept.
@@ -89,7 +76,7 @@ impl Graded {
 /// Sets the points of a part.
 pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
     let OverrideArguments { student, part, points, decision } = arguments;
-    let kept = Kept::read(&decision.output)?;
+    let kept = Kept::read(&decision.report.path)?;
     let parts = &kept.decided()?.assignment.rules.parts;
     let known = parts.iter().find(|own| own.id == *part).with_context(|| {
         let parts: Vec<&str> = parts.iter().map(|own| own.id.as_str()).collect();
@@ -100,7 +87,7 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
         "part {part} is worth 0 to {} points, found {points}",
         known.points
     );
-    let graded = one(student, &decision.output, &kept)?;
+    let graded = one(student, &decision.report.path, &kept)?;
     let own = graded.entry.grade.parts.iter().position(|own| own.id == *part);
     let own = own.map(|at| &graded.entry.grade.parts[at..=at]).unwrap_or_default();
     let evidence = fingerprint(&graded.subject(), own);
@@ -111,14 +98,14 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
         "{}: part {part} has {points} points from now on, the evidence says {before}",
         harmless(&graded.entry.who())
     );
-    said(&decision.output)
+    said(&decision.report.path)
 }
 
 /// Confirms what was left to the instructor.
 pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     let ConfirmArguments { student, decision } = arguments;
-    let kept = Kept::read(&decision.output)?;
-    let graded = one(student, &decision.output, &kept)?;
+    let kept = Kept::read(&decision.report.path)?;
+    let graded = one(student, &decision.report.path, &kept)?;
     let grade = &graded.entry.grade;
     let evidence = fingerprint(&graded.subject(), &grade.parts);
     decision.add(kept, &decision.of(&graded, evidence)?)?;
@@ -127,7 +114,7 @@ pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
         0.0 => println!("{name}: confirmed, no points hang on it"),
         points => println!("{name}: {points} points for the images are confirmed"),
     }
-    said(&decision.output)
+    said(&decision.report.path)
 }
 
 /// Says where a decision is kept.
@@ -181,10 +168,11 @@ impl DecisionArguments {
     /// # Errors
     /// When the file says what means nothing, or something cannot be written.
     pub fn add(&self, mut kept: Kept, decision: &Decision) -> anyhow::Result<Kept> {
-        let file = self.output.join(OVERRIDES);
+        let file = self.report.path.join(OVERRIDES);
         // What is there must be right before anything is added to it.
         let current = kept.decided()?.clone();
-        let mut decided = Decided::read(&self.output, current.assignment.clone(), current.attempt)?;
+        let mut decided =
+            Decided::read(&self.report.path, current.assignment.clone(), current.attempt)?;
         decided.matches = current.matches;
         if decided.overrides.is_empty() {
             decided.overrides = String::from(
@@ -195,7 +183,7 @@ impl DecisionArguments {
         decided.overrides += &entry(decision)?;
         write_whole(&file, decided.overrides.as_bytes())
             .with_context(|| format!("cannot write {}", file.display()))?;
-        kept.apply(&self.output, decided, &decision.reason, false)?;
+        kept.apply(&self.report.path, decided, &decision.reason, false)?;
         Ok(kept)
     }
 }
@@ -239,7 +227,7 @@ pub fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
 
 /// Lists what waits for the instructor; exit 1 where anything does.
 pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
-    let report = Report::read(&arguments.output)?;
+    let report = Report::read(&arguments.report.path)?;
     let class = report.class.unwrap_or_default();
     let rules = &report.assignment.rules;
     let row = |row: &Row, what: &str| format!("{} ({}): {what}", row.name, row.slug);

@@ -1,11 +1,12 @@
 //! `umbra defend`: why a part has its points, for an appeal.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Context as _;
 
 use super::context::Context;
 use super::decide::one;
+use super::report_folder::ReportFolder;
 use super::settling::Kept;
 use super::{EXIT_OK, class, terminal};
 use crate::report::{self, Look};
@@ -17,20 +18,13 @@ pub struct DefendArguments {
     student: String,
     /// The part, such as 1.3
     part: String,
-    /// The report's folder
-    #[arg(
-        long = "report",
-        alias = "output",
-        short_alias = 'o',
-        value_name = "DIR",
-        default_value = "umbra-report"
-    )]
-    output: PathBuf,
+    #[command(flatten)]
+    report: ReportFolder,
 }
 
 /// Prints the evidence, its bounds, how to reproduce it, and what a right part would have earned.
 pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u8> {
-    let DefendArguments { student, part, output } = arguments;
+    let DefendArguments { student, part, report: ReportFolder { path: output } } = arguments;
     let kept = Kept::read(output)?;
     let decided = kept.decided()?;
     let slug = one(student, output, &kept)?.entry.record.slug;

@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::class;
 use super::earlier::{Report, Row};
+use super::report_folder::ReportFolder;
 use crate::class::export::{Points, grade_book};
 use crate::class::feedback::{self, Feedback};
 use crate::class::{Kind, Roster};
@@ -72,15 +73,8 @@ pub struct ExportArguments {
     /// What takes the grades; brightspace, canvas and moodle fill the file that `umbra grade --class` was given
     #[arg(long, value_enum)]
     format: Format,
-    /// The report's folder
-    #[arg(
-        long = "report",
-        alias = "output",
-        short_alias = 'o',
-        value_name = "DIR",
-        default_value = "umbra-report"
-    )]
-    output: PathBuf,
+    #[command(flatten)]
+    report: ReportFolder,
     #[command(flatten)]
     item: Item,
     /// Only this submission: the name of its folder in the report
@@ -98,7 +92,8 @@ pub struct Item {
 
 /// Writes the grades and says who is not in them.
 pub fn export(arguments: &ExportArguments) -> anyhow::Result<u8> {
-    let ExportArguments { file, format, output, item, only } = arguments;
+    let ExportArguments { file, format, report: ReportFolder { path: output }, item, only } =
+        arguments;
     let mut report = Report::read(output)?;
     if let Some(only) = only {
         ensure!(

@@ -9,6 +9,7 @@ use anyhow::{Context as _, ensure};
 
 use super::class;
 use super::context::{Context, INTERRUPTED};
+use super::report_folder::ReportFolder;
 use super::settling::{self, Kept};
 use crate::class::jplag::{self, Match, Pair, Place};
 use crate::class::{Wanted, collect};
@@ -30,20 +31,13 @@ const SHOWN: usize = 100;
 pub struct LikenessArguments {
     /// The result of JPlag; without one, sources are written for JPlag and pairs of equal files shown
     result: Option<PathBuf>,
-    /// The report's folder
-    #[arg(
-        long = "report",
-        alias = "output",
-        short_alias = 'o',
-        value_name = "DIR",
-        default_value = "umbra-report"
-    )]
-    output: PathBuf,
+    #[command(flatten)]
+    report: ReportFolder,
 }
 
 /// Writes sources for JPlag or takes its result, and shows all pairs.
 pub fn run(arguments: &LikenessArguments, root: Option<&Path>) -> anyhow::Result<u8> {
-    let output = &arguments.output;
+    let output = &arguments.report.path;
     let kept = Kept::read(output)?;
     let folder = output.join(report::INSTRUCTOR).join(report::LIKENESS);
     match &arguments.result {

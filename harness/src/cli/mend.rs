@@ -41,7 +41,7 @@ pub struct MendArguments {
 /// Grades the mended submission beside the record of the unmended one, and keeps the decision.
 pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let MendArguments { student, patch, decision, .. } = arguments;
-    let output = &decision.output;
+    let output = &decision.report.path;
     decision.check()?;
     let assignment = Context::assignment(root)?;
     let Some(mend) = &assignment.mend else {
@@ -91,7 +91,7 @@ fn mended_source(
     slug: &str,
     digest: &str,
 ) -> anyhow::Result<PathBuf> {
-    let output = &arguments.decision.output;
+    let output = &arguments.decision.report.path;
     let place = class::place_of(output, slug).map(PathBuf::from);
     let given = arguments.submission.clone().or(place).filter(|path| path.exists());
     let given = given.with_context(|| {

@@ -24,6 +24,7 @@ mod merge;
 mod regrade;
 mod release;
 mod render;
+mod report_folder;
 mod settling;
 mod terminal;
 mod terminal_pictures;

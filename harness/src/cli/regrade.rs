@@ -1,10 +1,11 @@
 //! `umbra regrade`: what other rules, policies, matches or overrides make of a graded class.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Context as _;
 
 use super::context::Context;
+use super::report_folder::ReportFolder;
 use super::settling::{self, Kept, changes};
 use crate::class::overrides::OVERRIDES;
 use crate::class::pins::Change;
@@ -25,20 +26,13 @@ pub struct RegradeArguments {
     /// Why; kept with the change
     #[arg(long, value_name = "TEXT")]
     reason: Option<String>,
-    /// The report's folder
-    #[arg(
-        long = "report",
-        alias = "output",
-        short_alias = 'o',
-        value_name = "DIR",
-        default_value = "umbra-report"
-    )]
-    output: PathBuf,
+    #[command(flatten)]
+    report: ReportFolder,
 }
 
 /// Shows what changes; applies it where that is asked.
 pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
-    let RegradeArguments { apply, undo, reason, output } = arguments;
+    let RegradeArguments { apply, undo, reason, report: ReportFolder { path: output } } = arguments;
     let reason = reason.as_deref().map(str::trim);
     anyhow::ensure!(reason != Some(""), "--reason: expected a reason, found nothing");
     let mut kept = Kept::read(output)?;

@@ -1,13 +1,14 @@
 //! `umbra release`: what was held back from students becomes theirs, when nobody can submit any more.
 
 use std::io::{Cursor, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context as _, bail, ensure};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
 use super::context::Context;
+use super::report_folder::ReportFolder;
 use super::settling::{self, Kept};
 use crate::class::late;
 use crate::files::{files_below, write_whole};
@@ -20,20 +21,13 @@ const SCENES: &str = "held-back-scenes.zip";
 /// Options of `umbra release`.
 #[derive(clap::Args)]
 pub struct ReleaseArguments {
-    /// The report's folder
-    #[arg(
-        long = "report",
-        alias = "output",
-        short_alias = 'o',
-        value_name = "DIR",
-        default_value = "umbra-report"
-    )]
-    output: PathBuf,
+    #[command(flatten)]
+    report: ReportFolder,
 }
 
 /// Writes the scenes and the students' pages with them.
 pub fn run(arguments: &ReleaseArguments, root: Option<&Path>) -> anyhow::Result<u8> {
-    let output = &arguments.output;
+    let output = &arguments.report.path;
     let assignment = Context::assignment(root)?;
     let kept = Kept::read(output)?;
     let decided = kept.decided()?;
