@@ -1,9 +1,12 @@
 //! The sample submissions: real archives, packed from `samples/`, with the images that their own code
 //! draws. They lie under `target/umbra/samples/`.
+//!
+//! Samples with the same artist are packed one after the other: it is compiled once, and draws nothing twice.
 
 mod archive;
 mod expect;
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,11 +18,12 @@ use basecode::scene::SceneConfig;
 use basecode::{Image, Vec3};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
+use tempfile::TempDir;
 use umbra::assignment::{Assignment, SceneEntry};
-use umbra::build::{self, BuildOutcome, Recording};
-use umbra::files::Scratch;
+use umbra::build::{BuildOutcome, Kept, Recording};
+use umbra::files::{Scratch, hex};
 use umbra::worker::{
-    Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef, Supervisor,
+    Adapter, AdapterKind, Answer, CameraValue, Job, Outcome, Request, SceneRef, Supervisor,
 };
 
 use archive::write_archive;
@@ -96,18 +100,59 @@ fn template() -> String {
 pub type Wanted<'a> = &'a (dyn Fn(&str, &Recipe) -> bool + Sync);
 
 /// Packs the samples that are wanted where the archive is missing or older than its sources,
-/// as many at a time as there are cores.
+/// side by side.
 ///
 /// # Errors
 /// When a sample contradicts itself or cannot be drawn; names it.
 pub fn pack(root: &Path, wanted: Wanted) -> Result<Vec<Sample>> {
     let packer = Packer::new(root)?;
-    let recipes = packer.recipes.iter().filter(|(name, recipe)| wanted(name, recipe));
-    let names: Vec<&String> = recipes.map(|(name, _)| name).collect();
+    let (mut samples, mut by_source) = (Vec::new(), BTreeMap::<_, Vec<_>>::new());
+    for (name, recipe) in packer.recipes.iter().filter(|(name, recipe)| wanted(name, recipe)) {
+        let draft = packer.draft(name, recipe).with_context(|| format!("sample {name}"))?;
+        let (archive, expect) = (draft.archive.clone(), recipe.expect.clone());
+        samples.push(Sample { name: name.clone(), archive, expect });
+        if !draft.is_packed() {
+            by_source.entry(draft.artist.clone()).or_default().push(draft);
+        }
+    }
+    let mut groups: Vec<_> = by_source.into_iter().collect();
+    groups.sort_by_key(|(_, drafts)| Reverse(drafts.len()));
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    parallel::each(&names, cores, |_, name| {
-        packer.pack(name).with_context(|| format!("sample {name}"))
-    })
+    parallel::each(&groups, cores, |_, (source, drafts)| packer.pack(source.as_ref(), drafts))?;
+    Ok(samples)
+}
+
+/// The files below `src/`.
+type Source = BTreeMap<PathBuf, Vec<u8>>;
+
+/// A sample before its images are drawn.
+struct Draft<'a> {
+    name: &'a str,
+    recipe: &'a Recipe,
+    archive: PathBuf,
+    /// Its own source, by paths in the archive.
+    files: BTreeMap<String, Vec<u8>>,
+    /// Whose code draws its images, if any does.
+    artist: Option<Source>,
+    /// The student number that seeds them.
+    seed: &'a str,
+    /// All that the archive depends on.
+    key: String,
+    key_file: PathBuf,
+}
+
+impl Draft<'_> {
+    fn is_packed(&self) -> bool {
+        let old = fs::read_to_string(&self.key_file);
+        self.archive.is_file() && old.is_ok_and(|old| old == self.key)
+    }
+}
+
+/// A library that draws, and what it has drawn: EXR files, if it did, by scene and seed.
+struct Artist {
+    scratch: TempDir,
+    library: PathBuf,
+    drawn: BTreeMap<(PathBuf, u64), Option<Vec<u8>>>,
 }
 
 struct Packer {
@@ -117,6 +162,9 @@ struct Packer {
     assignment: Assignment,
     supervisor: Supervisor,
     recording: Recording,
+    kept: Kept,
+    /// What all archives depend on.
+    key: String,
     /// The supervisor's.
     _scratch: Scratch,
 }
@@ -147,12 +195,29 @@ impl Packer {
         fs::create_dir_all(&out)?;
         let recording = Recording::obtain(root, &umbra)?;
         let supervisor = Supervisor::available(umbra, scratch.path().to_owned());
-        let root = root.to_owned();
-        Ok(Self { root, out, recipes, assignment, supervisor, recording, _scratch: scratch })
+        let kept = Kept::within(&assignment.cache(), supervisor.isolation.isolation());
+        let mut hash = Sha256::new();
+        hash.update(&recording.key);
+        for (path, bytes) in read_tree(&root.join("scenes"))? {
+            hash.update(path.to_string_lossy().as_bytes());
+            hash.update(bytes);
+        }
+        let (root, key) = (root.to_owned(), hex(&hash.finalize()));
+        Ok(Self {
+            root,
+            out,
+            recipes,
+            assignment,
+            supervisor,
+            recording,
+            kept,
+            key,
+            _scratch: scratch,
+        })
     }
 
     /// The source files of a sample, relative to `src/`, with their contents.
-    fn source(&self, name: &str) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
+    fn source(&self, name: &str) -> Result<Source> {
         let recipe =
             self.recipes.get(name).with_context(|| format!("there is no sample {name}"))?;
         let mut files = match recipe.base.as_str() {
@@ -173,36 +238,68 @@ impl Packer {
         Ok(files)
     }
 
-    fn pack(&self, name: &str) -> Result<Sample> {
-        let recipe = &self.recipes[name];
-        let archive = self.out.join(format!("{name}.{}", recipe.format));
-        let sample = Sample { name: name.to_owned(), archive, expect: recipe.expect.clone() };
-        let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
+    fn draft<'a>(&'a self, name: &'a str, recipe: &'a Recipe) -> Result<Draft<'a>> {
+        let mut files = BTreeMap::new();
         let source = self.source(name)?;
         for (path, bytes) in &source {
             files.insert(format!("src/{}", path.display()).replace('\\', "/"), bytes.clone());
         }
-        let id = &recipe.student.id;
+        let mut seed = recipe.student.id.as_str();
         let artist = match (recipe.images.as_str(), recipe.images.split_once(':')) {
-            ("own", _) => Some((source, id)),
+            ("own", _) => Some(source),
             ("none", _) => None,
-            (_, Some(("from", sample))) => Some((self.source(sample)?, id)),
+            (_, Some(("from", sample))) => Some(self.source(sample)?),
             (_, Some(("of", sample))) => {
-                Some((self.source(sample)?, &self.recipes[sample].student.id))
+                seed = &self.recipes[sample].student.id;
+                Some(self.source(sample)?)
             }
             (other, _) => {
                 bail!("images is \"{other}\" but must be own, none, from:<sample> or of:<sample>")
             }
         };
-        let key = self.key(&files, recipe, artist.as_ref())?;
-        let key_file = self.out.join(format!(".{name}.key"));
-        if sample.archive.is_file() && fs::read_to_string(&key_file).is_ok_and(|old| old == key) {
-            return Ok(sample);
+        let mut hash = Sha256::new();
+        for (path, bytes) in &files {
+            hash.update(path);
+            hash.update(bytes);
         }
-        eprintln!("packing sample {name}");
+        for (path, bytes) in artist.iter().flatten() {
+            hash.update(path.to_string_lossy().as_bytes());
+            hash.update(bytes);
+        }
+        hash.update(format!("{seed} {recipe:?} {}", self.key));
+        let archive = self.out.join(format!("{name}.{}", recipe.format));
+        let key_file = self.out.join(format!(".{name}.key"));
+        Ok(Draft {
+            name,
+            recipe,
+            archive,
+            files,
+            artist,
+            seed,
+            key: hex(&hash.finalize()),
+            key_file,
+        })
+    }
+
+    /// Packs samples whose images the same source draws.
+    fn pack(&self, source: Option<&Source>, drafts: &[Draft]) -> Result<()> {
+        let of = |draft: &Draft| format!("sample {}", draft.name);
+        let mut artist = match source {
+            Some(source) => Some(self.artist(source).with_context(|| of(&drafts[0]))?),
+            None => None,
+        };
+        for draft in drafts {
+            eprintln!("packing {}", of(draft));
+            self.finish(draft, artist.as_mut()).with_context(|| of(draft))?;
+        }
+        Ok(())
+    }
+
+    fn finish(&self, draft: &Draft, artist: Option<&mut Artist>) -> Result<()> {
+        let (recipe, mut files) = (draft.recipe, draft.files.clone());
         let mut renders = Vec::new();
-        if let Some((source, id)) = &artist {
-            for (path, bytes) in self.draw(source, id, recipe)? {
+        if let Some(artist) = artist {
+            for (path, bytes) in self.draw(artist, draft)? {
                 renders.push(path.clone());
                 files.insert(path, bytes);
             }
@@ -225,36 +322,8 @@ impl Packer {
         for path in &recipe.omit {
             ensure!(files.remove(path).is_some(), "omit: {path} is not in the archive");
         }
-        write_archive(&sample.archive, recipe, &files)?;
-        fs::write(key_file, key)?;
-        Ok(sample)
-    }
-
-    /// All that an archive depends on.
-    fn key(
-        &self,
-        files: &BTreeMap<String, Vec<u8>>,
-        recipe: &Recipe,
-        artist: Option<&(BTreeMap<PathBuf, Vec<u8>>, &String)>,
-    ) -> Result<String> {
-        let mut hash = Sha256::new();
-        for (path, bytes) in files {
-            hash.update(path);
-            hash.update(bytes);
-        }
-        if let Some((source, id)) = artist {
-            for (path, bytes) in source {
-                hash.update(path.to_string_lossy().as_bytes());
-                hash.update(bytes);
-            }
-            hash.update(id);
-        }
-        hash.update(format!("{recipe:?} {}", self.recording.key));
-        for (path, bytes) in read_tree(&self.root.join("scenes"))? {
-            hash.update(path.to_string_lossy().as_bytes());
-            hash.update(bytes);
-        }
-        Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+        write_archive(&draft.archive, recipe, &files)?;
+        Ok(fs::write(&draft.key_file, &draft.key)?)
     }
 
     /// The published image of the scene whose offline image lies at `path`, as an EXR file.
@@ -271,13 +340,8 @@ impl Packer {
         Ok(fs::read(file.path())?)
     }
 
-    /// Builds a source and draws the images that a submission must contain, seeded by a student's `id`.
-    fn draw(
-        &self,
-        source: &BTreeMap<PathBuf, Vec<u8>>,
-        id: &str,
-        recipe: &Recipe,
-    ) -> Result<Vec<(String, Vec<u8>)>> {
+    /// Builds the source of an artist.
+    fn artist(&self, source: &Source) -> Result<Artist> {
         let scratch = tempfile::tempdir_in(&self.supervisor.scratch)?;
         let (src, out) = (scratch.path().join("src"), scratch.path().join("out"));
         fs::create_dir(&out)?;
@@ -286,54 +350,55 @@ impl Packer {
             fs::create_dir_all(file.parent().unwrap_or(&src))?;
             fs::write(file, bytes)?;
         }
-        let cancel = AtomicBool::new(false);
-        let limits = &self.assignment.limits;
+        let limits = &self.assignment.limits.build;
+        let never = AtomicBool::new(false);
         let report =
-            build::compile(&self.recording, &self.supervisor, &src, &out, &limits.build, &cancel)?;
-        let library = match report.outcome {
-            BuildOutcome::Built { library } => library,
+            self.kept.compile(&self.recording, &self.supervisor, &src, &out, limits, &never)?;
+        match report.outcome {
+            BuildOutcome::Built { library } => {
+                Ok(Artist { scratch, library, drawn: BTreeMap::new() })
+            }
             BuildOutcome::CompileError { errors } => {
                 let first = errors.first().map(|error| error.rendered.clone());
                 bail!("its source does not build:\n{}", first.unwrap_or_default())
             }
             other => bail!("its source does not build: {other:?}"),
-        };
-        let seed = id.parse().context("the student's id seeds the sampler")?;
-        let mut asked = Vec::new();
+        }
+    }
+
+    /// The images that a submission must contain, and their paths in it; what does not draw is left out.
+    fn draw(&self, artist: &mut Artist, draft: &Draft) -> Result<Vec<(String, Vec<u8>)>> {
+        let seed = draft.seed.parse().context("the student's id seeds the sampler")?;
+        let mut wanted = Vec::new();
         for scene in &self.assignment.scenes {
             let Some(images) = &scene.submitted else { continue };
-            asked.push((images.offline.clone(), self.request(&scene.offline, seed)?));
-            asked.push((images.realtime.clone(), self.request(&scene.realtime, seed)?));
-            let bonus = recipe.bonus.as_ref().filter(|path| path.contains(&scene.name));
+            wanted.push((images.offline.clone(), (scene.offline.clone(), seed)));
+            wanted.push((images.realtime.clone(), (scene.realtime.clone(), 0)));
+            let bonus = draft.recipe.bonus.as_ref().filter(|path| path.contains(&scene.name));
             if let (Some(path), Some(toml)) = (bonus, &scene.bonus) {
-                asked.push((path.clone(), self.request(toml, seed)?));
+                wanted.push((path.clone(), (toml.clone(), 0)));
             }
         }
-        let (paths, requests): (Vec<String>, Vec<Request>) = asked.into_iter().unzip();
-        let job = Job { plugin: Some(library), requests };
-        let report = self.supervisor.run_job(&job, &limits.run, &cancel, &mut |_| ());
-        let mut images = Vec::new();
-        for ((path, request), outcome) in paths.into_iter().zip(job.requests).zip(report.outcomes) {
-            let (Request::RenderOffline { width, height, .. }
-            | Request::RenderRealtime { width, height, .. }) = request
-            else {
-                bail!("only images are asked for");
+        let missing = wanted.iter().map(|(_, key)| key);
+        let missing: Vec<_> =
+            missing.filter(|key| !artist.drawn.contains_key(key)).cloned().collect();
+        let requests = missing.iter().map(|(toml, seed)| self.request(toml, *seed));
+        let job = Job {
+            plugin: Some(artist.library.clone()),
+            requests: requests.collect::<Result<_>>()?,
+        };
+        let limits = &self.assignment.limits.run;
+        let report = self.supervisor.run_job(&job, limits, &AtomicBool::new(false), &mut |_| ());
+        for ((key, request), outcome) in missing.into_iter().zip(job.requests).zip(report.outcomes)
+        {
+            let image = match outcome {
+                Outcome::Done(answer) => Some(exr(&request, &answer, artist.scratch.path())?),
+                _ => None,
             };
-            let is_offline = matches!(request, Request::RenderOffline { .. });
-            // What does not draw submits no image.
-            let Outcome::Done(answer) = outcome else { continue };
-            // Realtime images were clamped to [0, 1] by the original course's framebuffer.
-            let pixel = |v: &[f32; 3]| {
-                let v = Vec3::from(*v);
-                if is_offline { v } else { v.clamp(Vec3::ZERO, Vec3::ONE) }
-            };
-            let pixels = answer.values.as_chunks::<3>().0.iter().map(pixel).collect();
-            let image = Image { width: width as usize, height: height as usize, pixels };
-            let file = scratch.path().join("image.exr");
-            write_exr(&file, &image, Precision::Half, &[])?;
-            images.push((path, fs::read(&file)?));
+            artist.drawn.insert(key, image);
         }
-        Ok(images)
+        let drawn = wanted.into_iter().map(|(path, key)| (path, artist.drawn[&key].clone()));
+        Ok(drawn.filter_map(|(path, image)| Some((path, image?))).collect())
     }
 
     fn request(&self, toml: &Path, seed: u64) -> Result<Request> {
@@ -365,6 +430,26 @@ impl Packer {
             }
         })
     }
+}
+
+/// An answer as a submitted image.
+fn exr(request: &Request, answer: &Answer, scratch: &Path) -> Result<Vec<u8>> {
+    let (Request::RenderOffline { width, height, .. }
+    | Request::RenderRealtime { width, height, .. }) = request
+    else {
+        bail!("only images are asked for");
+    };
+    let is_offline = matches!(request, Request::RenderOffline { .. });
+    // Realtime images were clamped to [0, 1] by the original course's framebuffer.
+    let pixel = |v: &[f32; 3]| {
+        let v = Vec3::from(*v);
+        if is_offline { v } else { v.clamp(Vec3::ZERO, Vec3::ONE) }
+    };
+    let pixels = answer.values.as_chunks::<3>().0.iter().map(pixel).collect();
+    let image = Image { width: *width as usize, height: *height as usize, pixels };
+    let file = scratch.join("image.exr");
+    write_exr(&file, &image, Precision::Half, &[])?;
+    Ok(fs::read(&file)?)
 }
 
 /// The submission's own config.json, in the handout's form.

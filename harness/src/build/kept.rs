@@ -3,25 +3,29 @@
 //! Only the parent writes here, what the compiler's sandbox gave it for a source, under a name that holds all of the
 //! source's bytes and the compiler call. So a submission can at most change what is kept for itself. Where children are
 //! not kept from the machine's files, a plugin could write here, and the compiler could read what the name does not
-//! hold (`include_str!("../config.json")`): nothing is kept there, see [`Kept::new`].
+//! hold (`include_str!("../config.json")`): nothing is kept there, see [`Kept::within`].
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::{BuildOutcome, BuildReport, Diagnostic, Recording, TEMPLATE};
 use crate::files::{files_below, hex, library_name, write_whole};
+use crate::process::Limits;
+use crate::sandbox::Isolation;
+use crate::worker::Supervisor;
 
 /// So many libraries of about 10 MB are kept; the oldest go.
-const KEPT: usize = 16;
+const KEPT: usize = 64;
 /// What is known of a library beside it.
 const NOTE: &str = "note.json";
 
-/// A folder of libraries.
-pub struct Kept(PathBuf);
+/// The libraries that were built before, if any can be kept here.
+pub struct Kept(Option<PathBuf>);
 
 /// What is known of a kept library.
 #[derive(Serialize, Deserialize)]
@@ -31,49 +35,66 @@ struct Note {
 }
 
 impl Kept {
-    /// Keeps libraries in `folder`. `trusted`: the compiler sees nothing but the source, and no plugin can write there.
-    pub fn new(folder: PathBuf, trusted: bool) -> Option<Self> {
-        trusted.then_some(Self(folder))
+    /// Libraries are kept within `cache` where isolation is full: where the compiler sees nothing but the source, and
+    /// no plugin can write there.
+    pub fn within(cache: &Path, isolation: Isolation) -> Self {
+        Self((isolation == Isolation::Full).then(|| cache.join("built")))
     }
 
-    /// The library of this source, as `compile` makes it, or as it was made before.
+    /// The library of this source, as [`compile`](super::compile) makes it, or as it was made before.
     ///
     /// # Errors
-    /// Those of `compile`, and when the source cannot be read. Where nothing can be kept, nothing is.
-    pub fn or_compile(
+    /// Those of `compile`, and when the source cannot be read. Where nothing can be written, nothing is kept.
+    pub fn compile(
+        &self,
+        recording: &Recording,
+        supervisor: &Supervisor,
+        src: &Path,
+        out: &Path,
+        limits: &Limits,
+        cancel: &AtomicBool,
+    ) -> io::Result<BuildReport> {
+        self.found_or(recording, src, out, || {
+            super::compile(recording, supervisor, src, out, limits, cancel)
+        })
+    }
+
+    fn found_or(
         &self,
         recording: &Recording,
         src: &Path,
         out: &Path,
         compile: impl FnOnce() -> io::Result<BuildReport>,
     ) -> io::Result<BuildReport> {
-        let folder = self.0.join(key(recording, src)?);
+        let Some(all) = &self.0 else { return compile() };
+        let folder = all.join(key(recording, src)?);
         if let Some(found) = found(&folder, out) {
             return Ok(found);
         }
         let report = compile()?;
         if let BuildOutcome::Built { library } = &report.outcome
-            && self.keep(&folder, library, &report.warnings).is_err()
+            && keep(all, &folder, library, &report.warnings).is_err()
         {
             let _ = fs::remove_dir_all(&folder);
         }
         Ok(report)
     }
+}
 
-    fn keep(&self, folder: &Path, library: &Path, warnings: &[Diagnostic]) -> io::Result<()> {
-        let bytes = fs::read(library)?;
-        fs::create_dir_all(folder)?;
-        write_whole(&folder.join(library_name(TEMPLATE)), &bytes)?;
-        let note = Note { sha256: hex(&Sha256::digest(&bytes)), warnings: warnings.to_vec() };
-        write_whole(&folder.join(NOTE), &serde_json::to_vec(&note)?)?;
-        let age = |path: &PathBuf| path.metadata().and_then(|meta| meta.modified()).ok();
-        let mut all: Vec<_> = fs::read_dir(&self.0)?.flatten().map(|entry| entry.path()).collect();
-        all.sort_by_key(age);
-        for old in all.iter().take(all.len().saturating_sub(KEPT)) {
-            fs::remove_dir_all(old)?;
-        }
-        Ok(())
+/// Keeps a library in `folder`, and no more than [`KEPT`] in `all`.
+fn keep(all: &Path, folder: &Path, library: &Path, warnings: &[Diagnostic]) -> io::Result<()> {
+    let bytes = fs::read(library)?;
+    fs::create_dir_all(folder)?;
+    write_whole(&folder.join(library_name(TEMPLATE)), &bytes)?;
+    let note = Note { sha256: hex(&Sha256::digest(&bytes)), warnings: warnings.to_vec() };
+    write_whole(&folder.join(NOTE), &serde_json::to_vec(&note)?)?;
+    let age = |path: &PathBuf| path.metadata().and_then(|meta| meta.modified()).ok();
+    let mut all: Vec<_> = fs::read_dir(all)?.flatten().map(|entry| entry.path()).collect();
+    all.sort_by_key(age);
+    for old in all.iter().take(all.len().saturating_sub(KEPT)) {
+        fs::remove_dir_all(old)?;
     }
+    Ok(())
 }
 
 /// A library that was kept whole, copied to `out`.
@@ -117,7 +138,7 @@ mod tests {
     fn the_same_source_is_compiled_once_and_another_anew() {
         let place = tempfile::tempdir().unwrap();
         let at = |name: &str| place.path().join(name);
-        let [src, out, folder] = ["src", "out", "kept"].map(at);
+        let [src, out, folder] = ["src", "out", "built"].map(at);
         [&src, &out].iter().for_each(|folder| fs::create_dir(folder).unwrap());
         let mut recording = Recording {
             rustc: PathBuf::new(),
@@ -129,8 +150,8 @@ mod tests {
         };
         let calls = Cell::new(0);
         let built = |recording: &Recording| {
-            let kept = Kept::new(folder.clone(), true).unwrap();
-            let report = kept.or_compile(recording, &src, &out, || {
+            let kept = Kept::within(place.path(), Isolation::Full);
+            let report = kept.found_or(recording, &src, &out, || {
                 calls.set(calls.get() + 1);
                 let library = out.join(library_name(TEMPLATE));
                 fs::write(&library, format!("library {}", calls.get()))?;
@@ -155,7 +176,7 @@ mod tests {
             fs::write(entry.unwrap().path().join(library_name(TEMPLATE)), "evil").unwrap();
         }
         assert_eq!([built(&recording), built(&recording)], ["library 5", "library 5"]);
-        for number in 0..2 * KEPT {
+        for number in 0..KEPT + 2 {
             fs::write(src.join("lib.rs"), number.to_string()).unwrap();
             built(&recording);
         }
@@ -163,9 +184,8 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_compile_is_not_kept() {
+    fn what_does_not_compile_or_is_open_to_others_is_not_kept() {
         let place = tempfile::tempdir().unwrap();
-        let folder = place.path().join("kept");
         let recording = Recording {
             rustc: PathBuf::new(),
             sysroot: PathBuf::new(),
@@ -174,12 +194,18 @@ mod tests {
             closure: PathBuf::new(),
             key: String::new(),
         };
-        let kept = Kept::new(folder.clone(), true).unwrap();
+        let kept = Kept::within(place.path(), Isolation::Full);
         let outcome = BuildOutcome::CompileError { errors: Vec::new() };
         let report = BuildReport { outcome, warnings: Vec::new(), wall_s: 1.0, cpu_s: 1.0 };
-        let again = kept.or_compile(&recording, place.path(), place.path(), || Ok(report.clone()));
+        let again = kept.found_or(&recording, place.path(), place.path(), || Ok(report.clone()));
         assert_eq!(again.unwrap(), report);
-        assert!(!folder.exists());
-        assert!(Kept::new(folder, false).is_none());
+        assert_eq!(fs::read_dir(&place).unwrap().count(), 0);
+        // Nor is what was compiled where others can write.
+        let kept = Kept::within(place.path(), Isolation::None);
+        let library = place.path().join("src.rs");
+        fs::write(&library, "").unwrap();
+        let built = BuildReport { outcome: BuildOutcome::Built { library }, ..report };
+        kept.found_or(&recording, place.path(), place.path(), || Ok(built)).unwrap();
+        assert_eq!(fs::read_dir(&place).unwrap().count(), 1);
     }
 }

@@ -27,7 +27,6 @@ use crate::held_back::{self, HeldBack};
 use crate::intake::{self, IntakeError, Submission};
 use crate::process::Exit;
 use crate::rubric::BUILD;
-use crate::sandbox::Isolation;
 use crate::store::Store;
 use crate::worker::{Adapter, Budget, Reference, RetryBudget, Supervisor};
 
@@ -355,16 +354,10 @@ impl<'a> Grading<'a> {
         let out = scratch.join("out");
         std::fs::create_dir(&out)?;
         let limits = &self.assignment.limits.build;
-        let trusted = self.supervisor.isolation.isolation() == Isolation::Full;
-        let kept = build::Kept::new(self.assignment.cache().join("built"), trusted);
+        let isolation = self.supervisor.isolation.isolation();
+        let kept = build::Kept::within(&self.assignment.cache(), isolation);
         let compile = |src: &Path| {
-            let compile = || {
-                build::compile(&self.recording, &self.supervisor, src, &out, limits, self.cancel)
-            };
-            match &kept {
-                Some(kept) => kept.or_compile(&self.recording, src, &out, compile),
-                None => compile(),
-            }
+            kept.compile(&self.recording, &self.supervisor, src, &out, limits, self.cancel)
         };
         let template = self.assignment.template();
         let built = mend::build(&compile, &src, &template, &scratch.join("mended"))?;
