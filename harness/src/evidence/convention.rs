@@ -101,13 +101,23 @@ pub struct Conventional<'a> {
 /// So many parties must keep a convention: one alone has made a mistake.
 const PARTIES: usize = 2;
 
-/// The checks under the handout's convention, and under each other that enough parties keep.
+/// An integrator that is wrong in many ways is about as wrong under any convention, and leaves the choice to the BSDFs.
+const FURTHER: f64 = 1.5;
+
+/// The checks under the handout's convention, and under each other that enough parties keep: what the BSDFs leave out,
+/// an integrator must supply, so it must not be much further off than under the handout's.
 pub fn judge(questions: &[Conventional]) -> Vec<Check> {
     let mut checks: Vec<Check> =
         questions.iter().map(|question| (question.judge)(&Convention::default())).collect();
     if checks.iter().all(|check| check.verdict != Verdict::Fail) {
         return checks;
     }
+    let integrator_is_off = |checks: &[Check]| -> f64 {
+        let own = checks.iter().zip(questions);
+        let own = own.filter(|(_, question)| question.party == Party::Integrator);
+        own.map(|(check, _)| if check.verdict == Verdict::Fail { check.error } else { 0.0 }).sum()
+    };
+    let limit = integrator_is_off(&checks);
     let parties: BTreeSet<Party> = questions.iter().map(|question| question.party).collect();
     for convention in Convention::all().into_iter().skip(1) {
         let keeps = |party: &&Party| {
@@ -115,9 +125,13 @@ pub fn judge(questions: &[Conventional]) -> Vec<Check> {
             own.all(|question| (question.passes)(&convention))
         };
         if parties.iter().filter(keeps).count() >= PARTIES {
+            let own: Vec<Check> =
+                questions.iter().map(|question| (question.judge)(&convention)).collect();
+            if integrator_is_off(&own) > FURTHER * limit {
+                continue;
+            }
             let name = convention.name();
-            checks.extend(questions.iter().map(|question| {
-                let check = (question.judge)(&convention);
+            checks.extend(own.into_iter().map(|check| {
                 let summary = format!("{} (judged so: {name})", check.summary);
                 Check { convention: name.clone(), summary, ..check }
             }));
@@ -156,6 +170,11 @@ mod tests {
         let name = cosine.name();
         assert_eq!(names([cosine, own, cosine]), ["", "", "", &name, &name, &name]);
         assert_eq!(names([cosine, own, own]), [""; 3]);
+        // What both BSDFs leave out, nobody supplies.
+        assert_eq!(names([cosine, cosine, own]), [""; 3]);
+        // An integrator that is wrong either way does not tell.
+        let other = Convention { pi: -1, ..own };
+        assert_eq!(names([cosine, cosine, other]), ["", "", "", &name, &name, &name]);
     }
 
     #[test]

@@ -150,6 +150,9 @@ const BETWEEN: f32 = 0.25;
 /// So much of the film, at least, must be known to tell a slip.
 const KNOWN: f64 = 0.1;
 
+/// So much of what an image should be may a slip leave unexplained: between pixels it is known by its neighbours.
+const LEFT: f64 = 0.005;
+
 /// So many pixels are looked at.
 const PRICED: usize = 6000;
 
@@ -201,7 +204,8 @@ pub fn film_price(
         if (known as f64) < KNOWN * all as f64 || !price::follows(&pairs) {
             return price;
         }
-        price.or(change.name, Class::Slip, apart / total.max(f64::MIN_POSITIVE))
+        let residual = apart / total.max(f64::MIN_POSITIVE) - LEFT;
+        price.or(change.name, Class::Slip, residual.max(0.0))
     })
 }
 

@@ -12,6 +12,7 @@ use super::session::{self, Session};
 use super::stages::Stages;
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels;
+use crate::evidence::price::{Class, Price};
 use crate::evidence::shadow_map::Shadows;
 use crate::evidence::stages::VERTEX;
 use crate::evidence::{Check, CheckId, Verdict};
@@ -301,6 +302,9 @@ fn shadows(case: &PreparedScene) -> Shadows<'_> {
     Shadows { mask: &offline.mask, unshadowed: unshadowed_mask, median_lit: offline.median_lit }
 }
 
+/// The mistake of shadows in a default run.
+const ALWAYS_SHADOWED: &str = "shadows are drawn where none belong";
+
 /// A default run that is wrong by its shadows alone is the bonus' fault, not that of pass and
 /// stages: the checks that say so, if it is.
 fn plain_but_for_shadows(
@@ -323,7 +327,8 @@ fn plain_but_for_shadows(
     }
     let summary = "the default run draws shadows: only the bonus scene may";
     let mut checks = judged.to_vec();
-    checks.push(Check::new(CheckId::BonusDefault, name, Verdict::Fail, summary));
+    let check = Check::new(CheckId::BonusDefault, name, Verdict::Fail, summary);
+    checks.push(check.priced(|raw| Price::of_raw(raw).or(ALWAYS_SHADOWED, Class::Slip, 0.0)));
     Some(checks)
 }
 

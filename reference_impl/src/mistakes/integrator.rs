@@ -92,12 +92,9 @@ impl Mistaken {
         if has(M::WoWorld) {
             i.wo = -ray.direction;
         }
-        if has(M::WorldWi) {
-            i.wi = direction;
-        }
-        if has(M::WiNotNormalised) || has(M::WiUnnormalised) {
-            i.wi = i.frame_ns.to_local(to_light);
-        }
+        let long = has(M::WiNotNormalised) || has(M::WiUnnormalised);
+        let wi = if long { to_light } else { direction };
+        i.wi = if has(M::WorldWi) { wi } else { i.frame_ns.to_local(wi) };
         if has(M::WiReversed) {
             i.wi = -i.wi;
         }

@@ -1,7 +1,7 @@
 //! Mistakes made together: whatever is added to a mistake, no part gains a point by it.
 //!
 //! Left out are mistakes that mend each other, such as a cosine that one place lacks and another has
-//! twice: their image is nearer to the right one than that of either alone. The image tells.
+//! twice: an image is right, or all are nearer to the right ones, than with either alone. The images tell.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -153,15 +153,24 @@ fn gains(row: &Row, alone: &[&Row]) -> Vec<String> {
     gains.collect()
 }
 
-/// Whether the mistakes mend each other: their image is nearer to the right one than with any of
-/// them left out, on some path.
+/// Whether the mistakes mend each other: the image of a scene is right that is wrong with each alone, or the images
+/// of a path are nearer to the right ones than with any of them left out.
 fn mends(row: &Row, alone: &[&Row]) -> bool {
     [CheckId::ImageOffline, CheckId::ImageRealtime, CheckId::BonusImage].into_iter().any(|image| {
+        let right = right_scenes(row, image);
+        let alone_right: BTreeSet<&str> =
+            alone.iter().flat_map(|single| right_scenes(single, image)).collect();
         let together = distance(row, image);
         let alone =
             alone.iter().map(|single| distance(single, image)).fold(f64::INFINITY, f64::min);
-        together < NEARER * alone
+        together < NEARER * alone || !right.is_subset(&alone_right)
     })
+}
+
+/// The scenes whose image is right.
+fn right_scenes(row: &Row, image: CheckId) -> BTreeSet<&str> {
+    let right = row.evidence.named(image).filter(|check| check.verdict == Verdict::Pass);
+    right.map(|check| check.scene.as_str()).collect()
 }
 
 /// How far a renderer's images are from the right ones, all scenes together.
@@ -179,7 +188,11 @@ mod tests {
 
     fn row(names: &[&str], points: f64, error: f64) -> Row {
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
-        let check = Check { error, ..Check::new(CheckId::ImageOffline, "s", Verdict::Fail, "") };
+        let verdict = if error > 0.0 { Verdict::Fail } else { Verdict::Pass };
+        let check = Check { error, ..Check::new(CheckId::ImageOffline, "s", verdict, "") };
+        // Another scene, which is wrong whatever the mistakes.
+        let other =
+            Check { error: 0.9, ..Check::new(CheckId::ImageOffline, "t", Verdict::Fail, "") };
         let part = PartGrade {
             id: "1.3".into(),
             title: String::new(),
@@ -194,7 +207,7 @@ mod tests {
         Row {
             subject: Subject::together(names, vec!["1.3".into()]),
             all_shown: true,
-            evidence: Evidence { checks: vec![check] },
+            evidence: Evidence { checks: vec![check, other] },
             diagnoses: Vec::new(),
             grade: Grade {
                 parts: vec![part],
@@ -217,6 +230,10 @@ mod tests {
         assert_eq!(judge(12.0, 0.6), "pairs=1/1");
         assert_eq!(judge(12.5, 0.6), "pairs=0/1");
         assert_eq!(judge(12.5, 0.1), "pairs=0/0(+1 that mend each other)");
+        // Right on one scene, while the other is further off than with either alone.
+        let mut right = row(&["a", "b"], 12.5, 0.0);
+        right.evidence.checks[1].error = 2.0;
+        assert_eq!(figure("pairs", &[right], &singles).text, "pairs=0/0(+1 that mend each other)");
     }
 
     #[test]

@@ -210,7 +210,7 @@ impl CheckId {
                 BONUS,
             ),
             Self::BonusDefault => info(
-                "Appears only where a frame that should be without shadows has them and is right otherwise.",
+                "Appears only where a frame that should be without shadows has them and is right otherwise: a slip.",
                 "",
                 "",
                 &[],
