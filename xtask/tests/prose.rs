@@ -1,7 +1,10 @@
 //! Every Markdown file keeps to what CONTRIBUTING.md says of prose: lines of at most 120 columns,
 //! sentences of at most 40 words, and on average at most 20 words in a sentence.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+
+use serde_json::Value;
 
 /// Columns of a line, tables and code included.
 const LINE: usize = 120;
@@ -41,6 +44,33 @@ fn every_page_is_in_the_book() {
     let targets = summary.split("](").skip(1).filter_map(|rest| rest.split(')').next());
     for target in targets {
         assert!(docs.join(target).is_file(), "docs/SUMMARY.md names {target}, which is not there");
+    }
+}
+
+#[test]
+fn every_key_of_config_json_is_in_its_reference() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the repository");
+    let read = |path: &str| std::fs::read_to_string(root.join(path)).expect("UTF-8");
+    let config: Value = serde_json::from_str(&read("config.json")).expect("JSON");
+    let page = read("docs/reference/config.md");
+    let code = page.lines().flat_map(|line| line.split('`').skip(1).step_by(2));
+    let documented: BTreeSet<&str> =
+        code.flat_map(|code| code.split(['.', '[', ']', '*'])).collect();
+    let keys = keys(&config);
+    assert!(keys.len() > 50, "{keys:?}");
+    let missing: Vec<_> = keys.into_iter().filter(|key| !documented.contains(key)).collect();
+    assert!(missing.is_empty(), "docs/reference/config.md lacks {missing:?}");
+}
+
+/// All keys in a value, at any depth.
+fn keys(value: &Value) -> BTreeSet<&str> {
+    match value {
+        Value::Object(map) => {
+            let own = map.keys().map(String::as_str);
+            own.chain(map.values().flat_map(keys)).collect()
+        }
+        Value::Array(items) => items.iter().flat_map(keys).collect(),
+        _ => BTreeSet::new(),
     }
 }
 

@@ -1,7 +1,8 @@
-//! Every check and every rule by name: what it asks, what its error means, where its bound lies.
+//! Every check and every rule by name. What each asks, what its error means and where its bound lies stands in
+//! `info.rs`; who judges it, where `CheckId` with its variant stands in `evidence/` or `grading/`.
 //!
-//! A new check is one entry here, one function that judges it, and one mention in `config.json`.
-//! `umbra explain`, the table in `docs/evidence.md` and the reports read these entries.
+//! `umbra explain`, the list in `docs/evidence.md` and the reports read these entries. What a new check takes says
+//! ARCHITECTURE.md.
 
 mod info;
 

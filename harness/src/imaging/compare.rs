@@ -1,6 +1,6 @@
 //! The comparison that decides: is this image what a correct renderer draws?
 //!
-//! Rules in this order (DESIGN.md, "Images"): size; non-finite; negative; differing interior pixels; no failing 2x2
+//! Rules in this order (`docs/evidence.md`, "Images"): size; non-finite; negative; differing interior pixels; no failing 2x2
 //! block in the interior; differing pixels of the edge mask, as a fraction of the mask; signed bias of every region,
 //! its highlight apart. Pixels that show an emitter never count. One pass over the pixels serves all rules.
 

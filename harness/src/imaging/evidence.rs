@@ -32,7 +32,7 @@ pub struct Tolerances {
     pub min_region_pixels: u32,
     /// Below minus this a value is negative. Measured: a missing test of `wi` goes far below, rounding does not.
     pub negative_limit: f64,
-    /// Realtime, interior: the largest relative difference (DESIGN.md).
+    /// Realtime, interior: the largest relative difference.
     pub realtime_relative: f64,
     /// More of it per unit of Phong exponent n. WGSL's pow is exp2(n log2 x) with log2 good to 2^-21, that is 3.3e-7 n,
     /// and cos(alpha) itself carries about 1e-6 from the interpolated normal; three times their sum.
@@ -163,7 +163,7 @@ pub struct ImageEvidence {
     pub height: usize,
     /// What it was compared with.
     pub compared_with: ComparedWith,
-    /// Every rule, in the order of DESIGN.md.
+    /// Every rule, in the order of `docs/evidence.md`.
     pub checks: Vec<Check>,
     /// The mean of every region with interior pixels.
     pub regions: Vec<RegionBias>,

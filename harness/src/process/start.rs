@@ -1,5 +1,5 @@
-//! The start of a child, on both sides. A sandbox belongs here: what the parent must do goes into
-//! [`start`], what the child does to itself into [`confine_self`].
+//! The start of a child, on both sides: what the parent does stands in [`start`], what the child does to itself in
+//! [`confine_self`]. Both call `sandbox` for what is more than limits.
 
 use std::ffi::{OsStr, OsString};
 use std::io;
@@ -26,7 +26,7 @@ pub fn command(umbra: &Path, lock: &Confinement, program: &Path) -> Command {
     command
 }
 
-/// Starts `command`, which must be Umbra itself with a hidden command that calls [`confine_self`]
+/// Starts `command`, which must be Umbra with a hidden command, or `umbra-worker`: either calls [`confine_self`]
 /// before anything hostile is touched. Its standard input is taken. The child must be waited for on the thread that calls this:
 /// it is killed when that thread ends.
 ///

@@ -389,7 +389,7 @@ fn unjudged(evidence: &Evidence, part: &Part) -> PartScore {
     }
 }
 
-/// Rule 5: a wrong image that no part explains is paid by the path's `blame` part.
+/// A wrong image that no part explains is paid by the path's `residual_part`.
 fn charge_unexplained(rules: &Rules, evidence: &Evidence, worths: &mut [PartScore]) {
     for (name, path) in &rules.paths {
         let failed = evidence.named(path.proof).filter(|check| check.verdict == Verdict::Fail);

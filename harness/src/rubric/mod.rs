@@ -7,7 +7,7 @@
 //! 4. Evidence that does not apply gives way to the part's fallback.
 //! 5. A check that fails costs its scene's weight times what the curve takes for its error; a part
 //!    loses the largest of them, never a sum or a mean.
-//! 6. When the proof fails and no part's own evidence says why, the path's `blame` part pays.
+//! 6. When the proof fails and no part's own evidence says why, the path's `residual_part` pays.
 //! 7. What the machine could not ask is a range from 0 to all points, with its reason.
 //! 8. Without code, a part earns nothing until the instructor confirms what its images show
 //!    ([`PartGrade::unconfirmed`]).

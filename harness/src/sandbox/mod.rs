@@ -1,6 +1,6 @@
 //! Isolation of whatever touches hostile bytes: the compiler, the worker, the decoders.
 //!
-//! Every such child is Umbra itself, started by [`command`] with its orders on standard input. Before
+//! Every such child is Umbra itself, or `umbra-worker`, started by [`command`] with its orders on standard input. Before
 //! it has any thread and before it touches a hostile byte it locks itself ([`confine_self`]): namespaces
 //! with a new root that holds the policy's binds at fixed paths, no privileges, Landlock, a system
 //! call filter, limits. A worker then goes on in the same process; a compiler is executed

@@ -16,7 +16,7 @@ use super::shared_memory::{Input, Output, Table};
 use super::table::{Record, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE};
 use super::wire::{self, CAMERA_BYTES, Folder, WireJob, WireRequest, queries, rays, words};
 use crate::plugin::{
-    CallError, CallErrorKind, HostPlugin, LoadedScene, OfflineJob, RealtimeJob, Witness,
+    CallError, CallErrorKind, HostPlugin, LoadedScene, OfflineJob, OpenPass, RealtimeJob, Witness,
     WitnessState,
 };
 use crate::process::{self, exit_now};
@@ -84,22 +84,11 @@ fn answer_frames(
     let mut cameras = File::open(folder.cameras())?;
     let mut answered = File::options().write(true).open(folder.frames())?;
     let mut output = Output::open(&folder.output(), wired.output)?;
-    let Request::RenderRealtime { scene, width, height, shadow_map, adapter, .. } = &wired.request
-    else {
-        return Err(std::io::Error::other("only realtime frames are drawn live"));
-    };
     let mut current = None;
     let mut draw = || -> Result<(), CallError> {
         record.start();
-        let scene = load(plugin, &mut current, scene)?;
-        let mut pass = scene.open_realtime(&RealtimeJob {
-            width: *width,
-            height: *height,
-            shadow_map: *shadow_map,
-            adapter_kind: adapter.kind.as_api(),
-            adapter_name: &adapter.name,
-            stages: &[],
-        })?;
+        let scene = load(plugin, &mut current, wired.request.scene())?;
+        let mut pass = open(scene, &wired.request)?;
         let mut camera = [0; CAMERA_BYTES];
         while cameras.read_exact(&mut camera).is_ok() {
             record.start();
@@ -165,16 +154,8 @@ fn draw(
             let job = OfflineJob { width, height, spp, threads, seed, shadows, progress };
             scene.render_offline(&job, values).map(|()| None)
         }
-        Request::RenderRealtime { width, height, shadow_map, adapter, stages, cameras, .. } => {
-            let stages: Vec<_> = stages.iter().map(|stage| (&*stage.name, &*stage.text)).collect();
-            let mut pass = scene.open_realtime(&RealtimeJob {
-                width: *width,
-                height: *height,
-                shadow_map: *shadow_map,
-                adapter_kind: adapter.kind.as_api(),
-                adapter_name: &adapter.name,
-                stages: &stages,
-            })?;
+        Request::RenderRealtime { width, height, cameras, .. } => {
+            let mut pass = open(scene, request)?;
             let mut footprint = None;
             let frame_floats = (3 * *width as usize * *height as usize).max(1);
             for (camera, frame) in cameras.iter().zip(values.chunks_exact_mut(frame_floats)) {
@@ -188,11 +169,30 @@ fn draw(
             }
             Ok(footprint)
         }
-        Request::EvalBsdf { .. } | Request::Radiance { .. } => {
-            let message = "not a request for an image".to_owned();
-            Err(CallError { kind: CallErrorKind::Ours, message })
-        }
+        Request::EvalBsdf { .. } | Request::Radiance { .. } => Err(no_image()),
     }
+}
+
+/// The pass that a request for realtime frames is about.
+fn open<'s>(scene: &'s LoadedScene, request: &Request) -> Result<OpenPass<'s>, CallError> {
+    let &Request::RenderRealtime { width, height, shadow_map, ref adapter, ref stages, .. } =
+        request
+    else {
+        return Err(no_image());
+    };
+    let stages: Vec<_> = stages.iter().map(|stage| (&*stage.name, &*stage.text)).collect();
+    scene.open_realtime(&RealtimeJob {
+        width,
+        height,
+        shadow_map,
+        adapter_kind: adapter.kind.as_api(),
+        adapter_name: &adapter.name,
+        stages: &stages,
+    })
+}
+
+fn no_image() -> CallError {
+    CallError { kind: CallErrorKind::Ours, message: "not a request for such an image".to_owned() }
 }
 
 /// Answers a request for an image in this very process, without a lock: for authors who debug their own

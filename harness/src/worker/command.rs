@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::job::{AdapterKind, Request};
-use super::mounts::Mounts;
+use super::policy::WorkerPolicy;
 use super::wire::Folder;
 use crate::process::Limits;
 
@@ -62,13 +62,13 @@ impl Program {
 pub fn command(
     program: &Program,
     dir: &Path,
-    mounts: &Mounts,
+    own: &WorkerPolicy,
     requests: &[&Request],
     limits: &Limits,
     driver: Option<&Path>,
 ) -> Command {
     let mut command = program.command();
-    command.arg(&mounts.job).current_dir(Folder(dir).scratch()).env_clear();
+    command.arg(&own.job).current_dir(Folder(dir).scratch()).env_clear();
     command.env("LANG", "C").env("HOME", "/nonexistent");
     // What is compiled stays in the scratch of this one worker: one renderer's shaders are no
     // other's business (`shaders`).

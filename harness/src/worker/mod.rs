@@ -12,9 +12,9 @@ mod command;
 mod job;
 #[cfg_attr(not(unix), path = "live_fallback.rs")]
 mod live;
-mod mounts;
 mod neutral_pass;
 mod outcome;
+mod policy;
 mod retry_budget;
 mod shaders;
 mod shared_memory;
@@ -28,8 +28,8 @@ pub use job::{
     STAGES, SceneRef, Stage,
 };
 pub use live::LiveWorker;
-pub use mounts::as_given;
 pub use outcome::{Answer, Fault, JobReport, Late, Outcome, WitnessUse, WorkerRun};
+pub use policy::as_given;
 pub use retry_budget::{Budget, Reference, RetryBudget, is_environment_failure};
 pub use supervise::{Progress, Supervisor};
 // What is parsed of a file that foreign code could write: public for its fuzz target.

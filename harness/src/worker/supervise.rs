@@ -14,8 +14,8 @@ use tempfile::TempDir;
 
 use super::command::{Program, command, program_beside, software_driver};
 use super::job::{Job, Request};
-use super::mounts::Mounts;
 use super::outcome::{Answer, Fault, JobReport, Late, Outcome, WitnessUse, WorkerRun};
+use super::policy::WorkerPolicy;
 use super::retry_budget::{Allowed, CANNOT_RUN, RetryBudget};
 use super::table::{SLOT_BYTES, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE, SlotState};
 use super::wire::{Folder, Place, WireJob, WireRequest, take_input};
@@ -237,17 +237,17 @@ impl Supervisor {
         live: bool,
     ) -> io::Result<Ready> {
         fs::create_dir(Folder(private).scratch())?;
-        let mut mounts = Mounts::new(private, job, requests, self.isolation)?;
-        mounts.shaders(requests, &self.shaders, self.leaves_shaders.as_deref());
+        let mut own = WorkerPolicy::new(private, job, requests, self.isolation)?;
+        own.shaders(requests, &self.shaders, self.leaves_shaders.as_deref());
         if live {
-            mounts.live(private);
+            own.live(private);
         }
-        let files = Files::prepare(private, &mounts, requests, live)?;
+        let files = Files::prepare(private, &own, requests, live)?;
         let program = Program::open(&program_beside(&self.umbra))?;
         let driver = software_driver();
         let elsewhere = |driver: &PathBuf| !driver.starts_with("/usr/share/vulkan");
-        let command = command(&program, private, &mounts, requests, limits, driver.as_deref());
-        let mut policy = mounts.policy;
+        let command = command(&program, private, &own, requests, limits, driver.as_deref());
+        let mut policy = own.policy;
         policy.read_only.extend(driver.filter(elsewhere).map(Bind::same));
         let lock = Confinement::new(limits, policy);
         Ok(Ready { files, command, lock, _program: program })
@@ -352,13 +352,18 @@ pub(super) struct Files {
 }
 
 impl Files {
-    fn prepare(dir: &Path, mounts: &Mounts, requests: &[&Request], live: bool) -> io::Result<Self> {
+    fn prepare(
+        dir: &Path,
+        own: &WorkerPolicy,
+        requests: &[&Request],
+        live: bool,
+    ) -> io::Result<Self> {
         let folder = Folder(dir);
         let new = |path| File::options().create_new(true).read(true).write(true).open(path);
         let (mut input, mut output) = (new(folder.input())?, new(folder.output())?);
         let (mut input_end, mut output_end) = (0, 0);
         let mut wired = Vec::new();
-        for (request, scene) in requests.iter().zip(&mounts.scenes) {
+        for (request, scene) in requests.iter().zip(&own.scenes) {
             let (mut rest, words) = take_input(request);
             rest.scene_mut().path.clone_from(scene);
             let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_ne_bytes()).collect();
@@ -376,7 +381,7 @@ impl Files {
         let mut table = new(folder.table())?;
         table.write_all(&vec![0; SLOT_BYTES * (1 + requests.len())])?;
         let places = wired.iter().map(|request| request.output).collect();
-        let wired = WireJob { plugin: mounts.plugin.clone(), requests: wired, live };
+        let wired = WireJob { plugin: own.plugin.clone(), requests: wired, live };
         fs::write(folder.job(), serde_json::to_vec(&wired)?)?;
         // As root, the worker is another user; the folder above lets nobody else in.
         #[cfg(unix)]

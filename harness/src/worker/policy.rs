@@ -1,5 +1,5 @@
-//! What a worker sees: the plugin, the scenes it is asked about, its own files, and the system's
-//! libraries, all under neutral names.
+//! The policy of a worker: what it sees. That is the plugin, the scenes it is asked about, its own files and the
+//! system's libraries, all under neutral names.
 
 use std::fs;
 use std::io;
@@ -14,7 +14,7 @@ use crate::sandbox::policy::{JOB, PLUGIN, SCENE};
 use crate::sandbox::{Bind, Gpu, Kind, Layers, Policy};
 
 /// A policy, and the names by which the worker is told of things.
-pub struct Mounts {
+pub struct WorkerPolicy {
     /// What it sees.
     pub policy: Policy,
     /// The plugin, when there is one.
@@ -25,7 +25,7 @@ pub struct Mounts {
     pub job: PathBuf,
 }
 
-impl Mounts {
+impl WorkerPolicy {
     /// For a worker with the private folder `dir`.
     ///
     /// # Errors
@@ -69,7 +69,7 @@ impl Mounts {
     }
 }
 
-impl Mounts {
+impl WorkerPolicy {
     /// Gives it the pipes of a live worker; they must be there.
     pub fn live(&mut self, dir: &Path) {
         let (folder, inside) = (Folder(dir), Folder(Path::new(JOB)));
@@ -238,8 +238,8 @@ mod tests {
         let scene = SceneRef { path: toml.to_owned(), options: String::new() };
         let request = Request::EvalBsdf { scene, queries: Vec::new() };
         let job = Job { plugin: None, requests: vec![request.clone()] };
-        let mounts = Mounts::new(dir, &job, &[&request], Layers::full()).unwrap();
-        let scene = mounts.policy.read_only.iter().filter(|bind| bind.inside.starts_with(SCENE));
+        let own = WorkerPolicy::new(dir, &job, &[&request], Layers::full()).unwrap();
+        let scene = own.policy.read_only.iter().filter(|bind| bind.inside.starts_with(SCENE));
         let mut names = Vec::new();
         for bind in scene.clone().filter(|bind| bind.host.is_dir()) {
             for file in bind.host.read_dir().unwrap() {
@@ -247,7 +247,7 @@ mod tests {
             }
         }
         names.sort();
-        (mounts.scenes, scene.map(|bind| bind.inside.clone()).collect(), names)
+        (own.scenes, scene.map(|bind| bind.inside.clone()).collect(), names)
     }
 
     #[test]
