@@ -5,7 +5,7 @@ set -euo pipefail
 
 source_dir=${AUTOGRADER_DIR:-/autograder}/source
 export DEBIAN_FRONTEND=noninteractive
-export RUSTUP_HOME=/opt/rust/rustup CARGO_HOME=/opt/rust/cargo
+export RUSTUP_HOME=${RUSTUP_HOME:-/opt/rust/rustup} CARGO_HOME=${CARGO_HOME:-/opt/rust/cargo}
 export PATH="$CARGO_HOME/bin:$PATH"
 
 apt-get update

@@ -135,6 +135,13 @@ impl Check {
     }
 }
 
+/// Whether one mistake explains a check's answers and leaves next to nothing.
+pub(super) fn is_explained(check: &Check) -> bool {
+    let leaves_nothing = |class: Class| (check.error - class.price()).abs() < 1e-3;
+    let is_known = ![UNKNOWN, ""].contains(&check.mistake.as_str());
+    is_known && [Class::Slip, Class::Concept].into_iter().any(leaves_nothing)
+}
+
 /// Where one mistake explains a check on most scenes, and nothing known explains it on the others, it
 /// costs what it costs on most of them: on one a seam or an edge may leave more unexplained. Where it
 /// leaves nothing lit (`DARKENING`) that is no worse. And what is explained, or follows the right

@@ -1,5 +1,7 @@
 //! Part 2.5: whether realtime shadows fall where they should, apart from how surfaces are shaded.
 
+use std::collections::BTreeMap;
+
 use basecode::Image;
 
 use super::price::{self, Class, Price};
@@ -117,7 +119,9 @@ impl Shadows<'_> {
             *known += 1;
             let phong = self.unshadowed.region(self.unshadowed.pixels[index]).exponent > 0.0;
             let visibility = f64::from(a.element_sum()) / f64::from(b.element_sum());
-            known_pixels.push(Known { lit, phong, visibility });
+            let (region, left) =
+                (self.mask.pixels[index] & RegionMask::INDEX, f64::from(a.element_sum()));
+            known_pixels.push(Known { lit, phong, visibility, region, left });
             let off = if lit { (a - b).abs() } else { a.abs() };
             // Asked this way round, a NaN is wrong.
             let right = off.max_element() <= HALF_LIGHT * b.abs().max_element();
@@ -190,9 +194,37 @@ struct Known {
     lit: bool,
     /// Whether its material is Phong.
     phong: bool,
-    /// What is left of the light, as the frames have it.
+    /// What is left of the light, as the frames have it: a fraction.
     visibility: f64,
+    /// The number of its region.
+    region: u16,
+    /// Radiance with shadows, summed over channels.
+    left: f64,
 }
+
+/// What lies in shadow, where every pixel of a region has the same radiance, as an ambient term leaves it: the largest
+/// fraction of the light that is left to half of a region, and the fraction of dark pixels that have another radiance.
+fn ambient(pixels: &[Known]) -> (f64, f64) {
+    let mut of_region: BTreeMap<u16, Vec<&Known>> = BTreeMap::new();
+    for pixel in pixels.iter().filter(|pixel| !pixel.lit) {
+        of_region.entry(pixel.region).or_default().push(pixel);
+    }
+    let (mut largest, mut off, mut all) = (0.0, 0usize, 0usize);
+    for own in of_region.values_mut() {
+        own.sort_by(|a, b| a.left.total_cmp(&b.left));
+        let median = own[own.len() / 2].left;
+        // Asked this way round, a NaN is off.
+        let same = own.iter().filter(|p| (p.left - median).abs() <= f64::from(HALF_LIGHT) * median);
+        (off, all) = (off + own.len() - same.count(), all + own.len());
+        own.sort_by(|a, b| a.visibility.total_cmp(&b.visibility));
+        largest = f64::max(largest, own[own.len() / 2].visibility);
+    }
+    (largest, off as f64 / all.max(1) as f64)
+}
+
+/// An ambient term leaves no more of the light than this to half of a region: beyond it, a dim corner without any
+/// shadow has about the same radiance everywhere too.
+const AMBIENT: f64 = 0.5;
 
 /// The mistake of shadows where light belongs, and the reverse.
 const EXCHANGED: &str = "lit and dark are exchanged";
@@ -244,6 +276,13 @@ fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64) -> Price {
         }
     }
     let price = price::partly(price, lit_wrong, dark_wrong);
+    let price = match ambient(pixels) {
+        (left, off) if left > 0.0 && left <= AMBIENT => {
+            let residual = price::fading(left) + off + lit_wrong;
+            price.or("an ambient term is left in shadow", Class::Slip, residual)
+        }
+        _ => price,
+    };
     let mut dark: Vec<f64> = pixels.iter().filter(|p| !p.lit).map(|p| p.visibility).collect();
     dark.retain(|visibility| visibility.is_finite());
     dark.sort_by(f64::total_cmp);
@@ -304,6 +343,28 @@ mod tests {
         assert_eq!(judge(&not_a_number, &without), Some(Verdict::Fail));
         // A black renderer tells nothing, and earns nothing by it.
         assert_eq!(judge(&right, &image(|_| 0.0)), None);
+    }
+
+    #[test]
+    fn an_ambient_term_in_shadow_costs_a_slip_and_no_shadow_all() {
+        let (mask, unshadowed) = masks();
+        let shadows = Shadows { mask: &mask, unshadowed: &unshadowed, median_lit: 1.0 };
+        let tolerances = Tolerances { spare_pixels: 0, ..Tolerances::default() };
+        let error = |left: &dyn Fn(usize) -> f32| {
+            // In the light, and without shadows, each pixel has its own radiance beside what is left.
+            let without = image(|i| 2.0 + i as f32 + left(i));
+            let with = image(|i| if i < 10 { 2.0 + i as f32 + left(i) } else { left(i) });
+            shadows.judge("s", &with, &without, &tolerances).unwrap().error
+        };
+        let ambient = error(&|_| 0.5);
+        assert!((0.02..0.03).contains(&ambient), "{ambient}");
+        // Another value in every pixel is no ambient term.
+        let other = error(&|i| 0.5 + 2.0 * (i % 3) as f32);
+        assert!(other > 0.1, "{other}");
+        // All the same without any shadow: nothing was drawn.
+        let flat = image(|_| 3.0);
+        let none = shadows.judge("s", &flat, &flat, &tolerances).unwrap();
+        assert_eq!(none.error, 1.0);
     }
 
     #[test]

@@ -71,14 +71,14 @@ pub fn judge_scene<'a>(
         witness,
         seed: 1,
     };
-    let render = |width, height, spp, seed, threads| Request::RenderOffline {
+    let render = |(width, height), spp, seed, threads, shadows| Request::RenderOffline {
         scene: scene.clone(),
         width,
         height,
         spp,
         seed,
         threads,
-        shadows: true,
+        shadows,
     };
     let centres: Vec<_> =
         small.surface.pixels.iter().map(|(centre, _)| session::ray(centre)).collect();
@@ -88,20 +88,27 @@ pub fn judge_scene<'a>(
     requests.push(radiance(&chosen, FLAT, true));
     requests.push(radiance(&chosen, Witness::True, false));
     requests.push(radiance(&chosen, Witness::True, true));
-    requests.push(radiance(&centres, Witness::True, true));
-    requests.push(render(small.width, small.height, 1, 1, 1));
+    // What the loop is asked: a render, and radiance along its rays.
+    let size = (small.width, small.height);
+    let at_centres =
+        |shadows| [radiance(&centres, Witness::True, shadows), render(size, 1, 1, 1, shadows)];
+    let at_samples = |shadows| {
+        small.sampled.iter().flat_map(move |sampled| {
+            let size = (sampled.film.width, sampled.film.height);
+            let along = radiance(&sampled.rays, Witness::True, shadows);
+            [along, render(size, loops::SAMPLES, run.seed, 1, shadows)]
+        })
+    };
+    requests.extend(at_centres(true));
     let plain = plain_surfaces(case);
     let queries = plain.iter().map(|(_, query)| *query).collect();
     requests.push(Request::EvalBsdf { scene: scene.clone(), queries });
     let first = case.first.as_ref().filter(|_| !run.whole);
     let film =
         |expected: &Expected| (expected.unshadowed.width as u32, expected.unshadowed.height as u32);
-    let (width, height) = film(first.unwrap_or(&case.expected));
-    requests.push(render(width, height, case.spp, run.seed, run.threads));
-    if let Some(film) = &small.sampled {
-        requests.push(radiance(&film.rays, Witness::True, true));
-        requests.push(render(film.film.width, film.film.height, loops::SAMPLES, run.seed, 1));
-    }
+    let size = film(first.unwrap_or(&case.expected));
+    requests.push(render(size, case.spp, run.seed, run.threads, true));
+    requests.extend(at_samples(true));
     let outcomes = session.run(Some(plugin), requests);
     let [
         w0,
@@ -112,7 +119,7 @@ pub fn judge_scene<'a>(
         flat_on,
         true_off,
         true_on,
-        at_centres,
+        along_centres,
         one_spp,
         own,
         full,
@@ -162,9 +169,19 @@ pub fn judge_scene<'a>(
         }
         record_rays(session, case, w1, (flat_on, flat_off));
     }
-    checks.push(match (one_spp, at_centres) {
+    if let (Outcome::Done(image), Outcome::Done(along)) = (one_spp, along_centres) {
+        record_loop(session, case, (&image.values, &along.values));
+    }
+    // Where shadows leave nothing to see, the loop shows without them.
+    let unshadowed = is_black(along_centres).then(|| {
+        session.run(Some(plugin), at_centres(false).into_iter().chain(at_samples(false)).collect())
+    });
+    let (along_centres, one_spp, sampled) = match unshadowed.as_deref() {
+        Some([along, image, sampled @ ..]) => (along, image, sampled),
+        _ => (along_centres, one_spp, sampled),
+    };
+    checks.push(match (one_spp, along_centres) {
         (Outcome::Done(image), Outcome::Done(along)) => {
-            record_loop(session, case, (&image.values, &along.values));
             let (image, along) = (session::colours(&image.values), session::colours(&along.values));
             loops::judge_agreement(name, &small.mask, image, along)
         }
@@ -225,8 +242,7 @@ pub fn judge_scene<'a>(
         checks.push(check);
         return (checks, None);
     }
-    let (width, height) = film(&case.expected);
-    let whole = render(width, height, case.spp, run.seed, run.threads);
+    let whole = render(film(&case.expected), case.spp, run.seed, run.threads, true);
     let outcomes = session.run(Some(plugin), vec![whole]);
     let (whole, drawn) = match outcomes.first() {
         Some(outcome) => judge(outcome, &case.expected),
@@ -235,6 +251,11 @@ pub fn judge_scene<'a>(
     // An image that is wrong on any film is wrong; the larger one is shown.
     checks.push(if whole.verdict == Verdict::Fail { whole } else { check });
     (checks, drawn)
+}
+
+/// Whether an answer is there, and says that no light comes from anywhere.
+fn is_black(outcome: &Outcome) -> bool {
+    outcome.answer().is_some_and(|answer| answer.values.iter().all(|value| *value == 0.0))
 }
 
 /// What to ask a renderer about its own BSDF where lit rays end: the ray, and the question. Surfaces of

@@ -334,7 +334,8 @@ const LIGHT_ELSEWHERE: f64 = 0.9;
 
 /// Where the light stands elsewhere than it should, shadows fall elsewhere too. So on a scene whose
 /// unshadowed radiance is wrong nearly everywhere (1.3) shadows are not judged (1.4), as long as
-/// there is another scene whose radiance is right and whose shadows are judged.
+/// there is another scene whose radiance is right and whose shadows are judged. What one mistake explains to the end,
+/// with the light where it belongs, leaves the light there.
 pub fn set_apart(checks: &mut [Check]) {
     charge_what_is_never_tested(checks);
     let is = |check: &Check, id: CheckId, verdict| check.id == id && check.verdict == verdict;
@@ -344,7 +345,8 @@ pub fn set_apart(checks: &mut [Check]) {
     let radiance =
         |verdict| checks.iter().filter(move |check| is(check, CheckId::RadianceLit, verdict));
     let right = named(radiance(Verdict::Pass).collect());
-    let mut wrong = named(radiance(Verdict::Fail).filter(nearly_all).collect());
+    let elsewhere = |check: &&Check| nearly_all(check) && !price::is_explained(check);
+    let mut wrong = named(radiance(Verdict::Fail).filter(elsewhere).collect());
     // Right under a convention is right.
     wrong.retain(|scene| !right.contains(scene));
     let judged = |check: &Check| {

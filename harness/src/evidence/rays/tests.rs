@@ -168,6 +168,13 @@ fn shadows_are_judged_where_radiance_is_right() {
         [check(CheckId::RadianceLit, "cbox", pass), check(CheckId::ShadowRays, "cbox", fail)];
     let both = [emitter.as_slice(), right.as_slice()].concat();
     assert_eq!(verdicts(&both), [fail, Verdict::NotJudged, pass, fail]);
+    // One mistake explains it to the end, with the light where it belongs; or leaves some.
+    let explained = |error| {
+        let lit = Check { error, mistake: "red and blue exchanged".into(), ..wrong(0.99) };
+        [&[lit], &emitter[1..], right.as_slice()].concat()
+    };
+    assert_eq!(verdicts(&explained(0.02)), [fail, fail, pass, fail]);
+    assert_eq!(verdicts(&explained(0.05)), [fail, Verdict::NotJudged, pass, fail]);
     // A scene without shadows is no other scene to judge them on.
     let open = [emitter.as_slice(), &[check(CheckId::RadianceLit, "open", pass)]].concat();
     assert_eq!(verdicts(&open), [fail, fail, pass]);
