@@ -107,7 +107,7 @@ pub fn readme() -> File {
     let mut text = String::from(
         "# Probe scenes\n\n\
          `xtask scenes` makes these. Each shows faults that the four scenes of the assignment hide. Each has one point light,\n\
-         an offline version at 16 samples per pixel and a realtime version. `open` has 1 sample per pixel. `both_shadows` has a\n\
+         an offline version at 4 samples per pixel and a realtime version. `open` has 1 sample per pixel. `both_shadows` has a\n\
          realtime version with shadows as well.\n\n",
     );
     for (scene, shows) in PROBES {
