@@ -20,7 +20,7 @@ const OF_FAMILY: usize = 3;
 const ROUNDING: f64 = 0.011;
 /// So many combinations may gain for now, all of them printed: raw errors are relative, so that one
 /// mistake that darkens or brightens everything makes another's share smaller.
-const NOT_YET: f64 = 0.1;
+const NOT_YET: f64 = 0.06;
 /// An image must be nearer by this fraction to tell that two mistakes mend each other.
 const NEARER: f64 = 0.98;
 
