@@ -106,9 +106,9 @@ pub fn all() -> Vec<Scene> {
 pub fn readme() -> File {
     let mut text = String::from(
         "# Probe scenes\n\n\
-         `xtask scenes` makes these. Each shows faults that the four scenes of the assignment hide. Each has one point light,\n\
-         an offline version at 4 samples per pixel and a realtime version. `open` has 1 sample per pixel. `both_shadows` has a\n\
-         realtime version with shadows as well.\n\n",
+         `xtask scenes` makes these scenes and this page from `xtask/src/scenes/probes`. Each shows faults that the four\n\
+         scenes of the assignment hide. Each has one point light, an offline version at 4 samples per pixel and a realtime\n\
+         version. `open` has 1 sample per pixel. `both_shadows` has a realtime version with shadows as well.\n\n",
     );
     for (scene, shows) in PROBES {
         let scene = scene();
