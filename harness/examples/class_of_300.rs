@@ -95,7 +95,7 @@ fn make(root: &Path, download: &Path, size: usize) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A sample's zip with a line of the student's own in `src/lib.rs`: no two are compiled at once.
+/// A sample's zip with a line of the student's own in `src/lib.rs`: none is served by another's library.
 fn of_student(archive: &Path, student: usize) -> anyhow::Result<Vec<u8>> {
     let mut read = zip::ZipArchive::new(File::open(archive)?)?;
     let mut written = zip::ZipWriter::new(Cursor::new(Vec::new()));

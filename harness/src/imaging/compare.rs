@@ -1,8 +1,9 @@
 //! The comparison that decides: is this image what a correct renderer draws?
 //!
-//! Rules in this order (`docs/evidence.md`, "Images"): size; non-finite; negative; differing interior pixels; no failing 2x2
-//! block in the interior; differing pixels of the edge mask, as a fraction of the mask; signed bias of every region,
-//! its highlight apart. Pixels that show an emitter never count. One pass over the pixels serves all rules.
+//! Rules in this order (`docs/evidence.md`, "Images"): size; non-finite; negative; differing interior pixels; no
+//! failing 2x2 block in the interior; differing pixels of the edge mask, as a fraction of the mask; signed bias of
+//! every region, its highlight apart. Pixels that show an emitter never count. One pass over the pixels serves all
+//! rules.
 
 use basecode::image::Image;
 use glam::Vec3;

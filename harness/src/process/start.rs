@@ -26,9 +26,9 @@ pub fn command(umbra: &Path, lock: &Confinement, program: &Path) -> Command {
     command
 }
 
-/// Starts `command`, which must be Umbra with a hidden command, or `umbra-worker`: either calls [`confine_self`]
-/// before anything hostile is touched. Its standard input is taken. The child must be waited for on the thread that calls this:
-/// it is killed when that thread ends.
+/// Starts `command`, which must be Umbra with a hidden command, or `umbra-worker`: either calls [`confine_self`] before
+/// anything hostile is touched. Its standard input is taken. The child must be waited for on the thread that calls
+/// this: it is killed when that thread ends.
 ///
 /// # Errors
 /// When the process cannot be made.

@@ -1,7 +1,8 @@
 //! `umbra watch`: checks a working folder on every save, and shows the report in the browser.
 //!
-//! A first look asks one small scene and is there soon; then everything is asked. Each check is a program of its own, `umbra check`, so that nothing that a renderer does ends the watch. A newer save
-//! ends the check that runs. The page is served on this machine alone, under an address that nobody can guess.
+//! A first look asks one small scene and is there soon; then everything is asked. Each check is a program of its own,
+//! `umbra check`, so that nothing that a renderer does ends the watch. A newer save ends the check that runs. The page
+//! is served on this machine alone, under an address that nobody can guess.
 
 mod live;
 mod page;
