@@ -8,7 +8,9 @@ use basecode::{Image, Vec3};
 use umbra::assignment::SceneEntry;
 use umbra::evidence::images::{self, Kind};
 use umbra::evidence::rays::RayBatch;
-use umbra::evidence::vertex::{VertexFilm, judge_vertex};
+use umbra::evidence::stage_film::StageFilm;
+use umbra::evidence::stages::{BoundValue, judge_pass};
+use umbra::evidence::vertex::judge_vertex;
 use umbra::evidence::{Check, CheckId};
 use umbra::expected::{Expected, SurfaceBuffer, load_scene, regions};
 use umbra::grading::submitted::{SubmittedImage, judge as judge_submitted};
@@ -151,8 +153,9 @@ pub fn judge(bytes: &[u8]) {
     }
     let ProbeFilm { surface, mask, .. } = &case.probe_film;
     let camera = case.expected.scene.camera(WIDTH, HEIGHT).expect("a camera");
-    let film = VertexFilm { scene: &case.expected.scene, camera, surface, mask };
+    let film = StageFilm { scene: &case.expected.scene, camera, surface, mask };
     check(&[judge_vertex("a", &film, [[&image, &image]; 3])]);
+    check(&[judge_pass("a", &film, &BoundValue::ALL.map(|bound| (bound, image.clone())), &image)]);
     ImageDigest::new("a", "a.exr", &image);
     let (reference, mask) = (&case.expected.offline.mean, &case.expected.offline.mask);
     let scale = case.expected.offline.median_lit;

@@ -135,6 +135,19 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
             .with_context(|| file.display().to_string())?;
         return summary(&[figures::singles(&singles), figures::prices(&singles)]);
     }
+    // What finds most comes first: a run of all takes long.
+    let mut single = singles(&catalogue);
+    if arguments.quick {
+        bench.grading.cases.iter_mut().for_each(|case| case.spp = choice::QUICK_SPP);
+        single = single.into_iter().step_by(choice::QUICK_STEP).collect();
+    }
+    let together = Together::new(&bench, &catalogue, &single, arguments.quick, &chosen);
+    let pairs = if arguments.quick { Vec::new() } else { pairs(&catalogue)? };
+    let single = bench.grade_all(&chosen(single), jobs)?;
+    let combined = together.pairs.len() + together.triples.len();
+    let together = together.figures(&bench, &catalogue, &single, jobs)?;
+    let pairs = bench.grade_all(&chosen(pairs), jobs)?;
+    bench.reset(&store)?;
     let mut right = Vec::new();
     for (index, spp) in choice::SPP.into_iter().enumerate() {
         let all = variants(&catalogue, spp);
@@ -150,21 +163,9 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         }
     }
     bench.reset(&store)?;
-    let mut single = singles(&catalogue);
-    if arguments.quick {
-        bench.grading.cases.iter_mut().for_each(|case| case.spp = choice::QUICK_SPP);
-        single = single.into_iter().step_by(choice::QUICK_STEP).collect();
-    }
-    let together = Together::new(&bench, &catalogue, &single, arguments.quick, &chosen);
-    let pairs = if arguments.quick { Vec::new() } else { pairs(&catalogue)? };
-    let matrix = Matrix {
-        variants: right,
-        singles: bench.grade_all(&chosen(single), jobs)?,
-        pairs: bench.grade_all(&chosen(pairs), jobs)?,
-    };
+    let matrix = Matrix { variants: right, singles: single, pairs };
     let mut figures = figures::of_matrix(&matrix);
-    let combined = together.pairs.len() + together.triples.len();
-    figures.extend(together.figures(&bench, &catalogue, &matrix.singles, jobs)?);
+    figures.extend(together);
     let rules = deletion::figure(&matrix, &assignment.rules);
     // Some rules show in pairs alone, some in right variants.
     if arguments.only.is_empty() && !arguments.quick {

@@ -190,6 +190,11 @@ const EDGE_RATIO: f64 = 1.1;
 /// Sum of z on all edges over its standard deviation: under 4 for a right renderer, for points of a
 /// Sobol sequence too, whose mean is half a stratum off; 17 where black samples are not counted.
 const EDGE_BIAS: f64 = 8.0;
+/// A pixel is stray that is off by more than this, relative, where nothing around differs by more than
+/// [`CALM`]: one that is never written, or written over.
+const STRAY: f64 = 0.05;
+/// Standard error of a pixel, at most, where all around is smooth, relative to its mean.
+const CALM: f64 = 0.01;
 /// Edges of fewer pixels tell nothing.
 const LEAST_EDGES: usize = 40;
 
@@ -229,6 +234,7 @@ pub fn judge_samples(
     let around =
         |index: usize| near(index).filter_map(|i| own[i]).map(|p| p.variance).fold(0.0, f64::max);
     let (mut counted, mut off, mut inside) = (0usize, 0usize, 0usize);
+    let mut stray = Vec::new();
     let (mut apart, mut total) = (0.0, 0.0);
     let mut first = None;
     let mut edges = Edges::default();
@@ -238,17 +244,21 @@ pub fn judge_samples(
         let found = sum(&image[index]);
         counted += 1;
         let difference = if found.is_finite() { found - pixel.mean } else { typical };
-        let room =
-            Z_LIMIT * (around(index) * both).sqrt() + RELATIVE * pixel.mean.abs() + 1e-3 * typical;
+        let error = (around(index) * both).sqrt();
+        let room = Z_LIMIT * error + RELATIVE * pixel.mean.abs() + 1e-3 * typical;
         apart += difference.abs();
         total += pixel.mean.abs();
         if !found.is_finite() || difference.abs() > room {
             off += 1;
+            let calm = error < CALM * pixel.mean.abs();
+            if calm && difference.abs() > STRAY * pixel.mean.abs() {
+                stray.push((index, found, pixel.mean));
+            }
             inside += usize::from(!near(index).any(|i| own[i].is_some_and(|p| p.is_edge(typical))));
             first = first.or(Some((index, found, pixel.mean)));
         }
         if pixel.is_edge(typical) {
-            let z = difference / (around(index) * both).sqrt();
+            let z = difference / error;
             let (count, squares) = &mut edges.0[pixel.direction()];
             (*count, *squares) = (*count + 1, *squares + z * z);
             (bias, edge_count) = (bias + z, edge_count + 1);
@@ -276,29 +286,41 @@ pub fn judge_samples(
             bias,
             EDGE_BIAS,
         ),
+        Measure::at_most(
+            RuleId::LoopStray,
+            "pixels far from what all rays around them answer",
+            stray.len() as f64,
+            0.0,
+        ),
     ];
-    let [pixels, spread, _] = [0, 1, 2].map(|i| measures[i].passed);
+    let [pixels, spread] = [0, 1].map(|i| measures[i].passed);
     if measures.iter().all(|measure| measure.passed) {
         let summary = format!(
             "{SAMPLES} samples a pixel average what the integrator answers at {counted} pixels"
         );
         return (Check { measures, ..Check::new(id, scene, Verdict::Pass, summary) }, edges);
     }
+    let at = |(index, found, mean): (usize, f64, f64)| {
+        let (x, y, expected, found) = (index % width, index / width, mean / 3.0, found / 3.0);
+        format!("first at ({x}, {y}): expected {expected:.4}, found {found:.4}")
+    };
     let summary = match first.filter(|_| !pixels) {
-        Some((index, found, mean)) => format!(
+        Some(first) => format!(
             "{off} of {counted} pixels of a render at {SAMPLES} samples a pixel are not the average of what the \
-             integrator answers in them; first at ({}, {}): expected {:.4}, found {:.4}",
-            index % width,
-            index / width,
-            mean / 3.0,
-            found / 3.0
+             integrator answers in them; {}",
+            at(first)
+        ),
+        None if !stray.is_empty() => format!(
+            "{} of {counted} pixels are far from what all rays in and around them answer; {}",
+            stray.len(),
+            at(stray[0])
         ),
         None if !spread => format!(
             "edges are {worst:.1} times as far off as {SAMPLES} independent samples a pixel would leave them"
         ),
         None => format!("edges are off in one direction, by {bias:.0} standard deviations"),
     };
-    let hint = match (pixels, spread) {
+    let hint = match (pixels && stray.is_empty(), spread) {
         (false, _) => {
             "look at the sum over samples, what it is divided by, and the pixel it is written to"
         }
@@ -310,8 +332,15 @@ pub fn judge_samples(
     let raw = apart / f64::max(total, f64::MIN_POSITIVE);
     let mut price = Price::of_raw(raw);
     if inside as f64 <= OFF_FRACTION * counted as f64 + SPARE_PIXELS {
-        // All but edges is right.
-        price = price.or("samples that do not cover their pixels", Class::Slip, 0.0);
+        // All but edges is right, or a few pixels.
+        price = match stray.is_empty() {
+            true => price.or("samples that do not cover their pixels", Class::Slip, 0.0),
+            false => Price {
+                error: Class::Slip.price(),
+                mistake: Some("a few pixels are wrong"),
+                ..price
+            },
+        };
     } else {
         let mean = |values: &[[f32; 3]]| {
             let judging = &values[SAMPLES as usize..];

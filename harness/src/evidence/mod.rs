@@ -18,6 +18,7 @@ pub mod rays;
 mod registry;
 pub mod shading;
 pub mod shadow_map;
+pub mod stage_film;
 pub mod stages;
 pub mod submitted;
 pub mod vertex;

@@ -96,6 +96,8 @@ named! {
     LoopEdges = "loop.edges",
     /// Mean signed error on edges.
     LoopEdgeBias = "loop.edge_bias",
+    /// No pixel is far from what all rays through it and beside it answer.
+    LoopStray = "loop.stray",
     /// Width and height.
     ImageSize = "image.size",
     /// Pixels that are not finite.
@@ -122,6 +124,8 @@ named! {
     PassRhoS = "pass.rho_s",
     /// The uniform `exponent`.
     PassExponent = "pass.exponent",
+    /// Surfaces lie where they should on the film.
+    PassPlace = "pass.place",
     /// The position that the vertex stage forwards.
     VertexPosition = "vertex.position",
     /// The normal that the vertex stage forwards.

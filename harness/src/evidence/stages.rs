@@ -8,9 +8,8 @@ use std::collections::BTreeMap;
 use basecode::{Camera, Image, MaterialModel, Scene, Vec3};
 
 use super::price::{self, Class, Price};
+use super::stage_film::{OFFSET_PX, StageFilm, median_length};
 use super::{Check, CheckId, Measure, RuleId, Verdict};
-use crate::expected::SurfaceBuffer;
-use crate::imaging::reference::RegionMask;
 
 /// A vertex stage that does what the contract says, for use with a student's fragment stages.
 pub const VERTEX: &str =
@@ -129,25 +128,23 @@ const BOUND_RELATIVE: f32 = 1e-4;
 pub(super) const STRAY_FRACTION: f64 = 5e-3;
 
 /// Part 2.1: judges the frames that a student's pass drew with stages that show one bound value each.
+/// `positions` is the frame that shows world positions.
 pub fn judge_pass(
     scene_name: &str,
-    scene: &Scene,
-    surface: &SurfaceBuffer,
-    mask: &RegionMask,
+    film: &StageFilm,
     frames: &[(BoundValue, Image)],
+    positions: &Image,
 ) -> Check {
     let id = CheckId::PassUniforms;
-    let Ok(camera) = scene.camera(surface.width, surface.height) else {
-        return Check::new(id, scene_name, Verdict::NotJudged, "the scene has no camera");
-    };
+    let (scene, camera) = (film.scene, &film.camera);
     let mut measures = Vec::new();
     let mut first_wrong = None;
     let (mut wrong_total, mut total) = (0usize, 0usize);
     for (bound, frame) in frames {
         let (mut wrong, mut counted) = (0usize, 0usize);
         let mut example = None;
-        for (index, shape) in interior(surface, mask) {
-            let Some(expected) = bound.expected(scene, &camera, shape) else { continue };
+        for (index, shape) in film.interior() {
+            let Some(expected) = bound.expected(scene, camera, shape) else { continue };
             counted += 1;
             let found = frame.pixels[index];
             let close = (found - expected).abs().max_element()
@@ -190,8 +187,8 @@ pub fn judge_pass(
                 bound.name(),
                 100.0 * fraction,
                 scene.shapes()[shape].name,
-                index % surface.width,
-                index / surface.width
+                index % film.surface.width,
+                index / film.surface.width
             );
             let hint = if found == Vec3::ZERO {
                 "it was never set, or nothing was drawn there"
@@ -199,12 +196,12 @@ pub fn judge_pass(
                 ""
             };
             let wrong = wrong_total as f64 / total as f64;
-            let shapes = wrong_shapes(scene, &camera, surface, mask, frames);
+            let shapes = wrong_shapes(film, frames);
             // A pass that shows hardly one value, on no shape, is no pass, whatever it draws.
             let price = match wrong > NO_PASS && shapes.wrong == shapes.shapes {
                 true => Price::of_raw(wrong),
                 false => {
-                    let other = other_pipeline(scene, surface, mask, frames);
+                    let other = other_pipeline(film, frames);
                     shapes.price(price_of_values(wrong, &measures, other))
                 }
             };
@@ -217,9 +214,42 @@ pub fn judge_pass(
             .with_hint(hint)
         }
     };
+    let offset_px = median_offset_px(film, positions);
+    let placed = Measure::at_most(
+        RuleId::PassPlace,
+        "surfaces off their place on the film (pixels, median)",
+        offset_px,
+        OFFSET_PX,
+    );
+    let least = Class::Slip.price();
+    if !placed.passed && check.error < least {
+        let summary = format!("surfaces lie {offset_px:.2} pixels beside their place");
+        check = Check { error: least, ..Check::new(id, scene_name, Verdict::Fail, summary) };
+        check = check.with_hint("look at the viewport and at the matrices that the pass binds");
+        check.mistake = "surfaces lie beside their place".to_owned();
+    }
+    measures.push(placed);
     check.measures = measures;
     check
 }
+
+/// How far surfaces lie from their place under a pass. 0 where most of the film shows nothing near what
+/// belongs there: values tell what is wrong then, or the pass draws by a vertex stage of its own.
+fn median_offset_px(film: &StageFilm, positions: &Image) -> f64 {
+    let (mut all, mut offsets) = (0usize, Vec::new());
+    for (index, _) in film.interior() {
+        let (ray, Some(point)) = &film.surface.pixels[index] else { continue };
+        all += 1;
+        let found = positions.pixels[index];
+        if (found - point.position).length() <= NEAR * (point.position - ray.origin).length() {
+            offsets.push(film.offset_px(index, found));
+        }
+    }
+    if 2 * offsets.len() < all { 0.0 } else { median_length(&mut offsets) }
+}
+
+/// Positions are near, relative to their distance from the camera: a few pixels of the small film.
+const NEAR: f32 = 0.1;
 
 /// From this fraction of wrong pixels on, all values together, a pass has set nothing.
 const NO_PASS: f64 = 0.9;
@@ -242,17 +272,13 @@ fn price_of_values(wrong: f64, measures: &[Measure], other_pipeline: bool) -> Pr
 }
 
 /// Whether all Phong materials in view are drawn by the diffuse pipeline.
-fn other_pipeline(
-    scene: &Scene,
-    surface: &SurfaceBuffer,
-    mask: &RegionMask,
-    frames: &[(BoundValue, Image)],
-) -> bool {
+fn other_pipeline(film: &StageFilm, frames: &[(BoundValue, Image)]) -> bool {
     let Some((_, frame)) = frames.iter().find(|(bound, _)| *bound == BoundValue::Exponent) else {
         return false;
     };
-    let phong = interior(surface, mask)
-        .filter(|(_, shape)| scene.material_of(*shape).model == MaterialModel::Phong);
+    let phong = film
+        .interior()
+        .filter(|(_, shape)| film.scene.material_of(*shape).model == MaterialModel::Phong);
     let (all, blue) = phong.fold((0usize, 0usize), |(all, blue), (index, _)| {
         (all + 1, blue + usize::from(frame.pixels[index].z != 0.0))
     });
@@ -360,19 +386,14 @@ fn slips<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Slip<'a>> {
     slips
 }
 
-fn wrong_shapes(
-    scene: &Scene,
-    camera: &Camera,
-    surface: &SurfaceBuffer,
-    mask: &RegionMask,
-    frames: &[(BoundValue, Image)],
-) -> WrongShapes {
+fn wrong_shapes(film: &StageFilm, frames: &[(BoundValue, Image)]) -> WrongShapes {
+    let (scene, camera) = (film.scene, &film.camera);
     let close = |found: Vec3, expected: Vec3| {
         (found - expected).abs().max_element()
             <= BOUND_RELATIVE * expected.abs().max_element().max(1e-3)
     };
     let mut pixels: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (index, shape) in interior(surface, mask) {
+    for (index, shape) in film.interior() {
         pixels.entry(shape).or_default().push(index);
     }
     let shows = |shape: usize, expected: &dyn Fn(BoundValue) -> Option<Vec3>| {
@@ -408,19 +429,6 @@ fn wrong_shapes(
     WrongShapes { shapes: pixels.len(), wrong: wrong.len(), slips }
 }
 
-/// Pixels away from edges and emitters, with the shape that they show.
-pub(super) fn interior<'a>(
-    surface: &'a SurfaceBuffer,
-    mask: &'a RegionMask,
-) -> impl Iterator<Item = (usize, usize)> + 'a {
-    surface.pixels.iter().zip(&mask.pixels).enumerate().filter_map(
-        |(index, ((_, point), value))| {
-            let clear = value & (RegionMask::EDGE | RegionMask::EMITTER) == 0;
-            point.as_ref().filter(|_| clear).map(|point| (index, point.shape))
-        },
-    )
-}
-
 /// Whether a student's stage is still the template's: equal apart from comments and white space.
 pub fn is_template(stage: &str, template: &str) -> bool {
     bare(stage) == bare(template)
@@ -452,7 +460,55 @@ pub fn bare(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+    use crate::expected::{SurfaceBuffer, load_scene, regions};
+
+    /// What a right pass binds on the assignment's Cornell box, drawn so many pixels beside its place;
+    /// `position` is what shows as a world position.
+    fn judged(shift_px: usize, position: impl Fn(Vec3) -> Vec3) -> Check {
+        let (width, height) = (64, 48);
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let scene = root.join("scenes/a2/cbox/tinyrender/cbox_simple_offline.toml");
+        let scene = load_scene(&scene).unwrap();
+        let surface = SurfaceBuffer::new(&scene, width, height).unwrap();
+        let [_, mask] = regions(&scene, width, height).unwrap();
+        let camera = scene.camera(width, height).unwrap();
+        let film = StageFilm { scene: &scene, camera, surface: &surface, mask: &mask };
+        let image = |of: &dyn Fn(usize) -> Vec3| {
+            let pixels = (0..width * height).map(|index| {
+                let beside = (index % width + shift_px).min(width - 1);
+                of(index / width * width + beside)
+            });
+            Image { width, height, pixels: pixels.collect() }
+        };
+        let point = |index: usize| surface.pixels[index].1.as_ref();
+        let values = BoundValue::ALL.map(|bound| {
+            let of = |index| bound.expected(&scene, &film.camera, point(index)?.shape);
+            (bound, image(&|index| of(index).unwrap_or_default()))
+        });
+        let shown = |index| point(index).map_or(Vec3::ZERO, |point| position(point.position));
+        judge_pass("s", &film, &values, &image(&|index| shown(index)))
+    }
+
+    #[test]
+    fn a_pass_that_draws_beside_its_place_makes_a_slip() {
+        let place = |check: &Check| {
+            let of = |measure: &&Measure| measure.rule == Some(RuleId::PassPlace);
+            check.measures.iter().find(of).map(|measure| measure.value)
+        };
+        let right = judged(0, |p| p);
+        assert_eq!(right.verdict, Verdict::Pass, "{}", right.summary);
+        assert!(place(&right).is_some_and(|value| value < OFFSET_PX), "{:?}", place(&right));
+        let shifted = judged(1, |p| p);
+        assert_eq!(shifted.verdict, Verdict::Fail);
+        assert!((shifted.error - Class::Slip.price()).abs() < 0.01, "{}", shifted.error);
+        assert!(place(&shifted).is_some_and(|value| (value - 1.0).abs() < 0.01));
+        // A vertex stage of its own may forward anything; nothing is claimed of where that lies.
+        let own = judged(0, |p| 5.0 * p);
+        assert_eq!((own.verdict, place(&own)), (Verdict::Pass, Some(0.0)), "{}", own.summary);
+    }
 
     #[test]
     fn comments_and_space_do_not_make_a_stage() {

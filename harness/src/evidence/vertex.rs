@@ -3,35 +3,22 @@
 //! Three things are told apart: the world position, the world normal and the clip-space position. A
 //! position that lies on a surface is right, wherever on the film it shows.
 
-use basecode::{Camera, Image, Ray, Scene, SurfaceInteraction, Vec3};
+use basecode::{Image, Ray, Scene, SurfaceInteraction, Vec3};
 
 use super::price::{Class, Price};
-use super::stages::{STRAY_FRACTION, interior};
+use super::stage_film::{OFFSET_PX, StageFilm, median_length};
+use super::stages::STRAY_FRACTION;
 use super::{Check, CheckId, Measure, RuleId, Verdict};
-use crate::expected::{SurfaceBuffer, SurfacePoint};
+use crate::expected::SurfacePoint;
 use crate::imaging::reference::RegionMask;
 
 /// The tolerance of a position, relative to its distance from the camera: rasterised attributes
 /// against a ray's hit.
 const POSITION_RELATIVE: f32 = 2e-3;
-/// How far surfaces may lie from their place on the film [pixels]: hardware snaps vertices to 1/256.
-const OFFSET_PX: f64 = 0.04;
 /// The tolerance of a unit normal.
 const NORMAL_ABSOLUTE: f32 = 1e-2;
 /// So much of what should be seen must be, to tell anything of what is forwarded.
 const LEAST_SHOWN: f64 = 0.02;
-
-/// A scene on a small film.
-pub struct VertexFilm<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// Its camera, on this film.
-    pub camera: Camera,
-    /// What each pixel shows.
-    pub surface: &'a SurfaceBuffer,
-    /// Where edges are.
-    pub mask: &'a RegionMask,
-}
 
 /// World positions and normals, as the fragment stage receives them.
 type Frames<'a> = [&'a Image; 2];
@@ -39,7 +26,7 @@ type Frames<'a> = [&'a Image; 2];
 /// Part 2.2: judges the world positions and normals that a student's vertex stage forwards, and
 /// where on the film they land. `frames` are drawn under each of [`crate::worker::Matrices::ALL`]: the
 /// first decides, the others tell what is wrong.
-pub fn judge_vertex(scene_name: &str, film: &VertexFilm, frames: [Frames; 3]) -> Check {
+pub fn judge_vertex(scene_name: &str, film: &StageFilm, frames: [Frames; 3]) -> Check {
     let id = CheckId::StageVertex;
     let seen = frames.map(|frames| Seen::of(film, frames));
     let [usual, in_view, in_projection] = &seen;
@@ -125,8 +112,8 @@ struct Seen {
 }
 
 impl Seen {
-    fn of(film: &VertexFilm, [positions, normals]: Frames) -> Self {
-        let VertexFilm { scene, camera, surface, mask } = film;
+    fn of(film: &StageFilm, [positions, normals]: Frames) -> Self {
+        let StageFilm { scene, camera, surface, mask } = film;
         let mut seen = Self {
             counted: 0,
             missing: 0,
@@ -141,7 +128,7 @@ impl Seen {
             positions.pixels[index] != Vec3::ZERO || normals.pixels[index] != Vec3::ZERO
         };
         let mut offsets = Vec::new();
-        for (index, _) in interior(surface, mask) {
+        for (index, _) in film.interior() {
             let (ray, Some(point)) = &surface.pixels[index] else { continue };
             seen.counted += 1;
             let (p, n) = (positions.pixels[index], normals.pixels[index]);
@@ -152,7 +139,7 @@ impl Seen {
             seen.wrong_position += usize::from(!right_position);
             seen.wrong_normal += usize::from(!right_normal);
             if right_position {
-                offsets.push(offset_px(film, index, p));
+                offsets.push(film.offset_px(index, p));
             }
         }
         seen.offset_px = median_length(&mut offsets);
@@ -207,7 +194,7 @@ impl Seen {
 const EDGES: f64 = 0.1;
 
 /// What wrong frames cost: each of the three things alone, together as much as they add up to.
-fn price(film: &VertexFilm, seen: &[Seen; 3], frames: &[Frames; 3]) -> Price {
+fn price(film: &StageFilm, seen: &[Seen; 3], frames: &[Frames; 3]) -> Price {
     let [usual, in_view, in_projection] = seen;
     // Where nothing shows because of the matrices, the frames that show most tell the rest.
     let most = (0..3).max_by_key(|&index| (seen[index].shown, 3 - index)).unwrap_or_default();
@@ -255,12 +242,12 @@ fn price(film: &VertexFilm, seen: &[Seen; 3], frames: &[Frames; 3]) -> Price {
 }
 
 /// Whether positions lie beside their pixel by a slip: mirrored, upside down, or a constant offset.
-fn slip_of_place(film: &VertexFilm, frames: &[Frames; 3]) -> Option<&'static str> {
+fn slip_of_place(film: &StageFilm, frames: &[Frames; 3]) -> Option<&'static str> {
     let positions = frames[0][0];
     let (width, height) = (film.surface.width, film.surface.height);
     let place = |by: [f32; 2]| {
         let of = |index: usize, p: Vec3| {
-            let [x, y] = place_px(film, p);
+            let [x, y] = film.place_px(p);
             let (own_x, own_y) = ((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
             let x = if by[0] < 0.0 { width as f32 - x } else { x };
             let y = if by[1] < 0.0 { height as f32 - y } else { y };
@@ -291,9 +278,9 @@ fn slip_of_place(film: &VertexFilm, frames: &[Frames; 3]) -> Option<&'static str
 }
 
 /// Whether positions are those of their pixels times one constant.
-fn factor_of_positions(film: &VertexFilm, positions: &Image) -> bool {
+fn factor_of_positions(film: &StageFilm, positions: &Image) -> bool {
     let pairs = || {
-        interior(film.surface, film.mask).filter_map(|(index, _)| {
+        film.interior().filter_map(|(index, _)| {
             let (ray, point) = &film.surface.pixels[index];
             Some((positions.pixels[index], point.as_ref()?.position, ray.origin))
         })
@@ -315,7 +302,7 @@ fn factor_of_positions(film: &VertexFilm, positions: &Image) -> bool {
 type Change = (&'static str, Box<dyn Fn(&SurfacePoint) -> Vec3>);
 
 /// Whether normals are those of their pixels, negated, with axes exchanged, or the positions instead.
-fn slip_of_normals(film: &VertexFilm, normals: &Image) -> Option<&'static str> {
+fn slip_of_normals(film: &StageFilm, normals: &Image) -> Option<&'static str> {
     const EXCHANGED: &str = "the normal has its axes exchanged";
     let axes = |name, [x, y, z]: [usize; 3], signs: [f32; 3]| -> Change {
         let change = move |p: &SurfacePoint| {
@@ -335,7 +322,7 @@ fn slip_of_normals(film: &VertexFilm, normals: &Image) -> Option<&'static str> {
     changes.push(("the position stands for the normal", Box::new(position)));
     changes.into_iter().find_map(|(name, change)| {
         let (mut all, mut wrong) = (0usize, 0usize);
-        for (index, _) in interior(film.surface, film.mask) {
+        for (index, _) in film.interior() {
             let Some(point) = &film.surface.pixels[index].1 else { continue };
             all += 1;
             let right = (normals.pixels[index] - change(point)).length() <= 2.0 * NORMAL_ABSOLUTE;
@@ -359,30 +346,6 @@ fn surface_at(scene: &Scene, p: Vec3, eye: Vec3) -> Option<SurfaceInteraction> {
     let axes = [(p - eye).normalize(), Vec3::X, Vec3::Y, Vec3::Z];
     axes.into_iter()
         .find_map(|axis| scene.intersect(&Ray::segment(p - reach * axis, axis, 0.0, 2.0 * reach)))
-}
-
-/// Where on the film a world position belongs [pixels from left and top].
-fn place_px(film: &VertexFilm, position: Vec3) -> [f32; 2] {
-    let camera = &film.camera;
-    let ndc = (camera.projection() * camera.view()).project_point3(position);
-    let (width, height) = (film.surface.width as f32, film.surface.height as f32);
-    [(0.5 + 0.5 * ndc.x) * width, (0.5 - 0.5 * ndc.y) * height]
-}
-
-/// How far a world position lies from the centre of the pixel that shows it [pixels, x and y].
-fn offset_px(film: &VertexFilm, index: usize, position: Vec3) -> [f32; 2] {
-    let (x, y) = (index % film.surface.width, index / film.surface.width);
-    let [own_x, own_y] = place_px(film, position);
-    [own_x - x as f32 - 0.5, own_y - y as f32 - 0.5]
-}
-
-/// The length of the median offset; 0 when there is none.
-fn median_length(offsets: &mut [[f32; 2]]) -> f64 {
-    let mut median = |axis: usize| {
-        offsets.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
-        offsets.get(offsets.len() / 2).map_or(0.0, |offset| f64::from(offset[axis]))
-    };
-    median(0).hypot(median(1))
 }
 
 #[cfg(test)]

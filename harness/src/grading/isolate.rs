@@ -14,8 +14,9 @@ use super::stages::Stages;
 use super::stages::named;
 use crate::diagnosis::{Kind, Thumbnail, View};
 use crate::evidence::premultiplied::Premultiplied;
+use crate::evidence::stage_film::StageFilm;
 use crate::evidence::stages::{BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass};
-use crate::evidence::vertex::{VertexFilm, judge_vertex};
+use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::evidence::{images, pixels};
 use crate::imaging::evidence::Tolerances;
@@ -29,9 +30,20 @@ const CHECKS: [(CheckId, &str); 3] = [
     (CheckId::StagePhong, "2.4 Phong fragment shader"),
 ];
 
-/// The stages of ours that show what a pass binds.
-pub fn bound_values_shown() -> [Vec<Stage>; BoundValue::ALL.len()] {
-    BoundValue::ALL.map(|bound| named([VERTEX.to_owned(), bound.stage(false), bound.stage(true)]))
+/// The stages of ours that show what a pass binds, and then world positions.
+pub fn pass_shown() -> Vec<Vec<Stage>> {
+    let of = |fragments: [String; 2]| {
+        let [diffuse, phong] = fragments;
+        named([VERTEX.to_owned(), diffuse, phong])
+    };
+    let bound = BoundValue::ALL.map(|bound| of([bound.stage(false), bound.stage(true)]));
+    bound.into_iter().chain([of([SHOW_POSITION; 2].map(str::to_owned))]).collect()
+}
+
+/// What a student's pass draws under those.
+struct PassFrames {
+    bound: Vec<(BoundValue, Image)>,
+    positions: Image,
 }
 
 /// Judges the student's pass under stages of ours (2.1) and his stages under a pass of ours (2.2
@@ -46,11 +58,10 @@ pub fn isolate(
     fails: bool,
     tolerances: &Tolerances,
 ) -> Vec<Check> {
-    let bound_values_shown = bound_values_shown();
     let (swaps, sets) = swaps(stages);
     let is_right =
         |index, frames: &[Outcome]| pass_check(&cases[index], frames).verdict == Verdict::Pass;
-    let passes = draw_scenes(session, plugin, &under(cases, &bound_values_shown), &is_right);
+    let passes = draw_scenes(session, plugin, &under(cases, &pass_shown()), &is_right);
     let mut frames = under(cases, &sets).concat();
     for frame in &mut frames {
         let own = |stage: &Stage| stage.name == STAGES[0] && stage.text != VERTEX;
@@ -61,10 +72,10 @@ pub fn isolate(
     let mut checks = Vec::new();
     for (case, pass) in cases.iter().zip(passes) {
         let swapped: Vec<Outcome> = swapped.by_ref().take(sets.len()).collect();
-        let pass = match bound_values(case, &pass) {
+        let pass = match pass_frames(case, &pass) {
             Ok(frames) => {
-                observe::pass(session, case, &frames);
-                let check = judge_bound(case, &frames);
+                observe::pass(session, case, &frames.bound);
+                let check = judge_pass_frames(case, &frames);
                 shown.passes.push((case, frames));
                 check
             }
@@ -99,7 +110,8 @@ pub fn isolate(
             match images.as_slice() {
                 [p0, p1, p2, n0, n1, n2] => {
                     observe::vertex(session, case, p0, n0);
-                    vertex(case, [[p0, n0], [p1, n1], [p2, n2]])
+                    let frames = [[p0, n0], [p1, n1], [p2, n2]];
+                    on_film(id, case, |film, name| judge_vertex(name, film, frames))
                 }
                 [image] => {
                     record_fragment(session, case, image, index == 2);
@@ -122,7 +134,7 @@ pub fn isolate(
 /// What pass and fragment stages show of scenes.
 #[derive(Default)]
 struct Shown<'a> {
-    passes: Vec<(&'a PreparedScene, Vec<(BoundValue, Image)>)>,
+    passes: Vec<(&'a PreparedScene, PassFrames)>,
     /// With the stage's index.
     fragments: Vec<(&'a PreparedScene, usize, Image)>,
 }
@@ -131,7 +143,7 @@ impl Shown<'_> {
     /// The checks under each convention that the pass keeps on all scenes, and a fragment stage with it.
     fn judge_premultiplied(&self, tolerances: &Tolerances) -> Vec<Check> {
         let fits = |check: &Check| check.verdict != Verdict::Fail;
-        if self.passes.iter().all(|(case, frames)| fits(&judge_bound(case, frames))) {
+        if self.passes.iter().all(|(case, frames)| fits(&judge_pass_frames(case, frames))) {
             return Vec::new();
         }
         let mut checks = Vec::new();
@@ -141,7 +153,8 @@ impl Shown<'_> {
                 let undone = |(bound, frame): &(BoundValue, Image)| {
                     (*bound, convention.undone_bound(scene, surface, *bound, frame))
                 };
-                judge_bound(case, &frames.iter().map(undone).collect::<Vec<_>>())
+                let bound = frames.bound.iter().map(undone).collect();
+                judge_pass_frames(case, &PassFrames { bound, positions: frames.positions.clone() })
             });
             let kept: Option<Vec<Check>> = pass.map(|check| Some(check).filter(fits)).collect();
             let Some(kept) = kept else { continue };
@@ -225,19 +238,16 @@ fn images<'a>(case: &PreparedScene, outcomes: &'a [Outcome]) -> Result<Vec<Image
 }
 
 fn pass_check(case: &PreparedScene, outcomes: &[Outcome]) -> Check {
-    match bound_values(case, outcomes) {
-        Ok(frames) => judge_bound(case, &frames),
+    match pass_frames(case, outcomes) {
+        Ok(frames) => judge_pass_frames(case, &frames),
         Err(check) => *check,
     }
 }
 
-/// Each bound value with the frame that shows it, or else the check that says why there is none.
-fn bound_values(
-    case: &PreparedScene,
-    outcomes: &[Outcome],
-) -> Result<Vec<(BoundValue, Image)>, Box<Check>> {
+/// The frames that show what a pass binds, or else the check that says why there are none.
+fn pass_frames(case: &PreparedScene, outcomes: &[Outcome]) -> Result<PassFrames, Box<Check>> {
     let (id, name) = (CheckId::PassUniforms, &case.entry.name);
-    let images = match images(case, outcomes) {
+    let mut images = match images(case, outcomes) {
         Ok(images) => images,
         // Its own frame decides: a pass with a layout of its own takes no stages of ours.
         Err(Outcome::Failed(message)) => return Err(Box::new(not_possible(id, case, message))),
@@ -250,23 +260,32 @@ fn bound_values(
         let summary = "swap not possible: the pass draws the same under all stages";
         return Err(Box::new(Check::new(id, name, Verdict::NotJudged, summary)));
     }
-    Ok(BoundValue::ALL.into_iter().zip(images).collect())
+    let Some(positions) = images.pop() else {
+        let summary = "no frame: a bug of Umbra's";
+        return Err(Box::new(Check::new(id, name, Verdict::NotRun, summary)));
+    };
+    Ok(PassFrames { bound: BoundValue::ALL.into_iter().zip(images).collect(), positions })
 }
 
-fn judge_bound(case: &PreparedScene, frames: &[(BoundValue, Image)]) -> Check {
-    let (scene, small) = (&case.expected.scene, &case.probe_film);
-    judge_pass(&case.entry.name, scene, &small.surface, &small.unshadowed_mask, frames)
+fn judge_pass_frames(case: &PreparedScene, frames: &PassFrames) -> Check {
+    let judge =
+        |film: &StageFilm, name: &str| judge_pass(name, film, &frames.bound, &frames.positions);
+    on_film(CheckId::PassUniforms, case, judge)
 }
 
-fn vertex(case: &PreparedScene, frames: [[&Image; 2]; 3]) -> Check {
-    let (name, small) = (&case.entry.name, &case.probe_film);
-    let scene = &case.expected.scene;
+/// Judges on the small film of a scene.
+fn on_film(
+    id: CheckId,
+    case: &PreparedScene,
+    judge: impl FnOnce(&StageFilm, &str) -> Check,
+) -> Check {
+    let (scene, small, name) = (&case.expected.scene, &case.probe_film, &case.entry.name);
     match scene.camera(small.surface.width, small.surface.height) {
         Ok(camera) => {
             let (surface, mask) = (&small.surface, &small.unshadowed_mask);
-            judge_vertex(name, &VertexFilm { scene, camera, surface, mask }, frames)
+            judge(&StageFilm { scene, camera, surface, mask }, name)
         }
-        Err(error) => Check::new(CheckId::StageVertex, name, Verdict::NotRun, error.to_string()),
+        Err(error) => Check::new(id, name, Verdict::NotRun, error.to_string()),
     }
 }
 

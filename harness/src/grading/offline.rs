@@ -92,13 +92,11 @@ pub fn judge_scene<'a>(
     let size = (small.width, small.height);
     let at_centres =
         |shadows| [radiance(&centres, Witness::True, shadows), render(size, 1, 1, 1, shadows)];
-    let at_samples = |shadows| {
-        small.sampled.iter().flat_map(move |sampled| {
-            let size = (sampled.film.width, sampled.film.height);
-            let along = radiance(&sampled.rays, Witness::True, shadows);
-            [along, render(size, loops::SAMPLES, run.seed, 1, shadows)]
-        })
-    };
+    let at_samples = small.sampled.iter().flat_map(|sampled| {
+        let size = (sampled.film.width, sampled.film.height);
+        let along = radiance(&sampled.rays, Witness::True, false);
+        [along, render(size, loops::SAMPLES, run.seed, 1, false)]
+    });
     requests.extend(at_centres(true));
     let plain = plain_surfaces(case);
     let queries = plain.iter().map(|(_, query)| *query).collect();
@@ -108,7 +106,7 @@ pub fn judge_scene<'a>(
         |expected: &Expected| (expected.unshadowed.width as u32, expected.unshadowed.height as u32);
     let size = film(first.unwrap_or(&case.expected));
     requests.push(render(size, case.spp, run.seed, run.threads, true));
-    requests.extend(at_samples(true));
+    requests.extend(at_samples);
     let outcomes = session.run(Some(plugin), requests);
     let [
         w0,
@@ -173,12 +171,11 @@ pub fn judge_scene<'a>(
         record_loop(session, case, (&image.values, &along.values));
     }
     // Where shadows leave nothing to see, the loop shows without them.
-    let unshadowed = is_black(along_centres).then(|| {
-        session.run(Some(plugin), at_centres(false).into_iter().chain(at_samples(false)).collect())
-    });
-    let (along_centres, one_spp, sampled) = match unshadowed.as_deref() {
-        Some([along, image, sampled @ ..]) => (along, image, sampled),
-        _ => (along_centres, one_spp, sampled),
+    let unshadowed =
+        is_black(along_centres).then(|| session.run(Some(plugin), at_centres(false).into()));
+    let (along_centres, one_spp) = match unshadowed.as_deref() {
+        Some([along, image]) => (along, image),
+        _ => (along_centres, one_spp),
     };
     checks.push(match (one_spp, along_centres) {
         (Outcome::Done(image), Outcome::Done(along)) => {

@@ -363,9 +363,12 @@ fn judge_visibility(
     let again = |times, stages: &[Stage]| {
         judge(&drawn(bonus?, true, times, stages)?, &drawn(&case.realtime, false, times, stages)?)
     };
-    let swapped = again(1, &[vertex]).filter(passes);
-    let rescued = swapped.or_else(|| again(2, &[]).filter(passes));
-    rescued.or(own).unwrap_or(check)
+    let swapped = again(1, &[vertex]);
+    if let Some(swapped) = swapped.as_ref().filter(|swapped| passes(swapped)) {
+        return swapped.clone();
+    }
+    let second = again(2, &[]).filter(passes);
+    second.or(own).or(swapped).unwrap_or(check)
 }
 
 /// Where the image shows a surface and where not, and whether light falls on it.

@@ -19,7 +19,7 @@ impl Grading<'_> {
         let plain = Frame::plain(case);
         let toml = case.bonus.as_deref().unwrap_or(&case.realtime);
         let mut frames = vec![plain.clone(), Frame { toml, shadow_map: true, ..plain }];
-        let shown = isolate::bound_values_shown();
+        let shown = isolate::pass_shown().into_iter();
         frames.extend(shown.map(|stages| Frame::probe(case, stages)));
         let folder = self.shaders_of(&mut self.session(""), Some(reference), frames)?;
         self.supervisor.shaders.push(folder.path().to_owned());

@@ -1,6 +1,6 @@
 //! Mistakes made together: whatever is added to a mistake, no part gains a point by it.
 //!
-//! Left out are mistakes that mend each other, such as a cosine that one place lacks and another has
+//! Left out are mistakes two of which mend each other, such as a cosine that one place lacks and another has
 //! twice: an image is right, or all are nearer to the right ones, than with either alone. The images tell.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -154,17 +154,17 @@ fn gains(row: &Row, alone: &[&Row]) -> Vec<String> {
     gains.collect()
 }
 
-/// Whether the mistakes mend each other: the image of a scene is right that is wrong with each alone, or the images
-/// of a path are nearer to the right ones than with any of them left out.
+/// Whether two of the mistakes mend each other: the image of a scene is right that is wrong with each alone, or the
+/// images of a path are nearer to the right ones than with either alone.
 fn mends(row: &Row, alone: &[&Row]) -> bool {
     [CheckId::ImageOffline, CheckId::ImageRealtime, CheckId::BonusImage].into_iter().any(|image| {
         let right = right_scenes(row, image);
         let alone_right: BTreeSet<&str> =
             alone.iter().flat_map(|single| right_scenes(single, image)).collect();
-        let together = distance(row, image);
-        let alone =
-            alone.iter().map(|single| distance(single, image)).fold(f64::INFINITY, f64::min);
-        together < NEARER * alone || !right.is_subset(&alone_right)
+        let mut alone: Vec<f64> = alone.iter().map(|single| distance(single, image)).collect();
+        alone.sort_by(|a, b| b.total_cmp(a));
+        let nearer = |second: &f64| distance(row, image) < NEARER * second;
+        alone.get(1).is_some_and(nearer) || !right.is_subset(&alone_right)
     })
 }
 
@@ -235,6 +235,16 @@ mod tests {
         let mut right = row(&["a", "b"], 12.5, 0.0);
         right.evidence.checks[1].error = 2.0;
         assert_eq!(figure("pairs", &[right], &singles).text, "pairs=0/0(+1 that mend each other)");
+    }
+
+    #[test]
+    fn two_of_three_mistakes_may_mend_each_other() {
+        let (a, b, c) = (row(&["a"], 17.0, 0.3), row(&["b"], 12.0, 0.5), row(&["c"], 19.0, 0.01));
+        let singles = BTreeMap::from([("a", &a), ("b", &b), ("c", &c)]);
+        let judge = |error| figure("triples", &[row(&["a", "b", "c"], 12.5, error)], &singles).text;
+        assert_eq!(judge(0.1), "triples=0/0(+1 that mend each other)");
+        // Nearer than with one of them, but not than with any two.
+        assert_eq!(judge(0.6), "triples=0/1");
     }
 
     #[test]

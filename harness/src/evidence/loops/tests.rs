@@ -137,6 +137,28 @@ fn samples_that_do_not_cover_their_pixels_are_found() {
 }
 
 #[test]
+fn single_pixels_that_are_never_written_or_written_over_are_a_slip() {
+    let right = render(independent, mean);
+    // Away from edges: where the gradient is, and on a ring.
+    for index in [WIDTH as usize + 6, 23 * WIDTH as usize + 30] {
+        for value in [0.0, 10.0, f32::NAN] {
+            let mut image = right.clone();
+            image[index] = [value; 3];
+            let check = judge(&image);
+            assert_eq!(
+                (check.verdict, check.error),
+                (Verdict::Fail, Class::Slip.price()),
+                "{check:?}"
+            );
+            assert!(check.summary.starts_with("1 of 3072"), "{}", check.summary);
+        }
+        let mut image = right.clone();
+        image[index] = image[index].map(|v| 1.005 * v);
+        assert_eq!(judge(&image).verdict, Verdict::Pass);
+    }
+}
+
+#[test]
 fn averages_are_judged_whatever_is_shaded() {
     let sum = |values: &[f32]| values.iter().sum();
     let one_more = |values: &[f32]| values.iter().sum::<f32>() / (values.len() + 1) as f32;

@@ -96,15 +96,16 @@ impl CheckId {
                 &[RuleId::LoopAgreement],
             ),
             Self::LoopSamples => info(
-                "Renders at 16 samples per pixel, 64 pixels wide. Is that the average of what the integrator \
+                "Renders at 16 samples per pixel, 64 pixels wide, without shadows. Is that the average of what the integrator \
                     answers along 16 stratified rays of each pixel, whatever it shades? So sum, count and spread \
                     on both axes. Random, stratified, Sobol, lattice and grid samples pass.",
-                "The sum of differences over the sum of radiance. A fault on edges alone is a slip.",
+                "The sum of differences over the sum of radiance. A fault on edges or stray pixels alone is a slip.",
                 "Pixels: 4 standard errors, by the largest variance of the 3x3 around; 1 % + 4 pixels may \
                     exceed them. Edges, by direction: the mean square error, over the largest variance around, \
                     is at most 1.1 times that of independent samples. A right renderer has 0.4, samples that are \
-                    all the same have 4. The mean error on edges may be 8 standard deviations.",
-                &[RuleId::LoopPixels, RuleId::LoopEdges, RuleId::LoopEdgeBias],
+                    all the same have 4. The mean error on edges may be 8 standard deviations. No pixel may be \
+                    5 % off where the rays around it vary by 3 % at most.",
+                &[RuleId::LoopPixels, RuleId::LoopEdges, RuleId::LoopEdgeBias, RuleId::LoopStray],
             ),
             Self::ShadowRays => info(
                 "Asks for radiance with shadows over radiance without, along lit and along shadowed rays. The \
@@ -124,12 +125,12 @@ impl CheckId {
             ),
             Self::PassUniforms => info(
                 "Draws the student's pass under stages of ours, which show camera position, light position \
-                    and intensity, rho_d, rho_s and exponent.",
+                    and intensity, rho_d, rho_s, exponent and world position.",
                 "The fraction of wrong pixels, all uniforms together. One wrong value is a slip, two are a \
                     concept. Another shape's material, an energy scale too many or too few, exchanged albedos \
-                    and exchanged pipelines are a slip each.",
+                    and exchanged pipelines are a slip each, and so are surfaces beside their place.",
                 "1e-4 of the largest component, because it travels as f32. 0.5 % of the pixels may differ \
-                    (coverage along seams).",
+                    (coverage along seams). Surfaces may lie 0.04 pixels beside their place (median).",
                 &[
                     RuleId::PassCameraPosition,
                     RuleId::PassLightPosition,
@@ -137,6 +138,7 @@ impl CheckId {
                     RuleId::PassRhoD,
                     RuleId::PassRhoS,
                     RuleId::PassExponent,
+                    RuleId::PassPlace,
                 ],
             ),
             Self::StageVertex => info(

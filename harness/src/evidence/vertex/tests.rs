@@ -2,7 +2,7 @@ use std::path::Path;
 
 use super::*;
 use crate::evidence::price::Class;
-use crate::expected::{load_scene, regions};
+use crate::expected::{SurfaceBuffer, load_scene, regions};
 
 const FILM: (usize, usize) = (64, 48);
 
@@ -36,7 +36,7 @@ impl Fixture {
         let (width, height) = FILM;
         let camera = self.scene.camera(width, height).unwrap();
         let (scene, surface, mask) = (&self.scene, &self.surface, &self.mask);
-        judge_vertex("s", &VertexFilm { scene, camera, surface, mask }, frames)
+        judge_vertex("s", &StageFilm { scene, camera, surface, mask }, frames)
     }
 
     /// The same frames whatever the matrices.
