@@ -1,10 +1,10 @@
 //! Known mistakes, made on purpose: `mistake=NAME` in the options of a scene, several separated by
 //! commas. They prove the grader and feed the diagnosis; without one the plain renderer runs.
 //!
-//! The plain renderer stays plain: what can go wrong in a BSDF, the integrator or the render loop
-//! is written down once more here, with a switch at every place where students slip, and at some
-//! where they do otherwise and are right. A mistake of a shader is another text in one of its lines.
-//! `harness/data/mistakes.json` says of every name what it looks like and which parts it belongs to.
+//! The plain renderer stays plain. This module duplicates the BSDFs, the integrator and the render loop, with a switch
+//! at every place where students slip, and at some where they use a right variant. A mistake of a shader replaces text
+//! in one of its lines. `harness/data/mistakes.json` says for every name what it looks like and which parts it belongs
+//! to.
 
 mod bsdfs;
 mod film;
@@ -66,7 +66,7 @@ impl Mistakes {
         stages::apply(stage.name, stage.text, &self.stages).map_err(Error::Argument)
     }
 
-    /// The BSDF to take in the right one's place, if any.
+    /// The BSDF that replaces the right one, if any.
     pub fn bsdf(&self, material: &Material) -> Option<Box<dyn Bsdf>> {
         if self.none() {
             return None;
@@ -77,13 +77,13 @@ impl Mistakes {
         })
     }
 
-    /// The integrator to take in the right one's place, if any.
+    /// The integrator that replaces the right one, if any.
     pub fn integrator(&self, shadows: bool) -> Option<Box<dyn Integrator>> {
         let mistaken = || integrator::Mistaken { mistakes: self.clone(), shadows };
         (!self.none()).then(|| Box::new(mistaken()) as Box<dyn Integrator>)
     }
 
-    /// Renders in the right loop's place; nothing when there is no need.
+    /// Renders instead of the right loop; `None` if no mistake needs that.
     pub fn render(
         &self,
         scene: &Scene,

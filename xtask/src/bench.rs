@@ -1,4 +1,4 @@
-//! `xtask bench`: Umbra beside others that do the same work, in one run.
+//! `xtask bench`: measures Umbra beside other programs that do the same work, in one run.
 
 pub mod child;
 mod figures;

@@ -1,5 +1,4 @@
-//! What is given out: the student's kit, all that checking one's own work needs and nothing that gives the
-//! solution away.
+//! Makes the student's kit: everything that checking one's own work needs, and nothing that gives the solution away.
 //!
 //! Umbra goes in as a program: its source holds closed forms of the BSDFs, a render pass and a vertex
 //! stage, which are right answers to tasks.

@@ -1,7 +1,8 @@
 //! The sample submissions: real archives, packed from `samples/`, with the images that their own code
 //! draws. They lie under `target/umbra/samples/`.
 //!
-//! Samples with the same artist are packed one after the other: it is compiled once, and draws nothing twice.
+//! Samples whose images the same source draws are packed one after the other, so that it is compiled once and draws
+//! nothing twice.
 
 mod archive;
 mod expect;

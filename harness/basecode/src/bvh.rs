@@ -42,16 +42,16 @@ pub struct Hit {
     pub triangle: usize,
 }
 
-/// A hierarchy of so few triangles is built sooner than other threads begin.
+/// With fewer triangles, building takes less time than starting threads.
 const SMALL: usize = 16_384;
-/// From this depth on triangles are divided in halves. 0 makes the lowest tree: 32 levels at most, of 7 children beside
-/// a path.
+/// From this depth on, triangles are split in halves. 0 makes the lowest tree: at most 32 levels, with 7 children
+/// beside a path.
 const DEEP: u32 = 64;
 impl Bvh {
     /// Builds a hierarchy. `blocks[i]` tells whether triangle i takes part in [`Bvh::any_hit`].
     ///
     /// # Panics
-    /// While a render pass lives, as all that wants a ray: a realtime frame has none.
+    /// While a render pass exists: a realtime frame casts no rays.
     pub fn new(vertices: &[[Vec3; 3]], blocks: &[bool]) -> Self {
         refuse_rays();
         let threads = if vertices.len() < SMALL { 1 } else { threads::available() };
@@ -173,7 +173,7 @@ impl Bvh {
 trait Search {
     /// Whether nearer children come first.
     const SORTED: bool;
-    /// Looks at the triangles of a leaf. Answers how far hits still matter, or `None` to stop.
+    /// Tests the triangles of a leaf. Returns how far hits still matter, or `None` to stop.
     fn leaf<L: Lanes>(
         &mut self,
         ray: &WideRay<L>,

@@ -92,7 +92,7 @@ struct OpenPass {
     pass: Box<dyn RenderPass>,
     target: Target,
     gpu: Gpu,
-    /// By what the device was opened.
+    /// The kind and name of adapter that the device was opened with.
     adapter: (AdapterKind, String),
     realtime: Realtime,
     /// What making the pass handed to the device.
@@ -517,7 +517,7 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
         .unwrap_or("a panic without a message")
 }
 
-/// What a panic carries may itself panic when it is dropped, which would end the worker.
+/// Dropping a panic's payload may panic again, which would end the worker.
 fn forget(payload: Box<dyn Any + Send>) {
     std::mem::forget(payload);
 }

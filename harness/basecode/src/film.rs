@@ -1,4 +1,4 @@
-//! Where an image is collected.
+//! The film: the pixels of an image while it is rendered.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! No rays while a render pass lives: the pixels of a realtime frame come from its shaders.
+//! Refuses rays while a render pass exists: the pixels of a realtime frame come from its shaders.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -12,10 +12,10 @@ static REFUSED: AtomicBool = AtomicBool::new(false);
 const MESSAGE: &str = "a render pass asked for a ray (Scene::intersect or Scene::occluded), and there are \
                        none in a realtime frame: its pixels come from the shaders";
 
-/// What a refused ray panics with: no caller could go on without an answer.
+/// The panic payload of a refused ray, since no caller could go on without an answer.
 pub struct RayRefused;
 
-/// The life of one pass, from before it is made until it is closed.
+/// The lifetime of one pass, from before it is made until it is closed.
 pub struct Realtime(());
 
 impl Realtime {
@@ -49,7 +49,7 @@ impl RayRefused {
     }
 }
 
-/// To be called before anything that only rays need.
+/// Call this before any work that only rays need.
 ///
 /// # Panics
 /// With [`RayRefused`] while a pass lives.

@@ -1,4 +1,4 @@
-//! Mistakes in the diffuse BSDF, and what both have in common: the formulas of `crate::bsdfs`, with switches.
+//! Mistakes in the diffuse BSDF, and in what both BSDFs share: the formulas of `crate::bsdfs`, with switches.
 
 use basecode::{
     Bsdf, Frame, INV_PI, INV_TWO_PI, Material, SurfaceInteraction, Texture, Vec2, Vec3, vec3,

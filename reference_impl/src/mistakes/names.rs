@@ -1,5 +1,5 @@
-//! The names of all switches outside the shaders: what is wrong, and what is right although it
-//! is done otherwise. `harness/data/mistakes.json` describes them.
+//! The names of all switches outside the shaders: mistakes, and right variants. `harness/data/mistakes.json` describes
+//! them.
 
 macro_rules! switches {
     (mistakes { $($mistake:ident = $wrong:literal,)* } right { $($variant:ident = $right:literal,)* }) => {

@@ -1,5 +1,5 @@
-//! Mistakes of sampler, loop and camera, and other right orders of work: the loop of
-//! `crate::renderer`, with switches.
+//! Mistakes of sampler, loop and camera, and right variants of the order of work: the loop of `crate::renderer`, with
+//! switches.
 
 use std::sync::Mutex;
 

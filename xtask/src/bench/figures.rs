@@ -1,4 +1,4 @@
-//! Medians, spreads and how they are told.
+//! Medians, spreads and their formatting.
 
 /// Measurements of one thing, in any unit.
 #[derive(Clone, Debug, Default)]

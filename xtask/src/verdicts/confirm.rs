@@ -1,5 +1,5 @@
-//! Thresholds were set on public scenes and on those of one seed. Here they meet scenes that nobody
-//! has looked at: what is right must lose nothing on them, and a mistake no part but its own.
+//! Thresholds were set on public scenes and on those of one seed. This module tests them on scenes that nobody has
+//! looked at: a right renderer must lose nothing there, and a mistake must cost only its own parts.
 
 use std::sync::atomic::AtomicBool;
 

@@ -1,4 +1,4 @@
-//! Every rule is needed: without it some row of the matrix is not what the catalogue says.
+//! Proves that every rule is needed: without it, some row of the matrix is not what the catalogue says.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -46,7 +46,7 @@ enum EvidenceRule {
     Check(CheckId),
     /// What judges inside checks.
     Measure(RuleId),
-    /// What is left unexplained on this path costs its `blame` part.
+    /// The path's `residual_part` pays for unexplained errors.
     Blame(String),
 }
 
@@ -73,8 +73,8 @@ impl EvidenceRule {
         }
     }
 
-    /// Rubric and evidence as they would be without this rule: nothing is asked anew. A check that
-    /// failed by this rule alone passes.
+    /// Rubric and evidence as they would be without this rule, with no new requests. A check that failed by this rule
+    /// alone passes.
     fn delete(&self, rules: &Rules, evidence: &Evidence) -> (Rules, Evidence) {
         let (mut rules, mut evidence) = (rules.clone(), evidence.clone());
         match self {

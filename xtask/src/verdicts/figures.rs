@@ -1,4 +1,4 @@
-//! The line of figures that ends a run, and what is wrong where one is not full.
+//! The line of figures that ends a run, and the complaints about incomplete ones.
 
 use super::price;
 use super::row::Row;

@@ -1,5 +1,5 @@
-//! Real submissions: every sample is packed as a student would, built and graded by the real binary,
-//! and worth what its recipe says.
+//! Real submissions: every sample is packed as a student would pack it, built and graded by the real binary, and must
+//! earn what its recipe says.
 
 use std::path::Path;
 use std::process::Command;

@@ -1,7 +1,7 @@
-//! Mistakes made together: whatever is added to a mistake, no part gains a point by it.
+//! Combinations of mistakes: adding a mistake must never gain a part a point.
 //!
-//! Left out are mistakes two of which mend each other, such as a cosine that one place lacks and another has
-//! twice: an image is right, or all are nearer to the right ones, than with either alone. The images tell.
+//! Combinations in which two mistakes cancel are left out, such as a cosine that is missing in one place and doubled in
+//! another. The images tell: one is right, or all are nearer to the right ones than with either mistake alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -291,7 +291,7 @@ struct Bin {
     count: u32,
 }
 
-/// Sorts triangles to two sides. Answers how many are on the first, and the bounds of both.
+/// Partitions triangles into two sides. Returns how many are on the first side, and the bounds of both.
 fn split(items: &mut [Item], centers: &Aabb, levels: u32) -> (usize, [Bounds; 2]) {
     if levels > 0
         && let Some((axis, at, bins)) = best_plane(items, centers)
@@ -371,7 +371,7 @@ fn best_plane(items: &[Item], centers: &Aabb) -> Option<(usize, usize, usize)> {
 }
 
 impl Bin {
-    /// Adds another, and answers the area of all times their number.
+    /// Adds another bin, and returns half the area of both together, times their number of triangles.
     #[inline(always)]
     fn add(&mut self, other: &Self) -> f32 {
         self.aabb.grow(other.aabb.min, other.aabb.max);

@@ -16,9 +16,9 @@ pub trait Lanes: Copy {
     fn minus(self, other: Self) -> Self;
     fn times(self, other: Self) -> Self;
     fn over(self, other: Self) -> Self;
-    /// The smaller of two numbers. What it is of a NaN is not said.
+    /// The smaller of two numbers; unspecified if one is NaN.
     fn min(self, other: Self) -> Self;
-    /// The larger of two numbers. What it is of a NaN is not said.
+    /// The larger of two numbers; unspecified if one is NaN.
     fn max(self, other: Self) -> Self;
     /// Bit i: number i is at most the other's; never with a NaN.
     fn at_most(self, other: Self) -> u32;
@@ -97,8 +97,8 @@ mod avx2 {
         std::arch::is_x86_feature_detected!("avx2")
     }
 
-    /// Eight numbers in one register. Its values are made and used in functions with
-    /// `#[target_feature(enable = "avx2")]` alone, which nobody calls unless [`has_avx2`] says so.
+    /// Eight numbers in one register. Only functions with `#[target_feature(enable = "avx2")]` make and use its values,
+    /// and they are called only if [`has_avx2`] is true.
     #[derive(Clone, Copy)]
     pub struct Avx2(__m256);
 

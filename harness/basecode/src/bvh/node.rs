@@ -102,7 +102,7 @@ impl Node {
         let leave =
             self.slab(ray, 0, 1 - x).min(self.slab(ray, 1, 1 - y)).min(self.slab(ray, 2, 1 - z));
         let (enter, leave) = (enter.max(ray.min_t), leave.times(L::splat(1.000_000_5)));
-        // A ray that is no number may seem to meet anything, children that are not there too.
+        // A ray with NaN may seem to meet anything, even children that do not exist.
         (enter.at_most(leave.min(L::splat(max_t))) & self.present, enter)
     }
 
@@ -163,8 +163,8 @@ impl Triangles {
     /// Which triangles the ray hits within [min_t, max_t], a bit each; where, and the barycentric weights of
     /// the second and the third vertex there.
     ///
-    /// Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, without culling: no ray
-    /// passes between triangles that share an edge or a vertex. One of zero area as the ray sees it is not hit.
+    /// Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, without culling: no ray passes
+    /// between triangles that share an edge or a vertex. A triangle without area as seen from the ray is not hit.
     #[inline(always)]
     pub fn meet<L: Lanes>(&self, ray: &WideRay<L>, max_t: f32) -> (u32, [L; 3]) {
         let (ax, ay, az) = self.vertex(ray, 0);
@@ -186,7 +186,7 @@ impl Triangles {
         if inside == 0 {
             return (0, [zero; 3]);
         }
-        // Of no area this is no number, and some comparison false.
+        // Without area this is NaN, and some comparison is false.
         let scale = L::splat(1.0).over(u.plus(v).plus(w));
         let t = u.times(az).plus(v.times(bz)).plus(w.times(cz)).times(scale);
         let hit = inside & ray.min_t.at_most(t) & t.at_most(L::splat(max_t));

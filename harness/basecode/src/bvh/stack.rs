@@ -1,4 +1,4 @@
-//! The children that a ray has put aside. Nothing is zeroed or allocated for it.
+//! The stack of children that a traversal has yet to visit. It neither zeroes nor allocates memory.
 
 use std::mem::MaybeUninit;
 

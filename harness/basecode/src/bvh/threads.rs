@@ -8,10 +8,10 @@ pub fn available() -> usize {
     available_parallelism().map_or(1, usize::from)
 }
 
-/// Gives each task to one of up to `threads` threads. A thread that the system refuses is done without.
+/// Gives each task to one of up to `threads` threads. If the system refuses a thread, the others do its work.
 ///
-/// They are not rayon's: a hierarchy is built while rayon's threads wait for it, and one of them would take up another
-/// row in the meantime, and wait for the hierarchy there.
+/// These are not rayon's threads. Those wait for the hierarchy while it is built; one of them would start another row
+/// in the meantime, and wait for the hierarchy there.
 pub fn share<T: Send>(tasks: Vec<T>, threads: usize, work: impl Fn(T) + Sync) {
     let helpers = threads.min(tasks.len()).saturating_sub(1);
     let tasks = Mutex::new(tasks);

@@ -1,4 +1,4 @@
-//! The way out.
+//! Writing OpenEXR files.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;

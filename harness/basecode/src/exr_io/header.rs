@@ -1,4 +1,4 @@
-//! What a file says of itself, checked before memory for pixels is taken.
+//! The header of an OpenEXR file, checked before memory for pixels is allocated.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -27,7 +27,7 @@ fn split_channel(name: &str) -> (&str, &str) {
 /// The layers of a file: their names, sorted, and the channels that hold their R, G and B.
 pub(super) type Channels = Vec<(String, [usize; 3])>;
 
-/// One file on its way in, for checks and messages.
+/// A file that is being read, for checks and messages.
 pub(super) struct Checks<'a> {
     pub path: &'a Path,
     pub file_bytes: u64,
@@ -232,7 +232,7 @@ pub(super) fn provenance(header: &Header) -> BTreeMap<String, String> {
         .collect()
 }
 
-/// What a file is by its first bytes, when it is no EXR.
+/// The format that the first bytes of a file suggest, if it is not an EXR.
 fn kind_of(bytes: &[u8]) -> Option<&'static str> {
     const KINDS: [(&[u8], &str); 15] = [
         (b"\x89PNG", "a PNG image does"),

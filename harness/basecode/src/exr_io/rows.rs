@@ -79,7 +79,7 @@ impl ExrRows<'static> {
         let io = |source| ImageError::Io { path: path.into(), source };
         let file = File::open(path).map_err(io)?;
         let meta = file.metadata().map_err(io)?;
-        // A pipe is read but once.
+        // A pipe can be read only once.
         let source = match meta.is_file() {
             true => Source::File(file, meta.len()),
             false => Source::Memory(read_file(file, path)?.into()),

@@ -38,7 +38,7 @@ pub struct Gpu {
     watch: Arc<Watch>,
 }
 
-/// What the graphics library says outside of any call.
+/// Errors that the graphics library reports outside of any call.
 #[derive(Default)]
 struct Trouble {
     /// Why the device was lost, once it is.
@@ -47,7 +47,7 @@ struct Trouble {
     uncaught: Option<wgpu::Error>,
 }
 
-/// The device that was kept, and what it was opened by.
+/// The device that was kept, with the kind and name of adapter that it was opened with.
 static KEPT: Mutex<Option<((AdapterKind, String), Gpu)>> = Mutex::new(None);
 
 /// The one graphics interface to use here. Never GL: on software adapters it has no float targets.
@@ -137,8 +137,8 @@ impl Gpu {
     }
 
     /// Keeps a device for the next [`Gpu::reopen`] of the same `kind` and `name`, for opening one
-    /// costs more than a small frame. One on which anything went wrong is closed instead: neither
-    /// its errors nor its loss may reach the next.
+    /// costs more than a small frame. A device on which anything went wrong is closed instead, so that its errors do
+    /// not reach the next pass.
     pub fn keep(mut self, kind: AdapterKind, name: &str) {
         // What happened since the last check comes to light here.
         let polled = self.device.poll(wgpu::PollType::Poll).is_ok();
@@ -172,7 +172,7 @@ impl Gpu {
         text.strip_prefix('\u{feff}').unwrap_or(text)
     }
 
-    /// What was handed to the device since this was last asked.
+    /// What was handed to the device since the last call.
     pub fn take_footprint(&self) -> Footprint {
         self.watch.take_footprint()
     }
@@ -194,8 +194,8 @@ impl Gpu {
     /// [`Error::Gpu`] with the library's message: for a shader it holds the line of WGSL.
     ///
     /// # Panics
-    /// When the body does, unless it is the library that panics, over the debris of an error that it found
-    /// before: then that error is told.
+    /// When the body does. If the graphics library panics because of an error that it found before, that error is
+    /// returned instead.
     pub fn checked<T>(&self, body: &mut dyn FnMut() -> Result<T>) -> Result<T> {
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
@@ -240,7 +240,7 @@ impl Gpu {
     }
 }
 
-/// Whether a panic is the library's own: what it makes of an error in a render bundle.
+/// Whether the graphics library panicked, as it does on an error in a render bundle.
 fn is_of_wgpu(panic: &(dyn Any + Send)) -> bool {
     panic.downcast_ref::<String>().is_some_and(|said| said.starts_with("Error in "))
 }

@@ -1,7 +1,7 @@
 //! The shader contract as Rust types: what lies in the uniform buffers.
 //!
-//! `docs/shader_contract.md` says the same for people; a test compares the two. Members are
-//! vectors of four floats and 4x4 matrices only, because those lie alike in Rust and in WGSL.
+//! `docs/shader_contract.md` documents it, and a test compares the two. Members are only vectors of four floats and 4x4
+//! matrices, because these have the same layout in Rust and in WGSL.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3, Vec4};

@@ -1,4 +1,4 @@
-//! What the graphics library says, for people.
+//! Readable messages from errors of the graphics library.
 
 /// The library's message without its wrapping. Of a shader: `FILE:LINE:COLUMN: what`, then the
 /// source line with its caret, as they came. Of anything else: the causes in one line.

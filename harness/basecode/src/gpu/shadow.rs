@@ -1,4 +1,4 @@
-//! What a shadow map needs besides an idea: a depth texture, its sampler and bind group 3.
+//! The resources of a shadow map: a depth texture, its sampler and bind group 3.
 
 use bytemuck::Zeroable;
 

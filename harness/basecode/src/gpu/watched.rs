@@ -1,7 +1,7 @@
-//! Device and queue as render passes get them: wgpu's own, with a look at what a frame is made of.
+//! The device and queue that render passes get: wrappers of wgpu's own that record what a frame is made of.
 //!
-//! Nothing is refused here. The host asks what a pass hands to the device for a frame, and may have
-//! pipelines made otherwise than they are asked for: what is drawn then shows how pictures come about.
+//! They refuse nothing. The host reads what a pass hands to the device for a frame. It may also change the pipelines
+//! that the pass asks for: the resulting frame shows how the pass makes its pictures.
 
 use std::fmt;
 use std::ops::Deref;
@@ -13,20 +13,20 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 
 use super::COLOR_FORMAT;
 
-/// The name of no stage: what the host replaces under it holds a fragment entry point `umbra_shown`,
-/// by which all fragments that end in a picture are drawn.
+/// Not the name of a stage. If the host replaces it, the text holds a fragment entry point `umbra_shown`, which then
+/// draws all fragments of the picture.
 pub const EVERY_FRAGMENT: &str = "every.fs";
-/// The name of no stage: where the host replaces it, only the outlines of triangles are drawn. What
-/// has no outlines on this device, fragments included, stays as it is.
+/// Not the name of a stage. If the host replaces it, only the outlines of triangles are drawn. On a device that cannot
+/// draw outlines nothing changes, not even the fragments.
 pub const OUTLINES: &str = "outlines";
-/// The name of no stage: where the host replaces it, what a pipeline draws beside the picture, such as
-/// a shadow map, leaves no trace.
+/// Not the name of a stage. If the host replaces it, pipelines that do not draw the picture, such as those of a shadow
+/// map, write nothing.
 pub const UNDRAWN_MAPS: &str = "undrawn.maps";
 
 /// Name of the entry point in the text of [`EVERY_FRAGMENT`].
 const SHOWN: &str = "umbra_shown";
 
-/// Textures of this width [texels] are more than a place holder.
+/// From this width on [texels], a texture is more than a placeholder.
 const WIDE: u32 = 32;
 
 /// WGSL up to this length [bytes] is a program; what is longer is data.
@@ -60,7 +60,7 @@ impl Footprint {
     }
 }
 
-/// Reads what [`Footprint`] displays; of anything else nothing.
+/// Parses the text that [`Footprint`] displays.
 impl std::str::FromStr for Footprint {
     type Err = std::num::ParseIntError;
 
@@ -85,7 +85,7 @@ impl fmt::Display for Footprint {
     }
 }
 
-/// How the host has pipelines made.
+/// Changes to pipelines that the host asks for.
 #[derive(Clone, Default)]
 pub(super) struct Overrides {
     /// The text of [`EVERY_FRAGMENT`].
@@ -96,7 +96,7 @@ pub(super) struct Overrides {
     pub undrawn_maps: bool,
 }
 
-/// What device and queue know together.
+/// The state that device and queue share.
 #[derive(Default)]
 pub(super) struct Watch {
     uploaded: AtomicU64,
@@ -108,7 +108,7 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    /// Has modules and pipelines made so, from the next one on.
+    /// Applies these changes to modules and pipelines made from now on.
     pub(super) fn set_overrides(&self, overrides: Overrides) {
         if let Ok(mut current) = self.overrides.lock() {
             *current = overrides;
@@ -135,14 +135,14 @@ impl Watch {
     }
 }
 
-/// [`wgpu::Device`], which it stands for wherever one is wanted.
+/// A wrapper of [`wgpu::Device`] that works wherever one is expected.
 #[derive(Clone)]
 pub struct Device {
     device: wgpu::Device,
     watch: Arc<Watch>,
 }
 
-/// [`wgpu::Queue`], which it stands for wherever one is wanted.
+/// A wrapper of [`wgpu::Queue`] that works wherever one is expected.
 #[derive(Clone)]
 pub struct Queue {
     queue: wgpu::Queue,

@@ -105,7 +105,7 @@ impl Scene {
         &self.materials[self.shapes[shape].material]
     }
 
-    /// What its files hold and no picture shows, with file and line; see [`MeshFile::remarks`].
+    /// Content of its files that no picture shows, with file and line; see [`MeshFile::remarks`].
     pub fn remarks(&self) -> &[String] {
         &self.remarks
     }
@@ -238,10 +238,10 @@ impl Scene {
     }
 }
 
-/// How the panic of a renderer begins that asks a scene without a light for it.
+/// The beginning of the panic message when a renderer asks for the light of a scene without one.
 pub(crate) const NO_LIGHT: &str = "the scene has no light";
 
-/// The BSDF of what has none: reflects nothing.
+/// The BSDF of surfaces without one: reflects nothing.
 struct Black;
 
 impl Bsdf for Black {

@@ -76,7 +76,7 @@ impl Library {
         named(0, name).or_else(|| named(0, plain)).or_else(|| named(1, plain))
     }
 
-    /// What to say of a name that is not there.
+    /// The message for a material name that is not found.
     pub(super) fn lacks(&self) -> String {
         let Some(first) = self.files.first() else {
             return "in no material file: the mesh names none (expected an mtllib statement)"
@@ -171,7 +171,7 @@ impl Entry {
         }
     }
 
-    /// Takes a statement; answers false when it is one that others would see in the picture.
+    /// Applies a statement. Returns false if it has no effect here but would change the picture elsewhere.
     fn read(&mut self, at: &Place, keyword: &str, rest: &str) -> Result<bool> {
         let wrong = |message: String| at.wrong(format!("material \"{}\": {message}", self.name));
         match keyword.to_ascii_lowercase().as_str() {
@@ -197,13 +197,13 @@ impl Entry {
             "map_ks" => self.maps[1] = Some((at.line, rest.to_owned())),
             "bump" | "disp" | "decal" | "refl" | "norm" => return Ok(false),
             other if other.starts_with("map_") => return Ok(false),
-            // All is opaque here. `-halo` may stand before the number.
+            // Everything is opaque here. `-halo` may precede the number.
             "d" | "tr" => {
                 let opaque = if keyword.eq_ignore_ascii_case("d") { 1.0 } else { 0.0 };
                 let value = words(rest).last().and_then(|word| word.parse::<f32>().ok());
                 return Ok(value.is_none_or(|value| value == opaque));
             }
-            // Ambient light, refraction and what else has no part in the assignment.
+            // Ambient light, refraction and whatever else the assignment does not use.
             _ => {}
         }
         Ok(true)
@@ -374,7 +374,7 @@ fn taken_beside(path: &Path, line: usize, name: &str, file: &Path) -> String {
     )
 }
 
-/// What else is to be said of a file that is not there.
+/// A hint for the message about a missing file.
 fn why_missing(name: &str, file: &Path) -> String {
     if file.exists() {
         return String::new();

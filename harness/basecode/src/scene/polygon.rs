@@ -1,4 +1,4 @@
-//! Polygons into triangles.
+//! Triangulation of polygons.
 
 use earcut::Earcut;
 use glam::{DVec2, DVec3, Vec3};

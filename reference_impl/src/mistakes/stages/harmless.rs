@@ -1,4 +1,4 @@
-//! Right stages that read otherwise.
+//! Right variants of the stages.
 
 use super::{COSINE, DIFFUSE, FACING, NORMAL, PHONG, SQUARED, VS, mistakes};
 

@@ -1,4 +1,4 @@
-//! Mistakes of the shaders: texts that read otherwise. `xtask verdicts` submits the mistaken texts.
+//! Mistakes of the shaders, as replacements of text. `xtask verdicts` submits the changed texts.
 
 mod diffuse;
 mod harmless;
@@ -8,7 +8,7 @@ mod vertex;
 
 use std::borrow::Cow;
 
-/// A mistake of the shaders, or another way to be right.
+/// A mistake of the shaders, or a right variant.
 pub struct StageMistake {
     /// Its name in the catalogue.
     pub name: &'static str,
@@ -45,7 +45,7 @@ pub fn wrong() -> impl Iterator<Item = &'static StageMistake> {
     [vertex::ALL, diffuse::ALL, phong::ALL, shadow::ALL].into_iter().flatten()
 }
 
-/// What is no mistake although it differs: it must cost nothing.
+/// Right variants: they must cost nothing.
 pub const HARMLESS: &[StageMistake] = harmless::ALL;
 
 /// Both.

@@ -1,4 +1,4 @@
-//! Mistakes of how both fragment stages look the shadow map up.
+//! Mistakes in the shadow map lookup of both fragment stages.
 
 use super::{DIFFUSE, PHONG, VISIBLE, mistakes};
 

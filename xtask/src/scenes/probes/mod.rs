@@ -1,4 +1,4 @@
-//! Small scenes that show what the four of the assignment cannot.
+//! Small scenes that show mistakes which the assignment's four scenes cannot.
 
 mod geometry;
 mod materials;

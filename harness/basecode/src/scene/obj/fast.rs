@@ -1,6 +1,5 @@
-//! The statements that large files consist of, `v`, `vt`, `vn` and `f` in their plain forms, byte by
-//! byte. Whatever looks otherwise is left to `piece.rs`, so that there is one place that knows all
-//! forms and all errors.
+//! A fast byte-by-byte parser for the statements that make up large files: `v`, `vt`, `vn` and `f` in their plain
+//! forms. It leaves every other form to `piece.rs`, the one place that knows all forms and all errors.
 
 use glam::{Vec2, Vec3};
 
