@@ -1,5 +1,5 @@
-//! Text in columns of a terminal, by display width, and nouns with their number. What is given must be
-//! harmless to print already.
+//! Text in columns of a terminal, by display width, and nouns with their number. The input must already be harmless to
+//! print.
 
 use unicode_width::UnicodeWidthStr;
 

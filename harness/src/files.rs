@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all, folders that do not stay, digests as text.
+//! Files that are written atomically, temporary folders, and digests as text.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -11,8 +11,8 @@ const RUN: &str = "run-";
 /// The file in such a folder that its process holds locked.
 const LOCK: &str = "lock";
 
-/// A private folder of this process, for what nobody needs afterwards. It is removed when this is
-/// dropped or, when the process was killed, by the next one that makes one beside it.
+/// A private temporary folder of this process. It is removed when this is dropped or, if the process was killed, by the
+/// next process that makes one beside it.
 pub struct Scratch {
     folder: TempDir,
     /// Released by whatever ends the process.
@@ -105,7 +105,7 @@ pub fn step(name: &str, stage: &str) {
     }
 }
 
-/// A whole file under another name, synced; it is gone unless it is renamed.
+/// A complete, synced file under a temporary name; it is removed unless it is renamed.
 fn draft(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,

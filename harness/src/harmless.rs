@@ -1,4 +1,4 @@
-//! The one gate for words that come from a submission.
+//! Makes text from a submission safe to show; all such text passes through here.
 
 /// The text with every character made visible that could act on a terminal, reorder or hide the
 /// text around it, or break a file format: control characters (ANSI sequences begin with one),

@@ -1,6 +1,6 @@
-//! Umbra grades renderers. The `umbra` program is its face; this is the same for programs of your own.
+//! Umbra grades renderers. Most users run the `umbra` program; this library does the same for programs of your own.
 //!
-//! [`grade_submission`] takes one submission through all stages and answers its points with their evidence:
+//! [`grade_submission`] takes one submission through all stages and returns its points with their evidence:
 //!
 //! ```no_run
 //! use std::path::Path;
@@ -22,9 +22,8 @@
 //! # Ok::<(), anyhow::Error>(())
 //! ```
 //!
-//! Everything else is for Umbra's own programs, changes without notice, and is not listed here.
-//! ARCHITECTURE.md is the map of the code. Data flows one way:
-//! `intake` -> `build` -> `worker` -> `evidence` -> `rubric` -> `report`.
+//! Everything else serves Umbra's own programs, changes without notice, and is hidden from this page. ARCHITECTURE.md
+//! is the map of the code. Data flows one way: `intake` -> `build` -> `worker` -> `evidence` -> `rubric` -> `report`.
 
 // Its macros are for all modules below.
 #[macro_use]

@@ -1,6 +1,6 @@
-//! What is printed. Who reads it may have seen enough (`umbra check | head`): then nothing more is printed, and
-//! everything else is done all the same, so that no report is lost. [`end_of_closed_pipe`] ends the program as other
-//! programs end that write into a closed pipe.
+//! Printing that survives a closed pipe. If the reader goes away (`umbra check | head`), nothing more is printed, but
+//! all other work goes on, so that no report is lost. [`end_of_closed_pipe`] then ends the program like any other that
+//! writes into a closed pipe.
 //!
 //! The macros take the place of the standard library's, which panic.
 
@@ -14,7 +14,7 @@ static CLOSED: AtomicBool = AtomicBool::new(false);
 /// Prints to standard output.
 ///
 /// # Panics
-/// When it cannot be written for another reason than that nobody reads it; `Bug::unprintable` knows the words.
+/// When writing fails for another reason than a closed pipe; `Bug::unprintable` recognizes the message.
 pub fn print(text: fmt::Arguments) {
     if CLOSED.load(Ordering::Relaxed) {
         return;

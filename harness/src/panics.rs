@@ -1,4 +1,4 @@
-//! Bugs of Umbra's own: a panic is caught where it can do no more harm, and says where it came from.
+//! Panics of Umbra's own: each is caught where it can do no more harm, and reported with its place in the source.
 
 use std::any::Any;
 use std::fmt;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Panics that nobody has asked for yet; a thread pool's are met in another thread than they happened in.
 static MET: Mutex<Vec<Bug>> = Mutex::new(Vec::new());
-/// So many are kept: a program that meets more has said enough.
+/// Number of panics that are kept.
 const KEPT: usize = 64;
 
 /// A panic of Umbra's own.

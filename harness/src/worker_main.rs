@@ -1,5 +1,5 @@
-//! The `umbra-worker` binary: the process that loads a plugin. Of the library it holds what a worker needs,
-//! and nothing that judges, so that a plugin that reads its own memory finds no answers there.
+//! The `umbra-worker` binary: the process that loads a plugin. It links only the code that a worker needs, and none
+//! that judges, so a plugin that reads its own memory finds no answers there.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -1,9 +1,9 @@
 //! Libraries that were built before: the same source is not compiled again.
 //!
-//! Only the parent writes here, what the compiler's sandbox gave it for a source, under a name that holds all of the
-//! source's bytes and the compiler call. So a submission can at most change what is kept for itself. Where children are
-//! not kept from the machine's files, a plugin could write here, and the compiler could read what the name does not
-//! hold (`include_str!("../config.json")`): nothing is kept there, see [`Kept::within`].
+//! Only the parent writes here. It stores what the compiler's sandbox produced for a source, under a digest of the
+//! whole source and the compiler call. So a submission can only affect its own entry. Without full isolation, a plugin
+//! could write here, and the compiler could read files that the digest does not cover
+//! (`include_str!("../config.json")`). Nothing is kept then: see [`Kept::within`].
 
 use std::fs;
 use std::io;
@@ -19,7 +19,7 @@ use crate::process::Limits;
 use crate::sandbox::Isolation;
 use crate::worker::Supervisor;
 
-/// So many libraries of about 10 MB are kept; the oldest go.
+/// Number of libraries, of about 10 MB each, that are kept; the oldest are removed.
 const KEPT: usize = 64;
 /// What is known of a library beside it.
 const NOTE: &str = "note.json";

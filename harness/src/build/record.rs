@@ -58,7 +58,7 @@ pub enum RecordError {
     },
 }
 
-/// How far cargo is with what renderers are built on.
+/// Cargo's progress on the crates that renderers are built on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Compiling {
     /// Packages that are there.
@@ -192,7 +192,7 @@ impl Recording {
     }
 }
 
-/// A recording that nobody asked for in so long is removed: no class takes longer.
+/// A recording that nobody has used for this long is removed: no class takes longer.
 const KEPT: Duration = Duration::from_secs(3 * 24 * 60 * 60);
 
 /// Removes recordings, with their closures of some hundred MB, that nobody has asked for in a while. What cannot be
@@ -273,7 +273,7 @@ fn record(
             return Err(failed_to(&cargo, message));
         }
     };
-    // A cache of the user's incremental builds is nothing that a submission may see or write.
+    // A submission must neither see nor write the user's cache of incremental builds.
     if let Some(at) = call.args.iter().position(|arg| arg.starts_with("incremental=")) {
         call.args.drain(at.saturating_sub(1)..=at);
     }

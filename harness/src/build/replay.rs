@@ -17,7 +17,7 @@ use crate::sandbox::policy::{CLOSURE, SCRATCH, SRC, TOOLCHAIN};
 use crate::sandbox::{Bind, Kind, Policy};
 use crate::worker::Supervisor;
 
-/// So many characters of what is no message of the compiler's are shown.
+/// Number of characters shown of output that is no compiler message.
 const UNREADABLE: usize = 4096;
 
 /// What became of a compiler call.
@@ -33,7 +33,7 @@ pub enum BuildOutcome {
         /// At least one.
         errors: Vec<Diagnostic>,
     },
-    /// The compiler did not come to an end of its own, and not by the source's words.
+    /// The compiler did not end by itself, and not because of the source.
     Ended(Exit),
 }
 
@@ -141,7 +141,7 @@ fn compile_once(
         Exit::Code(code) if !sandboxed && code == i32::from(process::EXIT_NOT_LOCKED) => {
             return Err(io::Error::other(ended.stderr.head));
         }
-        // The compiler is content, and yet there is nothing: what it made could not be kept.
+        // The compiler succeeded but left no library: the library could not be stored.
         Exit::Code(0) if said.errors.is_empty() => {
             let message =
                 format!("cannot keep what the compiler made in {}: no disk space?", out.display());

@@ -1,5 +1,5 @@
-//! Which submissions a command line means: archives and folders, found wherever they lie below a folder or in a
-//! zip of many, as learning platforms lay them out (`class/Ann_1_assignsubmission_file/a2.zip`).
+//! Finds the submissions that a command line names: archives and folders anywhere below a folder or in a zip of many,
+//! as learning platforms lay them out (`class/Ann_1_assignsubmission_file/a2.zip`).
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs;
@@ -16,11 +16,11 @@ use super::layout::{
 use crate::harmless::printable;
 use crate::intake::{Limits, TreeSpec, format_of_bytes};
 
-/// So many folders below the one that is given.
+/// Depth of the search below the given folder, in folders.
 const MAX_DEPTH: usize = 8;
 /// What stands in place of the files of an empty folder.
 const NOTHING: &str = " (nothing in it)";
-/// So many skipped files are named.
+/// Number of skipped files that are named.
 const NAMED: usize = 12;
 /// Largest metadata of a platform that is read [bytes].
 const MAX_METADATA: u64 = 64 << 20;
@@ -44,7 +44,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// A submission that was named itself.
+    /// A submission that the command line names itself.
     pub fn given(path: &Path) -> Self {
         let name = file_name(path);
         Self { path: path.to_owned(), name, place: path.to_owned(), label: None }

@@ -1,8 +1,8 @@
 //! JPlag's result file: which pairs of submissions it found alike, and where.
 //!
-//! A result is a zip of JSON files. Which pairs there are is said in `submissionMappings.json` (JPlag 6) or
-//! `overview.json` (3 to 5); each pair has a file of its own, below `comparisons/` in JPlag 6. Keys changed with
-//! version 6; both spellings are read, and keys that are not needed may be missing.
+//! A result is a zip of JSON files. The list of pairs is in `submissionMappings.json` (JPlag 6) or `overview.json` (3
+//! to 5); each pair has a file of its own, below `comparisons/` in JPlag 6. Keys changed with version 6; both spellings
+//! are read, and keys that are not needed may be missing.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Cursor, ErrorKind, Read as _};

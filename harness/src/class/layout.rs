@@ -1,5 +1,4 @@
-//! How learning platforms name what students submitted: from the path of a submission in a download to who
-//! submitted it, and when.
+//! Reads from the path of a submission in a learning platform's download who submitted it, and when.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Whose submission it is, by the class list. What is not certain is the instructor's to decide, in `matches.toml`.
+//! Matches submissions to students of the class list. The instructor decides uncertain cases in `matches.toml`.
 
 use std::path::Path;
 

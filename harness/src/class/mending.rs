@@ -1,4 +1,4 @@
-//! A fix of a few lines by the instructor: what it may be, and how it is put into a source.
+//! A fix of a few lines by the instructor: its limits, and how it is applied to a source.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};

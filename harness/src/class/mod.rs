@@ -5,8 +5,7 @@
 //! paths --collect--> Source with Label --grading--> Claim and Grade --settle--> Standing, Class
 //! ```
 //!
-//! Nothing here is guessed: what the names, the class list and the instructor's decisions do not settle is listed for
-//! the instructor.
+//! Nothing here guesses: cases that names, class list and decisions leave open are listed for the instructor.
 
 pub mod collect;
 mod download;

@@ -1,5 +1,5 @@
-//! What the instructor decides on points: parts set by hand, and what was left to confirm. Kept in `overrides.toml`,
-//! which the commands only add to: the last decision on something counts.
+//! The instructor's decisions on points: parts set by hand, and confirmations. They are kept in `overrides.toml`, which
+//! commands only append to: the last decision on an item counts.
 
 use std::path::Path;
 

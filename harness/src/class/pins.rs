@@ -1,5 +1,5 @@
-//! What the grades of a report are settled by, pinned in it: every applied change is one more numbered file, and the
-//! last one counts.
+//! The rules and decisions that settle the grades of a report, pinned in it. Every applied change is one more numbered
+//! file, and the last one counts.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use crate::rubric::Rules;
 /// The folder of the files, in the instructor's folder.
 pub const FOLDER: &str = "settled";
 
-/// What settles grades beside what was found out.
+/// Everything besides the evidence that settles grades.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Decided {
     /// What the assignment says.

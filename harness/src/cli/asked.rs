@@ -1,4 +1,4 @@
-//! What of an assignment a student asks for: `--part`, `--scene`.
+//! The parts and scenes that a student asks for: `--part`, `--scene`.
 
 use anyhow::ensure;
 
@@ -21,7 +21,7 @@ impl Asked {
         self.parts.is_empty() && self.scenes.is_empty()
     }
 
-    /// Takes out of an assignment what is not asked.
+    /// Removes from an assignment the parts and scenes that are not asked for.
     ///
     /// # Errors
     /// When there is no such part or scene.

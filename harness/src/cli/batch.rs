@@ -1,4 +1,4 @@
-//! Submissions through all stages, and their report: what `umbra check` and `umbra grade` share.
+//! Takes submissions through all stages and writes their report: the code that `umbra check` and `umbra grade` share.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ use crate::sandbox::Isolation;
 /// The file with the seed of a batch's held-back scenes, in the instructor's folder.
 const SEED_FILE: &str = "held-back-seed.txt";
 
-/// The file with what the reference renderer took on this machine, where a slow submission needed it.
+/// The file with the reference renderer's times on this machine, if a slow submission needed them.
 const COSTS_FILE: &str = "reference-costs.json";
 
 /// Submissions to be taken through all stages.
@@ -40,17 +40,17 @@ pub struct Batch<'a> {
     pub output: &'a Path,
     /// What draws.
     pub adapter: AdapterChoice,
-    /// So many at the same time.
+    /// Number of submissions graded at the same time.
     pub jobs: usize,
-    /// What for.
+    /// Whether to grade or to check.
     pub mode: Mode,
-    /// What must isolate them.
+    /// The isolation to demand.
     pub isolation: IsolationChoice,
-    /// Nothing for the seed that is recorded with the batch.
+    /// The held-back scenes; `None` for the seed that is recorded with the batch.
     pub perturb: Option<Perturb>,
     /// How much time each has in all.
     pub budget: BudgetChoice,
-    /// What of the assignment is asked; nothing for all of it.
+    /// The parts and scenes to ask about; `None` for all.
     pub asked: Option<&'a Asked>,
     /// Whose submissions alone are graded, unless it is empty.
     pub only: &'a [String],
@@ -62,9 +62,9 @@ pub struct Batch<'a> {
     pub list: Option<&'a Path>,
     /// Which attempt of a student counts; as before where it is not said.
     pub attempt: Option<Attempt>,
-    /// Whether what was found out before is found out anew.
+    /// Whether to grade submissions again that have not changed.
     pub force: bool,
-    /// Where the library of what compiled is left, if anywhere.
+    /// Where to leave the compiled library, if anywhere.
     pub keeps_plugin: Option<&'a Path>,
     /// Whether to print what each stage cost.
     pub timings: bool,
@@ -81,7 +81,7 @@ pub enum Ended {
 }
 
 impl<'a> Batch<'a> {
-    /// Submissions as a command takes them that says nothing else, in the one mode or the other.
+    /// A batch with the default options of a mode.
     pub fn of(paths: Vec<PathBuf>, output: &'a Path, mode: Mode) -> Self {
         let (jobs, isolation) = match mode {
             Mode::Grade => (cores() as usize, IsolationChoice::Full),

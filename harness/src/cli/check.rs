@@ -1,4 +1,4 @@
-//! `umbra check`: one working folder through all stages, for its author.
+//! `umbra check`: takes one working folder through all stages, for its author.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -77,12 +77,12 @@ struct LastCheck {
     seconds: BTreeMap<String, f64>,
 }
 
-/// Checks one working folder and prints what is to be known of it; exit 1 when points are missing.
+/// Checks one working folder and prints the result; exit 1 when points are missing.
 pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let (parts, scenes) = (arguments.part.clone(), arguments.scene.clone());
     let asked = Asked { parts, scenes };
     let folder = &arguments.submission;
-    // What cannot be done is said before it is said what is done.
+    // Errors come before the announcement of the work.
     let mut assignment = Context::assignment(root)?;
     asked.restrict(&mut assignment)?;
     ensure!(folder.exists(), "{} does not exist", folder.display());

@@ -1,4 +1,4 @@
-//! What options of several commands may be.
+//! Values of options that several commands share.
 
 use std::str::FromStr;
 

@@ -23,7 +23,7 @@ const LABEL: &str = "label.json";
 const LIST: &str = "class.csv";
 /// The folder of what tasks of a partition found, in the instructor's folder.
 pub const WORK: &str = "work";
-/// So many names stand in a message.
+/// Number of names in a message.
 const NAMES: usize = 5;
 
 /// A submission that is there.
@@ -41,7 +41,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// What it says of whose it is before anything was looked at.
+    /// Whose it claims to be, before its content was read.
     pub fn claim(&self) -> Claim {
         Claim {
             name: self.name.clone(),

@@ -1,4 +1,4 @@
-//! What most commands need: the assignment, workers, the reference renderer, Ctrl-C, progress.
+//! The context of most commands: the assignment, workers, the reference renderer, Ctrl-C, progress.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};

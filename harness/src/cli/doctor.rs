@@ -1,4 +1,4 @@
-//! `umbra doctor`: what this machine can do for Umbra, and what to do about the rest.
+//! `umbra doctor`: shows what this machine supports, and how to get the rest.
 
 use std::process::Command;
 

@@ -1,4 +1,4 @@
-//! `umbra explain`: the registry of checks, for reading.
+//! `umbra explain`: prints entries of the registry of checks.
 
 use std::path::Path;
 

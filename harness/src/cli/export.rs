@@ -1,4 +1,4 @@
-//! `umbra export` and `umbra grade --export`: the grades of a report as other programs take them.
+//! `umbra export` and `umbra grade --export`: the grades of a report in the formats of other programs.
 
 mod junit;
 

@@ -1,4 +1,4 @@
-//! `umbra grade`: a class through all stages, and its report.
+//! `umbra grade`: takes a class through all stages and writes its report.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! What earlier runs into the same report found out about submissions that this one did not grade.
+//! Adds the results of earlier runs into the same report, for submissions that this run did not grade.
 
 use std::collections::HashSet;
 use std::path::Path;

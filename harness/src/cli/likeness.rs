@@ -1,5 +1,5 @@
-//! `umbra likeness`: submissions whose sources are alike, side by side. What is the same but for comments and blanks is
-//! found by Umbra, what was renamed or moved about by JPlag, from the folder that is written for it.
+//! `umbra likeness`: submissions whose sources are alike, side by side. Umbra finds files that are equal apart from
+//! comments and white space. JPlag finds renamed or moved code, in a folder that is written for it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -21,9 +21,9 @@ use crate::report::{self, Alike, AlikePage};
 
 /// A folder of sources for each submission, in [`report::LIKENESS`].
 const SUBMISSIONS: &str = "submissions";
-/// What all began from, in that folder.
+/// The template's folder in it, which all submissions started from.
 const TEMPLATE: &str = "template";
-/// So many pairs of JPlag's are shown: who looks at more will not find more.
+/// Number of JPlag's pairs that are shown: further pairs tell nothing more.
 const SHOWN: usize = 100;
 
 /// Options of `umbra likeness`.

@@ -1,5 +1,5 @@
-//! `umbra merge`: the reports of a batch that several tasks graded into one folder. Records are trusted, never how a
-//! task ended.
+//! `umbra merge`: the reports of a batch that several tasks graded into one folder. It relies on records, never on how
+//! a task ended.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -52,7 +52,7 @@ pub const EXIT_USAGE: u8 = 2;
 pub const EXIT_MACHINE: u8 = 3;
 /// A bug of Umbra's: of a batch, all other submissions have their reports.
 pub const EXIT_BUG: u8 = 70;
-/// ChildOutcome by Ctrl-C.
+/// Ended by Ctrl-C.
 pub const EXIT_INTERRUPTED: u8 = 130;
 
 /// Umbra grades renderers: it builds students' renderer plugins, runs them in isolation on every
@@ -72,7 +72,7 @@ const EXIT_CODES: &str = "Exit codes: 0 success; 1 the answer is no (points were
 does not conform, images differ); 2 the command line or an input cannot be used; 3 the machine lacks \
 something; 70 an internal error of Umbra; 130 interrupted.";
 
-/// What is said of a panic, after its own words.
+/// The text that follows a panic's message.
 const BUG: &str = concat!(
     "this is an internal error of Umbra, nobody else's fault. Please report it to its maintainers with \
      the line above, the command line, the file involved and the version, ",
@@ -209,7 +209,7 @@ fn wrapped(text: &str, width: usize) -> String {
     out
 }
 
-/// An error and its causes, without those that it tells of already.
+/// An error and its causes, without causes that its message already contains.
 fn told_once(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |told, cause| match told.as_str() {
         "" => cause,

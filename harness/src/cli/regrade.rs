@@ -1,4 +1,4 @@
-//! `umbra regrade`: what other rules, policies, matches or overrides make of a graded class.
+//! `umbra regrade`: recomputes the grades of a class under other rules, policies, matches or overrides.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! `umbra release`: what was held back from students becomes theirs, when nobody can submit any more.
+//! `umbra release`: gives students the held-back scenes once nobody can submit any more.
 
 use std::io::{Cursor, Write as _};
 use std::path::Path;

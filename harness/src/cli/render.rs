@@ -263,7 +263,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
         return Ok(super::EXIT_OK);
     }
     let job = Job { plugin: Some(plugin), requests: vec![request] };
-    // Whoever renders by hand may wait as long as he likes; Ctrl-C ends it.
+    // A manual render has no time limit; Ctrl-C ends it.
     let limits = Limits {
         wall_s: 86_400.0,
         cpu_s: 1 << 20,
@@ -274,7 +274,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     let begun = Instant::now();
     let mut report = context.supervisor.run_job(&job, &limits, &INTERRUPTED, &mut |progress| {
         let (done, rows) = progress.rows;
-        // What is quick needs no line in a log.
+        // A quick render needs no line in a log.
         if begun.elapsed() < Duration::from_secs(3) {
             return;
         }
@@ -299,7 +299,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
         outcome => {
             let outcome = outcome.as_ref();
             let said = match outcome {
-                // A file's mistake speaks for itself.
+                // An error in a file needs no context.
                 Some(Outcome::Failed(message)) => message.clone(),
                 Some(outcome) => outcome.to_string(),
                 None => "the worker gave no answer".to_owned(),

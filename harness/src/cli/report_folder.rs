@@ -1,4 +1,4 @@
-//! The folder that commands about a report are told.
+//! The `--report` option of commands on an existing report.
 
 use std::path::PathBuf;
 

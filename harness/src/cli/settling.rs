@@ -1,5 +1,5 @@
-//! A report from what its folder keeps: records, what the last run found beside them, and what is pinned. No
-//! submission is needed, and nothing is rendered.
+//! Makes a report from the files in its folder: records, other results of the last run, and pins. It needs no
+//! submission and renders nothing.
 
 use std::borrow::Cow;
 use std::io::ErrorKind;
@@ -31,7 +31,7 @@ pub const RELEASED: &str = "released.txt";
 /// The file of [`Found`], in the instructor's folder.
 const FILE: &str = "batch.json";
 
-/// What a grade says of a submission that was judged in another way than the others of its class.
+/// The remark on a submission that was judged differently from the others of its class.
 const OTHER_CONDITIONS: &str = "graded before with other scenes, limits or another version of Umbra: \
                                 not comparable, grade it again";
 
@@ -196,7 +196,7 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// Reads all that a report is made from.
+    /// Reads everything that a report is made from.
     ///
     /// # Errors
     /// When the folder holds no report, or one of another version.
@@ -392,7 +392,7 @@ pub fn settled(
         attempt: decided.attempt,
     };
     found.name(&mut records);
-    // In an order that does not hang on who was graded when.
+    // In an order that does not depend on the order of grading.
     records.sort_by_key(|earlier| earlier.record.slug.to_lowercase());
     let shared = shared(output, &records)?;
     let claims: Vec<Claim> =

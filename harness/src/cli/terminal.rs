@@ -1,4 +1,4 @@
-//! What is at the other end: how wide it is, whether it takes colours, and how progress is told to it.
+//! The terminal: its width, its colors, and the display of progress.
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 /// Columns where there is no terminal, and nobody says how many there are.
 const LOG_COLUMNS: usize = 160;
-/// In a log, what goes on is told again after so long.
+/// In a log, progress is repeated at this interval.
 const LOG_INTERVAL: Duration = Duration::from_secs(10);
 
 /// How wide standard output is, in columns: as `COLUMNS` says, else as the terminal is.

@@ -1,7 +1,8 @@
 //! Pictures in terminals that can show them: `umbra check --pictures`.
 //!
-//! Three ways are in use. kitty and iTerm2 take a PNG as it is; a sixel terminal takes colors from a palette. A crate for
-//! all of them, viuer, brings one under the LGPL, and the newest of icy_sixel a color quantizer of twenty crates.
+//! Three ways are in use. kitty and iTerm2 take a PNG as it is; a sixel terminal takes colors from a palette. The crate
+//! viuer supports all of them but depends on an LGPL crate. The newest icy_sixel adds twenty crates for a color
+//! quantizer.
 
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;

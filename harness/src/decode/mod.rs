@@ -1,9 +1,9 @@
-//! Decoding what hostile bytes may hold: archives, texts and images of a submission. Each question is
-//! answered by a child of its own, Umbra itself, locked before it touches a byte; what it sees is
-//! the one file or folder in question, what it may write is its answer.
+//! Decodes untrusted bytes: archives, texts and images of a submission. Each request runs in its own child process,
+//! which is Umbra itself and is locked before it touches a byte. The child sees only the one file or folder in
+//! question, and can write only its answer.
 //!
-//! The parent reads an answer when the child is gone, and believes neither names nor sizes in it.
-//! A child that dies is the submission's fault: whatever it could not decode is refused.
+//! The parent reads an answer after the child has ended, and trusts no name or size in it. A child that dies is the
+//! submission's fault: whatever it could not decode is refused.
 
 mod child;
 mod wire;
@@ -45,7 +45,7 @@ pub struct Decoder<'a> {
     cpu_s: Mutex<f64>,
 }
 
-/// A submission as it came: the private copy, and what is to be said about it.
+/// A submission as received: the private copy, and the findings on it.
 pub struct Received {
     /// The private copy.
     pub submission: Submission,
@@ -183,8 +183,7 @@ impl<'a> Decoder<'a> {
         })
     }
 
-    /// What is to be said of the images of the tree in a private copy before anything is graded: those that
-    /// are empty or cannot be decoded.
+    /// Findings on the tree's images in a private copy before grading: images that are empty or cannot be decoded.
     ///
     /// # Errors
     /// The machine's matters and Ctrl-C.
@@ -315,7 +314,8 @@ fn death(ended: &ChildOutcome) -> Result<(), NoAnswer> {
         Exit::Code(0) => return Ok(()),
         Exit::Cancelled => return Err(io::Error::from(io::ErrorKind::Interrupted).into()),
         Exit::Starved => return Err(process::starved("a decoder").into()),
-        // By its own word it could not work: no disk space, no memory, no lock. No hostile byte says that.
+        // The child itself reports that it could not work: no disk space, no memory, no lock. Hostile bytes cannot
+        // cause this exit.
         Exit::Code(code) if code == i32::from(process::EXIT_NOT_LOCKED) => {
             return Err(io::Error::other(ended.stderr.head.trim().to_owned()).into());
         }

@@ -1,5 +1,4 @@
-//! How a question reaches the child and its answer comes back: JSON, and behind an answer the bytes
-//! that it speaks of.
+//! The format of questions to the child and of its answers: JSON, and after an answer the bytes that it describes.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -96,7 +95,7 @@ pub fn write_answer(
     content(out)
 }
 
-/// The answer in these bytes, whoever wrote them, and its content.
+/// Parses an answer and its content from untrusted bytes.
 pub fn read_answer(bytes: Vec<u8>) -> Option<(Answer, Vec<u8>)> {
     let length = u64::from_le_bytes(*bytes.first_chunk::<8>()?);
     let end = usize::try_from(length).ok()?.checked_add(8)?;

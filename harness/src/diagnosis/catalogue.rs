@@ -15,12 +15,12 @@ const TEXT: &str = include_str!("../../data/mistakes.json");
 pub struct Catalogue {
     /// The mistakes, by family.
     pub mistakes: Vec<KnownMistake>,
-    /// What students do otherwise and right: it must cost nothing.
+    /// Right variants: they must cost nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub right: Vec<RightVariant>,
 }
 
-/// Another way to be right.
+/// A right variant: code that differs from the reference and is right.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RightVariant {
@@ -41,11 +41,11 @@ pub enum Class {
     Slip,
     /// Something that the handout asks for is missing.
     Concept,
-    /// What the part is about is not there at all.
+    /// Everything that the part is about is missing.
     Nothing,
     /// No image of the assignment shows it, probes do.
     Hidden,
-    /// PartScore a remark, no points.
+    /// Worth a remark, no points.
     Finding,
 }
 
@@ -67,8 +67,8 @@ pub struct KnownMistake {
     /// Other mistakes that look the same in everything that is asked: they are named together.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alike: Vec<String>,
-    /// Whether the reference's answers with it are stored, for the diagnosis to compare with. The
-    /// others prove the grader only.
+    /// Whether the reference's answers with it are stored, for the diagnosis to compare with. The others only test the
+    /// grader.
     #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
     pub stored: bool,
     /// For the student, after the words "looks like:".

@@ -1,4 +1,4 @@
-//! From the parts that fail to what each looks like. Decides nothing: points are given without it.
+//! Finds the likely mistake in each failing part. It decides nothing: grading does not use it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

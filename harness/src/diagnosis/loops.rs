@@ -1,5 +1,5 @@
-//! What goes wrong between the pixels and the image: tried out on the renderer's own radiance, so
-//! that it is found whatever else is wrong.
+//! Mistakes between pixels and image. Each is tried on the renderer's own radiance, so it is found whatever else is
+//! wrong.
 
 use basecode::{Image, Vec3};
 

@@ -1,5 +1,5 @@
-//! What a wrong picture looks like: the catalogue of known mistakes, what they answer, and which one
-//! a submission's answers are nearest to.
+//! Diagnosis of wrong answers: the catalogue of known mistakes, their answers, and the one nearest to a submission's
+//! answers.
 
 mod catalogue;
 mod diagnose;

@@ -1,5 +1,5 @@
-//! The known mistake that answers are nearest to, if it is clearly nearer than any other and than
-//! what is right. Pure: tiles in, a guess out.
+//! Finds the known mistake nearest to some answers, if it is clearly nearer than any other and than the right answers.
+//! A pure function from tiles to a guess.
 
 use std::collections::BTreeMap;
 
@@ -117,7 +117,7 @@ pub fn from_right(comparisons: &[Comparison]) -> f64 {
     total(&shown, |exhibit| exhibit.right.clone()).mean()
 }
 
-/// So much of what shines must be dark for answers to be black.
+/// Answers are black if at least this fraction of what should shine is dark.
 const BLACK: f64 = 0.98;
 
 /// Whether nearly everything is black that should shine: it may be so for any reason.
@@ -191,8 +191,8 @@ fn total(shown: &[(&Comparison, f32)], guess: impl Fn(&Comparison) -> Thumbnail)
     total
 }
 
-/// The relative difference of an answer and a guess, from 0 to 1; nothing where nothing was asked.
-/// A guess by which there would have been nothing to ask is all wrong.
+/// The relative difference of an answer and a guess, from 0 to 1; `None` where nothing was asked. A guess without a
+/// value there is entirely wrong.
 fn difference(a: Vec3, b: Vec3, scale: f32) -> Option<f32> {
     if a.is_nan() {
         return None;

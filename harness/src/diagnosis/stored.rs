@@ -1,7 +1,7 @@
 //! The stored answers of known mistakes: `expected/<assignment>/mistakes/<view>.exr`.
 //!
-//! A file is a column of tiles, named in order by its attribute `tiles`. The first is what is right,
-//! the second which material every value shows, the others what mistakes answer that show here.
+//! A file is a column of tiles, named in order by its attribute `tiles`. The first tile holds the right answers, the
+//! second the material behind each value, the others the answers of mistakes that differ here.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Tiles: what a renderer answers to one question, cut down to 32x24 values that stand for it.
+//! Tiles: a renderer's answer to one question, reduced to 32x24 values.
 
 use basecode::{Image, Vec3};
 

@@ -233,7 +233,7 @@ pub fn judge(
         let mut excess = 0.0f64;
         for (c, &answer) in value.iter().enumerate() {
             let (a, b) = (f64::from(answer), probe.expected[c]);
-            // What is no number is never right.
+            // NaN is never right.
             let difference = if a.is_finite() { (a - b).abs() } else { f64::INFINITY };
             not_finite += usize::from(!a.is_finite());
             excess = excess.max(difference / probe.tolerance[c].max(f64::MIN_POSITIVE));

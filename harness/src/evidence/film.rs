@@ -1,4 +1,4 @@
-//! What an image costs that is not what it should be: slips in how a film is written and looked at.
+//! The price of a wrong image: slips in how a film is written or viewed.
 
 use super::price::{self, Class, Price};
 use super::rays::RELATIVE;
@@ -153,11 +153,11 @@ const KNOWN: f64 = 0.1;
 /// So much of what an image should be may a slip leave unexplained: between pixels it is known by its neighbours.
 const LEFT: f64 = 0.005;
 
-/// So many pixels are looked at.
+/// Number of pixels that are looked at.
 const PRICED: usize = 6000;
 
-/// What an image costs that is not what it should be: a slip in how it is written explains it, or
-/// nothing. `room` is how far a pixel may be off, where it tells anything.
+/// The price of a wrong image: a slip in how it is written explains it, or nothing does. `room` is how far a pixel may
+/// be off, where it tells anything.
 pub fn film_price(
     (width, height): (usize, usize),
     image: &[[f32; 3]],
@@ -165,7 +165,7 @@ pub fn film_price(
     room: &dyn Fn(usize) -> Option<f32>,
     raw: f64,
 ) -> Price {
-    // Nothing is drawn: no slip explains that.
+    // A black image: no slip explains it.
     let Some(factor) = factor(image, right) else { return Price::of_raw(raw) };
     let edge = |index: usize| room(index).is_none();
     let film = Film { width, height, pixels: right, edge: &edge };

@@ -1,4 +1,4 @@
-//! Whole images against what is expected, all regions together or some of them.
+//! Compares whole images with the expected ones, over all regions or some of them.
 
 use basecode::Image;
 
@@ -116,7 +116,7 @@ pub fn judge(
     }
 }
 
-/// What an image costs that is `raw` off: a slip in how it is written explains it, or nothing.
+/// The price of an image that is `raw` off: a slip in how it is written explains it, or nothing does.
 pub fn film_price(image: &Image, right: &Image, mask: &RegionMask, raw: f64) -> Price {
     let colours = |image: &Image| image.pixels.iter().map(|p| p.to_array()).collect::<Vec<_>>();
     let room = |index: usize| {

@@ -1,5 +1,5 @@
-//! Part 1.3: the render loop, apart from what it shades. A render must be what the renderer's own
-//! integrator answers along rays of the host's choice, right or wrong.
+//! Part 1.3: the render loop, judged apart from shading. A render must equal what the renderer's own integrator answers
+//! along rays that the host chooses, right or wrong.
 
 use super::film::film_price;
 use super::price::{Class, Price};
@@ -180,9 +180,9 @@ const DIRECTIONS: usize = 8;
 const EDGE_VARIANCE: f64 = 0.1;
 /// A pixel is off from this many standard errors on.
 const Z_LIMIT: f64 = 4.0;
-/// So many pixels may be off: a variance from 16 rays is not well known.
+/// Fraction of pixels that may be off: a variance from 16 rays is not well known.
 const OFF_FRACTION: f64 = 0.01;
-/// And so many more, on any film.
+/// Number of further pixels that may be off, on any film.
 const SPARE_PIXELS: f64 = 4.0;
 /// Mean square of z, by the largest variance around, on edges of one direction: 0.4 for independent samples and rays in strata, less
 /// where the samples are spread better; 4 where all samples of a pixel are the same.

@@ -1,6 +1,6 @@
-//! What is found out about a submission: pure functions from values to checks.
+//! The evidence about a submission: pure functions from values to checks.
 //!
-//! Nothing here knows of processes, GPUs or libraries.
+//! Nothing here depends on processes, GPUs or libraries.
 
 pub mod bsdf;
 pub mod changes;

@@ -1,5 +1,5 @@
-//! Whether a BSDF can be a surface's: reciprocal, and never reflecting more than falls on it. Told to the
-//! reader as a finding; it decides nothing, since a BSDF is right or wrong by its formula.
+//! Whether a BSDF is physically plausible: it is reciprocal and never reflects more light than it receives. The result
+//! is a finding and decides nothing, since a BSDF is right or wrong by its formula.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -72,7 +72,7 @@ impl Probes {
         self.integrals.push(solid_angles);
     }
 
-    /// What the answers say, three floats each. Nothing when there are not as many as questions.
+    /// Judges the answers, three floats each. `None` if their number is not that of the questions.
     pub fn judge(&self, kind: BsdfKind, values: &[[f32; 3]]) -> Option<Check> {
         if values.len() != self.queries.len() {
             return None;
@@ -84,7 +84,7 @@ impl Probes {
             for (a, b) in one.iter().zip(other) {
                 let (a, b) = (f64::from(a / q.wi[2]), f64::from(b / r.wi[2]));
                 let apart = (a - b).abs() / a.abs().max(b.abs()).max(1e-6);
-                // Asked this way round, a NaN is as asymmetric as can be.
+                // Compared this way, a NaN counts as fully asymmetric.
                 asymmetry = asymmetry.max(if apart <= 1.0 { apart } else { 1.0 });
             }
         }

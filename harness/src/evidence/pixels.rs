@@ -1,4 +1,4 @@
-//! What an image costs that was shaded wrongly: its pixels beside those of known single mistakes.
+//! The price of a wrongly shaded image: compares its pixels with those of known single mistakes.
 
 use basecode::{Camera, Frame, Image, MaterialModel, Scene, Vec3};
 use renderer_api as api;
@@ -67,7 +67,7 @@ pub fn price(
         let points: Vec<ShadedPoint> = surfaces.iter().map(shaded).collect();
         let of = |index: usize, shading: &Shading| shading.radiance(&points[index]);
         let answers = Answers { of: &of, changes: &[], ..answers };
-        // Where it is black there is nothing to tell it from any other darkness.
+        // A black pixel cannot be told from any other black pixel.
         if answers.total() < LEAST_LEFT * points.len() as f64 {
             return price;
         }
@@ -75,7 +75,7 @@ pub fn price(
     })
 }
 
-/// Of the mean radiance so much must be left by a mistake that an image is said to show.
+/// Fraction of the mean radiance that a mistake must leave to explain an image.
 const LEAST_LEFT: f64 = 1e-4;
 
 /// Where a shader takes light and eye to be, world space.
@@ -85,7 +85,7 @@ struct Places {
     eye: Vec3,
 }
 
-/// What a shader gets wrong of what it is given: the mistake, and what it shades instead.
+/// A mistake in a shader's use of its inputs: its name, and what the shader shades instead.
 type Input<'a> = (&'static str, Class, Box<dyn Fn(&SurfacePoint) -> ShadedPoint + 'a>);
 
 /// The mistakes that are looked for.

@@ -1,9 +1,9 @@
 //! Conventions of the realtime path: what a render pass may multiply into its uniforms, so that the
 //! fragment stages leave it out.
 //!
-//! A pass that hands out intensity over pi to stages that do not divide by it is right. So pass and
-//! stages are judged as well after each such convention is undone that the pass keeps, and a fragment
-//! stage with it: one alone has made a mistake. The rubric takes what is worth most.
+//! A pass that hands out intensity over pi to stages that do not divide by it is right. So pass and stages are also
+//! judged with each such convention undone, if the pass and a fragment stage both keep it: one alone has made a
+//! mistake. The rubric takes the result that earns most.
 
 use std::f64::consts::{PI, TAU};
 
@@ -69,7 +69,7 @@ impl Premultiplied {
         format!("the pass multiplies {}, the stages leave it out", factors.join(" and "))
     }
 
-    /// A frame that shows a bound value, as it would be without.
+    /// A frame that shows a bound value, as it would look without the convention.
     pub fn undone_bound(
         &self,
         scene: &Scene,

@@ -1,9 +1,9 @@
-//! What a wrong answer costs: the smaller of how far off it is and what the one mistake costs that
-//! explains it, plus what that leaves unexplained.
+//! The price of a wrong answer: the smaller of its raw error, and the price of the one mistake that explains it plus
+//! the error left unexplained.
 //!
-//! A constant factor of pi is off by 214 %, and one slip all the same: a teacher takes little for
-//! it. So answers are compared with those of known single mistakes, each of a class that has a
-//! price; `rules.curve` makes points of the error.
+//! A constant factor of pi is off by 214 % and is still one slip: a teacher deducts little for it. So answers are
+//! compared with those of known single mistakes, each of a class that has a price. `rules.curve` turns the error into
+//! points.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::shading::Shading;
 use super::{Check, CheckId, Measure, Verdict};
 use crate::imaging::correlation::Moments;
 
-/// What a mistake is to a teacher.
+/// How a teacher would class a mistake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// One constant, sign, power, index or division: 10 to 25 % of a part.
@@ -33,7 +33,7 @@ impl Class {
     }
 }
 
-/// Answers beside what is right.
+/// Answers to be compared with the right ones.
 pub struct Answers<'a> {
     /// What was answered.
     pub found: &'a [[f32; 3]],
@@ -56,7 +56,7 @@ pub struct Change {
     pub name: &'static str,
     /// Its class.
     pub class: Class,
-    /// What is shaded then; nothing where a factor is fitted.
+    /// The changed shading; `None` where a factor is fitted.
     pub(super) shading: Option<Shading>,
     /// Which factor is fitted.
     pub(super) fitted: Option<Fitted>,
@@ -95,7 +95,7 @@ pub struct Price {
 impl Price {
     /// The price of answers that are `raw` off.
     pub fn of_raw(raw: f64) -> Self {
-        // What is no number is as wrong as can be.
+        // NaN is as wrong as possible.
         let raw = if raw <= 1.0 { raw } else { 1.0 };
         Self { error: raw, raw, mistake: None }
     }
@@ -142,10 +142,10 @@ pub(super) fn is_explained(check: &Check) -> bool {
     is_known && [Class::Slip, Class::Concept].into_iter().any(leaves_nothing)
 }
 
-/// Where one mistake explains a check on most scenes, and nothing known explains it on the others, it
-/// costs what it costs on most of them: on one a seam or an edge may leave more unexplained. Where it
-/// leaves nothing lit (`DARKENING`) that is no worse. And what is explained, or follows the right
-/// answers, on most scenes is more than nothing on the others.
+/// If one mistake explains a check on most scenes, and nothing known explains it on the others, the others cost no
+/// more: on one scene a seam or an edge may leave more unexplained. A scene that the mistake leaves without light
+/// (`DARKENING`) is no worse either. And if the answers on most scenes are explained, or follow the right ones, the
+/// others do not count as empty.
 pub fn agree(checks: &mut [Check]) {
     let mut of_id: BTreeMap<(CheckId, String), Vec<usize>> = BTreeMap::new();
     for (index, check) in checks.iter().enumerate() {
@@ -179,7 +179,7 @@ pub fn agree(checks: &mut [Check]) {
     }
 }
 
-/// What is said of a check whose answers are all black.
+/// The mistake's name for a check whose answers are all black.
 pub const BLACK: &str = "nothing is lit";
 /// The mistakes that can leave nothing lit on a scene.
 const DARKENING: [&str; 5] =
@@ -225,22 +225,22 @@ pub const UNKNOWN: &str = "something that no single known mistake explains";
 /// A factor below this leaves nothing of a term.
 const NOTHING: f64 = 1e-3;
 
-/// Whether values (a) follow those of a mistake (b), so that it may explain them: where its own hardly vary, any
-/// constant is about right, and has nothing of it.
+/// Whether values (a) follow those of a mistake (b), so that the mistake may explain them. If the mistake's own values
+/// hardly vary, any constant is about right, so they follow.
 pub(super) fn follows(pairs: &Moments) -> bool {
     let [_, varies, _] = pairs.about_means();
     pairs.correlation() >= LIKE || varies < FLAT * pairs.square_of_b()
 }
 
 impl Answers<'_> {
-    /// What the answers cost; `raw` is how far off they are, where that is known better.
+    /// The price of the answers; `raw` is how far off they are, if the caller knows that better.
     pub fn price(&self, raw: Option<f64>) -> Price {
         let questions = self.questions();
         let right = Shading::default();
         let price = Price::of_raw(
             raw.unwrap_or_else(|| self.residual(&questions, &right, &Factors::default())),
         );
-        // Nothing explains darkness but that nothing is there.
+        // Black answers hold nothing that a mistake could explain.
         if self.found.iter().all(|value| *value == [0.0; 3]) {
             return price;
         }
@@ -319,7 +319,7 @@ impl Answers<'_> {
                 let difference = match (a.is_finite(), b.is_finite()) {
                     (true, true) => (a - b).abs(),
                     (false, false) => 0.0,
-                    // What is no number is as far off as can be.
+                    // NaN is as far off as possible.
                     _ if b.is_finite() => unit.max(b.abs()),
                     _ => unit,
                 };
@@ -419,8 +419,8 @@ impl Answers<'_> {
     }
 }
 
-/// What it costs beside a slip that shadows leave this fraction of the light: little at half of it,
-/// most of the points where nearly none is missing.
+/// The price, on top of a slip, of shadows that leave this fraction of the light: little at half of it, most of the
+/// points where nearly none is missing.
 pub fn fading(light: f64) -> f64 {
     0.03 * light * light + light.powi(16)
 }

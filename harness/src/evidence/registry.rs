@@ -1,8 +1,8 @@
-//! Every check and every rule by name. What each asks, what its error means and where its bound lies stands in
-//! `info.rs`; who judges it, where `CheckId` with its variant stands in `evidence/` or `grading/`.
+//! Every check and every rule by name. `info.rs` says what each check asks, what its error means and where its bound
+//! lies. To find the code that judges a check, search `evidence/` and `grading/` for its variant of `CheckId`.
 //!
-//! `umbra explain`, the list in `docs/evidence.md` and the reports read these entries. What a new check takes says
-//! ARCHITECTURE.md.
+//! `umbra explain`, the list in `docs/evidence.md` and the reports read these entries. ARCHITECTURE.md says what a new
+//! check needs.
 
 mod info;
 

@@ -1,7 +1,7 @@
-//! The handout's shading in closed form, in f64, and the same with one thing changed.
+//! The handout's shading in closed form, in f64, and variants with one change.
 //!
-//! What is right is `Shading::default()`. A changed one is the answer of a renderer with one known
-//! mistake; [`super::price`] asks whether an answer is that of a single mistake.
+//! `Shading::default()` is right. A variant gives the answer of a renderer with one known mistake; [`super::price`]
+//! tests whether an answer is that of a single mistake.
 
 use renderer_api as api;
 

@@ -123,7 +123,7 @@ impl Shadows<'_> {
                 (self.mask.pixels[index] & RegionMask::INDEX, f64::from(a.element_sum()));
             known_pixels.push(Known { lit, phong, visibility, region, left });
             let off = if lit { (a - b).abs() } else { a.abs() };
-            // Asked this way round, a NaN is wrong.
+            // Compared this way, a NaN counts as wrong.
             let right = off.max_element() <= HALF_LIGHT * b.abs().max_element();
             if !right {
                 *wrong += 1;
@@ -202,7 +202,7 @@ struct Known {
     left: f64,
 }
 
-/// What lies in shadow, where every pixel of a region has the same radiance, as an ambient term leaves it: the largest
+/// The shadowed pixels, if every pixel of a region has the same radiance, as an ambient term leaves it: the largest
 /// fraction of the light that is left to half of a region, and the fraction of dark pixels that have another radiance.
 fn ambient(pixels: &[Known]) -> (f64, f64) {
     let mut of_region: BTreeMap<u16, Vec<&Known>> = BTreeMap::new();
@@ -213,7 +213,7 @@ fn ambient(pixels: &[Known]) -> (f64, f64) {
     for own in of_region.values_mut() {
         own.sort_by(|a, b| a.left.total_cmp(&b.left));
         let median = own[own.len() / 2].left;
-        // Asked this way round, a NaN is off.
+        // Compared this way, a NaN counts as off.
         let same = own.iter().filter(|p| (p.left - median).abs() <= f64::from(HALF_LIGHT) * median);
         (off, all) = (off + own.len() - same.count(), all + own.len());
         own.sort_by(|a, b| a.visibility.total_cmp(&b.visibility));
@@ -246,7 +246,7 @@ fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64) -> Price {
             let (mut all, mut wrong) = (0usize, 0usize);
             for pixel in own {
                 all += 1;
-                // Asked this way round, a NaN is wrong.
+                // Compared this way, a NaN counts as wrong.
                 let right = (pixel.visibility - light(pixel)).abs() <= f64::from(HALF_LIGHT);
                 wrong += usize::from(!right);
             }

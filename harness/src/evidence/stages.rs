@@ -1,7 +1,7 @@
-//! Parts 2.1 to 2.4 apart: a student's render pass under stages of ours that show what it binds,
-//! and a student's stages under a pass of ours.
+//! Parts 2.1 to 2.4 judged separately: a student's render pass with Umbra's stages, which show the values it binds, and
+//! a student's stages in Umbra's pass.
 //!
-//! No reference shader is needed: ours write positions, normals and uniforms, not radiance.
+//! No reference shader is needed: Umbra's stages write positions, normals and uniforms, not radiance.
 
 use std::collections::BTreeMap;
 
@@ -124,7 +124,7 @@ impl BoundValue {
 
 /// The tolerance of a bound value, relative to its largest component: it travels as f32.
 const BOUND_RELATIVE: f32 = 1e-4;
-/// So many interior pixels may still differ: a rasteriser's coverage along seams inside a shape.
+/// Fraction of interior pixels that may still differ: a rasterizer's coverage along seams inside a shape.
 pub(super) const STRAY_FRACTION: f64 = 5e-3;
 
 /// Part 2.1: judges the frames that a student's pass drew with stages that show one bound value each.
@@ -254,7 +254,7 @@ const NEAR: f32 = 0.1;
 /// From this fraction of wrong pixels on, all values together, a pass has set nothing.
 const NO_PASS: f64 = 0.9;
 
-/// What values cost of which this fraction is wrong, all together; `measures` has that of each, and
+/// The price of values if this fraction of all of them is wrong. `measures` has the fraction of each value, and
 /// `other_pipeline` says whether the diffuse pipeline draws Phong materials.
 fn price_of_values(wrong: f64, measures: &[Measure], other_pipeline: bool) -> Price {
     let price = match measures.iter().filter(|measure| !measure.passed).count() {

@@ -1,7 +1,7 @@
 //! Part 2.2: what a vertex stage forwards, and where on the film it lands.
 //!
-//! Three things are told apart: the world position, the world normal and the clip-space position. A
-//! position that lies on a surface is right, wherever on the film it shows.
+//! Three outputs are judged separately: the world position, the world normal and the clip-space position. A position on
+//! a surface is right, wherever on the film it appears.
 
 use basecode::{Image, Ray, Scene, SurfaceInteraction, Vec3};
 
@@ -17,7 +17,7 @@ use crate::imaging::reference::RegionMask;
 const POSITION_RELATIVE: f32 = 2e-3;
 /// The tolerance of a unit normal.
 const NORMAL_ABSOLUTE: f32 = 1e-2;
-/// So much of what should be seen must be, to tell anything of what is forwarded.
+/// Fraction of the expected surface that must be visible to judge the forwarded values.
 const LEAST_SHOWN: f64 = 0.02;
 
 /// World positions and normals, as the fragment stage receives them.
@@ -133,7 +133,7 @@ impl Seen {
             seen.counted += 1;
             let (p, n) = (positions.pixels[index], normals.pixels[index]);
             seen.missing += usize::from(!shows(index));
-            // What is no number is never right.
+            // NaN is never right.
             let right_position = is_near(p, point.position, ray.origin);
             let right_normal = (n - point.normal).length() <= NORMAL_ABSOLUTE;
             seen.wrong_position += usize::from(!right_position);
@@ -164,7 +164,7 @@ impl Seen {
         wrong as f64 / self.counted as f64
     }
 
-    /// Whether what is drawn tells anything.
+    /// Whether the drawn image is enough to judge by.
     fn tells(&self) -> bool {
         self.shown as f64 > LEAST_SHOWN * self.counted as f64
     }

@@ -1,5 +1,5 @@
-//! What is right: the images that a right renderer draws of a scene, and the geometry that tells where they can be
-//! trusted. Where the images come from is [`crate::store`]'s matter.
+//! Expected results: the images that a right renderer draws of a scene, and the geometry that tells where they can be
+//! trusted. [`crate::store`] provides the images.
 
 mod regions;
 mod scene_file;

@@ -1,4 +1,4 @@
-//! Which pixel of a scene shows what: material, lit or not, and where no pixel can be trusted.
+//! Labels the pixels of a scene: their material, whether they are lit, and whether they can be trusted.
 
 use basecode::{Frame, MaterialModel, Result, Scene, Vec3};
 

@@ -1,5 +1,5 @@
-//! The machine's word against a submission's: who blames the machine (no adapter, a lost device, a full
-//! disk, a worker that could not begin) is believed when a renderer of ours fails on the same case.
+//! Decides whether a reported environment failure (no adapter, a lost device, a full disk, a worker that could not
+//! begin) is real, by repeating the request with the reference renderer or Umbra's own pass.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::worker::{
 };
 
 impl Session<'_> {
-    /// Asks a plugin, or Umbra's neutral pass when there is none.
+    /// Runs requests on a plugin, or on Umbra's neutral pass without one.
     pub fn run(&self, plugin: Option<&Path>, requests: Vec<Request>) -> Vec<Outcome> {
         if requests.is_empty() {
             return Vec::new();
@@ -25,8 +25,8 @@ impl Session<'_> {
     }
 }
 
-/// Settles the outcomes of `job` that blame the machine: what a renderer of ours does is the
-/// submission's own failure; otherwise they are asked again while there is retries, and stay ungraded.
+/// Settles the outcomes of `job` that report an environment failure. If a renderer of ours succeeds, the failure is the
+/// submission's own. Otherwise the requests are repeated while retries are left, and then stay ungraded.
 fn attribute_failures(session: &Session, job: &Job, outcomes: &mut [Outcome]) {
     loop {
         let blaming = |&index: &usize| is_environment_failure(&outcomes[index]);
@@ -66,8 +66,8 @@ fn said(outcome: &Outcome) -> &str {
     }
 }
 
-/// Asks a renderer of ours the same in a fresh worker: the reference, or Umbra's own pass for stages
-/// and where there is no reference. Says who could do it; nothing when it fails as well.
+/// Repeats the request in a fresh worker with a renderer of ours: the reference, or Umbra's own pass for stages and
+/// where there is no reference. Says which one succeeded; `None` if it fails too.
 fn control_run(session: &Session, job: &Job, request: &Request) -> Option<&'static str> {
     let mut request = request.clone();
     request.scene_mut().options.clear();
@@ -76,7 +76,7 @@ fn control_run(session: &Session, job: &Job, request: &Request) -> Option<&'stat
         request = own_pass(&request);
     }
     let control = Job { plugin: reference.map(Into::into), requests: vec![request] };
-    // What a submission may use is no measure of ours.
+    // The limits of submissions do not apply to our own renderers.
     let limits = Limits { threads: session.limits.threads, ..Limits::default() };
     let report = session.supervisor.run_job(&control, &limits, session.cancel, &mut |_| ());
     let outcome = report.outcomes.first()?;

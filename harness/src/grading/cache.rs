@@ -1,5 +1,5 @@
-//! Records that are kept while a batch goes on: whatever ends it, the same command does only what
-//! is missing. Points are made from records anew each time.
+//! Stores records while a batch runs, so that the same command resumes it, whatever ended it. Every run recomputes
+//! points from the records.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -27,16 +27,16 @@ const REPLACED: &str = "record.replaced.json";
 pub struct RecordCache {
     /// SHA-256 over all that a record depends on, but for the submission.
     batch: [u8; 32],
-    /// Whether everything is found out anew.
+    /// Whether to ignore stored records.
     force: bool,
     /// The records of this run that are in their files, by slug: whether they were there before.
     settled: Mutex<HashMap<String, bool>>,
 }
 
-/// A record with its place among others. A class may have hundreds: what is long stays in the file.
+/// A record with its place among others. A class may have hundreds, so long parts stay in the file.
 #[derive(Clone)]
 pub struct Earlier {
-    /// The record, without what was found out where that is in its file.
+    /// The record; without its evidence if that is in its file.
     pub record: Record,
     /// Whether it was made with the same scenes, limits and program.
     pub comparable: bool,

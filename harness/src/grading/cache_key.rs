@@ -1,4 +1,4 @@
-//! What the records of a batch depend on.
+//! The cache key of a batch: everything that its records depend on.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! One submission never ends the batch: a bug of Umbra's that it meets is contained and remembered.
+//! One submission never ends the batch: if it triggers a panic in Umbra, that is caught and recorded.
 
 use std::path::Path;
 

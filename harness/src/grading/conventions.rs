@@ -1,5 +1,4 @@
-//! The answers of a plugin's BSDFs and integrator whose verdicts hang on a convention: asked once,
-//! judged under each.
+//! The answers of a plugin's BSDFs and integrator whose verdicts depend on a convention: asked once, judged under each.
 
 use std::path::Path;
 

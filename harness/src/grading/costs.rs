@@ -1,4 +1,4 @@
-//! What the reference renderer takes on this machine.
+//! The reference renderer's CPU time on this machine.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock};

@@ -1,5 +1,5 @@
-//! What the diagnosis is made from: answers kept while a submission is judged, and those of the known
-//! mistakes, which the reference renderer gives to the same questions.
+//! The input of the diagnosis: answers kept while a submission is judged, and the reference renderer's answers to the
+//! same questions with each known mistake.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! Frames: one of a scene under given stages, asked of a plugin or of Umbra's neutral pass.
+//! Draws frames of scenes with given stages, by a plugin or by Umbra's neutral pass.
 
 use std::path::Path;
 

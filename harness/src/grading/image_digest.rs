@@ -1,4 +1,4 @@
-//! What tells that two submitted images are one.
+//! Digests that tell whether two submitted images are the same.
 
 use basecode::Image;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
-//! Parts 2.1 to 2.4 apart, where an image is wrong: the student's pass under stages of ours, and
-//! his stages under a pass of ours, on small films.
+//! Judges parts 2.1 to 2.4 separately if an image is wrong: the student's pass with Umbra's stages, and the student's
+//! stages in Umbra's pass, on small films.
 
 use std::ops::Range;
 use std::path::Path;
@@ -46,10 +46,10 @@ struct PassFrames {
     positions: Image,
 }
 
-/// Judges the student's pass under stages of ours (2.1) and his stages under a pass of ours (2.2
-/// to 2.4) on scenes: one worker draws all frames of the former, another without any code of his
-/// those of the latter. `fails` says whether there are scenes that the student's own frame of gets
-/// no answer: then a stage that does not compile is to blame, otherwise no frame needs it.
+/// Judges the student's pass with Umbra's stages (2.1) and the student's stages in Umbra's pass (2.2 to 2.4) on scenes.
+/// One worker draws all frames of the former; another, without any of the student's Rust code, draws those of the
+/// latter. `fails` says whether the student's own frame of some scene got no answer: then a stage that does not compile
+/// is to blame, otherwise no frame needs it.
 pub fn isolate(
     session: &Session,
     plugin: &Path,

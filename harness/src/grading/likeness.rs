@@ -1,7 +1,7 @@
-//! What of a source is a student's own, for finding it again in another submission: without comments, blanks, and
-//! what the template says already.
+//! Digests of a student's own source text, to find it again in another submission. Comments, white space and the
+//! template's lines are left out.
 //!
-//! This finds copies. What was renamed or moved about is JPlag's to find (`class/jplag.rs`).
+//! This finds copies. JPlag finds renamed or moved code (`class/jplag.rs`).
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -13,8 +13,8 @@ use sha2::{Digest as _, Sha256};
 use crate::files::{files_below, hex};
 use crate::intake::Submission;
 
-/// So many signs of their own do not come about twice by chance: the shortest right answer to a task of the handout
-/// has fewer.
+/// Number of own characters that two students do not write alike by chance: the shortest right answer to a task of the
+/// handout has fewer.
 const LEAST: usize = 200;
 /// Largest file that is looked at [bytes].
 const MAX_BYTES: u64 = 2 << 20;

@@ -1,4 +1,4 @@
-//! The way of one submission through all stages, and of many.
+//! Takes one submission, or many, through all stages.
 
 mod attribution;
 mod cache;

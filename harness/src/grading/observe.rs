@@ -1,5 +1,5 @@
-//! Keeps answers together with the geometry that they depend on, for what is fitted to them. Only
-//! of public scenes: what is said of them is read by students.
+//! Keeps answers together with the geometry that they depend on, for the fits of the diagnosis. It keeps those of
+//! public scenes only, since students read the diagnosis.
 
 use basecode::{Image, MaterialModel, Ray, Scene, Vec3};
 

@@ -1,5 +1,4 @@
-//! Both halves of the assignment, each scene by scene: what is found out about offline images, and about
-//! realtime ones.
+//! Judges both halves of the assignment, offline and realtime, scene by scene.
 
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -26,7 +25,7 @@ impl Grading<'_> {
         checks: &mut Vec<Check>,
         drawn: &mut Vec<Drawn>,
     ) -> anyhow::Result<()> {
-        // Cheap questions first: what a slow submission is not asked any more is what costs most.
+        // Cheap questions first: a slow submission then skips only the most expensive ones.
         let probed = self.groups().map(|cases| {
             let mut answers = Answers::default();
             let checks = answers.probe_bsdfs(session, plugin, cases);

@@ -1,4 +1,4 @@
-//! Questions to a submission's plugin, and what becomes of those that get no answer.
+//! Runs requests on a submission's plugin, and handles those that get no answer.
 
 use std::path::Path;
 use std::sync::Mutex;
@@ -51,7 +51,7 @@ pub struct Session<'a> {
 }
 
 impl Session<'_> {
-    /// Runs a job while there is retries.
+    /// Runs a job, with retries while any are left.
     pub fn run_job(&self, job: &Job) -> Vec<Outcome> {
         let JobReport { outcomes, runs, .. } = self.supervisor.run_job_patiently(
             job,
@@ -69,7 +69,7 @@ impl Session<'_> {
         outcomes
     }
 
-    /// That the submission used up its time on this path, if it did.
+    /// The check that fails if the submission used up its time on this path.
     pub fn used_up(&self) -> Option<Check> {
         let used = self.retries.used_up()?;
         let said = format!("the submission used {used}; what was not asked earns nothing");
@@ -77,7 +77,7 @@ impl Session<'_> {
         Some(Check::new(BUDGET, "", Verdict::Fail, said).with_hint(hint))
     }
 
-    /// That the renderer printed more than is kept, if it did: that costs nothing.
+    /// The check that fails, at no cost, if the renderer printed more than is kept.
     pub fn printed_much(&self) -> Option<Check> {
         let printed = self.printed.lock().map_or(0, |printed| *printed);
         (printed > self.limits.output_kib << 10).then(|| {
@@ -107,7 +107,7 @@ impl Session<'_> {
         }
     }
 
-    /// All that was kept so, one text after the other.
+    /// All kept compiler messages, one after the other.
     pub fn quoted(&self) -> String {
         self.quotes.lock().map_or(String::new(), |quotes| quotes.join("\n\n"))
     }
@@ -122,7 +122,7 @@ impl Session<'_> {
         self.cancel.load(Ordering::Relaxed)
     }
 
-    /// Ends a path: answers the CPU seconds of its workers; retries begins anew.
+    /// Ends a path: returns the CPU seconds of its workers and resets the retries.
     pub fn end_path(&self) -> f64 {
         self.retries.renew();
         self.cpu_s.lock().map_or(0.0, |mut cpu_s| std::mem::take(&mut *cpu_s))

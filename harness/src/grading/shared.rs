@@ -132,8 +132,8 @@ impl Shared {
     }
 
     /// Adds to a record of the batch which of its images and sources another person submitted too, and whether its student
-    /// number is another person's. Depends on nothing but the set of the records; doing it again changes nothing. Names of
-    /// other submissions are private.
+    /// number is another person's. The result depends only on the set of records; calling this again changes nothing.
+    /// Names of other submissions are private.
     pub fn judge(&self, record: &mut Record) {
         let person = person(record);
         record.evidence.checks.retain(|check| ![SHARED, NUMBER, LIKENESS].contains(&check.id));

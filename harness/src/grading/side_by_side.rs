@@ -1,4 +1,4 @@
-//! Both paths of one submission, at once where there are threads for it.
+//! Judges both paths of one submission, in parallel if there are threads for it.
 
 use std::panic::resume_unwind;
 use std::path::Path;

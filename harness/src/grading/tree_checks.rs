@@ -1,5 +1,4 @@
-//! The checks on what arrived: whether it was unpacked, follows the tree, and has a `config.json` as it
-//! should be.
+//! Checks on the received files: whether they were unpacked, follow the tree, and hold a correct `config.json`.
 
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::intake::{self, Submission, TreeSpec, Validation};

@@ -1,10 +1,9 @@
-//! Pictures that the CPU uploads: a frame that no shader drew, whatever shaders there are.
+//! Detects frames that the CPU uploads instead of drawing them with shaders.
 //!
-//! Two things must come together before points are lost. Each frame of each scene uploads as much as
-//! a picture of it is large, which meshes, materials and lights never come to on all scenes. And what
-//! is drawn with it is not the scene's surfaces: with every fragment in one color, whatever pipelines
-//! there are, the background is covered as well, or the outlines of triangles fill all surfaces. One
-//! without the other is for the instructor to look at.
+//! Points are lost only if two conditions hold. First, each frame of each scene uploads as much data as a picture of
+//! it, which meshes, materials and lights never do on all scenes. Second, the frame does not draw the scene's surfaces:
+//! with every fragment in one color, in all pipelines, it covers the background as well, or the outlines of triangles
+//! fill all surfaces. If only one condition holds, the instructor is told.
 
 use std::path::Path;
 
@@ -36,16 +35,16 @@ const SHOWN: Vec3 = Vec3::new(0.25, 0.5, 0.75);
 const SHOW: &str =
     "@fragment fn umbra_shown() -> @location(0) vec4f { return vec4f(0.25, 0.5, 0.75, 1.0); }";
 
-/// So much of the background may be drawn over before it is not the scene that is drawn.
+/// Fraction of the background that may be covered; beyond it, the frame does not draw the scene.
 const MOST_BACKGROUND: f64 = 0.2;
 
-/// So much of the surfaces may be outlines of triangles before these are no larger than pixels. Scenes
+/// Fraction of the surfaces that outlines of triangles may cover; beyond it, triangles are as small as pixels. Scenes
 /// of few triangles have 0.1 to 0.3 on small films, triangles of a pixel 0.9 and more.
 const MOST_OUTLINES: f64 = 0.6;
 /// Scenes of more triangles tell nothing by their outlines.
 const FEW_TRIANGLES: usize = 200;
 
-/// What is to be said of how frames come about.
+/// Findings on how a pass makes its frames.
 #[derive(Default)]
 pub struct Uploaded {
     /// Checks for the instructor. They cost nothing by themselves.

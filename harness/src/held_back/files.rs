@@ -1,6 +1,6 @@
-//! A changed scene as files: the original's, with the numbers replaced.
+//! Writes a changed scene as the original's files with the numbers replaced.
 //!
-//! Names, order and words stay, so that a renderer is told of it as of the original.
+//! Names, order and words stay, so that a renderer gets it under the same names as the original.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};

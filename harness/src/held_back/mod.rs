@@ -1,9 +1,8 @@
 //! Held-back scenes: copies of the assignment's scenes, changed by a secret seed, that no student
 //! has seen. A renderer that is right is right on them too; one that knows the public scenes is not.
 //!
-//! Light, camera, materials, exponents and film are drawn from the seed and looked at without any
-//! renderer; what shows less than it should is drawn again. The same seed and the same scenes give
-//! the same files, byte for byte.
+//! Light, camera, materials, exponents and film are drawn from the seed and previewed without any renderer; a draw that
+//! shows too little is repeated. The same seed and the same scenes give the same files, byte for byte.
 
 mod draw;
 mod files;

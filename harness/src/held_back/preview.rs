@@ -1,4 +1,4 @@
-//! A coarse look at a changed scene, by its geometry alone: what would be seen of it.
+//! A coarse preview of a changed scene, from its geometry alone.
 
 use basecode::{Camera, Frame, MaterialModel, Result, Scene, Vec3};
 use renderer_api as api;
@@ -23,7 +23,7 @@ const LEAST_HIGHLIGHT: f64 = 0.0013;
 const LEAST_OF_MODEL: f64 = 0.02;
 /// The median of what is lit lies in this range [W m^-2 sr^-1].
 const MEDIAN: [f32; 2] = [0.02, 1.0];
-/// Light and eye stay so far from every surface, relative to their distance from the point looked at.
+/// Least distance of light and eye from every surface, relative to their distance from the point looked at.
 const CLEARANCE: f32 = 0.08;
 /// The frustum that holds the shadows opens by at most this much more than on the original.
 const WIDER: f32 = 5.0 * std::f32::consts::PI / 180.0;
@@ -137,7 +137,7 @@ struct Seen {
     highlight: bool,
     /// Unit direction from the light.
     from_light: Vec3,
-    /// Radiance when the light is in visibility, the channels' mean [W m^-2 sr^-1].
+    /// Radiance when the light is visible, the channels' mean [W m^-2 sr^-1].
     radiance: f32,
 }
 

@@ -5,8 +5,8 @@ use basecode::image::Image;
 use super::correlation::Moments;
 use super::reference::RegionMask;
 
-/// How much of a picture's structure is a scene's: the largest over the picture as it is and
-/// mirrored, which rows or columns in the wrong order make of it.
+/// How much a picture's structure is that of a scene: the larger value of the picture as it is and mirrored, since rows
+/// or columns may be in the wrong order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Likeness {
     /// Correlation of the brightness of pixels, in [-1, 1].

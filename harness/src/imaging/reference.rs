@@ -1,4 +1,4 @@
-//! What an image is compared with: mean, variance, pixel-centre image, and a mask of regions.
+//! The data that an image is compared with: mean, variance, pixel-center image, and a mask of regions.
 
 use basecode::image::Image;
 use serde::{Deserialize, Serialize};

@@ -57,7 +57,7 @@ impl Tally {
     }
 }
 
-/// RegionSums over the interior pixels of a region.
+/// Sums over the interior pixels of a region.
 #[derive(Clone, Default)]
 pub(super) struct RegionSums {
     pixels: u32,
@@ -80,7 +80,7 @@ pub(super) struct ComparisonStats {
     /// Failing interior pixels.
     failing: Vec<bool>,
     worst: Option<WorstPixel>,
-    /// RegionSums of the squared difference and of what noise predicts for it.
+    /// Sums of the squared difference, and of the value that noise predicts for it.
     noise: (f64, f64),
 }
 

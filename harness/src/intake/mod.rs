@@ -1,4 +1,4 @@
-//! Intake: from what a student submits to a safe private copy, and what is to be said about it.
+//! Intake: turns a student's submission into a safe private copy with findings.
 //!
 //! ```text
 //! archive or folder --unpack--> Submission (a copy, listed and hashed) --validate--> Validation

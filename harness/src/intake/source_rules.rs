@@ -1,5 +1,5 @@
-//! What the source of a submission contains that an instructor should look at. None of it is an
-//! error: the sandbox is what protects; these findings save reading time.
+//! Finds code in a submission that an instructor should look at. None of it is an error: the sandbox protects the
+//! machine, and these findings save reading time.
 
 use std::collections::HashMap;
 use std::fs;

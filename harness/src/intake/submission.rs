@@ -1,4 +1,4 @@
-//! A submission as intake knows it: the private copy, or why there is none.
+//! The result of intake: the private copy of a submission, or why there is none.
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! The found files laid beside the expected tree.
+//! Compares the found files with the expected tree.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use super::finding::Finding;
 use super::tree::{CONFIG_FILE, TreeFile, TreeSpec};
 use crate::harmless::printable;
 
-/// How one line of the tree fares.
+/// The status of one line of the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mark {
@@ -31,7 +31,7 @@ pub struct TreeLine {
     pub expected: Option<String>,
     /// The found path.
     pub found: Option<String>,
-    /// How it fares.
+    /// Its status.
     pub mark: Mark,
     /// What to do, or what is special.
     pub advice: String,

@@ -2,8 +2,8 @@
 //! data is inflated from exactly the bytes that both agree on: one reading of the archive, so
 //! that no second parser can see another tree in it.
 //!
-//! Bytes before, between and after the parts are passed over, with a warning, as long as nobody could take
-//! them for parts: a self-extracting program, an archiver's zeros, a line that a mailer added.
+//! Bytes before, between and after the parts (a self-extracting program, an archiver's zeros, a line that a mailer
+//! added) are skipped with a warning, unless another parser could take them for parts.
 //!
 //! Field offsets are those of PKWARE's APPNOTE 6.3 (4.3.7 local header, 4.3.9 data descriptor,
 //! 4.3.12 central directory, 4.3.14 zip64 end record and 4.3.15 its locator, 4.3.16 end record, 4.5.3

@@ -1,8 +1,8 @@
 //! Loading and calling plugins: foreign code behind safe functions.
 //!
-//! Only the worker does this, in a process of its own: a plugin may crash, hang or lie. "Safe"
-//! means that this side keeps the promises of `renderer_api`; what a plugin does with them is its
-//! own affair, and the worker's process is the wall. All `unsafe` of plugin loading lives here.
+//! Only the worker does this, in a process of its own: a plugin may crash, hang or lie. "Safe" means that this side
+//! keeps the promises of `renderer_api`. It does not restrain the plugin: the worker's process does. All `unsafe` of
+//! plugin loading lives here.
 
 mod scene;
 mod witness;

@@ -1,5 +1,5 @@
-//! Child processes: locked by themselves before anything hostile is touched, watched while they
-//! run, ended with all their descendants in reach and reaped on every path.
+//! Child processes. Each locks itself before it touches anything hostile, is watched while it runs, and is ended with
+//! all reachable descendants and reaped on every path.
 //!
 //! Everything of Umbra that runs foreign code (the compiler, the worker) goes through [`run`].
 //! `start` is the one place where a process is made; what the child does to itself first is
@@ -37,7 +37,7 @@ pub enum Exit {
     Signal(i32),
     /// At its memory limit, or so it said.
     OutOfMemory,
-    /// By the kernel, out of CPU time, or by Umbra, because whoever watched it found it had had enough.
+    /// By the kernel, out of CPU time, or by Umbra, because its watcher broke off.
     OutOfCpu,
     /// By Umbra, because it stood still too long: it neither computed nor waited for a processor.
     TimedOut,
@@ -50,9 +50,9 @@ pub enum Exit {
 }
 
 impl Exit {
-    /// The same, when the end may have been the memory's: a child that died within a tenth of its limit, or whose
-    /// last words were those of an allocator (Rust's, C++'s, LLVM's) that got nothing, ran out of memory. A child
-    /// may say so falsely, and fools only its own report.
+    /// Turns an end into [`Exit::OutOfMemory`] where that is likely: the child died within a tenth of its limit, or its
+    /// last message is that of a failed allocation (Rust's, C++'s, LLVM's). A child that forges the message fools only
+    /// its own report.
     fn with_memory(self, stderr: &Captured, peak_mib: u64, limit_mib: u64) -> Self {
         let says = ["memory allocation of ", "std::bad_alloc", "LLVM ERROR: out of memory"];
         let said = says.iter().any(|words| stderr.contains(words));
@@ -63,7 +63,7 @@ impl Exit {
         }
     }
 
-    /// Whether its time was over, its own or the machine's.
+    /// Whether it ran out of time, its own or the machine's.
     pub fn is_out_of_time(self) -> bool {
         matches!(self, Self::OutOfCpu | Self::TimedOut | Self::Starved)
     }

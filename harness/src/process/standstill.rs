@@ -1,5 +1,5 @@
-//! Whether a child waits by its own choice. On a busy machine one that computes looks like one that
-//! sleeps, as long as only the clock is looked at; its threads' states tell them apart.
+//! Whether a child is idle by its own choice. By the clock alone, a starved child on a busy machine looks like a
+//! sleeping one; the states of its threads tell them apart.
 
 use std::fs::{read_dir, read_to_string};
 use std::time::{Duration, Instant};
@@ -109,7 +109,7 @@ mod tests {
             (60, Some(false), 20),
             (80, Some(true), 20),
             (100, Some(true), 40),
-            // The one who looks was starved himself.
+            // This process was starved itself.
             (9_100, Some(true), 1_040),
             (9_200, None, 1_140),
         ] {

@@ -7,11 +7,10 @@ use crate::harmless::csv_cell;
 /// The grades as CSV (UTF-8, comma, `\n`). The columns are student id, last and first name, name of
 /// the submission, the parts, total, what it is out of, lowest and highest, unconfirmed, time, total before lateness, remarks.
 ///
-/// `total` is empty where the submission could not be judged wholly, so that nobody imports a number
-/// that is not decided; `submitted` and `before_late` tell of late submissions: when, and what was earned before
-/// the penalty. `lowest` and `highest` are filled only there. `unconfirmed` is what images
-/// alone are worth once the instructor confirms them, and empty where that is nothing. A part that is a range reads
-/// `0..20`.
+/// `total` is empty if part of the submission could not be judged, so that nobody imports an undecided number; `lowest`
+/// and `highest` are filled only then. `submitted` and `before_late` say when a submission came and what it earned
+/// before the late penalty. `unconfirmed` is what images alone are worth once the instructor confirms them, and empty
+/// if that is nothing. A part that is a range reads `0..20`.
 ///
 /// # Errors
 /// When there is no submission.

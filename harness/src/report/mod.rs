@@ -1,11 +1,11 @@
-//! What is shown: a console text, `report.json`, `grades.csv` and HTML pages.
+//! Reports: console text, `report.json`, `grades.csv` and HTML pages.
 //!
-//! What a student gets is the folder `<slug>/` of their submission: of held-back scenes it tells only
-//! whether they are right and how wrong, it names no other submission and leads nowhere else. All else is the instructor's: the files of the batch, and
-//! `instructor/<slug>/` with all that was found out.
+//! A student gets the folder `<slug>/` of their submission and nothing else. For held-back scenes it says only whether
+//! an answer is right and how wrong it is. It names no other submission and links nowhere else. Everything else is for
+//! the instructor: the files of the batch, and `instructor/<slug>/` with all evidence.
 //!
-//! It decides nothing. Every format lets a submission's words through one gate, `harmless`, and adds
-//! the escaping that the format itself needs.
+//! This module decides nothing. Every format passes a submission's text through `harmless`, and adds the escaping that
+//! the format itself needs.
 
 #[cfg(test)]
 mod browser_tests;
@@ -172,7 +172,7 @@ pub(crate) fn is_private(remark: &str, rules: &Rules) -> bool {
 /// Why there is no report.
 #[derive(Debug, Error)]
 pub enum ReportError {
-    /// A report of nothing would look like a batch that went well.
+    /// An empty report would look like a successful batch.
     #[error(
         "no submission to report: expected at least one (hint: name an archive, a folder, or a folder of them)"
     )]

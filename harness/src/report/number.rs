@@ -1,4 +1,4 @@
-//! Numbers as they are shown.
+//! Formats numbers for reports.
 
 use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, Measure, Verdict};

@@ -1,4 +1,5 @@
-//! What the pages of a class read of a submission: so much of each is held at the same time, and no more.
+//! Outlines of submissions: the part of a record that the class pages read. Only outlines of all submissions are in
+//! memory at the same time.
 
 use std::collections::HashSet;
 

@@ -1,4 +1,4 @@
-//! What the locked process does to itself, in an order in which each step is still allowed.
+//! The steps by which the locked process confines itself, in an order in which each is still allowed.
 
 use std::path::PathBuf;
 

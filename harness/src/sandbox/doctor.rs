@@ -1,4 +1,4 @@
-//! What this machine can do: every layer tried for real, in a child.
+//! Which layers this machine supports: each is tried for real, in a child.
 
 use std::path::Path;
 use std::process::Stdio;

@@ -1,10 +1,9 @@
 //! The system call filter.
 //!
-//! What is allowed is listed, and everything else answers ENOSYS, "this kernel has no such call":
-//! libraries know how to do without, and a call that a future kernel adds is closed from the start (a
-//! list of what is denied would let it in). A second list gives the answer EPERM to what programs
-//! expect to exist; it changes the answer, not what is allowed. The kernel answers plain entries
-//! from a bitmap, so that the length of the list costs nothing per call.
+//! It lists the allowed calls. Every other call answers ENOSYS, "this kernel has no such call": libraries then fall
+//! back, and a call that a future kernel adds is closed from the start (a list of denied calls would let it in). A
+//! second list answers EPERM to calls that programs expect to exist; it changes the error code, not what is allowed.
+//! The kernel answers plain entries from a bitmap, so that the length of the list costs nothing per call.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! What a worker that draws with a hardware adapter sees besides.
+//! The additional files and devices that a worker with a hardware adapter sees.
 
 use std::collections::BTreeSet;
 use std::fs;

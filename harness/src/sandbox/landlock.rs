@@ -1,4 +1,4 @@
-//! Landlock: the same sight as the mount namespace gives, kept by another mechanism.
+//! Landlock: limits file access to what the mount namespace shows, by a second mechanism.
 
 use std::path::PathBuf;
 

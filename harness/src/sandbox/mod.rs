@@ -3,8 +3,8 @@
 //! Every such child is Umbra itself, or `umbra-worker`, started by [`command`] with its orders on standard input.
 //! Before it has any thread and before it touches a hostile byte it locks itself ([`confine_self`]): namespaces with a
 //! new root that holds the policy's binds at fixed paths, no privileges, Landlock, a system call filter, limits. A
-//! worker then goes on in the same process; a compiler is executed ([`launch_main`]). A layer that is asked for and
-//! cannot be had is an error, never a silence.
+//! worker then goes on in the same process; a compiler is executed ([`launch_main`]). A requested layer that is not
+//! available is an error; it is never skipped silently.
 //!
 //! Three processes result. The *launcher*, which the caller sees, stays outside and mirrors how the
 //! inner process ended. *Init* is process 1 of the inner process namespace: when it dies, so does

@@ -17,7 +17,7 @@ use super::{Policy, SandboxError};
 /// "nobody": the user inside, and outside too when Umbra is root.
 pub const NOBODY: u32 = 65534;
 
-/// Who starts, and who runs in the end.
+/// The user that starts the sandbox, and the user that runs foreign code.
 pub struct Identity {
     /// Whether Umbra is root.
     pub root: bool,
@@ -29,7 +29,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// By who we are and what the policy asks for.
+    /// The identity for this process's user and the policy.
     pub fn of(policy: &Policy) -> Self {
         let (uid, gid) = (geteuid().as_raw(), getegid().as_raw());
         let root = uid == 0;
@@ -119,8 +119,8 @@ fn dumpable(yes: bool) -> Result<(), SandboxError> {
         .map_err(|cause| SandboxError::new("user_ns", "change whether it is dumpable", cause))
 }
 
-/// Gives up root, capabilities and the hope to regain either. As root with the user namespace
-/// layer, the new user then enters a namespace of its own: its processes are counted apart.
+/// Drops root and all capabilities for good. As root with the user namespace layer, the new user then enters a
+/// namespace of its own: its processes are counted apart.
 pub fn drop_all(
     policy: &Policy,
     identity: &Identity,

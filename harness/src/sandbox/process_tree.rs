@@ -36,20 +36,20 @@ pub fn follow(parent: u32) -> Result<(), SandboxError> {
     }
 }
 
-/// The locked process, and its last word.
+/// The locked process, ready to run foreign code, and its pipe to the launcher.
 pub struct Ready {
     in_force: InForce,
     report: Report,
 }
 
 impl Ready {
-    /// Closes what is left of the launcher: from here on foreign code may run.
+    /// Closes the pipe to the launcher: from here on foreign code may run.
     pub fn go(self) -> InForce {
         drop(self.report);
         self.in_force
     }
 
-    /// Tells the launcher that it came to nothing.
+    /// Reports failure to the launcher.
     pub fn failed(mut self, error: SandboxError) -> SandboxError {
         self.report.send(&Err(error.clone()));
         error
@@ -91,7 +91,7 @@ pub fn lock(policy: &Policy) -> Result<Ready, SandboxError> {
     }
 }
 
-/// Where [`begin`] returns.
+/// The process that [`begin`] returns in.
 enum Side {
     Launcher(Launcher),
     Locked(Ready),
@@ -236,7 +236,8 @@ fn init(
     }
 }
 
-/// Process 1: reaps until the locked process is gone, ends all others, collects, tells, ends.
+/// Process 1: reaps children until the locked process ends, kills all others, collects files, reports the exit code,
+/// exits.
 fn watch(locked: Pid, copies: Copies, policy: &Policy, mut status: File) -> ! {
     let code = loop {
         match waitpid(None, None) {
@@ -268,7 +269,7 @@ struct Launcher {
 }
 
 impl Launcher {
-    /// Waits for the end and ends in the same way. Returns when the child was not locked.
+    /// Waits for the locked process and ends in the same way. Returns only if the child was not locked.
     fn attend(mut self, report_file: Option<File>) -> Result<Ready, SandboxError> {
         // Ends when the locked process closes its end, or is gone.
         let mut text = String::new();
@@ -287,7 +288,7 @@ impl Launcher {
         let mut code = [0; 4];
         let code = match self.status.read_exact(&mut code) {
             Ok(()) => i32::from_le_bytes(code),
-            // Init never says nothing by itself: it was killed from outside.
+            // Init always reports a code unless it was killed from outside.
             Err(_) => 256 + libc::SIGKILL,
         };
         mirror(code)

@@ -1,4 +1,4 @@
-//! A root of its own: an empty tmpfs with the policy's binds at fixed paths.
+//! The child's own root: an empty tmpfs with the policy's binds at fixed paths.
 
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,4 @@
-//! What the viewer shows: images in data files of their own, and what is to be said of them. The page itself is in
-//! `report`.
+//! The data of the viewer: images in separate files, and their descriptions. The page itself is in `report`.
 
 mod pack;
 

@@ -12,7 +12,7 @@ use crate::process::Limits;
 
 /// The name of the program that loads plugins; it lies beside `umbra`.
 const PROGRAM: &str = "umbra-worker";
-/// What it is told that it is called.
+/// The name that it gets as its first argument.
 const CALLED: &str = "worker";
 
 /// The program that loads plugins, beside `umbra`.

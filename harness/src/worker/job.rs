@@ -1,4 +1,4 @@
-//! What a worker is asked. Pure data; conventions are those of `renderer_api`.
+//! Requests to a worker. Pure data; conventions are those of `renderer_api`.
 
 use std::path::PathBuf;
 

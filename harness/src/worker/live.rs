@@ -32,13 +32,13 @@ use crate::process::{self, ChildOutcome, Exit, Limits};
 const KEEP_OUTPUT: usize = 16 << 10;
 /// CPU seconds of a frame; the first one loads library and scene, and compiles shaders.
 const FRAME_CPU_S: [f64; 2] = [5.0, 2.0];
-/// A frame for which nothing was computed after so long is not coming.
+/// A frame is given up after this long without computation.
 const FRAME_STILL: Duration = Duration::from_secs(10);
 /// What counts as nothing, in CPU seconds.
 const NOTHING_S: f64 = 0.5;
-/// Who is asked nothing for so long ends.
+/// A worker without requests for this long ends.
 const IDLE: Duration = Duration::from_secs(30);
-/// A worker that ended is noticed after so long, if its pipe does not tell.
+/// Time after which a worker's end is noticed, if its pipe does not tell.
 const LOOK_MS: u16 = 50;
 
 /// A worker that draws frames. Dropping it ends the process.

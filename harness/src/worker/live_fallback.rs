@@ -1,4 +1,4 @@
-//! Where there are no named pipes, there is no worker that stays.
+//! Replaces the live worker on systems without named pipes: there is none.
 
 use std::io;
 use std::path::PathBuf;

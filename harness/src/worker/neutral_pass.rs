@@ -1,7 +1,7 @@
 //! Umbra's own realtime pass: it draws a scene with given stage texts, and no foreign code runs.
 //!
-//! It does what the shader contract says a right pass does, so that what is wrong in its picture
-//! is the stages' fault. Of a student it sees WGSL text alone.
+//! It follows the shader contract, so any error in its picture is the stages' fault. Of a student's work it sees only
+//! WGSL text.
 
 use std::path::{Path, PathBuf};
 

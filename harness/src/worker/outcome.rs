@@ -1,4 +1,4 @@
-//! What became of a request, and whose matter it is.
+//! The outcome of a request, and whose fault it is.
 
 use std::fmt;
 

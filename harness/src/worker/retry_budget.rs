@@ -1,5 +1,5 @@
-//! How long a renderer is waited for, how often it is asked again because the machine may be at fault,
-//! and when enough is enough. CPU time decides, never the machine's load.
+//! How long Umbra waits for a renderer, how often it repeats a request because the machine may be at fault, and when it
+//! gives up. CPU time decides, never the machine's load.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -7,19 +7,20 @@ use super::job::{Job, Request};
 use super::outcome::{Fault, Late, Outcome};
 use crate::process::{ChildOutcome, Limits};
 
-/// So many requests of a kind may be asked again: each may cost its time limit.
+/// Number of requests of a kind that may be repeated: each may cost its time limit.
 const MAX_RETRIES: usize = 2;
-/// After so many requests of a kind ran out of time, the rest of that kind is not asked any more.
+/// Number of requests of a kind that may run out of time; after that, the rest of the kind is not asked.
 const MAX_TIMEOUTS: usize = 2;
 /// CPU seconds that every question has at first; the reference takes a tenth of that for nearly all.
 const FIRST_S: f64 = 3.0;
-/// And so many more for each sample of a full render: five times what the reference took.
+/// Additional CPU seconds for each sample of a full render: five times what the reference took.
 const FIRST_S_PER_SAMPLE: f64 = 1.2e-6;
-/// A question that is asked again, alone, has so many times the reference's CPU time.
+/// A question that is repeated, alone, has this many times the reference's CPU time.
 const TIMES_REFERENCE: f64 = 10.0;
-/// Once a renderer is known to hang, other questions of that kind have so many times it, or a second.
+/// Once a renderer is known to hang, other questions of that kind have this many times the reference's CPU time, or a
+/// second if that is more.
 const TIMES_REFERENCE_SHORT: f64 = 3.0;
-/// And may stand still for this part of what they may otherwise.
+/// They may then stand still for this fraction of the usual limit.
 const SHORT: f64 = 0.2;
 
 /// How the reason begins when this process could not run a worker, for want of disk space, memory, files.
@@ -45,11 +46,11 @@ pub struct Budget {
     pub still_s: f64,
 }
 
-/// RetryBudget with one path of one submission, over all its jobs.
+/// Retries and time for one path of one submission, over all its jobs.
 ///
-/// A timeout counts when the same request runs out of time once more, alone on the machine. One
-/// that is confirmed so speaks for all of its kind: others have a short limit and count as they are. One
-/// that nobody can confirm any more counts for nothing, and what it asked stays ungraded.
+/// A timeout counts if the same request runs out of time again, alone on the machine. A confirmed timeout holds for all
+/// requests of its kind: the others get a short limit, and their timeouts count at once. A timeout that can no longer
+/// be confirmed does not count, and its request stays ungraded.
 #[derive(Default)]
 pub struct RetryBudget<'a> {
     reference: Option<&'a dyn Reference>,
@@ -84,7 +85,8 @@ pub(super) struct Allowed {
     pub each_cpu_s: Vec<f64>,
 }
 
-/// A kind of question, as an index. Shadows are a matter of their own: who hangs in them is right without.
+/// A kind of question, as an index. Shadows are a kind of their own: a renderer that hangs in them may be right
+/// without.
 fn kind(job: &Job, request: &Request) -> usize {
     match request {
         Request::EvalBsdf { .. } => 0,
@@ -108,20 +110,20 @@ fn samples(request: &Request) -> f64 {
 }
 
 impl<'a> RetryBudget<'a> {
-    /// With a submission of a batch: each question has the time that fits it, all of a path's together
-    /// the budget, if there is one.
+    /// For a submission of a batch: each question has its own limit, and all questions of a path share the budget, if
+    /// there is one.
     pub fn with(reference: Option<&'a dyn Reference>, budget: Option<Budget>) -> Self {
         Self { reference, budget, own_limits: true, ..Self::default() }
     }
 
-    /// None at all: every timeout counts at once.
+    /// Without any retries: every timeout counts at once.
     pub fn none() -> Self {
         let retries = Self::default();
         retries.state().kinds.iter_mut().for_each(|kind| kind.hangs = true);
         retries
     }
 
-    /// Begins anew, for another path.
+    /// Resets for another path.
     pub fn renew(&self) {
         *self.state() = State::default();
     }
@@ -181,7 +183,7 @@ impl<'a> RetryBudget<'a> {
         }
         let fair = match self.reference_cpu_s(request) {
             Some(cpu_s) => first(request).max(TIMES_REFERENCE * cpu_s),
-            // A slow machine of a student's.
+            // Without a reference: a student's machine may be slow.
             None => first(request).max((2.0 * first(request)).min(limits.cpu_s as f64)),
         };
         limits.cpu_s = fair.ceil() as u64 + 1;
@@ -277,7 +279,7 @@ impl<'a> RetryBudget<'a> {
         }
     }
 
-    /// The outcome of a request that is not asked any more, when retries is at its end.
+    /// The outcome of a request that is not asked any more because time or retries are used up.
     pub fn is_over(&self, job: &Job, request: &Request) -> Option<Outcome> {
         let state = self.state();
         if let (Some(over), Some(_)) = (&state.over, &job.plugin) {
@@ -305,13 +307,13 @@ fn unconfirmed() -> Outcome {
     Outcome::NotRun { reason, fault: Fault::Environment }
 }
 
-/// Whether an outcome may be a fault of the machine by the word of someone who could lie: it is
-/// believed when a renderer of ours fails on the same case.
+/// Whether an outcome claims a fault of the machine and could be forged. The claim is believed if a renderer of ours
+/// fails on the same case.
 pub fn is_environment_failure(outcome: &Outcome) -> bool {
     match outcome {
         Outcome::NoAdapter(_) => true,
         Outcome::NotRun { fault: Fault::Submission, .. } => false,
-        // Time, and what this process itself cannot do, is our own word.
+        // Timeouts, and failures of this process itself, cannot be forged.
         Outcome::NotRun { reason, .. } => {
             *outcome != unconfirmed() && !reason.starts_with(CANNOT_RUN)
         }

@@ -1,4 +1,4 @@
-//! What is said of two images, as text.
+//! The report on two images, as text.
 
 use basecode::Vec3;
 

@@ -8,18 +8,18 @@
 //! (`umbra check --keep-plugin`, a hidden option). This process never loads it: a confined worker does.
 //!
 //! **Realtime.** One worker loads library and scene once, opens the pass, and draws a frame for each camera it is sent.
-//! Another scene, shadow map or library means another worker. Nobody pushes frames: the browser asks for the next
-//! picture when it has one to spare, with the camera of that moment, so that a slow renderer skips and never lags.
+//! Another scene, shadow map or library means another worker. Frames are not pushed: the browser asks for the next
+//! picture when it is ready for one, with the camera of that moment, so a slow renderer skips frames and never lags.
 //!
 //! **Offline.** A renderer takes its camera from a scene file. So each picture is a job with a scene file of its own:
 //! the scene's, with the camera replaced, beside a link to the folder of its mesh. A camera that moved ends the job.
 //!
 //! **Pixels** reach the browser as 16-bit floats; exposure is applied there, without asking anybody.
 //!
-//! **What goes wrong** is the answer to the question: a text, shown in the picture's place. The page asks again after
-//! the next save. A frame may take so much CPU time, or stand still so long, and then its worker is ended.
+//! **Errors** come back as text, which is shown in place of the picture. The page asks again after the next save. A
+//! frame has limits on CPU time and on standing still; beyond them, its worker is ended.
 //!
-//! **Idle.** A worker that is asked nothing for a while ends. Then a watch has no process but itself.
+//! **Idle.** A worker without requests for a while ends, so an idle watch has no other process.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};

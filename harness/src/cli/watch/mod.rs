@@ -1,8 +1,8 @@
 //! `umbra watch`: checks a working folder on every save, and shows the report in the browser.
 //!
-//! A first look asks one small scene and is there soon; then everything is asked. Each check is a program of its own,
-//! `umbra check`, so that nothing that a renderer does ends the watch. A newer save ends the check that runs. The page
-//! is served on this machine alone, under an address that nobody can guess.
+//! A quick first check covers one small scene; a full check follows. Each check runs `umbra check` as a separate
+//! program, so that no renderer can end the watch. A new save ends the running check. The page is served only on this
+//! machine, under an address that nobody can guess.
 
 mod live;
 mod page;
@@ -24,9 +24,10 @@ use self::server::{Board, Extent, Server, Stage};
 use super::context::{Context, on_interrupt};
 use crate::assignment::SceneEntry;
 
-/// An editor writes several files, and one in several steps: a save is over after so long without another change.
+/// A save is over after this long without another change: an editor may write several files, and one file in several
+/// steps.
 const QUIET: Duration = Duration::from_millis(150);
-/// A check that was told to end has so long to do so.
+/// Time that a check has to end once it is told to.
 const GRACE: Duration = Duration::from_secs(10);
 
 /// The folder of first looks, in the report's.

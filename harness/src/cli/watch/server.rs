@@ -1,7 +1,7 @@
 //! Serves the page of `umbra watch`, on this machine alone.
 //!
-//! Every address begins with a secret. It reaches the browser through a file that only its owner can read, so that it
-//! stands in no command line. Requests for another host, or from another origin, are refused: a page elsewhere, or a
+//! Every address begins with a secret. It reaches the browser through a file that only its owner can read, so it never
+//! appears on a command line. Requests for another host, or from another origin, are refused: a page elsewhere, or a
 //! name that somebody points at this machine, learns nothing.
 
 use std::io::{self, Write as _};
@@ -18,12 +18,12 @@ use super::live::{LiveView, Question};
 use super::page::page as watch_page;
 use crate::report::HTML_FILE;
 
-/// A browser that went away is noticed after so long.
+/// Time after which a browser that went away is noticed.
 const PING: Duration = Duration::from_secs(20);
 /// Bytes of the secret.
 const SECRET_BYTES: usize = 16;
 
-/// How far the last save is.
+/// The state of the last save.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {

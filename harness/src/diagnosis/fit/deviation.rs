@@ -1,4 +1,4 @@
-//! What is said of a fit: which quantity of which term has which value.
+//! The result of a fit: which quantity of which term has which value.
 
 use std::f64::consts::PI;
 

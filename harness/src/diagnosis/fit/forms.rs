@@ -1,4 +1,4 @@
-//! Formulas of another form than the right one, as candidates of the search.
+//! Candidates of the search whose form differs from the right formula.
 
 use super::deviation::ORDERS;
 use super::formula::{
@@ -37,7 +37,7 @@ impl Search<'_> {
                 all.push(Formula { times, plus, follows: true, ..right });
             }
         }
-        // What changes nothing here is no rival.
+        // A candidate that changes nothing here is no rival.
         all.retain(|formula| {
             let differs = |sample: &&Sample| {
                 let (a, b) = (formula.value(sample), right.value(sample));

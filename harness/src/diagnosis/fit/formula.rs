@@ -1,5 +1,4 @@
-//! The formula of shading with all that is fitted of it: what is right, and how a renderer's may
-//! differ.
+//! The shading formula with its fitted parameters: the right values, and how a renderer's may differ.
 
 use std::f64::consts::PI;
 

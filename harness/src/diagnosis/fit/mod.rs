@@ -1,5 +1,5 @@
-//! What is wrong in a formula, estimated from answers whose geometry is known: no catalogue is
-//! needed for a cosine too many. Pure: answers in, words out.
+//! Estimates what is wrong in a formula from answers with known geometry. An extra cosine, for example, needs no
+//! catalogue. A pure function from answers to words.
 
 mod deviation;
 mod forms;

@@ -1,4 +1,4 @@
-//! What a render pass binds where another value belongs.
+//! Wrong values that a render pass binds.
 
 use basecode::Vec3;
 
@@ -28,7 +28,7 @@ const SAME: f32 = 1e-3;
 const SCALED: [&str; 2] = ["material.rho_d", "material.rho_s"];
 
 fn same(a: Vec3, b: Vec3) -> bool {
-    // What is no number is never the same.
+    // NaN equals nothing.
     (a - b).abs().max_element() <= SAME * a.abs().max_element().max(b.abs().max_element()).max(1e-4)
 }
 

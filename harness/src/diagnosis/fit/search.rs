@@ -25,11 +25,11 @@ pub struct Fitted {
     pub unexplained: f64,
 }
 
-/// A formula is said only when it leaves less than this fraction of the difference.
+/// A formula is reported only if it leaves less than this fraction of the difference unexplained.
 const UNEXPLAINED: f64 = 0.01;
-/// So many samples are fitted to; all others verify.
+/// Number of samples that are fitted to; all others verify.
 const FITTED: usize = 300;
-/// So many of the others are looked at first.
+/// Number of the others that are looked at first.
 const GLANCE: usize = 60;
 /// Fewer samples than this tell nothing.
 const LEAST: usize = 60;
@@ -56,7 +56,7 @@ pub(super) enum Feature {
     ExponentPlus,
 }
 
-/// What else is estimated.
+/// Further quantities that are estimated.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Intercept {
     None,
@@ -208,7 +208,7 @@ impl<'a> Search<'a> {
             for (found, value) in sample.found.iter().zip(value) {
                 let apart = 2.0 * difference(*found, value, self.floor);
                 sum += (apart - self.accuracy.relative / 2.0).max(0.0);
-                // What is no number is never right.
+                // NaN is never right.
                 most = most.max(if apart.is_finite() { apart } else { 1.0 });
             }
             stray += usize::from(most > self.accuracy.relative);

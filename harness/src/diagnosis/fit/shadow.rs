@@ -1,4 +1,4 @@
-//! Where shadow rays begin and end, and what darkness leaves, from visibility along rays whose
+//! Estimates where shadow rays begin and end, and how much light shadows leave, from visibility along rays whose
 //! occluders are known.
 
 use super::deviation::{Deviation, Of, Value};

@@ -1,4 +1,4 @@
-//! What a vertex stage forwards, and where what it draws lands.
+//! Faults of a vertex stage: the values that it forwards, and the place of its triangles on the film.
 
 use basecode::{Mat4, Vec3};
 

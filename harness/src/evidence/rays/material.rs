@@ -1,4 +1,4 @@
-//! Part 1.3: whether the BSDF that an integrator asks is that of the surface that the ray meets.
+//! Part 1.3: whether an integrator evaluates the BSDF of the surface that the ray meets.
 
 use basecode::Frame;
 
@@ -19,7 +19,7 @@ pub type OwnValue = (usize, [f32; 3]);
 /// Judges radiance along lit rays without shadows (`radiance`, by ray) by the renderer's own BSDFs,
 /// right or wrong: their values, cosine included, times I / r^2, under any convention.
 ///
-/// What is wrong with the light is another check's fault: see `set_apart`.
+/// Errors of the light belong to another check: see `set_apart`.
 pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]]) -> Check {
     let not_judged = |summary: &str| Check::new(ID, &batch.scene, Verdict::NotJudged, summary);
     if own.is_empty() {

@@ -1,8 +1,8 @@
 //! Parts 1.3 and 1.4: radiance along rays of the host's choice, under witness BSDFs.
 //!
-//! Under a witness a right integrator answers exactly V I / r^2 w, so that a fault in a BSDF is
-//! not paid twice. Only rays that hang on nothing are asked: away from every edge, both directions
-//! well above the surface, the light in visibility (or out of it) whatever the shadow ray's epsilon.
+//! Under a witness a right integrator answers exactly V I / r^2 w, so that a fault in a BSDF is not charged twice. Only
+//! unambiguous rays are asked: away from every edge, both directions well above the surface, the light visible (or
+//! hidden) whatever the shadow ray's epsilon.
 
 mod material;
 mod shadows;
@@ -23,17 +23,17 @@ pub use unshadowed::{Unshadowed, judge_unshadowed, passes_unshadowed};
 const MIN_COSINE: f32 = 0.05;
 /// Largest relative difference of a right answer: f32 positions and frames in any order.
 pub(super) const RELATIVE: f64 = 3e-3;
-/// So many of the rays may still differ: a student's own intersection code meets other triangles
-/// along seams that no mask knows.
+/// Fraction of the rays that may still differ: a student's own intersection code meets other triangles along seams that
+/// no mask knows.
 pub(super) const STRAY_FRACTION: f64 = 2e-3;
-/// Shadowed rays are asked whose occluder is nearer than this, over the light's distance.
+/// Shadowed rays in contact: their occluder is nearer than this, as a fraction of the light's distance.
 const CONTACT: f32 = 0.03;
-/// So many of these.
+/// Number of rays in contact that are asked.
 const CONTACTS: usize = 150;
-/// So many black rays are asked.
+/// Number of black rays that are asked.
 const BLACK: usize = 200;
 
-/// What one check's verdict means to another's, on all scenes together.
+/// Adjusts verdicts that depend on another check's verdict, on all scenes together.
 pub fn set_apart(checks: &mut [Check]) {
     shadows::set_apart(checks);
     material::set_apart(checks);

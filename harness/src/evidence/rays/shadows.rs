@@ -14,7 +14,7 @@ const NEARLY_ALL: f64 = 0.99;
 const LEAVES_LIGHT: &str = "shadows leave some light";
 /// The mistake of lit points that are darker with shadows on.
 const LOSES_LIGHT: &str = "lit points lose some light";
-/// So many of the lit rays must not be black without shadows.
+/// Fraction of the lit rays that must not be black without shadows.
 const LEAST_KNOWN: f64 = 0.25;
 /// A visibility below this is dark, above one minus it lit; anything between is neither.
 const HALF_LIGHT: f64 = 0.02;
@@ -57,7 +57,7 @@ pub fn judge_shadows(
         }
         let visibility = visibility(with[index], without[index], expected);
         if is_lit { &mut lit_seen } else { &mut dark_seen }.push(visibility);
-        // What is no number is never right.
+        // NaN is never right.
         let right = (visibility - f64::from(u8::from(is_lit))).abs() < HALF_LIGHT;
         let changed = is_lit && !same_shading(shaded.0[index], shaded.1[index]);
         // No shadow ray explains a query that lets light through and changes what is shaded.
@@ -69,7 +69,7 @@ pub fn judge_shadows(
             wrong_rays.push((batch.pixels[index], is_lit));
         }
     }
-    // What is black with shadows and without says nothing about visibility.
+    // A ray that is black both with and without shadows says nothing about visibility.
     let lit_known = batch.lit - lit_black;
     if (lit_known as f64) < LEAST_KNOWN * batch.lit as f64 {
         let verdict = if lit_known == 0 { Verdict::Fail } else { Verdict::NotJudged };
@@ -253,7 +253,7 @@ fn price(batch: &RayBatch, known: &[(usize, f64)], raw: f64, occluders: &Occlude
     let residual = |light: &dyn Fn(usize) -> f64| {
         let wrong = |wanted| {
             let wrong = of(wanted).filter(|(index, visibility)| {
-                // Asked this way round, a NaN is wrong.
+                // Compared this way, a NaN counts as wrong.
                 let right = (visibility - light(*index)).abs() < HALF_LIGHT;
                 !right
             });
@@ -317,7 +317,7 @@ fn price(batch: &RayBatch, known: &[(usize, f64)], raw: f64, occluders: &Occlude
     }
 }
 
-/// Whether radiance is the same but for rounding; what is no number in both is no matter of shadows.
+/// Whether radiance is the same except for rounding. NaN in both does not concern shadows.
 fn same_shading(with: [f32; 3], without: [f32; 3]) -> bool {
     let same = |a: f64, b: f64| match (a.is_finite(), b.is_finite()) {
         (true, true) => (a - b).abs() <= RELATIVE * b.abs(),
@@ -334,8 +334,8 @@ const LIGHT_ELSEWHERE: f64 = 0.9;
 
 /// Where the light stands elsewhere than it should, shadows fall elsewhere too. So on a scene whose
 /// unshadowed radiance is wrong nearly everywhere (1.3) shadows are not judged (1.4), as long as
-/// there is another scene whose radiance is right and whose shadows are judged. What one mistake explains to the end,
-/// with the light where it belongs, leaves the light there.
+/// there is another scene whose radiance is right and whose shadows are judged. If one mistake explains the answers
+/// completely with the light in its place, the light is in its place.
 pub fn set_apart(checks: &mut [Check]) {
     charge_what_is_never_tested(checks);
     let is = |check: &Check, id: CheckId, verdict| check.id == id && check.verdict == verdict;
@@ -414,7 +414,7 @@ fn visibility(with: [f32; 3], without: [f32; 3], expected: [f64; 3]) -> f64 {
 /// Whether radiance is nothing beside what is expected.
 fn is_black(radiance: [f32; 3], expected: [f64; 3]) -> bool {
     let sum = radiance.iter().map(|&x| f64::from(x)).sum::<f64>();
-    // Asked this way round, a NaN is black.
+    // Compared this way, a NaN counts as black.
     let shines = sum.abs() > 1e-3 * expected.iter().sum::<f64>();
     !shines
 }

@@ -1,4 +1,5 @@
-//! What a submission lost, part by part: why in a sentence, where to look, what it looks like; evidence folded.
+//! The lost points of a submission, part by part: the reason in a sentence, where to look, the likely mistake, and the
+//! evidence in collapsed sections.
 
 use super::super::number::{hints, is_failure, looks_like, of_part, points};
 use super::checks::{self, Placed};

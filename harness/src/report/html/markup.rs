@@ -1,4 +1,4 @@
-//! HTML in the making. Text cannot get in unescaped: only constants of the program can.
+//! Builds HTML. Only constants of the program can enter unescaped; text cannot.
 
 use std::fmt::Display;
 

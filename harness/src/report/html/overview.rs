@@ -13,12 +13,12 @@ use crate::columns::count;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::rubric::Part;
 
-/// So many names stand in a list before the rest is folded.
+/// Number of names in a list before the rest is collapsed.
 const NAMES: usize = 12;
 /// Bins of a distribution, and one for all points.
 const BINS: usize = 10;
 
-/// What is said of submissions that have something in common.
+/// The text on submissions that have something in common.
 const SHARE: &str = "share something with another: see their pages";
 
 /// What a part that nobody began looks like.
@@ -26,7 +26,7 @@ const UNDONE: &str = "not implemented";
 /// What a check says of a renderer or a compiler that was ended for its time.
 const OUT_OF_TIME: &str = "ran out of time";
 
-/// Whether the page of the class tells of a check.
+/// Whether the class page uses a check.
 pub fn is_read_by_class(check: &Check) -> bool {
     !check.private.is_empty()
         || check.verdict == Verdict::NotImplemented

@@ -1,4 +1,4 @@
-//! The last lines of a check: the verdict, and what is next to do.
+//! The last lines of a check: the verdict, and the next step.
 
 use std::collections::BTreeMap;
 

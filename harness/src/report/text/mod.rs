@@ -1,4 +1,4 @@
-//! What the console shows: a table for many submissions, the parts of one with what is next to do.
+//! Console output: a table of many submissions; for one, its parts and the next step.
 
 mod class;
 mod closing;
