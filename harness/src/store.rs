@@ -118,7 +118,7 @@ impl Store<'_> {
         Ok(masks.map(|image| as_mask(scene, &image)))
     }
 
-    /// The pixel-centre image of a scene without shadows.
+    /// The pixel-center image of a scene without shadows.
     ///
     /// # Errors
     /// As [`Store::expected`].
@@ -134,7 +134,7 @@ impl Store<'_> {
     }
 
     /// What the reference draws of a realtime scene without shadows when its fragment stages do not
-    /// renormalise the interpolated normal; nothing when it is not kept and cannot be drawn here.
+    /// renormalize the interpolated normal; nothing when it is not kept and cannot be drawn here.
     ///
     /// # Errors
     /// When the scene or the cache cannot be used.

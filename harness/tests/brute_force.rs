@@ -161,7 +161,7 @@ impl World {
     }
 }
 
-/// The ray through a pixel's centre; `camera` holds the lines of a TOML file.
+/// The ray through a pixel's center; `camera` holds the lines of a TOML file.
 fn camera_ray(toml: &str, width: usize, height: usize, x: usize, y: usize) -> (DVec3, DVec3) {
     let value = |key: &str| {
         let line = toml.lines().find(|line| line.starts_with(&format!("{key} ="))).unwrap();
@@ -222,7 +222,7 @@ fn stored_images_are_what_a_slow_tracer_in_f64_without_a_bvh_draws() {
             &wrong[..wrong.len().min(8)]
         );
         assert!(lit > PIXELS / 3 && dark > PIXELS / 100, "{name}: {lit} lit, {dark} dark");
-        // The mean over jittered samples differs from the centres on edges alone.
+        // The mean over jittered samples differs from the centers on edges alone.
         let bias = ((sum_of_means - sum) / sum).abs().max_element();
         assert!(bias < 0.02, "{name}: the stored mean lies {bias} off");
     }

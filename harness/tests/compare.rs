@@ -35,7 +35,7 @@ fn lit(name: &str) -> Region {
     Region { name: name.into(), lit: true, exponent: 0.0 }
 }
 
-/// One lit region everywhere, a constant colour, the given variance of one sample.
+/// One lit region everywhere, a constant color, the given variance of one sample.
 fn flat(width: usize, height: usize, value: Vec3, variance: f32) -> ReferenceImage {
     let mut mask = RegionMask::background(width, height);
     mask.regions.push(lit("wall"));
@@ -448,7 +448,7 @@ fn realtime_floats_allow_for_pow_only() {
 #[test]
 fn realtime_floats_allow_for_the_rasterisers_grid() {
     let mut reference = flat(48, 48, Vec3::splat(0.4), 0.0);
-    // A highlight 1.5 pixels wide on a dim wall, as a ray tracer and a shifted rasteriser see it.
+    // A highlight 1.5 pixels wide on a dim wall, as a ray tracer and a shifted rasterizer see it.
     let draw = |shift: f32| {
         let mut image = Image::new(48, 48);
         for (i, pixel) in image.pixels.iter_mut().enumerate() {

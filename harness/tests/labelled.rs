@@ -207,7 +207,7 @@ fn of_two_at_once_nothing_else_is_said() {
             own.iter().enumerate().flat_map(|(i, a)| own[..i].iter().map(move |b| (*a, *b)));
         for (a, b) in pairs.step_by(7) {
             let (one, other) = (&a.changes[0], &b.changes[0]);
-            // Two of a kind are one: n + 2 in exponent and normalisation, a factor and 1/pi.
+            // Two of a kind are one: n + 2 in exponent and normalization, a factor and 1/pi.
             let kind = |quantity: &str| match quantity {
                 "pi" | "factor" | "channels" => "constant".to_owned(),
                 other => other.split('_').next().unwrap().replace("normalisation", "exponent"),

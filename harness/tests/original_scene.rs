@@ -1,5 +1,5 @@
 //! A scene folder in the manner of the original course, dropped anywhere: `umbra render` must draw
-//! it, offline and realtime. Its files are as modellers and hands left them there: CRLF line ends, groups,
+//! it, offline and realtime. Its files are as modelers and hands left them there: CRLF line ends, groups,
 //! faces counted from the end, a triangle without area, materials without `Ks` or `Ns`, `illum` 5 and
 //! 8, keys that nobody knows, and a light 2e-6 wide.
 
@@ -103,7 +103,7 @@ fn lit(albedo: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| INTENSITY[c] / r2 * albedo[c] / std::f64::consts::PI * cos)
 }
 
-/// The pixel that shows the point (x, y, z), and the point on the same square at that pixel's centre.
+/// The pixel that shows the point (x, y, z), and the point on the same square at that pixel's center.
 fn pixel([x, y, z]: [f64; 3]) -> ((usize, usize), [f64; 3]) {
     let half = (5.0 - y) * 30f64.to_radians().tan();
     let scale = SIDE as f64 / 2.0 / half;

@@ -21,7 +21,7 @@ use umbra::process::Limits;
 use umbra::store::Store;
 use umbra::worker::{Job, Outcome, RayQuery, Request, SceneRef, Supervisor};
 
-/// Scenes with shadow edges and dark corners, a highlight, steep lobes, a coloured light.
+/// Scenes with shadow edges and dark corners, a highlight, steep lobes, a colored light.
 const SCENES: [&str; 4] = ["cbox", "sphere_phong", "exponents", "coloured"];
 /// Their film: regions are as small, and so as noisy, as they get.
 const FILM: [u32; 2] = [48, 36];
@@ -163,7 +163,7 @@ impl Bench<'_> {
         }
     }
 
-    /// The image at 1 spp against radiance along the pixels' centre rays.
+    /// The image at 1 spp against radiance along the pixels' center rays.
     fn judge_loop(&self, scene: &str, toml: &Path, expected: &Expected, used: &mut Used) {
         let [width, height] = FILM;
         let surface = SurfaceBuffer::new(&expected.scene, width as usize, height as usize).unwrap();
@@ -189,7 +189,7 @@ impl Bench<'_> {
         }
     }
 
-    /// The correlation of the noise in neighbouring rows.
+    /// The correlation of the noise in neighboring rows.
     fn judge_rows(&self, toml: &Path, used: &mut Used) {
         let config = basecode::scene::SceneConfig::load(toml).unwrap();
         let film = [config.width as u32, config.height as u32];

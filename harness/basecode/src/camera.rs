@@ -96,7 +96,7 @@ impl Camera {
     }
 
     /// The ray through the film position (`x`, `y`) in pixels: (0, 0) is the top left corner of the
-    /// film, (0.5, 0.5) the centre of the first pixel. It starts at the eye with `min_t` 0.
+    /// film, (0.5, 0.5) the center of the first pixel. It starts at the eye with `min_t` 0.
     pub fn ray(&self, x: f32, y: f32) -> Ray {
         let scale = 2.0 * self.tan_half_fov / self.height as f32;
         let right = (x - 0.5 * self.width as f32) * scale;

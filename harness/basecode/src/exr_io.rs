@@ -26,7 +26,7 @@ pub const MAX_SIDE: usize = 16_384;
 pub const MAX_PIXELS: usize = 64 << 20;
 /// The largest file that is read, in bytes: [`MAX_PIXELS`] as three 32-bit floats, and room for a header.
 pub const MAX_FILE_BYTES: u64 = 12 * MAX_PIXELS as u64 + (1 << 20);
-/// How a colour is stored in a file.
+/// How a color is stored in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
     /// 16-bit floats: 11 significant bits, largest finite value 65504; beyond it becomes infinite.
@@ -84,7 +84,7 @@ pub enum ImageError {
         /// The display window.
         display: String,
     },
-    /// A colour channel is not there.
+    /// A color channel is not there.
     #[error("{}: no channel {channel}; expected R, G and B, found {found}", path.display())]
     MissingChannel {
         /// The file.

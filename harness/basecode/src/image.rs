@@ -1,4 +1,4 @@
-//! A linear colour image in memory.
+//! A linear color image in memory.
 
 use glam::Vec3;
 
@@ -9,7 +9,7 @@ pub struct Image {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// `width * height` colours.
+    /// `width * height` colors.
     pub pixels: Vec<Vec3>,
 }
 
@@ -19,7 +19,7 @@ impl Image {
         Self { width, height, pixels: vec![Vec3::ZERO; width * height] }
     }
 
-    /// The colour at column `x`, row `y` (0 is the top).
+    /// The color at column `x`, row `y` (0 is the top).
     ///
     /// # Panics
     /// When the position lies outside the image.

@@ -2,7 +2,7 @@
 //!
 //! # Conventions, fixed here once
 //! * World space is right-handed, y is up. Lengths are in scene units.
-//! * Colours are linear RGB, Rec. 709 primaries. Radiance L is in W m^-2 sr^-1, radiant
+//! * Colors are linear RGB, Rec. 709 primaries. Radiance L is in W m^-2 sr^-1, radiant
 //!   intensity I in W sr^-1.
 //! * Images are row-major and row 0 is the *top* row; pixel (x, y) covers [x, x+1) x [y, y+1).
 //! * `wo` points toward the viewer, `wi` toward the light. Both are unit vectors that *leave* the

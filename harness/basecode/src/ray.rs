@@ -50,7 +50,7 @@ pub struct SurfaceInteraction {
     pub uv: Vec2,
     /// Unit normal of the triangle, world space, by the winding of its vertices.
     pub ng: Vec3,
-    /// Shading frame, built on the interpolated and normalised vertex normal.
+    /// Shading frame, built on the interpolated and normalized vertex normal.
     pub frame_ns: Frame,
     /// Direction toward the viewer, *local* shading frame. [`crate::Scene::intersect`] sets it.
     pub wo: Vec3,

@@ -65,7 +65,7 @@ pub struct RenderJob<'a> {
     pub width: usize,
     /// Film height in pixels.
     pub height: usize,
-    /// Samples per pixel. At 1, the sample is the pixel's centre.
+    /// Samples per pixel. At 1, the sample is the pixel's center.
     pub spp: usize,
     /// Seed of the samplers: the student id in a submission's own images.
     pub seed: u64,

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 ///
 /// The generator is PCG-RXS-M-XS-64 (O'Neill, "PCG: A Family of Simple Fast Space-Efficient
 /// Statistically Good Algorithms for Random Number Generation", 2014); seeds are scrambled with
-/// SplitMix64, so that neighbouring seeds give unrelated streams.
+/// SplitMix64, so that neighboring seeds give unrelated streams.
 #[derive(Debug)]
 pub struct Sampler {
     state: AtomicU64,

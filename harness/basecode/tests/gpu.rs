@@ -84,7 +84,7 @@ fn pixels_come_back_unclamped_and_in_their_places() {
             let inside = (5..15).contains(&y) && (x as f32 + 0.5 - 18.5).abs() < 5.0;
             let expected = vec3(x as f32 + 0.5, y as f32 + 0.5, 1e6);
             let expected = if inside { expected } else { Vec3::ZERO };
-            // The vertical edges run through pixel centres; either side is right there.
+            // The vertical edges run through pixel centers; either side is right there.
             if (x as f32 + 0.5 - 18.5).abs() != 5.0 {
                 assert_eq!(image.at(x, y), expected, "pixel ({x}, {y})");
             }

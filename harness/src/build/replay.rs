@@ -207,7 +207,7 @@ fn replayed(recording: &Recording, closure: &Path, src: &Path, out: &Path) -> Ve
                 args.next();
             }
             "--emit=dep-info,link" => replayed.push("--emit=link".into()),
-            // Without it the rendered messages are plain text, without colours.
+            // Without it the rendered messages are plain text, without colors.
             json if json.starts_with("--json=") => {}
             width if width.starts_with("--diagnostic-width=") => {}
             source if source.replace('\\', "/").ends_with(&root) => {

@@ -107,7 +107,7 @@ pub struct Wanted<'a> {
     pub tree: &'a TreeSpec,
     /// The size of a submission.
     pub limits: &'a Limits,
-    /// What the instructor says the download is; else it is recognised.
+    /// What the instructor says the download is; else it is recognized.
     pub from: Option<Kind>,
     /// A folder that is no submission, should it lie there.
     pub output: Option<&'a Path>,
@@ -160,7 +160,7 @@ struct Found {
 }
 
 impl Found {
-    /// Recognises the kind and reads all names by it.
+    /// Recognizes the kind and reads all names by it.
     fn labelled(mut self, from: Option<Kind>) -> Collected {
         // The path that was given may itself be a student's folder.
         let full = |source: &Source| match source.place.to_string_lossy() {

@@ -56,7 +56,7 @@ pub struct Batch<'a> {
     pub only: &'a [String],
     /// Which share of them alone is graded, without a report.
     pub slice: Option<Slice>,
-    /// Where they come from; recognised where it is not said.
+    /// Where they come from; recognized where it is not said.
     pub from: Option<Kind>,
     /// The class list; that of an earlier run where none is named.
     pub list: Option<&'a Path>,

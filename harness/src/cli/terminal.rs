@@ -19,7 +19,7 @@ pub fn width() -> usize {
     told.filter(|&columns| columns > 0).or_else(own).unwrap_or(LOG_COLUMNS)
 }
 
-/// Whether standard output takes colours; a `NO_COLOR` that is not empty refuses them, and changes
+/// Whether standard output takes colors; a `NO_COLOR` that is not empty refuses them, and changes
 /// nothing else.
 pub fn colours() -> bool {
     let refused = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());

@@ -305,7 +305,7 @@ mod tests {
     fn a_sixel_terminal_draws_every_pixel() {
         let (width, height) = picture().dimensions();
         assert_eq!(drawn(&sixel(&picture()), width, height), picture());
-        // Grey between two levels is so on the mean.
+        // Gray between two levels is so on the mean.
         let grey = RgbImage::from_pixel(64, 64, Rgb([70; 3]));
         let drawn = drawn(&sixel(&grey), 64, 64);
         let mean = drawn.pixels().map(|pixel| f64::from(pixel.0[1])).sum::<f64>() / 4096.0;

@@ -15,9 +15,9 @@ pub enum Kind {
     Diffuse,
     /// The Phong BSDF at the probes of part 1.2.
     Phong,
-    /// Radiance without shadows at pixel centres, under a witness BSDF.
+    /// Radiance without shadows at pixel centers, under a witness BSDF.
     Lit,
-    /// Visibility at pixel centres, under a witness BSDF.
+    /// Visibility at pixel centers, under a witness BSDF.
     Shadow,
     /// The offline image at one sample per pixel.
     Offline,
@@ -103,7 +103,7 @@ impl fmt::Display for View {
 pub struct Observations {
     /// The tiles of its answers.
     pub tiles: BTreeMap<View, Thumbnail>,
-    /// By scene: radiance along the centres of all pixels, and the image that its own loop made of it.
+    /// By scene: radiance along the centers of all pixels, and the image that its own loop made of it.
     pub loops: BTreeMap<String, LoopSeen>,
     /// By part: points that were shaded, and the answers.
     pub shaded: BTreeMap<&'static str, Vec<Sample>>,

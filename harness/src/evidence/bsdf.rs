@@ -16,7 +16,7 @@ use crate::imaging::ratio::ratio_name;
 pub enum BsdfKind {
     /// Lambertian reflection, part 1.1.
     Diffuse,
-    /// Normalised Phong, part 1.2.
+    /// Normalized Phong, part 1.2.
     Phong,
 }
 
@@ -77,7 +77,7 @@ pub fn long_probes(kind: BsdfKind) -> Vec<BsdfProbe> {
     .collect()
 }
 
-/// A probe of the BSDF that a scene hands out for a textured shape; `material` holds the colours
+/// A probe of the BSDF that a scene hands out for a textured shape; `material` holds the colors
 /// that its textures have at `uv`, `scale` is the shape's energy scale.
 pub fn textured_probe(
     (shape, primitive, uv): (u32, u32, [f32; 2]),

@@ -29,7 +29,7 @@ impl<'a> Film<'a> {
         self.pixels[y.min(self.height - 1) * self.width + x.min(self.width - 1)]
     }
 
-    /// The least and the largest values of the pixels whose centres are nearest around a place
+    /// The least and the largest values of the pixels whose centers are nearest around a place
     /// [pixels]: two each way. Nothing outside the film.
     fn around(&self, x: f64, y: f64) -> Option<[[f32; 3]; 2]> {
         let inside = |v: f64, size: usize| v > -1.0 && v < size as f64;
@@ -150,7 +150,7 @@ const BETWEEN: f32 = 0.25;
 /// So much of the film, at least, must be known to tell a slip.
 const KNOWN: f64 = 0.1;
 
-/// So much of what an image should be may a slip leave unexplained: between pixels it is known by its neighbours.
+/// So much of what an image should be may a slip leave unexplained: between pixels it is known by its neighbors.
 const LEFT: f64 = 0.005;
 
 /// Number of pixels that are looked at.

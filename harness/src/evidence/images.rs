@@ -149,7 +149,7 @@ pub fn same_origin(
     same_levels(a, b, mask, tolerances)
 }
 
-/// Judges a frame drawn by code, linear floats, against the image at pixel centres.
+/// Judges a frame drawn by code, linear floats, against the image at pixel centers.
 pub fn judge_realtime(
     id: CheckId,
     scene: &str,
@@ -164,7 +164,7 @@ pub fn judge_realtime(
     }
 }
 
-/// As [`judge_realtime`], but what stages draw that do not renormalise the interpolated normal
+/// As [`judge_realtime`], but what stages draw that do not renormalize the interpolated normal
 /// (`raw`) is as good, for all materials or for the diffuse or Phong ones alone.
 pub fn judge_shaded(
     id: CheckId,
@@ -318,7 +318,7 @@ mod tests {
         let of = |actual: &Image| shading_correlation(actual, &right, &mask);
         assert!(of(&right).is_some_and(|found| found > 0.999));
         assert!(of(&image(&|i| 0.3 * right.pixels[i].x + 0.1)).is_some_and(|found| found > 0.9));
-        // One colour for everything, one for each surface, and noise in which rows differ by nothing.
+        // One color for everything, one for each surface, and noise in which rows differ by nothing.
         assert_eq!(of(&image(&|_| 1.0)), Some(0.0));
         let by_surface = of(&image(&|i| if i % 16 < 8 { 1.0 } else { 4.0 }));
         assert!(by_surface.is_some_and(|found| found.abs() < 1e-3));

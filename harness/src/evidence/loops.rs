@@ -8,9 +8,9 @@ use super::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::imaging::reference::RegionMask;
 
 /// Part 1.3: whether the full render agrees with the renderer's own radiance along the same pixel
-/// centres; what differs is the loop's, the film's or the camera's fault.
+/// centers; what differs is the loop's, the film's or the camera's fault.
 ///
-/// `image` is a render at 1 spp, `rays` the renderer's radiance along the pixels' centre rays, both
+/// `image` is a render at 1 spp, `rays` the renderer's radiance along the pixels' center rays, both
 /// row by row; `mask` tells where an edge forgives.
 pub fn judge_agreement(
     scene: &str,

@@ -174,7 +174,7 @@ pub fn seen_by_shader(scene: &Scene, camera: &Camera, point: &SurfacePoint) -> S
 }
 
 impl Places {
-    /// A point as a right shader sees it: textures are averages, mirrors a plain diffuse colour.
+    /// A point as a right shader sees it: textures are averages, mirrors a plain diffuse color.
     fn shaded_point(&self, scene: &Scene, point: &SurfacePoint) -> ShadedPoint {
         let material = scene.material_of(point.shape);
         let phong = material.model == MaterialModel::Phong;

@@ -71,7 +71,7 @@ pub(super) enum Fitted {
     Channels,
     /// One of each group of questions: a wrong scale of the material's.
     Groups,
-    /// One of each group and channel: a wrong colour of the material's.
+    /// One of each group and channel: a wrong color of the material's.
     Colors,
     /// One of the diffuse term.
     Diffuse,

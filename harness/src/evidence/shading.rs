@@ -163,7 +163,7 @@ impl Default for Shading {
 /// One point of a surface, as its BSDF sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadedPoint {
-    /// The material, its colours not multiplied by `scale`.
+    /// The material, its colors not multiplied by `scale`.
     pub material: api::MaterialValue,
     /// The material's energy scale.
     pub scale: f64,

@@ -18,7 +18,7 @@ pub const VERTEX: &str =
 /// A fragment stage that writes the interpolated world position.
 pub const SHOW_POSITION: &str =
     concat!(include_str!("shaders/contract.wgsl"), include_str!("shaders/position.wgsl"));
-/// A fragment stage that writes the interpolated world normal, normalised.
+/// A fragment stage that writes the interpolated world normal, normalized.
 pub const SHOW_NORMAL: &str =
     concat!(include_str!("shaders/contract.wgsl"), include_str!("shaders/normal.wgsl"));
 

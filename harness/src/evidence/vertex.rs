@@ -12,7 +12,7 @@ use super::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::expected::SurfacePoint;
 use crate::imaging::reference::RegionMask;
 
-/// The tolerance of a position, relative to its distance from the camera: rasterised attributes
+/// The tolerance of a position, relative to its distance from the camera: rasterized attributes
 /// against a ray's hit.
 const POSITION_RELATIVE: f32 = 2e-3;
 /// The tolerance of a unit normal.
@@ -107,7 +107,7 @@ struct Seen {
     nowhere: usize,
     /// Those whose normal is not that of the surface where the position lies.
     turned: usize,
-    /// The median distance of right positions from the centre of their pixel [pixels].
+    /// The median distance of right positions from the center of their pixel [pixels].
     offset_px: f64,
 }
 

@@ -21,11 +21,11 @@ pub struct Expected {
     pub scene: Scene,
     /// Offline, with shadows.
     pub offline: ReferenceImage,
-    /// At pixel centres, without shadows: what realtime draws.
+    /// At pixel centers, without shadows: what realtime draws.
     pub unshadowed: Image,
     /// The regions of `unshadowed`.
     pub unshadowed_mask: RegionMask,
-    /// As `unshadowed`, by stages that do not renormalise the interpolated normal: as good. Absent
+    /// As `unshadowed`, by stages that do not renormalize the interpolated normal: as good. Absent
     /// where it was neither kept nor can be drawn.
     pub raw_normals: Option<Image>,
 }

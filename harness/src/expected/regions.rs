@@ -12,8 +12,8 @@ const GRAZING: f32 = 1e-3;
 
 /// The regions of a scene's image of `width` x `height` pixels: with shadows, and without.
 ///
-/// A pixel is an edge when the nine points on its centre, edges and corners, or those of a
-/// neighbour, do not see the same shape in the same light.
+/// A pixel is an edge when the nine points on its center, edges and corners, or those of a
+/// neighbor, do not see the same shape in the same light.
 ///
 /// # Errors
 /// When the film is empty or the scene's camera has no frame.
@@ -94,7 +94,7 @@ impl Seen {
         let material = scene.shapes()[point.shape].material;
         let emitter = scene.materials()[material].is_emitter();
         let blocked = shadows && point.visibility == Visibility::Blocked;
-        // Offline, which has shadows, a mirror is black; realtime draws it as a diffuse colour.
+        // Offline, which has shadows, a mirror is black; realtime draws it as a diffuse color.
         let black = shadows && scene.materials()[material].model == MaterialModel::Mirror;
         let lit = point.faces_both() && !blocked && !emitter && !black;
         let grazes = |w: Vec3| Frame::cos_theta(w).abs() < GRAZING;

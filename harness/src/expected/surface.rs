@@ -113,7 +113,7 @@ fn visibility(
     }
 }
 
-/// What each pixel's centre sees; row-major, row 0 on top.
+/// What each pixel's center sees; row-major, row 0 on top.
 #[derive(Clone, Debug)]
 pub struct SurfaceBuffer {
     /// Width in pixels.
@@ -125,7 +125,7 @@ pub struct SurfaceBuffer {
 }
 
 impl SurfaceBuffer {
-    /// Casts the centre ray of every pixel of a film of `width` x `height`.
+    /// Casts the center ray of every pixel of a film of `width` x `height`.
     ///
     /// # Errors
     /// When the film is empty or the scene's camera has no frame.
@@ -139,7 +139,7 @@ impl SurfaceBuffer {
     }
 }
 
-/// What the corners, edges and centres of all pixels see: (2 width + 1) x (2 height + 1) points,
+/// What the corners, edges and centers of all pixels see: (2 width + 1) x (2 height + 1) points,
 /// half a pixel apart.
 pub(super) struct Lattice {
     width: usize,
@@ -157,7 +157,7 @@ impl Lattice {
         Self { width: columns, points: points.collect() }
     }
 
-    /// The 3x3 points of pixel (`x`, `y`), its centre in the middle.
+    /// The 3x3 points of pixel (`x`, `y`), its center in the middle.
     pub(super) fn around(&self, x: usize, y: usize) -> [&Option<SurfacePoint>; 9] {
         std::array::from_fn(|i| &self.points[(2 * y + i / 3) * self.width + 2 * x + i % 3])
     }

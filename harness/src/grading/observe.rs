@@ -221,7 +221,7 @@ fn keep(session: &Session, part: &'static str, samples: impl Iterator<Item = Sam
     }
 }
 
-/// Answers under a witness as colours, where there are any.
+/// Answers under a witness as colors, where there are any.
 pub fn colours(outcome: &crate::worker::Outcome) -> Option<&[[f32; 3]]> {
     outcome.answer().map(|answer| session::colours(&answer.values))
 }

@@ -256,7 +256,7 @@ fn is_black(outcome: &Outcome) -> bool {
 }
 
 /// What to ask a renderer about its own BSDF where lit rays end: the ray, and the question. Surfaces of
-/// one colour alone: beside a texel's edge a right renderer may take either.
+/// one color alone: beside a texel's edge a right renderer may take either.
 fn plain_surfaces(case: &PreparedScene) -> Vec<(usize, BsdfQuery)> {
     let scene = &case.expected.scene;
     let batch = &case.probe_film.batch;
@@ -307,7 +307,7 @@ fn record_rays(
     }
 }
 
-/// Keeps for the diagnosis what the loop makes of the radiance along the centres of all pixels.
+/// Keeps for the diagnosis what the loop makes of the radiance along the centers of all pixels.
 fn record_loop(session: &Session, case: &PreparedScene, (image, along): (&[f32], &[f32])) {
     if case.held_back {
         return;

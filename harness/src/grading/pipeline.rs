@@ -76,7 +76,7 @@ pub struct Grading<'a> {
 pub enum RenderPath {
     /// Rays on the CPU: parts 1.1 to 1.4.
     Offline,
-    /// Rasterised: parts 2.1 to 2.5.
+    /// Rasterized: parts 2.1 to 2.5.
     Realtime,
 }
 

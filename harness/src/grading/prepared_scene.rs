@@ -55,7 +55,7 @@ pub struct ProbeFilm {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// What each pixel's centre sees.
+    /// What each pixel's center sees.
     pub surface: SurfaceBuffer,
     /// Regions with shadows.
     pub mask: RegionMask,
@@ -65,9 +65,9 @@ pub struct ProbeFilm {
     pub batch: RayBatch,
     /// What several samples a pixel are judged on; of scenes with stored images alone.
     pub sampled: Option<Sampled>,
-    /// What a stage that shades is compared with: centres, without shadows.
+    /// What a stage that shades is compared with: centers, without shadows.
     pub unshadowed: Image,
-    /// The same without renormalised normals; see [`Expected::raw_normals`].
+    /// The same without renormalized normals; see [`Expected::raw_normals`].
     pub raw_normals: Option<Image>,
 }
 

@@ -45,7 +45,7 @@ pub struct Judged {
 /// Whether surfaces lie where they should, for what cannot be judged alone.
 const COVERAGE: CheckId = CheckId::ImageRealtimeCoverage;
 
-/// Silhouettes correlate by 0, in one colour or one for each surface; what follows the light does by more.
+/// Silhouettes correlate by 0, in one color or one for each surface; what follows the light does by more.
 const LEAST_SHADING: f64 = 0.2;
 
 /// Draws every scene with the plugin and judges the images, those of the bonus too.

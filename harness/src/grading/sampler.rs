@@ -72,7 +72,7 @@ pub fn judge(session: &Session, plugin: &Path, scene: &Path) -> anyhow::Result<V
     ])
 }
 
-/// How alike the noise of neighbouring rows is: 0 when it is independent, 1 when it is the same.
+/// How alike the noise of neighboring rows is: 0 when it is independent, 1 when it is the same.
 /// The difference of two images of other seeds is noise alone.
 pub fn row_correlation(one: &[f32], other: &[f32], row_floats: usize) -> f64 {
     let noise: Vec<f64> = one.iter().zip(other).map(|(a, b)| f64::from(a - b)).collect();

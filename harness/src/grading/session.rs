@@ -156,7 +156,7 @@ pub fn query(query: &api::BsdfQuery) -> BsdfQuery {
     BsdfQuery { source, uv: query.uv, wo: query.wo, wi: query.wi }
 }
 
-/// An answer as colours.
+/// An answer as colors.
 pub fn colours(values: &[f32]) -> &[[f32; 3]] {
     values.as_chunks::<3>().0
 }

@@ -16,8 +16,8 @@ use super::stats::{Scale, accumulate};
 /// Judges an offline render with `spp` jittered samples per pixel, any seed.
 ///
 /// With several samples z = |a - b| / sqrt(v/n + v/N + floor^2) must not exceed `z_limit`, v being the reference's
-/// variance of one sample, dilated 3x3 (the largest of the nine). At 1 spp samples are at pixel centres and the image
-/// is compared with the pixel-centre reference, the floor alone allowing for rounding.
+/// variance of one sample, dilated 3x3 (the largest of the nine). At 1 spp samples are at pixel centers and the image
+/// is compared with the pixel-center reference, the floor alone allowing for rounding.
 ///
 /// # Errors
 /// When the sizes differ or `spp` is 0.
@@ -76,10 +76,10 @@ pub(crate) fn offline(
     Ok(stats.judge(&reference.mask, with, &scale, tolerances))
 }
 
-/// Judges a realtime frame drawn from code, as unclamped linear floats, against the pixel-centre reference.
+/// Judges a realtime frame drawn from code, as unclamped linear floats, against the pixel-center reference.
 ///
 /// In the interior |a - b| <= (relative + per_exponent n) b + snap (dx + dy) + floor, n being the region's Phong
-/// exponent, dx and dy the larger of the differences to the two neighbours in b's row and column.
+/// exponent, dx and dy the larger of the differences to the two neighbors in b's row and column.
 ///
 /// # Errors
 /// When the sizes differ, or the mask does not fit the reference.

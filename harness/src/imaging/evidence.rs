@@ -37,7 +37,7 @@ pub struct Tolerances {
     /// More of it per unit of Phong exponent n. WGSL's pow is exp2(n log2 x) with log2 good to 2^-21, that is 3.3e-7 n,
     /// and cos(alpha) itself carries about 1e-6 from the interpolated normal; three times their sum.
     pub realtime_per_exponent: f64,
-    /// And more of it where neighbours differ: this part of a pixel's way to them. Graphics hardware snaps vertices to
+    /// And more of it where neighbors differ: this part of a pixel's way to them. Graphics hardware snaps vertices to
     /// 1/256 of a pixel and interpolates from there (lavapipe does not); an H100 was 0.73 of that off in a highlight
     /// one pixel wide. Twice that, for room.
     pub realtime_snap_px: f64,
@@ -45,7 +45,7 @@ pub struct Tolerances {
     /// of pixels by driver).
     pub srgb_levels: u32,
     /// The largest fraction of interior pixels that may fail by levels: the geometric mean of 0.115 % (normal not
-    /// renormalised, accepted) and 0.54 % (weakest real mistake). Correct images have 0 to 2 such pixels.
+    /// renormalized, accepted) and 0.54 % (weakest real mistake). Correct images have 0 to 2 such pixels.
     pub srgb_fraction: f64,
 }
 
@@ -147,9 +147,9 @@ pub struct RegionBias {
 pub enum ComparedWith {
     /// The mean of many jittered samples, with its variance.
     Mean,
-    /// One sample at every pixel's centre, linear.
+    /// One sample at every pixel's center, linear.
     Centre,
-    /// One sample at every pixel's centre, in 8-bit sRGB levels.
+    /// One sample at every pixel's center, in 8-bit sRGB levels.
     CentreSrgb8,
 }
 

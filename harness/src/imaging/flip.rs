@@ -115,7 +115,7 @@ fn to_xyz() -> Mat3 {
     )
 }
 
-/// Linearised CIELAB, the papers' YCxCz, of a tone-mapped image.
+/// Linearized CIELAB, the papers' YCxCz, of a tone-mapped image.
 fn opponent(image: &Image, tone: impl Fn(Vec3) -> Vec3 + Sync) -> [Vec<f32>; 3] {
     let matrix = to_xyz();
     let colours: Vec<Vec3> = image
@@ -129,7 +129,7 @@ fn opponent(image: &Image, tone: impl Fn(Vec3) -> Vec3 + Sync) -> [Vec<f32>; 3] 
     [0, 1, 2].map(|c| colours.iter().map(|p| p[c]).collect())
 }
 
-/// CIELAB with Hunt's adjustment: colours count for less where it is dark.
+/// CIELAB with Hunt's adjustment: colors count for less where it is dark.
 fn hunt_lab(xyz: Vec3) -> Vec3 {
     const DELTA: f32 = 6.0 / 29.0;
     let f = (xyz / WHITE)
@@ -138,7 +138,7 @@ fn hunt_lab(xyz: Vec3) -> Vec3 {
     vec3(l, 0.01 * l * 500.0 * (f.x - f.y), 0.01 * l * 200.0 * (f.y - f.z))
 }
 
-/// HyAB, the distance for large differences of colour: city block in lightness, Euclidean in the rest.
+/// HyAB, the distance for large differences of color: city block in lightness, Euclidean in the rest.
 fn hyab(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
     d.x.abs() + d.y.hypot(d.z)
@@ -215,7 +215,7 @@ impl Filters {
         let forth = to_xyz();
         let (green, blue) = (hunt_lab(forth.y_axis), hunt_lab(forth.z_axis));
         let largest = hyab(green, blue).powf(0.7);
-        // Colour differences up to 0.4 of the largest take up 0.95 of the range.
+        // Color differences up to 0.4 of the largest take up 0.95 of the range.
         let knee = 0.4 * largest;
         let lab = |ycc: Vec3| {
             let y = (ycc.x + 16.0) / 116.0;

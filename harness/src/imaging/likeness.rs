@@ -57,7 +57,7 @@ fn brightness(image: &Image, width: usize, height: usize) -> Vec<f32> {
     (0..width * height).map(at).collect()
 }
 
-/// How steep brightness is around each pixel: the largest step between neighbours in its 3x3.
+/// How steep brightness is around each pixel: the largest step between neighbors in its 3x3.
 fn steepness(values: &[f32], width: usize, height: usize) -> Vec<f32> {
     let step = |i: usize, j: usize| (values[i] - values[j]).abs();
     let own: Vec<f32> = (0..width * height)

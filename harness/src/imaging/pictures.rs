@@ -1,6 +1,6 @@
-//! Pictures that explain: a render as a display shows it, its error in colours, an enlarged detail.
+//! Pictures that explain: a render as a display shows it, its error in colors, an enlarged detail.
 //!
-//! A picture says in its caption what its colours mean. Values that are not finite are magenta everywhere.
+//! A picture says in its caption what its colors mean. Values that are not finite are magenta everywhere.
 
 use std::io::Cursor;
 
@@ -35,7 +35,7 @@ pub struct Picture {
     pub height: usize,
     /// Row by row, row 0 on top.
     pub pixels: Vec<[u8; 3]>,
-    /// What the colours mean, with numbers.
+    /// What the colors mean, with numbers.
     pub caption: String,
 }
 
@@ -104,7 +104,7 @@ fn surroundings(start: usize, size: usize, limit: usize) -> (usize, usize) {
     (start.saturating_sub(margin), (end + margin).min(limit))
 }
 
-/// A picture of a render: exposed so that `median_lit` (the expected image's) comes to a middle grey, highlights
+/// A picture of a render: exposed so that `median_lit` (the expected image's) comes to a middle gray, highlights
 /// compressed by Reinhard's curve (Reinhard et al. 2002, equation 4), encoded as sRGB. Negative values are black.
 ///
 /// Use one `median_lit` for all pictures of a scene: a render that is too dark must look so.
@@ -152,7 +152,7 @@ pub fn clamped(image: &Image) -> Picture {
 const DIVERGING: [[u8; 3]; 5] =
     [[5, 113, 176], [146, 197, 222], [247, 247, 247], [244, 165, 130], [202, 0, 32]];
 
-/// The colour of a value in -1 (blue) to 1 (red).
+/// The color of a value in -1 (blue) to 1 (red).
 fn diverging(value: f32) -> [u8; 3] {
     let position = (value.clamp(-1.0, 1.0) + 1.0) * 2.0;
     let below = (position as usize).min(3);
@@ -164,8 +164,8 @@ fn mix(a: [u8; 3], b: [u8; 3], t: f32) -> [u8; 3] {
 }
 
 /// The signed relative error, mean of the channels: blue where the actual image is darker than expected, red where it
-/// is brighter, full colour at +-`full_scale` (0.1 is 10 %). Emitters are grey, edges, which are judged leniently,
-/// half grey. `None` when the sizes differ.
+/// is brighter, full color at +-`full_scale` (0.1 is 10 %). Emitters are gray, edges, which are judged leniently,
+/// half gray. `None` when the sizes differ.
 pub fn signed_error(
     actual: &Image,
     expected: &Image,
@@ -202,7 +202,7 @@ pub fn signed_error(
     })
 }
 
-/// The relative error that a difference picture should show in full colour: of the steps 1, 2, 5 the first that all but
+/// The relative error that a difference picture should show in full color: of the steps 1, 2, 5 the first that all but
 /// one in a hundred compared pixels stay below, from 1 % to 500 %.
 pub fn full_scale(actual: &Image, expected: &Image, mask: &RegionMask, median_lit: f32) -> f32 {
     const STEPS: [f32; 9] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0];
@@ -226,10 +226,10 @@ pub fn full_scale(actual: &Image, expected: &Image, mask: &RegionMask, median_li
 
 /// So many pixels are a ray's wide and high in its map.
 const RAY_SIDE: usize = 6;
-/// Lit, though it should be in shadow; and the other way round (Okabe and Ito 2008: told apart by the colour-blind).
+/// Lit, though it should be in shadow; and the other way round (Okabe and Ito 2008: told apart by the color-blind).
 const RAY_COLOURS: [[u8; 3]; 2] = [[230, 159, 0], [86, 180, 233]];
 
-/// A film without shadows in grey, and on it the rays that were judged wrongly: the pixel of each, and whether it should
+/// A film without shadows in gray, and on it the rays that were judged wrongly: the pixel of each, and whether it should
 /// be lit.
 pub fn ray_map(film: &Image, rays: &[(usize, bool)], median_lit: f32) -> Picture {
     let mut small = tone_mapped(film, median_lit);

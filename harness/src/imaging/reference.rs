@@ -66,7 +66,7 @@ pub struct ReferenceImage {
     pub variance: Image,
     /// Samples per pixel of `mean`.
     pub n: u32,
-    /// The image with one sample at every pixel's centre.
+    /// The image with one sample at every pixel's center.
     pub centre: Image,
     /// Which pixel shows what.
     pub mask: RegionMask,
@@ -96,7 +96,7 @@ pub enum ReferenceError {
         x: usize,
         /// Row.
         y: usize,
-        /// The colour found.
+        /// The color found.
         value: glam::Vec3,
     },
     /// A mask value without a region.

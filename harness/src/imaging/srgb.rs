@@ -57,7 +57,7 @@ pub fn level(linear: f32) -> u8 {
     level as u8
 }
 
-/// How many levels two colours are apart, in the channel where they are furthest.
+/// How many levels two colors are apart, in the channel where they are furthest.
 pub fn levels_apart(a: Vec3, b: Vec3) -> u32 {
     let levels = |p: Vec3| p.to_array().map(level);
     let pairs = levels(a).into_iter().zip(levels(b));

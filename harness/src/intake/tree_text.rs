@@ -13,7 +13,7 @@ use crate::columns::{count, left};
 const SHOWN: usize = 60;
 
 impl Validation {
-    /// The whole validation as text for a terminal, without colours.
+    /// The whole validation as text for a terminal, without colors.
     pub fn to_text(&self) -> String {
         let mut out = String::new();
         let verdict = if self.conforms { "conforms" } else { "does not conform" };

@@ -104,7 +104,7 @@ pub struct BsdfQuery {
 pub enum BsdfSource {
     /// A Lambertian material's with this albedo.
     Diffuse([f32; 3]),
-    /// A normalised Phong material's, before any energy scale.
+    /// A normalized Phong material's, before any energy scale.
     Phong {
         /// Diffuse albedo Kd.
         diffuse: [f32; 3],

@@ -75,7 +75,7 @@ pub struct Bound {
 /// A pixel that shows a surface point.
 #[derive(Clone, Debug)]
 pub struct Pixel {
-    /// Of its centre, from -1 to 1.
+    /// Of its center, from -1 to 1.
     pub ndc: [f64; 2],
     pub position: Vec3,
     pub normal: Vec3,
@@ -457,7 +457,7 @@ fn points(witnesses: &[Witness]) -> Vec<Probe> {
     witnesses.iter().flat_map(under).collect()
 }
 
-/// What a fragment stage shades: colours come scaled.
+/// What a fragment stage shades: colors come scaled.
 fn surfaces(phong: bool) -> Vec<Probe> {
     let materials = [
         ([0.5, 0.3, 0.1], [0.2, 0.3, 0.5], 6.5),

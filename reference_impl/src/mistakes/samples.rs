@@ -74,7 +74,7 @@ impl<'a> Samples<'a> {
         ((column as f32 + x) / columns as f32, (row as f32 + y) / rows as f32)
     }
 
-    /// Every other sample mirrors the one before in the pixel's centre.
+    /// Every other sample mirrors the one before in the pixel's center.
     fn antithetic(&self, index: usize) -> (f32, f32) {
         if index.is_multiple_of(2) {
             let (x, y) = self.sampler.next_2d();

@@ -146,7 +146,7 @@ fn draw(
     cameras.iter().map(&mut draw).collect()
 }
 
-/// Radiance through the pixel centres by the offline renderer.
+/// Radiance through the pixel centers by the offline renderer.
 fn trace(
     kind: ShadingKind,
     scene: &Scene,
@@ -170,7 +170,7 @@ fn agree(a: Vec3, b: Vec3) -> bool {
     (a - b).abs().cmple(2e-3 * b.abs() + 1e-6).all()
 }
 
-/// Where the ray through a pixel's centre meets y = 0.
+/// Where the ray through a pixel's center meets y = 0.
 fn floor_point(camera: &Camera, x: usize, y: usize) -> [f64; 3] {
     let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
     let t = -f64::from(ray.origin.y) / f64::from(ray.direction.y);

@@ -109,7 +109,7 @@ fn all_six_faces_of_the_cube_see_their_blockers() {
     let light = vec3(0.1, 0.2, -0.15);
     let mut build = Build::new(light, Vec3::splat(5.0));
     build.material("white", WHITE);
-    // A room that is seen from inside, and a box before each wall, none centred.
+    // A room that is seen from inside, and a box before each wall, none centered.
     build.cuboid("white", Vec3::splat(2.0), Vec3::splat(-2.0));
     for axis in 0..3 {
         for side in [-1.0, 1.0] {

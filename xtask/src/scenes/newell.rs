@@ -14,7 +14,7 @@ pub type HalfTube = [[[f64; 3]; 4]; 4];
 /// A circle's best K is 0.5523, so the teapot is not quite round. The published knob has .45 for .448 in one place.
 pub const QUARTER_TURN_K: f64 = 0.56;
 
-/// The knob's top, down over lid, rim and body, to the centre of the bottom.
+/// The knob's top, down over lid, rim and body, to the center of the bottom.
 ///
 /// The flat seat between lid and rim is ours: it closes the gap of a tenth that the published lid leaves.
 pub const TEAPOT_PROFILES: [Profile; 7] = [
@@ -59,7 +59,7 @@ pub const TEAPOT_SPOUT: [HalfTube; 2] = [
     ],
 ];
 
-/// The centre of the cup's inside, up its wall, over the rim, down and out along the saucer, and back underneath.
+/// The center of the cup's inside, up its wall, over the rim, down and out along the saucer, and back underneath.
 ///
 /// The first and the last profile are ours: they close the cup's bottom and the saucer's, which are published open.
 pub const TEACUP_PROFILES: [Profile; 8] = [

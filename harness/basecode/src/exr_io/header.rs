@@ -16,7 +16,7 @@ const MAX_CHANNELS: usize = 64;
 /// No codec of the format shrinks pixels more than deflate can: 1032 to 1 (zlib's technical notes).
 const MAX_COMPRESSION_RATIO: usize = 1032;
 
-/// The components of a colour, in the order of an [`crate::Image`]'s pixels.
+/// The components of a color, in the order of an [`crate::Image`]'s pixels.
 const RGB: [&str; 3] = ["R", "G", "B"];
 
 /// Splits `mean.R` into (`mean`, `R`) and `R` into (``, `R`): EXR's convention for layers.

@@ -8,7 +8,7 @@ use glam::{Mat4, Vec3, Vec4};
 
 use crate::Camera;
 
-/// Format of the colours: linear radiance, not clamped.
+/// Format of the colors: linear radiance, not clamped.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 /// Format of the depths, 0 near to 1 far.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -86,7 +86,7 @@ pub struct MaterialUniforms {
 }
 
 impl MaterialUniforms {
-    /// The uniforms of a material without textures: a realtime material has one colour, so pass
+    /// The uniforms of a material without textures: a realtime material has one color, so pass
     /// [`crate::Texture::average`], each albedo times [`crate::Material::energy_scale`].
     pub fn new(rho_d: Vec3, rho_s: Vec3, exponent: f32) -> Self {
         Self {

@@ -15,7 +15,7 @@ pub struct Stage<'a> {
 }
 
 impl Gpu {
-    /// A pipeline that draws colour and depth into a [`super::Target`]. All four bind groups must be
+    /// A pipeline that draws color and depth into a [`super::Target`]. All four bind groups must be
     /// set before it draws.
     ///
     /// What is wrong with a stage is reported by [`Gpu::checked`].

@@ -8,7 +8,7 @@ use crate::{Error, Image, Result};
 /// Bytes of a pixel in [`COLOR_FORMAT`].
 const PIXEL_SIZE: u64 = 16;
 
-/// A colour image (Rgba32Float, linear) with depth (Depth32Float) to draw into.
+/// A color image (Rgba32Float, linear) with depth (Depth32Float) to draw into.
 pub struct Target {
     /// Width in pixels.
     pub width: usize,
@@ -60,7 +60,7 @@ impl Target {
         })
     }
 
-    /// Begins to draw: colours are cleared to black (alpha 1), depths to the farthest.
+    /// Begins to draw: colors are cleared to black (alpha 1), depths to the farthest.
     pub fn begin<'e>(&self, encoder: &'e mut wgpu::CommandEncoder) -> wgpu::RenderPass<'e> {
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("target"),
@@ -80,7 +80,7 @@ impl Target {
         })
     }
 
-    /// Reads the colours back.
+    /// Reads the colors back.
     ///
     /// # Errors
     /// When the device was lost.

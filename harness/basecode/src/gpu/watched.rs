@@ -259,7 +259,7 @@ impl Device {
     }
 }
 
-/// Whether a pipeline draws into a picture, by the format of its colours.
+/// Whether a pipeline draws into a picture, by the format of its colors.
 fn draws_picture(desc: &wgpu::RenderPipelineDescriptor) -> bool {
     let targets = desc.fragment.as_ref().map_or(&[][..], |fragment| fragment.targets);
     targets.iter().flatten().any(|target| target.format == COLOR_FORMAT)

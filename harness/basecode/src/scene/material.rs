@@ -10,9 +10,9 @@ pub enum MaterialModel {
     /// `illum 7`: Lambertian reflection.
     Diffuse,
     /// `illum 5`: a mirror. It has no BSDF in this assignment and is black offline; realtime
-    /// draws it as a diffuse colour.
+    /// draws it as a diffuse color.
     Mirror,
-    /// Any other `illum`: normalised Phong.
+    /// Any other `illum`: normalized Phong.
     Phong,
 }
 
@@ -34,7 +34,7 @@ pub struct Material {
 }
 
 impl Material {
-    /// A diffuse material of a constant colour.
+    /// A diffuse material of a constant color.
     pub fn diffuse(albedo: Vec3) -> Self {
         Self {
             name: "diffuse".into(),
@@ -46,7 +46,7 @@ impl Material {
         }
     }
 
-    /// A Phong material of constant colours.
+    /// A Phong material of constant colors.
     pub fn phong(diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
         let (diffuse, specular) = (diffuse.into(), specular.into());
         Self {

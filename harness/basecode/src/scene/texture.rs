@@ -1,4 +1,4 @@
-//! Colours that may vary over a surface.
+//! Colors that may vary over a surface.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 
 use crate::SurfaceInteraction;
 
-/// A colour, constant or looked up in a bitmap.
+/// A color, constant or looked up in a bitmap.
 #[derive(Clone, Debug)]
 pub enum Texture {
     /// The same everywhere.
@@ -17,7 +17,7 @@ pub enum Texture {
     Bitmap(Arc<Bitmap>),
 }
 
-/// An image to look up colours in, linear RGB, row 0 on top.
+/// An image to look up colors in, linear RGB, row 0 on top.
 #[derive(Debug)]
 pub struct Bitmap {
     width: usize,
@@ -45,12 +45,12 @@ impl Default for Mapping {
 const MAX_SIDE: u32 = 8192;
 
 impl Texture {
-    /// The colour at a surface point.
+    /// The color at a surface point.
     pub fn eval(&self, i: &SurfaceInteraction) -> Vec3 {
         self.lookup(i.uv)
     }
 
-    /// The colour at texture coordinates.
+    /// The color at texture coordinates.
     pub fn lookup(&self, uv: Vec2) -> Vec3 {
         match self {
             Self::Constant(colour) => *colour,
@@ -68,7 +68,7 @@ impl Texture {
         }
     }
 
-    /// The mean colour: what realtime uses in the texture's place.
+    /// The mean color: what realtime uses in the texture's place.
     pub fn average(&self) -> Vec3 {
         match self {
             Self::Constant(colour) => *colour,

@@ -8,7 +8,7 @@ use basecode::Image;
 use crate::imaging::pictures::{signed_error, tone_mapped};
 use crate::imaging::reference::RegionMask;
 
-/// The relative error that the difference picture shows in full colour.
+/// The relative error that the difference picture shows in full color.
 const FULL_SCALE: f32 = 0.1;
 
 /// Writes the pictures and answers their files and captions.

@@ -172,9 +172,9 @@ pub struct Formula {
     pub times: f64,
     /// Its addend: b of a n + b.
     pub plus: f64,
-    /// Whether the normalisation is made from a n + b too.
+    /// Whether the normalization is made from a n + b too.
     pub follows: bool,
-    /// k of the normalisation (n + k) / (2 pi).
+    /// k of the normalization (n + k) / (2 pi).
     pub normalisation_plus: f64,
     /// What the energy scale is made from.
     pub scale: ScaleForm,

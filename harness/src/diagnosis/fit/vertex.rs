@@ -15,9 +15,9 @@ pub struct VertexSeen {
     pub normal: Vec3,
     /// The position that the stage forwards.
     pub found_position: Vec3,
-    /// The normal that it forwards, normalised.
+    /// The normal that it forwards, normalized.
     pub found_normal: Vec3,
-    /// The pixel's centre in normalised device coordinates.
+    /// The pixel's center in normalized device coordinates.
     pub at: [f64; 2],
     /// Where the position that is forwarded belongs, in the same.
     pub belongs: [f64; 2],

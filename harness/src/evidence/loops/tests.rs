@@ -209,7 +209,7 @@ fn slips_with_the_film_are_priced_and_other_pictures_are_not() {
         let error = error(&film(slip));
         assert!((0.0199..0.03).contains(&error), "{index}: {error}");
     }
-    // One colour, and stripes that have nothing to do with the picture.
+    // One color, and stripes that have nothing to do with the picture.
     let stripes = film(&|x, y| [0.5 + 0.5 * ((x * 7 + y * 13) % 5) as f32; 3]);
     assert!(error(&stripes) > 0.4, "{}", error(&stripes));
     assert_eq!(error(&film(&|_, _| [0.0; 3])), 1.0);

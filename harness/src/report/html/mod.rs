@@ -82,7 +82,7 @@ fn end(mut html: Html, report: &BatchReport) -> String {
     html.finish()
 }
 
-/// The class of points that lie in `[least, most]` of `out_of`: how a cell is coloured.
+/// The class of points that lie in `[least, most]` of `out_of`: how a cell is colored.
 fn class(least: f64, most: f64, out_of: f64) -> &'static str {
     if super::number::is_range(least, most) {
         "open"

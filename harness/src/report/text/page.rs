@@ -5,7 +5,7 @@ use unicode_width::UnicodeWidthStr;
 use super::super::harmless;
 use crate::columns::{cut, wrap};
 
-/// How a piece of text is shown; without colours all look the same.
+/// How a piece of text is shown; without colors all look the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Style {
     Plain,
@@ -46,7 +46,7 @@ impl Style {
 pub struct Look {
     /// Terminal columns; no line is wider.
     pub width: usize,
-    /// Whether ANSI colours are allowed.
+    /// Whether ANSI colors are allowed.
     pub colours: bool,
 }
 

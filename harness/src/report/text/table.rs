@@ -14,7 +14,7 @@ const NAME_MIN: usize = 8;
 
 /// A table with one row for each submission: name, student, points per part, total, and the numbers
 /// of the remarks that stand below it. `width` in terminal columns; no line is wider. `colours`
-/// allows ANSI colours.
+/// allows ANSI colors.
 ///
 /// # Errors
 /// When there is no submission.

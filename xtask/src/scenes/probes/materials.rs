@@ -1,4 +1,4 @@
-//! Probes of BSDFs, albedos and the light's colour.
+//! Probes of BSDFs, albedos and the light's color.
 
 use super::probe;
 use crate::scenes::scene::{Material, Scene};
@@ -70,7 +70,7 @@ pub fn textured() -> Scene {
         .lit_by(dvec3(-1.5, 3.0, 3.5), [30.0, 30.0, 30.0]);
     scene.textures =
         vec![
-            // Four tiles of four colours, each with a gradient and a dark corner: no symmetry in either direction.
+            // Four tiles of four colors, each with a gradient and a dark corner: no symmetry in either direction.
             Texture::new("tiles.png", 32, |x, y| {
                 let base = [[150, 60, 40], [50, 130, 60], [60, 70, 150], [140, 130, 50]]
                     [(x / 16 + 2 * (y / 16)) as usize];

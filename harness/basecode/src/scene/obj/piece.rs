@@ -167,7 +167,7 @@ impl Piece {
         Ok(numbers)
     }
 
-    /// `x y z`, with a weight `w` behind them or a colour of any number of components.
+    /// `x y z`, with a weight `w` behind them or a color of any number of components.
     fn position(&self, line: usize, rest: &str) -> Result<Vec3, Wrong> {
         let position = Vec3::from(self.numbers::<3>(line, "v", rest, 3)?);
         let mut more = words(rest).skip(3);
