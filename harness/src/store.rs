@@ -165,7 +165,7 @@ impl Store<'_> {
         Ok(self.layers(&file, &["raw"], draw).ok().map(|[image]| image))
     }
 
-    /// Renders the expected image of a stored scene anew and replaces the file.
+    /// Renders the expected image of a stored scene again and replaces the file.
     ///
     /// # Errors
     /// When there is no reference renderer, it fails, or the file cannot be written.

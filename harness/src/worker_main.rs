@@ -15,8 +15,8 @@ fn main() -> ExitCode {
 }
 
 /// What libraries call to lock a file. The system refuses it here, since a lock on a shared file reaches
-/// beyond this process. But Mesa keeps no compiled shader without one: of its own scratch, which nobody
-/// else sees, it is told that it has it.
+/// beyond this process. But Mesa keeps no compiled shader without one, so this function claims to grant locks in the
+/// worker's own scratch, which nobody else sees.
 #[cfg(target_os = "linux")]
 // SAFETY: it has the signature of the C library's function, whose place it takes, and its answers.
 #[unsafe(no_mangle)]

@@ -107,7 +107,7 @@ fn student(root: &Path, kit: &Path, programs: &[PathBuf]) -> Result<()> {
     add_expected(root, kit)
 }
 
-/// Who has an extension is nobody else's matter.
+/// Extensions are private to the students who have them.
 fn leave_out_extensions(config: &Path) -> Result<()> {
     let mut assignment: serde_json::Value = serde_json::from_slice(&fs::read(config)?)?;
     let late = assignment.get_mut("late").and_then(serde_json::Value::as_object_mut);

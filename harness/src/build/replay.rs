@@ -203,7 +203,7 @@ fn replayed(recording: &Recording, closure: &Path, src: &Path, out: &Path) -> Ve
                 }
             }
             "-L" => {
-                // Only the closure: cargo's own folder holds what is nobody's business.
+                // Only the closure: cargo's own folder holds much that does not concern a submission.
                 args.next();
             }
             "--emit=dep-info,link" => replayed.push("--emit=link".into()),

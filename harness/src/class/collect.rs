@@ -222,7 +222,7 @@ impl Found {
 struct Search<'a> {
     wanted: &'a Wanted<'a>,
     output: Option<PathBuf>,
-    /// So many zips of many were unpacked.
+    /// Number of zips of many submissions that were unpacked.
     unpacked: usize,
     found: Found,
 }

@@ -34,7 +34,7 @@ pub struct Pair {
 pub struct Match {
     /// In the first and in the second one.
     pub places: [Place; 2],
-    /// So many tokens.
+    /// Number of tokens.
     pub tokens: usize,
 }
 

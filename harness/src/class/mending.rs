@@ -88,7 +88,7 @@ pub fn choose(decision: &Decision, grade: &mut Grade, mended: Grade) -> Option<M
     Some(Mended { patch, lines, penalty, before, after, counts, words })
 }
 
-/// What is said of a fix of something that is no longer what was submitted.
+/// The remark on a fix whose submission has changed since.
 pub fn stale(decision: &Decision) -> String {
     format!(
         "the fix{} was of another submission and does not count; mend it again: {}",

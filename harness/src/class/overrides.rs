@@ -273,7 +273,7 @@ impl Applied {
     }
 }
 
-/// What a decision on some parts hangs on: what was submitted, and what was found out about these parts.
+/// Digest of everything that a decision on some parts depends on: the submission, and the evidence for these parts.
 pub fn fingerprint(subject: &Subject, parts: &[PartGrade]) -> String {
     let mut hash = Sha256::new();
     hash.update(subject.digest);

@@ -1,4 +1,4 @@
-//! `umbra bless`: the stored expected images, rendered anew on purpose.
+//! `umbra bless`: renders the stored expected images again, on purpose.
 
 use std::path::Path;
 
@@ -56,7 +56,7 @@ pub fn run(arguments: &BlessArguments, root: Option<&Path>) -> anyhow::Result<u8
     Ok(super::EXIT_OK)
 }
 
-/// Looks at every known mistake anew and replaces what is stored of them.
+/// Renders every known mistake again and replaces the stored answers.
 fn mistakes(context: &mut Context) -> anyhow::Result<u8> {
     for scene in context.assignment.scenes.iter_mut().filter(|scene| scene.submitted.is_some()) {
         scene.film = Some(SMALL_FILM);

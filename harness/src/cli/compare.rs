@@ -100,7 +100,7 @@ struct Difference {
     difference: Option<f32>,
 }
 
-/// Everything that is said of two images.
+/// The report on two images.
 #[derive(Serialize)]
 struct Comparison {
     equal: bool,
@@ -331,7 +331,7 @@ fn survey(images: &[&Open], nan_is_error: bool, keep: bool) -> anyhow::Result<Fo
     Ok(all)
 }
 
-/// What is said of files with different primaries.
+/// The remark on files with different primaries.
 fn different_primaries(actual: &ExrRows, expected: &ExrRows) -> Option<String> {
     let [actual, expected] =
         [actual, expected].map(|file| file.chromaticities().unwrap_or(REC_709));

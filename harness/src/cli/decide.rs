@@ -136,7 +136,7 @@ impl DecisionArguments {
         Ok(())
     }
 
-    /// A fix of a submission, which hangs on its very files.
+    /// A fix of a submission, which applies to exactly these files.
     ///
     /// # Errors
     /// When there is no reason.

@@ -135,7 +135,7 @@ pub fn shown(report: &BatchReport, output: &Path, skipped: Option<String>) -> an
     Ok(exit_code(&report.entries))
 }
 
-/// What a batch ends with: a bug of ours counts more than what the machine lacks.
+/// The exit code of a batch: a bug of ours takes precedence over something that the machine lacks.
 fn exit_code(entries: &[SubmissionReport]) -> u8 {
     let mut checks = entries.iter().flat_map(|entry| &entry.record.evidence.checks);
     if checks.any(|check| check.id == INTERNAL_ERROR && check.verdict == Verdict::Fail) {

@@ -38,7 +38,8 @@ pub struct MergeArguments {
     allow_mixed: bool,
 }
 
-/// Writes the reports and prints the table; refuses what is not whole, or not judged by the same.
+/// Writes the reports and prints the table. Refuses a class that is incomplete, or was not judged by one program and
+/// one kind of machine.
 pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let MergeArguments { output, allow_mixed } = arguments;
     let instructor = output.join(report::INSTRUCTOR);
@@ -112,7 +113,7 @@ fn one(output: &Path, begun: Vec<(PathBuf, Found)>) -> anyhow::Result<Found> {
             judged.entry(conditions).or_default().push(slug);
         }
     }
-    // Tasks that left nothing were begun anew by others.
+    // Other tasks repeated the work of tasks that left nothing.
     let made = |found: &Found| judged.contains_key(&found.conditions);
     let any = begun.iter().any(|(_, found)| made(found));
     let mut begun: Vec<_> = begun.into_iter().filter(|(_, found)| !any || made(found)).collect();
@@ -229,7 +230,7 @@ fn differing(there: &Evidence, here: &Evidence) -> Vec<String> {
         own.map(|check| (named(check), format!("{:?}", check.verdict).to_lowercase())).collect()
     };
     let (there, here) = (verdicts(there), verdicts(here));
-    // What is found only beside others of a class is no matter of the machine.
+    // Findings that compare submissions of a class do not depend on the machine.
     let both = there.iter().filter_map(|(name, old)| Some((name, old, here.get(name)?)));
     let differ = both.filter(|(_, old, new)| old != new);
     differ.map(|(name, old, new)| format!("{name} is {old} there and {new} here")).collect()

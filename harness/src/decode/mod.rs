@@ -287,7 +287,7 @@ fn is_image(path: &str) -> bool {
     path.ends_with(".exr")
 }
 
-/// What is to be said of an image in a private copy, if it was not decoded.
+/// The finding on an image in a private copy that was not decoded.
 pub fn image_finding(root: &Path, path: &str, image: &Result<Image, String>) -> Option<Finding> {
     let error = image.as_ref().err()?;
     let is_empty = root.join(path).metadata().is_ok_and(|found| found.len() == 0);

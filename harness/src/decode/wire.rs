@@ -19,7 +19,7 @@ pub enum Question {
         /// How much it may hold.
         limits: intake::Limits,
     },
-    /// What is to be said of a private copy; its root is the folder in question.
+    /// The findings on a private copy; its root is the folder in question.
     Inspect {
         /// The copy.
         submission: Submission,
@@ -40,7 +40,7 @@ pub enum Answer {
     Unpacked(Submission),
     /// The archive is refused.
     Refused(Refusal),
-    /// What is to be said of a copy.
+    /// The findings on a copy.
     Inspected {
         /// Beside the expected tree.
         validation: Validation,

@@ -145,14 +145,14 @@ impl Input<'_> {
         let own = |mistake: &KnownMistake| mistake.parts.iter().any(|own| own == part);
         let [isolated, image] = [question.isolated, &[question.image]]
             .map(|kinds| self.comparisons(kinds, question.material));
-        // Shadows where none should be: images of the bonus tell nothing of how it draws them.
+        // Shadows where none should be: images of the bonus do not show how it draws them.
         if part == "2.5" && self.verdict_of(CheckId::BonusDefault, Verdict::Fail) {
             return None;
         }
         if part == "1.3" {
             return self.direct_light(&isolated, &image);
         }
-        // An image that several parts spoil tells nothing of one of them.
+        // An image that several parts spoil says nothing about any one of them.
         let spoils = |other: &String| {
             other != part && ["2.1", "2.2", "2.3", "2.4"].contains(&other.as_str())
         };
@@ -187,7 +187,7 @@ impl Input<'_> {
         Some(Diagnosis { words: words.join("; and "), ..self.known(&[], unexplained, 1.0) })
     }
 
-    /// A known mistake that is as good as exact has the better words; what is fitted is exact.
+    /// A known mistake that is as good as exact is worded better than a fit; fits are exact.
     fn better(&self, fitted: Option<Diagnosis>, known: Option<Diagnosis>) -> Option<Diagnosis> {
         let exact = |known: &Diagnosis| {
             known.mistakes.len() == 1 && known.factor.is_none() && known.unexplained < EXACT

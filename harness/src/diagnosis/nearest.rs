@@ -19,7 +19,7 @@ const NOTHING: f64 = 1e-5;
 const SINGLE: f64 = 0.05;
 /// The same for a constant factor.
 const FACTOR: f64 = 0.03;
-/// A factor that is nearer to 1 is none.
+/// A factor nearer to 1 than this counts as none.
 const NO_FACTOR: f32 = 5e-3;
 /// The same for two mistakes together, which fit more easily.
 const PAIR: f64 = 0.02;

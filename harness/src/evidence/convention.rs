@@ -88,7 +88,7 @@ pub enum Party {
     Integrator,
 }
 
-/// A question whose right answer hangs on the convention.
+/// A question whose right answer depends on the convention.
 pub struct Conventional<'a> {
     /// Whose answer it is.
     pub party: Party,
@@ -98,7 +98,7 @@ pub struct Conventional<'a> {
     pub judge: Box<dyn Fn(&Convention) -> Check + 'a>,
 }
 
-/// So many parties must keep a convention: one alone has made a mistake.
+/// Number of parties that must keep a convention: one alone has made a mistake.
 const PARTIES: usize = 2;
 
 /// An integrator that is wrong in many ways is about as wrong under any convention, and leaves the choice to the BSDFs.

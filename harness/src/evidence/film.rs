@@ -147,10 +147,11 @@ impl<'a> Film<'a> {
 
 /// By how much of what pixels around a place differ it may lie outside of them.
 const BETWEEN: f32 = 0.25;
-/// So much of the film, at least, must be known to tell a slip.
+/// Least fraction of the film that must be known to tell a slip.
 const KNOWN: f64 = 0.1;
 
-/// So much of what an image should be may a slip leave unexplained: between pixels it is known by its neighbors.
+/// Fraction of the expected image that a slip may leave unexplained: between pixels, values are known only from
+/// neighbors.
 const LEFT: f64 = 0.005;
 
 /// Number of pixels that are looked at.

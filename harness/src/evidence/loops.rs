@@ -139,7 +139,7 @@ struct Pixel {
 }
 
 impl Pixel {
-    /// Nothing where a ray is no number.
+    /// `None` if a ray is NaN.
     fn of(values: &[[f32; 3]], offsets: &[[f32; 2]]) -> Option<Self> {
         let sum = |value: &[f32; 3]| value.iter().map(|&v| f64::from(v)).sum::<f64>();
         let sums: Vec<f64> = values.iter().map(sum).collect();
@@ -195,7 +195,7 @@ const EDGE_BIAS: f64 = 8.0;
 const STRAY: f64 = 0.05;
 /// Standard error of a pixel, at most, where all around is smooth, relative to its mean.
 const CALM: f64 = 0.01;
-/// Edges of fewer pixels tell nothing.
+/// Least number of pixels on edges that a verdict needs.
 const LEAST_EDGES: usize = 40;
 
 /// Judges a render of `film` at [`SAMPLES`] samples per pixel against the radiance that the renderer
@@ -359,7 +359,7 @@ pub fn judge_samples(
     (Check { error: price.error, mistake: price.name(), measures, ..check }, edges)
 }
 
-/// What the edges of all scenes tell together: each alone has few of most directions.
+/// Judges the edges of all scenes together: each scene alone has few of most directions.
 pub fn judge_edges(edges: &Edges) -> Check {
     let id = CheckId::LoopSamples;
     let name = "mean square error on the edges of one direction over that of independent samples";

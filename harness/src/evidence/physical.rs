@@ -19,7 +19,7 @@ const NODES: f64 = 1.7;
 pub struct Probes {
     /// The questions.
     pub queries: Vec<api::BsdfQuery>,
-    /// So many pairs of queries come first: a pair of directions, then the same exchanged.
+    /// Number of pairs of queries that come first: a pair of directions, then the same exchanged.
     pairs: usize,
     /// Then the nodes of one integral after another: their solid angles [sr].
     integrals: Vec<Vec<f64>>,

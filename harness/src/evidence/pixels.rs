@@ -9,7 +9,7 @@ use super::shading::{ShadedPoint, Shading};
 use crate::expected::SurfacePoint;
 use crate::imaging::reference::{Region, RegionMask};
 
-/// So many pixels of an image are looked at.
+/// Number of pixels of an image that are looked at.
 const PIXELS: usize = 3000;
 /// The largest relative difference that is none: WGSL's pow at high exponents.
 const RELATIVE: f64 = 5e-3;

@@ -99,7 +99,7 @@ impl Premultiplied {
             let shaded = seen_by_shader(scene, &camera, point);
             let (right, left) = (Shading::default(), self.left_to_stages());
             let n = f64::from(shaded.material.exponent);
-            // The lobe's normalization hangs on n, which the factor is taken at here.
+            // The lobe's normalization depends on n; the factor is taken at this n.
             let left = Shading { factor: [left[0], left[1] / (self.specular.of)(n)], ..right };
             let (right, left) = (right.radiance(&shaded), left.radiance(&shaded));
             let ratio = |c: usize| if left[c] > 0.0 { right[c] / left[c] } else { 1.0 };

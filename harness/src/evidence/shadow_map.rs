@@ -12,9 +12,9 @@ use crate::imaging::reference::RegionMask;
 /// A pixel is lit when it differs from the image without shadows by less than this fraction, dark
 /// when less than this fraction is left.
 const HALF_LIGHT: f32 = 0.02;
-/// What is dimmer than this fraction of the scene's median tells nothing about shadows.
+/// Pixels dimmer than this fraction of the scene's median tell nothing about shadows.
 const DIM: f32 = 1e-5;
-/// So much of the lit and of the shadowed surface must tell something.
+/// Fraction of the lit and of the shadowed surface that must tell something.
 const LEAST_KNOWN: f64 = 0.25;
 /// An image may have shadows when so much of what lies in shadow is black: not all of it where
 /// mirrors are, which are drawn plain.
@@ -229,8 +229,7 @@ const AMBIENT: f64 = 0.5;
 /// The mistake of shadows where light belongs, and the reverse.
 const EXCHANGED: &str = "lit and dark are exchanged";
 
-/// What wrong shadows cost, with the fractions of lit and of shadowed pixels that are wrong. Both
-/// count apart and add up.
+/// The price of wrong shadows, with the fractions of lit and of shadowed pixels that are wrong. The two errors add up.
 fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64) -> Price {
     // Without a shadow anywhere, or light, nothing is there.
     let dark = pixels.iter().filter(|pixel| pixel.visibility < f64::from(HALF_LIGHT)).count();
@@ -341,7 +340,7 @@ mod tests {
         assert_eq!(judge(&acne, &without), Some(Verdict::Fail));
         let not_a_number = image(|i| if i < 10 { f32::NAN } else { 0.0 });
         assert_eq!(judge(&not_a_number, &without), Some(Verdict::Fail));
-        // A black renderer tells nothing, and earns nothing by it.
+        // A black renderer shows nothing and earns nothing.
         assert_eq!(judge(&right, &image(|_| 0.0)), None);
     }
 

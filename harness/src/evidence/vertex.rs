@@ -190,10 +190,10 @@ impl Seen {
     }
 }
 
-/// So many of the pixels shown may be blends of surfaces along edges.
+/// Fraction of the shown pixels that may be blends of surfaces along edges.
 const EDGES: f64 = 0.1;
 
-/// What wrong frames cost: each of the three things alone, together as much as they add up to.
+/// The price of wrong frames: the sum of the prices of the three outputs.
 fn price(film: &StageFilm, seen: &[Seen; 3], frames: &[Frames; 3]) -> Price {
     let [usual, in_view, in_projection] = seen;
     // Where nothing shows because of the matrices, the frames that show most tell the rest.

@@ -32,7 +32,7 @@ pub enum Visibility {
     Clear,
     /// Something lies between, with a margin.
     Blocked,
-    /// It hangs on the epsilon of the shadow ray.
+    /// It depends on the epsilon of the shadow ray.
     Unsure,
 }
 

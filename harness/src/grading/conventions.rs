@@ -56,7 +56,7 @@ struct WitnessAnswer {
 
 impl<'a> Answers<'a> {
     /// Probes both BSDFs: given by value, as a textured scene hands them out, and as any held-back
-    /// one does, whose materials nobody has seen. Answers what hangs on no convention.
+    /// one does, whose materials nobody has seen. Returns the checks that depend on no convention.
     pub fn probe_bsdfs(
         &mut self,
         session: &Session,
@@ -105,7 +105,7 @@ impl<'a> Answers<'a> {
             let by_value =
                 |answer: &&mut BsdfAnswer| answer.kind == kind && answer.scene.is_empty();
             let known = self.bsdfs.iter_mut().find(by_value);
-            // Whoever does not answer them leaves no such convention.
+            // A renderer that does not answer them keeps no such convention.
             let (Some(known), Some(answer)) = (known, outcome.answer()) else { continue };
             if let Ok(values) = &mut known.values {
                 values.extend(session::colours(&answer.values));

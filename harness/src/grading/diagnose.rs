@@ -121,7 +121,7 @@ impl Grading<'_> {
                 session.record(View::new(Kind::Bonus, name), Thumbnail::of_ratio(with, without));
             }
             if case.is_probe() {
-                // At one sample the film tells nothing that the rays do not.
+                // At one sample the film shows no more than the rays.
                 let film = of(evidence::images::Kind::Offline { spp: case.spp });
                 let film = film.filter(|_| case.spp > 1);
                 for (kind, image) in [(Kind::Realtime, plain), (Kind::Film, film)] {

@@ -131,7 +131,7 @@ pub fn draw_plain(
     drawn.collect()
 }
 
-/// Whether two outcomes are the same, bit by bit; what is no number equals itself.
+/// Whether two outcomes are the same, bit by bit; NaN equals itself.
 fn same(a: &Outcome, b: &Outcome) -> bool {
     match (a.answer(), b.answer()) {
         (Some(a), Some(b)) => {

@@ -48,7 +48,7 @@ impl Reference for Grading<'_> {
         let mut request = request.clone();
         request.scene_mut().options.clear();
         let key = hex(&Sha256::digest(serde_json::to_vec(&request).unwrap_or_default()));
-        // Whoever asks the same meanwhile waits.
+        // Other threads that ask the same meanwhile wait.
         let mut known =
             self.reference_costs.questions.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(cost) = known.get(&key) {

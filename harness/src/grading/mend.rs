@@ -13,8 +13,7 @@ use crate::intake::Finding;
 use crate::process::Exit;
 use crate::rubric::Rules;
 
-/// So many times files are replaced: the first time those that are wrong, then those that needed
-/// what was theirs.
+/// Number of rounds in which files are replaced: first the wrong files, then files that needed their content.
 const ROUNDS: usize = 3;
 
 /// The check that says which files were replaced; it costs nothing by itself.
@@ -364,7 +363,7 @@ mod tests {
         let help = "help: to create the module `phong`, create file \"src/bsdfs/phong.rs\" or \
                     \"src/bsdfs/phong/mod.rs\"\n";
         assert_eq!(of(error(module, "src/bsdfs/mod.rs", help)), ["bsdfs/phong.rs"]);
-        // Somebody else's files are nobody's to replace, wherever a path leads.
+        // Only the template's files are replaced, wherever a path leads.
         for file in ["", "src/../../etc/passwd", "/rustc/library/core.rs", "src/mine.rs"] {
             assert_eq!(of(error("wrong", file, "")), [""; 0]);
         }

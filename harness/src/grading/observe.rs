@@ -12,16 +12,16 @@ use crate::expected::SurfacePoint;
 use crate::imaging::reference::RegionMask;
 use crate::plugin::Witness;
 
-/// So many answers of each kind are kept of a scene.
+/// Number of answers of each kind that are kept of a scene.
 const KEPT: usize = 300;
-/// So far behind the light, in distances to it, occluders are looked for.
+/// How far behind the light occluders are looked for, in distances to it.
 const REACH: f32 = 4.0;
-/// So many occluders of one ray are looked for.
+/// Number of occluders of one ray that are looked for.
 const MOST_OCCLUDERS: usize = 16;
-/// Shadow rays leave the surface so far from it, relatively to the light's distance: nearer hits
-/// are the surface itself.
+/// Distance from the surface at which shadow rays start, relative to the light's distance: nearer hits are the surface
+/// itself.
 const START: f32 = 1e-4;
-/// So many of a shape's pixels must show the same value.
+/// Fraction of a shape's pixels that must show the same value.
 const SAME: f64 = 0.9;
 
 /// Answers to the probes of a BSDF given by value.

@@ -297,7 +297,7 @@ fn record_rays(
     if let (Outcome::Done(with), Outcome::Done(without)) = (with, without) {
         let pairs = session::colours(&with.values).iter().zip(session::colours(&without.values));
         let sums = pairs.map(|(a, b)| (a.iter().sum::<f32>(), b.iter().sum::<f32>()));
-        // What is black without shadows tells nothing.
+        // A ray that is black without shadows tells nothing.
         let told = small.batch.met().zip(sums).filter(|(_, (_, without))| *without != 0.0);
         let visibility = told.map(|(&pixel, (with, without))| (pixel, [with / without; 3]));
         session.record(

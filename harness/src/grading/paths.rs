@@ -141,7 +141,7 @@ fn mark(checks: &mut [Check], cases: &[PreparedScene]) {
     for check in checks {
         check.held_back = held_back;
         let case = cases.iter().find(|case| case.entry.name == check.scene);
-        // Shadows where none belong are no matter of the scene.
+        // Shadows where none belong do not depend on the scene.
         let own = case.filter(|_| check.id != CheckId::BonusDefault);
         check.weight = own.map_or(1.0, |case| case.entry.weight);
     }

@@ -61,7 +61,7 @@ pub struct ProbeFilm {
     pub mask: RegionMask,
     /// Regions without shadows.
     pub unshadowed_mask: RegionMask,
-    /// The rays that hang on nothing.
+    /// The unambiguous rays.
     pub batch: RayBatch,
     /// What several samples a pixel are judged on; of scenes with stored images alone.
     pub sampled: Option<Sampled>,

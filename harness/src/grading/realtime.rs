@@ -248,7 +248,7 @@ fn shows_its_shadows(
         || by_visibility().is_some_and(|check| check.verdict == Verdict::Pass)
 }
 
-/// So much of the shadowed pixels' number must change when nothing is drawn into a shadow map.
+/// Number of pixels that must change when nothing is drawn into a shadow map, over the number of shadowed pixels.
 const LEAST_CHANGED: f64 = 0.2;
 
 /// Why shadows that are right come from no shadow map that is drawn and read, if that is so: the same

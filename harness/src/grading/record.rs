@@ -1,4 +1,4 @@
-//! What is kept of one graded submission: everything that its report and its grade are made from.
+//! The record of one graded submission: everything that its report and its grade are made from.
 
 use std::path::PathBuf;
 

@@ -41,7 +41,7 @@ const MOST_BACKGROUND: f64 = 0.2;
 /// Fraction of the surfaces that outlines of triangles may cover; beyond it, triangles are as small as pixels. Scenes
 /// of few triangles have 0.1 to 0.3 on small films, triangles of a pixel 0.9 and more.
 const MOST_OUTLINES: f64 = 0.6;
-/// Scenes of more triangles tell nothing by their outlines.
+/// On scenes with more triangles, outlines prove nothing.
 const FEW_TRIANGLES: usize = 200;
 
 /// Findings on how a pass makes its frames.

@@ -25,8 +25,8 @@ use draw::Draw;
 use files::File;
 use preview::ScenePreview;
 
-/// So many draws are looked at before a scene is given up. Over 200 seeds about every fourth draw is
-/// accepted, and none needed half of these.
+/// Number of draws that are previewed before a scene is given up. Over 200 seeds about every fourth draw is accepted,
+/// and none needed half of these.
 const TRIES: u32 = 100;
 
 /// What a batch has held back. The seed tells all of it.

@@ -27,8 +27,8 @@ pub struct ErrorMap {
 }
 
 impl ErrorMap {
-    /// The relative error of the mean of the channels, at most 100 %, which is also what is not finite; emitters have
-    /// none. `None` when the sizes differ.
+    /// The relative error of the mean of the channels, at most 100 %, which also stands for values that are not finite;
+    /// emitters have none. `None` when the sizes differ.
     pub fn of(
         actual: &Image,
         expected: &Image,

@@ -12,8 +12,8 @@ pub struct Tolerances {
     pub z_limit: f64,
     /// The largest fraction of interior pixels that may fail: the geometric mean of 6e-5 and 1e-3.
     pub interior_fraction: f64,
-    /// So many pixels more may fail, in the interior and on edges, on any film. Gaussian noise puts 6e-5 of the pixels
-    /// above 4: on 6,000 pixels 6 or more come once in 300,000 images, 3 or more once in 150.
+    /// Number of further pixels that may fail, in the interior and on edges, on any film. Gaussian noise puts 6e-5 of
+    /// the pixels above 4: on 6,000 pixels 6 or more come once in 300,000 images, 3 or more once in 150.
     pub spare_pixels: u32,
     /// The largest fraction of the edge mask that may fail. A correct image has under 1 % there (binomial coverage at
     /// 16 spp, this module's tests); an image half a pixel off at 1 spp has 16 % of a mask three pixels wide.

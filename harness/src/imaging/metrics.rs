@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::difference::Sums;
 use super::flip::{PIXELS_PER_DEGREE, flip_hdr, flip_ldr};
 
-/// So many pixels are summed by one thread.
+/// Number of pixels that one thread sums.
 const PART: usize = 1 << 14;
 
 /// All metrics of an image against the expected one. A field is `None` where it is undefined: a value is not finite,

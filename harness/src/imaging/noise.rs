@@ -13,12 +13,12 @@ use super::srgb;
 /// A pixel is noisy when one sample's standard deviation is at least this fraction of the brightest
 /// value around it: far above what half precision and 8-bit levels round away at 16 spp.
 const NOISY: f32 = 0.1;
-/// Fewer noisy pixels than this tell nothing.
+/// Least number of noisy pixels that a measurement needs.
 const FEWEST: usize = 200;
 /// Noisy pixels near an interior pixel that differs by this fraction of its value (and by what no
 /// noise does) are wrong, not noisy.
 const WRONG: f32 = 0.02;
-/// So near, in pixels: edges are three pixels wide.
+/// Distance that counts as near, in pixels: edges are three pixels wide.
 const NEAR: usize = 2;
 /// Two images are one when at most this fraction of the noisy pixels is further apart than one
 /// 8-bit level. Of two draws at 16 spp most are.

@@ -224,7 +224,7 @@ pub fn full_scale(actual: &Image, expected: &Image, mask: &RegionMask, median_li
     STEPS.into_iter().find(|&step| step >= size).unwrap_or(STEPS[8])
 }
 
-/// So many pixels are a ray's wide and high in its map.
+/// Width and height of a ray's square in its map, in pixels.
 const RAY_SIDE: usize = 6;
 /// Lit, though it should be in shadow; and the other way round (Okabe and Ito 2008: told apart by the color-blind).
 const RAY_COLOURS: [[u8; 3]; 2] = [[230, 159, 0], [86, 180, 233]];

@@ -229,7 +229,7 @@ fn canonical(path: &str, tree: &TreeSpec) -> String {
     tree.file_at(path).map_or(path, |file| &file.path).to_owned()
 }
 
-/// A listed path as a plain relative path, and what is to be said of how it is written.
+/// A listed path as a plain relative path, and the finding on its spelling.
 fn resolve(
     written: &str,
     paths: &[&str],

@@ -22,7 +22,7 @@ use crate::harmless::printable;
 pub(super) enum Stop {
     /// The submission is refused; the findings say why.
     Refused,
-    /// The destination or the source cannot be used; no matter of the submission.
+    /// The destination or the source cannot be used; not the submission's fault.
     Io(IntakeError),
 }
 

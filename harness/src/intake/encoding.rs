@@ -7,8 +7,8 @@ pub(super) fn text_of(bytes: &[u8]) -> String {
     decode(bytes).0
 }
 
-/// The text in these bytes, and what is to be said of its encoding: UTF-8, UTF-16 as some editors save it, or
-/// else the code page of western Windows, in which every byte is a character.
+/// The text in these bytes, and a remark on its encoding: UTF-8, UTF-16 as some editors save it, or else the code page
+/// of western Windows, in which every byte is a character.
 pub(super) fn decode(bytes: &[u8]) -> (String, Option<Finding>) {
     let other = |line: u32, code: &str, message: &str| {
         Some(Finding::warning(code, message).on_line(line).hint("save as UTF-8 without BOM"))

@@ -165,7 +165,7 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// So many of each severity are kept.
+    /// Number of findings of each severity that are kept.
     pub(super) const KEPT: usize = 50;
 
     pub(super) fn push(&mut self, finding: Finding) {

@@ -223,7 +223,7 @@ const LANGUAGES: [(&str, &[&str]); 7] = [
     ("Go", &["go"]),
 ];
 
-/// What is to be said of a file that is missing; of a source file, whether it is written in another language.
+/// The finding on a missing file; for a source file, it says whether the source is in another language.
 fn missing(expected: String, paths: &[&str]) -> Finding {
     let end = |path: &str| path.rsplit_once('.').map(|(_, end)| end.to_lowercase());
     let ends: Vec<String> = paths.iter().filter_map(|path| end(path)).collect();

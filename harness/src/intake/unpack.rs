@@ -161,7 +161,7 @@ pub fn unpack_bytes(
     within(found, unpack_once(&inner, name, dest, tree, limits))
 }
 
-/// What came of the inner one of two archives, with what is to be said of the outer one.
+/// The result for the inner one of two archives, with the findings on the outer one.
 fn within(
     found: Finding,
     inner: Result<Submission, IntakeError>,

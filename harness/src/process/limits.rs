@@ -8,9 +8,9 @@ use crate::sandbox::{self, Isolation, Policy};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
-    /// So many seconds it may stand still, neither computing nor waiting for a processor or a disk: a
-    /// busy machine does not count. Where the system does not tell (it does on Linux), seconds by the
-    /// clock. The parent enforces it, and gives up on a child that got no processor for 20 times as long.
+    /// Seconds that it may stand still, neither computing nor waiting for a processor or a disk: a busy machine does
+    /// not count. Where the system does not tell (it does on Linux), seconds by the clock. The parent enforces it, and
+    /// gives up on a child that got no processor for 20 times as long.
     pub wall_s: f64,
     /// CPU time of all threads together, in whole seconds.
     pub cpu_s: u64,

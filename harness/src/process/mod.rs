@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sandbox::InForce;
 
-/// Is told how many CPU seconds a child has had so far, and says whether it may go on: see [`run`].
+/// Receives the CPU seconds that a child has used so far, and says whether it may continue: see [`run`].
 pub type Watcher<'a> = dyn FnMut(f64) -> std::ops::ControlFlow<()> + 'a;
 
 /// How a child ended.

@@ -116,7 +116,7 @@ pub fn run(
         (None, None) => Exit::Code(libc::WEXITSTATUS(status)),
     };
     let in_force = match lock.sandbox.as_ref().map(in_force) {
-        // It was not locked, and nothing foreign ran: that is nobody's fault but the machine's.
+        // It was not locked, and nothing foreign ran: only the machine can be at fault.
         Some(Err(error)) if ended_by_us.is_none() => return Err(io::Error::other(error)),
         Some(in_force) => in_force.ok(),
         None => None,
@@ -278,7 +278,7 @@ impl Pipe {
         self.end.is_some()
     }
 
-    /// Takes what is there, at most a mouthful; whether there was anything.
+    /// Reads the available bytes, up to a limit. Returns whether there were any.
     fn read(&mut self) -> bool {
         let Some(end) = &mut self.end else { return false };
         let (mut buffer, mut taken) = ([0; 64 << 10], 0);

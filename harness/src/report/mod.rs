@@ -195,7 +195,7 @@ pub enum ReportError {
         /// Why.
         source: std::io::Error,
     },
-    /// What was found out about a submission cannot be had.
+    /// The evidence about a submission is not available.
     #[error("{slug}: {reason}")]
     Entry {
         /// Its folder in the report.

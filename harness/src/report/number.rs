@@ -61,7 +61,7 @@ pub(super) fn significant(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }
 
-/// A share of a whole in percent, without digits behind the point; what is there at all is never `0 %`.
+/// A share of a whole in percent, without decimals; a share above 0 is never `0 %`.
 pub(super) fn percent(part: usize, whole: usize) -> String {
     match (100.0 * part as f64 / whole.max(1) as f64).round() {
         0.0 if part > 0 => "under 1 %".to_owned(),

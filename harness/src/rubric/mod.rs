@@ -4,11 +4,11 @@
 //! 1. A gate that is closed caps the total.
 //! 2. A *path* (offline or realtime) whose proof passes on every scene earns all its parts in full.
 //! 3. Otherwise each part is worth what its own evidence says, the worst scene counting.
-//! 4. Evidence that does not apply gives way to the part's fallback.
+//! 4. If a part's evidence does not apply, its fallback decides.
 //! 5. A check that fails costs its scene's weight times what the curve takes for its error; a part
 //!    loses the largest of them, never a sum or a mean.
 //! 6. When the proof fails and no part's own evidence says why, the path's `residual_part` pays.
-//! 7. What the machine could not ask is a range from 0 to all points, with its reason.
+//! 7. A part that the machine could not test is a range from 0 to all points, with its reason.
 //! 8. Without code, a part earns nothing until the instructor confirms what its images show
 //!    ([`PartGrade::unconfirmed`]).
 //! 9. Public and held-back scenes are graded apart by these rules; the lower counts, part by part.

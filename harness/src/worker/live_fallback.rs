@@ -8,7 +8,7 @@ use super::outcome::Outcome;
 use super::supervise::Supervisor;
 use crate::process::Limits;
 
-/// Cannot be had here.
+/// Not available here.
 pub enum LiveWorker {}
 
 impl LiveWorker {

@@ -35,7 +35,7 @@ pub struct Supervisor {
     pub umbra: PathBuf,
     /// Where each worker's private folder is made, and removed in the end.
     pub scratch: PathBuf,
-    /// What isolates workers and compilers. A layer that cannot be had is an error of the machine.
+    /// What isolates workers and compilers. A layer that is not available is an error of the machine.
     pub isolation: Layers,
     /// Folders with compiled shaders of trusted workers, which each worker that draws gets copies of.
     pub shaders: Vec<PathBuf>,
@@ -94,7 +94,7 @@ impl Supervisor {
     }
 
     /// Does something beside others, and where it ran out of time once more, alone on the machine:
-    /// a busy machine is nobody's fault. For what is asked but once; jobs have a [`RetryBudget`].
+    /// a busy machine is nobody's fault. For work that is done only once; jobs have a [`RetryBudget`].
     pub fn confirming_timeouts<T>(
         &self,
         once: impl Fn() -> T,

@@ -12,13 +12,13 @@ pub const THREADS: [u32; 3] = [1, 2, 4];
 /// Seeds of right renderers: as student ids are.
 const SEEDS: [u64; 4] = [260_000_001, 260_712_345, 261_999_999, 7];
 
-/// Of the mistakes, `--quick` takes each so manieth; and so many pairs and triples of these.
+/// `--quick` takes every n-th of the mistakes, and this many pairs and triples of them.
 pub const QUICK_STEP: usize = 6;
 pub const QUICK_PAIRS: usize = 60;
 pub const QUICK_TRIPLES: usize = 20;
 /// The samples per pixel of all these.
 pub const QUICK_SPP: u32 = 4;
-/// So many triples otherwise.
+/// Number of triples without `--quick`.
 pub const TRIPLES: usize = 500;
 
 /// The seed of what stands for the other path.

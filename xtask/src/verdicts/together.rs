@@ -14,13 +14,13 @@ use super::row::Row;
 
 /// Seed of what is drawn: the same in every run.
 const SEED: u64 = 10_000_019;
-/// So many mistakes stand for their family in [`pairs`].
+/// Number of mistakes that represent their family in [`pairs`].
 const OF_FAMILY: usize = 3;
 /// Points are published with two digits.
 const ROUNDING: f64 = 0.011;
-/// So many combinations may gain for now, all of them printed: one mistake hides another (on a black material no
-/// shadow is missed), and what an image alone shows, such as half a pixel in realtime, is charged to no part when
-/// others are wrong. Of 453 pairs none is known to gain, of 500 triples 22.
+/// Fraction of the combinations that may gain for now; all of them are printed: one mistake hides another (on a black
+/// material no shadow is missed), and what an image alone shows, such as half a pixel in realtime, is charged to no
+/// part when others are wrong. Of 453 pairs none is known to gain, of 500 triples 22.
 const NOT_YET: f64 = 0.06;
 /// An image must be nearer by this fraction to tell that two mistakes mend each other.
 const NEARER: f64 = 0.98;
@@ -68,7 +68,7 @@ pub fn pairs(catalogue: &Catalogue, fits: Fits) -> Vec<Subject> {
     pairs
 }
 
-/// So many different combinations of `size` mistakes on one path, drawn from `names`.
+/// A number of different combinations of `size` mistakes on one path, drawn from `names`.
 pub fn drawn(
     catalogue: &Catalogue,
     names: &[&str],

@@ -33,7 +33,7 @@ pub(super) fn write(
     Ok(written)
 }
 
-/// The median of what is not black, for exposure.
+/// The median of the values that are not black, for exposure.
 fn median(image: &Image) -> f32 {
     let mut lit: Vec<f32> = image
         .pixels

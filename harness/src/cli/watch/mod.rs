@@ -246,7 +246,7 @@ struct Check<'a> {
     root: Option<&'a Path>,
     board: &'a Arc<Board>,
     live: &'a Arc<LiveView>,
-    /// Where it is told that a check has ended.
+    /// Where the end of a check is reported.
     happened: Sender<Happened>,
     /// The scene of the first look.
     scene: Option<String>,

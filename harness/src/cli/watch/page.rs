@@ -1,4 +1,4 @@
-//! The page of `umbra watch`: a line that says what goes on, above the report.
+//! The page of `umbra watch`: a status line above the report.
 
 use base64::Engine as _;
 use sha2::Digest as _;

@@ -12,7 +12,7 @@ use super::linear::least_squares;
 pub struct Accuracy {
     /// The largest relative difference of an answer that a formula explains.
     pub relative: f64,
-    /// So many of the answers may differ more.
+    /// Fraction of the answers that may differ more.
     pub stray: f64,
 }
 
@@ -31,7 +31,7 @@ const UNEXPLAINED: f64 = 0.01;
 const FITTED: usize = 300;
 /// Number of the others that are looked at first.
 const GLANCE: usize = 60;
-/// Fewer samples than this tell nothing.
+/// Least number of samples that a fit needs.
 const LEAST: usize = 60;
 /// The mean relative difference from what is right below which there is nothing to explain.
 const NOTHING: f64 = 1e-5;

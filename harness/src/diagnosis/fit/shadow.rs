@@ -17,13 +17,13 @@ pub struct ShadowRay {
 
 /// Visibilities that differ by less are the same.
 const SAME: f64 = 0.02;
-/// So many rays may be otherwise.
+/// Fraction of the rays that may differ.
 const STRAY: f64 = 5e-3;
-/// So many of the wrong rays may be wrong for another reason.
+/// Fraction of the wrong rays that may be wrong for another reason.
 const OTHERWISE: f64 = 0.05;
-/// Fewer rays on either side of a limit tell nothing of it.
+/// Least number of rays on either side of a limit that is needed to find it.
 const LEAST: usize = 8;
-/// An estimate is said when it is known to this, relatively.
+/// An estimate is reported only if its relative uncertainty is below this.
 const NARROW: f64 = 0.1;
 
 /// What is wrong with visibility, if one thing is.

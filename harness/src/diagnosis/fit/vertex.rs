@@ -27,7 +27,7 @@ pub struct VertexSeen {
     pub projection: Mat4,
 }
 
-/// So many pixels may be otherwise.
+/// Fraction of the pixels that may differ.
 const STRAY: f64 = 0.02;
 /// Positions that are nearer, relatively to the largest, are the same.
 const POSITION: f32 = 4e-3;
@@ -35,7 +35,7 @@ const POSITION: f32 = 4e-3;
 const NORMAL: f32 = 2e-2;
 /// Places on the film that are nearer are the same: a tenth of a pixel of a small film.
 const PLACE: f64 = 1e-3;
-/// Fewer pixels tell nothing.
+/// Least number of pixels that a diagnosis needs.
 const LEAST: usize = 50;
 
 /// What is wrong with a vertex stage, if one thing is.

@@ -245,7 +245,7 @@ fn changes<'a>(batch: &'a RayBatch, occluders: &'a Occluders<'a>) -> Vec<Change<
     changes
 }
 
-/// What wrong visibility costs. Errors of lit and of dark rays count apart and add up.
+/// The price of wrong visibility. The errors of lit and of dark rays add up.
 fn price(batch: &RayBatch, known: &[(usize, f64)], raw: f64, occluders: &Occluders) -> Price {
     let of = |wanted: bool| known.iter().filter(move |(index, _)| (*index < batch.lit) == wanted);
     let counts = [of(true).count().max(1), of(false).count().max(1)].map(|n| n as f64);

@@ -101,7 +101,7 @@ fn shining(batch: &RayBatch, answer: &Unshadowed) -> usize {
     black.iter().filter(|value| **value != [0.0; 3]).count()
 }
 
-/// What the answers under all witnesses cost together: one mistake must explain all of them.
+/// The price of the answers under all witnesses together: one mistake must explain all of them.
 fn price_of(
     batch: &RayBatch,
     answers: &[Unshadowed],
@@ -127,7 +127,7 @@ fn price_of(
     answers.price(Some(raw))
 }
 
-/// How one witness' answers differ from what is right.
+/// How one witness' answers differ from the right ones.
 struct Difference {
     /// Fraction of the rays that differ by more than the tolerance.
     wrong: f64,

@@ -72,7 +72,7 @@ fn private(html: &mut Html, check: &Check) {
 }
 
 fn title(html: &mut Html, check: &Check) {
-    // A sign and a word, so that nothing hangs on the color.
+    // A sign and a word, so that nothing depends on the color.
     html.raw(match check.verdict {
         Verdict::Pass => "<span class=\"badge good\">✓ ",
         Verdict::Fail | Verdict::NotImplemented => "<span class=\"badge bad\">✗ ",

@@ -19,7 +19,7 @@ pub struct Alike {
     pub who: [String; 2],
     /// Their students, where they say so.
     pub names: [String; 2],
-    /// So many files are the same but for comments, blanks and the template.
+    /// Number of files that are equal apart from comments, white space and the template's lines.
     pub same_files: usize,
     /// The share of tokens that match, as JPlag says.
     pub similarity: Option<f64>,
@@ -34,7 +34,7 @@ pub struct Alike {
 pub struct AlikePage {
     /// The assignment's title.
     pub title: String,
-    /// So many pairs JPlag compared.
+    /// Number of pairs that JPlag compared.
     pub compared: usize,
     /// The share of tokens that match in a pair in the middle of them.
     pub median: Option<f64>,

@@ -15,11 +15,11 @@ use crate::harmless::harmless_lines;
 use crate::intake::{Finding, INCLUDE_INSIDE, Severity};
 use crate::rubric::PartGrade;
 
-/// So many lines of the compiler's are shown.
+/// Number of the compiler's lines that are shown.
 const DIAGNOSTIC_LINES: usize = 400;
 
-/// The page of one submission, in the order in which it is wanted: the points; what a compiler says; what was lost,
-/// why, and what it looks like; findings; folded, what was right and everything else that was found out.
+/// The page of one submission, most important first: the points; compiler messages; the lost points, with reasons and
+/// likely mistakes; findings; in collapsed sections, the right parts and all other evidence.
 pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader) -> String {
     let known;
     let own = entry;

@@ -4,7 +4,7 @@ use super::super::BatchReport;
 use super::page::{Page, Style};
 use crate::class::{Class, Kind};
 
-/// So many of a kind are named.
+/// Number of names that are listed of a kind.
 const NAMED: usize = 30;
 
 /// The lines below the table.

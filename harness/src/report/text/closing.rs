@@ -77,7 +77,7 @@ fn is_whole(part: &PartGrade) -> bool {
     points(part.points) == points(part.out_of)
 }
 
-/// What is next to do: what hinders most, then the parts in the handout's order, then submitting.
+/// The next step: the worst obstacle first, then the parts in the handout's order, then submitting.
 fn next(report: &BatchReport, entry: &SubmissionReport, closing: &Closing) -> String {
     let Closing { folder, umbra, .. } = closing;
     let checks = &entry.record.evidence.checks;

@@ -5,7 +5,7 @@ use super::super::{BatchReport, SubmissionReport};
 use super::page::{Look, Page, Style};
 use crate::evidence::{Check, Verdict};
 
-/// Defends the points of a part of a submission, for the instructor.
+/// Explains the points of a part of a submission, for the instructor.
 ///
 /// # Errors
 /// When there is no such part; the message names those that there are.

@@ -11,14 +11,13 @@ use crate::harmless::harmless_lines;
 use crate::intake::{Finding, Severity};
 use crate::rubric::{BUILD, PartGrade};
 
-/// So many lines of the compiler's are shown.
+/// Number of the compiler's lines that are shown.
 const DIAGNOSTIC_LINES: usize = 60;
 /// Wide enough for a verdict and two spaces.
 const VERDICT_WIDTH: usize = 17;
 
-/// One submission: parts with points, and of those that lost some the reason and a hint; what is to be
-/// noticed besides; findings; what the compiler said. With `verbose`, every check with value, bound
-/// and verdict too, and under which conditions they were made.
+/// One submission: parts with points, and a reason and a hint for parts that lost some; other remarks; findings;
+/// compiler messages. With `verbose`, also every check with value, bound and verdict, and the conditions of grading.
 pub fn detail(report: &BatchReport, entry: &SubmissionReport, look: Look, verbose: bool) -> String {
     let SubmissionReport { record, grade, .. } = entry;
     let mut page = Page::new(look.width, look.colours);
@@ -110,7 +109,7 @@ fn parts(
     }
 }
 
-/// What failed without being the matter of a part: it costs nothing, but somebody should look.
+/// Failed checks that belong to no part: they cost nothing, but somebody should look.
 fn noticed(
     page: &mut Page,
     report: &BatchReport,
