@@ -66,21 +66,26 @@ pub struct SurfaceInteraction {
 }
 
 /// [`SurfaceInteraction::epsilon`] over the largest of the point's coordinates and its distance along
-/// the ray. Rounding moves a hit by a few times 6e-8 of them, and by 1 / cos as much along a shadow
-/// ray: this holds to a thousandth of a right angle. The original course has 1e-3 in scenes that
-/// are seen from 5 to 15 units.
+/// the ray. The original course has 1e-3 in scenes that are seen from 5 to 15 units.
 const EPSILON_OF_HIT: f32 = 1e-4;
+/// The same, at most, over the scene's size: contact shadows stay in a scene far from the origin or
+/// from the camera. A camera with a field of view of 14 degrees sees a whole scene from there.
+const EPSILON_OF_SCENE: f32 = 4.0 * EPSILON_OF_HIT;
 /// The same over the largest coordinate of the triangle, for a small view of a huge floor.
 const EPSILON_OF_TRIANGLE: f32 = 1e-6;
-/// The least `min_t` of a ray that begins with [`Ray::EPSILON`], over the largest coordinate of its
-/// origin: nothing changes within 60 units.
-const EPSILON_OF_ORIGIN: f32 = 1.0 / 65536.0;
+/// The least that rounding asks for, over the same as [`EPSILON_OF_HIT`]. Rounding moves a hit by a few
+/// times 6e-8 of them, and by 1 / cos as much along a shadow ray. A ray that begins with
+/// [`Ray::EPSILON`] takes it of its origin: nothing changes within 60 units.
+const EPSILON_OF_ROUNDING: f32 = 1.0 / 65536.0;
 
-/// [`SurfaceInteraction::epsilon`] of a hit at `p`, `t` along the ray, on a triangle.
-pub(crate) fn epsilon_at(p: Vec3, t: f32, corners: &[Vec3; 3]) -> f32 {
+/// [`SurfaceInteraction::epsilon`] of a hit at `p`, `t` along the ray, on a triangle of a scene whose
+/// bounding box has a diagonal of `size`.
+pub(crate) fn epsilon_at(p: Vec3, t: f32, corners: &[Vec3; 3], size: f32) -> f32 {
     let [a, b, c] = corners.map(|corner| corner.abs());
     let triangle = EPSILON_OF_TRIANGLE * a.max(b).max(c).max_element();
-    (EPSILON_OF_HIT * p.abs().max_element().max(t)).max(triangle)
+    let reach = p.abs().max_element().max(t);
+    let usual = (EPSILON_OF_HIT * reach).min(EPSILON_OF_SCENE * size);
+    usual.max(EPSILON_OF_ROUNDING * reach).max(triangle)
 }
 
 impl Ray {
@@ -90,7 +95,7 @@ impl Ray {
         if self.min_t != Self::EPSILON {
             return *self;
         }
-        let least = EPSILON_OF_ORIGIN * self.origin.abs().max_element();
+        let least = EPSILON_OF_ROUNDING * self.origin.abs().max_element();
         let least = least.max(EPSILON_OF_TRIANGLE * extent);
         Self { min_t: Self::EPSILON.max(least), ..*self }
     }

@@ -35,6 +35,8 @@ pub struct Scene {
     bvh: OnceLock<Bvh>,
     /// The largest coordinate of any vertex.
     extent: f32,
+    /// The diagonal of the bounding box of all vertices.
+    size: f32,
     /// Shape and triangle of each triangle in the hierarchy.
     triangles: Vec<(u32, u32)>,
     bsdfs: Vec<Box<dyn Bsdf>>,
@@ -53,8 +55,10 @@ impl Scene {
         let emits = |shape: &&Shape| materials[shape.material].is_emitter();
         let light = shapes.iter().find(emits);
         let light = light.map(|light| (light.index_mean(), materials[light.material].emission));
-        let extent = shapes.iter().flat_map(|shape| &shape.positions);
-        let extent = extent.fold(Vec3::ZERO, |extent, p| extent.max(p.abs())).max_element();
+        let positions = || shapes.iter().flat_map(|shape| &shape.positions);
+        let least = positions().copied().reduce(Vec3::min).unwrap_or_default();
+        let most = positions().copied().reduce(Vec3::max).unwrap_or_default();
+        let extent = least.abs().max(most.abs()).max_element();
         let mut triangles = Vec::new();
         for (index, shape) in shapes.iter().enumerate() {
             triangles.extend((0..shape.triangles.len()).map(|i| (index as u32, i as u32)));
@@ -68,6 +72,7 @@ impl Scene {
             remarks,
             bvh: OnceLock::new(),
             extent,
+            size: (most - least).length(),
             bsdfs: bsdfs.collect(),
             config,
             shapes,
@@ -206,7 +211,7 @@ impl Scene {
             wi: zero,
             shape,
             primitive,
-            epsilon: epsilon_at(corners[0], 0.0, &corners),
+            epsilon: epsilon_at(corners[0], 0.0, &corners, self.size),
         })
     }
 
@@ -233,7 +238,7 @@ impl Scene {
             wi: Vec3::ZERO,
             shape: shape_index as usize,
             primitive: primitive as usize,
-            epsilon: epsilon_at(p, hit.t, &corners),
+            epsilon: epsilon_at(p, hit.t, &corners, self.size),
         }
     }
 }

@@ -389,6 +389,50 @@ fn a_scene_without_a_light_loads_and_only_asking_for_it_fails() {
     assert!(said.starts_with("the scene has no light: no shape of "), "{said}");
 }
 
+/// A thin blocker close above a floor, anywhere and seen from anywhere: no point below it is lit, and none
+/// elsewhere shadows itself.
+#[test]
+fn contact_shadows_stay_far_from_the_origin_and_from_the_camera() {
+    let quad = |half: f32, y: f32, at: Vec3| {
+        let corner = |x: f32, z: f32| format!("v {} {} {}\n", x + at.x, y + at.y, z + at.z);
+        [corner(-half, half), corner(half, half), corner(half, -half), corner(-half, -half)]
+            .concat()
+    };
+    let places = [0.0, 10.0, 300.0, 1e3, 3e3, 1e4].map(|d| vec3(0.0, 0.0, d));
+    let places = places.into_iter().chain([vec3(1e3, -1e3, 1e3), vec3(-4e3, 2e3, 0.0)]);
+    for (at, away) in places.flat_map(|at| [5.0, 100.0, 1500.0, 3000.0].map(|away| (at, away))) {
+        let floor = quad(2.0, 0.0, at);
+        let blocker = quad(0.9, 0.25, at);
+        let obj = format!("mtllib s.mtl\n{floor}{blocker}usemtl grey\nf 1 2 3 4\nf 5 6 7 8\n");
+        let scene = Folder::new("moved", &obj, MTL).load().unwrap();
+        // Between floor and blocker, at a slant, lies the camera's line of sight.
+        let eye = at + away * vec3(0.0, 0.1, 1.0).normalize();
+        let light = at + vec3(0.0, 2.0, 0.0);
+        let (mut below, mut beside) = (0, 0);
+        for index in 0..400u16 {
+            let (x, z) = (f32::from(index % 20) - 9.5, f32::from(index / 20) - 9.5);
+            let target = at + 0.19 * vec3(x, 0.0, z);
+            let direction = (target - eye).normalize();
+            let Some(i) = scene.intersect(&Ray::segment(eye, direction, 0.0, f32::INFINITY)) else {
+                continue;
+            };
+            let local = i.p - at;
+            // The blocker itself, and a margin for what rounding does to places.
+            if local.y > 0.1 || (local.x.abs().max(local.z.abs()) - 1.03).abs() < 0.1 {
+                continue;
+            }
+            let is_below = local.x.abs().max(local.z.abs()) < 1.03;
+            let (distance, direction) = ((light - i.p).length(), (light - i.p).normalize());
+            for epsilon in [Ray::EPSILON, i.epsilon] {
+                let ray = Ray::segment(i.p, direction, epsilon, distance - epsilon);
+                assert_eq!(scene.occluded(&ray), is_below, "{at} from {away}: {local}, {epsilon}");
+            }
+            (below, beside) = (below + u32::from(is_below), beside + u32::from(!is_below));
+        }
+        assert!(below > 10 && beside > 50, "{at} from {away}: {below} and {beside}");
+    }
+}
+
 /// How a student writes a shadow ray, and how the reference does.
 #[test]
 fn no_surface_shadows_itself_in_a_large_scene() {
