@@ -6,7 +6,7 @@ use super::prepared_scene::PreparedScene;
 use super::session::Session;
 use super::stages::named;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
-use crate::worker::{CameraValue, Matrices, Outcome, Request, Stage};
+use crate::worker::{Adapter, CameraValue, Matrices, Outcome, Request, Stage};
 
 /// A frame to be drawn.
 #[derive(Clone)]
@@ -39,13 +39,24 @@ impl<'a> Frame<'a> {
     pub fn probe(case: &'a PreparedScene, stages: Vec<Stage>) -> Self {
         Self { size: (case.probe_film.width, case.probe_film.height), stages, ..Self::plain(case) }
     }
-}
 
-/// Draws once what workers draw again and again, so that their shaders are compiled: with a trusted
-/// renderer, or by Umbra's neutral pass with these stages. Why it fails is told when it counts.
-pub fn compile_shaders(session: &Session, renderer: Option<&Path>, mut frames: Vec<Frame>) {
-    frames.iter_mut().for_each(|frame| frame.size = (16, 16));
-    draw_each(session, renderer, &frames);
+    /// The request that asks for it.
+    pub fn request(&self, session: &Session, adapter: &Adapter) -> Request {
+        Request::RenderRealtime {
+            scene: session.scene(self.toml),
+            width: self.size.0,
+            height: self.size.1,
+            shadow_map: self.shadow_map,
+            adapter: adapter.clone(),
+            stages: self.stages.clone(),
+            cameras: match self.each_matrices {
+                true => Matrices::ALL
+                    .map(|matrices| CameraValue { matrices, ..self.case.camera })
+                    .into(),
+                false => vec![self.case.camera; self.times],
+            },
+        }
+    }
 }
 
 /// Draws one frame in a worker of its own.
@@ -61,21 +72,8 @@ pub fn draw_each(session: &Session, plugin: Option<&Path>, frames: &[Frame]) -> 
         Ok(adapter) => adapter,
         Err(reason) => return vec![Outcome::NoAdapter(reason.clone()); frames.len()],
     };
-    let request = |frame: &Frame| Request::RenderRealtime {
-        scene: session.scene(frame.toml),
-        width: frame.size.0,
-        height: frame.size.1,
-        shadow_map: frame.shadow_map,
-        adapter: adapter.clone(),
-        stages: frame.stages.clone(),
-        cameras: match frame.each_matrices {
-            true => {
-                Matrices::ALL.map(|matrices| CameraValue { matrices, ..frame.case.camera }).into()
-            }
-            false => vec![frame.case.camera; frame.times],
-        },
-    };
-    let mut outcomes = session.run(plugin, frames.iter().map(request).collect());
+    let requests = frames.iter().map(|frame| frame.request(session, adapter)).collect();
+    let mut outcomes = session.run(plugin, requests);
     for (outcome, frame) in outcomes.iter_mut().zip(frames) {
         if let Outcome::Done(answer) = outcome {
             let floats = answer.values.len() / frame.times;
