@@ -1,6 +1,7 @@
 //! The way of one submission through all stages, and of many.
 
 mod attribution;
+mod begun;
 mod cache;
 mod cache_key;
 mod contain;
@@ -31,6 +32,7 @@ pub mod submitted;
 mod tree_checks;
 mod uploads;
 
+pub use begun::{Begun, Workshop};
 pub use cache::{Earlier, RecordCache};
 pub use contain::INTERNAL_ERROR;
 pub use costs::Cost;

@@ -4,8 +4,9 @@ use std::panic::resume_unwind;
 use std::path::Path;
 use std::time::Instant;
 
+use super::costs::Costs;
 use super::offline::Drawn;
-use super::pipeline::{Costs, Grading, RenderPath};
+use super::pipeline::{Grading, RenderPath};
 use super::session::Session;
 use super::stages::Stages;
 use crate::evidence::Check;
