@@ -35,6 +35,12 @@ impl<'a> Frame<'a> {
         Self { case, toml, size, shadow_map: false, times: 1, each_matrices: false, stages }
     }
 
+    /// The realtime image with shadows, if the scene has one.
+    pub fn bonus(case: &'a PreparedScene) -> Option<Self> {
+        let toml = case.bonus.as_deref()?;
+        Some(Self { toml, shadow_map: true, ..Self::plain(case) })
+    }
+
     /// A scene's small film under other stages.
     pub fn probe(case: &'a PreparedScene, stages: Vec<Stage>) -> Self {
         Self { size: (case.probe_film.width, case.probe_film.height), stages, ..Self::plain(case) }
@@ -109,24 +115,18 @@ pub fn draw_scenes(
     drawn
 }
 
-/// Draws the plain image of every scene: those that only probe share a worker.
-pub fn draw_plain(
+/// Draws one frame of each scene, as [`draw_scenes`] does.
+pub fn draw_one_each(
     session: &Session,
     plugin: &Path,
-    cases: &[PreparedScene],
+    frames: &[Frame],
     is_right: &dyn Fn(&PreparedScene, &Outcome) -> bool,
 ) -> Vec<Outcome> {
-    let probes: Vec<&PreparedScene> = cases.iter().filter(|case| case.is_probe()).collect();
-    let frames: Vec<Vec<Frame>> = probes.iter().map(|case| vec![Frame::plain(case)]).collect();
+    let scenes: Vec<Vec<Frame>> = frames.iter().map(|frame| vec![frame.clone()]).collect();
     let all_right = |index: usize, outcomes: &[Outcome]| {
-        outcomes.iter().all(|outcome| is_right(probes[index], outcome))
+        outcomes.iter().all(|outcome| is_right(frames[index].case, outcome))
     };
-    let mut shared = draw_scenes(session, plugin, &frames, &all_right).into_iter().flatten();
-    let drawn = cases.iter().map(|case| {
-        let shared = if case.is_probe() { shared.next() } else { None };
-        shared.unwrap_or_else(|| draw(session, Some(plugin), &Frame::plain(case)))
-    });
-    drawn.collect()
+    draw_scenes(session, plugin, &scenes, &all_right).into_iter().flatten().collect()
 }
 
 /// Whether two outcomes are the same, bit by bit; what is no number equals itself.
