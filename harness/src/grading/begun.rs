@@ -20,6 +20,9 @@ use crate::process::Exit;
 use crate::rubric::BUILD;
 use crate::worker::Supervisor;
 
+/// Is told what is being done.
+pub type Say<'a> = &'a (dyn Fn(&str) + Sync);
+
 /// Receives and builds submissions.
 #[derive(Clone, Copy)]
 pub struct Workshop<'a> {
@@ -71,7 +74,7 @@ impl Workshop<'_> {
         source: &Path,
         slug: &str,
         mode: Mode,
-        say: &dyn Fn(&str),
+        say: Say,
     ) -> anyhow::Result<Begun> {
         say("copying the files");
         let decoder = Decoder::new(self.supervisor, &self.assignment.limits.decode, self.cancel);
@@ -120,7 +123,7 @@ impl Workshop<'_> {
     ///
     /// # Errors
     /// The machine's matters and Ctrl-C.
-    pub fn build(&self, begun: &mut Begun, say: &dyn Fn(&str)) -> anyhow::Result<()> {
+    pub fn build(&self, begun: &mut Begun, say: Say) -> anyhow::Result<()> {
         let Some((submission, _)) = &begun.received else { return Ok(()) };
         say("compiling the source");
         let src = submission.root.join("src");

@@ -9,7 +9,7 @@ use std::time::Instant;
 use anyhow::Context;
 use tempfile::TempDir;
 
-use super::begun::{Begun, Workshop};
+use super::begun::{Begun, Say, Workshop};
 use super::cache::RecordCache;
 use super::costs::ReferenceCosts;
 use super::pictures::Images;
@@ -197,7 +197,7 @@ impl<'a> Grading<'a> {
         slug: &str,
         out: &Folders,
         mode: Mode,
-        say: &dyn Fn(&str),
+        say: Say,
     ) -> anyhow::Result<Record> {
         let workshop = self.workshop();
         let mut begun = workshop.receive(source, slug, mode, say)?;
@@ -219,7 +219,7 @@ impl<'a> Grading<'a> {
     ///
     /// # Errors
     /// As [`Grading::submission`].
-    pub fn judge(&self, begun: Begun, out: &Folders, say: &dyn Fn(&str)) -> anyhow::Result<Record> {
+    pub fn judge(&self, begun: Begun, out: &Folders, say: Say) -> anyhow::Result<Record> {
         let Begun { mut record, mut checks, mut costs, received, built, _scratch } = begun;
         record.conditions = self.conditions();
         let Some((submission, config)) = received else {
@@ -322,7 +322,7 @@ impl<'a> Grading<'a> {
         let mut _compiled = None;
         let (mut checks, mut drawn) = (Vec::new(), Vec::new());
         if paths.contains(&RenderPath::Offline) {
-            self.offline(&session, library, seed, &mut checks, &mut drawn)?;
+            self.offline(&session, library, seed, &|_| (), &mut checks, &mut drawn)?;
             session.retries.renew();
         }
         if paths.contains(&RenderPath::Realtime) {
