@@ -197,6 +197,9 @@ impl<'a> Batch<'a> {
             if self.slice.is_some() {
                 found.begin(self.output)?;
             }
+            if self.mode == Mode::Check {
+                grading.keep_frames()?;
+            }
             if self.budget == BudgetChoice::None {
                 grading.budget = None;
             }

@@ -140,14 +140,14 @@ fn same(a: &Outcome, b: &Outcome) -> bool {
     }
 }
 
-/// Whether this machine can draw at all: asks Umbra's own pass for one small frame.
+/// Whether this machine can draw at all: asks Umbra's own pass for one small frame, and answers the adapter.
 ///
 /// # Errors
 /// Why not, in words.
-pub fn probe_adapter(session: &Session, case: &PreparedScene) -> Result<(), String> {
+pub fn probe_adapter(session: &Session, case: &PreparedScene) -> Result<String, String> {
     let stages = named([VERTEX, SHOW_NORMAL, SHOW_NORMAL].map(str::to_owned));
     match draw(session, None, &Frame { size: (16, 16), ..Frame::probe(case, stages) }) {
-        Outcome::Done(_) => Ok(()),
+        Outcome::Done(answer) => Ok(answer.adapter),
         Outcome::NoAdapter(message) | Outcome::Failed(message) => Err(message),
         other => Err(format!("{other:?}")),
     }

@@ -12,6 +12,7 @@ use tempfile::TempDir;
 use super::begun::{Begun, Say, Workshop};
 use super::cache::RecordCache;
 use super::costs::ReferenceCosts;
+use super::kept_frames::KeptFrames;
 use super::pictures::Images;
 use super::prepared_scene::PreparedScene;
 use super::record::{Conditions, Folders, Record};
@@ -47,6 +48,10 @@ pub struct Grading<'a> {
     pub held_back: Option<HeldBack>,
     /// What realtime is drawn with, or why nothing can be.
     pub adapter: Result<Adapter, String>,
+    /// What Umbra's own pass drew with, in the adapter's words; empty when nothing can be drawn.
+    pub(super) drawn_with: String,
+    /// Where frames of that pass are kept, if anywhere.
+    pub(super) kept_frames: Option<KeptFrames>,
     /// The reference renderer's library; absent in a student's kit.
     pub reference: Option<PathBuf>,
     /// Threads for each submission.
@@ -147,6 +152,8 @@ impl<'a> Grading<'a> {
             cases,
             held_back,
             adapter: Ok(adapter),
+            drawn_with: String::new(),
+            kept_frames: None,
             reference: store.reference.clone(),
             threads: store.threads,
             cancel,
@@ -157,10 +164,11 @@ impl<'a> Grading<'a> {
             reference_costs: ReferenceCosts::default(),
             stored: OnceLock::new(),
         };
-        if let Some(case) = grading.cases.first()
-            && let Err(why) = draw::probe_adapter(&grading.session(""), case)
-        {
-            grading.adapter = Err(why);
+        if let Some(case) = grading.cases.first() {
+            match draw::probe_adapter(&grading.session(""), case) {
+                Ok(adapter) => grading.drawn_with = adapter,
+                Err(why) => grading.adapter = Err(why),
+            }
         }
         grading.compile_shaders()?;
         Ok(grading)
@@ -182,6 +190,7 @@ impl<'a> Grading<'a> {
                 self.budget.clone(),
             ),
             reference: self.reference.as_deref(),
+            kept_frames: self.kept_frames.as_ref(),
             observations: Mutex::default(),
             quotes: Mutex::default(),
         }

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use basecode::{Image, Ray, Vec3};
 use renderer_api as api;
 
+use super::kept_frames::KeptFrames;
 use crate::diagnosis::{Observations, Thumbnail, View};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::process::Limits;
@@ -44,6 +45,8 @@ pub struct Session<'a> {
     /// The reference renderer's library, absent in a student's kit: what it can draw, the machine
     /// is not to blame for.
     pub reference: Option<&'a Path>,
+    /// Where frames of Umbra's own pass are kept, if anywhere.
+    pub kept_frames: Option<&'a KeptFrames>,
     /// What was answered, for the diagnosis.
     pub observations: Mutex<Observations>,
     /// What compilers said in several lines, each text once: to be shown line by line.
