@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 use super::draw::{Frame, draw_each};
 use super::pipeline::Grading;
-use super::session::Session;
+use super::session::{KeptFrames, Session};
 use crate::expected::scene_digest;
 use crate::files::{files_below, hex, write_whole};
 use crate::sandbox::Isolation;
@@ -20,12 +20,6 @@ use crate::worker::{Adapter, Answer, Outcome, Request};
 
 /// So many sets of frames are kept, of about 4 MB each; the oldest go.
 const KEPT: usize = 24;
-
-/// Where frames are kept, and what all of them depend on.
-pub struct KeptFrames {
-    folder: PathBuf,
-    conditions: [u8; 32],
-}
 
 impl Grading<'_> {
     /// Keeps what Umbra's own pass draws of a submission's stages, where isolation is full: elsewhere a plugin could

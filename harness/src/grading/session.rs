@@ -1,13 +1,12 @@
 //! Questions to a submission's plugin, and what becomes of those that get no answer.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use basecode::{Image, Ray, Vec3};
 use renderer_api as api;
 
-use super::kept_frames::KeptFrames;
 use crate::diagnosis::{Observations, Thumbnail, View};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::process::Limits;
@@ -23,6 +22,12 @@ const OUTPUT: CheckId = CheckId::SubmissionOutput;
 
 /// The error of a question that was not asked any more: it leaves no point that could be seen.
 const NOT_ASKED: f64 = 0.9999;
+
+/// Where frames of Umbra's own pass are kept, and the digest of what all of them depend on.
+pub struct KeptFrames {
+    pub(super) folder: PathBuf,
+    pub(super) conditions: [u8; 32],
+}
 
 /// What it takes to run one submission.
 pub struct Session<'a> {
