@@ -24,21 +24,13 @@ const KEPT: usize = 24;
 impl Grading<'_> {
     /// Keeps what Umbra's own pass draws of a submission's stages, where isolation is full: elsewhere a plugin could
     /// write there.
-    ///
-    /// # Errors
-    /// When the program that draws cannot be read.
-    pub fn keep_frames(&mut self) -> io::Result<()> {
-        if self.supervisor.isolation.isolation() != Isolation::Full || self.drawn_with.is_empty() {
-            return Ok(());
+    pub fn keep_frames(&mut self) {
+        if self.supervisor.isolation.isolation() == Isolation::Full && !self.drawn_with.is_empty() {
+            let [_, worker] = self.supervisor.programs();
+            let folder = self.assignment.cache().join("frames");
+            let drawn_with = self.drawn_with.clone();
+            self.kept_frames = Some(KeptFrames { folder, worker, drawn_with });
         }
-        let [_, worker] = self.supervisor.programs();
-        let conditions = Sha256::new()
-            .chain_update(Sha256::digest(fs::read(worker)?))
-            .chain_update(&self.drawn_with)
-            .finalize();
-        let folder = self.assignment.cache().join("frames");
-        self.kept_frames = Some(KeptFrames { folder, conditions: conditions.into() });
-        Ok(())
     }
 }
 
@@ -47,8 +39,10 @@ pub fn draw_sets(session: &Session, sets: &[Vec<Frame>]) -> Vec<Vec<Outcome>> {
     let (Some(kept), Ok(adapter)) = (session.kept_frames, &session.adapter) else {
         return draw_missing(session, sets.iter().collect());
     };
-    let files: Vec<Option<PathBuf>> =
-        sets.iter().map(|set| kept.file(session, adapter, set).ok()).collect();
+    // Where the program cannot be read, nothing is found and nothing kept.
+    let conditions = kept.conditions().ok();
+    let file = |set: &Vec<Frame>| kept.file(session, adapter, set, &conditions?).ok();
+    let files: Vec<Option<PathBuf>> = sets.iter().map(file).collect();
     let found = |(set, file): (&Vec<Frame>, &Option<PathBuf>)| {
         let requests = set.iter().map(|frame| frame.request(session, adapter));
         outcomes(&fs::read(file.as_ref()?).ok()?, requests)
@@ -75,15 +69,22 @@ fn draw_missing(session: &Session, sets: Vec<&Vec<Frame>>) -> Vec<Vec<Outcome>> 
 }
 
 impl KeptFrames {
+    /// The digest of what all frames depend on.
+    fn conditions(&self) -> io::Result<[u8; 32]> {
+        let worker = Sha256::digest(fs::read(&self.worker)?);
+        Ok(Sha256::new().chain_update(worker).chain_update(&self.drawn_with).finalize().into())
+    }
+
     /// The file of some frames.
     fn file(
         &self,
         session: &Session,
         adapter: &Adapter,
         frames: &[Frame],
+        conditions: &[u8; 32],
     ) -> anyhow::Result<PathBuf> {
         let mut hash = Sha256::new();
-        hash.update(self.conditions);
+        hash.update(conditions);
         for frame in frames {
             hash.update(serde_json::to_vec(&frame.request(session, adapter))?);
             hash.update(scene_digest(frame.toml)?);

@@ -23,10 +23,13 @@ const OUTPUT: CheckId = CheckId::SubmissionOutput;
 /// The error of a question that was not asked any more: it leaves no point that could be seen.
 const NOT_ASKED: f64 = 0.9999;
 
-/// Where frames of Umbra's own pass are kept, and the digest of what all of them depend on.
+/// Where frames of Umbra's own pass are kept, and what draws them.
 pub struct KeptFrames {
     pub(super) folder: PathBuf,
-    pub(super) conditions: [u8; 32],
+    /// The program.
+    pub(super) worker: PathBuf,
+    /// Adapter and driver, in their own words.
+    pub(super) drawn_with: String,
 }
 
 /// What it takes to run one submission.
