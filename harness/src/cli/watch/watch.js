@@ -13,7 +13,7 @@ let reports = -1;
 function show({ stage, message, reports: count, libraries, fresh, holds }) {
   document.body.className = stage;
   status.textContent = `${NAMES[stage]}: ${message}`;
-  tellLive({ libraries, fresh });
+  tellLive({ stage, libraries, fresh });
   mark.hidden = count === 0 || holds === "all";
   mark.textContent = EARLIER[holds] ?? "";
   if (count === reports) return;
