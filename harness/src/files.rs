@@ -88,6 +88,20 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
+/// Removes the oldest folders in a folder, so that no more than `most` stay.
+///
+/// # Errors
+/// When it cannot be read, or one not be removed.
+pub fn keep_newest(folder: &Path, most: usize) -> io::Result<()> {
+    let age = |path: &PathBuf| path.metadata().and_then(|meta| meta.modified()).ok();
+    let mut all: Vec<_> = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
+    all.sort_by_key(age);
+    for old in all.iter().take(all.len().saturating_sub(most)) {
+        std::fs::remove_dir_all(old)?;
+    }
+    Ok(())
+}
+
 fn end_at(path: &Path, stage: &str) {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     step(&name, stage);
@@ -143,6 +157,23 @@ pub fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
         }
     }
     Ok(files)
+}
+
+/// Copies the files below a folder.
+///
+/// # Errors
+/// When one cannot be read or written.
+pub fn copy_tree(from: &Path, to: &Path) -> io::Result<()> {
+    std::fs::create_dir_all(to)?;
+    for file in files_below(from)? {
+        let Ok(rest) = file.strip_prefix(from) else { continue };
+        let to = to.join(rest);
+        if let Some(parent) = to.parent() {
+            std::fs::create_dir_all(parent)?;
+        }
+        std::fs::copy(&file, to)?;
+    }
+    Ok(())
 }
 
 /// What this system calls the dynamic library of a crate, such as `libplugin.so`.

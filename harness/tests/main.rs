@@ -20,6 +20,7 @@ mod gradescope;
 mod intake;
 mod intake_properties;
 mod isolation;
+mod kept_frames;
 mod kill;
 mod labelled;
 mod likeness;

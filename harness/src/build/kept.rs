@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::{BuildOutcome, BuildReport, Diagnostic, Recording, TEMPLATE};
-use crate::files::{files_below, hex, library_name, write_whole};
+use crate::files::{files_below, hex, keep_newest, library_name, write_whole};
 use crate::process::Limits;
 use crate::sandbox::Isolation;
 use crate::worker::Supervisor;
@@ -88,13 +88,7 @@ fn keep(all: &Path, folder: &Path, library: &Path, warnings: &[Diagnostic]) -> i
     write_whole(&folder.join(library_name(TEMPLATE)), &bytes)?;
     let note = Note { sha256: hex(&Sha256::digest(&bytes)), warnings: warnings.to_vec() };
     write_whole(&folder.join(NOTE), &serde_json::to_vec(&note)?)?;
-    let age = |path: &PathBuf| path.metadata().and_then(|meta| meta.modified()).ok();
-    let mut all: Vec<_> = fs::read_dir(all)?.flatten().map(|entry| entry.path()).collect();
-    all.sort_by_key(age);
-    for old in all.iter().take(all.len().saturating_sub(KEPT)) {
-        fs::remove_dir_all(old)?;
-    }
-    Ok(())
+    keep_newest(all, KEPT)
 }
 
 /// A library that was kept whole, copied to `out`.

@@ -19,7 +19,7 @@ use super::settling::{self, Found};
 use crate::assignment::Assignment;
 use crate::class::{Attempt, Collected, Decided, Kind, Label, Pins, Stated, Wanted, collect};
 use crate::files::write_whole;
-use crate::grading::{Earlier, Folders, Grading, Mode, Record, judge_shared};
+use crate::grading::{Begun, Earlier, Folders, Grading, Mode, Record, Workshop, judge_shared};
 use crate::held_back::recorded_seed;
 use crate::program::graded;
 use crate::report::{self, BatchReport, SubmissionReport};
@@ -182,7 +182,12 @@ impl<'a> Batch<'a> {
         }
         let result = context.with_store(|store| {
             let adapter = self.adapter.adapter();
-            let mut grading = Grading::prepare(store, adapter, seed, &INTERRUPTED)?;
+            // What a student waits for is compiled while scenes are made ready.
+            let (mut grading, begun) =
+                Grading::prepare_beside(store, adapter, seed, &INTERRUPTED, |workshop| {
+                    let own = chosen.first().filter(|_| self.mode == Mode::Check);
+                    own.map(|source| self.begin(context, workshop, source))
+                })?;
             if self.mode == Mode::Grade {
                 let cache = grading.record_cache(self.force)?;
                 found.conditions = cache.conditions();
@@ -192,7 +197,9 @@ impl<'a> Batch<'a> {
             if self.slice.is_some() {
                 found.begin(self.output)?;
             }
-            grading.keeps_plugin = self.keeps_plugin.map(Path::to_owned);
+            if self.mode == Mode::Check {
+                grading.keep_frames();
+            }
             if self.budget == BudgetChoice::None {
                 grading.budget = None;
             }
@@ -200,21 +207,29 @@ impl<'a> Batch<'a> {
             grading.compares_submitted = self.asked.is_none_or(Asked::is_all);
             let jobs = self.jobs.min(chosen.len()).max(1);
             grading.threads = (cores() / jobs as u32).max(1);
-            let results = self.grade_all(context, &grading, &chosen, jobs);
+            let records = match (begun, &chosen[..]) {
+                (Some(begun), [source]) => {
+                    vec![begun.and_then(|begun| self.go_on(context, &grading, source, begun))]
+                }
+                _ => {
+                    let all = self.grade_all(context, &grading, &chosen, jobs);
+                    all.into_iter().map(Ok).collect()
+                }
+            };
             let costs = grading.costs_of_reference();
             if self.mode == Mode::Grade && !costs.is_empty() {
                 let file = self.output.join(report::INSTRUCTOR).join(COSTS_FILE);
                 write_whole(&file, &serde_json::to_vec_pretty(&costs)?)
                     .with_context(|| format!("cannot write {}", file.display()))?;
             }
-            Ok::<_, anyhow::Error>((results, grading.held_back, grading.cache))
+            Ok::<_, anyhow::Error>((records, grading.held_back, grading.cache))
         });
         context.progress.end();
         if INTERRUPTED.load(Ordering::Relaxed) {
             let goes_on = match (self.mode, &result) {
-                (Mode::Grade, Ok((results, ..))) => format!(
+                (Mode::Grade, Ok((records, ..))) => format!(
                     ", {} of {} submissions are graded; the same command resumes there",
-                    results.len(),
+                    records.len(),
                     chosen.len()
                 ),
                 _ => String::new(),
@@ -222,8 +237,8 @@ impl<'a> Batch<'a> {
             eprintln!("umbra: interrupted{goes_on}");
             return Ok(Ended::Interrupted);
         }
-        let (results, held_back, cache) = result?;
-        let mut records = results.into_iter().collect::<anyhow::Result<Vec<Earlier>>>()?;
+        let (records, held_back, cache) = result?;
+        let mut records = records.into_iter().collect::<anyhow::Result<Vec<Earlier>>>()?;
         if self.slice.is_some() {
             let rules = &context.assignment.rules;
             let entry = |own: &Earlier| Ok(report::outline(graded(own.whole()?, rules)));
@@ -317,58 +332,79 @@ impl<'a> Batch<'a> {
         Ok(aside.into_iter().map(|at| all[at].slug.clone()).collect())
     }
 
-    /// Takes submissions through all stages, in their order; none is begun after Ctrl-C. To be graded, one
-    /// that the machine failed on has a record that says so: the others' are no worse for it.
+    /// The folders of a submission in the report.
+    fn folders(&self, slug: &str) -> Folders {
+        Folders {
+            student: self.output.join(slug),
+            instructor: self.output.join(report::INSTRUCTOR).join(slug),
+        }
+    }
+
+    /// Receives and builds what a student checks.
+    fn begin(
+        &self,
+        context: &Context,
+        workshop: &Workshop,
+        source: &Source,
+    ) -> anyhow::Result<Begun> {
+        let say = |stage: &str| context.say(stage);
+        let begin = || {
+            let mut begun = workshop.receive(&source.path, &source.slug, self.mode, &say)?;
+            workshop.build(&mut begun, &say)?;
+            self.keeps_plugin.map_or(Ok(()), |file| begun.keep_plugin(file))?;
+            anyhow::Ok(begun)
+        };
+        begin().with_context(|| source.path.display().to_string())
+    }
+
+    /// Judges what was begun so.
+    fn go_on(
+        &self,
+        context: &Context,
+        grading: &Grading,
+        source: &Source,
+        begun: Begun,
+    ) -> anyhow::Result<Earlier> {
+        let Source { path, name, slug, .. } = source;
+        let record = grading.judge(begun, &self.folders(slug), &|stage| context.say(stage));
+        let record = record.with_context(|| path.display().to_string())?;
+        Ok(Earlier::held(Record { name: name.clone(), ..record }))
+    }
+
+    /// Takes submissions through all stages, in their order; none is begun after Ctrl-C. One that the machine
+    /// failed on has a record that says so: the others' are no worse for it.
     fn grade_all(
         &self,
         context: &Context,
         grading: &Grading,
         sources: &[&Source],
         jobs: usize,
-    ) -> Vec<anyhow::Result<Earlier>> {
+    ) -> Vec<Earlier> {
         let next = AtomicUsize::new(0);
         let results = Mutex::new(Vec::new());
-        let batch = self.mode == Mode::Grade;
-        if batch {
-            context.progress.count(sources.len());
-        }
+        context.progress.count(sources.len());
         let work = || {
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
                 let Some(source) = sources.get(index) else { return };
                 let Source { path, name, slug, .. } = source;
-                let say = |stage: &str| {
-                    if batch {
-                        context.progress.at(&format!("{slug}: {stage}"));
-                    } else {
-                        context.say(stage);
-                    }
-                };
-                let out = Folders {
-                    student: self.output.join(slug),
-                    instructor: self.output.join(report::INSTRUCTOR).join(slug),
-                };
+                let say = |stage: &str| context.progress.at(&format!("{slug}: {stage}"));
+                let out = self.folders(slug);
                 let begun = Instant::now();
-                let result = match self.mode {
-                    Mode::Grade => class::note_source(&out, source)
-                        .and_then(|()| grading.one_of_batch(path, slug, &out, &say)),
-                    Mode::Check => grading.submission(path, slug, &out, self.mode, &say),
-                };
+                let result = class::note_source(&out, source)
+                    .and_then(|()| grading.one_of_batch(path, slug, &out, &say));
                 if INTERRUPTED.load(Ordering::Relaxed) && result.is_err() {
                     return;
                 }
-                let result = match (result, self.mode) {
-                    (Err(error), Mode::Grade) => {
-                        let message = format!("{}: {}", path.display(), super::told_once(&error));
-                        context.progress.note(&message);
-                        Ok(grading.unjudged(path, slug))
-                    }
-                    (result, _) => result.with_context(|| path.display().to_string()),
-                };
-                let result = result.map(|record| Record { name: name.clone(), ..record });
+                let result = result.unwrap_or_else(|error| {
+                    let message = format!("{}: {}", path.display(), super::told_once(&error));
+                    context.progress.note(&message);
+                    grading.unjudged(path, slug)
+                });
+                let record = Record { name: name.clone(), ..result };
                 let mut is_kept = false;
-                if let (Ok(record), Some(cache)) = (&result, &grading.cache) {
-                    match cache.list(record, &out) {
+                if let Some(cache) = &grading.cache {
+                    match cache.list(&record, &out) {
                         Ok(()) => is_kept = true,
                         Err(error) => context.progress.note(&super::told_once(&error)),
                     }
@@ -380,12 +416,12 @@ impl<'a> Batch<'a> {
                     };
                     context
                         .progress
-                        .step(&format!("{}, {cost}", report::in_a_line(record, &grade)));
+                        .step(&format!("{}, {cost}", report::in_a_line(&record, &grade)));
                 }
-                let result = result.map(|record| match is_kept {
+                let result = match is_kept {
                     true => Earlier::kept(record, true, &out.instructor),
                     false => Earlier::held(record),
-                });
+                };
                 let Ok(mut results) = results.lock() else { return };
                 results.push((index, result));
             }

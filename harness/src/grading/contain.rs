@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::begun::Say;
 use super::cache::RecordCache;
 use super::pipeline::Grading;
 use super::record::{Folders, Record};
@@ -23,7 +24,7 @@ impl Grading<'_> {
         source: &Path,
         slug: &str,
         out: &Folders,
-        say: &dyn Fn(&str),
+        say: Say,
     ) -> anyhow::Result<Record> {
         let grade = || self.submission(source, slug, out, Mode::Grade, say);
         contained(self.cache.as_ref(), source, out, grade).unwrap_or_else(|bug| {

@@ -119,6 +119,25 @@ impl<'a> Answers<'a> {
         physical.filter_map(judge).collect()
     }
 
+    /// What is known of both BSDFs before any ray is cast, in words.
+    pub fn first_verdict(&self) -> String {
+        let handout = Convention::default();
+        let passes = |own: &BsdfAnswer| {
+            own.values.as_ref().is_ok_and(|values| bsdf::passes(&own.probes, values, &handout))
+        };
+        let words =
+            [(BsdfKind::Diffuse, "diffuse"), (BsdfKind::Phong, "Phong")].map(|(kind, name)| {
+                let own = || self.bsdfs.iter().filter(|own| own.kind == kind);
+                let verdict = match own().all(passes) {
+                    true => "as in the handout",
+                    false if own().all(|own| own.values.is_err()) => "without an answer",
+                    false => "not as in the handout",
+                };
+                format!("{name} BSDF {verdict}")
+            });
+        format!("first verdict: {}", words.join(", "))
+    }
+
     fn push_bsdf(
         &mut self,
         session: &Session,

@@ -6,7 +6,7 @@ use super::prepared_scene::PreparedScene;
 use super::session::Session;
 use super::stages::named;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
-use crate::worker::{CameraValue, Matrices, Outcome, Request, Stage};
+use crate::worker::{Adapter, CameraValue, Matrices, Outcome, Request, Stage};
 
 /// A frame to be drawn.
 #[derive(Clone)]
@@ -35,17 +35,34 @@ impl<'a> Frame<'a> {
         Self { case, toml, size, shadow_map: false, times: 1, each_matrices: false, stages }
     }
 
+    /// The realtime image with shadows, if the scene has one.
+    pub fn bonus(case: &'a PreparedScene) -> Option<Self> {
+        let toml = case.bonus.as_deref()?;
+        Some(Self { toml, shadow_map: true, ..Self::plain(case) })
+    }
+
     /// A scene's small film under other stages.
     pub fn probe(case: &'a PreparedScene, stages: Vec<Stage>) -> Self {
         Self { size: (case.probe_film.width, case.probe_film.height), stages, ..Self::plain(case) }
     }
-}
 
-/// Draws once what workers draw again and again, so that their shaders are compiled: with a trusted
-/// renderer, or by Umbra's neutral pass with these stages. Why it fails is told when it counts.
-pub fn compile_shaders(session: &Session, renderer: Option<&Path>, mut frames: Vec<Frame>) {
-    frames.iter_mut().for_each(|frame| frame.size = (16, 16));
-    draw_each(session, renderer, &frames);
+    /// The request that asks for it.
+    pub fn request(&self, session: &Session, adapter: &Adapter) -> Request {
+        Request::RenderRealtime {
+            scene: session.scene(self.toml),
+            width: self.size.0,
+            height: self.size.1,
+            shadow_map: self.shadow_map,
+            adapter: adapter.clone(),
+            stages: self.stages.clone(),
+            cameras: match self.each_matrices {
+                true => Matrices::ALL
+                    .map(|matrices| CameraValue { matrices, ..self.case.camera })
+                    .into(),
+                false => vec![self.case.camera; self.times],
+            },
+        }
+    }
 }
 
 /// Draws one frame in a worker of its own.
@@ -61,21 +78,8 @@ pub fn draw_each(session: &Session, plugin: Option<&Path>, frames: &[Frame]) -> 
         Ok(adapter) => adapter,
         Err(reason) => return vec![Outcome::NoAdapter(reason.clone()); frames.len()],
     };
-    let request = |frame: &Frame| Request::RenderRealtime {
-        scene: session.scene(frame.toml),
-        width: frame.size.0,
-        height: frame.size.1,
-        shadow_map: frame.shadow_map,
-        adapter: adapter.clone(),
-        stages: frame.stages.clone(),
-        cameras: match frame.each_matrices {
-            true => {
-                Matrices::ALL.map(|matrices| CameraValue { matrices, ..frame.case.camera }).into()
-            }
-            false => vec![frame.case.camera; frame.times],
-        },
-    };
-    let mut outcomes = session.run(plugin, frames.iter().map(request).collect());
+    let requests = frames.iter().map(|frame| frame.request(session, adapter)).collect();
+    let mut outcomes = session.run(plugin, requests);
     for (outcome, frame) in outcomes.iter_mut().zip(frames) {
         if let Outcome::Done(answer) = outcome {
             let floats = answer.values.len() / frame.times;
@@ -111,24 +115,18 @@ pub fn draw_scenes(
     drawn
 }
 
-/// Draws the plain image of every scene: those that only probe share a worker.
-pub fn draw_plain(
+/// Draws one frame of each scene, as [`draw_scenes`] does.
+pub fn draw_one_each(
     session: &Session,
     plugin: &Path,
-    cases: &[PreparedScene],
+    frames: &[Frame],
     is_right: &dyn Fn(&PreparedScene, &Outcome) -> bool,
 ) -> Vec<Outcome> {
-    let probes: Vec<&PreparedScene> = cases.iter().filter(|case| case.is_probe()).collect();
-    let frames: Vec<Vec<Frame>> = probes.iter().map(|case| vec![Frame::plain(case)]).collect();
+    let scenes: Vec<Vec<Frame>> = frames.iter().map(|frame| vec![frame.clone()]).collect();
     let all_right = |index: usize, outcomes: &[Outcome]| {
-        outcomes.iter().all(|outcome| is_right(probes[index], outcome))
+        outcomes.iter().all(|outcome| is_right(frames[index].case, outcome))
     };
-    let mut shared = draw_scenes(session, plugin, &frames, &all_right).into_iter().flatten();
-    let drawn = cases.iter().map(|case| {
-        let shared = if case.is_probe() { shared.next() } else { None };
-        shared.unwrap_or_else(|| draw(session, Some(plugin), &Frame::plain(case)))
-    });
-    drawn.collect()
+    draw_scenes(session, plugin, &scenes, &all_right).into_iter().flatten().collect()
 }
 
 /// Whether two outcomes are the same, bit by bit; NaN equals itself.
@@ -142,14 +140,14 @@ fn same(a: &Outcome, b: &Outcome) -> bool {
     }
 }
 
-/// Whether this machine can draw at all: asks Umbra's own pass for one small frame.
+/// Whether this machine can draw at all: asks Umbra's own pass for one small frame, and answers the adapter.
 ///
 /// # Errors
 /// Why not, in words.
-pub fn probe_adapter(session: &Session, case: &PreparedScene) -> Result<(), String> {
+pub fn probe_adapter(session: &Session, case: &PreparedScene) -> Result<String, String> {
     let stages = named([VERTEX, SHOW_NORMAL, SHOW_NORMAL].map(str::to_owned));
     match draw(session, None, &Frame { size: (16, 16), ..Frame::probe(case, stages) }) {
-        Outcome::Done(_) => Ok(()),
+        Outcome::Done(answer) => Ok(answer.adapter),
         Outcome::NoAdapter(message) | Outcome::Failed(message) => Err(message),
         other => Err(format!("{other:?}")),
     }

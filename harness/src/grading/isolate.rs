@@ -6,7 +6,8 @@ use std::path::Path;
 
 use basecode::{Image, Vec3};
 
-use super::draw::{Frame, draw_each, draw_scenes};
+use super::draw::{Frame, draw_scenes};
+use super::kept_frames::draw_sets;
 use super::observe;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session, headline};
@@ -62,16 +63,18 @@ pub fn isolate(
     let is_right =
         |index, frames: &[Outcome]| pass_check(&cases[index], frames).verdict == Verdict::Pass;
     let passes = draw_scenes(session, plugin, &under(cases, &pass_shown()), &is_right);
-    let mut frames = under(cases, &sets).concat();
-    for frame in &mut frames {
-        let own = |stage: &Stage| stage.name == STAGES[0] && stage.text != VERTEX;
-        frame.each_matrices = frame.stages.iter().any(own);
-    }
-    let mut swapped = draw_each(session, None, &frames).into_iter();
+    let own = |stage: &Stage| stage.name == STAGES[0] && stage.text != VERTEX;
+    let frame = |case, set: &Vec<Stage>| Frame {
+        each_matrices: set.iter().any(own),
+        ..Frame::probe(case, set.clone())
+    };
+    let frames: Vec<Vec<Frame>> =
+        sets.iter().map(|set| cases.iter().map(|case| frame(case, set)).collect()).collect();
+    let mut swapped: Vec<_> = draw_sets(session, &frames).into_iter().map(Vec::into_iter).collect();
     let mut shown = Shown::default();
     let mut checks = Vec::new();
     for (case, pass) in cases.iter().zip(passes) {
-        let swapped: Vec<Outcome> = swapped.by_ref().take(sets.len()).collect();
+        let swapped: Vec<Outcome> = swapped.iter_mut().filter_map(Iterator::next).collect();
         let pass = match pass_frames(case, &pass) {
             Ok(frames) => {
                 observe::pass(session, case, &frames.bound);

@@ -34,7 +34,7 @@ impl Grading<'_> {
         session.reference = None;
         let (mut checks, mut drawn) = (Vec::new(), Vec::new());
         let done = if offline {
-            self.offline(&session, reference, 0, &mut checks, &mut drawn)
+            self.offline(&session, reference, 0, &|_| (), &mut checks, &mut drawn)
         } else {
             self.realtime(&session, reference, &Stages::default(), &mut checks, &mut drawn)
         };

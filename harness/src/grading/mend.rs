@@ -8,7 +8,7 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::build::{BuildOutcome, BuildReport, Diagnostic};
 use crate::evidence::{Check, CheckId, Verdict};
-use crate::files::files_below;
+use crate::files::{copy_tree, files_below};
 use crate::intake::Finding;
 use crate::process::Exit;
 use crate::rubric::Rules;
@@ -250,20 +250,6 @@ fn below(path: &Path) -> Option<String> {
         }
     }
     (!parts.is_empty()).then(|| parts.join("/"))
-}
-
-/// Copies a folder of ours, without links: a submission's private copy has none.
-fn copy_tree(from: &Path, to: &Path) -> io::Result<()> {
-    fs::create_dir_all(to)?;
-    for file in files_below(from)? {
-        let Ok(rest) = file.strip_prefix(from) else { continue };
-        let to = to.join(rest);
-        if let Some(parent) = to.parent() {
-            fs::create_dir_all(parent)?;
-        }
-        fs::copy(&file, to)?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Takes one submission, or many, through all stages.
 
 mod attribution;
+mod begun;
 mod cache;
 mod cache_key;
 mod contain;
@@ -10,6 +11,7 @@ mod diagnose;
 mod draw;
 mod image_digest;
 mod isolate;
+mod kept_frames;
 mod likeness;
 mod measure_reference;
 pub mod mend;
@@ -31,6 +33,7 @@ pub mod submitted;
 mod tree_checks;
 mod uploads;
 
+pub use begun::{Begun, Workshop};
 pub use cache::{Earlier, RecordCache};
 pub use contain::INTERNAL_ERROR;
 pub use costs::Cost;

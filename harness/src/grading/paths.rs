@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::Ordering;
 
+use super::begun::Say;
 use super::conventions::Answers;
 use super::offline::{self, Drawn, Run};
 use super::pipeline::Grading;
@@ -22,6 +23,7 @@ impl Grading<'_> {
         session: &Session,
         plugin: &Path,
         seed: u64,
+        say: Say,
         checks: &mut Vec<Check>,
         drawn: &mut Vec<Drawn>,
     ) -> anyhow::Result<()> {
@@ -29,6 +31,9 @@ impl Grading<'_> {
         let probed = self.groups().map(|cases| {
             let mut answers = Answers::default();
             let checks = answers.probe_bsdfs(session, plugin, cases);
+            if cases.iter().any(|case| !case.held_back) {
+                say(&answers.first_verdict());
+            }
             (answers, checks)
         });
         let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;

@@ -1,5 +1,6 @@
-//! One submission through all stages: intake, build, offline, realtime, images.
+//! One submission through all stages: what was begun, then offline, realtime, images.
 
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, OnceLock};
@@ -8,25 +9,22 @@ use std::time::Instant;
 use anyhow::Context;
 use tempfile::TempDir;
 
+use super::begun::{Begun, Say, Workshop};
 use super::cache::RecordCache;
 use super::costs::ReferenceCosts;
 use super::pictures::Images;
 use super::prepared_scene::PreparedScene;
-use super::record::{Conditions, Folders, Record, StageCost, Student};
-use super::session::Session;
+use super::record::{Conditions, Folders, Record};
+use super::session::{KeptFrames, Session};
 use super::stages::Stages;
-use super::tree_checks::{Mode, config_check, refused_checks, tree_check};
-use super::{draw, likeness, mend, submitted};
+use super::tree_checks::Mode;
+use super::{draw, submitted};
 use crate::assignment::Assignment;
-use crate::build::{self, BuildOutcome, Recording};
-use crate::decode::{Decoder, Received};
+use crate::build::Recording;
+use crate::decode::Decoder;
 use crate::diagnosis::{Diagnosis, Stored};
 use crate::evidence::{Check, CheckId, Evidence, Verdict};
-use crate::files::{step, write_whole};
 use crate::held_back::{self, HeldBack};
-use crate::intake::{self, IntakeError, Submission};
-use crate::process::Exit;
-use crate::rubric::BUILD;
 use crate::store::Store;
 use crate::worker::{Adapter, Budget, Reference, RetryBudget, Supervisor};
 
@@ -49,6 +47,10 @@ pub struct Grading<'a> {
     pub held_back: Option<HeldBack>,
     /// What realtime is drawn with, or why nothing can be.
     pub adapter: Result<Adapter, String>,
+    /// What Umbra's own pass drew with, in the adapter's words; empty when nothing can be drawn.
+    pub(super) drawn_with: String,
+    /// Where frames of that pass are kept, if anywhere.
+    pub(super) kept_frames: Option<KeptFrames>,
     /// The reference renderer's library; absent in a student's kit.
     pub reference: Option<PathBuf>,
     /// Threads for each submission.
@@ -61,8 +63,6 @@ pub struct Grading<'a> {
     pub compares_submitted: bool,
     /// Records made before and to be made, if they are kept.
     pub cache: Option<RecordCache>,
-    /// Where the library of what compiled is left for others, if anywhere.
-    pub keeps_plugin: Option<PathBuf>,
     /// What a submission may use on each path, if that is limited.
     pub budget: Option<Budget>,
     /// What the reference renderer takes, as far as it was needed.
@@ -97,6 +97,20 @@ impl<'a> Grading<'a> {
         perturb: Option<u64>,
         cancel: &'a AtomicBool,
     ) -> anyhow::Result<Self> {
+        Self::prepare_beside(store, adapter, perturb, cancel, |_| ()).map(|(ready, ())| ready)
+    }
+
+    /// The same, while something is done that needs no scene. Answers what that gives, too.
+    ///
+    /// # Errors
+    /// As [`Grading::prepare`].
+    pub fn prepare_beside<T: Send>(
+        store: &Store<'a>,
+        adapter: Adapter,
+        perturb: Option<u64>,
+        cancel: &'a AtomicBool,
+        beside: impl FnOnce(&Workshop) -> T + Send,
+    ) -> anyhow::Result<(Self, T)> {
         let assignment = store.assignment;
         anyhow::ensure!(
             perturb.is_none() || store.reference.is_some(),
@@ -108,6 +122,25 @@ impl<'a> Grading<'a> {
             Recording::obtain_telling(&assignment.root, &store.supervisor.umbra, &|compiling| {
                 (store.progress)(&compiling.in_words(begun.elapsed()));
             })?;
+        let workshop =
+            Workshop { assignment, supervisor: store.supervisor, recording: &recording, cancel };
+        let (ready, done) = std::thread::scope(|scope| {
+            let done = scope.spawn(|| beside(&workshop));
+            let ready = Self::with_scenes(store, adapter, perturb, cancel, recording.clone());
+            (ready, done.join().unwrap_or_else(|panic| resume_unwind(panic)))
+        });
+        Ok((ready?, done))
+    }
+
+    /// Makes ready what needs scenes.
+    fn with_scenes(
+        store: &Store<'a>,
+        adapter: Adapter,
+        perturb: Option<u64>,
+        cancel: &'a AtomicBool,
+        recording: Recording,
+    ) -> anyhow::Result<Self> {
+        let assignment = store.assignment;
         let mut cases = PreparedScene::all(store, &assignment.scenes)?;
         let held_back = perturb.map(|seed| hold_back(store, seed, &mut cases)).transpose()?;
         let mut grading = Self {
@@ -118,21 +151,23 @@ impl<'a> Grading<'a> {
             cases,
             held_back,
             adapter: Ok(adapter),
+            drawn_with: String::new(),
+            kept_frames: None,
             reference: store.reference.clone(),
             threads: store.threads,
             cancel,
             paths: RenderPath::ALL.to_vec(),
             compares_submitted: true,
             cache: None,
-            keeps_plugin: None,
             budget: Some(assignment.limits.budget.clone()),
             reference_costs: ReferenceCosts::default(),
             stored: OnceLock::new(),
         };
-        if let Some(case) = grading.cases.first()
-            && let Err(why) = draw::probe_adapter(&grading.session(""), case)
-        {
-            grading.adapter = Err(why);
+        if let Some(case) = grading.cases.first() {
+            match draw::probe_adapter(&grading.session(""), case) {
+                Ok(adapter) => grading.drawn_with = adapter,
+                Err(why) => grading.adapter = Err(why),
+            }
         }
         grading.compile_shaders()?;
         Ok(grading)
@@ -154,6 +189,7 @@ impl<'a> Grading<'a> {
                 self.budget.clone(),
             ),
             reference: self.reference.as_deref(),
+            kept_frames: self.kept_frames.as_ref(),
             observations: Mutex::default(),
             quotes: Mutex::default(),
         }
@@ -169,55 +205,37 @@ impl<'a> Grading<'a> {
         slug: &str,
         out: &Folders,
         mode: Mode,
-        say: &dyn Fn(&str),
+        say: Say,
     ) -> anyhow::Result<Record> {
-        let session = self.session("");
-        let decoder = Decoder::new(&self.supervisor, &self.assignment.limits.decode, self.cancel);
-        let mut costs = Costs { since: Instant::now(), stages: Vec::new() };
-        let scratch =
-            tempfile::Builder::new().prefix("submission-").tempdir_in(&self.supervisor.scratch)?;
-        let mut record = self.begin(source, slug);
-        say("copying the files");
-        let copy = scratch.path().join("copy");
-        std::fs::create_dir(&copy)?;
-        let (tree, limits) = (&self.assignment.tree, &self.assignment.limits.archive);
-        let Received { submission, validation, source } =
-            match decoder.receive(source, &copy, tree, limits) {
-                Ok(received) => received,
-                Err(IntakeError::Refused(refusal)) => {
-                    let validation = intake::validate_refusal(&refusal);
-                    record.evidence.checks = refused_checks(&validation);
-                    record.findings = validation.findings;
-                    record.stages = costs.end("intake", decoder.take_cpu_s());
-                    return Ok(record);
-                }
-                Err(error) => return Err(error.into()),
-            };
-        step("submission", "copied");
-        record.digest.clone_from(&submission.digest);
-        let config = validation.config.clone().unwrap_or_default();
-        record.student = Student::of(&config);
-        record.findings.clone_from(&validation.findings);
-        record.findings.extend(source);
-        record.sources = likeness::digests(&submission, &self.assignment.template())
-            .context("cannot read the source")?;
-        let mut checks = vec![tree_check(&validation, &submission, tree, mode)];
-        checks.extend(config_check(&validation));
-        let key = self.cache.as_ref().map(|cache| cache.key(&record, &checks)).transpose()?;
-        if let (Some(cache), Some(key)) = (&self.cache, &key)
-            && let Some(found) =
-                cache.find(key, |evidence| self.failing(evidence), self.budget.is_some(), out)
-        {
+        let workshop = self.workshop();
+        let mut begun = workshop.receive(source, slug, mode, say)?;
+        begun.record.conditions = self.conditions();
+        let (Some(cache), true) = (&self.cache, begun.received.is_some()) else {
+            workshop.build(&mut begun, say)?;
+            return self.judge(begun, out, say);
+        };
+        let failing = |evidence: &Evidence| self.failing(evidence);
+        let key = cache.key(&begun.record, &begun.checks)?;
+        if let Some(found) = cache.find(&key, failing, self.budget.is_some(), out) {
             return Ok(found);
         }
-        costs.end("intake", decoder.take_cpu_s());
+        workshop.build(&mut begun, say)?;
+        cache.keep(&key, failing, self.judge(begun, out, say)?, out)
+    }
 
-        say("compiling the source");
-        let built =
-            self.build(&submission, scratch.path(), &mut record, &mut checks, &mut costs)?;
-        if built.is_some() {
-            step("submission", "built");
-        }
+    /// Goes on with a submission that was received and built.
+    ///
+    /// # Errors
+    /// As [`Grading::submission`].
+    pub fn judge(&self, begun: Begun, out: &Folders, say: Say) -> anyhow::Result<Record> {
+        let Begun { mut record, mut checks, mut costs, received, built, _scratch } = begun;
+        record.conditions = self.conditions();
+        let Some((submission, config)) = received else {
+            record.evidence = Evidence { checks };
+            return Ok(record);
+        };
+        let session = self.session("");
+        let decoder = Decoder::new(&self.supervisor, &self.assignment.limits.decode, self.cancel);
         let seed = config.sampler_seed().unwrap_or_default();
         let mut drawn = Vec::new();
         if let Some((plugin, built)) = &built {
@@ -238,6 +256,7 @@ impl<'a> Grading<'a> {
         if self.compares_submitted {
             say("comparing the submitted images");
         }
+        let tree = &self.assignment.tree;
         let submitted = submitted::read(&decoder, &submission.root, tree, compared)?;
         record
             .findings
@@ -273,12 +292,13 @@ impl<'a> Grading<'a> {
         record.diagnoses = diagnoses;
         record.views.extend(views);
         record.stages = costs.end("diagnosis", 0.0);
-        match (&self.cache, key) {
-            (Some(cache), Some(key)) => {
-                cache.keep(&key, |evidence| self.failing(evidence), record, out)
-            }
-            _ => Ok(record),
-        }
+        Ok(record)
+    }
+
+    /// What receives and builds submissions.
+    fn workshop(&self) -> Workshop<'_> {
+        let Self { assignment, supervisor, recording, cancel, .. } = self;
+        Workshop { assignment, supervisor, recording, cancel }
     }
 
     /// The record of a submission that the machine failed on: nothing is found out, no point lost.
@@ -289,22 +309,7 @@ impl<'a> Grading<'a> {
     }
 
     pub(super) fn begin(&self, source: &Path, slug: &str) -> Record {
-        Record {
-            name: source.file_name().unwrap_or(source.as_os_str()).to_string_lossy().into_owned(),
-            slug: slug.to_owned(),
-            digest: String::new(),
-            student: Student::default(),
-            findings: Vec::new(),
-            diagnostics: String::new(),
-            evidence: Evidence::default(),
-            diagnoses: Vec::new(),
-            views: Vec::new(),
-            error_maps: Vec::new(),
-            images: Vec::new(),
-            sources: Vec::new(),
-            stages: Vec::new(),
-            conditions: self.conditions(),
-        }
+        Record { conditions: self.conditions(), ..Record::begun(source, slug) }
     }
 
     /// What is found out on some paths about a library that is there already, without a submission
@@ -325,7 +330,7 @@ impl<'a> Grading<'a> {
         let mut _compiled = None;
         let (mut checks, mut drawn) = (Vec::new(), Vec::new());
         if paths.contains(&RenderPath::Offline) {
-            self.offline(&session, library, seed, &mut checks, &mut drawn)?;
+            self.offline(&session, library, seed, &|_| (), &mut checks, &mut drawn)?;
             session.retries.renew();
         }
         if paths.contains(&RenderPath::Realtime) {
@@ -335,62 +340,6 @@ impl<'a> Grading<'a> {
         let evidence = Evidence { checks };
         let (diagnoses, _) = self.diagnose(&session, &evidence, &drawn, None)?;
         Ok((evidence, diagnoses))
-    }
-
-    /// Builds the source, mended where it does not build as it is; answers the library with it.
-    fn build(
-        &self,
-        submission: &Submission,
-        scratch: &Path,
-        record: &mut Record,
-        checks: &mut Vec<Check>,
-        costs: &mut Costs,
-    ) -> anyhow::Result<Option<(PathBuf, mend::Built)>> {
-        let src = submission.root.join("src");
-        if !src.join("lib.rs").is_file() {
-            checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no src/lib.rs"));
-            return Ok(None);
-        }
-        let out = scratch.join("out");
-        std::fs::create_dir(&out)?;
-        let limits = &self.assignment.limits.build;
-        let isolation = self.supervisor.isolation.isolation();
-        let kept = build::Kept::within(&self.assignment.cache(), isolation);
-        let compile = |src: &Path| {
-            kept.compile(&self.recording, &self.supervisor, src, &out, limits, self.cancel)
-        };
-        let template = self.assignment.template();
-        let built = mend::build(&compile, &src, &template, &scratch.join("mended"))?;
-        costs.end("build", built.cpu_s);
-        let rendered = built.errors.iter().map(|error| error.rendered.as_str());
-        record.diagnostics = rendered.collect::<Vec<_>>().join("\n");
-        let first = built.errors.first().map(build::Diagnostic::headline).unwrap_or_default();
-        let mut hint = String::new();
-        let (plugin, summary) = match &built.report.outcome {
-            BuildOutcome::Built { library } if built.replaced.is_empty() => {
-                (Some(library.clone()), "the source builds".to_owned())
-            }
-            BuildOutcome::Built { library } => {
-                let summary =
-                    format!("the source builds but for files that were replaced: {first}");
-                (Some(library.clone()), summary)
-            }
-            BuildOutcome::CompileError { .. } => {
-                hint = first;
-                (None, "the source does not build".to_owned())
-            }
-            BuildOutcome::Ended(Exit::Cancelled) => anyhow::bail!("interrupted"),
-            BuildOutcome::Ended(exit) => (None, format!("the compiler {exit}")),
-        };
-        let verdict = if plugin.is_some() { Verdict::Pass } else { Verdict::Fail };
-        checks.push(Check::new(BUILD, "", verdict, summary).with_hint(hint));
-        // With files of the template in it, it is not what its author wants to see.
-        let own = plugin.as_ref().filter(|_| built.replaced.is_empty());
-        if let (Some(keep), Some(library)) = (&self.keeps_plugin, own) {
-            write_whole(keep, &std::fs::read(library)?)
-                .with_context(|| format!("cannot write {}", keep.display()))?;
-        }
-        Ok(plugin.map(|library| (library, built)))
     }
 
     fn conditions(&self) -> Conditions {
@@ -413,26 +362,4 @@ fn hold_back(store: &Store, seed: u64, cases: &mut Vec<PreparedScene>) -> anyhow
     let made = PreparedScene::all(store, &entries).with_context(|| format!("seed {seed}"))?;
     cases.extend(made.into_iter().map(|case| PreparedScene { held_back: true, ..case }));
     Ok(held_back)
-}
-
-/// What the stages cost so far.
-pub(super) struct Costs {
-    since: Instant,
-    stages: Vec<StageCost>,
-}
-
-impl Costs {
-    /// Adds a stage that was measured by itself.
-    pub(super) fn push(&mut self, name: &str, wall_s: f64, cpu_s: f64) {
-        self.since = Instant::now();
-        self.stages.push(StageCost { name: name.to_owned(), wall_s, cpu_s });
-    }
-
-    /// Ends a stage; answers all so far.
-    fn end(&mut self, name: &str, cpu_s: f64) -> Vec<StageCost> {
-        let now = Instant::now();
-        let wall_s = (now - std::mem::replace(&mut self.since, now)).as_secs_f64();
-        self.stages.push(StageCost { name: name.to_owned(), wall_s, cpu_s });
-        self.stages.clone()
-    }
 }

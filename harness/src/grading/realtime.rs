@@ -5,7 +5,7 @@ use std::path::Path;
 use basecode::Image;
 use basecode::gpu::{Footprint, UNDRAWN_MAPS};
 
-use super::draw::{Frame, draw, draw_plain};
+use super::draw::{Frame, draw, draw_one_each};
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
@@ -56,22 +56,30 @@ pub fn judge_images(
     stages: &Stages,
     tolerances: &Tolerances,
 ) -> Vec<Judged> {
-    let is_right = |case: &PreparedScene, outcome: &Outcome| {
-        let Outcome::Done(answer) = outcome else { return false };
-        let (width, height) = case.film();
-        let image = session::image(&answer.values, width, height);
-        judge(case, Kind::Realtime, &image, VIEWS[0], tolerances).verdict == Verdict::Pass
+    let right_as = |kind, view: View| {
+        move |case: &PreparedScene, outcome: &Outcome| {
+            let Outcome::Done(answer) = outcome else { return false };
+            let (width, height) = case.film();
+            let image = session::image(&answer.values, width, height);
+            judge(case, kind, &image, view, tolerances).verdict == Verdict::Pass
+        }
     };
-    let plain = draw_plain(session, plugin, cases, &is_right);
+    let frames: Vec<Frame> = cases.iter().map(Frame::plain).collect();
+    let plain = draw_one_each(session, plugin, &frames, &right_as(Kind::Realtime, VIEWS[0]));
+    // Workers of their own: the bonus may crash without a trace on the others.
+    let mut frames: Vec<Frame> = cases.iter().filter_map(Frame::bonus).collect();
+    // What this one takes is looked at, and must not be there from another.
+    frames.sort_by_key(|frame| !frame.case.entry.bonus_required);
+    let right = right_as(Kind::RealtimeShadows, (CheckId::BonusImage, &|_| true));
+    let outcomes = draw_one_each(session, plugin, &frames, &right);
+    let mut bonus: Vec<(Frame, Outcome)> = frames.into_iter().zip(outcomes).collect();
     let judged = cases.iter().zip(plain).map(|(case, plain)| {
         let footprint = plain.answer().and_then(|answer| answer.footprint);
         let fails = plain.fault() == Some(Fault::Submission);
         let (mut checks, plain) = judge_plain(session, case, &plain, tolerances);
         let mut drawn = Vec::from_iter(plain);
-        if let Some(toml) = &case.bonus {
-            // A worker of its own: the bonus may crash without a trace on the others.
-            let frame = Frame { toml, shadow_map: true, ..Frame::plain(case) };
-            let outcome = draw(session, Some(plugin), &frame);
+        let own = bonus.iter().position(|(frame, _)| std::ptr::eq(frame.case, case));
+        if let Some((frame, outcome)) = own.map(|index| bonus.swap_remove(index)) {
             let plain = drawn.first().map(|drawn| &drawn.image);
             let (mut check, bonus) =
                 judge_bonus(session, plugin, case, &outcome, plain, tolerances);

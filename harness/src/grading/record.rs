@@ -1,6 +1,6 @@
 //! The record of one graded submission: everything that its report and its grade are made from.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -106,6 +106,28 @@ pub struct Conditions {
     pub adapter: String,
     /// The compiler.
     pub compiler: String,
+}
+
+impl Record {
+    /// That of the submission at `source`, of which nothing is known yet.
+    pub(super) fn begun(source: &Path, slug: &str) -> Self {
+        Self {
+            name: source.file_name().unwrap_or(source.as_os_str()).to_string_lossy().into_owned(),
+            slug: slug.to_owned(),
+            digest: String::new(),
+            student: Student::default(),
+            findings: Vec::new(),
+            diagnostics: String::new(),
+            evidence: Evidence::default(),
+            diagnoses: Vec::new(),
+            views: Vec::new(),
+            error_maps: Vec::new(),
+            images: Vec::new(),
+            sources: Vec::new(),
+            stages: Vec::new(),
+            conditions: Conditions::default(),
+        }
+    }
 }
 
 impl Student {

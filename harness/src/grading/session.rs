@@ -1,6 +1,6 @@
 //! Runs requests on a submission's plugin, and handles those that get no answer.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -23,6 +23,15 @@ const OUTPUT: CheckId = CheckId::SubmissionOutput;
 /// The error of a question that was not asked any more: it leaves no point that could be seen.
 const NOT_ASKED: f64 = 0.9999;
 
+/// Where frames of Umbra's own pass are kept, and what draws them.
+pub struct KeptFrames {
+    pub(super) folder: PathBuf,
+    /// The program.
+    pub(super) worker: PathBuf,
+    /// Adapter and driver, in their own words.
+    pub(super) drawn_with: String,
+}
+
 /// What it takes to run one submission.
 pub struct Session<'a> {
     /// Starts workers.
@@ -44,6 +53,8 @@ pub struct Session<'a> {
     /// The reference renderer's library, absent in a student's kit: what it can draw, the machine
     /// is not to blame for.
     pub reference: Option<&'a Path>,
+    /// Where frames of Umbra's own pass are kept, if anywhere.
+    pub kept_frames: Option<&'a KeptFrames>,
     /// What was answered, for the diagnosis.
     pub observations: Mutex<Observations>,
     /// What compilers said in several lines, each text once: to be shown line by line.

@@ -4,8 +4,10 @@ use std::panic::resume_unwind;
 use std::path::Path;
 use std::time::Instant;
 
+use super::begun::Say;
+use super::costs::Costs;
 use super::offline::Drawn;
-use super::pipeline::{Costs, Grading, RenderPath};
+use super::pipeline::{Grading, RenderPath};
 use super::session::Session;
 use super::stages::Stages;
 use crate::evidence::Check;
@@ -35,13 +37,13 @@ impl Grading<'_> {
         plugin: &Path,
         stages: &Stages,
         seed: u64,
-        say: &dyn Fn(&str),
+        say: Say,
         costs: &mut Costs,
     ) -> anyhow::Result<BothPaths> {
         let begun = Instant::now();
         let offline = || {
             let (mut checks, mut drawn) = (Vec::new(), Vec::new());
-            self.offline(session, plugin, seed, &mut checks, &mut drawn)?;
+            self.offline(session, plugin, seed, say, &mut checks, &mut drawn)?;
             checks.extend(session.used_up());
             let (wall_s, cpu_s) = (begun.elapsed().as_secs_f64(), session.end_path());
             anyhow::Ok(OnPath { checks, drawn, quoted: String::new(), wall_s, cpu_s })

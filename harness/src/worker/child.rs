@@ -59,12 +59,13 @@ fn work(dir: &Path) -> std::io::Result<()> {
         let mut output = Output::open(&folder.output(), request.output)?;
         let bytes = input.bytes(request.input);
         let result = match &plugin {
-            Some(plugin) => ask(plugin, &mut scene, request, bytes, record, output.floats()),
+            Some(plugin) => ask(plugin, &mut scene, request, bytes, record, output.floats())
+                .map(|()| String::new()),
             None => neutral.render(&request.request, output.floats()),
         };
         let seconds = begin.elapsed().as_secs_f64();
         match result {
-            Ok(()) => record.answer(api::STATUS_OK, "", seconds),
+            Ok(adapter) => record.answer(api::STATUS_OK, &adapter, seconds),
             Err(error) => record.answer(status(error.kind), &error.message, seconds),
         }
     }

@@ -23,6 +23,7 @@ mod table;
 mod wire;
 
 pub use child::{child_main, draw_in_process};
+pub(crate) use command::software_driver;
 pub use job::{
     Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, Matrices, RayQuery, Request,
     STAGES, SceneRef, Stage,

@@ -45,13 +45,13 @@ struct Open {
 }
 
 impl Neutral {
-    /// Draws a [`Request::RenderRealtime`] into `values`, frame after frame.
+    /// Draws a [`Request::RenderRealtime`] into `values`, frame after frame. Answers adapter and driver.
     ///
     /// # Errors
     /// [`CallErrorKind::NoAdapter`] without an adapter, [`CallErrorKind::Stage`] for a stage that is no
     /// WGSL, [`CallErrorKind::Failed`] for stages that do not fit this pass or each other,
     /// [`CallErrorKind::Ours`] for a request that is not one.
-    pub fn render(&mut self, request: &Request, values: &mut [f32]) -> Result<(), CallError> {
+    pub fn render(&mut self, request: &Request, values: &mut [f32]) -> Result<String, CallError> {
         let Request::RenderRealtime { scene, width, height, adapter, stages, cameras, .. } =
             request
         else {
@@ -68,7 +68,7 @@ impl Neutral {
         }
         // A device on which something failed is not used again: here it is dropped on errors.
         let mut open = self.open.take();
-        let mut draw = || -> Result<(), Failure> {
+        let mut draw = || -> Result<String, Failure> {
             let open = match &mut open {
                 Some(open) => open,
                 closed => closed.insert(Open::new(adapter)?),
@@ -92,10 +92,14 @@ impl Neutral {
                     image.pixels.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>().as_slice(),
                 );
             }
-            Ok(())
+            let wgpu::AdapterInfo { name, driver, driver_info, .. } = &open.gpu.adapter;
+            Ok(format!("{name}, {driver}, {driver_info}"))
         };
         let drawn = draw();
-        drawn.map(|()| self.open = open).map_err(|failure| {
+        if drawn.is_ok() {
+            self.open = open;
+        }
+        drawn.map_err(|failure| {
             let (kind, message) = match failure {
                 Failure::Stage(why) => (CallErrorKind::Stage, why),
                 Failure::Other(error @ Error::NoAdapter(_)) => {

@@ -126,7 +126,7 @@ impl fmt::Display for Late {
 }
 
 /// What a renderer answered.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// The floats, as many as [`super::Request::answer_floats`] says; NaN where nothing was
     /// written. Any value may be there.
@@ -139,6 +139,9 @@ pub struct Answer {
     pub footprint: Option<Footprint>,
     /// Seconds it took by the worker's clock: for information, a plugin can forge it.
     pub seconds: f64,
+    /// What Umbra's own pass drew with: adapter and driver. Of a plugin's answer it tells nothing.
+    #[serde(default)]
+    pub adapter: String,
 }
 
 /// What a witness BSDF saw of its calls.
@@ -200,8 +203,7 @@ mod as_base64 {
         #[test]
         fn answers_survive_json_with_nan_and_infinity() {
             let values = vec![1.5, f32::NAN, f32::NEG_INFINITY, -0.0];
-            let answer =
-                Answer { values: values.clone(), witness: None, footprint: None, seconds: 0.5 };
+            let answer = Answer { values: values.clone(), seconds: 0.5, ..Answer::default() };
             let text = serde_json::to_string(&answer).unwrap();
             let back: Answer = serde_json::from_str(&text).unwrap();
             let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();

@@ -430,7 +430,8 @@ impl Files {
                     calls: *calls,
                     worst_norm_error: worst_norm_error.is_finite().then_some(*worst_norm_error),
                 });
-                Outcome::Done(Answer { values, witness, footprint: *footprint, seconds: *seconds })
+                let (footprint, seconds) = (*footprint, *seconds);
+                Outcome::Done(Answer { values, witness, footprint, seconds, adapter: message })
             }
             api::STATUS_ERROR => Outcome::Failed(message),
             api::STATUS_NOT_IMPLEMENTED => Outcome::NotImplemented(message),

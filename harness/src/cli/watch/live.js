@@ -9,6 +9,8 @@ const live = {
   /** What each picture shows, and how its questions stand. */
   views: {},
   libraries: 0,
+  /** Whether a save is being checked, which needs the cores. */
+  checking: true,
   /** Bytes of the screen by the bits of a half, for red and blue, and for green. */
   tables: [new Uint8Array(65536), new Uint8Array(65536)],
 };
@@ -129,13 +131,13 @@ function draw() {
   });
 }
 
-/** The offline picture, better and better. */
+/** The offline picture, better and better once nothing is being checked. */
 async function refine() {
   const view = live.views.offline;
   view.abort?.abort();
   if (view.stopped || !live.panel.open || !live.camera) return;
   const abort = view.abort = new AbortController();
-  const samples = SAMPLES.slice(0, Number(control("spp").value) + 1);
+  const samples = SAMPLES.slice(0, live.checking ? 1 : Number(control("spp").value) + 1);
   for (const spp of samples) {
     if (!view.picture) view.about.textContent = "first picture";
     if (!await ask(view, "offline", spp, abort.signal)) return;
@@ -163,8 +165,12 @@ function again() {
 }
 
 /** Is told by `watch.js` what goes on. */
-function tellLive({ libraries, fresh }) {
+function tellLive({ stage, libraries, fresh }) {
+  const changed = live.checking !== (stage === "running");
+  live.checking = stage === "running";
   for (const { figure } of Object.values(live.views)) figure.classList.toggle("earlier", !fresh);
+  // A new question ends the one before: a check has the cores for itself.
+  if (changed) refine().catch(gone);
   if (libraries === live.libraries) return;
   live.libraries = libraries;
   again();

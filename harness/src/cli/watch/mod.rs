@@ -1,8 +1,7 @@
 //! `umbra watch`: checks a working folder on every save, and shows the report in the browser.
 //!
-//! A quick first check covers one small scene; a full check follows. Each check runs `umbra check` as a separate
-//! program, so that no renderer can end the watch. A new save ends the running check. The page is served only on this
-//! machine, under an address that nobody can guess.
+//! Each check runs `umbra check` as a separate program, so that no renderer can end the watch. A new save ends the
+//! running check. The page is served only on this machine, under an address that nobody can guess.
 
 mod live;
 mod page;
@@ -20,18 +19,14 @@ use anyhow::Context as _;
 use notify::{EventKind, RecursiveMode, Watcher as _};
 
 use self::live::LiveView;
-use self::server::{Board, Extent, Server, Stage};
+use self::server::{Board, Server, Stage};
 use super::context::{Context, on_interrupt};
-use crate::assignment::SceneEntry;
 
 /// A save is over after this long without another change: an editor may write several files, and one file in several
 /// steps.
 const QUIET: Duration = Duration::from_millis(150);
 /// Time that a check has to end once it is told to.
 const GRACE: Duration = Duration::from_secs(10);
-
-/// The folder of first looks, in the report's.
-const FIRST_LOOK: &str = "first-look";
 
 /// Options of `umbra watch`.
 #[derive(clap::Args)]
@@ -87,12 +82,9 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     watcher.watch(&folder, RecursiveMode::Recursive).with_context(name)?;
 
     let board = Arc::new(Board::default());
-    let [first, whole] = [output.join(FIRST_LOOK), output.clone()].map(|output| {
-        let given = [crate::class::Source::given(&folder)];
-        let slug = super::class::sources(&given, &output).remove(0).slug;
-        (output.join(slug), output)
-    });
-    let server = Server::start([first.0, whole.0], Arc::clone(&board), Arc::clone(&live))?;
+    let given = [crate::class::Source::given(&folder)];
+    let slug = super::class::sources(&given, &output).remove(0).slug;
+    let server = Server::start(output.join(slug), Arc::clone(&board), Arc::clone(&live))?;
     let door = server.door()?;
     println!("{}", door.path().display());
     eprintln!(
@@ -101,19 +93,14 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     );
     super::view::open_page(&door.path());
 
-    let smallest = || smallest_scene(&context.assignment.scenes);
-    let scene = if arguments.scene.is_empty() { smallest() } else { None };
-    let parts = context.assignment.rules.parts.iter().filter(|part| part.path == "realtime");
     let check = Check {
         folder: &folder,
-        outputs: [first.1, whole.1],
+        output: &output,
         arguments,
         root,
         board: &board,
         live: &live,
         happened,
-        scene,
-        realtime: parts.map(|part| part.id.clone()).collect(),
     };
     let mut begun = 0;
     let mut running = Some(check.start(Change::Other, &mut begun)?);
@@ -133,8 +120,9 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
                 // An older one was ended by a save.
                 if let Some(mut ended) = running.take_if(|running| running.number == number) {
                     let status = ended.child.wait()?;
-                    offline_holds |= ended.look == Extent::Whole && is_judged(status);
-                    running = check.go_on(ended, status, &mut begun)?;
+                    ended.hear_out();
+                    offline_holds |= is_judged(status);
+                    check.show(status);
                 }
             }
             Happened::Interrupted => {
@@ -146,13 +134,6 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
             }
         }
     }
-}
-
-/// The scene with the smallest film, for a first look; none where they are all of one size.
-fn smallest_scene(scenes: &[SceneEntry]) -> Option<String> {
-    let small = scenes.iter().filter_map(|scene| Some((scene.film?, &scene.name)));
-    let smallest = small.min_by_key(|([width, height], _)| width * height);
-    smallest.filter(|_| scenes.len() > 1).map(|(_, name)| name.clone())
 }
 
 /// Whether a change of a file can change what a check finds.
@@ -209,7 +190,6 @@ struct Running {
     child: Child,
     /// Puts what it says on the board.
     said: Option<JoinHandle<()>>,
-    look: Extent,
 }
 
 impl Running {
@@ -240,18 +220,14 @@ impl Running {
 /// How a folder is checked.
 struct Check<'a> {
     folder: &'a Path,
-    /// Where the report of a first look goes, and that of everything.
-    outputs: [PathBuf; 2],
+    /// Where the report goes.
+    output: &'a Path,
     arguments: &'a WatchArguments,
     root: Option<&'a Path>,
     board: &'a Arc<Board>,
     live: &'a Arc<LiveView>,
     /// Where the end of a check is reported.
     happened: Sender<Happened>,
-    /// The scene of the first look.
-    scene: Option<String>,
-    /// The parts of the realtime half.
-    realtime: Vec<String>,
 }
 
 /// Whether a check came to a report.
@@ -260,61 +236,27 @@ fn is_judged(status: ExitStatus) -> bool {
 }
 
 impl Check<'_> {
-    /// Checks what was saved: one small scene first, where there is one.
+    /// Shows how a check ended.
+    fn show(&self, status: ExitStatus) {
+        match is_judged(status) {
+            true => self.board.report("everything that was asked is on the page"),
+            // The last line said why.
+            false => self.board.show(Stage::Failed, ""),
+        }
+    }
+
+    /// Checks what was saved.
     fn start(&self, change: Change, begun: &mut usize) -> anyhow::Result<Running> {
         self.board.saved(change == Change::Shader);
-        self.run(if self.scene.is_some() { Extent::First } else { Extent::Whole }, change, begun)
-    }
-
-    /// Whether a look is the first at a save.
-    fn is_first(&self, look: Extent) -> bool {
-        look == Extent::First || self.scene.is_none()
-    }
-
-    /// Shows how a check ended, and starts the next one, if any.
-    fn go_on(
-        &self,
-        mut ended: Running,
-        status: ExitStatus,
-        begun: &mut usize,
-    ) -> anyhow::Result<Option<Running>> {
-        ended.hear_out();
-        let judged = is_judged(status);
-        match (ended.look, &self.scene) {
-            (Extent::First, Some(scene)) if judged => {
-                let words = format!("first look, on {scene} alone; the rest is being checked");
-                self.board.report(Extent::First, Stage::Running, &words);
-                return self.run(Extent::Whole, Change::Other, begun).map(Some);
-            }
-            _ if judged => {
-                self.board.report(
-                    Extent::Whole,
-                    Stage::Done,
-                    "everything that was asked is on the page",
-                );
-            }
-            // The last line said why.
-            _ => self.board.show(Stage::Failed, ""),
-        }
-        Ok(None)
-    }
-
-    fn run(&self, look: Extent, change: Change, begun: &mut usize) -> anyhow::Result<Running> {
         *begun += 1;
         let number = *begun;
         let mut command = Command::new(std::env::current_exe()?);
-        command.arg("check").arg(self.folder).arg("--report").arg(&self.outputs[look as usize]);
-        let parts = &self.arguments.part;
-        // A first look at a shader asks what can have changed.
-        let realtime = self
-            .realtime
-            .iter()
-            .filter(|_| parts.is_empty() && look == Extent::First && change == Change::Shader);
-        for part in parts.iter().chain(realtime) {
+        command.arg("check").arg(self.folder).arg("--report").arg(self.output);
+        command.arg("--keep-plugin").arg(self.live.library());
+        for part in &self.arguments.part {
             command.arg("--part").arg(part);
         }
-        let first = self.scene.iter().filter(|_| look == Extent::First);
-        for scene in self.arguments.scene.iter().chain(first) {
+        for scene in &self.arguments.scene {
             command.arg("--scene").arg(scene);
         }
         if let Some(root) = self.root {
@@ -324,12 +266,6 @@ impl Check<'_> {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         command.stdin(Stdio::null()).stderr(Stdio::piped());
-        if look == Extent::First {
-            command.stdout(Stdio::null());
-        }
-        if self.is_first(look) {
-            command.arg("--keep-plugin").arg(self.live.library());
-        }
         let mut child = command.spawn().context("cannot start umbra check")?;
         let said = child.stderr.take().map(|said| {
             let (board, live) = (Arc::clone(self.board), Arc::clone(self.live));
@@ -347,23 +283,13 @@ impl Check<'_> {
                 let _ = happened.send(Happened::Ended(number));
             })
         });
-        Ok(Running { number, child, said, look })
+        Ok(Running { number, child, said })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_first_look_is_at_the_smallest_film() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let scenes = crate::assignment::Assignment::load(&root).unwrap().scenes;
-        let name = smallest_scene(&scenes).unwrap();
-        let area = |[width, height]: [u32; 2]| width * height;
-        let own = scenes.iter().find(|scene| scene.name == name).unwrap().film.map(area).unwrap();
-        assert!(scenes.iter().all(|scene| scene.film.is_none_or(|film| area(film) >= own)));
-    }
 
     #[test]
     fn only_what_a_check_reads_starts_one() {

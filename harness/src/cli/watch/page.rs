@@ -8,8 +8,8 @@ const STYLE: &str = include_str!("watch.css");
 const SCRIPT: &str = concat!(include_str!("live.js"), include_str!("watch.js"));
 const LIVE: &str = include_str!("live.html");
 
-/// The page, which shows `report`, a page of the folder `first` or `whole`, whichever is the newest. Nothing that anybody
-/// wrote is in it; what goes on reaches it as text, by its script.
+/// The page, which shows `report`, a page of the folder `report`. Nothing that anybody wrote is in it; what goes on
+/// reaches it as text, by its script.
 pub fn page(report: &'static str) -> String {
     let hash =
         |text: &str| base64::engine::general_purpose::STANDARD.encode(sha2::Sha256::digest(text));
@@ -22,8 +22,7 @@ pub fn page(report: &'static str) -> String {
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>Umbra watches</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <p id=\"status\" role=\"status\">Checking</p>\n\
-         {LIVE}<iframe id=\"first\" title=\"First look at what was saved\" hidden></iframe>\n\
-         <p id=\"mark\" role=\"status\" hidden></p>\n\
+         {LIVE}<p id=\"mark\" role=\"status\" hidden></p>\n\
          <iframe id=\"report\" title=\"Report\" data-page=\"{report}\"></iframe>\n\
          <script>{SCRIPT}</script>\n</body>\n</html>\n"
     )

@@ -36,28 +36,17 @@ pub enum Stage {
     Failed,
 }
 
-/// How much a report covers.
+/// What the last report is worth after the last save.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Extent {
-    /// One small scene.
-    First,
-    /// Everything that was asked.
-    #[default]
-    Whole,
-}
-
-/// What the last whole report is worth after the last save.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-enum Whole {
+enum Holds {
     /// There is none, or nothing of it need hold any more.
     #[default]
-    Past,
+    Nothing,
     /// What it says of the offline half still holds.
     Offline,
-    /// It is that of the last save.
-    Now,
+    /// All of it: it is that of the last save.
+    All,
 }
 
 /// What the page shows beside the report.
@@ -67,16 +56,14 @@ struct Shown {
     version: u64,
     stage: Stage,
     message: String,
-    /// Which report is the newest.
-    look: Extent,
-    /// How many reports there were: the page loads the newest when this rises.
+    /// How many reports there were: the page loads it again when this rises.
     reports: u64,
     /// How many libraries there were for the live view, which asks again when this rises.
     libraries: u64,
     /// Whether the last of them is that of the last save.
     fresh: bool,
-    /// What the last whole report is worth.
-    whole: Whole,
+    /// What the last report is worth.
+    holds: Holds,
 }
 
 /// Where the watch tells its browsers what it does.
@@ -92,13 +79,10 @@ impl Board {
         self.change(stage, message, |_| ());
     }
 
-    /// The same, and a new report.
-    pub fn report(&self, look: Extent, stage: Stage, message: &str) {
-        self.change(stage, message, |shown| {
-            shown.look = look;
-            if look == Extent::Whole {
-                shown.whole = Whole::Now;
-            }
+    /// Shows that there is a new report.
+    pub fn report(&self, message: &str) {
+        self.change(Stage::Done, message, |shown| {
+            shown.holds = Holds::All;
             shown.reports += 1;
         });
     }
@@ -107,7 +91,7 @@ impl Board {
     pub fn saved(&self, offline_holds: bool) {
         self.change(Stage::Running, "starting", |shown| {
             shown.fresh = false;
-            shown.whole = if offline_holds { Whole::Offline } else { Whole::Past };
+            shown.holds = if offline_holds { Holds::Offline } else { Holds::Nothing };
         });
     }
 
@@ -160,15 +144,11 @@ impl Door {
 }
 
 impl Server {
-    /// Serves the reports in the folders of a first look and of everything, and what is on the board.
+    /// Serves the report in a folder, and what is on the board.
     ///
     /// # Errors
     /// When no port can be had.
-    pub fn start(
-        folders: [PathBuf; 2],
-        board: Arc<Board>,
-        live: Arc<LiveView>,
-    ) -> anyhow::Result<Self> {
+    pub fn start(folder: PathBuf, board: Arc<Board>, live: Arc<LiveView>) -> anyhow::Result<Self> {
         let server = tiny_http::Server::http("127.0.0.1:0").map_err(anyhow::Error::from_boxed)?;
         let address = server.server_addr().to_ip().context("a port of this machine")?;
         let mut secret = [0; SECRET_BYTES];
@@ -179,10 +159,10 @@ impl Server {
         std::thread::spawn(move || {
             for request in server.incoming_requests() {
                 let asked = Asked::of(&request, &host, &secret);
-                let (folders, board) = (folders.clone(), Arc::clone(&board));
+                let (folder, board) = (folder.clone(), Arc::clone(&board));
                 let live = Arc::clone(&live);
                 // One that only waits must not hold up the others.
-                std::thread::spawn(move || answer(request, asked, &folders, &board, &live));
+                std::thread::spawn(move || answer(request, asked, &folder, &board, &live));
             }
         });
         Ok(own)
@@ -219,8 +199,8 @@ enum Asked {
     Scenes,
     /// A picture of one.
     Frame(Question),
-    /// A file of a report, by a path of plain names.
-    File(Extent, PathBuf),
+    /// A file of the report, by a path of plain names.
+    File(PathBuf),
     /// Refused, with the status.
     Nothing(u16),
 }
@@ -265,13 +245,10 @@ impl Asked {
                 .split_once('?')
                 .and_then(|(_, query)| Question::parse(query))
                 .map_or(Self::Nothing(400), Self::Frame),
-            _ => {
-                let look = [(Extent::First, "first/"), (Extent::Whole, "whole/")];
-                let mut file = look.into_iter().filter_map(|(look, name)| {
-                    Some(Self::File(look, plain_path(rest.strip_prefix(name)?)?))
-                });
-                file.next().unwrap_or(Self::Nothing(404))
-            }
+            _ => rest
+                .strip_prefix("report/")
+                .and_then(plain_path)
+                .map_or(Self::Nothing(404), Self::File),
         }
     }
 }
@@ -304,7 +281,7 @@ fn plain_path(text: &str) -> Option<PathBuf> {
     (!odd && path.components().count() > 0 && path.components().all(plain)).then_some(path)
 }
 
-fn answer(request: Request, asked: Asked, folders: &[PathBuf; 2], board: &Board, live: &LiveView) {
+fn answer(request: Request, asked: Asked, folder: &Path, board: &Board, live: &LiveView) {
     // A browser that goes away is no error.
     let _ = match asked {
         Asked::Page => {
@@ -320,7 +297,7 @@ fn answer(request: Request, asked: Asked, folders: &[PathBuf; 2], board: &Board,
                 request.respond(page("text/plain; charset=utf-8", words).with_status_code(409))
             }
         },
-        Asked::File(look, path) => match file(&folders[look as usize], &path) {
+        Asked::File(path) => match file(folder, &path) {
             Some((kind, bytes)) => request.respond(page(kind, bytes)),
             None => request.respond(refused(404)),
         },
@@ -404,9 +381,9 @@ mod tests {
         let question = Question::parse(frame).unwrap();
         assert_eq!(ask(&format!("/abcdef/frame?{frame}"), own, None), Asked::Frame(question));
         assert_eq!(ask("/abcdef/events?x", own, Some("http://127.0.0.1:4000")), Asked::Events);
-        let file = |path: &str| Asked::File(Extent::Whole, path.into());
-        assert_eq!(ask("/abcdef/whole/report.html", own, None), file("report.html"));
-        assert_eq!(ask("/abcdef/whole/viewer/a%20b.js", own, None), file("viewer/a b.js"));
+        let file = |path: &str| Asked::File(path.into());
+        assert_eq!(ask("/abcdef/report/report.html", own, None), file("report.html"));
+        assert_eq!(ask("/abcdef/report/viewer/a%20b.js", own, None), file("viewer/a b.js"));
         // Another name for this machine, another origin, another secret.
         for (url, asked, origin) in [
             ("/abcdef/", Some("localhost:4000"), None),
@@ -436,7 +413,7 @@ mod tests {
             "c:/b.html",
             "",
         ] {
-            let asked = ask(&format!("/abcdef/whole/{path}"), own, None);
+            let asked = ask(&format!("/abcdef/report/{path}"), own, None);
             assert_eq!(asked, Asked::Nothing(404), "{path}");
         }
     }
@@ -457,8 +434,7 @@ mod tests {
         let assignment = crate::assignment::Assignment::load(&root).unwrap();
         let supervisor = crate::worker::Supervisor::new("none".into(), place.path().to_owned());
         let live = Arc::new(LiveView::new(&assignment, &supervisor, &[]).unwrap());
-        let folders = [place.path().join("none"), folder];
-        let server = Server::start(folders, Arc::clone(&board), live).unwrap();
+        let server = Server::start(folder, Arc::clone(&board), live).unwrap();
         let (host, secret) = (server.host.clone(), server.secret.clone());
         let ask = |path: &str, more: &str| {
             let mut stream = TcpStream::connect(&host).unwrap();
@@ -471,16 +447,16 @@ mod tests {
             stream.read_to_string(&mut answer).unwrap();
             answer
         };
-        let report = ask(&format!("/{secret}/whole/report.html"), "");
+        let report = ask(&format!("/{secret}/report/report.html"), "");
         assert!(report.starts_with("HTTP/1.1 200") && report.ends_with("the report"), "{report}");
         assert!(report.contains("no-store") && report.contains("frame-ancestors 'self'"));
         for (path, more, status) in [
-            (format!("/{secret}/whole/last-check.json"), "", 404),
-            (format!("/{secret}/whole/link.html"), "", 404),
-            (format!("/{secret}/whole/../secret.html"), "", 404),
-            (format!("/{secret}/first/report.html"), "", 404),
+            (format!("/{secret}/report/last-check.json"), "", 404),
+            (format!("/{secret}/report/link.html"), "", 404),
+            (format!("/{secret}/report/../secret.html"), "", 404),
+            (format!("/{secret}/other/report.html"), "", 404),
             (format!("/{secret}/"), "Origin: http://evil.example\r\n", 403),
-            ("/0123/whole/report.html".to_owned(), "", 403),
+            ("/0123/report/report.html".to_owned(), "", 403),
         ] {
             let answer = ask(&path, more);
             assert!(answer.starts_with(&format!("HTTP/1.1 {status}")), "{path}: {answer}");
@@ -501,12 +477,12 @@ mod tests {
         };
         board.show(Stage::Running, "compiling\u{1b}[2J");
         until("\"message\":\"compiling\\\\u{1b}[2J\"");
-        board.report(Extent::Whole, Stage::Done, "");
+        board.report("");
         until("\"stage\":\"done\",\"message\":\"compiling");
-        until("\"look\":\"whole\",\"reports\":1");
-        until("\"whole\":\"now\"");
+        until("\"reports\":1");
+        until("\"holds\":\"all\"");
         board.saved(true);
-        until("\"whole\":\"offline\"");
+        until("\"holds\":\"offline\"");
 
         let door = server.door().unwrap();
         let text = std::fs::read_to_string(door.path()).unwrap();
