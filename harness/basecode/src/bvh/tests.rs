@@ -243,3 +243,76 @@ fn a_tree_of_halves_hits_as_far_away() {
         assert_eq!(usual.any_hit(&ray), halved.any_hit(&ray), "{ray:?}");
     }
 }
+
+/// Eight rays at once hit what each hits alone, bit by bit, however they lie, and whichever are missing.
+#[test]
+fn eight_rays_hit_what_each_hits_alone() {
+    let sampler = Sampler::new(6);
+    let mut alone = 0;
+    for scale in [1.0, 1e-12, 1e12] {
+        let triangles =
+            odd_triangles(&sampler).into_iter().map(|t| t.map(|v| scale * v)).collect::<Vec<_>>();
+        let blocks: Vec<bool> = (0..triangles.len()).map(|i| i % 3 != 0).collect();
+        let fast = Bvh::new(&triangles, &blocks);
+        let portable = Bvh { avx2: false, ..Bvh::new(&triangles, &blocks) };
+        let mut hits = 0;
+        for number in 0..20_000 {
+            let eye = scale * 2.0 * random_vec3(&sampler);
+            let [a, b, _] = triangles[number % triangles.len()];
+            // From one point, to one point, along axes, and anywhere; close together, or not; at vertices and edges.
+            let spread = scale * [1e-6, 1e-2, 1.0][number / 4 % 3];
+            let rays: [Option<Ray>; 8] = std::array::from_fn(|i| {
+                let target =
+                    [a, (a + b) / 2.0, a + spread * random_vec3(&sampler)][(number + i) % 3];
+                let (from, to) = match number % 4 {
+                    0 => (eye, target),
+                    1 => (target, eye),
+                    2 => (target - [Vec3::X, -Vec3::Y, Vec3::Z][number / 4 % 3] * scale, target),
+                    _ => (scale * 2.0 * random_vec3(&sampler), target),
+                };
+                let direction = (to - from).normalize_or(Vec3::X);
+                let end = if number % 4 == 1 { (to - from).length() } else { scale * 10.0 };
+                let ray = Ray::segment(from, direction, 1e-4 * scale, end);
+                (number % 5 != 0 || sampler.next_1d() < 0.2).then_some(ray)
+            });
+            for bvh in [&fast, &portable] {
+                let closest = rays.map(|ray| bvh.closest_hit(&ray?));
+                let any = rays.map(|ray| ray.is_some_and(|ray| bvh.any_hit(&ray)));
+                assert_eq!(bvh.closest_hits(&rays), closest, "{rays:?}");
+                assert_eq!(bvh.any_hits(&rays), any, "{rays:?}");
+                hits += closest.iter().flatten().count();
+            }
+            alone += usize::from(rays.iter().flatten().count() < 2);
+        }
+        assert!(hits > 50_000, "{hits}");
+    }
+    assert!(alone > 100, "{alone}");
+}
+
+/// A ray that is no number hits nothing, and the others hit what they do without it.
+#[test]
+fn odd_rays_do_not_disturb_the_others() {
+    let triangle = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
+    let down = Ray::segment(vec3(0.2, 0.2, 1.0), -Vec3::Z, 0.0, 5.0);
+    let odd = [
+        Ray { origin: Vec3::NAN, ..down },
+        Ray { direction: vec3(f32::NAN, 0.0, -1.0), ..down },
+        Ray { min_t: f32::NAN, ..down },
+        Ray { max_t: f32::NAN, ..down },
+        Ray { max_t: -1.0, ..down },
+        Ray { direction: Vec3::ZERO, ..down },
+        Ray { origin: Vec3::INFINITY, ..down },
+    ];
+    for bvh in [Bvh::new(&triangle, &[true]), Bvh { avx2: false, ..Bvh::new(&triangle, &[true]) }] {
+        for (number, odd) in odd.into_iter().enumerate() {
+            let mut rays = [Some(down); 8];
+            rays[number] = Some(odd);
+            let closest = rays.map(|ray| bvh.closest_hit(&ray?));
+            assert_eq!(closest.iter().flatten().count(), 7, "{odd:?}");
+            assert_eq!(bvh.closest_hits(&rays), closest, "{odd:?}");
+            assert_eq!(bvh.any_hits(&rays), closest.map(|hit| hit.is_some()), "{odd:?}");
+        }
+        assert_eq!(bvh.any_hits(&[None; 8]), [false; 8]);
+    }
+    assert_eq!(Bvh::new(&[], &[]).closest_hits(&[Some(down); 8]), [None; 8]);
+}
