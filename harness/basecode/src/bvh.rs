@@ -1,8 +1,8 @@
 //! Ray casting: a bounding volume hierarchy over triangles, eight children to a node.
 //!
 //! `build` makes a binary tree, `fold` one of eight children of it. A ray meets eight boxes or eight triangles at once
-//! (`node`), and any-hit queries stop at the first hit. Eight rays meet one box or one triangle at once (`packet`). Where
-//! the machine has AVX2 it is used, with the same hits.
+//! (`node`), and any-hit queries stop at the first hit. Eight rays meet one box or one triangle at once (`packet`).
+//! Where the machine has AVX2 it is used, with the same hits.
 
 mod build;
 mod fold;
@@ -100,8 +100,8 @@ impl Bvh {
         self.any::<Portable>(ray)
     }
 
-    /// [`Bvh::closest_hit`] of each of eight rays, bit by bit; none where there is no ray. It is faster where rays lie close
-    /// together.
+    /// [`Bvh::closest_hit`] of each of eight rays, bit by bit; none where there is no ray. It is faster where rays lie
+    /// close together.
     #[inline(never)]
     pub fn closest_hits(&self, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
         refuse_rays();
@@ -212,7 +212,8 @@ impl Bvh {
     }
 }
 
-/// What is looked for. A trait instead of a closure, because a closure in AVX2 code may be compiled apart, without AVX2.
+/// What is looked for. A trait instead of a closure, because a closure in AVX2 code may be compiled apart, without
+/// AVX2.
 trait Search {
     /// Whether nearer children come first.
     const SORTED: bool;
@@ -259,8 +260,9 @@ impl Search for Closest {
 
 /// Takes a hit for the closest, if it is. Hits matter as far as `nearest`.
 ///
-/// Rounding may put a hit before the box of its leaf. It counts from where the ray enters the box, at `enter`: so a leaf
-/// that begins farther away than the closest hit never holds a closer one, and the order of leaves does not matter.
+/// Rounding may put a hit before the box of its leaf. It counts from where the ray enters the box, at `enter`: so a
+/// leaf that begins farther away than the closest hit never holds a closer one, and the order of leaves does not
+/// matter.
 #[inline(always)]
 fn closer(best: &mut Option<Hit>, nearest: &mut f32, enter: f32, hit: Hit) {
     let from = if enter > hit.t { enter } else { hit.t };

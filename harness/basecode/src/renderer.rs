@@ -58,8 +58,8 @@ pub trait Integrator: Send + Sync {
     /// The radiance L that arrives at the origin of `ray` [W m^-2 sr^-1]; black where it hits nothing.
     fn radiance(&self, scene: &Scene, ray: &Ray, sampler: &Sampler) -> Vec3;
 
-    /// The radiance along each of eight rays; black where there is no ray. Nobody needs to write it: it is for integrators
-    /// that cast rays of one pixel at once, with [`Scene::intersect_eight`].
+    /// The radiance along each of eight rays; black where there is no ray. Nobody needs to write it: it is for
+    /// integrators that cast rays of one pixel at once, with [`Scene::intersect_eight`].
     fn radiance_of_eight(
         &self,
         scene: &Scene,

@@ -126,8 +126,8 @@ impl<L: Lanes> WideRay<L> {
         (right.minus(shear_x.times(depth)), up.minus(shear_y.times(depth)), scale.times(depth))
     }
 
-    /// Whether the ray hits a triangle within [min_t, max_t], a bit each; where, and the barycentric weights of the second
-    /// and the third vertex there. The coordinates of a vertex come in the order of the ray's axes.
+    /// Whether the ray hits a triangle within [min_t, max_t], a bit each; where, and the barycentric weights of the
+    /// second and the third vertex there. The coordinates of a vertex come in the order of the ray's axes.
     ///
     /// Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, without culling: no ray
     /// passes between triangles that share an edge or a vertex. One of zero area as the ray sees it is not hit.
@@ -292,8 +292,8 @@ fn edge<L: Lanes>(ax: L, ay: L, bx: L, by: L) -> L {
     ax.times(by).minus(ay.times(bx))
 }
 
-/// The same with the right sign, and zero for zero alone, where `product` is zero: what the ray does at one triangle does
-/// not depend on the others beside it.
+/// The same with the right sign, and zero for zero alone, where `product` is zero: what the ray does at one triangle
+/// does not depend on the others beside it.
 #[inline(always)]
 fn edge_exactly<L: Lanes>(ax: L, ay: L, bx: L, by: L, edge: L, product: &[f32; 8]) -> L {
     let (ax, ay, bx, by) = (ax.to_array(), ay.to_array(), bx.to_array(), by.to_array());

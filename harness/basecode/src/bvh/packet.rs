@@ -1,9 +1,9 @@
 //! Eight rays at once through the hierarchy.
 //!
 //! Rays of a packet go the same way. The beam around them meets the eight boxes of a node at once (Wald, Boulos and
-//! Shirley, "Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 26(1), 2007). Of the children
-//! that it meets, the box is tried with all eight rays, and so is each triangle. A ray hits what it hits alone, bit by bit:
-//! the same is computed for it at each box and triangle, and the order of leaves does not matter.
+//! Shirley, "Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 26(1), 2007). Of the
+//! children that it meets, the box is tried with all eight rays, and so is each triangle. A ray hits what it hits
+//! alone, bit by bit: the same is computed for it at each box and triangle, and the order of leaves does not matter.
 
 use super::lanes::{Eight, Lanes};
 use super::node::{Child, INVERSE_LIMIT, IS_LEAF, Node, Triangles, Way, WideRay, widened};
@@ -15,8 +15,8 @@ use crate::Ray;
 pub trait Packet {
     /// Whether nearer children come first.
     const SORTED: bool;
-    /// Looks at the triangles of a leaf whose box the rays of `lanes` enter at `enter`. `nearest` says how far hits still matter for each
-    /// ray.
+    /// Looks at the triangles of a leaf whose box the rays of `lanes` enter at `enter`. `nearest` says how far hits
+    /// still matter for each ray.
     fn leaf<L: Lanes>(
         &mut self,
         rays: &WideRay<L>,
@@ -110,8 +110,8 @@ impl<L: Lanes> Rays<L> {
         let first = wanted.trailing_zeros() as usize % 8;
         let instead = rays[first]?;
         let mut columns = [Eight([0.0; 8]); 8];
-        for lane in 0..8 {
-            let (ray, max_t) = match &rays[lane] {
+        for (lane, ray) in rays.iter().enumerate() {
+            let (ray, max_t) = match ray {
                 Some(ray) if wanted >> lane & 1 == 1 => (ray, ray.max_t),
                 _ => (&instead, f32::NAN),
             };

@@ -221,8 +221,8 @@ fn any_number_of_threads_builds_the_same() {
     }
 }
 
-/// A tree that would be too deep for a ray's stack is built in halves. Where triangles cross, rounding of boxes may decide
-/// between two hits.
+/// A tree that would be too deep for a ray's stack is built in halves. Where triangles cross, rounding of boxes may
+/// decide between two hits.
 #[test]
 fn a_tree_of_halves_hits_as_far_away() {
     let sampler = Sampler::new(5);
