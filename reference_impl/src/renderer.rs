@@ -13,14 +13,23 @@ pub fn render(
     job.for_each_row(film, &|y, row| {
         // A sampler for each row: threads share none, and the image does not depend on their number.
         let sampler = Sampler::new(job.seed.wrapping_add(y as u64));
-        for (x, pixel) in row.iter_mut().enumerate() {
-            let mut sum = Vec3::ZERO;
-            for _ in 0..job.spp {
+        // All samples of the row, pixel by pixel, eight at a time.
+        let count = row.len() * job.spp;
+        row.fill(Vec3::ZERO);
+        for first in (0..count).step_by(8) {
+            let eight = first..count.min(first + 8);
+            let mut rays = [None; 8];
+            for (ray, sample) in rays.iter_mut().zip(eight.clone()) {
                 let (jx, jy) = if job.spp == 1 { (0.5, 0.5) } else { sampler.next_2d() };
-                let ray = camera.ray(x as f32 + jx, y as f32 + jy);
-                sum += integrator.radiance(scene, &ray, &sampler);
+                *ray = Some(camera.ray((sample / job.spp) as f32 + jx, y as f32 + jy));
             }
-            *pixel = sum / job.spp as f32;
+            let radiance = integrator.radiance_of_eight(scene, &rays, &sampler);
+            for (radiance, sample) in radiance.into_iter().zip(eight) {
+                row[sample / job.spp] += radiance;
+            }
+        }
+        for pixel in row {
+            *pixel /= job.spp as f32;
         }
     })
 }

@@ -1,12 +1,14 @@
 //! Ray casting: a bounding volume hierarchy over triangles, eight children to a node.
 //!
 //! `build` makes a binary tree, `fold` one of eight children of it. A ray meets eight boxes or eight triangles at once
-//! (`node`), and any-hit queries stop at the first hit. Where the machine has AVX2 it is used, with the same hits.
+//! (`node`), and any-hit queries stop at the first hit. Eight rays meet one box or one triangle at once (`packet`).
+//! Where the machine has AVX2 it is used, with the same hits.
 
 mod build;
 mod fold;
 mod lanes;
 mod node;
+mod packet;
 mod stack;
 #[cfg(test)]
 mod tests;
@@ -19,6 +21,7 @@ use crate::realtime::refuse_rays;
 use fold::{Wide, fold};
 use lanes::{Lanes, Portable};
 use node::{Child, IS_LEAF, Node, Triangles, WideRay};
+use packet::{AnyOfEach, ClosestOfEach};
 use stack::Stack;
 
 /// A hierarchy over the triangles of a scene.
@@ -97,6 +100,45 @@ impl Bvh {
         self.any::<Portable>(ray)
     }
 
+    /// [`Bvh::closest_hit`] of each of eight rays, bit by bit; none where there is no ray. It is faster where rays lie
+    /// close together.
+    #[inline(never)]
+    pub fn closest_hits(&self, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
+        refuse_rays();
+        #[cfg(target_arch = "x86_64")]
+        if self.avx2 {
+            // SAFETY: the machine has AVX2.
+            return unsafe { closest_of_each_avx2(self, rays) };
+        }
+        self.closest_of_each::<Portable>(rays)
+    }
+
+    /// [`Bvh::any_hit`] of each of eight rays; false where there is no ray.
+    #[inline(never)]
+    pub fn any_hits(&self, rays: &[Option<Ray>; 8]) -> [bool; 8] {
+        refuse_rays();
+        #[cfg(target_arch = "x86_64")]
+        if self.avx2 {
+            // SAFETY: the machine has AVX2.
+            return unsafe { any_of_each_avx2(self, rays) };
+        }
+        self.any_of_each::<Portable>(rays)
+    }
+
+    #[inline(always)]
+    fn closest_of_each<L: Lanes>(&self, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
+        let mut search = ClosestOfEach([None; 8]);
+        self.traverse_eight::<L, _>(rays, &mut search);
+        search.0
+    }
+
+    #[inline(always)]
+    fn any_of_each<L: Lanes>(&self, rays: &[Option<Ray>; 8]) -> [bool; 8] {
+        let mut search = AnyOfEach(0);
+        self.traverse_eight::<L, _>(rays, &mut search);
+        std::array::from_fn(|lane| search.0 >> lane & 1 == 1)
+    }
+
     #[inline(always)]
     fn closest<L: Lanes>(&self, ray: &Ray) -> Option<Hit> {
         let mut search = Closest(None);
@@ -121,10 +163,11 @@ impl Bvh {
         let mut max_t = ray.max_t;
         // Children put aside, each with where the ray enters it; the nearest on top.
         let mut pending = Stack::new();
-        let mut child = 0;
+        let (mut child, mut begin) = (0, ray.min_t);
         loop {
             if child & IS_LEAF != 0 {
-                match search.leaf(&wide, &self.leaves[(child & !IS_LEAF) as usize], max_t) {
+                let leaf = &self.leaves[(child & !IS_LEAF) as usize];
+                match search.leaf(&wide, leaf, begin, max_t) {
                     Some(t) => max_t = t,
                     None => return,
                 }
@@ -134,11 +177,11 @@ impl Bvh {
                 if hit != 0 {
                     let first = hit.trailing_zeros() as usize % 8;
                     hit &= hit - 1;
+                    let enter = enter.to_array();
                     if hit == 0 {
-                        child = node.children[first];
+                        (child, begin) = (node.children[first], enter[first]);
                         continue;
                     }
-                    let enter = enter.to_array();
                     let mut nearest = entry(enter[first], node.children[first]);
                     let bottom = pending.len();
                     while hit != 0 {
@@ -152,7 +195,7 @@ impl Bvh {
                             pending.push(next);
                         }
                     }
-                    child = nearest as Child;
+                    (child, begin) = (nearest as Child, entered(nearest));
                     continue;
                 }
             }
@@ -161,7 +204,7 @@ impl Bvh {
             loop {
                 let Some(next) = pending.pop() else { return };
                 if next <= last {
-                    child = next as Child;
+                    (child, begin) = (next as Child, entered(next));
                     break;
                 }
             }
@@ -169,15 +212,18 @@ impl Bvh {
     }
 }
 
-/// What is looked for. A trait instead of a closure, because a closure in AVX2 code may be compiled apart, without AVX2.
+/// What is looked for. A trait instead of a closure, because a closure in AVX2 code may be compiled apart, without
+/// AVX2.
 trait Search {
     /// Whether nearer children come first.
     const SORTED: bool;
-    /// Tests the triangles of a leaf. Returns how far hits still matter, or `None` to stop.
+    /// Tests the triangles of a leaf that the ray enters at `enter`. Returns how far hits still matter, or `None` to
+    /// stop.
     fn leaf<L: Lanes>(
         &mut self,
         ray: &WideRay<L>,
         triangles: &Triangles,
+        enter: f32,
         max_t: f32,
     ) -> Option<f32>;
 }
@@ -192,6 +238,7 @@ impl Search for Closest {
         &mut self,
         ray: &WideRay<L>,
         triangles: &Triangles,
+        enter: f32,
         max_t: f32,
     ) -> Option<f32> {
         let (mut hit, found) = triangles.meet(ray, max_t);
@@ -203,14 +250,26 @@ impl Search for Closest {
         while hit != 0 {
             let i = hit.trailing_zeros() as usize % 8;
             hit &= hit - 1;
-            let (t, triangle) = (t[i], triangles.index(i) as usize);
-            let wins = |best: Hit| t < best.t || (t == best.t && triangle < best.triangle);
-            if self.0.is_none_or(wins) {
-                nearest = t;
-                self.0 = Some(Hit { t, barycentric: [u[i], v[i]], triangle });
-            }
+            let triangle = triangles.index(i) as usize;
+            let hit = Hit { t: t[i], barycentric: [u[i], v[i]], triangle };
+            closer(&mut self.0, &mut nearest, enter, hit);
         }
         Some(nearest)
+    }
+}
+
+/// Takes a hit for the closest, if it is. Hits matter as far as `nearest`.
+///
+/// Rounding may put a hit before the box of its leaf. It counts from where the ray enters the box, at `enter`: so a
+/// leaf that begins farther away than the closest hit never holds a closer one, and the order of leaves does not
+/// matter.
+#[inline(always)]
+fn closer(best: &mut Option<Hit>, nearest: &mut f32, enter: f32, hit: Hit) {
+    let from = if enter > hit.t { enter } else { hit.t };
+    let wins = |best: &Hit| from < *nearest || (from == *nearest && hit.triangle < best.triangle);
+    if best.as_ref().is_none_or(wins) {
+        *nearest = from;
+        *best = Some(hit);
     }
 }
 
@@ -225,6 +284,7 @@ impl Search for Any {
         &mut self,
         ray: &WideRay<L>,
         triangles: &Triangles,
+        _: f32,
         max_t: f32,
     ) -> Option<f32> {
         self.0 = triangles.any_blocks(triangles.meet(ray, max_t).0);
@@ -245,6 +305,13 @@ fn order(t: f32) -> u32 {
     if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
 }
 
+/// Where the ray enters the child of an entry.
+#[inline(always)]
+fn entered(entry: u64) -> f32 {
+    let order = (entry >> 32) as u32;
+    f32::from_bits(if order >> 31 == 1 { order & !(1 << 31) } else { !order })
+}
+
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn closest_avx2(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
@@ -255,4 +322,16 @@ fn closest_avx2(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
 #[target_feature(enable = "avx2")]
 fn any_avx2(bvh: &Bvh, ray: &Ray) -> bool {
     bvh.any::<lanes::Avx2>(ray)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn closest_of_each_avx2(bvh: &Bvh, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
+    bvh.closest_of_each::<lanes::Avx2>(rays)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn any_of_each_avx2(bvh: &Bvh, rays: &[Option<Ray>; 8]) -> [bool; 8] {
+    bvh.any_of_each::<lanes::Avx2>(rays)
 }

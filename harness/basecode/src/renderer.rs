@@ -57,6 +57,19 @@ pub trait Renderer: Send + Sync {
 pub trait Integrator: Send + Sync {
     /// The radiance L that arrives at the origin of `ray` [W m^-2 sr^-1]; black where it hits nothing.
     fn radiance(&self, scene: &Scene, ray: &Ray, sampler: &Sampler) -> Vec3;
+
+    /// The radiance along each of eight rays; black where there is no ray. The default calls
+    /// [`Integrator::radiance`]. Integrators that cast several rays at once override it: see
+    /// [`Scene::intersect_eight`].
+    fn radiance_of_eight(
+        &self,
+        scene: &Scene,
+        rays: &[Option<Ray>; 8],
+        sampler: &Sampler,
+    ) -> [Vec3; 8] {
+        let radiance = |ray| self.radiance(scene, ray, sampler);
+        std::array::from_fn(|i| rays[i].as_ref().map_or(Vec3::ZERO, radiance))
+    }
 }
 
 /// What to render offline.

@@ -23,6 +23,16 @@ const KINDS: [(&str, &str); 3] = [
     ("shadow rays to a point", "rtcOccluded1"),
     ("shuffled bounces", "rtcIntersect1"),
 ];
+/// What is measured: of which kind, and whether Umbra casts eight rays at once.
+const WORK: [(&str, usize, bool); 5] = [
+    ("camera rays", 0, false),
+    ("camera rays, eight at once", 0, true),
+    ("shadow rays to a point", 1, false),
+    ("shadow rays, eight at once", 1, true),
+    ("shuffled bounces", 2, false),
+];
+/// The pixels of eight rays at once.
+const TILE: (usize, usize) = (4, 2);
 const SCENES: [&str; 3] = ["sphere_diffuse", "teapot", "cbox"];
 
 /// No ray asks for it.
@@ -40,25 +50,33 @@ struct Cast {
     triangles: Vec<[Vec3; 3]>,
     bvh: Bvh,
     rays: [Vec<Ray>; 3],
+    /// Camera and shadow rays again, in tiles of pixels.
+    eights: [Vec<[Option<Ray>; 8]>; 2],
 }
 
 impl Cast {
     fn new(name: &str, triangles: Vec<[Vec3; 3]>, camera: Vec<Ray>, light: Vec3) -> Self {
         let bvh = build(&triangles);
         let sampler = Sampler::new(1);
-        let (mut shadow, mut bounces) = (Vec::new(), Vec::new());
-        for (ray, hit) in camera.iter().filter_map(|ray| Some((ray, bvh.closest_hit(ray)?))) {
-            let p = ray.at(hit.t);
+        let shadow_ray = |ray: &Ray| {
+            let p = ray.at(bvh.closest_hit(ray)?.t);
             let to_light = light - p;
             let distance = to_light.length();
-            shadow.push(Ray::segment(p, to_light / distance, 1e-3, distance - 1e-3));
+            Some(Ray::segment(p, to_light / distance, 1e-3, distance - 1e-3))
+        };
+        let (mut shadow, mut bounces) = (Vec::new(), Vec::new());
+        for ray in camera.iter().filter_map(shadow_ray) {
             let anywhere = Vec3::new(sampler.next_1d(), sampler.next_1d(), sampler.next_1d());
-            bounces.push(Ray::new(p, (2.0 * anywhere - 1.0).normalize_or(Vec3::X)));
+            bounces.push(Ray::new(ray.origin, (2.0 * anywhere - 1.0).normalize_or(Vec3::X)));
+            shadow.push(ray);
         }
         for i in (1..bounces.len()).rev() {
             bounces.swap(i, (sampler.next_1d() * (i + 1) as f32) as usize);
         }
-        Self { name: name.to_owned(), triangles, bvh, rays: [camera, shadow, bounces] }
+        let tiled: Vec<Ray> = (0..camera.len()).map(|i| camera[tiled(i)]).collect();
+        let lit: Vec<Ray> = tiled.iter().filter_map(shadow_ray).collect();
+        let eights = [tiled, lit].map(|rays| rays.chunks(8).map(eight).collect());
+        Self { name: name.to_owned(), triangles, bvh, rays: [camera, shadow, bounces], eights }
     }
 
     fn of_scene(root: &Path, name: &str) -> anyhow::Result<Self> {
@@ -90,11 +108,18 @@ impl Cast {
     }
 
     /// Seconds that one thread takes for all rays of a kind, and what was hit.
-    fn measure(&self, kind: usize) -> (f64, usize) {
+    fn measure(&self, kind: usize, eight: bool) -> (f64, usize) {
         let begin = Instant::now();
-        let hits = match kind {
-            1 => self.rays[1].iter().filter(|ray| self.bvh.any_hit(ray)).count(),
-            _ => self.rays[kind].iter().filter(|ray| self.bvh.closest_hit(ray).is_some()).count(),
+        let Self { bvh, rays, .. } = self;
+        let hits = match (kind, eight) {
+            (1, true) => {
+                self.eights[1].iter().flat_map(|rays| bvh.any_hits(rays)).filter(|hit| *hit).count()
+            }
+            (_, true) => {
+                self.eights[kind].iter().flat_map(|rays| bvh.closest_hits(rays)).flatten().count()
+            }
+            (1, false) => rays[1].iter().filter(|ray| bvh.any_hit(ray)).count(),
+            (_, false) => rays[kind].iter().filter(|ray| bvh.closest_hit(ray).is_some()).count(),
         };
         (begin.elapsed().as_secs_f64(), hits)
     }
@@ -113,6 +138,19 @@ impl Cast {
         }
         Ok(std::fs::File::create(path)?.write_all(&bytes)?)
     }
+}
+
+/// The pixel that comes at place `i` of a film in tiles, row by row of tiles.
+fn tiled(i: usize) -> usize {
+    let (wide, tall) = TILE;
+    let (tile, within) = (i / (wide * tall), i % (wide * tall));
+    let x = tile % (WIDTH / wide) * wide + within % wide;
+    let y = tile / (WIDTH / wide) * tall + within / wide;
+    y * WIDTH + x
+}
+
+fn eight(rays: &[Ray]) -> [Option<Ray>; 8] {
+    std::array::from_fn(|i| rays.get(i).copied())
 }
 
 fn build(triangles: &[[Vec3; 3]]) -> Bvh {
@@ -136,20 +174,21 @@ pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
         casts.push(Cast::of_scene(&bench.root, name)?);
     }
     casts.push(Cast::of_knot(200_000)?);
-    let mut lines: [Vec<Line>; 4] = Default::default();
+    let mut lines: [Vec<Line>; 6] = Default::default();
     for cast in &casts {
         let file = bench.folder.join("rays.bin");
         cast.write(&file)?;
         let mut plain = Server::start(&program, &[file.as_os_str()])?;
         let mut robust = Server::start(&program, &[file.as_os_str(), OsStr::new("robust")])?;
-        for (kind, (words, call)) in KINDS.iter().enumerate() {
+        for (row, (words, kind, eight)) in WORK.into_iter().enumerate() {
+            let call = KINDS[kind].1;
             let (mut ours, mut theirs) = (Samples::default(), Samples::default());
             let mut safe = Samples::default();
             let mut found = [0; 3];
             for _ in 0..bench.rounds {
                 for (side, samples) in [&mut ours, &mut theirs, &mut safe].into_iter().enumerate() {
                     let (seconds, hits) = match side {
-                        0 => cast.measure(kind),
+                        0 => cast.measure(kind, eight),
                         1 => plain.measure(&kind.to_string())?,
                         _ => robust.measure(&kind.to_string())?,
                     };
@@ -168,10 +207,8 @@ pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
             let rate = |samples: &Samples| {
                 format!("{:.1} M/s", cast.rays[kind].len() as f64 / samples.median() / 1e6)
             };
-            for (anchor, theirs) in
-                [((*call).to_owned(), theirs), (format!("{call}, robust"), safe)]
-            {
-                lines[kind].push(Line {
+            for (anchor, theirs) in [(call.to_owned(), theirs), (format!("{call}, robust"), safe)] {
+                lines[row].push(Line {
                     work: format!("{words}, {}", cast.name),
                     anchor: format!("Embree `{anchor}`").replace(", robust`", "`, robust"),
                     theirs: rate(&theirs),
@@ -189,7 +226,7 @@ pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
                 theirs.push(plain.measure("build")?.0);
             }
             let work = format!("BVH, {}", cast.name);
-            lines[3].push(Line::of_times(work, "Embree, all cores", &theirs, &ours));
+            lines[5].push(Line::of_times(work, "Embree, all cores", &theirs, &ours));
         }
     }
     Ok((lines.into_iter().flatten().collect(), growth(bench, &program)?))
@@ -209,7 +246,7 @@ fn growth(bench: &Bench, program: &Path) -> anyhow::Result<Vec<Curve>> {
         for kind in 0..KINDS.len() {
             let (mut ours, mut theirs) = (Samples::default(), Samples::default());
             for _ in 0..3 {
-                ours.push(cast.measure(kind).0);
+                ours.push(cast.measure(kind, false).0);
                 theirs.push(embree.measure(&kind.to_string())?.0);
             }
             for (side, samples) in [ours, theirs].iter().enumerate() {

@@ -22,6 +22,10 @@ pub trait Lanes: Copy {
     fn max(self, other: Self) -> Self;
     /// Bit i: number i is at most the other's; never with a NaN.
     fn at_most(self, other: Self) -> u32;
+    /// The smallest of the numbers, eight times over. What it is of a NaN is not said.
+    fn least(self) -> Self;
+    /// The largest of the numbers, eight times over. What it is of a NaN is not said.
+    fn most(self) -> Self;
     fn to_array(self) -> [f32; 8];
 }
 
@@ -76,6 +80,14 @@ impl Lanes for Portable {
         bits(0) | bits(1) << 4
     }
     #[inline(always)]
+    fn least(self) -> Self {
+        Self::splat(self.0[0].min(self.0[1]).min_element())
+    }
+    #[inline(always)]
+    fn most(self) -> Self {
+        Self::splat(self.0[0].max(self.0[1]).max_element())
+    }
+    #[inline(always)]
     fn to_array(self) -> [f32; 8] {
         let [[a, b, c, d], [e, f, g, h]] = self.0.map(|four| four.to_array());
         [a, b, c, d, e, f, g, h]
@@ -101,6 +113,21 @@ mod avx2 {
     /// and they are called only if [`has_avx2`] is true.
     #[derive(Clone, Copy)]
     pub struct Avx2(__m256);
+
+    impl Avx2 {
+        /// The numbers with their halves, the pairs of each half, or the members of each pair exchanged.
+        #[inline(always)]
+        fn swapped<const STEP: u8>(self) -> Self {
+            // SAFETY: the machine has AVX2, as the type's words say.
+            unsafe {
+                Self(match STEP {
+                    0 => _mm256_permute2f128_ps::<1>(self.0, self.0),
+                    1 => _mm256_permute_ps::<0b01_00_11_10>(self.0),
+                    _ => _mm256_permute_ps::<0b10_11_00_01>(self.0),
+                })
+            }
+        }
+    }
 
     // SAFETY of every block: the machine has AVX2, as the type's words say; memory is touched by `load` and
     // `to_array` alone, through references to 32 bytes.
@@ -149,6 +176,18 @@ mod avx2 {
         fn at_most(self, other: Self) -> u32 {
             // SAFETY: as above.
             unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32 }
+        }
+        #[inline(always)]
+        fn least(self) -> Self {
+            let two = self.min(self.swapped::<0>());
+            let four = two.min(two.swapped::<1>());
+            four.min(four.swapped::<2>())
+        }
+        #[inline(always)]
+        fn most(self) -> Self {
+            let two = self.max(self.swapped::<0>());
+            let four = two.max(two.swapped::<1>());
+            four.max(four.swapped::<2>())
         }
         #[inline(always)]
         fn to_array(self) -> [f32; 8] {

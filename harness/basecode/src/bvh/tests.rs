@@ -221,8 +221,8 @@ fn any_number_of_threads_builds_the_same() {
     }
 }
 
-/// A tree that would be too deep for a ray's stack is built in halves. Where triangles cross, rounding of boxes may decide
-/// between two hits.
+/// A tree that would be too deep for a ray's stack is built in halves. Where triangles cross, rounding of boxes may
+/// decide between two hits.
 #[test]
 fn a_tree_of_halves_hits_as_far_away() {
     let sampler = Sampler::new(5);
@@ -242,4 +242,108 @@ fn a_tree_of_halves_hits_as_far_away() {
         assert!(a.zip(b).is_none_or(|(a, b)| (a - b).abs() < 1e-5), "{a:?} {b:?} {ray:?}");
         assert_eq!(usual.any_hit(&ray), halved.any_hit(&ray), "{ray:?}");
     }
+}
+
+/// Eight rays at once hit what each hits alone, bit by bit, however they lie, and whichever are missing.
+#[test]
+fn eight_rays_hit_what_each_hits_alone() {
+    let sampler = Sampler::new(6);
+    let mut alone = 0;
+    for scale in [1.0, 1e-12, 1e12] {
+        let triangles =
+            odd_triangles(&sampler).into_iter().map(|t| t.map(|v| scale * v)).collect::<Vec<_>>();
+        let blocks: Vec<bool> = (0..triangles.len()).map(|i| i % 3 != 0).collect();
+        let fast = Bvh::new(&triangles, &blocks);
+        let portable = Bvh { avx2: false, ..Bvh::new(&triangles, &blocks) };
+        let mut hits = 0;
+        for number in 0..20_000 {
+            let eye = scale * 2.0 * random_vec3(&sampler);
+            let [a, b, _] = triangles[number % triangles.len()];
+            // From one point, to one point, along axes, and anywhere; close together, or not; at vertices and edges.
+            let spread = scale * [1e-6, 1e-2, 1.0][number / 4 % 3];
+            let rays: [Option<Ray>; 8] = std::array::from_fn(|i| {
+                let target =
+                    [a, (a + b) / 2.0, a + spread * random_vec3(&sampler)][(number + i) % 3];
+                let (from, to) = match number % 4 {
+                    0 => (eye, target),
+                    1 => (target, eye),
+                    2 => (target - [Vec3::X, -Vec3::Y, Vec3::Z][number / 4 % 3] * scale, target),
+                    _ => (scale * 2.0 * random_vec3(&sampler), target),
+                };
+                let direction = (to - from).normalize_or(Vec3::X);
+                let end = if number % 4 == 1 { (to - from).length() } else { scale * 10.0 };
+                let ray = Ray::segment(from, direction, 1e-4 * scale, end);
+                (number % 5 != 0 || sampler.next_1d() < 0.2).then_some(ray)
+            });
+            for bvh in [&fast, &portable] {
+                let closest = rays.map(|ray| bvh.closest_hit(&ray?));
+                let any = rays.map(|ray| ray.is_some_and(|ray| bvh.any_hit(&ray)));
+                assert_eq!(bvh.closest_hits(&rays), closest, "{rays:?}");
+                assert_eq!(bvh.any_hits(&rays), any, "{rays:?}");
+                hits += closest.iter().flatten().count();
+            }
+            alone += usize::from(rays.iter().flatten().count() < 2);
+        }
+        assert!(hits > 50_000, "{hits}");
+    }
+    assert!(alone > 100, "{alone}");
+}
+
+/// Walls along an axis, one upon the other: rounding puts hits before the boxes of their leaves. The order in which
+/// leaves are visited must not decide.
+#[test]
+fn eight_rays_hit_the_same_of_walls_that_touch() {
+    let sampler = Sampler::new(7);
+    let wall = |number: u32| {
+        let at = 1.0 + 6e-8 * (sampler.next_1d() * 20.0).floor();
+        let corner = |_| 2.0 * random_vec3(&sampler);
+        let axis = number as usize % 3;
+        [0, 1, 2].map(corner).map(|mut corner| {
+            corner[axis] = at;
+            corner
+        })
+    };
+    let triangles: Vec<_> = (0..600).map(wall).collect();
+    let bvh = Bvh::new(&triangles, &vec![true; triangles.len()]);
+    let mut hits = 0;
+    for _ in 0..20_000 {
+        let eye = 3.0 * random_vec3(&sampler);
+        let target = random_vec3(&sampler);
+        let rays: [Option<Ray>; 8] = std::array::from_fn(|_| {
+            let target = target + 0.05 * random_vec3(&sampler);
+            Some(Ray::segment(eye, (target - eye).normalize(), 1e-4, f32::INFINITY))
+        });
+        let alone = rays.map(|ray| bvh.closest_hit(&ray?));
+        assert_eq!(bvh.closest_hits(&rays), alone, "{rays:?}");
+        hits += alone.iter().flatten().count();
+    }
+    assert!(hits > 20_000, "{hits}");
+}
+
+/// A ray with NaN hits nothing, and does not change what the others hit.
+#[test]
+fn odd_rays_do_not_disturb_the_others() {
+    let triangle = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
+    let down = Ray::segment(vec3(0.2, 0.2, 1.0), -Vec3::Z, 0.0, 5.0);
+    let odd = [
+        Ray { origin: Vec3::NAN, ..down },
+        Ray { direction: vec3(f32::NAN, 0.0, -1.0), ..down },
+        Ray { min_t: f32::NAN, ..down },
+        Ray { max_t: f32::NAN, ..down },
+        Ray { max_t: -1.0, ..down },
+        Ray { direction: Vec3::ZERO, ..down },
+        Ray { origin: Vec3::INFINITY, ..down },
+    ];
+    for bvh in [Bvh::new(&triangle, &[true]), Bvh { avx2: false, ..Bvh::new(&triangle, &[true]) }] {
+        for (number, odd) in odd.into_iter().enumerate() {
+            let mut rays = [Some(down); 8];
+            rays[number] = Some(odd);
+            let closest = rays.map(|ray| bvh.closest_hit(&ray?));
+            assert_eq!(closest.iter().flatten().count(), 7, "{odd:?}");
+            assert_eq!(bvh.closest_hits(&rays), closest, "{odd:?}");
+            assert_eq!(bvh.any_hits(&rays), closest.map(|hit| hit.is_some()), "{odd:?}");
+        }
+        assert_eq!(bvh.any_hits(&[None; 8]), [false; 8]);
+    }
+    assert_eq!(Bvh::new(&[], &[]).closest_hits(&[Some(down); 8]), [None; 8]);
 }
