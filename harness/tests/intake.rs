@@ -641,7 +641,7 @@ fn nobody_is_taken_where_two_people_are_named() {
         assert!(!found.conforms && found.config.is_none(), "{text}");
         let said = found.findings.iter().find(|f| f.code == "tree_ambiguous").unwrap();
         assert!(said.message.contains(ada) && said.message.contains(other), "{text}");
-        assert!(fix_files(&files).is_err(), "{text}");
+        assert!(fix_files(&files).is_err() && !text.contains("not looked at"), "{text}");
     }
     // Two whole submissions in one archive.
     let mut files = moved(|path| Some(format!("a1/{path}")));

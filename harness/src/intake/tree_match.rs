@@ -71,6 +71,8 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
         })
         .collect();
     let mut taken: BTreeSet<&str> = placed.iter().flatten().copied().collect();
+    // Of these the finding on the expected file says all.
+    let mut unclear: BTreeSet<&str> = BTreeSet::new();
     let mut matched = Matched { lines: Vec::new(), findings: Vec::new() };
     for (file, placed) in tree.files.iter().zip(placed) {
         let found = match placed {
@@ -83,8 +85,10 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
             }
         };
         matched.take(file, &found, files);
-        if let Lost::One(path) = found {
-            taken.insert(path);
+        match found {
+            Lost::One(path) => taken.extend([path]),
+            Lost::Several(paths) => unclear.extend(paths),
+            Lost::None => {}
         }
     }
     let moved = matched.lines.iter().filter(|line| line.mark == Mark::WrongPlace);
@@ -121,6 +125,12 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
     for path in files.iter().map(|file| file.path.as_str()).filter(|path| !taken.contains(path)) {
         match places.get(path) {
             Some(place) => matched.wrong_place(place, path),
+            None if unclear.contains(path) => matched.lines.push(TreeLine {
+                expected: None,
+                found: Some(path.to_owned()),
+                mark: Mark::Unexpected,
+                advice: "one of several that may be it".to_owned(),
+            }),
             None => matched.unexpected(path),
         }
     }
