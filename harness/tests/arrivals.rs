@@ -233,6 +233,66 @@ fn what_cannot_be_packed_or_written_is_named_with_its_reason() {
     assert!(code == Some(2) && said.starts_with("umbra: there is no part 2.6"), "{said}");
 }
 
+#[test]
+fn fix_writes_a_new_zip_and_nothing_else() {
+    let place = tempfile::tempdir().unwrap();
+    let at = |name: &str| place.path().join(name);
+    let config = config("Ada", "Lampglow", "260123456");
+    let files = submission(&config, "code/lib.rs", "x");
+    put(at("mine.zip"), &zip(&files));
+    put(at("thesis.txt"), b"precious");
+    for (path, text) in &files {
+        put(at("wd").join(path), text.as_bytes());
+    }
+    symlink(at("mine.zip"), at("link.zip")).unwrap();
+    symlink(at("nowhere"), at("dangling.zip")).unwrap();
+    for (input, out, said) in [
+        ("mine.zip", "mine.zip", "is there already"),
+        ("mine.zip", "link.zip", "is there already"),
+        ("mine.zip", "dangling.zip", "is there already"),
+        ("mine.zip", "thesis.txt", "is there already"),
+        ("mine.zip", "wd", "is there already"),
+        ("wd", "wd/code/lib.rs", "is there already"),
+        ("wd", "wd/new.zip", "lies inside"),
+        ("wd", "wd/../wd/code/new.zip", "lies inside"),
+        ("mine.zip", "out.tar.gz", "ends in .zip"),
+        ("mine.zip", "out", "ends in .zip"),
+        ("mine.zip", "nonexist/out.zip", "nonexist/out.zip: there is no folder"),
+    ] {
+        let before: Vec<_> = crate::support::scratch::listing(place.path()).into_iter().collect();
+        let (code, _, errors) = umbra(&["validate"], &[&at(input), Path::new("--fix"), &at(out)]);
+        assert!(code == Some(2) && errors.contains(said), "{input} {out}: {errors}");
+        let after: Vec<_> = crate::support::scratch::listing(place.path()).into_iter().collect();
+        assert!(before == after, "{input} {out}");
+    }
+    // A download with one archive is that archive, as is a folder that holds one.
+    let own = zip(&files);
+    let download =
+        [Entry::stored("a2/a2_ada.zip", &own), Entry::stored("__MACOSX/a2/._a2_ada.zip", b"x")];
+    put(at("m.zip"), &Zip::of(download).bytes());
+    put(at("one/a2_ada.zip"), &own);
+    for (input, out) in
+        [("mine.zip", "1.zip"), ("m.zip", "2.zip"), ("one", "3.zip"), ("wd", "4.zip")]
+    {
+        let (code, said, errors) =
+            umbra(&["validate"], &[&at(input), Path::new("--fix"), &at(out)]);
+        assert!(
+            code == Some(1) && said.contains("moved code/lib.rs to src/lib.rs"),
+            "{said}{errors}"
+        );
+        let (code, said, _) = umbra(&["validate"], &[&at(out)]);
+        assert_eq!(code, Some(0), "{said}");
+    }
+    // Nor does pack write over what is no archive.
+    let work = at("work");
+    for (path, text) in submission(&config, "src/lib.rs", "x") {
+        put(work.join(path), text.as_bytes());
+    }
+    let (code, _, errors) = umbra(&["pack"], &[&work, Path::new("--output"), &at("thesis.txt")]);
+    assert!(code == Some(2) && errors.contains("no zip archive"), "{errors}");
+    assert_eq!(fs::read(at("thesis.txt")).unwrap(), b"precious");
+}
+
 /// What is renamed onto a device would take its place.
 #[cfg(unix)]
 #[test]
@@ -240,11 +300,11 @@ fn an_archive_is_not_written_over_what_is_no_file() {
     let place = tempfile::tempdir().unwrap();
     let config = config("Ada", "Lampglow", "260123456");
     put(place.path().join("a.zip"), &zip(&submission(&config, "src/lib.rs", "x")));
-    let fifo = place.path().join("fifo");
+    let fifo = place.path().join("fifo.zip");
     nix::unistd::mkfifo(&fifo, nix::sys::stat::Mode::from_bits_truncate(0o600)).unwrap();
     let archive = place.path().join("a.zip");
     let (code, _, said) = umbra(&["validate"], &[&archive, Path::new("--fix"), &fifo]);
-    assert!(code == Some(2) && said.contains("it is there, and no file"), "{said}");
+    assert!(code == Some(2) && said.contains("fifo.zip is there already"), "{said}");
     use std::os::unix::fs::FileTypeExt as _;
     assert!(fifo.symlink_metadata().unwrap().file_type().is_fifo());
 }

@@ -527,7 +527,7 @@ fn what_systems_add_to_a_name_is_known_and_two_of_a_kind_are_none() {
     let mut files = perfect();
     files.push(("config (1).json".into(), b"{}".to_vec()));
     assert!(validate_files(&files).conforms);
-    // Of two configurations the first counts, of two sources none.
+    // Of two configurations that name one person the first counts, of two sources none.
     let mut files = moved(|path| (path != "config.json").then(|| path.to_owned()));
     for name in ["config (1).json", "config (2).json"] {
         files.push((name.into(), CONFIG.into()));
@@ -542,9 +542,159 @@ fn what_systems_add_to_a_name_is_known_and_two_of_a_kind_are_none() {
     let said = found.findings.iter().find(|f| f.code == "tree_ambiguous").unwrap();
     assert_eq!(
         said.message,
-        "expected once in the submission, found 2 files of this name: v1/lib.rs, v2/lib.rs"
+        "expected once in the submission, found 2 files that may be it: v1/lib.rs, v2/lib.rs"
     );
     assert!(!found.follows_tree());
+}
+
+/// Each has one name that a person, a system or a program makes of an image's.
+#[test]
+fn an_image_is_known_by_its_words() {
+    let own = "offline/cbox_simple_offline.exr";
+    for seen in [
+        "cbox simple offline.exr",
+        "cbox-simple-offline.exr",
+        " cbox_simple_offline.exr",
+        "cbox_simple_offline.exr.exr",
+        "cbox_simple_offline - copie.exr",
+        "Copy of cbox_simple_offline.exr",
+        "Kopie von cbox_simple_offline.exr",
+        "cbox_simple_offline-1.exr",
+        "cbox_simple_offline.exr ",
+        "cbox_simple_offline .EXR",
+        "CboxSimpleOffline.exr",
+        "cbox_simple_ofline.exr",
+        "cbox_simple_offline",
+        "offline/cbox_simple_offline (2).exr.txt",
+        "offline/cbox_simple_offline \u{526f}\u{672c}.exr",
+    ] {
+        let files = moved(|path| Some(if path == own { seen } else { path }.to_owned()));
+        let found = validate_files(&files);
+        let errors = found.findings.iter().filter(|f| f.severity == Severity::Error);
+        let said: Vec<String> = errors.map(ToString::to_string).collect();
+        assert!(
+            matches!(&said[..], [one] if one.contains(&format!("expected at '{own}'"))),
+            "{seen}: {said:?}"
+        );
+        assert_eq!(fix_files(&files).unwrap().digest, fix_files(&perfect()).unwrap().digest);
+    }
+    // Another picture, another kind of file, and two that may be it.
+    let without = || moved(|path| (path != own).then(|| path.to_owned()));
+    for other in ["cbox_simple_offline.png", "offline/mirror.exr", "realtime/cbox_bonus.exr"] {
+        let mut files = without();
+        files.push((other.to_owned(), b"x".to_vec()));
+        let found = validate_files(&files);
+        assert!(found.findings.iter().any(|f| f.code == "tree_missing"), "{}", found.to_text());
+    }
+    let mut files = without();
+    for (name, content) in [("cbox_simple_offline 1.exr", "1"), ("cbox_simple_offline 2.exr", "2")]
+    {
+        files.push((name.to_owned(), content.into()));
+    }
+    let text = validate_files(&files).to_text();
+    assert!(text.contains("cbox_simple_offline 1.exr, cbox_simple_offline 2.exr"), "{text}");
+    // Copies of one image are one.
+    files.iter_mut().rev().take(2).for_each(|(_, content)| *content = b"same".to_vec());
+    assert!(fix_files(&files).is_ok());
+}
+
+#[test]
+fn copies_of_a_source_and_a_configuration_are_known_in_many_languages() {
+    for mark in ["Copy of X", "X - Kopie", "X - Copia", "Copie de X", "X-1", "X \u{526f}\u{672c}"] {
+        for (own, end) in [("src/lib", "rs"), ("config", "json")] {
+            let seen = mark.replace('X', own.rsplit('/').next().unwrap());
+            let seen = format!("{}{seen}.{end}", own.strip_suffix("lib").unwrap_or_default());
+            let own = format!("{own}.{end}");
+            let files = moved(|path| Some(if path == own { &seen } else { path }.to_owned()));
+            assert_eq!(
+                fix_files(&files).unwrap().digest,
+                fix_files(&perfect()).unwrap().digest,
+                "{seen}"
+            );
+        }
+    }
+}
+
+/// A configuration of another person.
+fn config_of(first: &str, last: &str, number: &str) -> Vec<u8> {
+    let config = CONFIG.replace("Ada", first).replace("Lampglow", last);
+    config.replace("260123456", number).into_bytes()
+}
+
+#[test]
+fn nobody_is_taken_where_two_people_are_named() {
+    let bob = || config_of("Bob", "Dimlight", "260000009");
+    let without = || moved(|path| (path != "config.json").then(|| path.to_owned()));
+    for [ada, other] in [
+        ["v1/config.json", "v2/config.json"],
+        ["config (1).json", "config (2).json"],
+        ["x/config.json", "x/old/config.json"],
+        ["CONFIG.JSON", "Config.json"],
+        ["config - Copy.json", "v1/config.json"],
+        ["my_config.json", "config.txt"],
+    ] {
+        let mut files = without();
+        files.push((ada.to_owned(), CONFIG.into()));
+        files.push((other.to_owned(), bob()));
+        let found = validate_files(&files);
+        let text = found.to_text();
+        assert!(!found.conforms && found.config.is_none(), "{text}");
+        let said = found.findings.iter().find(|f| f.code == "tree_ambiguous").unwrap();
+        assert!(said.message.contains(ada) && said.message.contains(other), "{text}");
+        assert!(fix_files(&files).is_err() && !text.contains("not looked at"), "{text}");
+    }
+    // Two whole submissions in one archive.
+    let mut files = moved(|path| Some(format!("a1/{path}")));
+    files.extend(moved(|path| Some(format!("a2/{path}"))));
+    for (name, content) in &mut files {
+        if name == "a2/config.json" {
+            *content = bob();
+        }
+    }
+    let found = validate_files(&files);
+    assert!(
+        found.config.is_none() && !found.to_text().contains("write \"a1"),
+        "{}",
+        found.to_text()
+    );
+    // In one file.
+    let both = [b"[".as_slice(), CONFIG.as_bytes(), b",", &bob(), b"]"].concat();
+    let mut files = perfect();
+    files[0].1 = both;
+    let found = validate_files(&files);
+    let text = found.to_text();
+    assert!(text.contains("found 2: Ada Lampglow 260123456 and Bob Dimlight 260000009"), "{text}");
+    let config = found.config.unwrap();
+    assert!(!found.conforms && config.sampler_seed().is_none() && config.first_name.is_none());
+    // One who is named twice is one, and what names nobody says nothing.
+    let mut files = without();
+    files.push(("v1/config.json".into(), CONFIG.into()));
+    files.push(("v2/config.json".into(), CONFIG.replace("renders", "images").into()));
+    files.push(("v3/config.json".into(), b"{\"studentID\": \"\"}".to_vec()));
+    let found = validate_files(&files);
+    assert_eq!(found.config.unwrap().sampler_seed(), Some(260_123_456));
+}
+
+#[test]
+fn a_source_without_code_is_noticed() {
+    for source in ["", " \n", "\u{feff}", "// nothing\n/* yet */"] {
+        let mut files = perfect();
+        let lib = files.iter_mut().find(|(path, _)| path == "src/lib.rs").unwrap();
+        lib.1 = source.into();
+        let found = validate_files(&files);
+        assert!(found.findings.iter().any(|f| f.code == "source_empty"), "{}", found.to_text());
+    }
+    assert!(!validate_files(&perfect()).to_text().contains("no code"));
+}
+
+#[test]
+fn what_is_said_of_many_entries_is_said_a_few_times() {
+    let entries = (0..24).map(|i| Entry::with(format!("\u{fc}_{i}.rs").as_bytes(), 0, vec![], b""));
+    let bad = entries.map(|entry| entry.both(|h| h.name[0] = 0xff));
+    let (submission, _scratch) = assert_accepted(&Zip::of(bad).bytes(), "a.zip", "name_not_utf8");
+    let said = submission.findings.iter().filter(|f| f.code == "name_not_utf8");
+    assert_eq!(said.clone().count(), 4);
+    assert!(said.last().unwrap().message.starts_with("the same of 21 more: the name is not"));
 }
 
 // --- pack and fix ---
@@ -676,6 +826,31 @@ fn fix_mends_levels_folders_aliases_and_junk() {
             moved(|path| Some(path.replace("offline/", "").replace("realtime/", ""))),
         ),
         ("inside a folder named src", moved(|path| Some(format!("src/{path}")))),
+        ("src/src", moved(|path| Some(path.replace("src/", "src/src/")))),
+        ("src/src/src", moved(|path| Some(path.replace("src/", "src/src/src/")))),
+        ("a crate in src", moved(|path| Some(path.replace("src/", "src/student_template/src/")))),
+        ("capitals", moved(|path| Some(path.to_uppercase()))),
+        ("capitals in a folder", moved(|path| Some(format!("A/B/{path}").to_uppercase()))),
+        ("shaders in Src", moved(|path| Some(path.replace("src/shaders", "Src/shaders")))),
+        ("shaders in SRC", moved(|path| Some(path.replace("src/shaders", "SRC/shaders")))),
+        ("half in Src", moved(|path| Some(path.replace("src/lib", "Src/lib")))),
+        (
+            "half in Src, in a folder",
+            stray(moved(|path| Some(format!("a/{}", path.replace("src/bsdfs", "Src/bsdfs"))))),
+        ),
+        ("lib.rs beside src", moved(|path| Some(path.replace("src/lib.rs", "lib.rs")))),
+        (
+            "lib.rs beside src, in a folder",
+            stray(moved(|path| Some(format!("a/{}", path.replace("src/lib.rs", "lib.rs"))))),
+        ),
+        (
+            "a copy of lib.rs elsewhere",
+            moved(|path| {
+                Some(path.replace("src/lib.rs", "code/lib (1).rs").replace("src/", "code/"))
+            }),
+        ),
+        ("the whole kit", kit(true)),
+        ("half the kit", kit(false)),
     ] {
         match fix_files(&files) {
             Ok(submission) => assert_eq!(submission.digest, digest, "{what}"),
@@ -686,6 +861,82 @@ fn fix_mends_levels_folders_aliases_and_junk() {
     files.push(("renders/cbox_bonus.exr".to_owned(), b"bonus".to_vec()));
     let submission = fix_files(&files).unwrap();
     assert!(submission.file("realtime/cbox_bonus.exr").is_some());
+}
+
+/// A submission in the kit that students get, with the kit's own configuration at the root or not.
+fn kit(whole: bool) -> Vec<(String, Vec<u8>)> {
+    let mut files = moved(|path| Some(format!("student_template/{path}")));
+    for own in ["harness/basecode/src/lib.rs", "harness/api/src/lib.rs", "harness/api/src/x.rs"] {
+        files.push((own.to_owned(), b"// not the student's".to_vec()));
+    }
+    if whole {
+        files.push(("config.json".to_owned(), br#"{"name": "a2", "title": "A"}"#.to_vec()));
+    }
+    files
+}
+
+#[test]
+fn no_source_is_lost_quietly() {
+    let mut files = moved(|path| Some(path.replace("offline/cbox", "cbox")));
+    files.push(("shaders/x.wgsl".to_owned(), b"// x".to_vec()));
+    let text = validate_files(&files).to_text();
+    assert!(text.contains("shaders/x.wgsl: a source file outside src/"), "{text}");
+    let (submission, scratch) = accepted(&files);
+    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    let validation = validate_submission(&submission, &tree).unwrap();
+    let said = umbra::intake::mends(&submission, &validation, &tree).unwrap();
+    assert!(said.ends_with("; leaves out 1 source file outside src/"), "{said}");
+    let out = scratch.root.path().join("out.zip");
+    let packed = fix(&submission, &out, &tree, &limits).unwrap();
+    assert_eq!(packed.left_out, ["shaders/x.wgsl"]);
+    // A second time it would be written over.
+    let written = fs::read(&out).unwrap();
+    let again = fix(&submission, &out, &tree, &limits).unwrap_err().to_string();
+    assert!(again.contains("cannot write") && fs::read(&out).unwrap() == written, "{again}");
+    // Two files for one place.
+    let mut files = perfect();
+    files.push(("Src/shaders/phong.wgsl".to_owned(), b"// another".to_vec()));
+    let said = fix_files(&files).unwrap_err().to_string();
+    assert!(said.contains("'Src/shaders/phong.wgsl'") && said.contains("'src/shaders/phong.wgsl'"));
+}
+
+#[test]
+fn a_build_folder_in_an_archive_does_not_count() {
+    let mut files = perfect();
+    for i in 0..5000 {
+        files.push((format!("target/debug/deps/{i}.o"), Vec::new()));
+        files.push((format!(".git/objects/{i}"), Vec::new()));
+    }
+    for bytes in [zip_of(&files), gz(&tar_of(&files))] {
+        let (submission, _scratch) = {
+            let scratch = Scratch::new();
+            let (tree, limits) = (TreeSpec::default(), Limits::default());
+            (unpack_bytes(&bytes, "a.zip", &scratch.dest, &tree, &limits).unwrap(), scratch)
+        };
+        assert_eq!(submission.files.len(), perfect().len());
+    }
+    assert!(fix_files(&files).is_ok());
+    // The limit on what counts stands.
+    files.extend((0..4000).map(|i| (format!("src/{i}.rs"), Vec::new())));
+    let said = fix_files(&files).unwrap_err().to_string();
+    assert!(said.contains("more than 4000 entries"), "{said}");
+}
+
+#[test]
+fn what_is_no_archive_is_called_what_it_is() {
+    for (bytes, said) in [
+        (vec![0; 5000], "the file holds only zeros (5000 bytes)"),
+        (vec![0; 10240], "the file holds only zeros (10240 bytes)"),
+        ([vec![0; 600], b"x".to_vec()].concat(), "found something else"),
+        ("\u{feff}<!DOCTYPE html>".into(), "found a web page"),
+        ("\n  <html>".into(), "found a web page"),
+        ("<!-- x --><html>".into(), "found a web page"),
+        ("\u{feff}<html>".encode_utf16().flat_map(u16::to_le_bytes).collect(), "found a web page"),
+        (b"%PDF-1.7".to_vec(), "found a PDF"),
+    ] {
+        let text = validate_bytes(&bytes, "z.zip").to_text();
+        assert!(text.contains(said) && !text.contains("tar archive,"), "{text}");
+    }
 }
 
 #[test]
@@ -706,7 +957,8 @@ fn fix_refuses_what_moving_cannot_mend() {
 fn what_fixing_would_do_is_said_in_words() {
     let said = |files: &[(String, Vec<u8>)]| {
         let (submission, _scratch) = accepted(files);
-        umbra::intake::mends(&submission, &TreeSpec::default())
+        let validation = validate_submission(&submission, &TreeSpec::default()).unwrap();
+        umbra::intake::mends(&submission, &validation, &TreeSpec::default())
     };
     assert_eq!(said(&perfect()), None);
     let elsewhere = moved(|path| Some(path.replace("src/", "code/")));

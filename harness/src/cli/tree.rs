@@ -10,8 +10,12 @@ use unicode_width::UnicodeWidthStr as _;
 
 use super::context::{Context, INTERRUPTED};
 use crate::class::{Collected, Kind, Wanted, collect};
+use crate::columns::count;
 use crate::harmless::harmless;
 use crate::intake::{self, IntakeError, Severity, Submission, Validation};
+
+/// Files that `--fix` leaves out and names.
+const LEFT_OUT: usize = 40;
 
 /// Options of `umbra validate`.
 #[derive(clap::Args)]
@@ -25,7 +29,7 @@ pub struct ValidateArguments {
     /// Print what was found as JSON: a list with one entry for each submission
     #[arg(long, conflicts_with = "fix")]
     json: bool,
-    /// Repack a nearly conforming submission (wrong level, other names, junk) into a conforming archive
+    /// Repack a nearly conforming submission (wrong level, other names, junk) into a new archive
     #[arg(long, value_name = "OUT.zip")]
     fix: Option<PathBuf>,
 }
@@ -46,6 +50,9 @@ pub fn validate(arguments: &ValidateArguments, root: Option<&Path>) -> anyhow::R
     for path in &arguments.submissions {
         // A link that leads nowhere is there, and refused.
         ensure!(path.symlink_metadata().is_ok(), "{} does not exist", path.display());
+    }
+    if let Some(out) = &arguments.fix {
+        ensure_new_archive(out, &arguments.submissions)?;
     }
     let scratch = tempfile::tempdir_in(&context.supervisor.scratch)?;
     let found = match &arguments.submissions[..] {
@@ -71,8 +78,35 @@ pub fn validate(arguments: &ValidateArguments, root: Option<&Path>) -> anyhow::R
         [only] if !arguments.json && only.path == arguments.submissions[0] => {
             one(arguments, &only.path, &context)
         }
+        // The only one in a download or folder.
+        [only] if arguments.fix.is_some() => one(arguments, &only.path, &context),
         _ => many(arguments, &found, &context),
     }
+}
+
+/// Refuses to write an archive over what is there, into a submission, or under a name that says something else.
+fn ensure_new_archive(out: &Path, submissions: &[PathBuf]) -> anyhow::Result<()> {
+    let shown = out.display();
+    ensure!(
+        out.symlink_metadata().is_err(),
+        "{shown} is there already; hint: name a new file, --fix overwrites nothing"
+    );
+    let is_zip = out.extension().is_some_and(|end| end.eq_ignore_ascii_case("zip"));
+    ensure!(is_zip, "{shown}: --fix writes a zip, expected a name that ends in .zip");
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    let whole = folder.canonicalize().with_context(|| {
+        format!("cannot write {shown}: there is no folder {}", folder.display())
+    })?;
+    for submission in submissions.iter().filter(|path| path.is_dir()) {
+        let inside = submission.canonicalize().is_ok_and(|own| whole.starts_with(own));
+        ensure!(
+            !inside,
+            "{shown} lies inside {}, which is to be read; hint: write it beside that folder",
+            submission.display()
+        );
+    }
+    Ok(())
 }
 
 /// Of one submission, its tree.
@@ -89,6 +123,12 @@ fn one(arguments: &ValidateArguments, archive: &Path, context: &Context) -> anyh
         let packed = intake::fix(&submission?, out, tree, limits)?;
         for (from, to) in packed.files.iter().filter(|(from, to)| from != to) {
             println!("moved {from} to {to}");
+        }
+        for path in packed.left_out.iter().take(LEFT_OUT) {
+            println!("left out {path}");
+        }
+        if packed.left_out.len() > LEFT_OUT {
+            println!("left out {} more", packed.left_out.len() - LEFT_OUT);
         }
         println!("repacked as {}", packed.archive.display());
     }
@@ -129,7 +169,8 @@ fn many(arguments: &ValidateArguments, found: &Collected, context: &Context) -> 
             println!("recognised as a download of {}", found.kind.title());
         }
         let all = validations.len();
-        println!("{all} submissions, {} conform, {wrong} do not", all - wrong);
+        let all = count(all, "submission");
+        println!("{all}: {} conforming, {wrong} not", validations.len() - wrong);
         for empty in &found.empty {
             println!("{}: {}", harmless(&empty.label.who()), harmless(&empty.reason()));
         }
@@ -145,10 +186,9 @@ fn many(arguments: &ValidateArguments, found: &Collected, context: &Context) -> 
 fn in_a_line(validation: &Validation) -> String {
     let of =
         |severity| validation.findings.iter().filter(move |finding| finding.severity == severity);
-    let plural = |count: usize, what: &str| match count {
+    let plural = |number: usize, what: &str| match number {
         0 => String::new(),
-        1 => format!(", 1 {what}"),
-        more => format!(", {more} {what}s"),
+        _ => format!(", {}", count(number, what)),
     };
     let warnings = plural(of(Severity::Warning).count(), "warning");
     match of(Severity::Error).next() {

@@ -53,7 +53,7 @@ pub fn tree_check(
                 .with_hint("umbra validate shows the whole tree")
         }
         Mode::Grade => {
-            let hint = match intake::mends(submission, tree) {
+            let hint = match intake::mends(submission, validation, tree) {
                 Some(mends) => format!("umbra validate --fix mends it: {mends}"),
                 None => format!("umbra validate shows the whole tree; {error}"),
             };

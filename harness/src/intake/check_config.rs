@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::finding::Finding;
 use super::limits::Limits;
 use super::name::safe_path;
-use super::submitted_config::{Field, SubmittedConfig};
+use super::submitted_config::{Field, SubmittedConfig, why_no_number};
 use super::tree::{CONFIG_FILE, TreeSpec};
 use crate::harmless::printable;
 
@@ -45,7 +45,7 @@ fn warning(code: &str, line: u32, message: String, hint: impl Into<String>) -> F
 }
 
 /// Whether a value is one that templates ship with.
-fn is_template_value(text: &str) -> bool {
+pub(super) fn is_template_value(text: &str) -> bool {
     let plain: String =
         text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
     const TEMPLATE: [&str; 15] = [
@@ -117,8 +117,9 @@ fn check_id(field: &Option<Field>, findings: &mut Vec<Finding>) {
             if !field.text.bytes().all(|b| b.is_ascii_digit())
                 || field.text.parse::<u64>().is_err() =>
         {
-            let message =
-                format!("\"studentID\": expected digits only, found '{}'", printable(&field.text));
+            let why = why_no_number(&field.text).map_or(String::new(), |why| format!(": {why}"));
+            let found = printable(&field.text);
+            let message = format!("\"studentID\": expected digits only, found '{found}'{why}");
             findings.push(error("config_student_id", field.line, message, hint));
         }
         Some(field) if field.text.bytes().all(|b| b == b'0') => {
@@ -202,7 +203,9 @@ fn not_found(written: &str, name: &str, paths: &[&str], tree: &TreeSpec) -> Find
     let lower = name.to_lowercase();
     let base = |path: &str| path.rsplit('/').next().unwrap_or(path).to_lowercase();
     let same_path = paths.iter().find(|found| canonical(found, tree).to_lowercase() == lower);
-    let same_name = || paths.iter().find(|found| base(found) == base(name));
+    // Another place of the tree, not one that is no part of it.
+    let in_tree = |found: &&&str| tree.file_at(found).is_some() && base(found) == base(name);
+    let same_name = || paths.iter().find(in_tree);
     if let Some(found) = same_path {
         Finding::warning(
             "config_wrong_case",

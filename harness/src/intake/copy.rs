@@ -1,6 +1,7 @@
 //! The private copy: admits entries one by one, writes their bytes below the destination, counts
 //! and hashes what really comes. Shared by zip, tar and folder.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -67,6 +68,7 @@ pub(super) struct PrivateCopy<'a> {
     /// Lower-cased path to the first spelling seen.
     spellings: HashMap<String, String>,
     ignored: BTreeMap<String, u64>,
+    headers: u64,
     entries: u64,
     total_bytes: u64,
 }
@@ -91,6 +93,7 @@ impl<'a> PrivateCopy<'a> {
             folders: BTreeSet::new(),
             spellings: HashMap::new(),
             ignored: BTreeMap::new(),
+            headers: 0,
             entries: 0,
             total_bytes: 0,
         })
@@ -104,15 +107,22 @@ impl<'a> PrivateCopy<'a> {
 
     /// Counts one entry, its name unread (links, extended headers and the like count too).
     pub(super) fn count_entry(&mut self) -> Result<(), Stop> {
-        self.entries += 1;
-        if self.entries > self.limits.max_entries {
-            let message = format!("more than {} entries", self.limits.max_entries);
-            return Err(self.refuse(
-                Finding::error("limit_entries", message)
-                    .hint("submit only the files of the tree, no build folder"),
-            ));
+        self.headers += 1;
+        if self.headers > self.limits.most_headers() {
+            return Err(self.refuse(too_many(self.limits.most_headers())));
         }
         Ok(())
+    }
+
+    /// Counts what is not ignored.
+    pub(super) fn count_kept(&mut self) -> Result<(), Stop> {
+        self.entries += 1;
+        match self.entries.cmp(&self.limits.max_entries.saturating_add(1)) {
+            Ordering::Less => Ok(()),
+            Ordering::Equal => Err(self.refuse(too_many(self.limits.max_entries))),
+            // It was said.
+            Ordering::Greater => Err(Stop::Refused),
+        }
     }
 
     /// Whether an entry that is neither a file nor a folder lies where all is ignored; counts it then.
@@ -143,6 +153,9 @@ impl<'a> PrivateCopy<'a> {
         if let Some(pattern) = self.tree.ignored_by(&path) {
             *self.ignored.entry(printable(pattern)).or_default() += 1;
             return EntryAction::Ignored;
+        }
+        if self.count_kept().is_err() {
+            return EntryAction::Refused;
         }
         if safe.replaced {
             self.findings.push(
@@ -351,7 +364,7 @@ impl<'a> PrivateCopy<'a> {
             return Err(IntakeError::Refused(Box::new(Refusal {
                 name: printable(name),
                 format: Some(format),
-                findings: self.findings.into_vec(),
+                findings: self.findings.without_repetition().into_vec(),
             })));
         }
         open_to_readers(self.dest, &self.folders, &files)?;
@@ -378,9 +391,14 @@ impl<'a> PrivateCopy<'a> {
             wrapped_in,
             digest: digest(&files),
             files,
-            findings: self.findings.into_vec(),
+            findings: self.findings.without_repetition().into_vec(),
         })
     }
+}
+
+fn too_many(limit: u64) -> Finding {
+    Finding::error("limit_entries", format!("more than {limit} entries"))
+        .hint("submit only the files of the tree, no build folder")
 }
 
 /// What to say of a second entry of one name: programs differ in which of the two they take.

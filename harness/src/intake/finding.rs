@@ -180,6 +180,31 @@ impl Findings {
         self.counts[Severity::Error as usize] > 0
     }
 
+    /// Names a few entries of which the same is to be said, and counts the others.
+    pub(super) fn without_repetition(self) -> Self {
+        /// Number of entries that are named.
+        const NAMED: usize = 3;
+        let mut seen: Vec<(Finding, usize)> = Vec::new();
+        let (mut kept, counts) = (Self::default(), self.counts);
+        for finding in self.list {
+            let plain = Finding { path: None, ..finding.clone() };
+            let at = seen.iter().position(|(other, _)| *other == plain).unwrap_or_else(|| {
+                seen.push((plain, 0));
+                seen.len() - 1
+            });
+            seen[at].1 += 1;
+            if seen[at].1 <= NAMED {
+                kept.list.push(finding);
+            }
+        }
+        for (mut plain, number) in seen.into_iter().filter(|(_, number)| *number > NAMED) {
+            plain.message = format!("the same of {} more: {}", number - NAMED, plain.message);
+            kept.list.push(plain);
+        }
+        kept.counts = counts;
+        kept
+    }
+
     /// The kept findings, worst first, then in the order they were found; ends with a note where
     /// some were left out.
     pub(super) fn into_vec(mut self) -> Vec<Finding> {

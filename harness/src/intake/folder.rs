@@ -57,7 +57,7 @@ impl Walk<'_, '_> {
     /// Copies from an open folder, whose path ends with a slash. Folders that are deeper than allowed are not
     /// admitted, so that neither the stack nor open folders pile up.
     fn folder(&mut self, mut folder: Folder, path: &[u8]) -> Result<(), Stop> {
-        let most = usize::try_from(self.copy.limits.max_entries).unwrap_or(usize::MAX);
+        let most = usize::try_from(self.copy.limits.most_headers()).unwrap_or(usize::MAX);
         let names = folder.names(most.saturating_add(1));
         let mut names = self.known("list", path, names)?;
         for _ in &names {

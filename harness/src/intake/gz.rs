@@ -8,6 +8,7 @@ use super::copy::{PrivateCopy, Stop};
 use super::finding::Finding;
 use super::limits::{Limits, mib};
 use super::tar::{self, AGAIN, BLOCK, PADDING, Refused};
+use crate::columns::count;
 
 /// Members of gzip data; programs that pack in pieces take 64 KiB or more for each.
 const MAX_MEMBERS: u64 = 1 << 14;
@@ -29,7 +30,7 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop>
     match gz.rest {
         None => Ok(()),
         Some(rest) if rest.iter().all(|byte| *byte == 0) => {
-            let message = format!("{} zeros after the gzip data", rest.len());
+            let message = format!("{} after the gzip data", count(rest.len(), "zero"));
             copy.findings.push(Finding::note("gz_padding", message));
             Ok(())
         }
@@ -40,7 +41,7 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop>
         }
         Some(rest) => {
             let message =
-                format!("{} bytes after the gzip data belong to no part of it", rest.len());
+                format!("{} after the gzip data: no part of it", count(rest.len(), "byte"));
             copy.findings.push(Finding::warning("gz_data_after", message).hint(AGAIN));
             Ok(())
         }
@@ -108,7 +109,7 @@ impl Read for Gz<'_> {
             ));
         }
         // Headers and padding come on top of the contents: at most two blocks an entry.
-        let overhead = self.limits.max_entries.saturating_mul(2 * BLOCK as u64) + 2 * PADDING;
+        let overhead = self.limits.most_headers().saturating_mul(2 * BLOCK as u64) + 2 * PADDING;
         if self.unpacked > mib(self.limits.max_total_mib).saturating_add(overhead) {
             return Err(refused(
                 "limit_total",

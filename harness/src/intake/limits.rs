@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
-    /// Entries in the archive or folder, folders and ignored ones included.
+    /// Entries in the archive or folder, folders included, besides ignored ones ([`Limits::most_headers`]).
     pub max_entries: u64,
     /// Size of the archive itself, and of all its contents together (MiB).
     pub max_total_mib: u64,
@@ -45,6 +45,11 @@ pub(super) fn mib(mib: u64) -> u64 {
 }
 
 impl Limits {
+    /// Entries of all kinds: ignored ones, whose content is not looked at, are a build folder's thousands.
+    pub(super) fn most_headers(&self) -> u64 {
+        self.max_entries.saturating_mul(25)
+    }
+
     /// Whether `unpacked` bytes out of `packed` exceed the ratio.
     pub(super) fn ratio_exceeded(&self, unpacked: u64, packed: u64) -> bool {
         unpacked > mib(self.ratio_from_mib)

@@ -30,6 +30,8 @@ mod submitted_config;
 mod tar;
 mod tar_sparse;
 mod tree;
+mod tree_config;
+mod tree_lost;
 mod tree_match;
 mod tree_text;
 mod unpack;

@@ -1,6 +1,6 @@
 //! Writing conforming archives: `pack` from a working folder, `fix` from a nearly right submission.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{self, Cursor, Write};
 use std::path::{Path, PathBuf};
@@ -12,12 +12,15 @@ use serde::{Deserialize, Serialize};
 use super::copy::Kind;
 use super::finding::Finding;
 use super::limits::Limits;
-use super::submission::{IntakeError, Refusal, Submission};
+use super::submission::{Format, IntakeError, Refusal, Submission};
 use super::submitted_config::{Field, SubmittedConfig};
 use super::tree::TreeSpec;
-use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
-use super::unpack::{copy_folder, unpack_bytes};
+use super::tree_lost::is_source;
+use super::tree_match::{Mark, Matched, TreeLine, match_tree};
+use super::unpack::{copy_folder, format_of_bytes, unpack_bytes};
 use super::validate::{Validation, validate_submission};
+use crate::columns::count;
+use crate::files::{write_new, write_whole};
 
 /// An archive that was written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,6 +29,8 @@ pub struct Packed {
     pub archive: PathBuf,
     /// Path in the source and path in the archive, sorted by the latter.
     pub files: Vec<(String, String)>,
+    /// Paths in the source that are not in the archive, sorted.
+    pub left_out: Vec<String>,
     /// The archive's own validation; its tree is the handout's.
     pub validation: Validation,
 }
@@ -58,7 +63,7 @@ pub fn pack(
     };
     let scratch = scratch_folder()?;
     let submission = copy_folder(dir, &is_wanted, scratch.path(), tree, limits)?;
-    write(&submission, out, tree, limits, |validation| validation.conforms)
+    write(&submission, out, tree, limits, &|validation| validation.conforms, write_over_archive)
 }
 
 fn scratch_folder() -> Result<tempfile::TempDir, IntakeError> {
@@ -78,7 +83,7 @@ pub fn archive_name(config: &SubmittedConfig, tree: &TreeSpec) -> String {
 }
 
 /// Repacks a nearly right submission: wrong level, wrong folders, other names, junk and stray files, an archive
-/// made in an odd way. What `config.json` says is the student's to mend.
+/// made in an odd way. What `config.json` says is the student's to mend. `out` is a new file: nothing is written over.
 ///
 /// # Errors
 /// [`IntakeError::Refused`] when something is missing that moving files cannot mend; nothing is
@@ -89,21 +94,36 @@ pub fn fix(
     tree: &TreeSpec,
     limits: &Limits,
 ) -> Result<Packed, IntakeError> {
-    write(submission, out, tree, limits, Validation::follows_tree)
+    write(submission, out, tree, limits, &Validation::follows_tree, write_new)
 }
 
 /// What [`fix`] would do to the tree, in words; nothing where it cannot mend it, or need not.
-pub fn mends(submission: &Submission, tree: &TreeSpec) -> Option<String> {
-    let places = places(submission, tree).ok()?;
+pub fn mends(submission: &Submission, validation: &Validation, tree: &TreeSpec) -> Option<String> {
+    let places = places(submission, &validation.tree, &[], tree).ok()?;
     let moved: Vec<_> = places
         .iter()
         .filter(|(to, from)| to != from && !tree.file_at(to).is_some_and(|file| file.accepts(from)))
         .collect();
     let (to, from) = moved.first()?;
-    Some(match moved.len() - 1 {
-        0 => format!("moves {from} to {to}"),
-        more => format!("moves {from} to {to}, and {more} more"),
-    })
+    let mut said = format!("moves {from} to {to}");
+    if moved.len() > 1 {
+        said += &format!(", and {} more", moved.len() - 1);
+    }
+    let source = left_out(submission, &places).filter(|path| is_source(path)).count();
+    if source > 0 {
+        said += &format!("; leaves out {} outside src/", count(source, "source file"));
+    }
+    Some(said)
+}
+
+/// The files of a submission that are not packed.
+fn left_out<'a>(
+    submission: &'a Submission,
+    places: &BTreeMap<String, String>,
+) -> impl Iterator<Item = &'a str> {
+    let packed: BTreeSet<String> = places.values().cloned().collect();
+    let paths = submission.files.iter().map(|file| file.path.as_str());
+    paths.filter(move |path| !packed.contains(*path))
 }
 
 /// Writes an archive of what belongs to the tree, where its validation is good enough.
@@ -112,9 +132,11 @@ fn write(
     out: &Path,
     tree: &TreeSpec,
     limits: &Limits,
-    is_good: impl Fn(&Validation) -> bool,
+    is_good: &dyn Fn(&Validation) -> bool,
+    put: fn(&Path, &[u8]) -> io::Result<()>,
 ) -> Result<Packed, IntakeError> {
-    let places = places(submission, tree)?;
+    let Matched { lines, findings } = match_tree(submission, tree)?;
+    let places = places(submission, &lines, &findings, tree)?;
     let bytes = zip_bytes(submission, &places)?;
     let scratch = scratch_folder()?;
     // The archive as whoever grades it will see it.
@@ -127,21 +149,31 @@ fn write(
         Some(config) if out.is_dir() => out.join(archive_name(config, tree)),
         _ => out.to_owned(),
     };
-    // What is renamed onto a device takes its place.
-    if archive.metadata().is_ok_and(|there| !there.is_file()) {
-        let source = io::Error::new(io::ErrorKind::AlreadyExists, "it is there, and no file");
-        return Err(IntakeError::io("write", &archive, source));
-    }
     validation.name = archive.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    // Beside the target, so that a half-written archive is never seen under its name.
-    let partial = archive.with_extension("zip.partial");
-    fs::write(&partial, &bytes).map_err(|e| IntakeError::io("write", &partial, e))?;
-    fs::rename(&partial, &archive).map_err(|e| IntakeError::io("write", &archive, e))?;
+    put(&archive, &bytes).map_err(|e| IntakeError::io("write", &archive, e))?;
+    let left_out = left_out(submission, &places).map(str::to_owned).collect();
     Ok(Packed {
         archive,
+        left_out,
         files: places.into_iter().map(|(to, from)| (from, to)).collect(),
         validation,
     })
+}
+
+/// Writes an archive, in place of an earlier one at most.
+fn write_over_archive(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let other = |message| Err(io::Error::new(io::ErrorKind::AlreadyExists, message));
+    match path.metadata() {
+        Ok(there) if !there.is_file() => other("it is there, and no file"),
+        Ok(_) if format_of_bytes(&fs::read(path)?) != Some(Format::Zip) => {
+            other("it is there, and no zip archive")
+        }
+        // Folders are not made.
+        Err(_) if path.parent().is_some_and(|folder| !folder.join(".").is_dir()) => {
+            Err(io::Error::new(io::ErrorKind::NotFound, "there is no such folder"))
+        }
+        _ => write_whole(path, bytes),
+    }
 }
 
 fn refused(submission: &Submission, mut findings: Vec<Finding>) -> IntakeError {
@@ -153,35 +185,44 @@ fn refused(submission: &Submission, mut findings: Vec<Finding>) -> IntakeError {
     }))
 }
 
-/// Path in the archive to path in the copy, for everything that belongs to the tree.
+/// Path in the archive to path in the copy, for everything that belongs to the tree. `findings` say what is missing.
 fn places(
     submission: &Submission,
+    lines: &[TreeLine],
+    findings: &[Finding],
     tree: &TreeSpec,
 ) -> Result<BTreeMap<String, String>, IntakeError> {
-    let paths: Vec<&str> = submission.files.iter().map(|file| file.path.as_str()).collect();
-    let lines = match_tree(&paths, tree);
-    if lines.iter().any(|line| line.mark == Mark::Missing) {
-        let missing = |line: &TreeLine| line.mark == Mark::Missing;
-        let missing: Vec<TreeLine> = lines.into_iter().filter(missing).collect();
-        return Err(refused(submission, tree_findings(&missing, &paths)));
+    let missing: Vec<&str> = lines
+        .iter()
+        .filter(|line| line.mark == Mark::Missing)
+        .filter_map(|line| line.expected.as_deref())
+        .collect();
+    if !missing.is_empty() {
+        let is_missing = |finding: &&Finding| {
+            finding.path.as_deref().is_some_and(|path| missing.contains(&path))
+        };
+        return Err(refused(submission, findings.iter().filter(is_missing).cloned().collect()));
     }
-    let mut moves: Vec<(String, String)> = Vec::new();
+    let mut moves: Vec<(&str, &str)> = Vec::new();
     for line in lines {
-        if let (Some(expected), Some(found)) = (line.expected, line.found)
-            && submission.file(&found).is_some()
+        if let (Some(expected), Some(found)) = (&line.expected, &line.found)
+            && submission.file(found).is_some()
         {
             moves.push((expected, found));
         }
     }
-    for path in paths {
-        let is_moved = moves.iter().any(|(_, found)| found == path);
+    for path in submission.files.iter().map(|file| file.path.as_str()) {
+        let is_moved = moves.iter().any(|(_, found)| *found == path);
         if !is_moved && tree.open_folder_of(path).is_some() {
-            moves.push((path.to_owned(), path.to_owned()));
+            moves.push((path, path));
         }
     }
+    let content = |path: &str| submission.file(path).map(|file| &file.sha256);
     let mut places = BTreeMap::new();
     for (to, from) in moves {
-        if let Some(other) = places.insert(to.clone(), from.clone()) {
+        if let Some(other) = places.insert(to.to_owned(), from.to_owned())
+            && content(&other) != content(from)
+        {
             let finding = Finding::error(
                 "fix_collision",
                 format!("'{from}' and '{other}' belong to the same place"),

@@ -11,6 +11,7 @@ use super::tree::CONFIG_FILE;
 use crate::harmless::printable;
 
 use keys::{Key, known_key};
+pub(super) use numbers::why_no_number;
 use numbers::{is_digits, number_in};
 
 /// What the submission's `config.json` says; absent where it does not say it.
@@ -68,10 +69,8 @@ impl SubmittedConfig {
                         .on_line(node.line)
                         .hint("start from the template's config.json"),
                 );
-                if let Value::List(items) = &node.value
-                    && let Some(Value::Object(members)) = items.first().map(|item| &item.value)
-                {
-                    config.take_members(members, true, &mut findings);
+                if let Value::List(items) = &node.value {
+                    config.take_one_of(items, true, &mut findings);
                 }
             }
             None => {}
@@ -110,8 +109,10 @@ impl SubmittedConfig {
             match known {
                 Key::First => take(&mut self.first_name, key, *line, node, findings),
                 Key::Last => take(&mut self.last_name, key, *line, node, findings),
-                Key::Full if is_number => take(&mut self.student_id, key, *line, node, findings),
-                Key::Id => take(&mut self.student_id, key, *line, node, findings),
+                Key::Full if is_number => {
+                    take_number(&mut self.student_id, key, *line, node, findings)
+                }
+                Key::Id => take_number(&mut self.student_id, key, *line, node, findings),
                 Key::Email => take(&mut self.email, key, *line, node, findings),
                 Key::Full => match (&node.value, members_of(node)) {
                     (_, Some(members)) if is_top => self.take_members(members, false, findings),
@@ -185,13 +186,62 @@ impl SubmittedConfig {
         field.text = digits;
     }
 
-    /// `["Ada", "Lampglow"]`, or a list of students, of whom the first counts.
+    /// The student of a list. Of several nobody is taken: which of them submits is not for us to guess.
+    fn take_one_of(&mut self, items: &[Node], is_top: bool, findings: &mut Vec<Finding>) {
+        let mut students: Vec<Self> = Vec::new();
+        for members in items.iter().filter_map(members_of) {
+            let mut student = Self::default();
+            student.take_members(members, is_top, findings);
+            let is_known = students.iter().any(|other| other.names_same(&student));
+            if !is_known && student.names_somebody() {
+                students.push(student);
+            }
+        }
+        match &students[..] {
+            [] | [_] => {
+                if let Some(members) = items.iter().filter_map(members_of).next() {
+                    self.take_members(members, is_top, &mut Vec::new());
+                }
+            }
+            [first, second, ..] => {
+                let text = |field: &Option<Field>| field.as_ref().map(|field| field.text.clone());
+                let who = |one: &Self| {
+                    let said = [&one.first_name, &one.last_name, &one.student_id];
+                    printable(&said.into_iter().filter_map(text).collect::<Vec<_>>().join(" "))
+                };
+                let message = format!(
+                    "expected one student, found {}: {} and {}",
+                    students.len(),
+                    who(first),
+                    who(second)
+                );
+                let numbers = students.iter().filter_map(|one| text(&one.student_id));
+                let line = first.student_id.as_ref().map_or(1, |field| field.line);
+                self.student_id =
+                    Some(Field { text: numbers.collect::<Vec<_>>().join(", "), line });
+                let finding = Finding::warning("config_two_students", message).on_line(line);
+                findings.push(finding.hint("keep the one who submits"));
+            }
+        }
+    }
+
+    fn names_somebody(&self) -> bool {
+        self.first_name.is_some() || self.last_name.is_some() || self.student_id.is_some()
+    }
+
+    fn names_same(&self, other: &Self) -> bool {
+        let text = |field: &Option<Field>| field.as_ref().map(|field| field.text.clone());
+        let all = |one: &Self| [&one.first_name, &one.last_name, &one.student_id].map(text);
+        all(self) == all(other)
+    }
+
+    /// `["Ada", "Lampglow"]`, or a list of students.
     fn take_names(&mut self, key: &str, line: u32, items: &[Node], findings: &mut Vec<Finding>) {
         let message = format!("'{}': expected text, found a list", printable(key));
         let finding = Finding::warning("config_type", message).on_line(line);
         findings.push(finding.hint("write one name in double quotes"));
-        if let Some(members) = items.first().and_then(members_of) {
-            return self.take_members(members, false, findings);
+        if items.first().and_then(members_of).is_some() {
+            return self.take_one_of(items, false, findings);
         }
         let names: Vec<String> = items.iter().filter_map(plain_text).collect();
         let is_word = |name: &String| !name.contains(char::is_whitespace);
@@ -333,6 +383,48 @@ const MAX_RENDERS: usize = 100;
 const RENDER_HINT: &str =
     r#"write { "scene": "Teapot, offline", "render": "offline/teapot_simple_offline.exr" }"#;
 
+/// Takes a student number. Several are kept together, so that none of them counts.
+fn take_number(
+    slot: &mut Option<Field>,
+    key: &str,
+    line: u32,
+    node: &Node,
+    findings: &mut Vec<Finding>,
+) {
+    let mut own = None;
+    take(&mut own, key, line, node, findings);
+    let several = |items: Vec<&Node>| {
+        let mut texts: Vec<String> = items.into_iter().filter_map(plain_text).collect();
+        texts.dedup();
+        (!texts.is_empty()).then(|| Field { text: texts.join(", "), line })
+    };
+    let own = own.or_else(|| match &node.value {
+        Value::List(items) => several(items.iter().collect()),
+        Value::Object(members) => several(members.iter().map(|(.., node)| node).collect()),
+        _ => None,
+    });
+    let Some(own) = own else { return };
+    match slot {
+        Some(first) if first.text.is_empty() => *slot = Some(own),
+        Some(first) if own.text.is_empty() || is_same_number(&first.text, &own.text) => {}
+        Some(first) => {
+            let message = format!(
+                "'{}' says something else than line {}: neither counts",
+                printable(key),
+                first.line
+            );
+            first.text = format!("{}, {}", first.text, own.text);
+            let finding = Finding::warning("config_twice", message).on_line(line);
+            findings.push(finding.hint("keep one of them"));
+        }
+        None => *slot = Some(own),
+    }
+}
+
+fn is_same_number(one: &str, other: &str) -> bool {
+    one == other || number_in(one).is_some_and(|number| number_in(other) == Some(number))
+}
+
 /// Takes a text or a number.
 fn take(slot: &mut Option<Field>, key: &str, line: u32, node: &Node, findings: &mut Vec<Finding>) {
     if !matches!(node.value, Value::Text(_) | Value::Number(_) | Value::Null) {
@@ -347,7 +439,11 @@ fn take(slot: &mut Option<Field>, key: &str, line: u32, node: &Node, findings: &
     if let Some(first) = slot
         && first.text != text
     {
-        let message = format!("'{}' says something else than line {}", printable(key), first.line);
+        let message = format!(
+            "'{}' says something else than line {}, which counts",
+            printable(key),
+            first.line
+        );
         findings
             .push(Finding::warning("config_twice", message).on_line(line).hint("keep one of them"));
         return;

@@ -12,6 +12,7 @@ use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::Finding;
 use super::submission::IntakeError;
 use super::tar_sparse::{Map, Records, gnu_map};
+use crate::columns::count;
 use crate::harmless::{printable, printable_bytes};
 
 pub(super) const BLOCK: usize = 512;
@@ -29,12 +30,12 @@ const VOLUME_LABEL: u8 = b'V';
 /// The type of a folder in an incremental backup, by `tar --listed-incremental`.
 const DUMPED_FOLDER: u8 = b'D';
 
-/// Whether the first block is a tar header, or the zeros of an empty tar.
+/// Whether the first block is a tar header. An empty tar is zeros, as is what a failed upload leaves.
 pub(super) fn looks_like_tar(bytes: &[u8]) -> bool {
     let Some(block) = bytes.get(..BLOCK) else {
         return false;
     };
-    block.iter().all(|b| *b == 0) || is_header(block)
+    is_header(block)
 }
 
 /// The checksum is the sum of the block's bytes with its own field as spaces.
@@ -109,6 +110,9 @@ pub(super) fn read(mut reader: impl Read, copy: &mut PrivateCopy<'_>) -> Result<
             | EntryType::GNULongLink
             | EntryType::XHeader
             | EntryType::XGlobalHeader => {
+                if entry_type == EntryType::XGlobalHeader {
+                    copy.count_kept()?;
+                }
                 let data = read_extended(&mut reader, size, copy)?;
                 let pending = extended.get_or_insert_default();
                 take_extended(entry_type, data, pending, copy)?;
@@ -187,7 +191,10 @@ fn check_padding(reader: &mut impl Read, copy: &mut PrivateCopy<'_>) -> Result<(
         }
     }
     if after > 0 {
-        let message = format!("{after} bytes after the end of the archive belong to no part of it");
+        let message = format!(
+            "{} after the end of the archive: no part of it",
+            count(usize::try_from(after).unwrap_or(usize::MAX), "byte")
+        );
         copy.findings.push(Finding::warning("tar_data_after", message).hint(AGAIN));
     }
     Ok(())

@@ -5,6 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop, clear};
+use super::encoding::text_of;
 use super::finding::Finding;
 use super::limits::{Limits, mib};
 use super::submission::{Format, IntakeError, Refusal, Submission, archive_magic};
@@ -245,13 +246,24 @@ fn unknown_format(bytes: &[u8]) -> Finding {
             Finding::error("empty", format!("the file is empty (0 bytes); {EXPECTED}"))
                 .hint("the upload may have been cut off; submit it again")
         }
+        None if bytes.iter().all(|byte| *byte == 0) => {
+            let message = format!("the file holds only zeros ({} bytes); {EXPECTED}", bytes.len());
+            Finding::error("format_unknown", message)
+                .hint("the upload or the disk failed; submit it again")
+        }
         None => {
-            let start = bytes.get(..16).unwrap_or(bytes).to_ascii_lowercase();
-            let found = if start.starts_with(b"<!doctype") || start.starts_with(b"<html") {
+            /// Bytes in which a text shows what it is.
+            const HEAD: usize = 512;
+            let start = text_of(bytes.get(..HEAD).unwrap_or(bytes)).to_lowercase();
+            let start = start.trim_start_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
+            let is_markup = |rest: &str| {
+                rest.starts_with(|c: char| "!?".contains(c) || c.is_ascii_alphabetic())
+            };
+            let found = if start.strip_prefix('<').is_some_and(is_markup) {
                 "a web page"
-            } else if start.starts_with(b"%pdf") {
+            } else if start.starts_with("%pdf") {
                 "a PDF"
-            } else if start.starts_with(b"v/1\x01") {
+            } else if bytes.starts_with(b"v/1\x01") {
                 "a single EXR image"
             } else {
                 "something else"

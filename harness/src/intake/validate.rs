@@ -7,10 +7,13 @@ use serde::{Deserialize, Serialize};
 use super::check_config::check_config;
 use super::encoding::text_of;
 use super::finding::{Finding, Findings, Severity};
+use super::lexer::tokens;
 use super::submission::{Format, IntakeError, Refusal, Submission};
 use super::submitted_config::SubmittedConfig;
 use super::tree::{CONFIG_FILE, TreeSpec};
-use super::tree_match::{Mark, TreeLine, match_tree, tree_findings};
+use super::tree_config::MAX_CONFIG;
+use super::tree_match::{Mark, Matched, TreeLine, match_tree};
+use crate::columns::count;
 
 /// What `validate` found.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,9 +32,6 @@ pub struct Validation {
     pub findings: Vec<Finding>,
 }
 
-/// Largest `config.json` that is read [bytes].
-const MAX_CONFIG: u64 = 64 << 10;
-
 /// Validates a private copy that was already made.
 ///
 /// # Errors
@@ -40,15 +40,15 @@ pub fn validate_submission(
     submission: &Submission,
     tree: &TreeSpec,
 ) -> Result<Validation, IntakeError> {
-    let paths: Vec<&str> = submission.files.iter().map(|file| file.path.as_str()).collect();
-    let lines = match_tree(&paths, tree);
+    let Matched { lines, findings: said } = match_tree(submission, tree)?;
     let mut findings = submission.findings.clone();
-    findings.extend(tree_findings(&lines, &paths));
+    findings.extend(said);
+    findings.extend(empty_source(submission, &lines)?);
     let mut config = None;
     // One in the wrong place says whose submission it is all the same.
     let config_line = lines.iter().find(|line| line.expected.as_deref() == Some(CONFIG_FILE));
-    let name = config_line.and_then(|line| line.found.as_deref()).unwrap_or(CONFIG_FILE);
-    if let Some(file) = submission.file(name) {
+    let name = config_line.and_then(|line| line.found.as_deref());
+    if let Some((name, file)) = name.and_then(|name| Some((name, submission.file(name)?))) {
         if file.bytes > MAX_CONFIG {
             findings.push(
                 Finding::error(
@@ -85,6 +85,29 @@ pub fn validate_submission(
         config,
         findings,
     })
+}
+
+/// The warning on a source file of the tree that holds no code, but comments at most.
+fn empty_source(submission: &Submission, lines: &[TreeLine]) -> Result<Vec<Finding>, IntakeError> {
+    /// Files that hold nothing are small [bytes].
+    const SMALL: u64 = 64 << 10;
+    let mut findings = Vec::new();
+    for path in lines.iter().filter(|line| line.expected.is_some()) {
+        let Some(file) = path.found.as_deref().and_then(|path| submission.file(path)) else {
+            continue;
+        };
+        if !file.path.to_lowercase().ends_with("lib.rs") || file.bytes > SMALL {
+            continue;
+        }
+        let path = submission.root.join(&file.path);
+        let bytes = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
+        if tokens(&text_of(&bytes)).is_empty() {
+            let message = format!("it holds no code ({})", count(bytes.len(), "byte"));
+            let finding = Finding::warning("source_empty", message).at(file.path.as_str());
+            findings.push(finding.hint("save your source, then pack again"));
+        }
+    }
+    Ok(findings)
 }
 
 impl Validation {

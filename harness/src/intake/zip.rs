@@ -16,9 +16,11 @@ use flate2::read::DeflateDecoder;
 
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::Finding;
+use super::limits::Limits;
 use super::zip_headers::{
     AGAIN, CENTRAL, Central, Entry, LOCAL, ZIP64, check_entry, u16_at, u32_at, u64_at,
 };
+use crate::columns::count;
 use crate::harmless::printable_bytes;
 
 const END: &[u8] = b"PK\x05\x06";
@@ -42,7 +44,7 @@ fn last_end_record(bytes: &[u8]) -> Option<usize> {
 
 /// Reads a zip archive into the copy. Nothing is written before all headers are checked.
 pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop> {
-    let directory = find_directory(bytes, copy.limits.max_entries).map_err(|f| copy.refuse(f))?;
+    let directory = find_directory(bytes, copy.limits).map_err(|f| copy.refuse(f))?;
     let mut entries = read_directory(bytes, &directory, copy)?;
     check_ranges(bytes, &entries, &directory, copy);
     slashes(&mut entries, copy);
@@ -52,7 +54,7 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop>
         match copy.accept(&entry.name, kind) {
             EntryAction::File(path) => files.push((entry, path)),
             EntryAction::Folder if entry.unpacked_bytes > 0 => {
-                let message = format!("a folder that holds {} bytes", entry.unpacked_bytes);
+                let message = format!("a folder that holds data (size {})", entry.unpacked_bytes);
                 copy.findings.push(Finding::error("zip_folder_data", message).at(entry.shown()));
             }
             EntryAction::Folder | EntryAction::Ignored | EntryAction::Refused => {}
@@ -106,7 +108,7 @@ struct End {
     offset: u64,
 }
 
-fn find_directory(bytes: &[u8], max_entries: u64) -> Result<Directory, Finding> {
+fn find_directory(bytes: &[u8], limits: &Limits) -> Result<Directory, Finding> {
     let Some(at) = last_end_record(bytes) else {
         return Err(Finding::error(
             "zip_truncated",
@@ -122,8 +124,8 @@ fn find_directory(bytes: &[u8], max_entries: u64) -> Result<Directory, Finding> 
         );
     }
     let count = end.counts[1];
-    if count > max_entries {
-        let message = format!("{count} entries, over the limit of {max_entries}");
+    if count > limits.most_headers() {
+        let message = format!("{count} entries, over the limit of {}", limits.most_headers());
         return Err(Finding::error("limit_entries", message)
             .hint("submit only the files of the tree, no build folder"));
     }
@@ -281,25 +283,27 @@ fn check_ranges(
     let mut warn =
         |code: &str, message: String| copy.findings.push(Finding::warning(code, message));
     if before > 0 {
-        warn("zip_data_before", format!("{before} bytes before the zip belong to no part of it"));
+        warn("zip_data_before", format!("{} before the zip: no part of it", bytes_of(before)));
     }
     if between > 0 {
-        warn("zip_gap", format!("{between} bytes between the entries belong to none of them"));
+        warn("zip_gap", format!("{} between the entries: part of none", bytes_of(between)));
     }
     if after < directory.comment {
-        let message = format!("expected a comment of {} bytes, found {after}", directory.comment);
+        let message =
+            format!("expected a comment of {}, found {after}", bytes_of(directory.comment));
         warn("zip_comment_cut", message);
     }
     let tail = &bytes[bytes.len() - after.saturating_sub(directory.comment)..];
     if tail.iter().any(|byte| *byte != 0) {
-        warn(
-            "zip_data_after",
-            format!("{} bytes after the zip belong to no part of it", tail.len()),
-        );
+        warn("zip_data_after", format!("{} after the zip: no part of it", bytes_of(tail.len())));
     } else if !tail.is_empty() {
-        let message = format!("{} zeros after the zip", tail.len());
+        let message = format!("{} after the zip", count(tail.len(), "zero"));
         copy.findings.push(Finding::note("zip_padding", message));
     }
+}
+
+fn bytes_of(number: usize) -> String {
+    count(number, "byte")
 }
 
 /// Unpacks one entry and checks that its data keep what the headers promise.

@@ -83,6 +83,17 @@ fn numbers_are_found_among_other_signs_where_they_are_clear() {
         "",
         "260.12.3456",
         "nan",
+        "260181512, 260181513",
+        "260181512,260181513",
+        "260181512 260181513",
+        "260181512-260181513",
+        "260181512 2019-10-05",
+        "2019-10-05 260181512",
+        "260123456 1",
+        "26018 26019",
+        "2.6018E8",
+        "2.6018e+08",
+        "26E7",
         "inf",
         "1e300",
     ] {
@@ -167,6 +178,41 @@ fn endless_lists_are_cut() {
     let text = format!("{{\"renders\": [{}\"a\"]}}", "\"a\",".repeat(5000));
     let (config, findings, _) = SubmittedConfig::parse(text.as_bytes());
     assert_eq!((config.renders.len(), findings.len()), (100, 1));
+}
+
+#[test]
+fn of_two_numbers_none_counts() {
+    for text in [
+        r#"{"studentID": ["260181512", "260181513"]}"#,
+        r#"{"studentID": {"a": 260181512, "b": 260181513}}"#,
+        r#"{"studentID": "260181512", "studentID": "260181513"}"#,
+        r#"{"studentID": "260181512, 260181513"}"#,
+        r#"{"id": 260181512, "student": 260181513}"#,
+        r#"[{"id": 260181512}, {"id": 260181513}]"#,
+        r#"{"students": [{"id": 260181512}, {"id": 260181513}]}"#,
+    ] {
+        let (config, _, is_whole) = SubmittedConfig::parse(text.as_bytes());
+        assert_eq!(config.sampler_seed(), None, "{text}");
+        let tree = crate::intake::TreeSpec::default();
+        let said = crate::intake::check_config(&config, is_whole, &[], &[], &tree);
+        let said: Vec<String> = said.iter().map(ToString::to_string).collect();
+        assert!(
+            said.iter().any(|said| said.contains("260181512, 260181513': these are several")),
+            "{text}: {said:?}"
+        );
+    }
+    // One that is written in two ways is one.
+    for text in [
+        r#"{"studentID": "260 181 512", "id": 260181512}"#,
+        r#"{"studentID": ["260181512", "260181512"]}"#,
+        r#"{"studentID": "", "id": 260181512}"#,
+    ] {
+        assert_eq!(names(text).2, Some(260_181_512), "{text}");
+    }
+    let (config, ..) = SubmittedConfig::parse(br#"{"studentID": 2.6018E8}"#);
+    let said =
+        crate::intake::check_config(&config, false, &[], &[], &crate::intake::TreeSpec::default());
+    assert!(said[0].message.ends_with("digits are lost"), "{}", said[0]);
 }
 
 #[test]
