@@ -12,7 +12,7 @@ use super::matching::{Claim, Match, Matches, find};
 use super::mending::Mended;
 use super::overrides::Applied;
 use super::roster::{Roster, Student};
-use super::{names, stamps};
+use super::{names, owners, stamps};
 use crate::rubric::Grade;
 
 /// Which of a student's attempts counts.
@@ -255,7 +255,7 @@ pub fn settle(
 }
 
 /// Whom submissions are told apart by where there is no class list, in their order.
-fn people(claims: &[Claim]) -> Vec<String> {
+pub(super) fn people(claims: &[Claim]) -> Vec<String> {
     let own = |claim: &Claim| match &claim.label {
         Some(label) => label.person(),
         None => format!("submission {}", claim.slug),
@@ -310,7 +310,12 @@ fn charge(
     deciding: &Deciding,
 ) -> Option<Late> {
     let policy = deciding.policy?;
-    let number = standing.student.as_ref().map_or(&claim.number, |student| &student.number);
+    let number = match &standing.student {
+        Some(student) => &student.number,
+        None if deciding.roster.is_none() => owners::number(claim),
+        // Whose it is must be decided first: the number that it says may be another's.
+        None => claim.label.as_ref().map_or("", |label| &label.number),
+    };
     let own = |word: &str| !number.is_empty() && names::number(word) == names::number(number);
     let stamp = stamp(claim, standing, deciding);
     if let Some(mut late) = policy.judge(deciding.due, stamp, own) {

@@ -11,7 +11,7 @@ use anyhow::{Context as _, ensure};
 use super::MachineLacks;
 use super::asked::Asked;
 use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
-use super::class::{self, Source};
+use super::class::{self, Source, Telling};
 use super::context::{Context, INTERRUPTED, cores};
 use super::join::join;
 use super::render::AdapterChoice;
@@ -165,14 +165,16 @@ impl<'a> Batch<'a> {
             None => Some(recorded_seed(&instructor.join(SEED_FILE))?),
         };
         let all = class::sources(&collected.sources, self.output);
-        if self.mode == Mode::Grade {
-            class::roster(self.list, self.output)?;
+        let mut telling = Telling::default();
+        if let Some((_, decided)) = &pins {
+            let roster = class::roster(self.list, self.output)?;
+            telling = Telling { roster, matches: decided.matches(self.output)? };
         }
         let aside = match &pins {
             Some((_, decided)) => self.set_aside(&all, decided)?,
             None => HashSet::new(),
         };
-        let mut chosen = class::only(context, self.output, &all, self.only)?;
+        let mut chosen = class::only(context, self.output, &all, self.only, &telling)?;
         chosen.retain(|source| !aside.contains(&source.slug));
         let mut found = self.found(&collected, &all, &aside);
         let counting = chosen.len();

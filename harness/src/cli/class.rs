@@ -5,10 +5,10 @@ use std::collections::{HashMap, HashSet, VecDeque};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 
 use super::context::Context;
-use crate::class::{self, Claim, Label, MATCHES, Roster};
+use crate::class::{self, Claim, Label, MATCHES, Matches, Owners, Roster};
 use crate::columns::count;
 use crate::files::write_whole;
 use crate::grading::{Folders, Record, RecordCache, Student};
@@ -229,8 +229,17 @@ pub fn some(names: &[String]) -> String {
     }
 }
 
-/// The submissions of some students: by number, name, or file name; all when nobody is named. Who
-/// submitted what is known from earlier runs, else from the submissions themselves.
+/// By what a batch tells whose submissions are.
+#[derive(Default)]
+pub struct Telling {
+    /// The class list, if there is one.
+    pub roster: Option<Roster>,
+    /// The instructor's decisions.
+    pub matches: Matches,
+}
+
+/// The submissions of some students: by file name, else as [`Owners`] tell; all when nobody is named. What submissions
+/// say of themselves is known from earlier runs, else from the submissions themselves.
 ///
 /// # Errors
 /// When somebody has none, and when one cannot be looked into.
@@ -239,6 +248,7 @@ pub fn only<'a>(
     output: &Path,
     all: &'a [Source],
     wanted: &[String],
+    telling: &Telling,
 ) -> anyhow::Result<Vec<&'a Source>> {
     if wanted.is_empty() {
         return Ok(all.iter().collect());
@@ -248,19 +258,40 @@ pub fn only<'a>(
         let known = RecordCache::student(&instructor);
         known.or_else(|| student_of(context, &source.path)).unwrap_or_default()
     };
-    let students: Vec<Student> = all.iter().map(student).collect();
+    let claim = |source: &Source| {
+        let student = student(source);
+        let (number, full_name) = (student.id.clone(), student.full_name());
+        (Claim { number, full_name, ..source.claim() }, student.last_name)
+    };
+    let (claims, last_names): (Vec<Claim>, Vec<String>) = all.iter().map(claim).unzip();
+    let owners = Owners::of(&claims, telling.roster.as_ref(), &telling.matches)?;
     let mut chosen = vec![false; all.len()];
     for wanted in wanted {
-        let mut found = false;
-        for (index, (source, student)) in all.iter().zip(&students).enumerate() {
-            let matches = is_called(source, student, wanted);
-            chosen[index] |= matches;
-            found |= matches;
+        let word = wanted.trim().to_lowercase();
+        let of = |is: &dyn Fn(usize) -> bool| -> Vec<usize> {
+            (0..all.len()).filter(|at| !word.is_empty() && is(*at)).collect()
+        };
+        let mut found = owners.meant(wanted);
+        if found.is_empty() {
+            found = of(&|at| is_file(&all[at], &word));
         }
-        let like = students.iter().map(who).find(|name| !name.is_empty());
+        let listed = owners.listed_as(wanted);
+        if found.is_empty() && listed.is_none() {
+            found = of(&|at| last_names[at].trim().to_lowercase() == word);
+        }
+        found.iter().for_each(|at| chosen[*at] = true);
+        if let (true, Some(who)) = (found.is_empty(), listed) {
+            bail!(
+                "--only: {who} has no submission that is theirs for certain; hint: name its file"
+            );
+        }
+        let names = claims
+            .iter()
+            .map(|claim| if claim.full_name.is_empty() { &claim.number } else { &claim.full_name });
+        let like = names.into_iter().find(|name| !name.is_empty()).cloned();
         let like = like.or_else(|| all.first().map(|source| file_name(&source.path)));
         ensure!(
-            found,
+            !found.is_empty(),
             "--only: nobody of {} is \"{wanted}\"; expected a student number, a first and last name or a \
              file name, such as \"{}\"",
             count(all.len(), "submission"),
@@ -270,19 +301,13 @@ pub fn only<'a>(
     Ok(all.iter().zip(chosen).filter(|(_, chosen)| *chosen).map(|(source, _)| source).collect())
 }
 
-fn is_called(source: &Source, student: &Student, wanted: &str) -> bool {
+/// Whether a word in lower case is the file of a submission.
+fn is_file(source: &Source, word: &str) -> bool {
     let name = file_name(&source.path);
-    let own = [
-        student.id.trim().to_owned(),
-        student.full_name(),
-        student.last_name.trim().to_owned(),
-        source.slug.clone(),
-        stem(&name).to_owned(),
-        name,
-        source.path.to_string_lossy().into_owned(),
-    ];
-    let wanted = wanted.trim().to_lowercase();
-    own.iter().any(|own| !own.is_empty() && own.to_lowercase() == wanted)
+    let path = source.path.to_string_lossy();
+    [source.slug.as_str(), &source.name, stem(&name), &name, &path]
+        .iter()
+        .any(|own| own.to_lowercase() == word)
 }
 
 /// Whose a submission is, by its config.json; nothing when it cannot be read.
@@ -355,20 +380,13 @@ mod tests {
     }
 
     #[test]
-    fn a_student_is_called_by_number_name_or_file() {
-        let student = Student {
-            first_name: "Ada".into(),
-            last_name: "Lampglow".into(),
-            id: "260181512".into(),
-        };
+    fn a_submission_is_called_by_its_file() {
         let source = source("class/a2_ada.tar.gz", "a2_ada-2");
-        for name in ["260181512", "ada lampglow", "LAMPGLOW", "a2_ada", "a2_ada.tar.gz", "a2_ada-2"]
-        {
-            assert!(is_called(&source, &student, name), "{name}");
+        for name in ["a2_ada", "a2_ada.tar.gz", "a2_ada-2", "class/a2_ada.tar.gz"] {
+            assert!(is_file(&source, name), "{name}");
         }
-        for name in ["", "ada", "26018151", "a2", "class"] {
-            assert!(!is_called(&source, &student, name), "{name}");
+        for name in ["", "ada", "a2", "class"] {
+            assert!(!is_file(&source, name), "{name}");
         }
-        assert!(!is_called(&source, &Student::default(), " "));
     }
 }
