@@ -109,3 +109,131 @@ fn a_number_that_may_be_two_people_s_is_on_nobody_and_said() {
     );
     assert_eq!(points(&place), of(&[("a2_ann", 2.0), ("a2_mal", 0.0)]));
 }
+
+const NAMES: [&str; 3] = ["Zoe Oz", "Ann Lee", "Bob Dim"];
+
+/// The entries of a download of Brightspace, of its first students.
+fn brightspace(students: usize) -> Vec<(String, Vec<u8>)> {
+    let own = |(at, name): (usize, &&str)| {
+        let (first, last) = name.split_once(' ').unwrap();
+        let path = format!("10{at}-90{at} - {name} - Oct 5, 2019 1159 PM/a2.zip");
+        (path, submission(&config(first, last, &format!("26000010{at}"))))
+    };
+    NAMES.iter().enumerate().take(students).map(own).collect()
+}
+
+fn download(files: &[(String, Vec<u8>)]) -> Vec<u8> {
+    zip(&files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect::<Vec<_>>())
+}
+
+#[test]
+fn a_newer_download_of_a_class_holds_the_same_submissions() {
+    let moodle = |students: usize| -> Vec<(String, Vec<u8>)> {
+        let own = |(at, (_, bytes)): (usize, (String, Vec<u8>))| {
+            (format!("{}_{at}_assignsubmission_file/a2.zip", NAMES[at]), bytes)
+        };
+        brightspace(students).into_iter().enumerate().map(own).collect()
+    };
+    let canvas = |students: usize| -> Vec<(String, Vec<u8>)> {
+        let own = |(at, (_, bytes)): (usize, (String, Vec<u8>))| {
+            (format!("{}_{at}_77{at}_a2.zip", NAMES[at].replace(' ', "").to_lowercase()), bytes)
+        };
+        brightspace(students).into_iter().enumerate().map(own).collect()
+    };
+    let plain = |students: usize| -> Vec<(String, Vec<u8>)> {
+        let own = |(at, (_, bytes)): (usize, (String, Vec<u8>))| (format!("a2_{at}.zip"), bytes);
+        brightspace(students).into_iter().enumerate().map(own).collect()
+    };
+    let layouts: [(&str, &dyn Fn(usize) -> Vec<(String, Vec<u8>)>); 4] = [
+        ("Brightspace", &brightspace),
+        ("Moodle", &moodle),
+        ("Canvas", &canvas),
+        ("plain", &plain),
+    ];
+    for (title, files) in layouts {
+        let place = Place::new();
+        let root = place.assignment(LATE);
+        let (mon, tue) = (files(2), files(3));
+        place.put("mon.zip", &download(&mon));
+        place.put("tue.zip", &download(&tue));
+        place.put("moved/tue.zip", &download(&tue));
+        tue.iter().for_each(|(name, bytes)| place.put(&format!("tue/{name}"), bytes));
+        let names = |report: &Value| -> Vec<String> {
+            rows(report).into_iter().map(|(name, ..)| name).collect()
+        };
+        let (_, report) = place.grade(&root, &["mon.zip"]);
+        assert_eq!(names(&report).len(), 2, "{title}");
+        for (given, kept) in [
+            (&["tue.zip"][..], 2),
+            (&["moved/tue.zip"], 3),
+            (&["tue"], 3),
+            (&["mon.zip", "tue.zip"], 3),
+        ] {
+            let (said, report) = place.grade(&root, given);
+            assert_eq!(names(&report).len(), 3, "{title} {given:?}: {said}");
+            assert!(
+                said.contains(&format!("{kept} of 3 submissions keep their earlier grades")),
+                "{title} {given:?}: {said}"
+            );
+            assert_eq!(
+                report["class"]["undecided"].as_array().unwrap().len(),
+                0,
+                "{title}: {said}"
+            );
+        }
+        // The older one again: nobody is lost.
+        let (_, report) = place.grade(&root, &["mon.zip"]);
+        assert_eq!(names(&report).len(), 3, "{title}");
+    }
+}
+
+#[test]
+fn another_content_under_one_name_is_said_and_each_has_an_address() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    let name = "Ann Lee_7_assignsubmission_file/a2.zip".to_owned();
+    let (first, second) = (config("Ann", "Lee", "260000104"), config("Ann", "Lee", "260000104 "));
+    place.put("mon.zip", &download(&[(name.clone(), submission(&first))]));
+    place.put("tue.zip", &download(&[(name.clone(), submission(&second))]));
+    // In a newer download it replaces the older one, by name.
+    place.grade(&root, &["mon.zip"]);
+    let (said, report) = place.grade(&root, &["tue.zip"]);
+    assert_eq!(rows(&report).len(), 1, "{said}");
+    assert!(
+        said.contains(&format!("{name} of Ann Lee is graded again: it replaces the one")),
+        "{said}"
+    );
+    assert!(
+        place.at("out/instructor/Ann-Lee_7_assignsubmission_file-a2/record.replaced.json").exists()
+    );
+    // Side by side both are there.
+    fs::remove_dir_all(place.at("out")).unwrap();
+    let (said, report) = place.grade(&root, &["mon.zip", "tue.zip"]);
+    let slugs: Vec<String> = points(&place).into_iter().map(|(slug, _)| slug).collect();
+    assert_eq!(slugs.len(), 2, "{said}");
+    let asked: Vec<&str> = report["class"]["undecided"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|own| text(&own["submission"]))
+        .collect();
+    assert_eq!(asked, slugs);
+    let (_, said) = umbra(&place, &root, &["status"]);
+    assert!(said.contains(&format!("there is also {}", slugs[1])), "{said}");
+    let decide = |submission: &str| {
+        let text = format!("[[match]]\nsubmission = \"{submission}\"\nstudent = \"none\"\n");
+        place.put("out/matches.toml", text.as_bytes());
+        let (code, said) = umbra(&place, &root, &["regrade", "--apply", "--reason", "x"]);
+        assert_eq!(code, Some(0), "{said}");
+        points(&place).into_iter().map(|(slug, _)| slug).collect::<Vec<_>>()
+    };
+    assert_eq!(decide(&slugs[0]), [slugs[1].clone()]);
+    // Their name is that of two, and nobody's grade vanishes.
+    assert_eq!(decide(&name), slugs);
+    let (code, said) = umbra(&place, &root, &["status"]);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("may be more than one submission, so it is on none"), "{said}");
+    assert_eq!(decide("nobody/a2.zip"), slugs);
+    let (_, said) = umbra(&place, &root, &["status"]);
+    assert!(said.contains("there is no submission \"nobody/a2.zip\""), "{said}");
+}

@@ -1,7 +1,7 @@
 //! Finds the submissions that a command line names: archives and folders anywhere below a folder or in a zip of many,
 //! as learning platforms lay them out (`class/Ann_1_assignsubmission_file/a2.zip`).
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,7 @@ use super::layout::{
     self, ARCHIVES, Kind, Label, end_of, gradescope_metadata, has_end_of_archive, is_labelled,
     label_of,
 };
+use super::slots::{content, slot};
 use crate::harmless::printable;
 use crate::intake::{Limits, TreeSpec, format_of_bytes};
 
@@ -81,9 +82,44 @@ pub struct Collected {
     pub skipped: Vec<String>,
     /// Those of whom a platform has something, but nothing to grade.
     pub empty: Vec<Empty>,
+    /// What lies in several downloads with the same content, and is one submission.
+    pub copies: Vec<String>,
 }
 
 impl Collected {
+    /// Of what has one place in several downloads with the same content, keeps the first. What the command line names
+    /// itself is always a submission of its own.
+    fn leave_out_copies(&mut self, paths: &[PathBuf]) -> anyhow::Result<()> {
+        let mut slots: BTreeMap<String, Vec<(usize, Option<String>)>> = BTreeMap::new();
+        for (at, source) in self.sources.iter().enumerate() {
+            if !paths.contains(&source.place) {
+                let slot = slot(source.label.as_ref(), &source.name);
+                slots.entry(slot).or_default().push((at, None));
+            }
+        }
+        let mut copies = BTreeSet::new();
+        for own in slots.values_mut().filter(|own| own.len() > 1) {
+            for (at, digest) in own.iter_mut() {
+                let path = &self.sources[*at].path;
+                // A link is refused as a submission, so nothing is read through it.
+                if !path.is_symlink() {
+                    let failed = || format!("cannot read {}", path.display());
+                    *digest = Some(content(path).with_context(failed)?);
+                }
+            }
+            let mut seen = BTreeSet::new();
+            for (at, digest) in own.iter() {
+                if digest.as_ref().is_some_and(|digest| !seen.insert(digest)) {
+                    copies.insert(*at);
+                }
+            }
+        }
+        self.copies = copies.iter().map(|at| self.sources[*at].name.clone()).collect();
+        let mut at = 0..;
+        self.sources.retain(|_| at.next().is_none_or(|at| !copies.contains(&at)));
+        Ok(())
+    }
+
     /// What was skipped, in words; nothing when nothing was.
     pub fn skipped(&self) -> Option<String> {
         skipped(&self.skipped)
@@ -145,7 +181,9 @@ pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> 
             );
         }
     }
-    Ok(search.found.labelled(wanted.from))
+    let mut collected = search.found.labelled(wanted.from);
+    collected.leave_out_copies(paths)?;
+    Ok(collected)
 }
 
 /// What a search has found so far.
@@ -215,7 +253,8 @@ impl Found {
         for (source, label) in self.sources.iter_mut().zip(labels) {
             source.label = label;
         }
-        Collected { kind, sources: self.sources, skipped: self.skipped, empty }
+        let copies = Vec::new();
+        Collected { kind, sources: self.sources, skipped: self.skipped, empty, copies }
     }
 }
 

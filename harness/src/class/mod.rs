@@ -22,6 +22,7 @@ pub mod owners;
 pub mod pins;
 pub mod roster;
 pub mod settle;
+pub mod slots;
 pub mod stamps;
 
 pub use collect::{Collected, Empty, Source, Wanted, collect};

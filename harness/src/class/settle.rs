@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::late::{Late, Policy};
 use super::layout::{Kind, Label};
-use super::matching::{Claim, Match, Matches, find};
+use super::matching::{Claim, Match, Matches, address, find};
 use super::mending::Mended;
 use super::overrides::Applied;
 use super::roster::{Roster, Student};
@@ -161,6 +161,9 @@ pub fn settle(
     kind: Kind,
     deciding: &Deciding,
 ) -> anyhow::Result<(Vec<(usize, Standing)>, Class)> {
+    let matches = &deciding.matches.among(claims);
+    let deciding = &Deciding { matches, ..*deciding };
+    let called = |at: usize| address(&claims[at], claims);
     let list = deciding.roster.and_then(|roster| roster.path.file_name());
     let list = list.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let mut class = Class { kind, list, ..Class::default() };
@@ -172,7 +175,7 @@ pub fn settle(
         let mut standing = Standing { label: claim.label.clone(), ..Standing::default() };
         let mut person = persons[index].clone();
         if deciding.matches.is_nobody(claim) {
-            class.not_counted.push(claim.name.clone());
+            class.not_counted.push(called(index));
             standings.push(standing);
             continue;
         }
@@ -187,12 +190,12 @@ pub fn settle(
                 Match::Undecided(reason, candidates) => {
                     for at in &candidates {
                         expected.entry(*at).or_insert_with(|| {
-                            format!("perhaps {}: decide in matches.toml", claim.name)
+                            format!("perhaps {}: decide in matches.toml", called(index))
                         });
                     }
                     let candidates =
                         candidates.into_iter().map(|at| roster.students[at].clone()).collect();
-                    let submission = claim.name.clone();
+                    let submission = called(index);
                     class.undecided.push(Undecided { submission, reason, candidates });
                     person = format!("undecided {index}");
                 }
@@ -211,18 +214,15 @@ pub fn settle(
         match choose(&attempts, claims, &standings, grades, deciding) {
             Some(own) => {
                 let others = attempts.iter().filter(|at| **at != own);
-                standings[own].set_aside = others.map(|at| claims[*at].name.clone()).collect();
+                standings[own].set_aside = others.map(|at| called(*at)).collect();
                 counts.push(own);
             }
             None => {
                 for &own in &attempts {
-                    let others: Vec<&str> = attempts
-                        .iter()
-                        .filter(|at| **at != own)
-                        .map(|at| claims[*at].name.as_str())
-                        .collect();
+                    let others: Vec<String> =
+                        attempts.iter().filter(|at| **at != own).map(|at| called(*at)).collect();
                     class.undecided.push(Undecided {
-                        submission: claims[own].name.clone(),
+                        submission: called(own),
                         reason: format!(
                             "which of the attempts counts is not certain, there is also {}",
                             others.join(", ")

@@ -18,8 +18,9 @@ use super::render::AdapterChoice;
 use super::settling::{self, Found};
 use crate::assignment::Assignment;
 use crate::class::{Attempt, Collected, Decided, Kind, Label, Pins, Stated, Wanted, collect};
+use crate::columns::count;
 use crate::files::write_whole;
-use crate::grading::{Earlier, Folders, Grading, Mode, Record, judge_shared};
+use crate::grading::{Earlier, Folders, Grading, Mode, Record, RecordCache, judge_shared};
 use crate::held_back::recorded_seed;
 use crate::program::graded;
 use crate::report::{self, BatchReport, SubmissionReport};
@@ -164,7 +165,18 @@ impl<'a> Batch<'a> {
             Some(Perturb(seed)) => seed,
             None => Some(recorded_seed(&instructor.join(SEED_FILE))?),
         };
-        let all = class::sources(&collected.sources, self.output);
+        let earlier = match self.mode {
+            Mode::Grade => Found::read(self.output)?.unwrap_or_default(),
+            Mode::Check => Found::default(),
+        };
+        let all = class::sources(&collected.sources, self.output, &earlier.names());
+        if !collected.copies.is_empty() {
+            eprintln!(
+                "umbra: {} in more than one download with the same content, graded once: {}",
+                count(collected.copies.len(), "submission"),
+                class::some(&collected.copies)
+            );
+        }
         let mut telling = Telling::default();
         if let Some((_, decided)) = &pins {
             let roster = class::roster(self.list, self.output)?;
@@ -351,6 +363,7 @@ impl<'a> Batch<'a> {
                     instructor: self.output.join(report::INSTRUCTOR).join(slug),
                 };
                 let begun = Instant::now();
+                let older = source.moved.as_ref().and_then(|_| RecordCache::text(&out.instructor));
                 let result = match self.mode {
                     Mode::Grade => class::note_source(&out, source)
                         .and_then(|()| grading.one_of_batch(path, slug, &out, &say)),
@@ -369,6 +382,17 @@ impl<'a> Batch<'a> {
                 };
                 let result = result.map(|record| Record { name: name.clone(), ..record });
                 let mut is_kept = false;
+                if let (Ok(record), Some(older), Some(from)) = (&result, older, &source.moved) {
+                    match RecordCache::keep_replaced(&out.instructor, &older, record) {
+                        Ok(false) => {}
+                        Ok(true) => context.progress.note(&format!(
+                            "{} of {} is graded again: it replaces the one that was {from}",
+                            record.name,
+                            class::who(&record.student)
+                        )),
+                        Err(error) => context.progress.note(&super::told_once(&error)),
+                    }
+                }
                 if let (Ok(record), Some(cache)) = (&result, &grading.cache) {
                     match cache.list(record, &out) {
                         Ok(()) => is_kept = true,

@@ -96,7 +96,7 @@ fn write_sources(
     let wanted = Wanted { tree, limits, from: None, output: Some(output), scratch: scratch.path() };
     let there: Vec<PathBuf> = kept.paths().iter().filter(|path| path.exists()).cloned().collect();
     let collected = collect(&there, &wanted)?;
-    let sources = class::sources(&collected.sources, output);
+    let sources = class::sources(&collected.sources, output, &kept.names());
     let path_of = |slug: &str| {
         let found = sources.iter().find(|source| source.slug == slug);
         let place = || class::place_of(output, slug).map(PathBuf::from);

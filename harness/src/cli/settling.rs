@@ -2,6 +2,7 @@
 //! submission and renders nothing.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -111,8 +112,13 @@ impl Found {
         }
     }
 
+    /// What reports call each submission, by its folder.
+    pub fn names(&self) -> HashMap<String, String> {
+        self.seen.iter().map(|seen| (seen.slug.clone(), seen.name.clone())).collect()
+    }
+
     /// Gives records the names that reports call them by; in their files they have that of the archive alone.
-    fn name(&self, records: &mut [Earlier]) {
+    pub fn name(&self, records: &mut [Earlier]) {
         for Earlier { record, .. } in records {
             if let Some(seen) = self.seen.iter().find(|seen| seen.slug == record.slug) {
                 record.name.clone_from(&seen.name);
@@ -242,6 +248,11 @@ impl Kept {
         settled(output, decided, &self.found, self.roster.as_ref(), self.records.clone())
     }
 
+    /// What reports call each submission, by its folder.
+    pub fn names(&self) -> HashMap<String, String> {
+        self.found.names()
+    }
+
     /// The submissions that are graded, without what was found out about them.
     pub fn records(&self) -> impl Iterator<Item = &Record> {
         self.records.iter().map(|earlier| &earlier.record)
@@ -257,7 +268,8 @@ impl Kept {
     /// # Errors
     /// When a decision means nothing.
     pub fn owners<'a>(&'a self, claims: &'a [Claim], output: &Path) -> anyhow::Result<Owners<'a>> {
-        Owners::of(claims, self.roster.as_ref(), &self.decided()?.matches(output)?)
+        let matches = self.decided()?.matches(output)?.among(claims);
+        Owners::of(claims, self.roster.as_ref(), &matches)
     }
 
     /// A submission with what it is worth before anything is decided.
@@ -376,7 +388,14 @@ pub fn settled(
     mut records: Vec<Earlier>,
 ) -> anyhow::Result<Settled> {
     let stated = &decided.assignment;
-    let matches = decided.matches(output)?;
+    found.name(&mut records);
+    // In an order that does not depend on the order of grading.
+    records.sort_by_key(|earlier| earlier.record.slug.to_lowercase());
+    let shared = shared(output, &records)?;
+    let claims: Vec<Claim> =
+        records.iter().map(|earlier| class::claim(output, &earlier.record)).collect();
+    let matches = decided.matches(output)?.among(&claims);
+    let owners = Owners::of(&claims, roster, &matches)?;
     let deciding = Deciding {
         roster,
         matches: &matches,
@@ -384,13 +403,6 @@ pub fn settled(
         due: &stated.due,
         attempt: decided.attempt,
     };
-    found.name(&mut records);
-    // In an order that does not depend on the order of grading.
-    records.sort_by_key(|earlier| earlier.record.slug.to_lowercase());
-    let shared = shared(output, &records)?;
-    let claims: Vec<Claim> =
-        records.iter().map(|earlier| class::claim(output, &earlier.record)).collect();
-    let owners = Owners::of(&claims, roster, &matches)?;
     let overrides = decided.overrides(output)?.on(&owners);
     let mut entries: Vec<SubmissionReport> = Vec::new();
     let mut grades: Vec<Grade> = Vec::new();
@@ -437,7 +449,12 @@ pub fn settled(
     let (standings, mut class) = settle(&claims, &mut grades, &absent, found.kind, &deciding)?;
     let parts: Vec<&str> = stated.rules.parts.iter().map(|part| part.id.as_str()).collect();
     let counts = |slug: &str| standings.iter().any(|(at, _)| claims[*at].slug == slug);
-    class.unused = overrides.unused(counts, &parts);
+    class.unused.extend(overrides.unused(counts, &parts));
+    let is_seen = |word: &str| {
+        let label = |seen: &Seen| seen.label.as_ref().is_some_and(|own| own.submission == word);
+        found.seen.iter().any(|seen| seen.slug == word || seen.name == word || label(seen))
+    };
+    class.unused.extend(matches.lost(is_seen));
     if !found.list.is_empty() {
         class.list.clone_from(&found.list);
     }

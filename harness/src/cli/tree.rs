@@ -10,6 +10,7 @@ use unicode_width::UnicodeWidthStr as _;
 
 use super::context::{Context, INTERRUPTED};
 use crate::class::{Collected, Kind, Wanted, collect};
+use crate::columns::count;
 use crate::harmless::harmless;
 use crate::intake::{self, IntakeError, Severity, Submission, Validation};
 
@@ -129,7 +130,11 @@ fn many(arguments: &ValidateArguments, found: &Collected, context: &Context) -> 
             println!("recognised as a download of {}", found.kind.title());
         }
         let all = validations.len();
-        println!("{all} submissions, {} conform, {wrong} do not", all - wrong);
+        println!("{}, {} conform, {wrong} do not", count(all, "submission"), all - wrong);
+        if !found.copies.is_empty() {
+            let copies = harmless(&found.copies.join(", "));
+            println!("in more than one download with the same content, read once: {copies}");
+        }
         for empty in &found.empty {
             println!("{}: {}", harmless(&empty.label.who()), harmless(&empty.reason()));
         }

@@ -89,7 +89,9 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     let board = Arc::new(Board::default());
     let [first, whole] = [output.join(FIRST_LOOK), output.clone()].map(|output| {
         let given = [crate::class::Source::given(&folder)];
-        let slug = super::class::sources(&given, &output).remove(0).slug;
+        let slug = super::class::sources(&given, &output, &std::collections::HashMap::new())
+            .remove(0)
+            .slug;
         (output.join(slug), output)
     });
     let server = Server::start([first.0, whole.0], Arc::clone(&board), Arc::clone(&live))?;
