@@ -170,6 +170,7 @@ pub fn settle(
     let mut standings = Vec::new();
     let persons = self::people(claims);
     let mut people: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    let mut own_person = Vec::new();
     let mut expected: BTreeMap<usize, String> = BTreeMap::new();
     for (index, (claim, grade)) in claims.iter().zip(grades.iter_mut()).enumerate() {
         let mut standing = Standing { label: claim.label.clone(), ..Standing::default() };
@@ -201,7 +202,10 @@ pub fn settle(
                 }
                 Match::Nobody => {}
             }
+        } else if let Some(word) = matches.word(claim) {
+            person = format!("number {}", names::number(word));
         }
+        own_person.push((index, person.clone()));
         standing.late = charge(claim, &standing, grade, deciding);
         standing.time_unknown = standing.late.is_none()
             && deciding.policy.is_some()
@@ -234,6 +238,9 @@ pub fn settle(
             }
         }
     }
+    if deciding.roster.is_none() {
+        class.undecided.extend(doubles(claims, &own_person, matches));
+    }
     if let Some(roster) = deciding.roster {
         for (label, reason) in absent {
             let claim = Claim { label: Some(label.clone()), ..Claim::default() };
@@ -254,10 +261,47 @@ pub fn settle(
     Ok((standings.collect(), class))
 }
 
+/// Submissions that may be one student's, though nothing says that they are attempts: no platform names both, and they
+/// have one number under several names, or one name without a number.
+fn doubles(claims: &[Claim], persons: &[(usize, String)], matches: &Matches) -> Vec<Undecided> {
+    let mut known: BTreeMap<String, Vec<(usize, &str)>> = BTreeMap::new();
+    for (at, person) in persons {
+        let (number, name) = (owners::number(&claims[*at]), owners::name(&claims[*at]));
+        let key = match (names::number(number), names::words(name)) {
+            (number, name) if number.is_empty() && name.is_empty() => continue,
+            (number, _) if !number.is_empty() => format!("the student number {number}"),
+            _ => format!("the name {name}, without a student number,"),
+        };
+        known.entry(key).or_default().push((*at, person.as_str()));
+    }
+    let mut found = Vec::new();
+    for (key, all) in known {
+        let may_be = |(a, own): (usize, &str), (b, other): (usize, &str)| {
+            own != other && (claims[a].label.is_none() || claims[b].label.is_none())
+        };
+        for own in all.iter().filter(|own| matches.word(&claims[own.0]).is_none()) {
+            let others = all.iter().filter(|other| may_be(*own, **other));
+            let others: Vec<String> = others.map(|own| address(&claims[own.0], claims)).collect();
+            if !others.is_empty() {
+                found.push(Undecided {
+                    submission: address(&claims[own.0], claims),
+                    reason: format!("{key} is also in {}", others.join(", ")),
+                    candidates: Vec::new(),
+                });
+            }
+        }
+    }
+    found
+}
+
 /// Whom submissions are told apart by where there is no class list, in their order.
 pub(super) fn people(claims: &[Claim]) -> Vec<String> {
     let own = |claim: &Claim| match &claim.label {
         Some(label) => label.person(),
+        // One number under one name is one student, with several attempts.
+        None if !names::number(&claim.number).is_empty() => {
+            format!("number {} {}", names::number(&claim.number), names::words(&claim.full_name))
+        }
         None => format!("submission {}", claim.slug),
     };
     let mut people: Vec<String> = claims.iter().map(own).collect();
@@ -349,14 +393,25 @@ impl Class {
     pub fn questions(&self) -> String {
         let mut text = String::from(
             "# Whose submissions are, where the class list and the submissions do not tell. Umbra reads this file on\n\
-             # every run and never changes it. `student` is a student number, or \"none\" for a submission that does\n\
-             # not count; `submitted` is a time stamp.\n",
+             # every run and never changes it. `submission` is its name or its folder in the report. `student` is a\n\
+             # student number, or \"none\" for a submission that does not count; `submitted` is a time stamp.\n",
         );
         for Undecided { submission, reason, candidates } in &self.undecided {
             let quoted = toml::Value::String(submission.clone());
             text += &format!("\n# {}\n# [[match]]\n# submission = {quoted}\n", one_line(reason));
-            let who = candidates.first().map_or("none", |student| student.number.as_str());
-            text += &format!("# student = {}\n", toml::Value::String(who.to_owned()));
+            // Between several nothing is filled in, so that nobody takes it by mistake.
+            let who = match &candidates[..] {
+                [] => "none",
+                [only] => only.number.as_str(),
+                _ => "",
+            };
+            text += &format!("# student = {}", toml::Value::String(who.to_owned()));
+            let all: Vec<String> =
+                candidates.iter().map(|student| one_line(&student.who())).collect();
+            text += &match all.len() {
+                0 | 1 => "\n".to_owned(),
+                _ => format!("    # {}\n", all.join(" or ")),
+            };
         }
         text
     }
@@ -505,6 +560,44 @@ mod tests {
     }
 
     #[test]
+    fn one_number_twice_is_asked_where_no_platform_tells() {
+        let plain = |slug: &str, number: &str, name: &str| Claim {
+            name: format!("{slug}.zip"),
+            slug: slug.to_owned(),
+            label: None,
+            number: number.to_owned(),
+            full_name: name.to_owned(),
+        };
+        let reasons = |claims: &[Claim], attempt, matches: &str| -> Vec<String> {
+            let settled = run(claims, &vec![1.0; claims.len()], false, attempt, matches);
+            settled.class.undecided.into_iter().map(|own| own.reason).collect()
+        };
+        let ann = plain("ann", "1", "Ann Lee");
+        for (other, reason) in [
+            (
+                plain("ann2", "#1", "lee ann"),
+                "which of the attempts counts is not certain, there is also ann2.zip",
+            ),
+            (plain("mal", "1", "Mallory"), "the student number 1 is also in mal.zip"),
+            (plain("x", "1", ""), "the student number 1 is also in x.zip"),
+        ] {
+            let said = reasons(&[ann.clone(), other.clone()], Attempt::Latest, "");
+            assert_eq!((said.len(), said[0].as_str()), (2, reason));
+        }
+        let two = [plain("a", "", "Ann Lee"), plain("b", "", "Ann Lee")];
+        let said = reasons(&two, Attempt::Best, "");
+        assert_eq!(said[0], "the name Ann Lee, without a student number, is also in b.zip");
+        // Two people, or one of them does not count; others do not matter.
+        let is = |slug: &str, who: &str| {
+            format!("[[match]]\nsubmission = \"{slug}\"\nstudent = \"{who}\"\n")
+        };
+        let both = is("a", "1") + &is("b", "2");
+        assert_eq!(reasons(&two, Attempt::Latest, &both), [""; 0]);
+        assert_eq!(reasons(&two, Attempt::Latest, &is("a.zip", "none")), [""; 0]);
+        assert_eq!(reasons(&[ann, two[0].clone()], Attempt::Latest, ""), [""; 0]);
+    }
+
+    #[test]
     fn attempts_that_no_time_tells_apart_are_the_instructors() {
         let claims = [
             claim("Bo Ode_7_assignsubmission_file", "3"),
@@ -521,6 +614,10 @@ mod tests {
             ),
             "{text}"
         );
+        // Between several, nothing is filled in.
+        let at = "11-9 - Ann Lee - Oct 5, 2019 1000 PM";
+        let open = run(&[claim(at, "")], &[1.0], true, Attempt::Latest, "").class.questions();
+        assert!(open.contains("# student = \"\"    # Ann Lee (1) or Ann Lee (2)\n"), "{open}");
         // As a comment it is empty, and without the signs it is read.
         let open: String = text
             .lines()
