@@ -180,6 +180,9 @@ impl<'a> Batch<'a> {
         let mut telling = Telling::default();
         if let Some((_, decided)) = &pins {
             let roster = class::roster(self.list, self.output)?;
+            if let (Some(_), Some(roster)) = (self.list, &roster) {
+                eprintln!("umbra: {}", roster.reading());
+            }
             telling = Telling { roster, matches: decided.matches(self.output)? };
         }
         let aside = match &pins {
