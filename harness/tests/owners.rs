@@ -237,3 +237,61 @@ fn another_content_under_one_name_is_said_and_each_has_an_address() {
     let (_, said) = umbra(&place, &root, &["status"]);
     assert!(said.contains("there is no submission \"nobody/a2.zip\""), "{said}");
 }
+
+#[test]
+fn a_download_among_other_archives_is_no_row_of_zero() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    let late = submission(&config("Zed", "Late", "260000107"));
+    let tue = download(&brightspace(3));
+    place.put("f/late_by_mail.zip", &late);
+    place.put("f/tue.zip", &tue);
+    place.put("f/deeper/mon.zip", &download(&brightspace(2)));
+    let (said, report) = place.grade_to(Some(1), &root, &["f"]);
+    let names = |report: &Value| -> Vec<String> {
+        rows(report).into_iter().map(|(name, ..)| name).collect()
+    };
+    assert_eq!(names(&report), ["late_by_mail.zip"], "{said}");
+    let unopened = report["class"]["unopened"].as_array().unwrap();
+    assert_eq!(unopened.len(), 2, "{said}");
+    assert!(said.contains("tue.zip: it looks like a download of Brightspace"), "{said}");
+    let (code, said) = umbra(&place, &root, &["status"]);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("neither opened nor graded: 2"), "{said}");
+    // As the hint says.
+    let (said, report) = place.grade(&root, &["f/tue.zip", "f/late_by_mail.zip"]);
+    assert_eq!(names(&report).len(), 4, "{said}");
+    // A zip of nothing but the download.
+    fs::remove_dir_all(place.at("out")).unwrap();
+    let junk = ("__MACOSX/._tue.zip".to_owned(), b"x".to_vec());
+    place.put("outer.zip", &download(&[("tue.zip".to_owned(), tue), junk]));
+    let (said, report) = place.grade(&root, &["outer.zip"]);
+    assert_eq!(names(&report).len(), 3, "{said}");
+    let (_, said, _) = place.run(&["validate", "outer.zip", "--root", root.to_str().unwrap()]);
+    assert!(said.contains("3 submissions, "), "{said}");
+}
+
+#[test]
+fn two_contents_under_one_name_of_a_download_are_refused() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    let (name, ann) = brightspace(2).remove(1);
+    let other = submission(&config("Ann", "Lee", "260000199"));
+    let run = |command: &str| {
+        let mut all = vec![command, "dup.zip", "--root", root.to_str().unwrap()];
+        all.extend((command == "grade").then_some(["--report", "out"]).into_iter().flatten());
+        let (code, said, errors) = place.run(&all);
+        (code, said + &errors)
+    };
+    place.put("dup.zip", &download(&[(name.clone(), ann.clone()), (name.clone(), other)]));
+    for command in ["validate", "grade"] {
+        let (code, said) = run(command);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains(&format!("two files in it are called \"{name}\"")), "{said}");
+    }
+    assert!(!place.at("out").exists());
+    // With one content they are one.
+    place.put("dup.zip", &download(&[(name.clone(), ann.clone()), (name, ann)]));
+    let (_, said) = run("validate");
+    assert!(said.contains("1 submission, "), "{said}");
+}

@@ -3,11 +3,12 @@
 //! A word is first a folder of the report, then a student of the class list, and only then what a submission says of
 //! itself. The number that a student typed never takes the place of what the class list or the platform says.
 
+use std::collections::BTreeMap;
+
 use super::layout::{Kind, Label};
 use super::matching::{Claim, Match, Matches, find};
 use super::names;
 use super::roster::{Roster, Student};
-use super::settle::people;
 
 /// Submissions of a report, with the students that they are matched to.
 pub struct Owners<'a> {
@@ -138,6 +139,30 @@ impl<'a> Owners<'a> {
             format!("{slug}/")
         }
     }
+}
+
+/// Whom submissions are told apart by where there is no class list, in their order.
+pub fn people(claims: &[Claim]) -> Vec<String> {
+    let own = |claim: &Claim| match &claim.label {
+        Some(label) => label.person(),
+        // One number under one name is one student, with several attempts.
+        None if !names::number(&claim.number).is_empty() => {
+            format!("number {} {}", names::number(&claim.number), names::words(&claim.full_name))
+        }
+        None => format!("submission {}", claim.slug),
+    };
+    let mut people: Vec<String> = claims.iter().map(own).collect();
+    // Brightspace's numbers may be those of attempts: one name and one student number are one person.
+    let mut known: BTreeMap<(String, String), String> = BTreeMap::new();
+    for (at, claim) in claims.iter().enumerate() {
+        let number = names::number(&claim.number);
+        let label = claim.label.as_ref().filter(|label| label.kind == Kind::Brightspace);
+        let Some(label) = label.filter(|_| !number.is_empty()) else { continue };
+        let person = people[at].clone();
+        let first = known.entry((names::words(&label.name), number)).or_insert(person.clone());
+        people.iter_mut().filter(|own| **own == person).for_each(|own| own.clone_from(first));
+    }
+    people
 }
 
 /// The number that a submission is known by before anybody is matched: the platform's, else its own.

@@ -79,6 +79,8 @@ pub struct Class {
     pub undecided: Vec<Undecided>,
     /// Submissions that the instructor decided not to count.
     pub not_counted: Vec<String>,
+    /// Zips that look like the download of a class, among other archives: neither opened nor graded.
+    pub unopened: Vec<String>,
     /// Decisions on points whose evidence has changed since.
     pub stale: Vec<String>,
     /// Decisions on points that are on nothing that is there.
@@ -168,7 +170,7 @@ pub fn settle(
     let list = list.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let mut class = Class { kind, list, ..Class::default() };
     let mut standings = Vec::new();
-    let persons = self::people(claims);
+    let persons = owners::people(claims);
     let mut people: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     let mut own_person = Vec::new();
     let mut expected: BTreeMap<usize, String> = BTreeMap::new();
@@ -294,30 +296,6 @@ fn doubles(claims: &[Claim], persons: &[(usize, String)], matches: &Matches) -> 
     found
 }
 
-/// Whom submissions are told apart by where there is no class list, in their order.
-pub(super) fn people(claims: &[Claim]) -> Vec<String> {
-    let own = |claim: &Claim| match &claim.label {
-        Some(label) => label.person(),
-        // One number under one name is one student, with several attempts.
-        None if !names::number(&claim.number).is_empty() => {
-            format!("number {} {}", names::number(&claim.number), names::words(&claim.full_name))
-        }
-        None => format!("submission {}", claim.slug),
-    };
-    let mut people: Vec<String> = claims.iter().map(own).collect();
-    // Brightspace's numbers may be those of attempts: one name and one student number are one person.
-    let mut known: BTreeMap<(String, String), String> = BTreeMap::new();
-    for (at, claim) in claims.iter().enumerate() {
-        let number = names::number(&claim.number);
-        let label = claim.label.as_ref().filter(|label| label.kind == Kind::Brightspace);
-        let Some(label) = label.filter(|_| !number.is_empty()) else { continue };
-        let person = people[at].clone();
-        let first = known.entry((names::words(&label.name), number)).or_insert(person.clone());
-        people.iter_mut().filter(|own| **own == person).for_each(|own| own.clone_from(first));
-    }
-    people
-}
-
 /// The attempt that counts; nothing where that is not certain.
 fn choose(
     attempts: &[usize],
@@ -383,7 +361,7 @@ fn charge(
 impl Class {
     /// Whether there is anything to say.
     pub fn is_quiet(&self) -> bool {
-        let decisions = [&self.not_counted, &self.stale, &self.unused];
+        let decisions = [&self.not_counted, &self.unopened, &self.stale, &self.unused];
         self.missing.is_empty()
             && self.undecided.is_empty()
             && decisions.iter().all(|lines| lines.is_empty())

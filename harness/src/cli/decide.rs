@@ -260,6 +260,7 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
     let mut waits = false;
     for (title, lines) in [
         ("whose they are, to be decided in matches.toml", undecided.collect()),
+        ("neither opened nor graded", class.unopened.clone()),
         ("images without code, for `umbra confirm` or `umbra override`", images),
         ("to be looked at, then `umbra confirm` or `umbra override`", remarks.collect::<Vec<_>>()),
         (

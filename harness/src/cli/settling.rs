@@ -48,6 +48,9 @@ pub struct Found {
     pub held_back: Option<HeldBack>,
     /// What was there, graded or not.
     pub seen: Vec<Seen>,
+    /// Zips that look like the download of a class, among other archives.
+    #[serde(default)]
+    pub unopened: Vec<String>,
     /// The version of Umbra.
     pub umbra: String,
     /// Where the submissions were looked for.
@@ -89,7 +92,8 @@ impl Found {
             ..Seen::default()
         }));
         let umbra = env!("CARGO_PKG_VERSION").to_owned();
-        Self { kind: collected.kind, seen, umbra, ..Self::default() }
+        let unopened = collected.unopened.clone();
+        Self { kind: collected.kind, seen, unopened, umbra, ..Self::default() }
     }
 
     /// Adds what an earlier run into `output` found of those that this one was not given.
@@ -455,6 +459,7 @@ pub fn settled(
         found.seen.iter().any(|seen| seen.slug == word || seen.name == word || label(seen))
     };
     class.unused.extend(matches.lost(is_seen));
+    class.unopened.clone_from(&found.unopened);
     if !found.list.is_empty() {
         class.list.clone_from(&found.list);
     }
