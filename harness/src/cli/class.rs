@@ -282,7 +282,7 @@ pub struct Telling {
     pub matches: Matches,
 }
 
-/// The submissions of some students: by file name, else as [`Owners`] tell; all when nobody is named. What submissions
+/// The submissions of some students: as [`Owners`] tell, else by file name; all when nobody is named. What submissions
 /// say of themselves is known from earlier runs, else from the submissions themselves.
 ///
 /// # Errors
@@ -330,10 +330,10 @@ pub fn only<'a>(
                 "--only: {who} has no submission that is theirs for certain; hint: name its file"
             );
         }
-        let names = claims
+        let mut names = claims
             .iter()
             .map(|claim| if claim.full_name.is_empty() { &claim.number } else { &claim.full_name });
-        let like = names.into_iter().find(|name| !name.is_empty()).cloned();
+        let like = names.find(|name| !name.is_empty()).cloned();
         let like = like.or_else(|| all.first().map(|source| file_name(&source.path)));
         ensure!(
             !found.is_empty(),
