@@ -26,6 +26,7 @@ mod labelled;
 mod likeness;
 mod metrics;
 mod original_scene;
+mod owners;
 mod program;
 mod race;
 mod real_archives;

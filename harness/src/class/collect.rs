@@ -1,18 +1,20 @@
 //! Finds the submissions that a command line names: archives and folders anywhere below a folder or in a zip of many,
 //! as learning platforms lay them out (`class/Ann_1_assignsubmission_file/a2.zip`).
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 
+pub use super::download::Ambiguous;
 use super::download::{self, GRADESCOPE_METADATA};
 use super::layout::{
     self, ARCHIVES, Kind, Label, end_of, gradescope_metadata, has_end_of_archive, is_labelled,
     label_of,
 };
+use super::slots::{content, slot};
 use crate::harmless::printable;
 use crate::intake::{Limits, TreeSpec, format_of_bytes};
 
@@ -81,9 +83,46 @@ pub struct Collected {
     pub skipped: Vec<String>,
     /// Those of whom a platform has something, but nothing to grade.
     pub empty: Vec<Empty>,
+    /// Zips that look like the download of a class, among other archives: neither opened nor graded.
+    pub unopened: Vec<String>,
+    /// What lies in several downloads with the same content, and is one submission.
+    pub copies: Vec<String>,
 }
 
 impl Collected {
+    /// Of what has one place in several downloads with the same content, keeps the first. What the command line names
+    /// itself is always a submission of its own.
+    fn leave_out_copies(&mut self, paths: &[PathBuf]) -> anyhow::Result<()> {
+        let mut slots: BTreeMap<String, Vec<(usize, Option<String>)>> = BTreeMap::new();
+        for (at, source) in self.sources.iter().enumerate() {
+            if !paths.contains(&source.place) {
+                let slot = slot(source.label.as_ref(), &source.name);
+                slots.entry(slot).or_default().push((at, None));
+            }
+        }
+        let mut copies = BTreeSet::new();
+        for own in slots.values_mut().filter(|own| own.len() > 1) {
+            for (at, digest) in own.iter_mut() {
+                let path = &self.sources[*at].path;
+                // A link is refused as a submission, so nothing is read through it.
+                if !path.is_symlink() {
+                    let failed = || format!("cannot read {}", path.display());
+                    *digest = Some(content(path).with_context(failed)?);
+                }
+            }
+            let mut seen = BTreeSet::new();
+            for (at, digest) in own.iter() {
+                if digest.as_ref().is_some_and(|digest| !seen.insert(digest)) {
+                    copies.insert(*at);
+                }
+            }
+        }
+        self.copies = copies.iter().map(|at| self.sources[*at].name.clone()).collect();
+        let mut at = 0..;
+        self.sources.retain(|_| at.next().is_none_or(|at| !copies.contains(&at)));
+        Ok(())
+    }
+
     /// What was skipped, in words; nothing when nothing was.
     pub fn skipped(&self) -> Option<String> {
         skipped(&self.skipped)
@@ -127,13 +166,14 @@ pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> 
         let said = search.found.skipped.len();
         if path.is_dir() && !is_submission(path, wanted.tree)? {
             search.descend(path, path, "", 0)?;
-        } else if !search.download(path, path, "", wanted.from)? {
+        } else if !search.wrapped(path)? && !search.download(path, path, "", wanted.from)? {
             search.found.sources.push(Source::given(path));
         }
         if search.found.sources.len() == before {
             let found = &search.found.skipped[said..];
             let other =
                 skipped(found).map_or("it is empty".into(), |names| format!("it holds {names}"));
+            let other = search.found.unopened.first().cloned().unwrap_or(other);
             let platform = wanted.from.filter(|kind| *kind != Kind::Plain);
             let platform = platform.map_or(String::new(), |kind| {
                 format!(", in {} named like {}", kind.title(), kind.pattern())
@@ -145,7 +185,9 @@ pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> 
             );
         }
     }
-    Ok(search.found.labelled(wanted.from))
+    let mut collected = search.found.labelled(wanted.from);
+    collected.leave_out_copies(paths)?;
+    Ok(collected)
 }
 
 /// What a search has found so far.
@@ -153,6 +195,7 @@ pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> 
 struct Found {
     sources: Vec<Source>,
     skipped: Vec<String>,
+    unopened: Vec<String>,
     /// Of clones: their names below the given path.
     clones: Vec<String>,
     /// What Gradescope says of its folders.
@@ -215,7 +258,8 @@ impl Found {
         for (source, label) in self.sources.iter_mut().zip(labels) {
             source.label = label;
         }
-        Collected { kind, sources: self.sources, skipped: self.skipped, empty }
+        let (copies, unopened) = (Vec::new(), self.unopened);
+        Collected { kind, sources: self.sources, skipped: self.skipped, empty, copies, unopened }
     }
 }
 
@@ -269,6 +313,8 @@ impl Search<'_> {
                 }
             } else if downloads && self.download(&path, &place, &format!("{name}/"), None)? {
                 // Its submissions are found.
+            } else if let Some(platform) = self.looks_like(&path, &place) {
+                self.found.unopened.push(unopened(&name, platform, &place));
             } else if kind.is_symlink() || (kind.is_file() && is_archive(&path)) {
                 // A link is refused as a submission, so that somebody looks at it.
                 self.found.sources.push(Source { path, name, place, label: None });
@@ -332,6 +378,32 @@ impl Search<'_> {
         Ok(true)
     }
 
+    /// Whose download an archive among others looks like. What lies in a student's folder, or is named as a student's, is
+    /// the student's.
+    fn looks_like(&self, path: &Path, place: &Path) -> Option<Kind> {
+        let is_student_s = place.iter().any(|part| is_labelled(&part.to_string_lossy()));
+        if is_student_s || path.is_symlink() || !path.is_file() || !download::may_be(path) {
+            return None;
+        }
+        download::platform(&download::names(path)?, self.wanted.tree)
+    }
+
+    /// Searches the download in a zip that was named and holds nothing else; false where it is none.
+    fn wrapped(&mut self, path: &Path) -> anyhow::Result<bool> {
+        let names = Some(path).filter(|path| download::may_be(path) && !path.is_symlink());
+        let names = names.and_then(download::names).unwrap_or_default();
+        let Some(only) = download::only_archive(&names, self.wanted.tree) else { return Ok(false) };
+        self.unpacked += 1;
+        let into = self.wanted.scratch.join(self.unpacked.to_string());
+        fs::create_dir_all(&into).with_context(|| format!("cannot make {}", into.display()))?;
+        download::unpack(path, &into, self.wanted.limits)?;
+        let place = path.join(&only);
+        match self.looks_like(&into.join(&only), &place) {
+            Some(_) => self.download(&into.join(&only), &place, "", None),
+            None => Ok(false),
+        }
+    }
+
     fn read_metadata(&mut self, path: &Path) -> anyhow::Result<()> {
         let cannot = || format!("cannot read {}", path.display());
         let file = fs::File::open(path).with_context(cannot)?;
@@ -340,6 +412,16 @@ impl Search<'_> {
         self.found.metadata.extend(gradescope_metadata(&String::from_utf8_lossy(&bytes)));
         Ok(())
     }
+}
+
+/// Why a zip that looks like a download is no submission.
+fn unopened(name: &str, platform: Kind, place: &Path) -> String {
+    format!(
+        "{name}: it looks like a download of {}, so among other archives it is neither opened nor graded; hint: name it \
+         itself, {}",
+        platform.title(),
+        place.display()
+    )
 }
 
 fn file_name(path: &Path) -> String {

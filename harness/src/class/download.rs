@@ -3,9 +3,9 @@
 //! The platform made the zip, but students named what is in it. Names are checked before anything is written, and
 //! what students uploaded is only copied: archives among it are opened later, in locked children.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read, Seek as _, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 
 use anyhow::Context as _;
@@ -19,6 +19,78 @@ use crate::intake::{Limits, TreeSpec};
 pub const GRADESCOPE_METADATA: &str = "submission_metadata.yml";
 /// More entries than a download of a large class has.
 const MAX_ENTRIES: usize = 200_000;
+
+/// A download that programs would unpack differently.
+#[derive(Debug)]
+pub struct Ambiguous(String);
+
+impl std::fmt::Display for Ambiguous {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Ambiguous {}
+
+impl Ambiguous {
+    fn new(path: &Path, name: &str) -> Self {
+        Self(format!(
+            "{}: two files in it are called \"{}\", with other content each; expected names that differ; hint: \
+             download it again, or unpack it, rename one, and name the folder",
+            path.display(),
+            printable(name)
+        ))
+    }
+}
+
+/// A name that two entries have with other content; the reader of zips shows only the last of them.
+fn named_twice(path: &Path) -> io::Result<Option<String>> {
+    let Some(zip) = open(path) else { return Ok(None) };
+    let mut file = BufReader::new(File::open(path)?);
+    file.seek(SeekFrom::Start(zip.central_directory_start()))?;
+    let mut seen: HashMap<Vec<u8>, Vec<u8>> = HashMap::new();
+    let mut head = [0; 46];
+    // Each entry: 46 bytes, its name, and two fields that do not matter here.
+    while file.read_exact(&mut head).is_ok() && head.starts_with(b"PK\x01\x02") {
+        let length = |at: usize| usize::from(u16::from_le_bytes([head[at], head[at + 1]]));
+        let mut name = vec![0; length(28)];
+        file.read_exact(&mut name)?;
+        file.seek_relative((length(30) + length(32)) as i64)?;
+        // Checksum and size.
+        let content = [&head[16..20], &head[24..28]].concat();
+        if let Some(other) = seen.insert(name.clone(), content.clone())
+            && other != content
+        {
+            return Ok(Some(String::from_utf8_lossy(&name).into_owned()));
+        }
+    }
+    Ok(None)
+}
+
+/// The platform whose download a zip with these names looks like, beyond doubt.
+pub fn platform(names: &[String], tree: &TreeSpec) -> Option<Kind> {
+    if !is_download(names, tree, None) {
+        return None;
+    }
+    let any = |kind: Kind| {
+        names.iter().flat_map(|name| name.split('/')).any(|part| label_of(kind, part).is_some())
+    };
+    Kind::PLATFORMS.into_iter().find(|kind| any(*kind))
+}
+
+/// The one archive in a zip that holds nothing else but what systems add.
+pub fn only_archive(names: &[String], tree: &TreeSpec) -> Option<String> {
+    let is_junk = |name: &&String| {
+        let mut parts = name.split('/');
+        name.ends_with('/')
+            || parts.any(|part| part.starts_with('.') || tree.ignored_by(part).is_some())
+    };
+    let files: Vec<&String> = names.iter().filter(|name| !is_junk(name)).collect();
+    match files[..] {
+        [only] if end_of(only) == "zip" && safe(only).is_some() => Some(only.clone()),
+        _ => None,
+    }
+}
 
 /// The names in a zip; none where it is no zip that can be read.
 pub fn names(path: &Path) -> Option<Vec<String>> {
@@ -94,6 +166,9 @@ pub fn unpack(path: &Path, into: &Path, limits: &Limits) -> anyhow::Result<Vec<S
     let mut zip = ZipArchive::new(BufReader::new(File::open(path).with_context(cannot)?))
         .with_context(cannot)?;
     let names = names(path).with_context(cannot)?;
+    if let Some(name) = named_twice(path).with_context(cannot)? {
+        return Err(Ambiguous::new(path, &name).into());
+    }
     // What is larger than a submission may be is refused by intake, which only needs to see that it is.
     let most = (limits.max_total_mib << 20) + 1;
     let mut skipped = Vec::new();
@@ -117,7 +192,13 @@ pub fn unpack(path: &Path, into: &Path, limits: &Limits) -> anyhow::Result<Vec<S
         fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
         let mut out = match File::create_new(&to) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-                skip("its name is there twice");
+                let mut content = Vec::new();
+                file.by_ref().take(most).read_to_end(&mut content).with_context(cannot)?;
+                // Also names that only this file system takes for one.
+                if !to.is_file() || fs::read(&to).with_context(cannot)? != content {
+                    return Err(Ambiguous::new(path, name).into());
+                }
+                skip("it is there twice, with the same content");
                 continue;
             }
             out => out.with_context(|| format!("cannot write {}", to.display()))?,

@@ -53,6 +53,19 @@ struct Decision {
     student: Option<String>,
     submitted: Option<String>,
     place: String,
+    on: On,
+}
+
+/// The submissions that a decision is on, by their folders.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+enum On {
+    /// Whatever is called so.
+    #[default]
+    Any,
+    /// These.
+    Folders(Vec<String>),
+    /// None: which of these is not certain.
+    Unclear(Vec<String>),
 }
 
 #[derive(Deserialize)]
@@ -100,7 +113,8 @@ impl Matches {
                     "{place}: expected student = \"NUMBER\" or \"{NOBODY}\", or submitted = \"TIME\""
                 );
             }
-            decisions.push(Decision { submission, student, submitted, place });
+            let on = On::Any;
+            decisions.push(Decision { submission, student, submitted, place, on });
         }
         Ok(Self(decisions))
     }
@@ -114,10 +128,55 @@ impl Matches {
         .collect()
     }
 
+    /// The decisions on some submissions. The name of several is that of none: each has a folder.
+    #[must_use]
+    pub fn among(&self, claims: &[Claim]) -> Self {
+        let on = |decision: &Decision| {
+            let meant = meant(&decision.submission, claims);
+            let slugs = meant.iter().map(|own| own.slug.clone()).collect::<Vec<_>>();
+            let label = |own: &&Claim| {
+                own.label.as_ref().is_some_and(|own| own.submission == decision.submission)
+            };
+            match meant.len() {
+                0 => On::Any,
+                1 => On::Folders(slugs),
+                // A platform's own name of all that is in a folder.
+                _ if meant.iter().all(label) => On::Folders(slugs),
+                _ => On::Unclear(slugs),
+            }
+        };
+        Self(self.0.iter().map(|own| Decision { on: on(own), ..own.clone() }).collect())
+    }
+
+    /// Decisions on nothing that is there, with their lines; `is_seen` says what is there, graded or not.
+    pub fn lost(&self, is_seen: impl Fn(&str) -> bool) -> Vec<String> {
+        let lost = self.0.iter().filter_map(|Decision { submission, place, on, .. }| match on {
+            On::Any if !is_seen(submission) => {
+                Some(format!("{place}: there is no submission \"{submission}\""))
+            }
+            On::Unclear(slugs) => Some(format!(
+                "{place}: \"{submission}\" may be more than one submission, so it is on none; name a folder: {}",
+                slugs.join(", ")
+            )),
+            _ => None,
+        });
+        lost.collect()
+    }
+
+    /// Whose the instructor says that a submission is, where there is no class list.
+    pub fn word<'a>(&'a self, claim: &'a Claim) -> Option<&'a str> {
+        self.of(claim).find_map(|decision| decision.student.as_deref())
+    }
+
     fn of<'a>(&'a self, claim: &'a Claim) -> impl Iterator<Item = &'a Decision> {
         let own = move |decision: &&Decision| {
             let label = claim.label.as_ref().map_or("", |label| &label.submission);
-            [claim.name.as_str(), &claim.slug, label].contains(&decision.submission.as_str())
+            match &decision.on {
+                On::Any => [claim.name.as_str(), &claim.slug, label]
+                    .contains(&decision.submission.as_str()),
+                On::Folders(slugs) => slugs.contains(&claim.slug),
+                On::Unclear(_) => false,
+            }
         };
         self.0.iter().filter(own)
     }
@@ -156,6 +215,30 @@ impl Matches {
             )
         })
     }
+}
+
+/// The submissions that a word in `matches.toml` may mean: by folder or name; where there is none, by what the platform
+/// calls all that is in a folder.
+fn meant<'a>(word: &str, claims: &'a [Claim]) -> Vec<&'a Claim> {
+    let of = |is: &dyn Fn(&Claim) -> bool| -> Vec<&'a Claim> {
+        claims.iter().filter(|own| is(own)).collect()
+    };
+    if let Some(folder) = word.strip_suffix('/') {
+        let found = of(&|own| own.slug == folder);
+        if !found.is_empty() {
+            return found;
+        }
+    }
+    let found = of(&|own| own.slug == word || own.name == word);
+    let label = |own: &Claim| own.label.as_ref().is_some_and(|own| own.submission == word);
+    if found.is_empty() { of(&label) } else { found }
+}
+
+/// What a submission is called among others: its name, or its folder in the report where another has that name.
+pub fn address(claim: &Claim, claims: &[Claim]) -> String {
+    let alone = |word: &&String| meant(word, claims).len() == 1;
+    let own = [&claim.name, &claim.slug].into_iter().find(alone).cloned();
+    own.unwrap_or_else(|| format!("{}/", claim.slug))
 }
 
 /// The line of a place in a text, from 1.

@@ -18,15 +18,18 @@ pub mod matching;
 pub mod mending;
 pub mod names;
 pub mod overrides;
+pub mod owners;
 pub mod pins;
 pub mod roster;
 pub mod settle;
+pub mod slots;
 pub mod stamps;
 
 pub use collect::{Collected, Empty, Source, Wanted, collect};
 pub use late::{Late, Policy};
 pub use layout::{Kind, Label};
 pub use matching::{Claim, MATCHES, Matches};
+pub use owners::Owners;
 pub use pins::{Decided, Pins, Stated};
 pub use roster::{Roster, Student};
 pub use settle::{Attempt, Class, Deciding, Missing, Standing, Undecided, set_aside, settle};

@@ -10,7 +10,7 @@ use sha2::{Digest as _, Sha256};
 use toml::Spanned;
 
 use super::matching::line_of;
-use super::names;
+use super::owners::Owners;
 use crate::evidence::Evidence;
 use crate::files::hex;
 use crate::rubric::{Grade, PartGrade};
@@ -22,7 +22,7 @@ pub const OVERRIDES: &str = "overrides.toml";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Decision {
-    /// Student number, or the submission's folder in the report.
+    /// The student's number by the class list or the platform, or the submission's folder in the report.
     pub student: String,
     /// The part that is set; none where what was left to the instructor is confirmed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -38,8 +38,8 @@ pub struct Decision {
     pub penalty: Option<f64>,
     /// Why; the student reads it.
     pub reason: String,
-    /// Who decided.
-    #[serde(default)]
+    /// Who decided; left out where nobody knows.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub by: String,
     /// When, RFC 3339.
     #[serde(default)]
@@ -51,7 +51,18 @@ pub struct Decision {
 
 /// All decisions, in the order in which they were made.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Overrides(Vec<(Decision, usize)>);
+pub struct Overrides(Vec<Entry>);
+
+/// A decision in the file.
+#[derive(Clone, Debug, PartialEq)]
+struct Entry {
+    decision: Decision,
+    line: usize,
+    /// The folders of the submissions that it is on; see [`Overrides::on`].
+    slugs: Vec<String>,
+    /// Why it is on none, if it is on none.
+    unused: Option<String>,
+}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -81,8 +92,6 @@ pub struct Applied {
 pub struct Subject<'a> {
     /// Its folder in the report.
     pub slug: &'a str,
-    /// The student numbers that it is known by.
-    pub numbers: Vec<String>,
     /// Digest of what was submitted.
     pub digest: &'a str,
     /// What was found out.
@@ -132,44 +141,75 @@ impl Overrides {
             if decision.reason.trim().is_empty() {
                 bail!("{place}: expected a reason");
             }
-            decisions.push((decision, line_of(text, at)));
+            let line = line_of(text, at);
+            decisions.push(Entry { decision, line, slugs: Vec::new(), unused: None });
         }
-        decisions.sort_by_key(|(_, line)| *line);
+        decisions.sort_by_key(|entry| entry.line);
         Ok(Self(decisions))
     }
 
     /// What is decided, in its order.
     pub fn says(&self) -> Vec<&Decision> {
-        self.0.iter().map(|(decision, _)| decision).collect()
+        self.0.iter().map(|entry| &entry.decision).collect()
     }
 
-    /// Decisions on submissions that are not there, or on parts that the assignment does not have, with their lines.
-    pub fn unused(&self, subjects: &[Subject], parts: &[&str]) -> Vec<String> {
-        let unused = self.0.iter().filter_map(|(decision, line)| {
-            let place = format!("{OVERRIDES}:{line}");
-            if !subjects.iter().any(|subject| subject.is(decision)) {
-                return Some(format!(
-                    "{place}: there is no submission of \"{}\"",
-                    decision.student
-                ));
+    /// The decisions with the submissions that they are on. What may mean submissions of two persons is on none.
+    #[must_use]
+    pub fn on(mut self, owners: &Owners) -> Self {
+        for entry in &mut self.0 {
+            let word = &entry.decision.student;
+            let meant = owners.meant(word);
+            let folders = owners.folders(&meant).join(", ");
+            entry.unused = match (meant.is_empty(), owners.is_one(&meant)) {
+                (true, _) => Some(match owners.listed_as(word) {
+                    Some(who) => format!("{who} has no submission that is theirs for certain"),
+                    None => format!("there is no submission of \"{word}\""),
+                }),
+                (_, false) => Some(format!(
+                    "\"{word}\" may be more than one person, so it is on nobody; name a folder: {folders}"
+                )),
+                _ => None,
+            };
+            if entry.unused.is_none() {
+                entry.slugs = owners.folders(&meant).into_iter().map(str::to_owned).collect();
             }
-            let part = decision.part.as_deref().filter(|part| !parts.contains(part))?;
-            Some(format!("{place}: there is no part {part}; it has {}", parts.join(", ")))
+        }
+        self
+    }
+
+    /// The decisions on a submission, in their order.
+    fn of(&self, subject: &Subject) -> impl DoubleEndedIterator<Item = &Decision> {
+        let is = |entry: &&Entry| entry.slugs.iter().any(|slug| slug == subject.slug);
+        self.0.iter().filter(is).map(|entry| &entry.decision)
+    }
+
+    /// Decisions on submissions that are not there or do not count, or on parts that the assignment does not have, with
+    /// their lines. `counts` says whether the submission in a folder counts.
+    pub fn unused(&self, counts: impl Fn(&str) -> bool, parts: &[&str]) -> Vec<String> {
+        let unused = self.0.iter().filter_map(|Entry { decision, line, slugs, unused }| {
+            let part = decision.part.as_deref().filter(|part| !parts.contains(part));
+            let said = if let Some(unused) = unused {
+                unused.clone()
+            } else if let Some(part) = part {
+                format!("there is no part {part}; it has {}", parts.join(", "))
+            } else if slugs.iter().any(|slug| counts(slug)) {
+                return None;
+            } else {
+                format!("{} does not count", slugs.join(", "))
+            };
+            Some(format!("{OVERRIDES}:{line}: {said}"))
         });
         unused.collect()
     }
 
     /// The last fix of a submission, if there is one.
     pub fn mend(&self, subject: &Subject) -> Option<&Decision> {
-        let mut own = self.0.iter().map(|(decision, _)| decision);
-        own.rfind(|own| own.patch.is_some() && subject.is(own))
+        self.of(subject).rfind(|own| own.patch.is_some())
     }
 
     /// Applies to a grade what was decided on its submission, and notes it in the remarks. Fixes are no matter of points.
     pub fn apply(&self, subject: &Subject, grade: &mut Grade) -> Vec<Applied> {
-        let decisions = self.0.iter().map(|(decision, _)| decision);
-        let own: Vec<&Decision> =
-            decisions.filter(|own| own.patch.is_none() && subject.is(own)).collect();
+        let own: Vec<&Decision> = self.of(subject).filter(|own| own.patch.is_none()).collect();
         let last = own
             .iter()
             .enumerate()
@@ -225,16 +265,6 @@ fn set(part: &mut PartGrade, points: f64, decision: &Decision) -> [f64; 2] {
     part.reason =
         format!("set by the instructor: {}; before that: {}", decision.reason, part.reason);
     before
-}
-
-impl Subject<'_> {
-    /// Whether a decision is on this submission.
-    pub fn is(&self, decision: &Decision) -> bool {
-        let word = decision.student.trim();
-        let number = names::number(word);
-        word == self.slug
-            || self.numbers.iter().any(|own| !number.is_empty() && names::number(own) == number)
-    }
 }
 
 impl Decision {
@@ -319,7 +349,8 @@ pub fn entry(decision: &Decision) -> anyhow::Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::sample;
+    use crate::class::{Claim, Matches};
+    use crate::report::{SubmissionReport, sample};
 
     fn of(text: &str) -> Overrides {
         Overrides::parse(text, Path::new(OVERRIDES)).unwrap()
@@ -331,16 +362,22 @@ mod tests {
     #[test]
     fn a_part_is_set_and_images_are_confirmed() {
         let report = sample::report();
+        let claim = |entry: &SubmissionReport| Claim {
+            slug: entry.record.slug.clone(),
+            number: entry.record.student.id.clone(),
+            ..Claim::default()
+        };
+        let claims: Vec<Claim> = report.entries.iter().map(claim).collect();
+        let owners = Owners::of(&claims, None, &Matches::default()).unwrap();
         let run = |index: usize, text: &str| {
             let entry = &report.entries[index];
             let mut grade = entry.grade.clone();
             let subject = Subject {
                 slug: &entry.record.slug,
-                numbers: vec![entry.record.student.id.clone()],
                 digest: &entry.record.digest,
                 evidence: &entry.record.evidence,
             };
-            let applied = of(text).apply(&subject, &mut grade);
+            let applied = of(text).on(&owners).apply(&subject, &mut grade);
             (grade, applied, fingerprint(&subject, &entry.grade.parts[2..3]))
         };
         // It was 9.85 of 64.85..84.85.
@@ -371,17 +408,26 @@ mod tests {
         let (grade, applied, _) = run(0, &confirm.replace(slug.as_str(), "260000001"));
         assert_eq!(grade.points, report.entries[0].grade.points);
         assert!(applied[0].words().starts_with("the instructor looked at it"));
-        let subjects = [];
+        let none = Owners::of(&[], None, &Matches::default()).unwrap();
         assert_eq!(
-            of(SET).unused(&subjects, &["1.3"]),
+            of(SET).on(&none).unused(|_| true, &["1.3"]),
             ["overrides.toml:1: there is no submission of \"#0260000002\""]
         );
+        let bound = of(SET).on(&owners);
+        assert_eq!(bound.unused(|_| true, &["1.3"]), [""; 0]);
+        assert_eq!(
+            bound.unused(|_| true, &["1.1"]),
+            ["overrides.toml:1: there is no part 1.3; it has 1.1"]
+        );
+        let slug = &claims[1].slug;
+        let aside = format!("overrides.toml:1: {slug} does not count");
+        assert_eq!(bound.unused(|own| own != slug, &["1.3"]), [aside]);
     }
 
     #[test]
     fn what_is_written_is_read_again_and_slips_have_a_line() {
-        let decision = of(SET).0.remove(0).0;
-        assert_eq!(of(&entry(&decision).unwrap()).0[0].0, decision);
+        let decision = of(SET).0.remove(0).decision;
+        assert_eq!(of(&entry(&decision).unwrap()).0[0].decision, decision);
         for (text, expected) in [
             (
                 "[[override]]\nstudent = \"1\"\nreason = \"x\"\n",

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::layout::Kind;
 use super::{names, stamps};
+use crate::harmless::printable;
 
 /// A class list.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -22,6 +23,9 @@ pub struct Roster {
     pub rows: Vec<Vec<String>>,
     /// The students, in the order of the file.
     pub students: Vec<Student>,
+    /// Rows that are no student, with their lines.
+    #[serde(default)]
+    pub left_out: Vec<String>,
 }
 
 /// A student of a class list. A text is empty where the list does not say it.
@@ -74,7 +78,8 @@ impl Student {
     }
 }
 
-/// What columns are called, without accents, signs and case, and what they hold.
+/// What columns are called, without accents, signs and case, and what they hold. Numbers and names also as students
+/// call them in `config.json`.
 const COLUMNS: [(Column, &[&str]); 8] = [
     (
         Column::Number,
@@ -82,21 +87,154 @@ const COLUMNS: [(Column, &[&str]); 8] = [
             "orgdefinedid",
             "sisuserid",
             "idnumber",
+            "idnum",
             "sid",
             "studentid",
+            "studentidnumber",
             "studentnumber",
+            "studentno",
+            "studentnr",
+            "studentnum",
+            "studentnummer",
             "number",
             "numero",
+            "numerodetudiant",
+            "numeroetudiant",
             "matricule",
+            "codepermanent",
+            "matricola",
+            "matricula",
+            "matrikelnummer",
+            "matrikelnr",
+            "mcgillid",
+            "emplid",
+            "uin",
+            "\u{5b66}\u{53f7}",
         ],
     ),
     (Column::Id, &["id", "identifier", "githubid", "userid"]),
-    (Column::Username, &["username", "sisloginid", "githubusername", "login", "user"]),
-    (Column::First, &["firstname", "first", "givenname", "prenom"]),
-    (Column::Last, &["lastname", "last", "surname", "familyname", "nom"]),
-    (Column::Full, &["student", "fullname", "name", "studentname", "nomcomplet"]),
-    (Column::Email, &["email", "emailaddress", "mail", "courriel"]),
+    (
+        Column::Username,
+        &[
+            "username",
+            "sisloginid",
+            "githubusername",
+            "login",
+            "loginid",
+            "user",
+            "netid",
+            "nomdutilisateur",
+        ],
+    ),
+    (
+        Column::First,
+        &[
+            "firstname",
+            "first",
+            "givenname",
+            "givennames",
+            "given",
+            "forename",
+            "fname",
+            "prenom",
+            "prenoms",
+            "vorname",
+            "nombre",
+            "nombres",
+            "nome",
+            "\u{540d}",
+        ],
+    ),
+    (
+        Column::Last,
+        &[
+            "lastname",
+            "last",
+            "surname",
+            "familyname",
+            "familynames",
+            "family",
+            "lname",
+            "nom",
+            "nomdefamille",
+            "nomfamille",
+            "nachname",
+            "apellido",
+            "apellidos",
+            "cognome",
+            "\u{59d3}",
+        ],
+    ),
+    (
+        Column::Full,
+        &[
+            "student",
+            "fullname",
+            "name",
+            "names",
+            "studentname",
+            "nomcomplet",
+            "nomprenom",
+            "prenomnom",
+            "nometprenom",
+            "prenometnom",
+            "lastnamefirstname",
+            "firstnamelastname",
+            "firstlast",
+            "nomdeletudiant",
+            "etudiant",
+            "\u{59d3}\u{540d}",
+        ],
+    ),
+    (
+        Column::Email,
+        &["email", "emailaddress", "mail", "courriel", "adressecourriel", "adresseelectronique"],
+    ),
     (Column::Submitted, &["lastmodifiedsubmission"]),
+];
+
+/// Words of a heading for a number of a person, such as `Banner ID`, `Student #` or `N\u{b0} de dossier`.
+const NUMBER: [&str; 9] = ["id", "number", "no", "nr", "num", "numero", "n", "nummer", "code"];
+/// Words of a heading for a number of something else.
+const NO_PERSON: [&str; 23] = [
+    "phone",
+    "telephone",
+    "tel",
+    "mobile",
+    "section",
+    "course",
+    "cours",
+    "group",
+    "groupe",
+    "team",
+    "class",
+    "assignment",
+    "submission",
+    "attempt",
+    "term",
+    "room",
+    "postal",
+    "zip",
+    "crn",
+    "seat",
+    "program",
+    "programme",
+    "project",
+];
+/// Names of rows that sum up a list.
+const SUMS: [&str; 12] = [
+    "total",
+    "totals",
+    "sum",
+    "count",
+    "average",
+    "mean",
+    "median",
+    "maximum",
+    "minimum",
+    "moyenne",
+    "somme",
+    "points possible",
 ];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,8 +266,28 @@ impl Roster {
     /// As [`Roster::read`].
     pub fn parse(bytes: &[u8], path: &Path) -> anyhow::Result<Self> {
         // As one line end, or lines would be counted wrongly.
-        let text = decode(bytes).replace("\r\n", "\n").replace('\r', "\n");
-        let delimiter = delimiter(&text);
+        if let Some(what) = no_text(bytes) {
+            bail!(
+                "{}: expected a CSV file, found {what}; hint: save it as CSV (UTF-8)",
+                path.display()
+            );
+        }
+        let mut text = decode(bytes).replace("\r\n", "\n").replace('\r', "\n");
+        let mut delimiter = delimiter(&text);
+        if let Some(sign) = separator(&text) {
+            delimiter = sign;
+            // Lines are counted as before.
+            text = text[text.find('\n').unwrap_or(text.len())..].to_owned();
+        }
+        if let Some((line, end)) = open_quote(&text, delimiter) {
+            let end = end.map_or("is not closed".to_owned(), |end| {
+                format!("ends in the middle of a cell on line {end}")
+            });
+            bail!(
+                "{}:{line}: the quote that opens here {end}, and swallows the lines between; hint: remove or close it",
+                path.display()
+            );
+        }
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(delimiter)
             .flexible(true)
@@ -145,7 +303,8 @@ impl Roster {
         let Some((line, header)) = records.next() else {
             bail!("{}: the class list is empty", path.display());
         };
-        let columns: Vec<Option<Column>> = header.iter().map(|name| column(name)).collect();
+        let kind = kind(&header);
+        let columns = columns(&header, kind);
         let at = |column: Column| columns.iter().position(|own| *own == Some(column));
         let has = |column: Column| at(column).is_some();
         let named = has(Column::Full) || has(Column::Last);
@@ -155,16 +314,16 @@ impl Roster {
                  SIS User ID, ID number, SID, Student or Full name; found {}; hint: export the class list or the \
                  grade book from your learning platform",
                 path.display(),
-                header.iter().take(6).cloned().collect::<Vec<_>>().join(", ")
+                printable(&header.iter().take(6).cloned().collect::<Vec<_>>().join(", "))
             );
         }
-        let kind = kind(&header);
         let mut roster = Self {
             path: path.to_owned(),
             kind,
             header: header.clone(),
             rows: Vec::new(),
             students: Vec::new(),
+            left_out: Vec::new(),
         };
         for (line, cells) in records {
             let cell = |column: Column| {
@@ -189,6 +348,27 @@ impl Roster {
             // Canvas's rows of points and its made-up student.
             if kind == Kind::Canvas && (student.id.is_empty() || full == "Student, Test") {
                 continue;
+            }
+            let is_sum = SUMS.contains(&names::plain(&full).trim())
+                || SUMS.contains(&names::plain(&student.full_name()).trim());
+            let keys = [&student.number, &student.username, &student.email];
+            if is_sum && keys.iter().all(|key| key.is_empty()) {
+                roster
+                    .left_out
+                    .push(format!("line {line}, {}", printable(&(student.full_name() + &full))));
+                continue;
+            }
+            if student.last_name.is_empty() && !has(Column::Last) && !student.first_name.is_empty()
+            {
+                // `Name, First name`: the whole name, or the last one.
+                let (own, first) = (names::words(&full), names::words(&student.first_name));
+                let is_whole =
+                    first.split(' ').all(|word| own.split(' ').any(|other| other == word));
+                if is_whole {
+                    student.first_name = String::new();
+                } else {
+                    student.last_name.clone_from(&full);
+                }
             }
             if student.last_name.is_empty() && student.first_name.is_empty() {
                 match full.split_once(',') {
@@ -220,6 +400,43 @@ impl Roster {
         }
         roster.refuse_doubles()?;
         Ok(roster)
+    }
+
+    /// Which columns were read, and which were not, in a sentence.
+    pub fn reading(&self) -> String {
+        let columns = columns(&self.header, self.kind);
+        let of = |wanted: &[Option<Column>]| -> Vec<String> {
+            let own = self.header.iter().zip(&columns);
+            let own =
+                own.filter(|(name, column)| wanted.contains(column) && !name.trim().is_empty());
+            own.map(|(name, _)| format!("\"{}\"", printable(name.trim()))).collect()
+        };
+        let from = |what: &str, names: &[String]| match names {
+            [] => format!("no {what}"),
+            names => format!("{what} from {}", names.join(" and ")),
+        };
+        let (first, full) =
+            (of(&[Some(Column::First), Some(Column::Last)]), of(&[Some(Column::Full)]));
+        let has_last = columns.contains(&Some(Column::Last));
+        let name = match (first.is_empty(), has_last) {
+            (true, _) => full,
+            (false, true) => first,
+            (false, false) => [first, full].concat(),
+        };
+        let mut said = format!(
+            "{}: {}, {}",
+            self.path.display(),
+            from("student number", &of(&[Some(Column::Number)])),
+            from("name", &name)
+        );
+        let unused = of(&[None]);
+        if !unused.is_empty() {
+            said += &format!("; not used: {}", unused.join(", "));
+        }
+        if !self.left_out.is_empty() {
+            said += &format!("; no student: {}", self.left_out.join(", "));
+        }
+        said
     }
 
     fn refuse_doubles(&self) -> anyhow::Result<()> {
@@ -266,9 +483,97 @@ fn delimiter(text: &str) -> u8 {
     [b',', b';', b'\t'].into_iter().rev().max_by_key(count).unwrap_or(b',')
 }
 
+/// What each column holds; the first of those that hold the same. A list of no platform has other headings for the
+/// student number: where one column alone is called like a number of a person, that is the one.
+fn columns(header: &[String], kind: Kind) -> Vec<Option<Column>> {
+    let mut columns: Vec<Option<Column>> = Vec::new();
+    for name in header {
+        let own = column(name).filter(|own| !columns.contains(&Some(*own)));
+        columns.push(own);
+    }
+    if kind == Kind::Plain && !columns.contains(&Some(Column::Number)) {
+        let is_number = |at: &usize| {
+            columns[*at] == Some(Column::Id) || (columns[*at].is_none() && is_number(&header[*at]))
+        };
+        let may_be: Vec<usize> = (0..header.len()).filter(is_number).collect();
+        if let [only] = may_be[..] {
+            columns[only] = Some(Column::Number);
+        }
+    }
+    columns
+}
+
 fn column(name: &str) -> Option<Column> {
     let name = names::letters(name);
     COLUMNS.iter().find(|(_, known)| known.contains(&name.as_str())).map(|(column, _)| *column)
+}
+
+/// Whether a heading is like one for a number of a person.
+fn is_number(name: &str) -> bool {
+    let plain = names::plain(name);
+    let has = |known: &[&str]| {
+        plain.split(|c: char| !c.is_alphanumeric()).any(|word| known.contains(&word))
+    };
+    (has(&NUMBER) || plain.contains(['#', '\u{2116}'])) && !has(&NO_PERSON)
+}
+
+/// What a file is that is no text, if it is none.
+fn no_text(bytes: &[u8]) -> Option<&'static str> {
+    match bytes {
+        [b'P', b'K', 3 | 5, 4 | 6, ..] => Some("an Excel workbook or another zip"),
+        [0xd0, 0xcf, 0x11, 0xe0, ..] => Some("an old Excel workbook"),
+        [b'%', b'P', b'D', b'F', ..] => Some("a PDF"),
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => None,
+        bytes if bytes.contains(&0) => Some("a file that is no text"),
+        _ => None,
+    }
+}
+
+/// The sign of Excel's line `sep=;`, if there is one.
+fn separator(text: &str) -> Option<u8> {
+    let line = text.lines().next()?.trim_matches('"');
+    let sign = line.get(..4).filter(|key| key.eq_ignore_ascii_case("sep=")).map(|_| &line[4..])?;
+    match sign.as_bytes() {
+        [sign @ (b',' | b';' | b'\t' | b'|')] => Some(*sign),
+        _ => None,
+    }
+}
+
+/// A quoted cell over several lines that is not closed, or closed where no cell ends: the line where it begins, and
+/// that where it ends, if it does.
+fn open_quote(text: &str, delimiter: u8) -> Option<(usize, Option<usize>)> {
+    let bytes = text.as_bytes();
+    let (mut at, mut line, mut begins) = (0, 1, true);
+    while at < bytes.len() {
+        if !(begins && bytes[at] == b'"') {
+            line += usize::from(bytes[at] == b'\n');
+            begins = bytes[at] == delimiter || bytes[at] == b'\n';
+            at += 1;
+            continue;
+        }
+        let first = line;
+        at += 1;
+        loop {
+            match (bytes.get(at), bytes.get(at + 1)) {
+                (None, _) => return Some((first, None)),
+                (Some(b'"'), Some(b'"')) => at += 2,
+                (Some(b'"'), after) => {
+                    let ends = after.is_none_or(|own| *own == delimiter || *own == b'\n');
+                    if !ends && line != first {
+                        return Some((first, Some(line)));
+                    }
+                    at += 1;
+                    break;
+                }
+                (Some(byte), _) => {
+                    line += usize::from(*byte == b'\n');
+                    at += 1;
+                }
+            }
+        }
+        begins = false;
+    }
+    None
 }
 
 /// Whose export has such a header.
@@ -341,6 +646,89 @@ mod tests {
 
         let list = read("student_id\tname\n00123\tAnn Lee\n");
         assert_eq!((list.kind, said(&list.students[0])[0]), (Kind::Plain, "00123"));
+    }
+
+    #[test]
+    fn headings_of_registrars_in_several_languages() {
+        for heading in [
+            "ID",
+            "McGill ID",
+            "Student #",
+            "Student no",
+            "Student No.",
+            "Banner ID",
+            "EMPLID",
+            "Num\u{e9}ro d'\u{e9}tudiant",
+            "Student Number",
+            "N\u{b0} \u{e9}tudiant",
+            "Matricule",
+            "Matrikel-Nr.",
+            "UBC Student Number",
+            "No",
+        ] {
+            let list = read(&format!("Name,{heading},Phone number\n\"Lee, Ann\",260000104,1\n"));
+            assert_eq!(said(&list.students[0]), ["260000104", "", "", "Ann", "Lee"], "{heading}");
+            let expected = format!(
+                "list.csv: student number from \"{heading}\", name from \"Name\"; not used: \"Phone number\""
+            );
+            assert_eq!(list.reading(), expected);
+        }
+        for names in [
+            "Nom de famille,Pr\u{e9}nom",
+            "Family Name,Given Names",
+            "Nom,Pr\u{e9}nom",
+            "Nachname,Vorname",
+            "Name,First name",
+            "Surname,Forename",
+        ] {
+            let list = read(&format!("{names},Student ID\nLee,Ann,1\n"));
+            assert_eq!(list.students[0].full_name(), "Ann Lee", "{names}");
+            assert!(!list.reading().contains("not used"), "{}", list.reading());
+        }
+        let list = read("Name,First name,SID\nAnn Lee,Ann,1\n");
+        assert_eq!(list.students[0].full_name(), "Ann Lee");
+        // Two that may be the number: neither is guessed, and both are named.
+        let list = read("Name,Banner ID,Card no\nAnn Lee,1,2\n");
+        assert_eq!(said(&list.students[0])[0], "");
+        assert_eq!(
+            list.reading(),
+            "list.csv: no student number, name from \"Name\"; not used: \"Banner ID\", \"Card no\""
+        );
+    }
+
+    #[test]
+    fn a_list_of_excel() {
+        for text in ["sep=;\nName;SID\nA;7\n", "\"sep=;\"\r\nName;SID\r\nA;7\r\n"] {
+            let list = read(text);
+            assert_eq!((said(&list.students[0])[0], list.students[0].line), ("7", 3), "{text}");
+        }
+        let list = read("SID,Name\n7,Ann Lee\n,Total\n,Bo\n");
+        let names: Vec<String> = list.students.iter().map(Student::full_name).collect();
+        assert_eq!(names, ["Ann Lee", "Bo"]);
+        assert!(list.reading().ends_with("; no student: line 3, Total"), "{}", list.reading());
+        // A cell of several lines is none of its business.
+        let list = read("SID,Name,Note\n7,Ann Lee,\"a\n\"\"b\"\" c\"\n8,\"Bo \"\"B\"\" Ode\",\n");
+        assert_eq!((list.students.len(), list.students[1].line), (2, 4));
+        for (bytes, expected) in [
+            (
+                &b"PK\x03\x04\x14\x00\x1b[31m\x01\n"[..],
+                "list.csv: expected a CSV file, found an Excel workbook",
+            ),
+            (b"\xd0\xcf\x11\xe0\xa1", "list.csv: expected a CSV file, found an old Excel workbook"),
+            (b"Name,SID\nA\0,1\n", "list.csv: expected a CSV file, found a file that is no text"),
+            (b"\x1b[31m,b\n1,2\n", "list.csv:1: expected a header"),
+            (
+                b"SID,Name\n3,\"Li\n4,Ann Lee\n",
+                "list.csv:2: the quote that opens here is not closed",
+            ),
+            (
+                b"SID,Name\n3,\"Li\n4,Ann Lee\n5,\"Wu\n",
+                "list.csv:2: the quote that opens here ends in the middle of a cell on line 4",
+            ),
+        ] {
+            let error = Roster::parse(bytes, Path::new("list.csv")).unwrap_err().to_string();
+            assert!(error.starts_with(expected) && !error.contains('\x1b'), "{error:?}");
+        }
     }
 
     #[test]

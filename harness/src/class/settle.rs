@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use super::late::{Late, Policy};
 use super::layout::{Kind, Label};
-use super::matching::{Claim, Match, Matches, find};
+use super::matching::{Claim, Match, Matches, address, find};
 use super::mending::Mended;
 use super::overrides::Applied;
 use super::roster::{Roster, Student};
-use super::{names, stamps};
+use super::{names, owners, stamps};
 use crate::rubric::Grade;
 
 /// Which of a student's attempts counts.
@@ -79,6 +79,8 @@ pub struct Class {
     pub undecided: Vec<Undecided>,
     /// Submissions that the instructor decided not to count.
     pub not_counted: Vec<String>,
+    /// Zips that look like the download of a class, among other archives: neither opened nor graded.
+    pub unopened: Vec<String>,
     /// Decisions on points whose evidence has changed since.
     pub stale: Vec<String>,
     /// Decisions on points that are on nothing that is there.
@@ -161,18 +163,22 @@ pub fn settle(
     kind: Kind,
     deciding: &Deciding,
 ) -> anyhow::Result<(Vec<(usize, Standing)>, Class)> {
+    let matches = &deciding.matches.among(claims);
+    let deciding = &Deciding { matches, ..*deciding };
+    let called = |at: usize| address(&claims[at], claims);
     let list = deciding.roster.and_then(|roster| roster.path.file_name());
     let list = list.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let mut class = Class { kind, list, ..Class::default() };
     let mut standings = Vec::new();
-    let persons = self::people(claims);
+    let persons = owners::people(claims);
     let mut people: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    let mut own_person = Vec::new();
     let mut expected: BTreeMap<usize, String> = BTreeMap::new();
     for (index, (claim, grade)) in claims.iter().zip(grades.iter_mut()).enumerate() {
         let mut standing = Standing { label: claim.label.clone(), ..Standing::default() };
         let mut person = persons[index].clone();
         if deciding.matches.is_nobody(claim) {
-            class.not_counted.push(claim.name.clone());
+            class.not_counted.push(called(index));
             standings.push(standing);
             continue;
         }
@@ -187,18 +193,21 @@ pub fn settle(
                 Match::Undecided(reason, candidates) => {
                     for at in &candidates {
                         expected.entry(*at).or_insert_with(|| {
-                            format!("perhaps {}: decide in matches.toml", claim.name)
+                            format!("perhaps {}: decide in matches.toml", called(index))
                         });
                     }
                     let candidates =
                         candidates.into_iter().map(|at| roster.students[at].clone()).collect();
-                    let submission = claim.name.clone();
+                    let submission = called(index);
                     class.undecided.push(Undecided { submission, reason, candidates });
                     person = format!("undecided {index}");
                 }
                 Match::Nobody => {}
             }
+        } else if let Some(word) = matches.word(claim) {
+            person = format!("number {}", names::number(word));
         }
+        own_person.push((index, person.clone()));
         standing.late = charge(claim, &standing, grade, deciding);
         standing.time_unknown = standing.late.is_none()
             && deciding.policy.is_some()
@@ -211,18 +220,15 @@ pub fn settle(
         match choose(&attempts, claims, &standings, grades, deciding) {
             Some(own) => {
                 let others = attempts.iter().filter(|at| **at != own);
-                standings[own].set_aside = others.map(|at| claims[*at].name.clone()).collect();
+                standings[own].set_aside = others.map(|at| called(*at)).collect();
                 counts.push(own);
             }
             None => {
                 for &own in &attempts {
-                    let others: Vec<&str> = attempts
-                        .iter()
-                        .filter(|at| **at != own)
-                        .map(|at| claims[*at].name.as_str())
-                        .collect();
+                    let others: Vec<String> =
+                        attempts.iter().filter(|at| **at != own).map(|at| called(*at)).collect();
                     class.undecided.push(Undecided {
-                        submission: claims[own].name.clone(),
+                        submission: called(own),
                         reason: format!(
                             "which of the attempts counts is not certain, there is also {}",
                             others.join(", ")
@@ -233,6 +239,9 @@ pub fn settle(
                 counts.extend(attempts);
             }
         }
+    }
+    if deciding.roster.is_none() {
+        class.undecided.extend(doubles(claims, &own_person, matches));
     }
     if let Some(roster) = deciding.roster {
         for (label, reason) in absent {
@@ -254,24 +263,37 @@ pub fn settle(
     Ok((standings.collect(), class))
 }
 
-/// Whom submissions are told apart by where there is no class list, in their order.
-fn people(claims: &[Claim]) -> Vec<String> {
-    let own = |claim: &Claim| match &claim.label {
-        Some(label) => label.person(),
-        None => format!("submission {}", claim.slug),
-    };
-    let mut people: Vec<String> = claims.iter().map(own).collect();
-    // Brightspace's numbers may be those of attempts: one name and one student number are one person.
-    let mut known: BTreeMap<(String, String), String> = BTreeMap::new();
-    for (at, claim) in claims.iter().enumerate() {
-        let number = names::number(&claim.number);
-        let label = claim.label.as_ref().filter(|label| label.kind == Kind::Brightspace);
-        let Some(label) = label.filter(|_| !number.is_empty()) else { continue };
-        let person = people[at].clone();
-        let first = known.entry((names::words(&label.name), number)).or_insert(person.clone());
-        people.iter_mut().filter(|own| **own == person).for_each(|own| own.clone_from(first));
+/// Submissions that may be one student's, though nothing says that they are attempts: no platform names both, and they
+/// have one number under several names, or one name without a number.
+fn doubles(claims: &[Claim], persons: &[(usize, String)], matches: &Matches) -> Vec<Undecided> {
+    let mut known: BTreeMap<String, Vec<(usize, &str)>> = BTreeMap::new();
+    for (at, person) in persons {
+        let (number, name) = (owners::number(&claims[*at]), owners::name(&claims[*at]));
+        let key = match (names::number(number), names::words(name)) {
+            (number, name) if number.is_empty() && name.is_empty() => continue,
+            (number, _) if !number.is_empty() => format!("the student number {number}"),
+            _ => format!("the name {name}, without a student number,"),
+        };
+        known.entry(key).or_default().push((*at, person.as_str()));
     }
-    people
+    let mut found = Vec::new();
+    for (key, all) in known {
+        let may_be = |(a, own): (usize, &str), (b, other): (usize, &str)| {
+            own != other && (claims[a].label.is_none() || claims[b].label.is_none())
+        };
+        for own in all.iter().filter(|own| matches.word(&claims[own.0]).is_none()) {
+            let others = all.iter().filter(|other| may_be(*own, **other));
+            let others: Vec<String> = others.map(|own| address(&claims[own.0], claims)).collect();
+            if !others.is_empty() {
+                found.push(Undecided {
+                    submission: address(&claims[own.0], claims),
+                    reason: format!("{key} is also in {}", others.join(", ")),
+                    candidates: Vec::new(),
+                });
+            }
+        }
+    }
+    found
 }
 
 /// The attempt that counts; nothing where that is not certain.
@@ -310,7 +332,12 @@ fn charge(
     deciding: &Deciding,
 ) -> Option<Late> {
     let policy = deciding.policy?;
-    let number = standing.student.as_ref().map_or(&claim.number, |student| &student.number);
+    let number = match &standing.student {
+        Some(student) => &student.number,
+        None if deciding.roster.is_none() => owners::number(claim),
+        // Whose it is must be decided first: the number that it says may be another's.
+        None => claim.label.as_ref().map_or("", |label| &label.number),
+    };
     let own = |word: &str| !number.is_empty() && names::number(word) == names::number(number);
     let stamp = stamp(claim, standing, deciding);
     if let Some(mut late) = policy.judge(deciding.due, stamp, own) {
@@ -334,7 +361,7 @@ fn charge(
 impl Class {
     /// Whether there is anything to say.
     pub fn is_quiet(&self) -> bool {
-        let decisions = [&self.not_counted, &self.stale, &self.unused];
+        let decisions = [&self.not_counted, &self.unopened, &self.stale, &self.unused];
         self.missing.is_empty()
             && self.undecided.is_empty()
             && decisions.iter().all(|lines| lines.is_empty())
@@ -344,14 +371,25 @@ impl Class {
     pub fn questions(&self) -> String {
         let mut text = String::from(
             "# Whose submissions are, where the class list and the submissions do not tell. Umbra reads this file on\n\
-             # every run and never changes it. `student` is a student number, or \"none\" for a submission that does\n\
-             # not count; `submitted` is a time stamp.\n",
+             # every run and never changes it. `submission` is its name or its folder in the report. `student` is a\n\
+             # student number, or \"none\" for a submission that does not count; `submitted` is a time stamp.\n",
         );
         for Undecided { submission, reason, candidates } in &self.undecided {
             let quoted = toml::Value::String(submission.clone());
             text += &format!("\n# {}\n# [[match]]\n# submission = {quoted}\n", one_line(reason));
-            let who = candidates.first().map_or("none", |student| student.number.as_str());
-            text += &format!("# student = {}\n", toml::Value::String(who.to_owned()));
+            // Between several nothing is filled in, so that nobody takes it by mistake.
+            let who = match &candidates[..] {
+                [] => "none",
+                [only] => only.number.as_str(),
+                _ => "",
+            };
+            text += &format!("# student = {}", toml::Value::String(who.to_owned()));
+            let all: Vec<String> =
+                candidates.iter().map(|student| one_line(&student.who())).collect();
+            text += &match all.len() {
+                0 | 1 => "\n".to_owned(),
+                _ => format!("    # {}\n", all.join(" or ")),
+            };
         }
         text
     }
@@ -500,6 +538,44 @@ mod tests {
     }
 
     #[test]
+    fn one_number_twice_is_asked_where_no_platform_tells() {
+        let plain = |slug: &str, number: &str, name: &str| Claim {
+            name: format!("{slug}.zip"),
+            slug: slug.to_owned(),
+            label: None,
+            number: number.to_owned(),
+            full_name: name.to_owned(),
+        };
+        let reasons = |claims: &[Claim], attempt, matches: &str| -> Vec<String> {
+            let settled = run(claims, &vec![1.0; claims.len()], false, attempt, matches);
+            settled.class.undecided.into_iter().map(|own| own.reason).collect()
+        };
+        let ann = plain("ann", "1", "Ann Lee");
+        for (other, reason) in [
+            (
+                plain("ann2", "#1", "lee ann"),
+                "which of the attempts counts is not certain, there is also ann2.zip",
+            ),
+            (plain("mal", "1", "Mallory"), "the student number 1 is also in mal.zip"),
+            (plain("x", "1", ""), "the student number 1 is also in x.zip"),
+        ] {
+            let said = reasons(&[ann.clone(), other.clone()], Attempt::Latest, "");
+            assert_eq!((said.len(), said[0].as_str()), (2, reason));
+        }
+        let two = [plain("a", "", "Ann Lee"), plain("b", "", "Ann Lee")];
+        let said = reasons(&two, Attempt::Best, "");
+        assert_eq!(said[0], "the name Ann Lee, without a student number, is also in b.zip");
+        // Two people, or one of them does not count; others do not matter.
+        let is = |slug: &str, who: &str| {
+            format!("[[match]]\nsubmission = \"{slug}\"\nstudent = \"{who}\"\n")
+        };
+        let both = is("a", "1") + &is("b", "2");
+        assert_eq!(reasons(&two, Attempt::Latest, &both), [""; 0]);
+        assert_eq!(reasons(&two, Attempt::Latest, &is("a.zip", "none")), [""; 0]);
+        assert_eq!(reasons(&[ann, two[0].clone()], Attempt::Latest, ""), [""; 0]);
+    }
+
+    #[test]
     fn attempts_that_no_time_tells_apart_are_the_instructors() {
         let claims = [
             claim("Bo Ode_7_assignsubmission_file", "3"),
@@ -516,6 +592,10 @@ mod tests {
             ),
             "{text}"
         );
+        // Between several, nothing is filled in.
+        let at = "11-9 - Ann Lee - Oct 5, 2019 1000 PM";
+        let open = run(&[claim(at, "")], &[1.0], true, Attempt::Latest, "").class.questions();
+        assert!(open.contains("# student = \"\"    # Ann Lee (1) or Ann Lee (2)\n"), "{open}");
         // As a comment it is empty, and without the signs it is read.
         let open: String = text
             .lines()

@@ -11,15 +11,18 @@ use anyhow::{Context as _, ensure};
 use super::MachineLacks;
 use super::asked::Asked;
 use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
-use super::class::{self, Source};
+use super::class::{self, Source, Telling};
 use super::context::{Context, INTERRUPTED, cores};
 use super::join::join;
 use super::render::AdapterChoice;
 use super::settling::{self, Found};
 use crate::assignment::Assignment;
 use crate::class::{Attempt, Collected, Decided, Kind, Label, Pins, Stated, Wanted, collect};
+use crate::columns::count;
 use crate::files::write_whole;
-use crate::grading::{Begun, Earlier, Folders, Grading, Mode, Record, Workshop, judge_shared};
+use crate::grading::{
+    Begun, Earlier, Folders, Grading, Mode, Record, RecordCache, Workshop, judge_shared,
+};
 use crate::held_back::recorded_seed;
 use crate::program::graded;
 use crate::report::{self, BatchReport, SubmissionReport};
@@ -164,15 +167,31 @@ impl<'a> Batch<'a> {
             Some(Perturb(seed)) => seed,
             None => Some(recorded_seed(&instructor.join(SEED_FILE))?),
         };
-        let all = class::sources(&collected.sources, self.output);
-        if self.mode == Mode::Grade {
-            class::roster(self.list, self.output)?;
+        let earlier = match self.mode {
+            Mode::Grade => Found::read(self.output)?.unwrap_or_default(),
+            Mode::Check => Found::default(),
+        };
+        let all = class::sources(&collected.sources, self.output, &earlier.names());
+        if !collected.copies.is_empty() {
+            eprintln!(
+                "umbra: {} in more than one download with the same content, graded once: {}",
+                count(collected.copies.len(), "submission"),
+                class::some(&collected.copies)
+            );
+        }
+        let mut telling = Telling::default();
+        if let Some((_, decided)) = &pins {
+            let roster = class::roster(self.list, self.output)?;
+            if let (Some(_), Some(roster)) = (self.list, &roster) {
+                eprintln!("umbra: {}", roster.reading());
+            }
+            telling = Telling { roster, matches: decided.matches(self.output)? };
         }
         let aside = match &pins {
             Some((_, decided)) => self.set_aside(&all, decided)?,
             None => HashSet::new(),
         };
-        let mut chosen = class::only(context, self.output, &all, self.only)?;
+        let mut chosen = class::only(context, self.output, &all, self.only, &telling)?;
         chosen.retain(|source| !aside.contains(&source.slug));
         let mut found = self.found(&collected, &all, &aside);
         let counting = chosen.len();
@@ -391,6 +410,7 @@ impl<'a> Batch<'a> {
                 let say = |stage: &str| context.progress.at(&format!("{slug}: {stage}"));
                 let out = self.folders(slug);
                 let begun = Instant::now();
+                let older = source.moved.as_ref().and_then(|_| RecordCache::text(&out.instructor));
                 let result = class::note_source(&out, source)
                     .and_then(|()| grading.one_of_batch(path, slug, &out, &say));
                 if INTERRUPTED.load(Ordering::Relaxed) && result.is_err() {
@@ -403,6 +423,17 @@ impl<'a> Batch<'a> {
                 });
                 let record = Record { name: name.clone(), ..result };
                 let mut is_kept = false;
+                if let (Some(older), Some(from)) = (older, &source.moved) {
+                    match RecordCache::keep_replaced(&out.instructor, &older, &record) {
+                        Ok(false) => {}
+                        Ok(true) => context.progress.note(&format!(
+                            "{} of {} is graded again: it replaces the one that was {from}",
+                            record.name,
+                            class::who(&record.student)
+                        )),
+                        Err(error) => context.progress.note(&super::told_once(&error)),
+                    }
+                }
                 if let Some(cache) = &grading.cache {
                     match cache.list(&record, &out) {
                         Ok(()) => is_kept = true,

@@ -1,6 +1,6 @@
 //! `umbra check`: takes one working folder through all stages, for its author.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -99,7 +99,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let source = Some(folder.clone()).filter(|folder| folder.file_name().is_some());
     let source = source.or_else(named).unwrap_or_else(|| folder.clone());
     let given = [Source::given(&source)];
-    let slug = class::sources(&given, &arguments.output).remove(0).slug;
+    let slug = class::sources(&given, &arguments.output, &HashMap::new()).remove(0).slug;
     let last_file = arguments.output.join(&slug).join(LAST);
     let last = fs::read(&last_file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
     let mut last: LastCheck = last.unwrap_or_default();

@@ -5,10 +5,11 @@ use std::collections::{HashMap, HashSet, VecDeque};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 
 use super::context::Context;
-use crate::class::{self, Claim, Label, MATCHES, Roster};
+use crate::class::slots::{content, slot};
+use crate::class::{self, Claim, Label, MATCHES, Matches, Owners, Roster};
 use crate::columns::count;
 use crate::files::write_whole;
 use crate::grading::{Folders, Record, RecordCache, Student};
@@ -19,6 +20,8 @@ use crate::viewer;
 const SOURCE: &str = "source.txt";
 /// The file with what a platform's names say of a submission, in its instructor's folder.
 const LABEL: &str = "label.json";
+/// The file with the digest of a submission that no platform names, in its instructor's folder.
+const CONTENT: &str = "content.sha256";
 /// The class list of a report, in the instructor's folder.
 const LIST: &str = "class.csv";
 /// The folder of what tasks of a partition found, in the instructor's folder.
@@ -38,6 +41,8 @@ pub struct Source {
     pub place: PathBuf,
     /// What a platform's names say of it.
     pub label: Option<Label>,
+    /// Where it was when it was graded before, if that was in an older download.
+    pub moved: Option<String>,
 }
 
 impl Source {
@@ -86,8 +91,13 @@ pub fn ask(class: &class::Class, output: &Path) -> anyhow::Result<()> {
 }
 
 /// Submissions with the folders that they have in the report at `output`: those that they had before,
-/// else what their names allow, made unique.
-pub fn sources(given: &[class::Source], output: &Path) -> Vec<Source> {
+/// else what their names allow, made unique. Those of an older download are found by `names`, what reports call the
+/// submission in each folder.
+pub fn sources(
+    given: &[class::Source],
+    output: &Path,
+    names: &HashMap<String, String>,
+) -> Vec<Source> {
     // Folders of the report's own.
     let own = [
         report::INSTRUCTOR,
@@ -106,13 +116,42 @@ pub fn sources(given: &[class::Source], output: &Path) -> Vec<Source> {
             known.entry(place).or_default().push_back(slug);
         }
     }
-    let source = |given: &class::Source| {
+    let places: HashSet<String> = given.iter().map(|given| place(&given.place)).collect();
+    let mut older: HashMap<String, Vec<(&String, &String)>> = HashMap::new();
+    for (at, slugs) in known.iter().filter(|(at, _)| !places.contains(*at)) {
+        for slug in slugs {
+            if let Some(name) = names.get(slug) {
+                let slot = slot(label(output, slug).as_ref(), name);
+                older.entry(slot).or_default().push((slug, at));
+            }
+        }
+    }
+    let mut newer: HashMap<String, usize> = HashMap::new();
+    for given in given.iter().filter(|given| !known.contains_key(&place(&given.place))) {
+        *newer.entry(slot(given.label.as_ref(), &given.name)).or_default() += 1;
+    }
+    // The folder of the same submission in an older download, where there is no doubt.
+    let older = |given: &class::Source| -> Option<(String, String)> {
+        let slot = slot(given.label.as_ref(), &given.name);
+        let [(slug, at)] = older.get(&slot)?[..] else { return None };
+        let noted = || fs::read_to_string(output.join(report::INSTRUCTOR).join(slug).join(CONTENT));
+        // Where no platform tells submissions apart, the bytes do.
+        let same = given.label.is_some()
+            || noted().is_ok_and(|noted| content(&given.path).is_ok_and(|own| own == noted));
+        (newer.get(&slot) == Some(&1) && same).then(|| (slug.clone(), at.clone()))
+    };
+    let older: Vec<Option<(String, String)>> = given.iter().map(older).collect();
+    let source = |(given, older): (&class::Source, Option<(String, String)>)| {
         let class::Source { path, name, place: at, label } = given.clone();
         let before = known.get_mut(&place(&at)).and_then(VecDeque::pop_front);
-        let slug = before.unwrap_or_else(|| new_slug(&name, &mut taken));
-        Source { path, name, slug, place: at, label }
+        let (slug, moved) = match (before, older) {
+            (Some(slug), _) => (slug, None),
+            (None, Some((slug, at))) => (slug, Some(at)),
+            (None, None) => (new_slug(&name, &mut taken), None),
+        };
+        Source { path, name, slug, place: at, label, moved }
     };
-    given.iter().map(source).collect()
+    given.iter().zip(older).map(source).collect()
 }
 
 fn new_slug(name: &str, taken: &mut HashSet<String>) -> String {
@@ -153,7 +192,12 @@ fn place(path: &Path) -> String {
 /// When it cannot be written.
 pub fn note_source(out: &Folders, source: &Source) -> anyhow::Result<()> {
     let label = serde_json::to_vec_pretty(&source.label)?;
-    for (name, bytes) in [(SOURCE, place(&source.place).into_bytes()), (LABEL, label)] {
+    let mut notes = vec![(SOURCE, place(&source.place).into_bytes()), (LABEL, label)];
+    if source.label.is_none() && !source.path.is_symlink() {
+        // What cannot be read is told as a finding of the submission.
+        notes.extend(content(&source.path).ok().map(|own| (CONTENT, own.into_bytes())));
+    }
+    for (name, bytes) in notes {
         let file = out.instructor.join(name);
         if fs::read(&file).is_ok_and(|noted| noted == bytes) {
             continue;
@@ -229,8 +273,17 @@ pub fn some(names: &[String]) -> String {
     }
 }
 
-/// The submissions of some students: by number, name, or file name; all when nobody is named. Who
-/// submitted what is known from earlier runs, else from the submissions themselves.
+/// By what a batch tells whose submissions are.
+#[derive(Default)]
+pub struct Telling {
+    /// The class list, if there is one.
+    pub roster: Option<Roster>,
+    /// The instructor's decisions.
+    pub matches: Matches,
+}
+
+/// The submissions of some students: as [`Owners`] tell, else by file name; all when nobody is named. What submissions
+/// say of themselves is known from earlier runs, else from the submissions themselves.
 ///
 /// # Errors
 /// When somebody has none, and when one cannot be looked into.
@@ -239,6 +292,7 @@ pub fn only<'a>(
     output: &Path,
     all: &'a [Source],
     wanted: &[String],
+    telling: &Telling,
 ) -> anyhow::Result<Vec<&'a Source>> {
     if wanted.is_empty() {
         return Ok(all.iter().collect());
@@ -248,19 +302,41 @@ pub fn only<'a>(
         let known = RecordCache::student(&instructor);
         known.or_else(|| student_of(context, &source.path)).unwrap_or_default()
     };
-    let students: Vec<Student> = all.iter().map(student).collect();
+    let claim = |source: &Source| {
+        let student = student(source);
+        let (number, full_name) = (student.id.clone(), student.full_name());
+        (Claim { number, full_name, ..source.claim() }, student.last_name)
+    };
+    let (claims, last_names): (Vec<Claim>, Vec<String>) = all.iter().map(claim).unzip();
+    let matches = telling.matches.among(&claims);
+    let owners = Owners::of(&claims, telling.roster.as_ref(), &matches)?;
     let mut chosen = vec![false; all.len()];
     for wanted in wanted {
-        let mut found = false;
-        for (index, (source, student)) in all.iter().zip(&students).enumerate() {
-            let matches = is_called(source, student, wanted);
-            chosen[index] |= matches;
-            found |= matches;
+        let word = wanted.trim().to_lowercase();
+        let of = |is: &dyn Fn(usize) -> bool| -> Vec<usize> {
+            (0..all.len()).filter(|at| !word.is_empty() && is(*at)).collect()
+        };
+        let mut found = owners.meant(wanted);
+        if found.is_empty() {
+            found = of(&|at| is_file(&all[at], &word));
         }
-        let like = students.iter().map(who).find(|name| !name.is_empty());
+        let listed = owners.listed_as(wanted);
+        if found.is_empty() && listed.is_none() {
+            found = of(&|at| last_names[at].trim().to_lowercase() == word);
+        }
+        found.iter().for_each(|at| chosen[*at] = true);
+        if let (true, Some(who)) = (found.is_empty(), listed) {
+            bail!(
+                "--only: {who} has no submission that is theirs for certain; hint: name its file"
+            );
+        }
+        let mut names = claims
+            .iter()
+            .map(|claim| if claim.full_name.is_empty() { &claim.number } else { &claim.full_name });
+        let like = names.find(|name| !name.is_empty()).cloned();
         let like = like.or_else(|| all.first().map(|source| file_name(&source.path)));
         ensure!(
-            found,
+            !found.is_empty(),
             "--only: nobody of {} is \"{wanted}\"; expected a student number, a first and last name or a \
              file name, such as \"{}\"",
             count(all.len(), "submission"),
@@ -270,19 +346,13 @@ pub fn only<'a>(
     Ok(all.iter().zip(chosen).filter(|(_, chosen)| *chosen).map(|(source, _)| source).collect())
 }
 
-fn is_called(source: &Source, student: &Student, wanted: &str) -> bool {
+/// Whether a word in lower case is the file of a submission.
+fn is_file(source: &Source, word: &str) -> bool {
     let name = file_name(&source.path);
-    let own = [
-        student.id.trim().to_owned(),
-        student.full_name(),
-        student.last_name.trim().to_owned(),
-        source.slug.clone(),
-        stem(&name).to_owned(),
-        name,
-        source.path.to_string_lossy().into_owned(),
-    ];
-    let wanted = wanted.trim().to_lowercase();
-    own.iter().any(|own| !own.is_empty() && own.to_lowercase() == wanted)
+    let path = source.path.to_string_lossy();
+    [source.slug.as_str(), &source.name, stem(&name), &name, &path]
+        .iter()
+        .any(|own| own.to_lowercase() == word)
 }
 
 /// Whose a submission is, by its config.json; nothing when it cannot be read.
@@ -307,6 +377,7 @@ mod tests {
             slug: slug.into(),
             place: path.into(),
             label: None,
+            moved: None,
         }
     }
 
@@ -329,7 +400,7 @@ mod tests {
         };
         let sources = |paths: &[PathBuf], output: &Path| {
             let given: Vec<_> = paths.iter().map(|path| class::Source::given(path)).collect();
-            super::sources(&given, output)
+            super::sources(&given, output, &HashMap::new())
         };
         let slugs = |sources: &[Source]| -> Vec<String> {
             sources.iter().map(|source| source.slug.clone()).collect()
@@ -355,20 +426,13 @@ mod tests {
     }
 
     #[test]
-    fn a_student_is_called_by_number_name_or_file() {
-        let student = Student {
-            first_name: "Ada".into(),
-            last_name: "Lampglow".into(),
-            id: "260181512".into(),
-        };
+    fn a_submission_is_called_by_its_file() {
         let source = source("class/a2_ada.tar.gz", "a2_ada-2");
-        for name in ["260181512", "ada lampglow", "LAMPGLOW", "a2_ada", "a2_ada.tar.gz", "a2_ada-2"]
-        {
-            assert!(is_called(&source, &student, name), "{name}");
+        for name in ["a2_ada", "a2_ada.tar.gz", "a2_ada-2", "class/a2_ada.tar.gz"] {
+            assert!(is_file(&source, name), "{name}");
         }
-        for name in ["", "ada", "26018151", "a2", "class"] {
-            assert!(!is_called(&source, &student, name), "{name}");
+        for name in ["", "ada", "a2", "class"] {
+            assert!(!is_file(&source, name), "{name}");
         }
-        assert!(!is_called(&source, &Student::default(), " "));
     }
 }

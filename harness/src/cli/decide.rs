@@ -7,8 +7,8 @@ use anyhow::{Context as _, bail, ensure};
 use super::earlier::{Report, Row};
 use super::report_folder::ReportFolder;
 use super::settling::Kept;
+use crate::class::Decided;
 use crate::class::overrides::{Decision, OVERRIDES, Subject, entry, fingerprint};
-use crate::class::{Decided, names};
 use crate::files::write_whole;
 use crate::report::{self, SubmissionReport, harmless};
 
@@ -58,18 +58,14 @@ pub struct StatusArguments {
 pub struct Graded {
     /// What it is worth before anything is decided.
     pub entry: SubmissionReport,
-    numbers: Vec<String>,
+    /// By what decisions name it.
+    key: String,
 }
 
 impl Graded {
     fn subject(&self) -> Subject<'_> {
         let record = &self.entry.record;
-        Subject {
-            slug: &record.slug,
-            numbers: self.numbers.clone(),
-            digest: &record.digest,
-            evidence: &record.evidence,
-        }
+        Subject { slug: &record.slug, digest: &record.digest, evidence: &record.evidence }
     }
 }
 
@@ -148,10 +144,8 @@ impl DecisionArguments {
     /// A decision on a submission as a whole.
     fn of(&self, graded: &Graded, evidence: String) -> anyhow::Result<Decision> {
         self.check()?;
-        let account = || std::env::var("USER").or_else(|_| std::env::var("USERNAME")).ok();
-        let number = graded.numbers.first().cloned();
         Ok(Decision {
-            student: number.unwrap_or_else(|| graded.entry.record.slug.clone()),
+            student: graded.key.clone(),
             part: None,
             points: None,
             patch: None,
@@ -193,36 +187,47 @@ impl DecisionArguments {
 /// # Errors
 /// When there is none, or several.
 pub fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
-    let mut found: Vec<(&str, Vec<String>)> = Vec::new();
-    let mut names = Vec::new();
-    for (record, numbers) in kept.known(output)? {
-        let full_name = record.student.full_name();
-        let is_number = numbers.iter().any(|own| names::number(own) == names::number(wanted));
-        let is_name = !full_name.is_empty() && names::words(&full_name) == names::words(wanted);
-        if record.slug == wanted || is_number || is_name {
-            found.push((&record.slug, numbers));
-        } else {
-            names.push(record.slug.as_str());
+    let claims = kept.claims(output);
+    let owners = kept.owners(&claims, output)?;
+    match owners.meant(wanted)[..] {
+        [at] => {
+            let (key, slug) = (owners.key(at), &claims[at].slug);
+            Ok(Graded { entry: kept.graded(output, slug)?, key })
         }
-    }
-    match found.as_slice() {
-        [(slug, numbers)] => {
-            Ok(Graded { entry: kept.graded(output, slug)?, numbers: numbers.clone() })
-        }
-        [] => bail!(
-            "nobody in {} is \"{wanted}\"; expected a student number, a name, or a submission's folder such as {}",
-            output.display(),
-            names.first().unwrap_or(&"a2_ada_lampglow")
-        ),
-        several => {
-            let slugs: Vec<&str> = several.iter().map(|(slug, _)| *slug).collect();
+        [] => {
+            if let Some(who) = owners.listed_as(wanted) {
+                bail!(
+                    "{}: {who} has no submission that is theirs for certain; hint: decide in matches.toml whose it \
+                     is, or name the submission's folder",
+                    output.display()
+                );
+            }
+            let first = claims.first().map_or("a2_ada_lampglow", |claim| &claim.slug);
             bail!(
-                "{} submissions are \"{wanted}\"; name the folder of one: {}",
-                slugs.len(),
-                slugs.join(", ")
+                "nobody in {} is \"{wanted}\"; expected a student number, a name, or a submission's folder such as \
+                 {first}",
+                output.display()
             )
         }
+        ref several => bail!(
+            "{} submissions are \"{wanted}\"; name the folder of one: {}",
+            several.len(),
+            owners.folders(several).join(", ")
+        ),
     }
+}
+
+/// The name of the account that runs this; nothing where the system knows none.
+fn account() -> Option<String> {
+    let named = ["USER", "LOGNAME", "USERNAME"].into_iter();
+    let named = named.filter_map(|name| std::env::var(name).ok());
+    let named = named.map(|name| name.trim().to_owned()).find(|name| !name.is_empty());
+    #[cfg(unix)]
+    let named = named.or_else(|| {
+        let user = nix::unistd::User::from_uid(nix::unistd::Uid::current()).ok()??;
+        Some(user.name).filter(|name| !name.is_empty())
+    });
+    named
 }
 
 /// Lists what waits for the instructor; exit 1 where anything does.
@@ -255,6 +260,7 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
     let mut waits = false;
     for (title, lines) in [
         ("whose they are, to be decided in matches.toml", undecided.collect()),
+        ("neither opened nor graded", class.unopened.clone()),
         ("images without code, for `umbra confirm` or `umbra override`", images),
         ("to be looked at, then `umbra confirm` or `umbra override`", remarks.collect::<Vec<_>>()),
         (

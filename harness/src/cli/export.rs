@@ -190,7 +190,11 @@ fn of_platform(roster: Option<Roster>, kind: Kind, output: &Path) -> anyhow::Res
 /// Why a submission is not handed back yet, if it is not.
 fn waits(row: &Row, report: &Report) -> Option<&'static str> {
     let undecided = report.class.as_ref().map(|class| class.undecided.as_slice());
-    if undecided.unwrap_or_default().iter().any(|own| own.submission == row.name) {
+    if undecided
+        .unwrap_or_default()
+        .iter()
+        .any(|own| [&row.name, &row.slug].contains(&&own.submission))
+    {
         return Some("not decided yet");
     }
     (row.points < row.points_max).then_some("not wholly judged")

@@ -80,7 +80,8 @@ pub struct GradeArguments {
     item: Item,
 }
 
-/// Grades submissions and prints the table; exit 0 when all could be graded, whatever their points.
+/// Grades submissions and prints the table; exit 0 when all could be graded, whatever their points, 1 when a zip that
+/// looks like a download was left out.
 pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     export::check(&arguments.export, &arguments.output, arguments.class.as_deref())?;
     let batch = Batch {
@@ -132,7 +133,11 @@ pub fn shown(report: &BatchReport, output: &Path, skipped: Option<String>) -> an
     if let Some(held_back) = &report.held_back {
         println!("held-back seed {0}; --perturb {0} reproduces this batch", held_back.seed);
     }
-    Ok(exit_code(&report.entries))
+    let unopened = report.class.as_ref().is_some_and(|class| !class.unopened.is_empty());
+    Ok(match exit_code(&report.entries) {
+        super::EXIT_OK if unopened => super::EXIT_NOT_IN_ORDER,
+        code => code,
+    })
 }
 
 /// The exit code of a batch: a bug of ours takes precedence over something that the machine lacks.

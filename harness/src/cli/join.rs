@@ -14,6 +14,8 @@ use crate::report;
 pub fn join(output: &Path, found: &Found, records: &mut Vec<Earlier>) {
     let graded: HashSet<String> = records.iter().map(|own| own.record.slug.clone()).collect();
     let mut gone = Vec::new();
+    let before = Found::read(output).ok().flatten().unwrap_or_default();
+    found.name(records);
     let slugs = |aside: bool| -> HashSet<&str> {
         let own = found.seen.iter().filter(|seen| seen.aside == aside && seen.empty.is_empty());
         own.map(|seen| seen.slug.as_str()).collect()
@@ -26,7 +28,7 @@ pub fn join(output: &Path, found: &Found, records: &mut Vec<Earlier>) {
             continue;
         }
         let earlier = match RecordCache::earlier(&instructor, &found.conditions) {
-            Ok(Some(earlier)) => earlier,
+            Ok(Some(earlier)) => named(earlier, &before),
             Ok(None) => continue,
             Err(error) => {
                 eprintln!("umbra: {} is skipped: {}", slug, super::told_once(&error));
@@ -73,6 +75,14 @@ pub fn join(output: &Path, found: &Found, records: &mut Vec<Earlier>) {
             some(&missing)
         );
     }
+}
+
+/// A record under the name that reports call it by.
+fn named(earlier: Earlier, before: &Found) -> Earlier {
+    let mut own = [earlier];
+    before.name(&mut own);
+    let [earlier] = own;
+    earlier
 }
 
 /// Whether `new` resubmits `old`: the same file name, by the same student.

@@ -44,7 +44,7 @@ pub fn run(arguments: &LikenessArguments, root: Option<&Path>) -> anyhow::Result
         Some(result) => take(result, &folder)?,
         None => write_sources(&kept, output, root, &folder)?,
     }
-    show(&kept, output, &folder)?;
+    show(&kept, &folder)?;
     // The reports name what is alike.
     settling::write(output, &kept.report(output, kept.decided()?)?)?;
     Ok(super::EXIT_OK)
@@ -96,7 +96,7 @@ fn write_sources(
     let wanted = Wanted { tree, limits, from: None, output: Some(output), scratch: scratch.path() };
     let there: Vec<PathBuf> = kept.paths().iter().filter(|path| path.exists()).cloned().collect();
     let collected = collect(&there, &wanted)?;
-    let sources = class::sources(&collected.sources, output);
+    let sources = class::sources(&collected.sources, output, &kept.names());
     let path_of = |slug: &str| {
         let found = sources.iter().find(|source| source.slug == slug);
         let place = || class::place_of(output, slug).map(PathBuf::from);
@@ -104,7 +104,7 @@ fn write_sources(
     };
     let (mut changed, mut missing) = (BTreeSet::new(), Vec::new());
     let copies = tempfile::tempdir_in(&context.supervisor.scratch)?;
-    for (record, _) in kept.known(output)? {
+    for record in kept.records() {
         let slug = &record.slug;
         // What could not be unpacked has no sources.
         if record.digest.is_empty() {
@@ -184,14 +184,13 @@ fn copy_sources(from: &Path, to: &Path) -> anyhow::Result<bool> {
 }
 
 /// Writes the pages, and says what is alike.
-fn show(kept: &Kept, output: &Path, folder: &Path) -> anyhow::Result<()> {
-    let known = kept.known(output)?;
-    let shared = Shared::of(known.iter().map(|(record, _)| *record));
+fn show(kept: &Kept, folder: &Path) -> anyhow::Result<()> {
+    let shared = Shared::of(kept.records());
     let near = jplag::kept(folder)?;
     let mut all: BTreeMap<[String; 2], Alike> = BTreeMap::new();
     let name = |slug: &String| {
-        let record = known.iter().find(|(record, _)| record.slug == *slug);
-        record.map(|(record, _)| record.student.full_name()).unwrap_or_default()
+        let record = kept.records().find(|record| record.slug == *slug);
+        record.map(|record| record.student.full_name()).unwrap_or_default()
     };
     let alike = |who: &[String; 2]| Alike {
         who: who.clone(),

@@ -2,6 +2,7 @@
 //! submission and renders nothing.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -11,12 +12,11 @@ use sha2::{Digest as _, Sha256};
 
 use super::class::{self, WORK};
 use crate::class::jplag;
-use crate::class::matching::{Match, find};
 use crate::class::mending;
 use crate::class::overrides::{Applied, Subject};
 use crate::class::pins::Change;
 use crate::class::{
-    Claim, Collected, Decided, Deciding, Kind, Label, Matches, Pins, Roster, settle,
+    Claim, Collected, Decided, Deciding, Kind, Label, Owners, Pins, Roster, settle,
 };
 use crate::files::{files_below, hex, write_new, write_whole};
 use crate::grading::{Earlier, Record, RecordCache, Shared};
@@ -48,6 +48,9 @@ pub struct Found {
     pub held_back: Option<HeldBack>,
     /// What was there, graded or not.
     pub seen: Vec<Seen>,
+    /// Zips that look like the download of a class, among other archives.
+    #[serde(default)]
+    pub unopened: Vec<String>,
     /// The version of Umbra.
     pub umbra: String,
     /// Where the submissions were looked for.
@@ -89,7 +92,8 @@ impl Found {
             ..Seen::default()
         }));
         let umbra = env!("CARGO_PKG_VERSION").to_owned();
-        Self { kind: collected.kind, seen, umbra, ..Self::default() }
+        let unopened = collected.unopened.clone();
+        Self { kind: collected.kind, seen, unopened, umbra, ..Self::default() }
     }
 
     /// Adds what an earlier run into `output` found of those that this one was not given.
@@ -112,8 +116,13 @@ impl Found {
         }
     }
 
+    /// What reports call each submission, by its folder.
+    pub fn names(&self) -> HashMap<String, String> {
+        self.seen.iter().map(|seen| (seen.slug.clone(), seen.name.clone())).collect()
+    }
+
     /// Gives records the names that reports call them by; in their files they have that of the archive alone.
-    fn name(&self, records: &mut [Earlier]) {
+    pub fn name(&self, records: &mut [Earlier]) {
         for Earlier { record, .. } in records {
             if let Some(seen) = self.seen.iter().find(|seen| seen.slug == record.slug) {
                 record.name.clone_from(&seen.name);
@@ -243,17 +252,28 @@ impl Kept {
         settled(output, decided, &self.found, self.roster.as_ref(), self.records.clone())
     }
 
-    /// The submissions that are graded, without what was found out about them, and the numbers that each is known by.
+    /// What reports call each submission, by its folder.
+    pub fn names(&self) -> HashMap<String, String> {
+        self.found.names()
+    }
+
+    /// The submissions that are graded, without what was found out about them.
+    pub fn records(&self) -> impl Iterator<Item = &Record> {
+        self.records.iter().map(|earlier| &earlier.record)
+    }
+
+    /// What each graded submission says of whose it is.
+    pub fn claims(&self, output: &Path) -> Vec<Claim> {
+        self.records().map(|record| class::claim(output, record)).collect()
+    }
+
+    /// Whose the graded submissions are, as decided.
     ///
     /// # Errors
     /// When a decision means nothing.
-    pub fn known(&self, output: &Path) -> anyhow::Result<Vec<(&Record, Vec<String>)>> {
-        let matches = self.decided()?.matches(output)?;
-        let known = |earlier: &'_ Earlier| {
-            let claim = class::claim(output, &earlier.record);
-            numbers(&claim, self.roster.as_ref(), &matches)
-        };
-        Ok(self.records.iter().map(|own| (&own.record, known(own))).collect())
+    pub fn owners<'a>(&'a self, claims: &'a [Claim], output: &Path) -> anyhow::Result<Owners<'a>> {
+        let matches = self.decided()?.matches(output)?.among(claims);
+        Owners::of(claims, self.roster.as_ref(), &matches)
     }
 
     /// A submission with what it is worth before anything is decided.
@@ -360,17 +380,6 @@ fn whole(records: &[Earlier], slug: &str) -> anyhow::Result<Record> {
     own.with_context(|| format!("there is no submission {slug}"))?.whole()
 }
 
-/// The numbers that a submission is known by: its own, the platform's, the class list's.
-fn numbers(claim: &Claim, roster: Option<&Roster>, matches: &Matches) -> Vec<String> {
-    let listed = roster.and_then(|roster| match find(claim, roster, matches) {
-        Ok(Match::Student(at, _)) => Some(roster.students[at].number.clone()),
-        _ => None,
-    });
-    let label = claim.label.as_ref().map(|label| label.number.clone());
-    let all = [Some(claim.number.clone()), label, listed].into_iter().flatten();
-    all.filter(|number| !number.is_empty()).collect()
-}
-
 /// The report of some records: points by what is decided, whose each is, which of them count, what lateness costs.
 ///
 /// # Errors
@@ -383,7 +392,14 @@ pub fn settled(
     mut records: Vec<Earlier>,
 ) -> anyhow::Result<Settled> {
     let stated = &decided.assignment;
-    let (matches, overrides) = (decided.matches(output)?, decided.overrides(output)?);
+    found.name(&mut records);
+    // In an order that does not depend on the order of grading.
+    records.sort_by_key(|earlier| earlier.record.slug.to_lowercase());
+    let shared = shared(output, &records)?;
+    let claims: Vec<Claim> =
+        records.iter().map(|earlier| class::claim(output, &earlier.record)).collect();
+    let matches = decided.matches(output)?.among(&claims);
+    let owners = Owners::of(&claims, roster, &matches)?;
     let deciding = Deciding {
         roster,
         matches: &matches,
@@ -391,18 +407,13 @@ pub fn settled(
         due: &stated.due,
         attempt: decided.attempt,
     };
-    found.name(&mut records);
-    // In an order that does not depend on the order of grading.
-    records.sort_by_key(|earlier| earlier.record.slug.to_lowercase());
-    let shared = shared(output, &records)?;
-    let claims: Vec<Claim> =
-        records.iter().map(|earlier| class::claim(output, &earlier.record)).collect();
+    let overrides = decided.overrides(output)?.on(&owners);
     let mut entries: Vec<SubmissionReport> = Vec::new();
     let mut grades: Vec<Grade> = Vec::new();
     let mut decisions: Vec<Vec<Applied>> = Vec::new();
     let mut mends = Vec::new();
     // One at a time is whole.
-    for (earlier, claim) in records.iter().zip(&claims) {
+    for earlier in &records {
         let mut record = earlier.whole()?;
         shared.judge(&mut record);
         let SubmissionReport { record, grade: mut original, standing } =
@@ -411,12 +422,8 @@ pub fn settled(
             original.remarks.push(OTHER_CONDITIONS.to_owned());
         }
         let mut grade = original.clone();
-        let subject = Subject {
-            slug: &record.slug,
-            numbers: numbers(claim, roster, &matches),
-            digest: &record.digest,
-            evidence: &record.evidence,
-        };
+        let subject =
+            Subject { slug: &record.slug, digest: &record.digest, evidence: &record.evidence };
         decisions.push(overrides.apply(&subject, &mut grade));
         let mended = class::mended_record(output, subject.slug)?;
         mends.push(match (overrides.mend(&subject), mended) {
@@ -435,18 +442,6 @@ pub fn settled(
         grades.push(grade);
         entries.push(outline(SubmissionReport { record, grade: Grade::default(), standing }));
     }
-    let subjects: Vec<Subject> = entries
-        .iter()
-        .zip(&claims)
-        .map(|(SubmissionReport { record, .. }, claim)| Subject {
-            slug: &record.slug,
-            numbers: numbers(claim, roster, &matches),
-            digest: &record.digest,
-            evidence: &record.evidence,
-        })
-        .collect();
-    let parts: Vec<&str> = stated.rules.parts.iter().map(|part| part.id.as_str()).collect();
-    let unused = overrides.unused(&subjects, &parts);
     let is_graded = |seen: &Seen| claims.iter().any(|claim| claim.slug == seen.slug);
     let open = found.seen.iter().filter(|seen| !seen.aside && !is_graded(seen));
     let absent: Vec<(Label, String)> = open
@@ -456,7 +451,15 @@ pub fn settled(
         })
         .collect();
     let (standings, mut class) = settle(&claims, &mut grades, &absent, found.kind, &deciding)?;
-    class.unused = unused;
+    let parts: Vec<&str> = stated.rules.parts.iter().map(|part| part.id.as_str()).collect();
+    let counts = |slug: &str| standings.iter().any(|(at, _)| claims[*at].slug == slug);
+    class.unused.extend(overrides.unused(counts, &parts));
+    let is_seen = |word: &str| {
+        let label = |seen: &Seen| seen.label.as_ref().is_some_and(|own| own.submission == word);
+        found.seen.iter().any(|seen| seen.slug == word || seen.name == word || label(seen))
+    };
+    class.unused.extend(matches.lost(is_seen));
+    class.unopened.clone_from(&found.unopened);
     if !found.list.is_empty() {
         class.list.clone_from(&found.list);
     }

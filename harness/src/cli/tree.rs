@@ -9,6 +9,7 @@ use anyhow::{Context as _, bail, ensure};
 use unicode_width::UnicodeWidthStr as _;
 
 use super::context::{Context, INTERRUPTED};
+use crate::class::collect::Ambiguous;
 use crate::class::{Collected, Kind, Wanted, collect};
 use crate::columns::count;
 use crate::harmless::harmless;
@@ -68,7 +69,11 @@ pub fn validate(arguments: &ValidateArguments, root: Option<&Path>) -> anyhow::R
             };
             match collect(paths, &wanted) {
                 Ok(found) => Some(found),
-                Err(error) if paths.len() > 1 || arguments.from.is_some() => return Err(error),
+                Err(error)
+                    if paths.len() > 1 || arguments.from.is_some() || error.is::<Ambiguous>() =>
+                {
+                    return Err(error);
+                }
                 Err(_) => None,
             }
         }
@@ -169,8 +174,14 @@ fn many(arguments: &ValidateArguments, found: &Collected, context: &Context) -> 
             println!("recognised as a download of {}", found.kind.title());
         }
         let all = validations.len();
-        let all = count(all, "submission");
-        println!("{all}: {} conforming, {wrong} not", validations.len() - wrong);
+        println!("{}: {} conforming, {wrong} not", count(all, "submission"), all - wrong);
+        for line in &found.unopened {
+            println!("neither opened nor graded: {}", harmless(line));
+        }
+        if !found.copies.is_empty() {
+            let copies = harmless(&found.copies.join(", "));
+            println!("in more than one download with the same content, read once: {copies}");
+        }
         for empty in &found.empty {
             println!("{}: {}", harmless(&empty.label.who()), harmless(&empty.reason()));
         }
@@ -178,7 +189,7 @@ fn many(arguments: &ValidateArguments, found: &Collected, context: &Context) -> 
             println!("skipped, not submissions: {skipped}");
         }
     }
-    let in_order = wrong == 0 && found.empty.is_empty();
+    let in_order = wrong == 0 && found.empty.is_empty() && found.unopened.is_empty();
     Ok(if in_order { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
 }
 

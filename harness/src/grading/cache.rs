@@ -235,6 +235,25 @@ impl RecordCache {
         fs::rename(instructor.join(FILE), instructor.join(REPLACED))
     }
 
+    /// The record in an instructor's folder as it is kept, if there is one.
+    pub fn text(instructor: &Path) -> Option<Vec<u8>> {
+        fs::read(instructor.join(FILE)).ok()
+    }
+
+    /// Sets an older record aside, unless `record` is of the same submission; answers whether it did.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn keep_replaced(instructor: &Path, older: &[u8], record: &Record) -> anyhow::Result<bool> {
+        let kept: Result<File<Record>, _> = serde_json::from_slice(older);
+        if kept.is_ok_and(|kept| kept.record.digest == record.digest) {
+            return Ok(false);
+        }
+        let path = instructor.join(REPLACED);
+        write_whole(&path, older).with_context(|| format!("cannot keep {}", path.display()))?;
+        Ok(true)
+    }
+
     fn write(
         &self,
         key: &str,

@@ -83,7 +83,8 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
 
     let board = Arc::new(Board::default());
     let given = [crate::class::Source::given(&folder)];
-    let slug = super::class::sources(&given, &output).remove(0).slug;
+    let slug =
+        super::class::sources(&given, &output, &std::collections::HashMap::new()).remove(0).slug;
     let server = Server::start(output.join(slug), Arc::clone(&board), Arc::clone(&live))?;
     let door = server.door()?;
     println!("{}", door.path().display());

@@ -131,6 +131,9 @@ fn about(html: &mut Html, report: &BatchReport, class: &Class) {
         }
         html.raw("</ul>\n");
     }
+    for line in &class.unopened {
+        html.raw("<p class=\"notice\">Neither opened nor graded: ").text(line).raw("</p>\n");
+    }
     for line in class.stale.iter().chain(&class.unused) {
         html.raw("<p class=\"notice\">A decision on points to look at again: ")
             .text(line)

@@ -28,6 +28,7 @@ pub(super) fn class(page: &mut Page, report: &BatchReport, class: &Class) {
         (format!("without a submission{list}"), Style::Open, missing.collect()),
         ("decisions whose evidence has changed".to_owned(), Style::Bad, class.stale.clone()),
         ("decisions on nothing that is there".to_owned(), Style::Bad, class.unused.clone()),
+        ("neither opened nor graded".to_owned(), Style::Bad, class.unopened.clone()),
         ("to be decided in matches.toml".to_owned(), Style::Bad, undecided.collect()),
     ] {
         if lines.is_empty() {
