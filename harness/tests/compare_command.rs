@@ -124,6 +124,29 @@ fn layers_are_chosen_by_name() {
         code == 2 && said.contains("no layer \"none\"") && said.contains("mean, variance"),
         "{said}"
     );
+
+    // A file that has layers, but not this one, is not taken for it, whichever file comes first.
+    let other = write("other.exr", &[("", 0.5), ("spec", 0.5)]);
+    let torn = folder.path().join("torn.exr");
+    let channels = ["R", "G", "B", "left.R"].map(|name| (name, vec![0.5]));
+    write_exr_channels(&torn, 1, &channels).unwrap();
+    for (lacking, has) in
+        [(&other, "plain R, G, B, spec"), (&single, "raw"), (&torn, "plain R, G, B")]
+    {
+        for [a, b] in [[&stereo, lacking], [lacking, &stereo]] {
+            let (code, out, said) = layer(a, b, "left");
+            let file = lacking.file_name().unwrap().to_string_lossy();
+            let expected = format!("{file} (it has: {has})\n");
+            assert!(code == 2 && out.is_empty(), "{out}{said}");
+            assert!(said.starts_with("umbra: no layer \"left\" in "), "{said}");
+            assert!(said.ends_with(&expected), "{said}");
+        }
+    }
+    // Plain channels beside R, G and B make no layer.
+    let depth = folder.path().join("depth.exr");
+    let channels = ["R", "G", "B", "Z"].map(|name| (name, vec![0.75]));
+    write_exr_channels(&depth, 1, &channels).unwrap();
+    assert_eq!(layer(&stereo, &depth, "left").0, 0);
 }
 
 #[test]

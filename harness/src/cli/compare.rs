@@ -32,8 +32,8 @@ pub struct CompareArguments {
     /// The expected image
     #[arg(required_unless_present = "idiff")]
     expected: Option<PathBuf>,
-    /// The layer to compare, such as `mean` of a stored expected image; a file with only plain R, G
-    /// and B is used as it is [default: plain R, G and B, or the only layer]
+    /// The layer to compare, such as `mean` of a stored expected image; the other file may have only
+    /// plain channels instead, such as R, G and B [default: plain R, G and B, or the only layer]
     #[arg(long, value_name = "NAME")]
     layer: Option<String>,
     /// Count a pixel with a NaN as different, even where both images have one
@@ -149,6 +149,9 @@ struct Found {
     sizes: Vec<i32>,
 }
 
+/// The layers of a file, and the indices of their R, G and B.
+type Layers = Vec<(String, [usize; 3])>;
+
 /// An image that is open, and the layer that is compared.
 struct Open {
     file: ExrRows<'static>,
@@ -233,15 +236,26 @@ fn open(paths: [&PathBuf; 2], wanted: Option<&str>) -> anyhow::Result<[Open; 2]>
         anyhow::Ok((file, layers, notes))
     });
     let (actual, expected) = (actual?, expected?);
-    if let Some(wanted) = wanted
-        && ![&actual.1, &expected.1].iter().any(|layers| layers.iter().any(|(n, _)| n == wanted))
-    {
-        let [a, b] = [&actual.1, &expected.1].map(|layers| names(layers));
-        let [first, second] = paths.map(|path| path.display());
-        bail!("no layer \"{wanted}\" in {first} (it has: {a}) nor in {second} (it has: {b})");
+    if let Some(wanted) = wanted {
+        let lacks = |(file, layers, _): &(ExrRows, Layers, Vec<String>)| {
+            let has = layers.iter().any(|(name, _)| name == wanted);
+            (!has).then(|| (format!("{} (it has: {})", file.path().display(), names(layers)), is_plain(file)))
+        };
+        match (lacks(&actual), lacks(&expected)) {
+            (Some((a, _)), Some((b, _))) => bail!("no layer \"{wanted}\" in {a} nor in {b}"),
+            (Some((file, false)), None) | (None, Some((file, false))) => {
+                bail!("no layer \"{wanted}\" in {file}")
+            }
+            _ => {}
+        }
     }
     let choose = |(file, layers, notes)| Open::new(file, layers, notes, wanted);
     Ok([choose(actual)?, choose(expected)?])
+}
+
+/// Whether a file has no layers, but only channels without one.
+fn is_plain(file: &ExrRows) -> bool {
+    file.channels().iter().all(|name| !name.contains('.'))
 }
 
 /// The names of a file's layers, for messages.
@@ -258,7 +272,7 @@ impl Open {
     /// only one.
     fn new(
         file: ExrRows<'static>,
-        mut layers: Vec<(String, [usize; 3])>,
+        mut layers: Layers,
         mut notes: Vec<String>,
         wanted: Option<&str>,
     ) -> anyhow::Result<Self> {
