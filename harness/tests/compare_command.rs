@@ -340,6 +340,18 @@ fn larger(kept: Option<Different>, size: f32, index: usize) -> Option<Different>
     }
 }
 
+/// A copy of a file whose two windows begin one column further right.
+fn moved(from: &Path, to: &Path) {
+    let mut bytes = std::fs::read(from).unwrap();
+    for window in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+        let at = bytes.windows(window.len()).position(|own| own == window).unwrap();
+        let corners = &mut bytes[at + window.len() + 4..][..16];
+        corners[0] += 1;
+        corners[8] += 1;
+    }
+    std::fs::write(to, bytes).unwrap();
+}
+
 /// Exit codes and words of idiff 2.4.7 on these images, but for what `docs/reference/compare.md` excepts.
 #[test]
 fn idiff_s_arguments_have_idiff_s_answers() {
@@ -353,6 +365,7 @@ fn idiff_s_arguments_have_idiff_s_answers() {
     file(&folder, "minus.exr", &[(0, Vec3::NEG_INFINITY)]);
     write_exr(folder.path().join("small.exr"), &Image::new(2, 1), Precision::Float, &[]).unwrap();
     write_exr_channels(folder.path().join("xyz.exr"), 2, &[("X", vec![0.5; 4])]).unwrap();
+    moved(&folder.path().join("a.exr"), &folder.path().join("right.exr"));
     let run = |line: &str| {
         let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
             .current_dir(folder.path())
@@ -392,6 +405,11 @@ fn idiff_s_arguments_have_idiff_s_answers() {
         ("-fail 0.3 -hardfail 0.1 a.exr b.exr", 2),
         ("a.exr xyz.exr", 2),
         ("a.exr small.exr", 3),
+        ("right.exr right.exr", 0),
+        ("right.exr a.exr", 2),
+        ("a.exr right.exr", 2),
+        // idiff passes this one.
+        ("-fail 1 a.exr right.exr", 2),
         ("a.exr none.exr", 4),
         ("-fail much a.exr b.exr", 4),
         ("-unknown a.exr b.exr", 4),

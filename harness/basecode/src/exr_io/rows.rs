@@ -111,6 +111,12 @@ impl<'a> ExrRows<'a> {
         self.height
     }
 
+    /// Where the first column and row lie in the plane of all images; mostly (0, 0).
+    pub fn origin(&self) -> [i32; 2] {
+        let Vec2(x, y) = self.header.data_window().position;
+        [x, y]
+    }
+
     /// The file.
     pub fn path(&self) -> &Path {
         &self.path

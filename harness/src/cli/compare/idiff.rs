@@ -5,7 +5,8 @@
 //! - A pixel where only one image has NaN or infinity, or both have infinity of opposite signs, is
 //!   over every threshold. idiff lets it pass.
 //! - Channels are compared by name. idiff compares them by place, whatever they are called.
-//! - Images of two sizes end with 3, as its documentation says. idiff compares them with black.
+//! - Images of two sizes end with 3, as its documentation says, and images at two places fail. idiff
+//!   compares them with black.
 //! - `-warn`, `-warnpercent`, `-warnrelative`, `-hardwarn` and `-hardfail` count although no pixel is
 //!   over `-fail`, as its documentation says.
 
@@ -166,6 +167,10 @@ fn compare(options: &Options) -> anyhow::Result<u8> {
     if (a.width(), a.height()) != (b.width(), b.height()) {
         let [a, b] = [&a, &b].map(|image| format!("{}x{}", image.width(), image.height()));
         return different(OTHER_SIZE, format!("  sizes differ: {a} vs {b}"));
+    }
+    if a.origin() != b.origin() {
+        let [a, b] = [&a, &b].map(|image| image.origin()).map(|[x, y]| format!("({x}, {y})"));
+        return different(FAILURE, format!("  places differ: {a} vs {b}"));
     }
     let [named_a, named_b] = [&a, &b].map(in_idiff_order);
     let names = |named: &[(String, usize)]| -> Vec<String> {
