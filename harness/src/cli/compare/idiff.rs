@@ -7,8 +7,6 @@
 //! - Channels are compared by name. idiff compares them by place, whatever they are called.
 //! - Images of two sizes end with 3, as its documentation says, and images at two places fail. idiff
 //!   compares them with black.
-//! - `-warn`, `-warnpercent`, `-warnrelative`, `-hardwarn` and `-hardfail` count although no pixel is
-//!   over `-fail`, as its documentation says.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -39,9 +37,9 @@ As OpenImageIO's idiff, for EXR images (without -p, which is perceptual):
     -failrelative VAL          The same, as a fraction of the mean of |a| and |b| (default: 0)
     -failpercent PERCENT       Allow so many pixels above both (default: 0)
     -hardfail VAL              Fail if any pixel is above (default: inf)
-    -allowfailures N           Match although so many pixels fail (default: 0)
+    -allowfailures N           Match if at most so many pixels fail, whatever else is asked (default: 0)
     -warn, -warnrelative, -warnpercent, -hardwarn
-                               The same for a warning
+                               The same for a warning, if more pixels fail than -allowfailures has
     -o FILENAME                Write the difference image, an EXR file
     -od                        ... only if there is a difference
     -abs, -scale FACTOR        ... of absolute values; multiplied
@@ -58,8 +56,7 @@ struct Options {
     all: bool,
     fail: Limits,
     warn: Limits,
-    /// Whether a warning was asked for.
-    warns: bool,
+    /// With at most so many failing pixels, nothing else counts.
     allowed: usize,
     output: Option<PathBuf>,
     only_different: bool,
@@ -89,7 +86,6 @@ impl Options {
             all: false,
             fail: limits,
             warn: limits,
-            warns: false,
             allowed: 0,
             output: None,
             only_different: false,
@@ -125,7 +121,14 @@ impl Options {
                 "warnrelative" => options.warn.relative = number()?,
                 "warnpercent" => options.warn.percent = number()?,
                 "hardwarn" => options.warn.hard = number()?,
-                "allowfailures" => options.allowed = number()?.max(0.0) as usize,
+                // A number below 0 is a very large one to idiff.
+                "allowfailures" => {
+                    let count = number()?;
+                    if count.fract() != 0.0 {
+                        bail!("-{name} has \"{count}\", expected a whole number");
+                    }
+                    options.allowed = usize::try_from(count as i64).unwrap_or(usize::MAX);
+                }
                 "o" => options.output = Some(value()?.into()),
                 "od" => options.only_different = true,
                 "abs" => options.absolute = true,
@@ -133,7 +136,6 @@ impl Options {
                 "p" => bail!("-p is not known here; hint: umbra compare --metrics measures FLIP"),
                 _ => bail!("unknown option -{name}\n{HELP}"),
             }
-            options.warns |= name.starts_with("warn") || name == "hardwarn";
         }
         if options.images.len() != 2 && !options.help {
             bail!("expected two images, found {}\n{HELP}", options.images.len());
@@ -220,19 +222,22 @@ fn compare(options: &Options) -> anyhow::Result<u8> {
     Ok(code)
 }
 
-/// Which exit code the differences have.
+/// Which exit code the differences have. As to idiff, nothing but `-fail` and `-failrelative` counts
+/// unless more than the allowed pixels are above both.
 fn verdict(options: &Options, tally: &Tally, pixels: usize) -> u8 {
     let Options { fail, warn, .. } = options;
     let largest = tally.largest.map_or(0.0, |largest| largest.size);
     let above = |limits: &Limits, count: usize| {
         count as f64 > f64::from(limits.percent) / 100.0 * pixels as f64 || largest > limits.hard
     };
-    match tally.failing {
-        failing if failing > 0 && failing <= options.allowed => MATCH,
-        failing if above(fail, failing) => FAILURE,
-        0 if !options.warns => MATCH,
-        _ if above(warn, tally.warned) => WARNING,
-        _ => MATCH,
+    if tally.failing <= options.allowed {
+        MATCH
+    } else if above(fail, tally.failing) {
+        FAILURE
+    } else if above(warn, tally.warned) {
+        WARNING
+    } else {
+        MATCH
     }
 }
 
