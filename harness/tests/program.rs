@@ -1,8 +1,11 @@
-//! What a program of somebody else's calls.
+//! The program as its callers meet it: as a library, and in an odd environment.
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
+use basecode::Image;
+use basecode::exr_io::{Precision, write_exr};
 use umbra::{GradeOptions, Verdict, grade_submission};
 
 #[test]
@@ -30,4 +33,37 @@ fn a_program_grades_a_submission_and_gets_points_with_their_evidence() {
     }
     let error = grade_submission(&place.path().join("b2"), &options).unwrap_err();
     assert!(error.to_string().ends_with("b2 does not exist"), "{error}");
+}
+
+/// Without a temporary folder the message is one line about that folder, and nothing is said of the rest.
+#[test]
+fn a_temporary_folder_that_is_not_there_is_named() {
+    let place = tempfile::tempdir().unwrap();
+    let file = place.path().join("file");
+    fs::write(&file, "").unwrap();
+    let image = place.path().join("a.exr");
+    write_exr(&image, &Image::new(2, 2), Precision::Float, &[]).unwrap();
+    let run = |temporary: &Path, arguments: &[&str]| {
+        let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
+            .env("TMPDIR", temporary)
+            .current_dir(place.path())
+            .args(arguments)
+            .output()
+            .unwrap();
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (run.status.code(), text(&run.stdout), text(&run.stderr))
+    };
+    for (temporary, what) in [(place.path().join("gone"), "not there"), (file, "not a folder")] {
+        let line = format!("umbra: TMPDIR is {}, which is {what}\n", temporary.display());
+        for arguments in [&["doctor"][..], &["view", "a.exr"], &["pack", "."], &["watch", "."]] {
+            let expected = (Some(3), String::new(), line.clone());
+            assert_eq!(run(&temporary, arguments), expected, "{arguments:?}");
+        }
+        let (code, _, said) = run(&temporary, &["view", "a.exr", "-o", "page"]);
+        assert_eq!(code, Some(0), "needs none: {said}");
+    }
+    let (code, out, said) = run(Path::new("/proc"), &["doctor"]);
+    assert!(code == Some(3) && out.is_empty(), "{out}");
+    assert!(said.starts_with("umbra: cannot write to /proc: "), "{said}");
+    assert!(said.lines().count() == 1 && !said.contains("at path"), "{said}");
 }

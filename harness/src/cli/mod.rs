@@ -136,6 +136,19 @@ enum Command {
     Bless(bless::BlessArguments),
 }
 
+impl Command {
+    /// Whether it works in the system's temporary folder, and not only in the assignment's own.
+    fn needs_temporary_folder(&self) -> bool {
+        match self {
+            Self::Merge(_) | Self::Pack(_) | Self::Watch(_) => true,
+            Self::View(arguments) => arguments.output.is_none(),
+            #[cfg(target_os = "linux")]
+            Self::Doctor => true,
+            _ => false,
+        }
+    }
+}
+
 /// Parses the command line, runs the command and prints its error once.
 ///
 /// Hidden commands come first: they are Umbra starting itself, and lock the process before
@@ -240,18 +253,33 @@ fn machine_lacks(error: &anyhow::Error) -> bool {
 /// # Errors
 /// When not, with the folder's name.
 fn writable(output: &Path) -> anyhow::Result<()> {
-    let lacks = |what: String| anyhow::Error::from(MachineLacks(what));
-    let temporary = std::env::temp_dir();
-    if !temporary.is_dir() {
+    has_temporary_folder()?;
+    takes_files(output)
+}
+
+/// Makes sure that temporary files can be made, before any work.
+///
+/// # Errors
+/// When not, with the folder's name and what named it.
+fn has_temporary_folder() -> anyhow::Result<()> {
+    let folder = std::env::temp_dir();
+    if !folder.is_dir() {
         let named =
             if std::env::var_os("TMPDIR").is_some() { "TMPDIR" } else { "temporary folder" };
-        return Err(lacks(format!("{named} is {}, which is not a folder", temporary.display())));
+        let what = if folder.exists() { "not a folder" } else { "not there" };
+        return Err(MachineLacks(format!("{named} is {}, which is {what}", folder.display())).into());
     }
-    for folder in [output, &temporary] {
-        std::fs::create_dir_all(folder)
-            .and_then(|()| tempfile::Builder::new().prefix(".umbra-").tempfile_in(folder))
-            .map_err(|error| lacks(format!("cannot write to {}: {error}", folder.display())))?;
-    }
+    takes_files(&folder)
+}
+
+/// Makes a folder where there is none, and a file in it that goes away again.
+fn takes_files(folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder)
+        .and_then(|()| tempfile::Builder::new().prefix(".umbra-").tempfile_in(folder))
+        .map_err(|error| {
+            // The name of the file that could not be made helps nobody.
+            MachineLacks(format!("cannot write to {}: {}", folder.display(), error.kind()))
+        })?;
     Ok(())
 }
 
@@ -261,6 +289,9 @@ fn writable(output: &Path) -> anyhow::Result<()> {
 struct MachineLacks(String);
 
 fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
+    if command.needs_temporary_folder() {
+        has_temporary_folder()?;
+    }
     match command {
         Command::Check(arguments) => check::check(&arguments, root),
         Command::Grade(arguments) => grade::grade(&arguments, root),
