@@ -268,6 +268,46 @@ fn other_channels_are_ignored_with_a_note() {
     assert_eq!(file.layers[""].pixels, vec![vec3(3.0, 2.0, 1.0); 12]);
 }
 
+/// A layer that is no color image keeps nobody from those that are.
+#[test]
+fn incomplete_and_integer_layers_are_ignored_with_a_note() {
+    let (half, whole) = (SampleType::F16, SampleType::U32);
+    let file = |more: &[(&str, SampleType)]| {
+        let mut channels = [&BGR[..], more].concat();
+        channels.sort_by(|a, b| a.0.cmp(b.0));
+        foreign(&channels, Compression::ZIP16, LINES, |_| ())
+    };
+    for (more, notes) in [
+        (
+            &[("motion.G", half), ("motion.R", half)][..],
+            &["layer motion is ignored: no channel motion.B"][..],
+        ),
+        (&[("mask.R", half)], &["layer mask is ignored: no channel mask.G"]),
+        (&[("mask.R", whole)], &["layer mask is ignored: channel mask.R holds integers"]),
+        (
+            &[("id.B", whole), ("id.G", whole), ("id.R", whole), ("id.X", half)],
+            &["channel id.X is ignored", "layer id is ignored: channel id.R holds integers"],
+        ),
+        (&[("a.b.G", half)], &["layer a.b is ignored: no channel a.b.R"]),
+    ] {
+        let read = decode(&file(more)).unwrap();
+        assert_eq!(read.notes, notes);
+        assert_eq!(read.layers.keys().collect::<Vec<_>>(), [""]);
+        let first = read.layers[""].pixels[0];
+        assert_eq!((first.y - first.z, first.x - first.y), (1.0, 1.0), "B, G, R count up");
+    }
+    // Plain channels are a layer like others; who wants those alone is told what they lack.
+    let channels = [("G", half), ("R", half), ("x.B", half), ("x.G", half), ("x.R", half)];
+    let bytes = foreign(&channels, Compression::ZIP16, LINES, |_| ());
+    let read = decode(&bytes).unwrap();
+    assert_eq!(read.notes, ["layer without a name is ignored: no channel B"]);
+    assert_eq!(read.layers["x"].pixels[0], vec3(4.0, 3.0, 2.0));
+    let folder = Folder::new("incomplete");
+    let path = folder.0.join("a.exr");
+    std::fs::write(&path, bytes).unwrap();
+    assert!(read_exr(&path).unwrap_err().to_string().contains("no channel B; expected R, G and B"));
+}
+
 #[test]
 fn wrong_kinds_of_file_are_named() {
     assert_eq!(
@@ -326,10 +366,7 @@ fn wrong_channels_are_named() {
         file(&[("X", half), ("Y", half), ("Z", half)]),
         "submission.exr: no channel R; expected R, G and B, found X, Y, Z"
     );
-    assert!(
-        file(&[("B", half), ("G", half), ("R", half), ("x.B", half), ("x.R", half)])
-            .contains("no channel x.G")
-    );
+    assert!(file(&[("x.B", half), ("x.R", half)]).contains("no channel x.G"));
     assert!(file(&[("B", half), ("G", half), ("R", SampleType::U32)]).contains("holds integers"));
     // name, type, linear flag, then the sampling rates in x and y
     let subsampled = patched(plain(), b"G\0\x01\0\0\0", 4, &[2, 0, 0, 0]);

@@ -239,7 +239,9 @@ fn open(paths: [&PathBuf; 2], wanted: Option<&str>) -> anyhow::Result<[Open; 2]>
     if let Some(wanted) = wanted {
         let lacks = |(file, layers, _): &(ExrRows, Layers, Vec<String>)| {
             let has = layers.iter().any(|(name, _)| name == wanted);
-            (!has).then(|| (format!("{} (it has: {})", file.path().display(), names(layers)), is_plain(file)))
+            (!has).then(|| {
+                (format!("{} (it has: {})", file.path().display(), names(layers)), is_plain(file))
+            })
         };
         match (lacks(&actual), lacks(&expected)) {
             (Some((a, _)), Some((b, _))) => bail!("no layer \"{wanted}\" in {a} nor in {b}"),

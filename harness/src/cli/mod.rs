@@ -267,7 +267,9 @@ fn has_temporary_folder() -> anyhow::Result<()> {
         let named =
             if std::env::var_os("TMPDIR").is_some() { "TMPDIR" } else { "temporary folder" };
         let what = if folder.exists() { "not a folder" } else { "not there" };
-        return Err(MachineLacks(format!("{named} is {}, which is {what}", folder.display())).into());
+        return Err(
+            MachineLacks(format!("{named} is {}, which is {what}", folder.display())).into()
+        );
     }
     takes_files(&folder)
 }

@@ -129,20 +129,18 @@ impl Checks<'_> {
         Ok((width, height))
     }
 
-    /// Finds R, G and B of each layer.
+    /// Finds R, G and B of each layer. What cannot be a color image is ignored, with a note, where another layer can.
     pub(super) fn layers(
         &self,
         channels: &ChannelList,
         notes: &mut Vec<String>,
     ) -> Result<Channels, ImageError> {
         let all: Vec<String> = channels.list.iter().map(|c| c.name.to_string()).collect();
-        let find = |layer: &str, component: &str| {
-            all.iter().rposition(|name| split_channel(name) == (layer, component))
-        };
         let mut names: Vec<&str> = all.iter().map(|name| split_channel(name).0).collect();
         names.sort_unstable();
         names.dedup();
-        names.retain(|layer| RGB.iter().any(|c| find(layer, c).is_some()));
+        let is_in = |layer: &str, c: &str| all.iter().any(|name| split_channel(name) == (layer, c));
+        names.retain(|layer| RGB.iter().any(|c| is_in(layer, c)));
         if names.is_empty() {
             let of_luminance = |name: &String| ["Y", "RY", "BY", "A"].contains(&name.as_str());
             return Err(match all.iter().any(|name| name == "Y") && all.iter().all(of_luminance) {
@@ -151,27 +149,56 @@ impl Checks<'_> {
             });
         }
         let mut layers = Vec::with_capacity(names.len());
+        let mut ignored = Vec::new();
         for layer in names {
-            let mut found = [0; 3];
-            for (index, c) in found.iter_mut().zip(RGB) {
-                *index = find(layer, c).ok_or_else(|| {
-                    let full = if layer.is_empty() { c.to_owned() } else { format!("{layer}.{c}") };
-                    self.missing_channel(&full, &all)
-                })?;
+            match self.colors(layer, channels) {
+                Ok(found) => layers.push((layer.to_owned(), found)),
+                Err(error) => ignored.push((layer, error)),
             }
-            layers.push((layer.to_owned(), found));
         }
-        for (index, (channel, name)) in channels.list.iter().zip(&all).enumerate() {
-            let is_color = layers.iter().any(|(_, found)| found.contains(&index));
+        if layers.is_empty() && !ignored.is_empty() {
+            return Err(ignored.swap_remove(0).1);
+        }
+        for (index, name) in all.iter().enumerate() {
+            let (layer, component) = split_channel(name);
+            let of_ignored =
+                RGB.contains(&component) && ignored.iter().any(|(own, _)| *own == layer);
             // Subsampled channels have been refused with the header.
-            if is_color && channel.sample_type == SampleType::U32 {
-                return Err(self.integers(name));
-            }
-            if !is_color {
+            if !of_ignored && !layers.iter().any(|(_, found)| found.contains(&index)) {
                 notes.push(format!("channel {name} is ignored"));
             }
         }
+        for (layer, error) in ignored {
+            let layer = if layer.is_empty() { "without a name" } else { layer };
+            let why = match error {
+                ImageError::MissingChannel { channel, .. } => format!("no channel {channel}"),
+                ImageError::Unsupported { what, .. } => what,
+                other => other.to_string(),
+            };
+            notes.push(format!("layer {layer} is ignored: {why}"));
+        }
         Ok(layers)
+    }
+
+    /// The channels that hold R, G and B of a layer as floats.
+    pub(super) fn colors(
+        &self,
+        layer: &str,
+        channels: &ChannelList,
+    ) -> Result<[usize; 3], ImageError> {
+        let all: Vec<String> = channels.list.iter().map(|c| c.name.to_string()).collect();
+        let mut found = [0; 3];
+        for (index, c) in found.iter_mut().zip(RGB) {
+            let at = all.iter().rposition(|name| split_channel(name) == (layer, c));
+            *index = at.ok_or_else(|| {
+                let full = if layer.is_empty() { c.to_owned() } else { format!("{layer}.{c}") };
+                self.missing_channel(&full, &all)
+            })?;
+            if channels.list[*index].sample_type == SampleType::U32 {
+                return Err(self.integers(&all[*index]));
+            }
+        }
+        Ok(found)
     }
 
     pub(super) fn integers(&self, channel: &str) -> ImageError {

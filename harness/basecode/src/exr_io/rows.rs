@@ -1,6 +1,7 @@
 //! The pixels of a file, a few rows at a time, from several threads at once.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
@@ -138,7 +139,7 @@ impl<'a> ExrRows<'a> {
     /// reader may want to know about the file, such as channels of no layer.
     ///
     /// # Errors
-    /// When there is none, a layer lacks a channel, or one holds integers.
+    /// When there is none, because each lacks a channel or holds integers.
     pub fn layers(&self) -> Result<(Channels, Vec<String>), ImageError> {
         let mut notes = self.notes.clone();
         let layers = self.checks().layers(&self.header.channels, &mut notes)?;
@@ -185,9 +186,35 @@ impl<'a> ExrRows<'a> {
         })
     }
 
+    /// The whole image of plain R, G and B.
+    pub(super) fn image(&self) -> Result<Image, ImageError> {
+        let (layers, _) = self.layers()?;
+        let colors = self.checks().colors("", &self.header.channels);
+        let channels = colors.map_err(|error| match error {
+            ImageError::MissingChannel { path, channel, .. } if channel == "R" => {
+                let names: Vec<String> = layers.into_iter().map(|(name, _)| name).collect();
+                let found = format!("only the layers {}", names.join(", "));
+                ImageError::MissingChannel { path, channel, found }
+            }
+            other => other,
+        })?;
+        let mut read = self.whole(vec![(String::new(), channels)])?;
+        Ok(read.remove("").unwrap_or_default())
+    }
+
     /// The whole image of every layer.
     pub(super) fn images(&self) -> Result<ExrLayers, ImageError> {
         let (layers, notes) = self.layers()?;
+        Ok(ExrLayers {
+            layers: self.whole(layers)?,
+            chromaticities: self.chromaticities(),
+            attributes: provenance(&self.header),
+            notes,
+        })
+    }
+
+    /// The whole images of these layers.
+    fn whole(&self, layers: Channels) -> Result<BTreeMap<String, Image>, ImageError> {
         let channels: Vec<usize> = layers.iter().flat_map(|(_, found)| *found).collect();
         let mut images = vec![Image::new(self.width, self.height); layers.len()];
         let mut band = Band::default();
@@ -205,12 +232,7 @@ impl<'a> ExrRows<'a> {
                 }
             }
         }
-        Ok(ExrLayers {
-            layers: layers.into_iter().map(|(name, _)| name).zip(images).collect(),
-            chromaticities: self.chromaticities(),
-            attributes: provenance(&self.header),
-            notes,
-        })
+        Ok(layers.into_iter().map(|(name, _)| name).zip(images).collect())
     }
 
     fn checks(&self) -> Checks<'_> {
