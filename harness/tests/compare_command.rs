@@ -442,3 +442,19 @@ fn idiff_s_arguments_have_idiff_s_answers() {
     run("-q -od -o none.exr a.exr a.exr");
     assert!(!folder.path().join("none.exr").exists());
 }
+
+/// The files come from OpenImageIO 2.4.7, and so do the exit codes: `read_b44.exr` is `b44.exr` as it reads it.
+#[test]
+fn idiff_s_files_are_read() {
+    for (a, b, code) in [("uint_1.exr", "uint_1.exr", 0), ("uint_1.exr", "uint_2.exr", 2)] {
+        let (found, out, err) = compare(&[Path::new("--idiff"), &golden(a), &golden(b)]);
+        assert_eq!(found, code, "{a} {b}: {out}{err}");
+    }
+    for file in ["pxr24.exr", "b44.exr", "b44a.exr"] {
+        let read = format!("read_{file}");
+        let (found, out, err) = compare(&[&golden(file), &golden(&read)]);
+        assert_eq!(found, 0, "{file}: {out}{err}");
+        let (found, out, err) = compare(&[Path::new("--idiff"), &golden(file), &golden(&read)]);
+        assert_eq!(found, 0, "{file}: {out}{err}");
+    }
+}

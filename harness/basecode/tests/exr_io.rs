@@ -235,14 +235,14 @@ fn what_has_no_valid_form_is_not_written() {
 }
 
 #[test]
-fn every_lossless_coding_and_plain_tiles_are_read() {
+fn every_coding_but_dwa_and_plain_tiles_are_read() {
     let tiles = BlockDescription::Tiles(TileDescription {
         tile_size: Vec2(3, 2),
         level_mode: LevelMode::Singular,
         rounding_mode: RoundingMode::Down,
     });
-    use Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
-    for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ] {
+    use Compression::{B44, B44A, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
+    for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24, B44, B44A] {
         for blocks in [LINES, tiles] {
             let file = decode(&foreign(&BGR, compression, blocks, |_| ())).unwrap();
             assert_eq!(file.layers[""].pixels, vec![vec3(2.0, 1.0, 0.0); 12], "{compression}");
@@ -334,8 +334,14 @@ fn wrong_kinds_of_file_are_named() {
         matches!(missing, ImageError::Io { .. })
             && missing.to_string().contains("/nonexistent/a.exr")
     );
-    let lossy = message(&foreign(&BGR, Compression::B44, LINES, |_| ()));
-    assert_eq!(lossy, "submission.exr: b44 compression, expected none, RLE, ZIP or PIZ");
+    // What DWAA compresses is not read, so any bytes will do.
+    let at = [&b"compression\0compression\0"[..], &1u32.to_le_bytes()].concat();
+    let zip = foreign(&BGR, Compression::ZIP16, LINES, |_| ());
+    let lossy = message(&patched(zip, &at, 0, &[8]));
+    assert_eq!(
+        lossy,
+        "submission.exr: dwaa compression, expected none, RLE, ZIP, PIZ, PXR24 or B44"
+    );
     let mip = BlockDescription::Tiles(TileDescription {
         tile_size: Vec2(2, 2),
         level_mode: LevelMode::MipMap,
@@ -448,9 +454,9 @@ fn changed_bytes_never_panic() {
         level_mode: LevelMode::Singular,
         rounding_mode: RoundingMode::Down,
     });
-    use Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
+    use Compression::{B44, B44A, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
     let (mut accepted, mut refused) = (0, 0);
-    for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ] {
+    for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24, B44, B44A] {
         for blocks in [LINES, tiles] {
             let whole = foreign(&BGR, compression, blocks, |_| ());
             for at in 0..whole.len() {
@@ -492,7 +498,7 @@ fn a_block_stored_twice_is_refused() {
 /// Any rows of any channels, whatever the blocks; and from several threads at once.
 #[test]
 fn rows_are_read_from_anywhere() {
-    use Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
+    use Compression::{PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
     let (width, height) = (21, 75);
     let value = |channel: usize, x: usize, y: usize| (channel * 512 + y * 4 + x % 3) as f32;
     let tiles = BlockDescription::Tiles(TileDescription {
@@ -502,7 +508,7 @@ fn rows_are_read_from_anywhere() {
     });
     let kinds = [SampleType::F16, SampleType::F32, SampleType::F16, SampleType::F32];
     let folder = Folder::new("rows");
-    for (round, (compression, blocks)) in [Uncompressed, RLE, ZIP1, ZIP16, PIZ]
+    for (round, (compression, blocks)) in [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24]
         .into_iter()
         .flat_map(|compression| [LINES, tiles].map(|blocks| (compression, blocks)))
         .enumerate()

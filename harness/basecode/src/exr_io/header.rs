@@ -13,8 +13,9 @@ use super::{ImageError, MAX_PIXELS, MAX_SIDE};
 
 /// The most channels a file may hold.
 const MAX_CHANNELS: usize = 64;
-/// No codec of the format shrinks pixels more than deflate can: 1032 to 1 (zlib's technical notes).
-const MAX_COMPRESSION_RATIO: usize = 1032;
+/// No codec that is read shrinks pixels more: deflate 1032 to 1 (zlib's technical notes), after PXR24 has made three
+/// bytes of four.
+const MAX_COMPRESSION_RATIO: usize = 1376;
 
 /// The components of a color, in the order of an [`crate::Image`]'s pixels.
 const RGB: [&str; 3] = ["R", "G", "B"];
@@ -105,9 +106,13 @@ impl Checks<'_> {
                 )));
             }
         }
-        use Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
-        if !matches!(header.compression, Uncompressed | RLE | ZIP1 | ZIP16 | PIZ) {
-            return Err(self.unsupported(&header.compression.to_string(), "none, RLE, ZIP or PIZ"));
+        use Compression::{B44, B44A, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
+        if !matches!(
+            header.compression,
+            Uncompressed | RLE | ZIP1 | ZIP16 | PIZ | PXR24 | B44 | B44A
+        ) {
+            let found = header.compression.to_string();
+            return Err(self.unsupported(&found, "none, RLE, ZIP, PIZ, PXR24 or B44"));
         }
         if header.channels.list.len() > MAX_CHANNELS {
             return Err(

@@ -153,10 +153,11 @@ impl<'a> ExrRows<'a> {
         (BAND_BYTES / row.max(1)).max(1).next_multiple_of(block)
     }
 
-    /// Reads these rows of these channels (indices of [`ExrRows::channels`]) as 32-bit floats.
+    /// Reads these rows of these channels (indices of [`ExrRows::channels`]) as 32-bit floats; integers as a fraction of
+    /// the largest, as OpenImageIO does.
     ///
     /// # Errors
-    /// When a block is damaged, or a channel holds integers.
+    /// When a block is damaged.
     ///
     /// # Panics
     /// When a row or channel is not there.
@@ -169,11 +170,7 @@ impl<'a> ExrRows<'a> {
         assert!(rows.end <= self.height, "rows {rows:?} of an image {} high", self.height);
         band.width = self.width;
         band.planes.resize_with(channels.len(), Vec::new);
-        for (plane, &channel) in band.planes.iter_mut().zip(channels) {
-            let channel = &self.header.channels.list[channel];
-            if channel.sample_type == SampleType::U32 {
-                return Err(self.checks().integers(&channel.name.to_string()));
-            }
+        for plane in &mut band.planes {
             plane.resize(rows.len() * self.width, 0.0);
         }
         let first = self.blocks.partition_point(|block| block.rows().end <= rows.start);
@@ -292,9 +289,14 @@ impl<'a> ExrRows<'a> {
                             *value = from_half(u16::from_ne_bytes(*b));
                         }
                     }
-                    _ => {
+                    SampleType::F32 => {
                         for (value, b) in row.iter_mut().zip(from.as_chunks::<4>().0) {
                             *value = f32::from_ne_bytes(*b);
+                        }
+                    }
+                    SampleType::U32 => {
+                        for (value, b) in row.iter_mut().zip(from.as_chunks::<4>().0) {
+                            *value = u32::from_ne_bytes(*b) as f32 / u32::MAX as f32;
                         }
                     }
                 }
