@@ -458,3 +458,69 @@ fn idiff_s_files_are_read() {
         assert_eq!(found, 0, "{file}: {out}{err}");
     }
 }
+
+/// What a file calls its channels reaches a terminal as plain text, in one line.
+#[test]
+fn names_from_files_do_nothing_to_a_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
+            .current_dir(folder.path())
+            .args(arguments)
+            .output()
+            .unwrap();
+        let text = [run.stdout, run.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+        let acts = |c: char| c.is_control() && c != '\n';
+        assert!(!text.concat().contains(acts), "{arguments:?}: {text:?}");
+        text
+    };
+    let write = |file: &str, names: &[&str]| {
+        let channels: Vec<_> = names.iter().map(|name| (*name, vec![0.5; 4])).collect();
+        write_exr_channels(folder.path().join(file), 2, &channels).unwrap();
+    };
+    let (evil, shown) = ("x\u{1b}[2J\u{9b}31m\nPASS\r", "x\\u{1b}[2J\\u{9b}31m\\nPASS\\r");
+    let layer = ["R", "G", "B"].map(|c| format!("{evil}.{c}"));
+    let layer: Vec<&str> = layer.iter().map(String::as_str).collect();
+    write("plain.exr", &["R", "G", "B"]);
+    write("channel.exr", &["R", "G", "B", evil]);
+    write("layer.exr", &[&["R", "G", "B"][..], &layer].concat());
+    write("only.exr", &layer);
+    write("two.exr", &[&["a.R", "a.G", "a.B"][..], &layer].concat());
+    write("torn.exr", &[&["R", "G", "B"][..], &layer[..1]].concat());
+    write("none.exr", &layer[..1]);
+    let plain = "plain.exr";
+    for (arguments, expected) in [
+        (&["channel.exr", plain][..], format!("channel {shown} is ignored\n")),
+        (&["layer.exr", plain], format!("other layers are not compared: {shown} (--layer")),
+        (&["layer.exr", plain, "--layer", evil], format!("actual: layer {shown}\n")),
+        (&["only.exr", plain], format!("actual: layer {shown}\n")),
+        (&["two.exr", plain], format!("one of a, {shown}\n")),
+        (&["two.exr", plain, "--layer", "b"], format!("(it has: a, {shown})")),
+        (&["torn.exr", plain], format!("layer {shown} is ignored: no channel {shown}.G\n")),
+        (&["none.exr", plain], format!("no channel {shown}.G")),
+        (&["only.exr", plain, "--json"], "\"layer\": \"x\\u001b[2J\\u009b31m\\nPASS\\r\"".into()),
+        (
+            &["--idiff", "channel.exr", plain],
+            format!("channels differ: R, G, B, {shown} vs R, G, B\n"),
+        ),
+    ] {
+        let said = run(&[&["compare"], arguments].concat()).concat();
+        assert!(said.contains(&expected), "{arguments:?}: {said}\n{expected}");
+    }
+    let said = run(&["view", "channel.exr", "-o", "page"]).concat();
+    assert!(said.contains(&format!("channel {shown} is ignored\n")), "{said}");
+    // A path is the user's own; even so.
+    std::fs::copy(folder.path().join(plain), folder.path().join("p\u{1b}[2J.exr")).unwrap();
+    assert!(run(&["compare", "--idiff", "p\u{1b}[2J.exr", plain]).concat().contains("p\\u{1b}[2J"));
+
+    let scene = "\"key\\u001b[2J\" = 1\n[input]\nobjfile = \"s.obj\"\n[camera]\neye = [0.0, 1.0, 4.0]\n\
+                 at = [0.0, 0.0, 0.0]\nfov = 50.0\n[film]\nwidth = 4\nheight = 4\n";
+    let mesh = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\u{1b}[2J\nf 1 2 3\n";
+    for (file, text) in
+        [("s.toml", scene), ("s.obj", mesh), ("m.mtl", "newmtl b\u{1b}[2J\nillum 7\nKd 0 0 0\n")]
+    {
+        std::fs::write(folder.path().join(file), text).unwrap();
+    }
+    let said = run(&["render", "s.toml", "--plugin", "reference", "-o", "o.exr"]).concat();
+    assert!(said.contains("key\\u{1b}[2J") && said.contains("a\\u{1b}[2J"), "{said}");
+}

@@ -16,6 +16,7 @@ use basecode::exr_io::{ExrRows, REC_709};
 use basecode::{Image, Vec3};
 use serde::Serialize;
 
+use crate::harmless::{harmless, harmless_json};
 use crate::imaging::difference::{Count, Differences, Different, Odd};
 use crate::imaging::metrics::{Errors, Metrics};
 use crate::imaging::rows::{Channels, Row, visit_rows};
@@ -221,7 +222,7 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
         comparison.page = Some(super::view::write_page(folder, &images)?);
     }
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&comparison)?);
+        println!("{}", harmless_json(&comparison)?);
     } else {
         print!("{}", text::text(&comparison)?);
     }
@@ -265,8 +266,8 @@ fn names(layers: &[(String, [usize; 3])]) -> String {
     layers.iter().map(|(name, _)| shown(name)).collect::<Vec<_>>().join(", ")
 }
 
-fn shown(layer: &str) -> &str {
-    if layer.is_empty() { "plain R, G, B" } else { layer }
+fn shown(layer: &str) -> String {
+    if layer.is_empty() { "plain R, G, B".to_owned() } else { harmless(layer) }
 }
 
 impl Open {

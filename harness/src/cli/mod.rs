@@ -180,7 +180,7 @@ pub fn main() -> ExitCode {
         }
         let help = error.render();
         let help = if terminal::colours() { help.ansi().to_string() } else { help.to_string() };
-        print!("{}", wrapped(&help, terminal::width().min(HELP_COLUMNS)));
+        print_as_is!("{}", wrapped(&help, terminal::width().min(HELP_COLUMNS)));
         crate::output::end_of_closed_pipe();
         std::process::exit(i32::from(EXIT_OK))
     });
@@ -320,7 +320,7 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "umbra", &mut script);
-            print!("{}", String::from_utf8_lossy(&script));
+            print_as_is!("{}", String::from_utf8_lossy(&script));
             Ok(EXIT_OK)
         }
         Command::Bless(arguments) => bless::run(&arguments, root),

@@ -20,6 +20,15 @@ const MAX_COMPRESSION_RATIO: usize = 1376;
 /// The components of a color, in the order of an [`crate::Image`]'s pixels.
 const RGB: [&str; 3] = ["R", "G", "B"];
 
+/// A name as a message shows it: without characters that act on a terminal or end a line.
+pub(super) fn visible(name: &str) -> String {
+    let shown = |c: char| match c.is_control() {
+        true => c.escape_default().collect(),
+        false => String::from(c),
+    };
+    name.chars().map(shown).collect()
+}
+
 /// Splits `mean.R` into (`mean`, `R`) and `R` into (``, `R`): EXR's convention for layers.
 fn split_channel(name: &str) -> (&str, &str) {
     name.rsplit_once('.').unwrap_or(("", name))
@@ -170,11 +179,11 @@ impl Checks<'_> {
                 RGB.contains(&component) && ignored.iter().any(|(own, _)| *own == layer);
             // Subsampled channels have been refused with the header.
             if !of_ignored && !layers.iter().any(|(_, found)| found.contains(&index)) {
-                notes.push(format!("channel {name} is ignored"));
+                notes.push(format!("channel {} is ignored", visible(name)));
             }
         }
         for (layer, error) in ignored {
-            let layer = if layer.is_empty() { "without a name" } else { layer };
+            let layer = if layer.is_empty() { "without a name" } else { &visible(layer) };
             let why = match error {
                 ImageError::MissingChannel { channel, .. } => format!("no channel {channel}"),
                 ImageError::Unsupported { what, .. } => what,
@@ -207,7 +216,7 @@ impl Checks<'_> {
     }
 
     pub(super) fn integers(&self, channel: &str) -> ImageError {
-        self.unsupported(&format!("channel {channel} holds integers"), "half or float")
+        self.unsupported(&format!("channel {} holds integers", visible(channel)), "half or float")
     }
 
     /// What the decoder said of a place in the file.
@@ -248,8 +257,8 @@ impl Checks<'_> {
     fn missing_channel(&self, channel: &str, all: &[String]) -> ImageError {
         ImageError::MissingChannel {
             path: self.path.into(),
-            channel: channel.into(),
-            found: all.join(", "),
+            channel: visible(channel),
+            found: visible(&all.join(", ")),
         }
     }
 }

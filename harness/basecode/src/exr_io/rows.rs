@@ -17,7 +17,7 @@ use exr::meta::BlockDescription;
 use exr::meta::attribute::{IntegerBounds, SampleType};
 use exr::meta::header::Header;
 
-use super::header::{Channels, Checks, provenance};
+use super::header::{Channels, Checks, provenance, visible};
 use super::{ExrLayers, ImageError, MAX_FILE_BYTES, read_file};
 use crate::Vec3;
 use crate::image::Image;
@@ -190,7 +190,7 @@ impl<'a> ExrRows<'a> {
         let channels = colors.map_err(|error| match error {
             ImageError::MissingChannel { path, channel, .. } if channel == "R" => {
                 let names: Vec<String> = layers.into_iter().map(|(name, _)| name).collect();
-                let found = format!("only the layers {}", names.join(", "));
+                let found = format!("only the layers {}", visible(&names.join(", ")));
                 ImageError::MissingChannel { path, channel, found }
             }
             other => other,

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use basecode::exr_io::{ExrRows, write_exr_channels};
 
+use crate::harmless::harmless;
 use crate::imaging::rows::{Channels, Row, visit_rows};
 use crate::imaging::thresholds::{Limits, Tally};
 
@@ -180,7 +181,7 @@ fn compare(options: &Options) -> anyhow::Result<u8> {
     };
     let (names, names_b) = (names(&named_a), names(&named_b));
     if names != names_b {
-        let (names, names_b) = (names.join(", "), names_b.join(", "));
+        let [names, names_b] = [names, names_b].map(|names| harmless(&names.join(", ")));
         return different(FAILURE, format!("  channels differ: {names} vs {names_b}"));
     }
     let indices = [named_a, named_b].map(|named| named.iter().map(|(_, i)| *i).collect::<Vec<_>>());
@@ -262,7 +263,7 @@ fn report(
             println!(
                 "  Max error  = {} @ ({x}, {y}, {})  values are {a} vs {b}",
                 general(f64::from(largest.size), 6),
-                names[largest.channel]
+                harmless(&names[largest.channel])
             );
         }
         _ => println!("  Max error  = 0"),

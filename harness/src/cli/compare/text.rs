@@ -3,6 +3,7 @@
 use basecode::Vec3;
 
 use super::{Comparison, Difference, Pixels};
+use crate::harmless::harmless;
 
 /// All of it, line by line.
 pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
@@ -10,7 +11,7 @@ pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
     let mut out = String::new();
     for (name, side) in [("actual", &comparison.actual), ("expected", &comparison.expected)] {
         if !side.layer.is_empty() {
-            writeln!(out, "{name}: layer {}", side.layer)?;
+            writeln!(out, "{name}: layer {}", harmless(&side.layer))?;
         }
         for note in &side.notes {
             writeln!(out, "{name}: {note}")?;
