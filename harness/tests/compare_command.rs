@@ -189,6 +189,39 @@ fn json_is_json_alone() {
     assert_eq!(told.get("differing"), None);
 }
 
+/// A file system that refuses such a name has nothing to test.
+#[cfg(unix)]
+#[test]
+fn json_takes_any_file_name() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let a = file(&folder, "a.exr", &[]);
+    let odd = |name: &[u8]| folder.path().join(std::ffi::OsStr::from_bytes(name));
+    let own = odd(b"n\xff.exr");
+    if std::fs::copy(&a, &own).is_err() {
+        return;
+    }
+    let (pictures, page) = (odd(b"p\xff"), odd(b"h\xff"));
+    let arguments: [&Path; 7] = [
+        &own,
+        &a,
+        Path::new("--json"),
+        Path::new("--pictures"),
+        &pictures,
+        Path::new("--html"),
+        &page,
+    ];
+    let (code, out, said) = compare(&arguments);
+    assert_eq!(code, 0, "{said}");
+    let told: Value = serde_json::from_str(&out).unwrap();
+    assert!(told["actual"]["file"].as_str().unwrap().ends_with("n\u{fffd}.exr"), "{out}");
+    let mut written = told["pictures"].as_object().unwrap().keys();
+    assert!(
+        written.all(|name| name.contains("p\u{fffd}")) && pictures.join("actual.png").is_file()
+    );
+    assert!(told["page"].as_str().unwrap().contains("h\u{fffd}"), "{out}");
+}
+
 #[test]
 fn ssim_and_flip_come_only_when_asked_for() {
     let folder = tempfile::tempdir().unwrap();

@@ -67,7 +67,8 @@ pub struct CompareArguments {
 /// One of the two images.
 #[derive(Serialize)]
 struct Side {
-    file: PathBuf,
+    /// The path; a name that is not Unicode has U+FFFD in its place.
+    file: String,
     /// The layer; "" is plain R, G and B.
     layer: String,
     width: usize,
@@ -113,10 +114,10 @@ struct Comparison {
     #[serde(flatten)]
     values: Option<Values>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pictures: BTreeMap<PathBuf, String>,
+    pictures: BTreeMap<String, String>,
     /// The viewer's page.
     #[serde(skip_serializing_if = "Option::is_none")]
-    page: Option<PathBuf>,
+    page: Option<String>,
 }
 
 /// How the pixels of two images of one size differ.
@@ -219,7 +220,7 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
     }
     if let (Some(folder), Some([actual, expected])) = (&arguments.html, images) {
         let images = [("actual".to_owned(), actual), ("expected".to_owned(), expected)];
-        comparison.page = Some(super::view::write_page(folder, &images)?);
+        comparison.page = Some(super::view::write_page(folder, &images)?.display().to_string());
     }
     if arguments.json {
         println!("{}", harmless_json(&comparison)?);
@@ -305,7 +306,7 @@ impl Open {
         let pixels = |Count { count, first }| (count > 0).then_some(Pixels { count, first });
         let [width, height] = self.size();
         Side {
-            file: self.file.path().to_owned(),
+            file: self.file.path().display().to_string(),
             layer: self.layer.clone(),
             width,
             height,

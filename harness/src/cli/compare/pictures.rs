@@ -1,7 +1,7 @@
 //! Pictures of two images and of their difference.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use basecode::Image;
 
@@ -15,7 +15,7 @@ const FULL_SCALE: f32 = 0.1;
 pub(super) fn write(
     folder: &Path,
     [actual, expected]: &[Image; 2],
-) -> anyhow::Result<BTreeMap<PathBuf, String>> {
+) -> anyhow::Result<BTreeMap<String, String>> {
     std::fs::create_dir_all(folder)?;
     let scale = median(expected);
     let mask = RegionMask::background(actual.width, actual.height);
@@ -28,7 +28,7 @@ pub(super) fn write(
         let Some(picture) = picture else { continue };
         let file = folder.join(format!("{name}.png"));
         std::fs::write(&file, picture.png()?)?;
-        written.insert(file, picture.caption);
+        written.insert(file.display().to_string(), picture.caption);
     }
     Ok(written)
 }

@@ -31,7 +31,7 @@ pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
             [&comparison.actual, &comparison.expected].map(|side| (side.width, side.height));
         writeln!(out, "actual is {}x{} but expected is {}x{}", a.0, a.1, b.0, b.1)?;
         if let Some(page) = &comparison.page {
-            writeln!(out, "{}", page.display())?;
+            writeln!(out, "{page}")?;
         }
         return Ok(out);
     };
@@ -57,10 +57,10 @@ pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
         writeln!(out, "{}", serde_json::to_string_pretty(metrics)?)?;
     }
     for (file, caption) in &comparison.pictures {
-        writeln!(out, "{}: {caption}", file.display())?;
+        writeln!(out, "{file}: {caption}")?;
     }
     if let Some(page) = &comparison.page {
-        writeln!(out, "{}", page.display())?;
+        writeln!(out, "{page}")?;
     }
     Ok(out)
 }
