@@ -189,6 +189,20 @@ fn json_is_json_alone() {
     assert_eq!(told.get("differing"), None);
 }
 
+#[test]
+fn a_folder_for_pictures_that_cannot_be_made_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let a = file(&folder, "a.exr", &[]);
+    let there = folder.path().join("there");
+    let taken = there.join("expected.png");
+    std::fs::create_dir_all(&taken).unwrap();
+    for (given, named) in [(&a, &a), (&there, &taken), (&"/proc/x".into(), &"/proc/x".into())] {
+        let (code, out, said) = compare(&[&a, &a, Path::new("--pictures"), given]);
+        let expected = format!("umbra: cannot write to {}: ", named.display());
+        assert!(code == 2 && out.is_empty() && said.starts_with(&expected), "{out}{said}");
+    }
+}
+
 /// A file system that refuses such a name has nothing to test.
 #[cfg(unix)]
 #[test]

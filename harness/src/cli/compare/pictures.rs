@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use anyhow::Context;
 use basecode::Image;
 
 use crate::imaging::pictures::{signed_error, tone_mapped};
@@ -16,7 +17,8 @@ pub(super) fn write(
     folder: &Path,
     [actual, expected]: &[Image; 2],
 ) -> anyhow::Result<BTreeMap<String, String>> {
-    std::fs::create_dir_all(folder)?;
+    let cannot = |path: &Path| format!("cannot write to {}", path.display());
+    std::fs::create_dir_all(folder).with_context(|| cannot(folder))?;
     let scale = median(expected);
     let mask = RegionMask::background(actual.width, actual.height);
     let mut written = BTreeMap::new();
@@ -27,7 +29,7 @@ pub(super) fn write(
     ] {
         let Some(picture) = picture else { continue };
         let file = folder.join(format!("{name}.png"));
-        std::fs::write(&file, picture.png()?)?;
+        std::fs::write(&file, picture.png()?).with_context(|| cannot(&file))?;
         written.insert(file.display().to_string(), picture.caption);
     }
     Ok(written)
