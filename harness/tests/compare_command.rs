@@ -203,6 +203,22 @@ fn a_folder_for_pictures_that_cannot_be_made_is_named() {
     }
 }
 
+#[test]
+fn images_of_two_sizes_have_pictures_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let a = file(&folder, "a.exr", &[]);
+    let small = folder.path().join("small.exr");
+    write_exr(&small, &Image::new(1, 2), Precision::Half, &[]).unwrap();
+    let pictures = folder.path().join("pictures");
+    let (code, out, said) = compare(&[&a, &small, Path::new("--pictures"), &pictures]);
+    assert!(code == 1 && said.is_empty(), "{out}{said}");
+    let begins = "actual is 2x2 but expected is 1x2\nthere is no picture of the difference\n";
+    assert!(out.contains(begins) && out.contains("actual.png: "), "{out}");
+    for (name, is_there) in [("actual", true), ("expected", true), ("difference", false)] {
+        assert_eq!(pictures.join(format!("{name}.png")).is_file(), is_there, "{name}");
+    }
+}
+
 /// A file system that refuses such a name has nothing to test.
 #[cfg(unix)]
 #[test]

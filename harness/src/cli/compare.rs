@@ -49,7 +49,7 @@ pub struct CompareArguments {
     /// Print one JSON object and nothing else
     #[arg(long)]
     json: bool,
-    /// Write actual, expected and difference as PNG files into this folder
+    /// Write actual, expected and, of one size, their difference as PNG files into this folder
     #[arg(long, value_name = "DIR")]
     pictures: Option<PathBuf>,
     /// Write a page with a viewer of both images and their difference into this folder
@@ -215,7 +215,7 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
         pictures: BTreeMap::new(),
         page: None,
     };
-    if let (Some(folder), Some(images), true) = (&arguments.pictures, &images, same_size) {
+    if let (Some(folder), Some(images)) = (&arguments.pictures, &images) {
         comparison.pictures = pictures::write(folder, images)?;
     }
     if let (Some(folder), Some([actual, expected])) = (&arguments.html, images) {

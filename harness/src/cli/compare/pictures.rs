@@ -12,7 +12,7 @@ use crate::imaging::reference::RegionMask;
 /// The relative error that the difference picture shows in full color.
 const FULL_SCALE: f32 = 0.1;
 
-/// Writes the pictures and answers their files and captions.
+/// Writes the pictures, that of the difference when the sizes are the same, and answers their files and captions.
 pub(super) fn write(
     folder: &Path,
     [actual, expected]: &[Image; 2],
