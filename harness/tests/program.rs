@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use basecode::Image;
 use basecode::exr_io::{Precision, write_exr};
@@ -66,4 +66,55 @@ fn a_temporary_folder_that_is_not_there_is_named() {
     assert!(code == Some(3) && out.is_empty(), "{out}");
     assert!(said.starts_with("umbra: cannot write to /proc: "), "{said}");
     assert!(said.lines().count() == 1 && !said.contains("at path"), "{said}");
+}
+
+/// Words that a full disk swallows are an error, and under `--idiff` every error has idiff's code.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_cannot_be_printed_or_parsed_has_its_exit_code() {
+    let place = tempfile::tempdir().unwrap();
+    write_exr(place.path().join("a.exr"), &Image::new(2, 2), Precision::Float, &[]).unwrap();
+    let run = |line: &str, out: Stdio| {
+        let arguments = line.split(' ').filter(|argument| !argument.is_empty());
+        let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
+            .current_dir(place.path())
+            .args(arguments)
+            .stdout(out)
+            .output()
+            .unwrap();
+        (run.status.code(), String::from_utf8_lossy(&run.stderr).into_owned())
+    };
+    let full = || Stdio::from(fs::File::options().write(true).open("/dev/full").unwrap());
+    for (line, code) in [
+        ("--help", 3),
+        ("--version", 3),
+        ("help compare", 3),
+        ("compare --help", 3),
+        ("compare a.exr a.exr", 3),
+        ("completions bash", 3),
+        ("compare --idiff a.exr a.exr", 4),
+        ("compare a.exr a.exr --idiff", 4),
+        ("compare --idiff -help", 4),
+        ("--root . compare --idiff a.exr a.exr", 4),
+    ] {
+        let (found, said) = run(line, full());
+        assert_eq!(found, Some(code), "{line}: {said}");
+        assert!(said.starts_with("umbra: cannot write to standard output: "), "{line}: {said}");
+    }
+    for (line, code) in [
+        ("", 2),
+        ("--help", 0),
+        ("--version", 0),
+        ("compare --unknown a.exr a.exr", 2),
+        ("compare --json --idiff a.exr a.exr", 4),
+        ("compare --idiff=-fail 1 a.exr a.exr", 4),
+        ("compare --unknown --idiff a.exr a.exr", 4),
+        ("compare a.exr a.exr a.exr --idiff", 4),
+        ("compare --idiff", 4),
+        ("compare --idiff -q a.exr a.exr", 0),
+    ] {
+        let (found, said) = run(line, Stdio::null());
+        assert_eq!(found, Some(code), "{line}: {said}");
+        assert_eq!(said.is_empty(), code == 0, "{line}: {said}");
+    }
 }

@@ -162,6 +162,16 @@ struct Open {
     notes: Vec<String>,
 }
 
+/// The exit code of `--idiff` when a file, the command line or standard output cannot be used.
+pub const IDIFF_CANNOT: u8 = idiff::CANNOT;
+
+/// Whether the program's arguments ask for `umbra compare --idiff`.
+pub fn is_idiff(arguments: &[OsString]) -> bool {
+    let mut names = arguments.iter().map(|argument| argument.to_string_lossy());
+    names.any(|name| name == "compare")
+        && names.any(|name| name == "--idiff" || name.starts_with("--idiff="))
+}
+
 /// Prints where two images differ; exit 0 when they are equal, 1 when not. Without the scene's
 /// variance nothing more can be decided: `check` and `grade` decide, this only measures.
 pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {

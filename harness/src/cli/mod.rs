@@ -174,24 +174,28 @@ pub fn main() -> ExitCode {
         _ => {}
     }
     panics::note();
-    let Arguments { command, root } = Arguments::try_parse().unwrap_or_else(|error| {
-        if error.kind() != clap::error::ErrorKind::DisplayHelp {
-            error.exit()
+    // idiff's own codes leave no other for a failure.
+    let failed = |code| if compare::is_idiff(&args) { compare::IDIFF_CANNOT } else { code };
+    let ended = panics::contain(|| match Arguments::try_parse() {
+        Ok(Arguments { command, root }) => run(command, root.as_deref()),
+        Err(error) if error.use_stderr() => {
+            let _ = error.print();
+            Ok(failed(EXIT_USAGE))
         }
-        let help = error.render();
-        let help = if terminal::colours() { help.ansi().to_string() } else { help.to_string() };
-        print_as_is!("{}", wrapped(&help, terminal::width().min(HELP_COLUMNS)));
-        crate::output::end_of_closed_pipe();
-        std::process::exit(i32::from(EXIT_OK))
+        Err(error) => {
+            let text = error.render();
+            let text = if terminal::colours() { text.ansi().to_string() } else { text.to_string() };
+            print_as_is!("{}", wrapped(&text, terminal::width().min(HELP_COLUMNS)));
+            Ok(EXIT_OK)
+        }
     });
-    let ended = panics::contain(|| run(command, root.as_deref()));
     crate::output::end_of_closed_pipe();
     match ended {
         Ok(Ok(code)) => ExitCode::from(code),
         Err(bug) => match bug.unprintable() {
             Some(error) => {
                 eprintln!("umbra: cannot write to standard output: {error}");
-                ExitCode::from(EXIT_MACHINE)
+                ExitCode::from(failed(EXIT_MACHINE))
             }
             None => {
                 eprintln!("umbra: {BUG}");
@@ -200,7 +204,7 @@ pub fn main() -> ExitCode {
         },
         Ok(Err(error)) => {
             eprintln!("umbra: {}", told_once(&error));
-            ExitCode::from(if machine_lacks(&error) { EXIT_MACHINE } else { EXIT_USAGE })
+            ExitCode::from(failed(if machine_lacks(&error) { EXIT_MACHINE } else { EXIT_USAGE }))
         }
     }
 }

@@ -26,8 +26,8 @@ const WARNING: u8 = 1;
 const FAILURE: u8 = 2;
 /// They are not of one size.
 const OTHER_SIZE: u8 = 3;
-/// A file, or the command line, cannot be used.
-const CANNOT: u8 = 4;
+/// A file, the command line or standard output cannot be used.
+pub(super) const CANNOT: u8 = 4;
 
 const HELP: &str = "\
 Usage: umbra compare --idiff [options] image1 image2
@@ -45,7 +45,7 @@ As OpenImageIO's idiff, for EXR images (without -p, which is perceptual):
     -od                        ... only if there is a difference
     -abs, -scale FACTOR        ... of absolute values; multiplied
     -a                         Compare all parts: files have one
-Exit codes: 0 match, 1 warning, 2 failure, 3 other size, 4 a file cannot be used.
+Exit codes: 0 match, 1 warning, 2 failure, 3 other size, 4 a file cannot be used or written.
 ";
 
 /// The command line.
