@@ -502,6 +502,8 @@ fn idiff_s_arguments_have_idiff_s_answers() {
     run("-q -abs -scale 10 -o d.exr a.exr c.exr");
     let difference = read_exr(folder.path().join("d.exr")).unwrap();
     assert_eq!(difference.pixels[2..], [Vec3::new(0.0, 10.0, 0.0), Vec3::splat(2.5)]);
+    assert_eq!(run("-q -o D.EXR a.exr c.exr").0, 2);
+    assert_eq!(read_exr(folder.path().join("D.EXR")).unwrap().pixels[2].y, -1.0);
     run("-q -od -o none.exr a.exr a.exr");
     assert!(!folder.path().join("none.exr").exists());
 }

@@ -142,7 +142,9 @@ impl Options {
             bail!("expected two images, found {}\n{HELP}", options.images.len());
         }
         let output = options.output.as_deref();
-        if let Some(path) = output.filter(|path| path.extension().is_none_or(|end| end != "exr")) {
+        let is_exr =
+            |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("exr"));
+        if let Some(path) = output.filter(|path| !is_exr(path)) {
             bail!("{}: the difference image can only be an EXR file", path.display());
         }
         Ok(options)
