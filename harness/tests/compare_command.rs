@@ -68,6 +68,39 @@ fn equal_infinities_and_nan_are_equal_unless_told_otherwise() {
     assert!(code == 1 && said.contains("no pixel with finite values differs"), "{said}");
 }
 
+/// A difference of finite values is finite, even where no 32-bit float holds it.
+#[test]
+fn the_largest_of_finite_values_has_its_difference() {
+    let folder = tempfile::tempdir().unwrap();
+    let values = |sign: f32| {
+        [(0, 2e38), (1, 1e38), (2, 3e38), (3, 2.5e38)]
+            .map(|(i, value): (usize, f32)| (i, Vec3::new(0.5, sign * value, 0.5)))
+    };
+    let (a, b) = (file(&folder, "a.exr", &values(1.0)), file(&folder, "b.exr", &values(-1.0)));
+    let told = |a: &Path, b: &Path| -> Value {
+        let (code, out, said) = compare(&[a, b, Path::new("--json")]);
+        assert_eq!(code, 1, "{said}");
+        serde_json::from_str(&out).unwrap()
+    };
+    for told in [told(&a, &b), told(&b, &a)] {
+        for largest in [&told["largest"], &told["largest_finite"]] {
+            assert_eq!((&largest["x"], &largest["y"]), (&0.into(), &1.into()));
+            let difference = largest["difference"].as_f64().unwrap();
+            assert!((difference / 6e38 - 1.0).abs() < 1e-6, "{difference}");
+        }
+    }
+    let (_, said, _) = compare(&[&a, &b]);
+    assert!(said.contains("largest at (0, 1): ") && !said.contains("largest finite"), "{said}");
+    let (code, said, _) = compare(&[Path::new("--idiff"), &a, &b]);
+    assert!(code == 2 && said.contains("Mean error = 1.41667e+38"), "{said}");
+    assert!(said.contains("Max error  = inf @ (0, 0, G)") && !said.contains("NaN"), "{said}");
+    // Infinity still comes first.
+    let c = file(&folder, "c.exr", &[(3, Vec3::INFINITY)]);
+    let told = told(&c, &b);
+    assert_eq!((&told["largest"]["x"], &told["largest"]["difference"]), (&1.into(), &Value::Null));
+    assert_eq!(told["largest_finite"]["y"], 1);
+}
+
 #[test]
 fn what_is_not_compared_is_said() {
     let (zero, one, aces) = (golden("alpha_0.exr"), golden("alpha_1.exr"), golden("aces.exr"));
@@ -385,9 +418,9 @@ fn plain(a: &Image, b: &Image, nan_is_error: bool) -> String {
         }
         let Some(size) = size else { continue };
         found.differing += 1;
-        found.largest = larger(found.largest, size, i);
+        found.largest = larger(found.largest, size.into(), i);
         if size.is_finite() {
-            found.largest_finite = larger(found.largest_finite, size, i);
+            found.largest_finite = larger(found.largest_finite, size.into(), i);
         }
     }
     for kept in [&mut found.largest, &mut found.largest_finite].into_iter().flatten() {
@@ -396,7 +429,7 @@ fn plain(a: &Image, b: &Image, nan_is_error: bool) -> String {
     told(&odd, &found)
 }
 
-fn larger(kept: Option<Different>, size: f32, index: usize) -> Option<Different> {
+fn larger(kept: Option<Different>, size: f64, index: usize) -> Option<Different> {
     match kept {
         Some(kept) if kept.size >= size => Some(kept),
         _ => Some(Different { at: [index, 0], size, actual: [0.0; 3], expected: [0.0; 3] }),

@@ -99,7 +99,7 @@ struct Difference {
     #[serde(serialize_with = "any_float")]
     expected: [f32; 3],
     /// Of the channel that differs most; none where a value is not finite.
-    difference: Option<f32>,
+    difference: Option<f64>,
 }
 
 /// The report on two images.
@@ -382,7 +382,10 @@ fn primaries([red, green, blue, white]: &[[f32; 2]; 4]) -> String {
 impl From<Different> for Difference {
     fn from(found: Different) -> Self {
         let Different { at: [x, y], size, actual, expected } = found;
-        Self { x, y, actual, expected, difference: Some(size).filter(|size| size.is_finite()) }
+        // As short as the values are, where 32 bits hold it.
+        let short = (size as f32).to_string().parse().ok().filter(|short: &f64| short.is_finite());
+        let difference = Some(short.unwrap_or(size)).filter(|size| size.is_finite());
+        Self { x, y, actual, expected, difference }
     }
 }
 
