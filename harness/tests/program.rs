@@ -118,3 +118,24 @@ fn what_cannot_be_printed_or_parsed_has_its_exit_code() {
         assert_eq!(said.is_empty(), code == 0, "{line}: {said}");
     }
 }
+
+/// A graphics driver prints an error of its own for a desktop's folder that is not there; the rows say all there is.
+#[cfg(target_os = "linux")]
+#[test]
+fn doctor_prints_nothing_among_its_rows() {
+    let run = |folder: Option<&str>| {
+        let mut doctor = Command::new(env!("CARGO_BIN_EXE_umbra"));
+        match folder {
+            Some(folder) => doctor.env("XDG_RUNTIME_DIR", folder),
+            None => doctor.env_remove("XDG_RUNTIME_DIR"),
+        };
+        let run = doctor.arg("doctor").output().unwrap();
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (run.status.code(), text(&run.stdout), text(&run.stderr))
+    };
+    let (code, rows, _) = run(Some("/"));
+    assert!(rows.contains("graphics adapters"), "{rows}");
+    for folder in [None, Some(""), Some("not/absolute"), Some("/"), Some("/nonexistent")] {
+        assert_eq!(run(folder), (code, rows.clone(), String::new()), "{folder:?}");
+    }
+}
