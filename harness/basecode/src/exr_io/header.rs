@@ -183,7 +183,7 @@ impl Checks<'_> {
             }
         }
         for (layer, error) in ignored {
-            let layer = if layer.is_empty() { "without a name" } else { &visible(layer) };
+            let layer = if layer.is_empty() { "without a name".to_owned() } else { visible(layer) };
             let why = match error {
                 ImageError::MissingChannel { channel, .. } => format!("no channel {channel}"),
                 ImageError::Unsupported { what, .. } => what,
