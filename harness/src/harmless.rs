@@ -7,10 +7,33 @@
 /// Applying it twice changes nothing. What a format gives a meaning to (`<`, `=`) stays: escaping
 /// that is the format's own task.
 pub fn harmless(text: &str) -> String {
+    escaped(text, is_harmful, |c, out| out.extend(escape(c)))
+}
+
+/// Text of several lines that may hold names and values from files: [`harmless`] but for line ends
+/// and tabs. All output passes through here; a name on a line of its own is [`harmless`] before.
+pub(crate) fn harmless_output(text: &str) -> String {
+    let acts = |c| is_harmful(c) && !matches!(c, '\n' | '\t');
+    escaped(text, acts, |c, out| out.extend(escape(c)))
+}
+
+/// A value as JSON that is harmless and loses nothing: JSON has escapes of its own.
+pub(crate) fn harmless_json(value: &impl serde::Serialize) -> serde_json::Result<String> {
+    let text = serde_json::to_string_pretty(value)?;
+    let acts = |c| is_harmful(c) && c != '\n';
+    Ok(escaped(&text, acts, |c, out| {
+        for unit in c.encode_utf16(&mut [0; 2]) {
+            out.push_str(&format!("\\u{unit:04x}"));
+        }
+    }))
+}
+
+/// The text with each character that acts as `escape` writes it.
+fn escaped(text: &str, acts: impl Fn(char) -> bool, escape: impl Fn(char, &mut String)) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
-        if is_harmful(c) {
-            out.extend(escape(c));
+        if acts(c) {
+            escape(c, &mut out);
         } else {
             out.push(c);
         }
@@ -125,6 +148,15 @@ mod tests {
             assert_eq!(harmless(text), expected);
             assert_eq!(harmless(expected), expected);
         }
+    }
+
+    #[test]
+    fn json_stays_json_and_the_same() {
+        let names = ["a\u{1b}[2J", "\u{9b}", "\u{202e}\u{e0041}", "\n\t\"\\"];
+        let json = harmless_json(&names).unwrap();
+        assert!(!json.chars().any(|c| is_harmful(c) && c != '\n'), "{json}");
+        assert_eq!(serde_json::from_str::<Vec<String>>(&json).unwrap(), names);
+        assert_eq!(harmless_output("a\n\tb\u{1b}[2J\r\n"), "a\n\tb\\u{1b}[2J\\r\n");
     }
 
     #[test]

@@ -2,20 +2,31 @@
 //! all other work goes on, so that no report is lost. [`end_of_closed_pipe`] then ends the program like any other that
 //! writes into a closed pipe.
 //!
-//! The macros take the place of the standard library's, which panic.
+//! The macros take the place of the standard library's, which panic. What they print is harmless to a terminal, whatever
+//! names it holds; only `print_as_is!` prints sequences that mean something to one.
 
 use std::fmt;
 use std::io::{ErrorKind, Write as _};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::harmless::harmless_output;
+
 /// Whether nobody reads standard output any more.
 static CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// Prints to standard output, made harmless.
+///
+/// # Panics
+/// As [`print_as_is`].
+pub fn print(text: fmt::Arguments) {
+    print_as_is(format_args!("{}", harmless_output(&text.to_string())));
+}
 
 /// Prints to standard output.
 ///
 /// # Panics
 /// When writing fails for another reason than a closed pipe; `Bug::unprintable` recognizes the message.
-pub fn print(text: fmt::Arguments) {
+pub fn print_as_is(text: fmt::Arguments) {
     if CLOSED.load(Ordering::Relaxed) {
         return;
     }
@@ -28,9 +39,10 @@ pub fn print(text: fmt::Arguments) {
     }
 }
 
-/// Prints to standard error, where that can be written.
+/// Prints to standard error, made harmless, where that can be written.
 pub fn eprint(text: fmt::Arguments) {
-    let _ = std::io::stderr().lock().write_fmt(text);
+    let text = harmless_output(&text.to_string());
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
 /// Ends the program by the signal of a closed pipe, if standard output was one.
@@ -46,6 +58,9 @@ pub fn end_of_closed_pipe() {
 
 macro_rules! print {
     ($($text:tt)*) => { $crate::output::print(format_args!($($text)*)) };
+}
+macro_rules! print_as_is {
+    ($($text:tt)*) => { $crate::output::print_as_is(format_args!($($text)*)) };
 }
 macro_rules! println {
     () => { $crate::output::print(format_args!("\n")) };

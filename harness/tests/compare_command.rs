@@ -68,6 +68,39 @@ fn equal_infinities_and_nan_are_equal_unless_told_otherwise() {
     assert!(code == 1 && said.contains("no pixel with finite values differs"), "{said}");
 }
 
+/// A difference of finite values is finite, even where no 32-bit float holds it.
+#[test]
+fn the_largest_of_finite_values_has_its_difference() {
+    let folder = tempfile::tempdir().unwrap();
+    let values = |sign: f32| {
+        [(0, 2e38), (1, 1e38), (2, 3e38), (3, 2.5e38)]
+            .map(|(i, value): (usize, f32)| (i, Vec3::new(0.5, sign * value, 0.5)))
+    };
+    let (a, b) = (file(&folder, "a.exr", &values(1.0)), file(&folder, "b.exr", &values(-1.0)));
+    let told = |a: &Path, b: &Path| -> Value {
+        let (code, out, said) = compare(&[a, b, Path::new("--json")]);
+        assert_eq!(code, 1, "{said}");
+        serde_json::from_str(&out).unwrap()
+    };
+    for told in [told(&a, &b), told(&b, &a)] {
+        for largest in [&told["largest"], &told["largest_finite"]] {
+            assert_eq!((&largest["x"], &largest["y"]), (&0.into(), &1.into()));
+            let difference = largest["difference"].as_f64().unwrap();
+            assert!((difference / 6e38 - 1.0).abs() < 1e-6, "{difference}");
+        }
+    }
+    let (_, said, _) = compare(&[&a, &b]);
+    assert!(said.contains("largest at (0, 1): ") && !said.contains("largest finite"), "{said}");
+    let (code, said, _) = compare(&[Path::new("--idiff"), &a, &b]);
+    assert!(code == 2 && said.contains("Mean error = 1.41667e+38"), "{said}");
+    assert!(said.contains("Max error  = inf @ (0, 0, G)") && !said.contains("NaN"), "{said}");
+    // Infinity still comes first.
+    let c = file(&folder, "c.exr", &[(3, Vec3::INFINITY)]);
+    let told = told(&c, &b);
+    assert_eq!((&told["largest"]["x"], &told["largest"]["difference"]), (&1.into(), &Value::Null));
+    assert_eq!(told["largest_finite"]["y"], 1);
+}
+
 #[test]
 fn what_is_not_compared_is_said() {
     let (zero, one, aces) = (golden("alpha_0.exr"), golden("alpha_1.exr"), golden("aces.exr"));
@@ -124,6 +157,29 @@ fn layers_are_chosen_by_name() {
         code == 2 && said.contains("no layer \"none\"") && said.contains("mean, variance"),
         "{said}"
     );
+
+    // A file that has layers, but not this one, is not taken for it, whichever file comes first.
+    let other = write("other.exr", &[("", 0.5), ("spec", 0.5)]);
+    let torn = folder.path().join("torn.exr");
+    let channels = ["R", "G", "B", "left.R"].map(|name| (name, vec![0.5]));
+    write_exr_channels(&torn, 1, &channels).unwrap();
+    for (lacking, has) in
+        [(&other, "plain R, G, B, spec"), (&single, "raw"), (&torn, "plain R, G, B")]
+    {
+        for [a, b] in [[&stereo, lacking], [lacking, &stereo]] {
+            let (code, out, said) = layer(a, b, "left");
+            let file = lacking.file_name().unwrap().to_string_lossy();
+            let expected = format!("{file} (it has: {has})\n");
+            assert!(code == 2 && out.is_empty(), "{out}{said}");
+            assert!(said.starts_with("umbra: no layer \"left\" in "), "{said}");
+            assert!(said.ends_with(&expected), "{said}");
+        }
+    }
+    // Plain channels beside R, G and B make no layer.
+    let depth = folder.path().join("depth.exr");
+    let channels = ["R", "G", "B", "Z"].map(|name| (name, vec![0.75]));
+    write_exr_channels(&depth, 1, &channels).unwrap();
+    assert_eq!(layer(&stereo, &depth, "left").0, 0);
 }
 
 #[test]
@@ -164,6 +220,69 @@ fn json_is_json_alone() {
     let (code, told) = json(&[&small, &b]);
     assert_eq!((code, &told["equal"], &told["actual"]["width"]), (1, &false.into(), &1.into()));
     assert_eq!(told.get("differing"), None);
+}
+
+#[test]
+fn a_folder_for_pictures_that_cannot_be_made_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let a = file(&folder, "a.exr", &[]);
+    let there = folder.path().join("there");
+    let taken = there.join("expected.png");
+    std::fs::create_dir_all(&taken).unwrap();
+    for (given, named) in [(&a, &a), (&there, &taken), (&"/proc/x".into(), &"/proc/x".into())] {
+        let (code, out, said) = compare(&[&a, &a, Path::new("--pictures"), given]);
+        let expected = format!("umbra: cannot write to {}: ", named.display());
+        assert!(code == 2 && out.is_empty() && said.starts_with(&expected), "{out}{said}");
+    }
+}
+
+#[test]
+fn images_of_two_sizes_have_pictures_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let a = file(&folder, "a.exr", &[]);
+    let small = folder.path().join("small.exr");
+    write_exr(&small, &Image::new(1, 2), Precision::Half, &[]).unwrap();
+    let pictures = folder.path().join("pictures");
+    let (code, out, said) = compare(&[&a, &small, Path::new("--pictures"), &pictures]);
+    assert!(code == 1 && said.is_empty(), "{out}{said}");
+    let begins = "actual is 2x2 but expected is 1x2\nthere is no picture of the difference\n";
+    assert!(out.contains(begins) && out.contains("actual.png: "), "{out}");
+    for (name, is_there) in [("actual", true), ("expected", true), ("difference", false)] {
+        assert_eq!(pictures.join(format!("{name}.png")).is_file(), is_there, "{name}");
+    }
+}
+
+/// A file system that refuses such a name has nothing to test.
+#[cfg(unix)]
+#[test]
+fn json_takes_any_file_name() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let a = file(&folder, "a.exr", &[]);
+    let odd = |name: &[u8]| folder.path().join(std::ffi::OsStr::from_bytes(name));
+    let own = odd(b"n\xff.exr");
+    if std::fs::copy(&a, &own).is_err() {
+        return;
+    }
+    let (pictures, page) = (odd(b"p\xff"), odd(b"h\xff"));
+    let arguments: [&Path; 7] = [
+        &own,
+        &a,
+        Path::new("--json"),
+        Path::new("--pictures"),
+        &pictures,
+        Path::new("--html"),
+        &page,
+    ];
+    let (code, out, said) = compare(&arguments);
+    assert_eq!(code, 0, "{said}");
+    let told: Value = serde_json::from_str(&out).unwrap();
+    assert!(told["actual"]["file"].as_str().unwrap().ends_with("n\u{fffd}.exr"), "{out}");
+    let mut written = told["pictures"].as_object().unwrap().keys();
+    assert!(
+        written.all(|name| name.contains("p\u{fffd}")) && pictures.join("actual.png").is_file()
+    );
+    assert!(told["page"].as_str().unwrap().contains("h\u{fffd}"), "{out}");
 }
 
 #[test]
@@ -299,9 +418,9 @@ fn plain(a: &Image, b: &Image, nan_is_error: bool) -> String {
         }
         let Some(size) = size else { continue };
         found.differing += 1;
-        found.largest = larger(found.largest, size, i);
+        found.largest = larger(found.largest, size.into(), i);
         if size.is_finite() {
-            found.largest_finite = larger(found.largest_finite, size, i);
+            found.largest_finite = larger(found.largest_finite, size.into(), i);
         }
     }
     for kept in [&mut found.largest, &mut found.largest_finite].into_iter().flatten() {
@@ -310,11 +429,23 @@ fn plain(a: &Image, b: &Image, nan_is_error: bool) -> String {
     told(&odd, &found)
 }
 
-fn larger(kept: Option<Different>, size: f32, index: usize) -> Option<Different> {
+fn larger(kept: Option<Different>, size: f64, index: usize) -> Option<Different> {
     match kept {
         Some(kept) if kept.size >= size => Some(kept),
         _ => Some(Different { at: [index, 0], size, actual: [0.0; 3], expected: [0.0; 3] }),
     }
+}
+
+/// A copy of a file whose two windows begin one column further right.
+fn moved(from: &Path, to: &Path) {
+    let mut bytes = std::fs::read(from).unwrap();
+    for window in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+        let at = bytes.windows(window.len()).position(|own| own == window).unwrap();
+        let corners = &mut bytes[at + window.len() + 4..][..16];
+        corners[0] += 1;
+        corners[8] += 1;
+    }
+    std::fs::write(to, bytes).unwrap();
 }
 
 /// Exit codes and words of idiff 2.4.7 on these images, but for what `docs/reference/compare.md` excepts.
@@ -330,6 +461,7 @@ fn idiff_s_arguments_have_idiff_s_answers() {
     file(&folder, "minus.exr", &[(0, Vec3::NEG_INFINITY)]);
     write_exr(folder.path().join("small.exr"), &Image::new(2, 1), Precision::Float, &[]).unwrap();
     write_exr_channels(folder.path().join("xyz.exr"), 2, &[("X", vec![0.5; 4])]).unwrap();
+    moved(&folder.path().join("a.exr"), &folder.path().join("right.exr"));
     let run = |line: &str| {
         let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
             .current_dir(folder.path())
@@ -365,12 +497,26 @@ fn idiff_s_arguments_have_idiff_s_answers() {
         ("inf.exr minus.exr", 2),
         ("nan.exr inf.exr", 2),
         ("-fail 1e30 a.exr inf.exr", 2),
-        ("-fail 0.3 -warn 0.1 a.exr b.exr", 1),
-        ("-fail 0.3 -hardfail 0.1 a.exr b.exr", 2),
+        // No pixel is above -fail: nothing else counts.
+        ("-fail 0.3 -warn 0.1 a.exr b.exr", 0),
+        ("-fail 0.3 -hardfail 0.1 a.exr b.exr", 0),
+        ("-fail 0.3 -hardwarn 1000 a.exr b.exr", 0),
+        ("-fail 0.3 -warnrelative 0 a.exr b.exr", 0),
+        ("-failrelative 0.41 -warnpercent 1 a.exr b.exr", 0),
+        ("-hardfail -1 -warnpercent -1 a.exr a.exr", 0),
+        ("-allowfailures 1 -hardfail 0.1 -hardwarn 0.1 a.exr b.exr", 0),
+        ("-allowfailures -1 a.exr b.exr", 0),
+        ("-failpercent 25 -hardwarn 0.1 -warnpercent 25 a.exr b.exr", 1),
         ("a.exr xyz.exr", 2),
         ("a.exr small.exr", 3),
+        ("right.exr right.exr", 0),
+        ("right.exr a.exr", 2),
+        ("a.exr right.exr", 2),
+        // idiff passes this one.
+        ("-fail 1 a.exr right.exr", 2),
         ("a.exr none.exr", 4),
         ("-fail much a.exr b.exr", 4),
+        ("-allowfailures 1.7 a.exr b.exr", 4),
         ("-unknown a.exr b.exr", 4),
         ("a.exr", 4),
         ("-o d.png a.exr b.exr", 4),
@@ -389,6 +535,90 @@ fn idiff_s_arguments_have_idiff_s_answers() {
     run("-q -abs -scale 10 -o d.exr a.exr c.exr");
     let difference = read_exr(folder.path().join("d.exr")).unwrap();
     assert_eq!(difference.pixels[2..], [Vec3::new(0.0, 10.0, 0.0), Vec3::splat(2.5)]);
+    assert_eq!(run("-q -o D.EXR a.exr c.exr").0, 2);
+    assert_eq!(read_exr(folder.path().join("D.EXR")).unwrap().pixels[2].y, -1.0);
     run("-q -od -o none.exr a.exr a.exr");
     assert!(!folder.path().join("none.exr").exists());
+}
+
+/// The files come from OpenImageIO 2.4.7, and so do the exit codes: `read_b44.exr` is `b44.exr` as it reads it.
+#[test]
+fn idiff_s_files_are_read() {
+    for (a, b, code) in [("uint_1.exr", "uint_1.exr", 0), ("uint_1.exr", "uint_2.exr", 2)] {
+        let (found, out, err) = compare(&[Path::new("--idiff"), &golden(a), &golden(b)]);
+        assert_eq!(found, code, "{a} {b}: {out}{err}");
+    }
+    for file in ["pxr24.exr", "b44.exr", "b44a.exr"] {
+        let read = format!("read_{file}");
+        let (found, out, err) = compare(&[&golden(file), &golden(&read)]);
+        assert_eq!(found, 0, "{file}: {out}{err}");
+        let (found, out, err) = compare(&[Path::new("--idiff"), &golden(file), &golden(&read)]);
+        assert_eq!(found, 0, "{file}: {out}{err}");
+    }
+}
+
+/// What a file calls its channels reaches a terminal as plain text, in one line.
+#[test]
+fn names_from_files_do_nothing_to_a_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
+            .current_dir(folder.path())
+            .args(arguments)
+            .output()
+            .unwrap();
+        let text = [run.stdout, run.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+        let acts = |c: char| c.is_control() && c != '\n';
+        assert!(!text.concat().contains(acts), "{arguments:?}: {text:?}");
+        text
+    };
+    let write = |file: &str, names: &[&str]| {
+        let channels: Vec<_> = names.iter().map(|name| (*name, vec![0.5; 4])).collect();
+        write_exr_channels(folder.path().join(file), 2, &channels).unwrap();
+    };
+    let (evil, shown) = ("x\u{1b}[2J\u{9b}31m\nPASS\r", "x\\u{1b}[2J\\u{9b}31m\\nPASS\\r");
+    let layer = ["R", "G", "B"].map(|c| format!("{evil}.{c}"));
+    let layer: Vec<&str> = layer.iter().map(String::as_str).collect();
+    write("plain.exr", &["R", "G", "B"]);
+    write("channel.exr", &["R", "G", "B", evil]);
+    write("layer.exr", &[&["R", "G", "B"][..], &layer].concat());
+    write("only.exr", &layer);
+    write("two.exr", &[&["a.R", "a.G", "a.B"][..], &layer].concat());
+    write("torn.exr", &[&["R", "G", "B"][..], &layer[..1]].concat());
+    write("none.exr", &layer[..1]);
+    let plain = "plain.exr";
+    for (arguments, expected) in [
+        (&["channel.exr", plain][..], format!("channel {shown} is ignored\n")),
+        (&["layer.exr", plain], format!("other layers are not compared: {shown} (--layer")),
+        (&["layer.exr", plain, "--layer", evil], format!("actual: layer {shown}\n")),
+        (&["only.exr", plain], format!("actual: layer {shown}\n")),
+        (&["two.exr", plain], format!("one of a, {shown}\n")),
+        (&["two.exr", plain, "--layer", "b"], format!("(it has: a, {shown})")),
+        (&["torn.exr", plain], format!("layer {shown} is ignored: no channel {shown}.G\n")),
+        (&["none.exr", plain], format!("no channel {shown}.G")),
+        (&["only.exr", plain, "--json"], "\"layer\": \"x\\u001b[2J\\u009b31m\\nPASS\\r\"".into()),
+        (
+            &["--idiff", "channel.exr", plain],
+            format!("channels differ: R, G, B, {shown} vs R, G, B\n"),
+        ),
+    ] {
+        let said = run(&[&["compare"], arguments].concat()).concat();
+        assert!(said.contains(&expected), "{arguments:?}: {said}\n{expected}");
+    }
+    let said = run(&["view", "channel.exr", "-o", "page"]).concat();
+    assert!(said.contains(&format!("channel {shown} is ignored\n")), "{said}");
+    // A path is the user's own; even so.
+    std::fs::copy(folder.path().join(plain), folder.path().join("p\u{1b}[2J.exr")).unwrap();
+    assert!(run(&["compare", "--idiff", "p\u{1b}[2J.exr", plain]).concat().contains("p\\u{1b}[2J"));
+
+    let scene = "\"key\\u001b[2J\" = 1\n[input]\nobjfile = \"s.obj\"\n[camera]\neye = [0.0, 1.0, 4.0]\n\
+                 at = [0.0, 0.0, 0.0]\nfov = 50.0\n[film]\nwidth = 4\nheight = 4\n";
+    let mesh = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\u{1b}[2J\nf 1 2 3\n";
+    for (file, text) in
+        [("s.toml", scene), ("s.obj", mesh), ("m.mtl", "newmtl b\u{1b}[2J\nillum 7\nKd 0 0 0\n")]
+    {
+        std::fs::write(folder.path().join(file), text).unwrap();
+    }
+    let said = run(&["render", "s.toml", "--plugin", "reference", "-o", "o.exr"]).concat();
+    assert!(said.contains("key\\u{1b}[2J") && said.contains("a\\u{1b}[2J"), "{said}");
 }

@@ -150,8 +150,7 @@ pub const REC_709: [[f32; 2]; 4] = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3
 /// # Errors
 /// See [`ImageError`]; nothing that a file can hold makes this panic.
 pub fn read_exr(path: impl AsRef<Path>) -> Result<Image, ImageError> {
-    let path = path.as_ref();
-    single_layer(read_exr_layers(path)?, path)
+    ExrRows::open(path)?.image()
 }
 
 /// Reads every layer of an EXR file that has R, G and B.
@@ -216,18 +215,6 @@ pub fn write_exr_channels(
 /// See [`ImageError`]; no bytes make this panic, and memory stays within a fixed multiple of their number.
 pub fn decode_exr(bytes: &[u8], path: &Path) -> Result<ExrLayers, ImageError> {
     ExrRows::of_bytes(bytes, path)?.images()
-}
-
-/// The unnamed layer of a decoded file.
-fn single_layer(mut content: ExrLayers, path: &Path) -> Result<Image, ImageError> {
-    content.layers.remove("").ok_or_else(|| ImageError::MissingChannel {
-        path: path.into(),
-        channel: "R".into(),
-        found: format!(
-            "only the layers {}",
-            content.layers.keys().cloned().collect::<Vec<_>>().join(", ")
-        ),
-    })
 }
 
 fn read_file(file: std::fs::File, path: &Path) -> Result<Vec<u8>, ImageError> {

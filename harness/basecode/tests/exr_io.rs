@@ -235,14 +235,14 @@ fn what_has_no_valid_form_is_not_written() {
 }
 
 #[test]
-fn every_lossless_coding_and_plain_tiles_are_read() {
+fn every_coding_but_dwa_and_plain_tiles_are_read() {
     let tiles = BlockDescription::Tiles(TileDescription {
         tile_size: Vec2(3, 2),
         level_mode: LevelMode::Singular,
         rounding_mode: RoundingMode::Down,
     });
-    use Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
-    for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ] {
+    use Compression::{B44, B44A, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
+    for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24, B44, B44A] {
         for blocks in [LINES, tiles] {
             let file = decode(&foreign(&BGR, compression, blocks, |_| ())).unwrap();
             assert_eq!(file.layers[""].pixels, vec![vec3(2.0, 1.0, 0.0); 12], "{compression}");
@@ -266,6 +266,46 @@ fn other_channels_are_ignored_with_a_note() {
     let file = decode(&foreign(&channels, Compression::ZIP16, LINES, |_| ())).unwrap();
     assert_eq!(file.notes, ["channel A is ignored", "channel Z is ignored"]);
     assert_eq!(file.layers[""].pixels, vec![vec3(3.0, 2.0, 1.0); 12]);
+}
+
+/// A layer that is no color image keeps nobody from those that are.
+#[test]
+fn incomplete_and_integer_layers_are_ignored_with_a_note() {
+    let (half, whole) = (SampleType::F16, SampleType::U32);
+    let file = |more: &[(&str, SampleType)]| {
+        let mut channels = [&BGR[..], more].concat();
+        channels.sort_by(|a, b| a.0.cmp(b.0));
+        foreign(&channels, Compression::ZIP16, LINES, |_| ())
+    };
+    for (more, notes) in [
+        (
+            &[("motion.G", half), ("motion.R", half)][..],
+            &["layer motion is ignored: no channel motion.B"][..],
+        ),
+        (&[("mask.R", half)], &["layer mask is ignored: no channel mask.G"]),
+        (&[("mask.R", whole)], &["layer mask is ignored: channel mask.R holds integers"]),
+        (
+            &[("id.B", whole), ("id.G", whole), ("id.R", whole), ("id.X", half)],
+            &["channel id.X is ignored", "layer id is ignored: channel id.R holds integers"],
+        ),
+        (&[("a.b.G", half)], &["layer a.b is ignored: no channel a.b.R"]),
+    ] {
+        let read = decode(&file(more)).unwrap();
+        assert_eq!(read.notes, notes);
+        assert_eq!(read.layers.keys().collect::<Vec<_>>(), [""]);
+        let first = read.layers[""].pixels[0];
+        assert_eq!((first.y - first.z, first.x - first.y), (1.0, 1.0), "B, G, R count up");
+    }
+    // Plain channels are a layer like others; who wants those alone is told what they lack.
+    let channels = [("G", half), ("R", half), ("x.B", half), ("x.G", half), ("x.R", half)];
+    let bytes = foreign(&channels, Compression::ZIP16, LINES, |_| ());
+    let read = decode(&bytes).unwrap();
+    assert_eq!(read.notes, ["layer without a name is ignored: no channel B"]);
+    assert_eq!(read.layers["x"].pixels[0], vec3(4.0, 3.0, 2.0));
+    let folder = Folder::new("incomplete");
+    let path = folder.0.join("a.exr");
+    std::fs::write(&path, bytes).unwrap();
+    assert!(read_exr(&path).unwrap_err().to_string().contains("no channel B; expected R, G and B"));
 }
 
 #[test]
@@ -294,8 +334,14 @@ fn wrong_kinds_of_file_are_named() {
         matches!(missing, ImageError::Io { .. })
             && missing.to_string().contains("/nonexistent/a.exr")
     );
-    let lossy = message(&foreign(&BGR, Compression::B44, LINES, |_| ()));
-    assert_eq!(lossy, "submission.exr: b44 compression, expected none, RLE, ZIP or PIZ");
+    // What DWAA compresses is not read, so any bytes will do.
+    let at = [&b"compression\0compression\0"[..], &1u32.to_le_bytes()].concat();
+    let zip = foreign(&BGR, Compression::ZIP16, LINES, |_| ());
+    let lossy = message(&patched(zip, &at, 0, &[8]));
+    assert_eq!(
+        lossy,
+        "submission.exr: dwaa compression, expected none, RLE, ZIP, PIZ, PXR24 or B44"
+    );
     let mip = BlockDescription::Tiles(TileDescription {
         tile_size: Vec2(2, 2),
         level_mode: LevelMode::MipMap,
@@ -326,10 +372,7 @@ fn wrong_channels_are_named() {
         file(&[("X", half), ("Y", half), ("Z", half)]),
         "submission.exr: no channel R; expected R, G and B, found X, Y, Z"
     );
-    assert!(
-        file(&[("B", half), ("G", half), ("R", half), ("x.B", half), ("x.R", half)])
-            .contains("no channel x.G")
-    );
+    assert!(file(&[("x.B", half), ("x.R", half)]).contains("no channel x.G"));
     assert!(file(&[("B", half), ("G", half), ("R", SampleType::U32)]).contains("holds integers"));
     // name, type, linear flag, then the sampling rates in x and y
     let subsampled = patched(plain(), b"G\0\x01\0\0\0", 4, &[2, 0, 0, 0]);
@@ -411,9 +454,9 @@ fn changed_bytes_never_panic() {
         level_mode: LevelMode::Singular,
         rounding_mode: RoundingMode::Down,
     });
-    use Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
+    use Compression::{B44, B44A, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
     let (mut accepted, mut refused) = (0, 0);
-    for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ] {
+    for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24, B44, B44A] {
         for blocks in [LINES, tiles] {
             let whole = foreign(&BGR, compression, blocks, |_| ());
             for at in 0..whole.len() {
@@ -455,7 +498,7 @@ fn a_block_stored_twice_is_refused() {
 /// Any rows of any channels, whatever the blocks; and from several threads at once.
 #[test]
 fn rows_are_read_from_anywhere() {
-    use Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
+    use Compression::{PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
     let (width, height) = (21, 75);
     let value = |channel: usize, x: usize, y: usize| (channel * 512 + y * 4 + x % 3) as f32;
     let tiles = BlockDescription::Tiles(TileDescription {
@@ -465,7 +508,7 @@ fn rows_are_read_from_anywhere() {
     });
     let kinds = [SampleType::F16, SampleType::F32, SampleType::F16, SampleType::F32];
     let folder = Folder::new("rows");
-    for (round, (compression, blocks)) in [Uncompressed, RLE, ZIP1, ZIP16, PIZ]
+    for (round, (compression, blocks)) in [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24]
         .into_iter()
         .flat_map(|compression| [LINES, tiles].map(|blocks| (compression, blocks)))
         .enumerate()

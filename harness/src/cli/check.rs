@@ -118,10 +118,10 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let entry = &report.entries[0].for_student(&report.rules, false);
     let width = terminal::width().min(READABLE_COLUMNS);
     let look = Look { width, colours: terminal::colours() };
-    print!("{}", report::text_detail(&report, entry, look, arguments.verbose));
+    print_as_is!("{}", report::text_detail(&report, entry, look, arguments.verbose));
     let folder_of_page = arguments.output.join(&entry.record.slug);
     if arguments.pictures {
-        print!("{}", terminal_pictures::pictures(entry, &report.rules, &folder_of_page));
+        print_as_is!("{}", terminal_pictures::pictures(entry, &report.rules, &folder_of_page));
     }
     let page = folder_of_page.join(report::HTML_FILE);
     let program = std::env::args().next().unwrap_or_else(|| "umbra".to_owned());
@@ -133,7 +133,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         last: &last.parts,
         asked: &what,
     };
-    print!("{}", report::text_closing(&report, entry, &closing, look));
+    print_as_is!("{}", report::text_closing(&report, entry, &closing, look));
     let points = entry.grade.parts.iter();
     last.parts.extend(points.map(|part| (part.id.clone(), (part.points, part.points_max))));
     last.seconds.insert(what, begun.elapsed().as_secs_f64());

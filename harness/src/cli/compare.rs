@@ -16,6 +16,7 @@ use basecode::exr_io::{ExrRows, REC_709};
 use basecode::{Image, Vec3};
 use serde::Serialize;
 
+use crate::harmless::{harmless, harmless_json};
 use crate::imaging::difference::{Count, Differences, Different, Odd};
 use crate::imaging::metrics::{Errors, Metrics};
 use crate::imaging::rows::{Channels, Row, visit_rows};
@@ -32,8 +33,8 @@ pub struct CompareArguments {
     /// The expected image
     #[arg(required_unless_present = "idiff")]
     expected: Option<PathBuf>,
-    /// The layer to compare, such as `mean` of a stored expected image; a file with only plain R, G
-    /// and B is used as it is [default: plain R, G and B, or the only layer]
+    /// The layer to compare, such as `mean` of a stored expected image; the other file may have only
+    /// plain channels instead, such as R, G and B [default: plain R, G and B, or the only layer]
     #[arg(long, value_name = "NAME")]
     layer: Option<String>,
     /// Count a pixel with a NaN as different, even where both images have one
@@ -48,7 +49,7 @@ pub struct CompareArguments {
     /// Print one JSON object and nothing else
     #[arg(long)]
     json: bool,
-    /// Write actual, expected and difference as PNG files into this folder
+    /// Write actual, expected and, of one size, their difference as PNG files into this folder
     #[arg(long, value_name = "DIR")]
     pictures: Option<PathBuf>,
     /// Write a page with a viewer of both images and their difference into this folder
@@ -66,7 +67,8 @@ pub struct CompareArguments {
 /// One of the two images.
 #[derive(Serialize)]
 struct Side {
-    file: PathBuf,
+    /// The path; a name that is not Unicode has U+FFFD in its place.
+    file: String,
     /// The layer; "" is plain R, G and B.
     layer: String,
     width: usize,
@@ -97,7 +99,7 @@ struct Difference {
     #[serde(serialize_with = "any_float")]
     expected: [f32; 3],
     /// Of the channel that differs most; none where a value is not finite.
-    difference: Option<f32>,
+    difference: Option<f64>,
 }
 
 /// The report on two images.
@@ -112,10 +114,10 @@ struct Comparison {
     #[serde(flatten)]
     values: Option<Values>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pictures: BTreeMap<PathBuf, String>,
+    pictures: BTreeMap<String, String>,
     /// The viewer's page.
     #[serde(skip_serializing_if = "Option::is_none")]
-    page: Option<PathBuf>,
+    page: Option<String>,
 }
 
 /// How the pixels of two images of one size differ.
@@ -149,12 +151,25 @@ struct Found {
     sizes: Vec<i32>,
 }
 
+/// The layers of a file, and the indices of their R, G and B.
+type Layers = Vec<(String, [usize; 3])>;
+
 /// An image that is open, and the layer that is compared.
 struct Open {
     file: ExrRows<'static>,
     layer: String,
     channels: [usize; 3],
     notes: Vec<String>,
+}
+
+/// The exit code of `--idiff` when a file, the command line or standard output cannot be used.
+pub const IDIFF_CANNOT: u8 = idiff::CANNOT;
+
+/// Whether the program's arguments ask for `umbra compare --idiff`.
+pub fn is_idiff(arguments: &[OsString]) -> bool {
+    let mut names = arguments.iter().map(|argument| argument.to_string_lossy());
+    names.any(|name| name == "compare")
+        && names.any(|name| name == "--idiff" || name.starts_with("--idiff="))
 }
 
 /// Prints where two images differ; exit 0 when they are equal, 1 when not. Without the scene's
@@ -210,15 +225,15 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
         pictures: BTreeMap::new(),
         page: None,
     };
-    if let (Some(folder), Some(images), true) = (&arguments.pictures, &images, same_size) {
+    if let (Some(folder), Some(images)) = (&arguments.pictures, &images) {
         comparison.pictures = pictures::write(folder, images)?;
     }
     if let (Some(folder), Some([actual, expected])) = (&arguments.html, images) {
         let images = [("actual".to_owned(), actual), ("expected".to_owned(), expected)];
-        comparison.page = Some(super::view::write_page(folder, &images)?);
+        comparison.page = Some(super::view::write_page(folder, &images)?.display().to_string());
     }
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&comparison)?);
+        println!("{}", harmless_json(&comparison)?);
     } else {
         print!("{}", text::text(&comparison)?);
     }
@@ -233,15 +248,28 @@ fn open(paths: [&PathBuf; 2], wanted: Option<&str>) -> anyhow::Result<[Open; 2]>
         anyhow::Ok((file, layers, notes))
     });
     let (actual, expected) = (actual?, expected?);
-    if let Some(wanted) = wanted
-        && ![&actual.1, &expected.1].iter().any(|layers| layers.iter().any(|(n, _)| n == wanted))
-    {
-        let [a, b] = [&actual.1, &expected.1].map(|layers| names(layers));
-        let [first, second] = paths.map(|path| path.display());
-        bail!("no layer \"{wanted}\" in {first} (it has: {a}) nor in {second} (it has: {b})");
+    if let Some(wanted) = wanted {
+        let lacks = |(file, layers, _): &(ExrRows, Layers, Vec<String>)| {
+            let has = layers.iter().any(|(name, _)| name == wanted);
+            (!has).then(|| {
+                (format!("{} (it has: {})", file.path().display(), names(layers)), is_plain(file))
+            })
+        };
+        match (lacks(&actual), lacks(&expected)) {
+            (Some((a, _)), Some((b, _))) => bail!("no layer \"{wanted}\" in {a} nor in {b}"),
+            (Some((file, false)), None) | (None, Some((file, false))) => {
+                bail!("no layer \"{wanted}\" in {file}")
+            }
+            _ => {}
+        }
     }
     let choose = |(file, layers, notes)| Open::new(file, layers, notes, wanted);
     Ok([choose(actual)?, choose(expected)?])
+}
+
+/// Whether a file has no layers, but only channels without one.
+fn is_plain(file: &ExrRows) -> bool {
+    file.channels().iter().all(|name| !name.contains('.'))
 }
 
 /// The names of a file's layers, for messages.
@@ -249,8 +277,8 @@ fn names(layers: &[(String, [usize; 3])]) -> String {
     layers.iter().map(|(name, _)| shown(name)).collect::<Vec<_>>().join(", ")
 }
 
-fn shown(layer: &str) -> &str {
-    if layer.is_empty() { "plain R, G, B" } else { layer }
+fn shown(layer: &str) -> String {
+    if layer.is_empty() { "plain R, G, B".to_owned() } else { harmless(layer) }
 }
 
 impl Open {
@@ -258,7 +286,7 @@ impl Open {
     /// only one.
     fn new(
         file: ExrRows<'static>,
-        mut layers: Vec<(String, [usize; 3])>,
+        mut layers: Layers,
         mut notes: Vec<String>,
         wanted: Option<&str>,
     ) -> anyhow::Result<Self> {
@@ -288,7 +316,7 @@ impl Open {
         let pixels = |Count { count, first }| (count > 0).then_some(Pixels { count, first });
         let [width, height] = self.size();
         Side {
-            file: self.file.path().to_owned(),
+            file: self.file.path().display().to_string(),
             layer: self.layer.clone(),
             width,
             height,
@@ -354,7 +382,10 @@ fn primaries([red, green, blue, white]: &[[f32; 2]; 4]) -> String {
 impl From<Different> for Difference {
     fn from(found: Different) -> Self {
         let Different { at: [x, y], size, actual, expected } = found;
-        Self { x, y, actual, expected, difference: Some(size).filter(|size| size.is_finite()) }
+        // As short as the values are, where 32 bits hold it.
+        let short = (size as f32).to_string().parse().ok().filter(|short: &f64| short.is_finite());
+        let difference = Some(short.unwrap_or(size)).filter(|size| size.is_finite());
+        Self { x, y, actual, expected, difference }
     }
 }
 

@@ -1,13 +1,23 @@
 //! `umbra doctor`: shows what this machine supports, and how to get the rest.
 
+use std::os::unix::process::CommandExt;
+use std::path::Path;
 use std::process::Command;
 
 use basecode::gpu::{AdapterKind, Gpu};
 
 use crate::sandbox::{Isolation, doctor::examine};
 
+/// Where a desktop's programs keep their sockets. Graphics drivers print an error on their own when it names no folder.
+const RUNTIME: &str = "XDG_RUNTIME_DIR";
+
 /// Prints what there is; exit 0 when submissions can be graded with full isolation.
 pub fn run() -> anyhow::Result<u8> {
+    if !std::env::var_os(RUNTIME).is_some_and(|folder| Path::new(&folder).is_absolute()) {
+        // No socket lies in the root folder either, and nothing is said of that.
+        let mut again = Command::new(std::env::current_exe()?);
+        return Err(again.args(std::env::args_os().skip(1)).env(RUNTIME, "/").exec().into());
+    }
     let examination = examine(&std::env::current_exe()?);
     println!("isolation");
     for finding in &examination.findings {

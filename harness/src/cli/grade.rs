@@ -121,7 +121,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
 
 /// Prints the table of a report, what was skipped, and what is left to do; the exit code that it stands for.
 pub fn shown(report: &BatchReport, output: &Path, skipped: Option<String>) -> anyhow::Result<u8> {
-    print!("{}", report::text_table(report, terminal::width(), terminal::colours())?);
+    print_as_is!("{}", report::text_table(report, terminal::width(), terminal::colours())?);
     if let Some(skipped) = skipped {
         println!("skipped, not submissions: {skipped}");
     }

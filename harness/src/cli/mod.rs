@@ -136,6 +136,19 @@ enum Command {
     Bless(bless::BlessArguments),
 }
 
+impl Command {
+    /// Whether it works in the system's temporary folder, and not only in the assignment's own.
+    fn needs_temporary_folder(&self) -> bool {
+        match self {
+            Self::Merge(_) | Self::Pack(_) | Self::Watch(_) => true,
+            Self::View(arguments) => arguments.output.is_none(),
+            #[cfg(target_os = "linux")]
+            Self::Doctor => true,
+            _ => false,
+        }
+    }
+}
+
 /// Parses the command line, runs the command and prints its error once.
 ///
 /// Hidden commands come first: they are Umbra starting itself, and lock the process before
@@ -161,24 +174,28 @@ pub fn main() -> ExitCode {
         _ => {}
     }
     panics::note();
-    let Arguments { command, root } = Arguments::try_parse().unwrap_or_else(|error| {
-        if error.kind() != clap::error::ErrorKind::DisplayHelp {
-            error.exit()
+    // idiff's own codes leave no other for a failure.
+    let failed = |code| if compare::is_idiff(&args) { compare::IDIFF_CANNOT } else { code };
+    let ended = panics::contain(|| match Arguments::try_parse() {
+        Ok(Arguments { command, root }) => run(command, root.as_deref()),
+        Err(error) if error.use_stderr() => {
+            let _ = error.print();
+            Ok(failed(EXIT_USAGE))
         }
-        let help = error.render();
-        let help = if terminal::colours() { help.ansi().to_string() } else { help.to_string() };
-        print!("{}", wrapped(&help, terminal::width().min(HELP_COLUMNS)));
-        crate::output::end_of_closed_pipe();
-        std::process::exit(i32::from(EXIT_OK))
+        Err(error) => {
+            let text = error.render();
+            let text = if terminal::colours() { text.ansi().to_string() } else { text.to_string() };
+            print_as_is!("{}", wrapped(&text, terminal::width().min(HELP_COLUMNS)));
+            Ok(EXIT_OK)
+        }
     });
-    let ended = panics::contain(|| run(command, root.as_deref()));
     crate::output::end_of_closed_pipe();
     match ended {
         Ok(Ok(code)) => ExitCode::from(code),
         Err(bug) => match bug.unprintable() {
             Some(error) => {
                 eprintln!("umbra: cannot write to standard output: {error}");
-                ExitCode::from(EXIT_MACHINE)
+                ExitCode::from(failed(EXIT_MACHINE))
             }
             None => {
                 eprintln!("umbra: {BUG}");
@@ -187,7 +204,7 @@ pub fn main() -> ExitCode {
         },
         Ok(Err(error)) => {
             eprintln!("umbra: {}", told_once(&error));
-            ExitCode::from(if machine_lacks(&error) { EXIT_MACHINE } else { EXIT_USAGE })
+            ExitCode::from(failed(if machine_lacks(&error) { EXIT_MACHINE } else { EXIT_USAGE }))
         }
     }
 }
@@ -240,18 +257,35 @@ fn machine_lacks(error: &anyhow::Error) -> bool {
 /// # Errors
 /// When not, with the folder's name.
 fn writable(output: &Path) -> anyhow::Result<()> {
-    let lacks = |what: String| anyhow::Error::from(MachineLacks(what));
-    let temporary = std::env::temp_dir();
-    if !temporary.is_dir() {
+    has_temporary_folder()?;
+    takes_files(output)
+}
+
+/// Makes sure that temporary files can be made, before any work.
+///
+/// # Errors
+/// When not, with the folder's name and what named it.
+fn has_temporary_folder() -> anyhow::Result<()> {
+    let folder = std::env::temp_dir();
+    if !folder.is_dir() {
         let named =
             if std::env::var_os("TMPDIR").is_some() { "TMPDIR" } else { "temporary folder" };
-        return Err(lacks(format!("{named} is {}, which is not a folder", temporary.display())));
+        let what = if folder.exists() { "not a folder" } else { "not there" };
+        return Err(
+            MachineLacks(format!("{named} is {}, which is {what}", folder.display())).into()
+        );
     }
-    for folder in [output, &temporary] {
-        std::fs::create_dir_all(folder)
-            .and_then(|()| tempfile::Builder::new().prefix(".umbra-").tempfile_in(folder))
-            .map_err(|error| lacks(format!("cannot write to {}: {error}", folder.display())))?;
-    }
+    takes_files(&folder)
+}
+
+/// Makes a folder where there is none, and a file in it that goes away again.
+fn takes_files(folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder)
+        .and_then(|()| tempfile::Builder::new().prefix(".umbra-").tempfile_in(folder))
+        .map_err(|error| {
+            // The name of the file that could not be made helps nobody.
+            MachineLacks(format!("cannot write to {}: {}", folder.display(), error.kind()))
+        })?;
     Ok(())
 }
 
@@ -261,6 +295,9 @@ fn writable(output: &Path) -> anyhow::Result<()> {
 struct MachineLacks(String);
 
 fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
+    if command.needs_temporary_folder() {
+        has_temporary_folder()?;
+    }
     match command {
         Command::Check(arguments) => check::check(&arguments, root),
         Command::Grade(arguments) => grade::grade(&arguments, root),
@@ -287,7 +324,7 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "umbra", &mut script);
-            print!("{}", String::from_utf8_lossy(&script));
+            print_as_is!("{}", String::from_utf8_lossy(&script));
             Ok(EXIT_OK)
         }
         Command::Bless(arguments) => bless::run(&arguments, root),

@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::harmless::harmless;
+
 /// Columns where there is no terminal, and nobody says how many there are.
 const LOG_COLUMNS: usize = 160;
 /// In a log, progress is repeated at this interval.
@@ -47,7 +49,7 @@ impl Progress {
     /// Tells what is being done. In a log, a message that begins with the same word as the one before
     /// is another step of the same, and told only now and then.
     pub fn say(&self, message: &str) {
-        self.line.set_message(message.to_owned());
+        self.line.set_message(harmless(message));
         self.line.tick();
         let Some(mut told) = self.log.as_ref().and_then(|log| log.lock().ok()) else { return };
         let word = message.split(' ').next().unwrap_or_default();
@@ -76,7 +78,7 @@ impl Progress {
 
     /// What one of the counted steps is at; told on a terminal alone.
     pub fn at(&self, message: &str) {
-        self.line.set_message(message.to_owned());
+        self.line.set_message(harmless(message));
         self.line.tick();
     }
 

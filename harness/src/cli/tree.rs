@@ -12,7 +12,7 @@ use super::context::{Context, INTERRUPTED};
 use crate::class::collect::Ambiguous;
 use crate::class::{Collected, Kind, Wanted, collect};
 use crate::columns::count;
-use crate::harmless::harmless;
+use crate::harmless::{harmless, harmless_json};
 use crate::intake::{self, IntakeError, Severity, Submission, Validation};
 
 /// Files that `--fix` leaves out and names.
@@ -120,7 +120,7 @@ fn one(arguments: &ValidateArguments, archive: &Path, context: &Context) -> anyh
     let private = tempfile::tempdir_in(&context.supervisor.scratch)?;
     let (validation, submission) = look(archive, &private.path().join("copy"), context)?;
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&[&validation])?);
+        println!("{}", harmless_json(&[&validation])?);
         return Ok(if validation.conforms { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER });
     }
     print!("{}", validation.to_text());
@@ -160,7 +160,7 @@ fn many(arguments: &ValidateArguments, found: &Collected, context: &Context) -> 
     context.progress.end();
     let wrong = validations.iter().filter(|validation| !validation.conforms).count();
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&validations)?);
+        println!("{}", harmless_json(&validations)?);
     } else {
         let name = |validation: &Validation| harmless(&validation.name);
         let wide = validations.iter().map(|own| name(own).width()).max().unwrap_or_default();

@@ -22,7 +22,7 @@ pub struct ViewArguments {
     images: Vec<PathBuf>,
     /// The folder for the page and its data [default: a new one in the system's temporary folder]
     #[arg(long, short, value_name = "DIR")]
-    output: Option<PathBuf>,
+    pub(super) output: Option<PathBuf>,
 }
 
 /// Writes the page, opens it where there is a browser, and prints its path.

@@ -4,6 +4,8 @@ use super::rows::Row;
 
 /// Bits of a 32-bit float's infinity. Those of numbers that are not negative sort as the numbers do.
 const INFINITE: i32 = 0x7f80_0000;
+/// Bits of the largest finite one: of every difference of finite values from there on.
+const LARGE: i32 = INFINITE - 1;
 
 /// How many pixels are so, and the first of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,8 +30,9 @@ pub struct Odd {
 pub struct Different {
     /// Column and row.
     pub at: [usize; 2],
-    /// The difference of the channel that differs most; infinite where a value is not finite.
-    pub size: f32,
+    /// The difference of the channel that differs most; infinite where a value is not finite. That of finite values is
+    /// finite, though it may be beyond what 32 bits hold.
+    pub size: f64,
     /// The values of the first image.
     pub actual: [f32; 3],
     /// The values of the second.
@@ -124,16 +127,19 @@ impl Differences {
         for (kept, size) in
             [(&mut self.largest, largest), (&mut self.largest_finite, largest_finite)]
         {
-            let value = f32::from_bits(size as u32);
-            if size > 0 && kept.is_none_or(|kept| value > kept.size) {
-                let x = sizes.iter().position(|&own| own == size).unwrap_or_default();
-                let pixel = |of: [&[f32]; 3]| of.map(|channel| channel[x]);
-                *kept = Some(Different {
-                    at: [x, row.y],
-                    size: value,
-                    actual: pixel(actual),
-                    expected: pixel(expected),
-                });
+            let x = match size {
+                0 => continue,
+                LARGE => largest_at(actual, expected, sizes),
+                _ => sizes.iter().position(|&own| own == size).unwrap_or_default(),
+            };
+            let pixel = |of: [&[f32]; 3]| of.map(|channel| channel[x]);
+            let (actual, expected) = (pixel(actual), pixel(expected));
+            let size = match size {
+                LARGE => apart(actual, expected),
+                _ => f64::from(f32::from_bits(size as u32)),
+            };
+            if kept.is_none_or(|kept| size > kept.size) {
+                *kept = Some(Different { at: [x, row.y], size, actual, expected });
             }
         }
         for (a, b) in actual.iter().zip(expected) {
@@ -202,12 +208,34 @@ fn measure<const NAN_IS_ERROR: bool>(a: [&[f32]; 3], b: [&[f32]; 3], sizes: &mut
         for c in 0..3 {
             let (a, b) = (a[c][i], b[c][i]);
             let size = (a - b).abs();
-            let size = if size.is_nan() { INFINITE } else { size.to_bits() as i32 };
+            let finite = (a.abs() < f32::INFINITY) & (b.abs() < f32::INFINITY);
+            let most = if finite { LARGE } else { INFINITE };
+            let size = if size.is_nan() { INFINITE } else { (size.to_bits() as i32).min(most) };
             let both_nan = !NAN_IS_ERROR & a.is_nan() & b.is_nan();
             let size = if (a == b) | both_nan { 0 } else { size };
             *largest = (*largest).max(size);
         }
     }
+}
+
+/// Of the pixels whose difference is too large for 32 bits, the column of the one that differs most.
+fn largest_at(a: [&[f32]; 3], b: [&[f32]; 3], sizes: &[i32]) -> usize {
+    let pixel = |of: [&[f32]; 3], x: usize| of.map(|channel| channel[x]);
+    let mut largest = (0, 0.0);
+    for (x, _) in sizes.iter().enumerate().filter(|(_, size)| **size == LARGE) {
+        let size = apart(pixel(a, x), pixel(b, x));
+        if size > largest.1 {
+            largest = (x, size);
+        }
+    }
+    largest.0
+}
+
+/// The difference of the channel that differs most, of those with finite values; of 32 bits where they hold it.
+fn apart(a: [f32; 3], b: [f32; 3]) -> f64 {
+    let apart = a.iter().zip(b).map(|(&a, b)| (f64::from(a) - f64::from(b)).abs());
+    let most = apart.filter(|size| size.is_finite()).fold(0.0, f64::max);
+    if (most as f32).is_finite() { f64::from(most as f32) } else { most }
 }
 
 /// The largest value, 0 where none is above.

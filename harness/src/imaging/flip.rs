@@ -44,7 +44,8 @@ pub fn flip_ldr(actual: &Image, expected: &Image, pixels_per_degree: f32) -> Opt
     Some(filters.difference(&shown(actual), &shown(expected), expected))
 }
 
-/// HDR-FLIP with the ACES tone mapper and the exposures that the papers derive from the expected image.
+/// HDR-FLIP with the ACES tone mapper and the exposures that the papers derive from the expected image. Negative values
+/// count as 0, as no display shows them.
 ///
 /// `None` when the sizes differ, a value is not a number, or the expected image is black.
 pub fn flip_hdr(actual: &Image, expected: &Image, pixels_per_degree: f32) -> Option<FlipMap> {

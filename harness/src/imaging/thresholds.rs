@@ -18,7 +18,7 @@ pub struct Limits {
 /// The largest difference of two images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Largest {
-    /// |a - b|, above 0; infinite where only one is finite.
+    /// |a - b|, above 0; infinite where only one is finite, or where 32 bits do not hold it.
     pub size: f32,
     /// Column and row.
     pub at: [usize; 2],
@@ -76,9 +76,11 @@ impl Tally {
         for (i, ((&a, &b), flags)) in a.iter().zip(b).zip(&mut self.flags).enumerate() {
             let size = size(a, b);
             let mean = 0.5 * (a.abs() + b.abs());
-            let not_finite = size == f32::INFINITY;
+            // Two finite values may be further apart than any 32-bit number.
+            let infinite = size == f32::INFINITY;
+            let not_finite = infinite & !(a.is_finite() & b.is_finite());
             let above = |limits: &Limits| {
-                not_finite | (size > limits.absolute.max(limits.relative * mean)) & (size > 0.0)
+                infinite | (size > limits.absolute.max(limits.relative * mean)) & (size > 0.0)
             };
             for (is_so, flag) in
                 [(above(fail), FAILS), (above(warn), WARNS), (not_finite, NOT_FINITE)]
@@ -89,7 +91,9 @@ impl Tally {
             let finite =
                 |value: f32| if value.is_finite() { value.abs().to_bits() as i32 } else { 0 };
             peak = peak.max(finite(a)).max(finite(b));
-            let size = if not_finite { 0.0 } else { f64::from(size) };
+            let apart =
+                if infinite { (f64::from(a) - f64::from(b)).abs() } else { f64::from(size) };
+            let size = if not_finite { 0.0 } else { apart };
             sums[0][i % 4] += size;
             sums[1][i % 4] += size * size;
         }

@@ -13,11 +13,21 @@ use super::{ImageError, MAX_PIXELS, MAX_SIDE};
 
 /// The most channels a file may hold.
 const MAX_CHANNELS: usize = 64;
-/// No codec of the format shrinks pixels more than deflate can: 1032 to 1 (zlib's technical notes).
-const MAX_COMPRESSION_RATIO: usize = 1032;
+/// No codec that is read shrinks pixels more: deflate 1032 to 1 (zlib's technical notes), after PXR24 has made three
+/// bytes of four.
+const MAX_COMPRESSION_RATIO: usize = 1376;
 
 /// The components of a color, in the order of an [`crate::Image`]'s pixels.
 const RGB: [&str; 3] = ["R", "G", "B"];
+
+/// A name as a message shows it: without characters that act on a terminal or end a line.
+pub(super) fn visible(name: &str) -> String {
+    let shown = |c: char| match c.is_control() {
+        true => c.escape_default().collect(),
+        false => String::from(c),
+    };
+    name.chars().map(shown).collect()
+}
 
 /// Splits `mean.R` into (`mean`, `R`) and `R` into (``, `R`): EXR's convention for layers.
 fn split_channel(name: &str) -> (&str, &str) {
@@ -105,9 +115,13 @@ impl Checks<'_> {
                 )));
             }
         }
-        use Compression::{PIZ, RLE, Uncompressed, ZIP1, ZIP16};
-        if !matches!(header.compression, Uncompressed | RLE | ZIP1 | ZIP16 | PIZ) {
-            return Err(self.unsupported(&header.compression.to_string(), "none, RLE, ZIP or PIZ"));
+        use Compression::{B44, B44A, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
+        if !matches!(
+            header.compression,
+            Uncompressed | RLE | ZIP1 | ZIP16 | PIZ | PXR24 | B44 | B44A
+        ) {
+            let found = header.compression.to_string();
+            return Err(self.unsupported(&found, "none, RLE, ZIP, PIZ, PXR24 or B44"));
         }
         if header.channels.list.len() > MAX_CHANNELS {
             return Err(
@@ -129,20 +143,18 @@ impl Checks<'_> {
         Ok((width, height))
     }
 
-    /// Finds R, G and B of each layer.
+    /// Finds R, G and B of each layer. What cannot be a color image is ignored, with a note, where another layer can.
     pub(super) fn layers(
         &self,
         channels: &ChannelList,
         notes: &mut Vec<String>,
     ) -> Result<Channels, ImageError> {
         let all: Vec<String> = channels.list.iter().map(|c| c.name.to_string()).collect();
-        let find = |layer: &str, component: &str| {
-            all.iter().rposition(|name| split_channel(name) == (layer, component))
-        };
         let mut names: Vec<&str> = all.iter().map(|name| split_channel(name).0).collect();
         names.sort_unstable();
         names.dedup();
-        names.retain(|layer| RGB.iter().any(|c| find(layer, c).is_some()));
+        let is_in = |layer: &str, c: &str| all.iter().any(|name| split_channel(name) == (layer, c));
+        names.retain(|layer| RGB.iter().any(|c| is_in(layer, c)));
         if names.is_empty() {
             let of_luminance = |name: &String| ["Y", "RY", "BY", "A"].contains(&name.as_str());
             return Err(match all.iter().any(|name| name == "Y") && all.iter().all(of_luminance) {
@@ -151,31 +163,60 @@ impl Checks<'_> {
             });
         }
         let mut layers = Vec::with_capacity(names.len());
+        let mut ignored = Vec::new();
         for layer in names {
-            let mut found = [0; 3];
-            for (index, c) in found.iter_mut().zip(RGB) {
-                *index = find(layer, c).ok_or_else(|| {
-                    let full = if layer.is_empty() { c.to_owned() } else { format!("{layer}.{c}") };
-                    self.missing_channel(&full, &all)
-                })?;
+            match self.colors(layer, channels) {
+                Ok(found) => layers.push((layer.to_owned(), found)),
+                Err(error) => ignored.push((layer, error)),
             }
-            layers.push((layer.to_owned(), found));
         }
-        for (index, (channel, name)) in channels.list.iter().zip(&all).enumerate() {
-            let is_color = layers.iter().any(|(_, found)| found.contains(&index));
+        if layers.is_empty() && !ignored.is_empty() {
+            return Err(ignored.swap_remove(0).1);
+        }
+        for (index, name) in all.iter().enumerate() {
+            let (layer, component) = split_channel(name);
+            let of_ignored =
+                RGB.contains(&component) && ignored.iter().any(|(own, _)| *own == layer);
             // Subsampled channels have been refused with the header.
-            if is_color && channel.sample_type == SampleType::U32 {
-                return Err(self.integers(name));
+            if !of_ignored && !layers.iter().any(|(_, found)| found.contains(&index)) {
+                notes.push(format!("channel {} is ignored", visible(name)));
             }
-            if !is_color {
-                notes.push(format!("channel {name} is ignored"));
-            }
+        }
+        for (layer, error) in ignored {
+            let layer = if layer.is_empty() { "without a name".to_owned() } else { visible(layer) };
+            let why = match error {
+                ImageError::MissingChannel { channel, .. } => format!("no channel {channel}"),
+                ImageError::Unsupported { what, .. } => what,
+                other => other.to_string(),
+            };
+            notes.push(format!("layer {layer} is ignored: {why}"));
         }
         Ok(layers)
     }
 
+    /// The channels that hold R, G and B of a layer as floats.
+    pub(super) fn colors(
+        &self,
+        layer: &str,
+        channels: &ChannelList,
+    ) -> Result<[usize; 3], ImageError> {
+        let all: Vec<String> = channels.list.iter().map(|c| c.name.to_string()).collect();
+        let mut found = [0; 3];
+        for (index, c) in found.iter_mut().zip(RGB) {
+            let at = all.iter().rposition(|name| split_channel(name) == (layer, c));
+            *index = at.ok_or_else(|| {
+                let full = if layer.is_empty() { c.to_owned() } else { format!("{layer}.{c}") };
+                self.missing_channel(&full, &all)
+            })?;
+            if channels.list[*index].sample_type == SampleType::U32 {
+                return Err(self.integers(&all[*index]));
+            }
+        }
+        Ok(found)
+    }
+
     pub(super) fn integers(&self, channel: &str) -> ImageError {
-        self.unsupported(&format!("channel {channel} holds integers"), "half or float")
+        self.unsupported(&format!("channel {} holds integers", visible(channel)), "half or float")
     }
 
     /// What the decoder said of a place in the file.
@@ -216,8 +257,8 @@ impl Checks<'_> {
     fn missing_channel(&self, channel: &str, all: &[String]) -> ImageError {
         ImageError::MissingChannel {
             path: self.path.into(),
-            channel: channel.into(),
-            found: all.join(", "),
+            channel: visible(channel),
+            found: visible(&all.join(", ")),
         }
     }
 }

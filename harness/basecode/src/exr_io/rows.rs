@@ -1,6 +1,7 @@
 //! The pixels of a file, a few rows at a time, from several threads at once.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
@@ -16,7 +17,7 @@ use exr::meta::BlockDescription;
 use exr::meta::attribute::{IntegerBounds, SampleType};
 use exr::meta::header::Header;
 
-use super::header::{Channels, Checks, provenance};
+use super::header::{Channels, Checks, provenance, visible};
 use super::{ExrLayers, ImageError, MAX_FILE_BYTES, read_file};
 use crate::Vec3;
 use crate::image::Image;
@@ -111,6 +112,12 @@ impl<'a> ExrRows<'a> {
         self.height
     }
 
+    /// Where the first column and row lie in the plane of all images; mostly (0, 0).
+    pub fn origin(&self) -> [i32; 2] {
+        let Vec2(x, y) = self.header.data_window().position;
+        [x, y]
+    }
+
     /// The file.
     pub fn path(&self) -> &Path {
         &self.path
@@ -132,7 +139,7 @@ impl<'a> ExrRows<'a> {
     /// reader may want to know about the file, such as channels of no layer.
     ///
     /// # Errors
-    /// When there is none, a layer lacks a channel, or one holds integers.
+    /// When there is none, because each lacks a channel or holds integers.
     pub fn layers(&self) -> Result<(Channels, Vec<String>), ImageError> {
         let mut notes = self.notes.clone();
         let layers = self.checks().layers(&self.header.channels, &mut notes)?;
@@ -146,10 +153,11 @@ impl<'a> ExrRows<'a> {
         (BAND_BYTES / row.max(1)).max(1).next_multiple_of(block)
     }
 
-    /// Reads these rows of these channels (indices of [`ExrRows::channels`]) as 32-bit floats.
+    /// Reads these rows of these channels (indices of [`ExrRows::channels`]) as 32-bit floats; integers as a fraction of
+    /// the largest, as OpenImageIO does.
     ///
     /// # Errors
-    /// When a block is damaged, or a channel holds integers.
+    /// When a block is damaged.
     ///
     /// # Panics
     /// When a row or channel is not there.
@@ -162,11 +170,7 @@ impl<'a> ExrRows<'a> {
         assert!(rows.end <= self.height, "rows {rows:?} of an image {} high", self.height);
         band.width = self.width;
         band.planes.resize_with(channels.len(), Vec::new);
-        for (plane, &channel) in band.planes.iter_mut().zip(channels) {
-            let channel = &self.header.channels.list[channel];
-            if channel.sample_type == SampleType::U32 {
-                return Err(self.checks().integers(&channel.name.to_string()));
-            }
+        for plane in &mut band.planes {
             plane.resize(rows.len() * self.width, 0.0);
         }
         let first = self.blocks.partition_point(|block| block.rows().end <= rows.start);
@@ -179,9 +183,35 @@ impl<'a> ExrRows<'a> {
         })
     }
 
+    /// The whole image of plain R, G and B.
+    pub(super) fn image(&self) -> Result<Image, ImageError> {
+        let (layers, _) = self.layers()?;
+        let colors = self.checks().colors("", &self.header.channels);
+        let channels = colors.map_err(|error| match error {
+            ImageError::MissingChannel { path, channel, .. } if channel == "R" => {
+                let names: Vec<String> = layers.into_iter().map(|(name, _)| name).collect();
+                let found = format!("only the layers {}", visible(&names.join(", ")));
+                ImageError::MissingChannel { path, channel, found }
+            }
+            other => other,
+        })?;
+        let mut read = self.whole(vec![(String::new(), channels)])?;
+        Ok(read.remove("").unwrap_or_default())
+    }
+
     /// The whole image of every layer.
     pub(super) fn images(&self) -> Result<ExrLayers, ImageError> {
         let (layers, notes) = self.layers()?;
+        Ok(ExrLayers {
+            layers: self.whole(layers)?,
+            chromaticities: self.chromaticities(),
+            attributes: provenance(&self.header),
+            notes,
+        })
+    }
+
+    /// The whole images of these layers.
+    fn whole(&self, layers: Channels) -> Result<BTreeMap<String, Image>, ImageError> {
         let channels: Vec<usize> = layers.iter().flat_map(|(_, found)| *found).collect();
         let mut images = vec![Image::new(self.width, self.height); layers.len()];
         let mut band = Band::default();
@@ -199,12 +229,7 @@ impl<'a> ExrRows<'a> {
                 }
             }
         }
-        Ok(ExrLayers {
-            layers: layers.into_iter().map(|(name, _)| name).zip(images).collect(),
-            chromaticities: self.chromaticities(),
-            attributes: provenance(&self.header),
-            notes,
-        })
+        Ok(layers.into_iter().map(|(name, _)| name).zip(images).collect())
     }
 
     fn checks(&self) -> Checks<'_> {
@@ -264,9 +289,14 @@ impl<'a> ExrRows<'a> {
                             *value = from_half(u16::from_ne_bytes(*b));
                         }
                     }
-                    _ => {
+                    SampleType::F32 => {
                         for (value, b) in row.iter_mut().zip(from.as_chunks::<4>().0) {
                             *value = f32::from_ne_bytes(*b);
+                        }
+                    }
+                    SampleType::U32 => {
+                        for (value, b) in row.iter_mut().zip(from.as_chunks::<4>().0) {
+                            *value = u32::from_ne_bytes(*b) as f32 / u32::MAX as f32;
                         }
                     }
                 }

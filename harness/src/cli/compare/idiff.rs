@@ -5,9 +5,8 @@
 //! - A pixel where only one image has NaN or infinity, or both have infinity of opposite signs, is
 //!   over every threshold. idiff lets it pass.
 //! - Channels are compared by name. idiff compares them by place, whatever they are called.
-//! - Images of two sizes end with 3, as its documentation says. idiff compares them with black.
-//! - `-warn`, `-warnpercent`, `-warnrelative`, `-hardwarn` and `-hardfail` count although no pixel is
-//!   over `-fail`, as its documentation says.
+//! - Images of two sizes end with 3, as its documentation says, and images at two places fail. idiff
+//!   compares them with black.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -15,6 +14,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use basecode::exr_io::{ExrRows, write_exr_channels};
 
+use crate::harmless::harmless;
 use crate::imaging::rows::{Channels, Row, visit_rows};
 use crate::imaging::thresholds::{Limits, Tally};
 
@@ -26,8 +26,8 @@ const WARNING: u8 = 1;
 const FAILURE: u8 = 2;
 /// They are not of one size.
 const OTHER_SIZE: u8 = 3;
-/// A file, or the command line, cannot be used.
-const CANNOT: u8 = 4;
+/// A file, the command line or standard output cannot be used.
+pub(super) const CANNOT: u8 = 4;
 
 const HELP: &str = "\
 Usage: umbra compare --idiff [options] image1 image2
@@ -38,14 +38,14 @@ As OpenImageIO's idiff, for EXR images (without -p, which is perceptual):
     -failrelative VAL          The same, as a fraction of the mean of |a| and |b| (default: 0)
     -failpercent PERCENT       Allow so many pixels above both (default: 0)
     -hardfail VAL              Fail if any pixel is above (default: inf)
-    -allowfailures N           Match although so many pixels fail (default: 0)
+    -allowfailures N           Match if at most so many pixels fail, whatever else is asked (default: 0)
     -warn, -warnrelative, -warnpercent, -hardwarn
-                               The same for a warning
+                               The same for a warning, if more pixels fail than -allowfailures has
     -o FILENAME                Write the difference image, an EXR file
     -od                        ... only if there is a difference
     -abs, -scale FACTOR        ... of absolute values; multiplied
     -a                         Compare all parts: files have one
-Exit codes: 0 match, 1 warning, 2 failure, 3 other size, 4 a file cannot be used.
+Exit codes: 0 match, 1 warning, 2 failure, 3 other size, 4 a file cannot be used or written.
 ";
 
 /// The command line.
@@ -57,8 +57,7 @@ struct Options {
     all: bool,
     fail: Limits,
     warn: Limits,
-    /// Whether a warning was asked for.
-    warns: bool,
+    /// With at most so many failing pixels, nothing else counts.
     allowed: usize,
     output: Option<PathBuf>,
     only_different: bool,
@@ -88,7 +87,6 @@ impl Options {
             all: false,
             fail: limits,
             warn: limits,
-            warns: false,
             allowed: 0,
             output: None,
             only_different: false,
@@ -124,7 +122,14 @@ impl Options {
                 "warnrelative" => options.warn.relative = number()?,
                 "warnpercent" => options.warn.percent = number()?,
                 "hardwarn" => options.warn.hard = number()?,
-                "allowfailures" => options.allowed = number()?.max(0.0) as usize,
+                // A number below 0 is a very large one to idiff.
+                "allowfailures" => {
+                    let count = number()?;
+                    if count.fract() != 0.0 {
+                        bail!("-{name} has \"{count}\", expected a whole number");
+                    }
+                    options.allowed = usize::try_from(count as i64).unwrap_or(usize::MAX);
+                }
                 "o" => options.output = Some(value()?.into()),
                 "od" => options.only_different = true,
                 "abs" => options.absolute = true,
@@ -132,13 +137,14 @@ impl Options {
                 "p" => bail!("-p is not known here; hint: umbra compare --metrics measures FLIP"),
                 _ => bail!("unknown option -{name}\n{HELP}"),
             }
-            options.warns |= name.starts_with("warn") || name == "hardwarn";
         }
         if options.images.len() != 2 && !options.help {
             bail!("expected two images, found {}\n{HELP}", options.images.len());
         }
         let output = options.output.as_deref();
-        if let Some(path) = output.filter(|path| path.extension().is_none_or(|end| end != "exr")) {
+        let is_exr =
+            |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("exr"));
+        if let Some(path) = output.filter(|path| !is_exr(path)) {
             bail!("{}: the difference image can only be an EXR file", path.display());
         }
         Ok(options)
@@ -167,13 +173,17 @@ fn compare(options: &Options) -> anyhow::Result<u8> {
         let [a, b] = [&a, &b].map(|image| format!("{}x{}", image.width(), image.height()));
         return different(OTHER_SIZE, format!("  sizes differ: {a} vs {b}"));
     }
+    if a.origin() != b.origin() {
+        let [a, b] = [&a, &b].map(|image| image.origin()).map(|[x, y]| format!("({x}, {y})"));
+        return different(FAILURE, format!("  places differ: {a} vs {b}"));
+    }
     let [named_a, named_b] = [&a, &b].map(in_idiff_order);
     let names = |named: &[(String, usize)]| -> Vec<String> {
         named.iter().map(|(name, _)| name.clone()).collect()
     };
     let (names, names_b) = (names(&named_a), names(&named_b));
     if names != names_b {
-        let (names, names_b) = (names.join(", "), names_b.join(", "));
+        let [names, names_b] = [names, names_b].map(|names| harmless(&names.join(", ")));
         return different(FAILURE, format!("  channels differ: {names} vs {names_b}"));
     }
     let indices = [named_a, named_b].map(|named| named.iter().map(|(_, i)| *i).collect::<Vec<_>>());
@@ -215,19 +225,22 @@ fn compare(options: &Options) -> anyhow::Result<u8> {
     Ok(code)
 }
 
-/// Which exit code the differences have.
+/// Which exit code the differences have. As to idiff, nothing but `-fail` and `-failrelative` counts
+/// unless more than the allowed pixels are above both.
 fn verdict(options: &Options, tally: &Tally, pixels: usize) -> u8 {
     let Options { fail, warn, .. } = options;
     let largest = tally.largest.map_or(0.0, |largest| largest.size);
     let above = |limits: &Limits, count: usize| {
         count as f64 > f64::from(limits.percent) / 100.0 * pixels as f64 || largest > limits.hard
     };
-    match tally.failing {
-        failing if failing > 0 && failing <= options.allowed => MATCH,
-        failing if above(fail, failing) => FAILURE,
-        0 if !options.warns => MATCH,
-        _ if above(warn, tally.warned) => WARNING,
-        _ => MATCH,
+    if tally.failing <= options.allowed {
+        MATCH
+    } else if above(fail, tally.failing) {
+        FAILURE
+    } else if above(warn, tally.warned) {
+        WARNING
+    } else {
+        MATCH
     }
 }
 
@@ -252,7 +265,7 @@ fn report(
             println!(
                 "  Max error  = {} @ ({x}, {y}, {})  values are {a} vs {b}",
                 general(f64::from(largest.size), 6),
-                names[largest.channel]
+                harmless(&names[largest.channel])
             );
         }
         _ => println!("  Max error  = 0"),

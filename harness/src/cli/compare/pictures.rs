@@ -1,8 +1,9 @@
 //! Pictures of two images and of their difference.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use anyhow::Context;
 use basecode::Image;
 
 use crate::imaging::pictures::{signed_error, tone_mapped};
@@ -11,12 +12,13 @@ use crate::imaging::reference::RegionMask;
 /// The relative error that the difference picture shows in full color.
 const FULL_SCALE: f32 = 0.1;
 
-/// Writes the pictures and answers their files and captions.
+/// Writes the pictures, that of the difference when the sizes are the same, and answers their files and captions.
 pub(super) fn write(
     folder: &Path,
     [actual, expected]: &[Image; 2],
-) -> anyhow::Result<BTreeMap<PathBuf, String>> {
-    std::fs::create_dir_all(folder)?;
+) -> anyhow::Result<BTreeMap<String, String>> {
+    let cannot = |path: &Path| format!("cannot write to {}", path.display());
+    std::fs::create_dir_all(folder).with_context(|| cannot(folder))?;
     let scale = median(expected);
     let mask = RegionMask::background(actual.width, actual.height);
     let mut written = BTreeMap::new();
@@ -27,8 +29,8 @@ pub(super) fn write(
     ] {
         let Some(picture) = picture else { continue };
         let file = folder.join(format!("{name}.png"));
-        std::fs::write(&file, picture.png()?)?;
-        written.insert(file, picture.caption);
+        std::fs::write(&file, picture.png()?).with_context(|| cannot(&file))?;
+        written.insert(file.display().to_string(), picture.caption);
     }
     Ok(written)
 }

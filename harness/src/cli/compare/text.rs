@@ -3,6 +3,7 @@
 use basecode::Vec3;
 
 use super::{Comparison, Difference, Pixels};
+use crate::harmless::harmless;
 
 /// All of it, line by line.
 pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
@@ -10,7 +11,7 @@ pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
     let mut out = String::new();
     for (name, side) in [("actual", &comparison.actual), ("expected", &comparison.expected)] {
         if !side.layer.is_empty() {
-            writeln!(out, "{name}: layer {}", side.layer)?;
+            writeln!(out, "{name}: layer {}", harmless(&side.layer))?;
         }
         for note in &side.notes {
             writeln!(out, "{name}: {note}")?;
@@ -29,9 +30,10 @@ pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
         let [a, b] =
             [&comparison.actual, &comparison.expected].map(|side| (side.width, side.height));
         writeln!(out, "actual is {}x{} but expected is {}x{}", a.0, a.1, b.0, b.1)?;
-        if let Some(page) = &comparison.page {
-            writeln!(out, "{}", page.display())?;
+        if !comparison.pictures.is_empty() {
+            writeln!(out, "there is no picture of the difference")?;
         }
+        files(&mut out, comparison)?;
         return Ok(out);
     };
     writeln!(out, "{} of {} pixels differ", values.differing, values.pixels)?;
@@ -55,11 +57,18 @@ pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
     if let Some(metrics) = &values.metrics {
         writeln!(out, "{}", serde_json::to_string_pretty(metrics)?)?;
     }
+    files(&mut out, comparison)?;
+    Ok(out)
+}
+
+/// What has been written.
+fn files(out: &mut String, comparison: &Comparison) -> std::fmt::Result {
+    use std::fmt::Write;
     for (file, caption) in &comparison.pictures {
-        writeln!(out, "{}: {caption}", file.display())?;
+        writeln!(out, "{file}: {caption}")?;
     }
     if let Some(page) = &comparison.page {
-        writeln!(out, "{}", page.display())?;
+        writeln!(out, "{page}")?;
     }
-    Ok(out)
+    Ok(())
 }
