@@ -468,9 +468,29 @@ fn a_realtime_frame_is_drawn_without_a_word_and_what_lies_out_of_range_is_said()
         scene.run(&["s.toml", "--output", "o.exr"])
     };
     assert_eq!(realtime(1.0), (0, String::new()));
-    for scale in [3000.0, 1e-3] {
+    assert_eq!(realtime(0.01), (0, String::new()));
+    assert_eq!(realtime(100.0), (0, String::new()));
+    // All of the picture, and a part of it, at either end.
+    for scale in [3000.0, 200.0, 2e-3, 1e-3] {
         let (code, said) = realtime(scale);
-        assert!(code == 0 && said.starts_with("umbra: warning: s.obj: reaches "), "{said}");
+        let expected = "umbra: warning: s.obj: what is in view reaches from ";
+        assert!(code == 0 && said.starts_with(expected), "{scale}: {said}");
+    }
+    // A floor that begins behind the camera is in view from where the film's edge meets it.
+    let under =
+        TOML.replace("spp = 4", "realtime = true").replace("0.0, 3.0, 4.0", "0.0, 0.5, 0.0");
+    for (at, expected) in [
+        ("0.0, 0.5, -1.0", ""),
+        ("0.0, 9.0, -9.0", "umbra: warning: s.obj: nothing of it is in view\n"),
+    ] {
+        let scene = Scene::new(&plain(), MTL);
+        fs::write(
+            scene.path("s.toml"),
+            under.replace("at = [0.0, 0.0, 0.0]", &format!("at = [{at}]")),
+        )
+        .unwrap();
+        let found = scene.run(&["s.toml", "--output", "o.exr"]);
+        assert_eq!(found, (0, expected.to_owned()), "{at}");
     }
 }
 

@@ -1,5 +1,7 @@
 //! `umbra render`: one image of one scene by one plugin.
 
+mod range;
+
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::{Duration, Instant};
@@ -138,13 +140,16 @@ impl Format {
 }
 
 /// Loads what a scene consists of, so that its mistakes are told in the user's own names, with what
-/// it holds that no picture shows.
-fn check_scene(toml: &Path) -> anyhow::Result<SceneConfig> {
-    let config = SceneConfig::load(toml)?;
+/// it holds that no picture shows. The film has the size that is asked for.
+fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
+    let mut config = SceneConfig::load(toml)?;
+    if let Some(Size(width, height)) = size {
+        (config.width, config.height) = (width as usize, height as usize);
+    }
     for key in &config.unknown_keys {
         eprintln!("umbra: {}: warning: unknown key {key}", toml.display());
     }
-    Camera::new(config.camera, config.width, config.height)
+    let camera = Camera::new(config.camera, config.width, config.height)
         .with_context(|| toml.display().to_string())?;
     let mesh = MeshFile::load(&config.mesh)?;
     for remark in &mesh.remarks {
@@ -154,8 +159,10 @@ fn check_scene(toml: &Path) -> anyhow::Result<SceneConfig> {
     let folder = folder.unwrap_or(Path::new("."));
     let real = |path: &Path| path.canonicalize().with_context(|| path.display().to_string());
     let root = real(folder)?;
-    if config.realtime {
-        warn_of_range(&config, &mesh);
+    if config.realtime
+        && let Some(said) = range::out_of_range(&camera, &mesh)
+    {
+        eprintln!("umbra: warning: {}: {said}", config.mesh.display());
     }
     for file in &mesh.files {
         if !real(file)?.starts_with(&root) {
@@ -169,28 +176,12 @@ fn check_scene(toml: &Path) -> anyhow::Result<SceneConfig> {
     Ok(config)
 }
 
-/// Warns when no vertex lies where the base code's projection draws: the picture would be empty.
-fn warn_of_range(config: &SceneConfig, mesh: &MeshFile) {
-    let forward = (config.camera.at - config.camera.eye).normalize_or_zero();
-    let vertices = mesh.shapes.iter().flat_map(|shape| &shape.positions);
-    let depths = vertices.map(|vertex| (*vertex - config.camera.eye).dot(forward));
-    let farthest = depths.fold(f32::NEG_INFINITY, f32::max);
-    let (near, far) = (Camera::NEAR, Camera::FAR);
-    if !(near..=far).contains(&farthest) {
-        eprintln!(
-            "umbra: warning: {}: reaches {farthest} units before the camera; the base code's projection draws \
-             from {near} to {far}",
-            config.mesh.display()
-        );
-    }
-}
-
 /// Renders the image and writes it: float for what is drawn offline, half for realtime as the
 /// course's own files.
 pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
     let format = Format::of(&arguments.output)?;
-    let config = check_scene(&arguments.scene)?;
+    let config = check_scene(&arguments.scene, arguments.size)?;
     let plugin = match arguments.plugin.as_str() {
         "reference" => context.reference().context(
             "there is no reference renderer here (a student's kit has none); hint: cargo build --release --workspace",
@@ -208,8 +199,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
             library_name("plugin")
         );
     }
-    let Size(width, height) =
-        arguments.size.unwrap_or(Size(config.width as u32, config.height as u32));
+    let (width, height) = (config.width as u32, config.height as u32);
     let scene = SceneRef {
         path: arguments.scene.canonicalize().context("scene")?,
         options: arguments.options.clone(),
