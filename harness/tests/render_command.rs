@@ -344,6 +344,10 @@ fn slips_in_a_scene_file_are_told_in_plain_words() {
     let (code, said) =
         Scene::new(&plain(), MTL).run(&["s.toml", "--output", "o.exr", "--spp", "0"]);
     assert!(code == 2 && said.contains("0 is not in 1..="), "{said}");
+    let (code, said) =
+        Scene::new(&plain(), MTL).run(&["s.toml", "--output", "o.exr", "--size", "16384x4097"]);
+    let expected = "expected at most 67108864 pixels, found 67125248";
+    assert!(code == 2 && said.contains(expected), "{said}");
 }
 
 /// The scene `scale` times as large, its light as bright.

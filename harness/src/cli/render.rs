@@ -7,7 +7,7 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail, ensure};
-use basecode::exr_io::{Precision, write_exr};
+use basecode::exr_io::{MAX_PIXELS, MAX_SIDE, Precision, write_exr};
 use basecode::scene::{MeshFile, SceneConfig};
 use basecode::{Camera, Image, Vec3};
 
@@ -46,7 +46,7 @@ pub struct RenderArguments {
     /// Whether to draw shadows [default: offline on, realtime as the scene's `bonus` says]
     #[arg(long, value_name = "on|off")]
     shadows: Option<Switch>,
-    /// Film size in pixels [default: the scene's]
+    /// Film size in pixels, at most 16384 a side and 67108864 in all [default: the scene's]
     #[arg(long, value_name = "WxH")]
     size: Option<Size>,
     /// Which adapter draws realtime scenes
@@ -110,8 +110,14 @@ impl FromStr for Size {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || format!("expected WIDTHxHEIGHT such as 640x480, found {text}");
         let (width, height) = text.split_once('x').ok_or_else(wrong)?;
-        let side = |text: &str| text.parse().ok().filter(|side| (1..=16_384).contains(side));
-        Ok(Self(side(width).ok_or_else(wrong)?, side(height).ok_or_else(wrong)?))
+        let side =
+            |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE as u32).contains(side));
+        let (width, height) = (side(width).ok_or_else(wrong)?, side(height).ok_or_else(wrong)?);
+        let pixels = width as usize * height as usize;
+        if pixels > MAX_PIXELS {
+            return Err(format!("expected at most {MAX_PIXELS} pixels, found {pixels}"));
+        }
+        Ok(Self(width, height))
     }
 }
 

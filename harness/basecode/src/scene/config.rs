@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::text::decode;
+use crate::exr_io::{MAX_PIXELS, MAX_SIDE};
 use crate::{CameraConfig, Error, Result, ShadingKind};
 
 /// A scene file as it was written, defaults filled in.
@@ -31,9 +32,6 @@ pub struct SceneConfig {
     /// Keys that nobody knows, as `section.key`. Harmless, but perhaps misspelt.
     pub unknown_keys: Vec<String>,
 }
-
-/// Films larger than this in either direction are taken for a mistake.
-const MAX_FILM_SIDE: i64 = 16_384;
 
 #[derive(Deserialize)]
 struct File {
@@ -184,12 +182,20 @@ impl SceneConfig {
                 return Err(wrong(line_of_key(text, "renderer", "type"), message));
             }
         };
+        let width = in_range("film", "width", file.film.width, MAX_SIDE as i64)?;
+        let height = in_range("film", "height", file.film.height, MAX_SIDE as i64)?;
+        if width * height > MAX_PIXELS {
+            let line = line_of_key(text, "film", "width");
+            let message =
+                format!("film has {} pixels but must have at most {MAX_PIXELS}", width * height);
+            return Err(wrong(line, message));
+        }
         Ok(Self {
             path: path.to_owned(),
             mesh: path.parent().unwrap_or(Path::new("")).join(mesh),
             camera,
-            width: in_range("film", "width", file.film.width, MAX_FILM_SIDE)?,
-            height: in_range("film", "height", file.film.height, MAX_FILM_SIDE)?,
+            width,
+            height,
             realtime: renderer.realtime,
             kind,
             spp: in_range("renderer", "spp", renderer.spp, 1 << 20)?,
@@ -278,6 +284,10 @@ mod tests {
             ("[camera]\nfov = 30\n", "missing field `input`"),
             (&format!("{base}[film]\nwidth = 0\n"), "b.toml:4: film.width is 0"),
             (&format!("{base}[film]\nheight = 99999\n"), "b.toml:4: film.height is 99999"),
+            (
+                &format!("{base}[film]\nwidth = 16384\nheight = 4097\n"),
+                "b.toml:4: film has 67125248 pixels but must have at most 67108864",
+            ),
             (&format!("{base}[renderer]\nspp = -1\n"), "b.toml:4: renderer.spp is -1"),
             (
                 &format!("{base}[renderer]\nspp = 4\ntype = \"glass\"\n"),
