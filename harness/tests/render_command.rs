@@ -464,6 +464,34 @@ fn an_image_is_written_as_its_name_says_or_refused() {
 }
 
 #[test]
+fn an_output_that_cannot_be_written_is_refused_before_any_work() {
+    // Work would find that there is no mesh.
+    let scene = Scene::new("", MTL);
+    fs::create_dir(scene.path("d.exr")).unwrap();
+    fs::create_dir(scene.path("d.png")).unwrap();
+    let pipe = Command::new("mkfifo").arg(scene.path("p.exr")).status().unwrap();
+    assert!(pipe.success());
+    for (output, expected) in [
+        ("d.exr", "umbra: d.exr: expected a file, found a folder"),
+        ("d.png", "umbra: d.png: expected a file, found a folder"),
+        ("p.exr", "umbra: p.exr: expected a file, found a pipe or device"),
+        ("/proc/x.exr", "umbra: /proc/x.exr: "),
+    ] {
+        let (code, said) = scene.run(&["s.toml", "--output", output]);
+        assert!(code == 2 && said.starts_with(expected), "{said}");
+        assert!(!said.contains("s.obj"), "{said}");
+    }
+    // What is there stays when there is no image, and nothing is left behind.
+    fs::write(scene.path("old.exr"), "old").unwrap();
+    for output in ["old.exr", "new.exr"] {
+        let (_, said) = scene.run(&["s.toml", "--output", output]);
+        assert!(said.contains("s.obj: mesh holds no triangle"), "{said}");
+    }
+    assert_eq!(fs::read(scene.path("old.exr")).unwrap(), b"old");
+    assert!(!scene.path("new.exr").exists());
+}
+
+#[test]
 fn a_realtime_frame_is_drawn_without_a_word_and_what_lies_out_of_range_is_said() {
     let realtime = |scale: f64| {
         let scene = scaled(&plain(), scale);

@@ -129,7 +129,7 @@ enum Format {
 }
 
 impl Format {
-    /// The format of an output file, which must have a folder.
+    /// The format of an output file, which must be possible to write.
     fn of(output: &Path) -> anyhow::Result<Self> {
         let ending = output.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let format = match ending.as_str() {
@@ -141,8 +141,26 @@ impl Format {
         if !folder.as_os_str().is_empty() && !folder.is_dir() {
             bail!("{}: there is no folder {}", output.display(), folder.display());
         }
+        try_to_write(output).with_context(|| output.display().to_string())?;
         Ok(format)
     }
+}
+
+/// Opens a file to write it, so that no work is lost on one that cannot be; changes none.
+fn try_to_write(output: &Path) -> anyhow::Result<()> {
+    let is_new = output.symlink_metadata().is_err();
+    // To open a pipe is to wait for its reader.
+    ensure!(!output.exists() || output.is_file(), "expected a file, found {}", kind_of(output));
+    std::fs::OpenOptions::new().write(true).create(true).truncate(false).open(output)?;
+    if is_new {
+        std::fs::remove_file(output)?;
+    }
+    Ok(())
+}
+
+/// What lies at a path that is no file.
+fn kind_of(path: &Path) -> &'static str {
+    if path.is_dir() { "a folder" } else { "a pipe or device" }
 }
 
 /// Loads what a scene consists of, so that its mistakes are told in the user's own names, with what
