@@ -8,7 +8,7 @@ use super::Material;
 use super::mtl::Library;
 use super::obj::{Corner, MISSING, Obj, Part};
 use super::polygon::triangulate;
-use super::text::decode;
+use super::text::{decode, visible};
 use crate::{Error, Result};
 
 /// A triangle mesh with one material.
@@ -49,8 +49,8 @@ pub struct MeshFile {
     pub shapes: Vec<Shape>,
     /// All materials.
     pub materials: Vec<Material>,
-    /// What was left out, with file and line: lines and points, which have no area; maps that are
-    /// not supported.
+    /// What was left out, with file and line: lines and points, which have no area; maps and
+    /// statements that are not supported.
     pub remarks: Vec<String>,
     /// The files that it was made of: OBJ, MTL, textures.
     pub files: Vec<PathBuf>,
@@ -101,11 +101,6 @@ impl MeshFile {
         let files = std::iter::once(path.to_owned()).chain(library.files().cloned()).collect();
         Ok(Self { shapes, materials: library.materials, remarks, files })
     }
-}
-
-/// A character as a message shows it.
-fn visible(c: char) -> char {
-    if c.is_control() { '?' } else { c }
 }
 
 /// Index of the material of a part.

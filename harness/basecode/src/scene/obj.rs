@@ -9,12 +9,14 @@ mod piece;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::text::visible;
 use crate::{Error, Result};
 use piece::{Mark, Piece, Wrong, wrong_corner};
 
@@ -141,7 +143,12 @@ struct Assembly<'a> {
     not_finite: Vec<(&'static str, usize, usize)>,
     /// What has no area: words for one and for several, how many, the first's line.
     without_area: [((&'static str, &'static str), usize, usize); 3],
+    /// Statements that are not supported: how many of each keyword, the first's line.
+    ignored: BTreeMap<String, (usize, usize)>,
 }
+
+/// Keywords of ignored statements that are remarked on at most.
+const LISTED: usize = 12;
 
 const UNNAMED: &str = "unnamed_object";
 
@@ -160,6 +167,7 @@ impl Default for Assembly<'_> {
                 (("line (l) has", "lines (l) have"), 0, 0),
                 (("face of fewer than 3 corners has", "faces of fewer than 3 corners have"), 0, 0),
             ],
+            ignored: BTreeMap::new(),
         }
     }
 }
@@ -213,6 +221,9 @@ impl Assembly<'_> {
                 *first = self.lines + line;
             }
             *count += more;
+        }
+        for (keyword, (more, line)) in piece.ignored {
+            self.ignored.entry(keyword).or_insert((0, self.lines + line)).0 += more;
         }
         self.lines += piece.lines;
         Ok(())
@@ -269,6 +280,19 @@ impl Assembly<'_> {
                     .remarks
                     .push(format!("{path}:{line}: {count} {words} no area and will not be seen"));
             }
+        }
+        let mut ignored: Vec<_> = self.ignored.iter().collect();
+        ignored.sort_by_key(|(_, (_, line))| *line);
+        for (keyword, (count, line)) in ignored.iter().take(LISTED) {
+            let keyword: String = keyword.chars().take(40).map(visible).collect();
+            let words = if *count == 1 { "statement is" } else { "statements are" };
+            let path = self.path.display();
+            self.obj.remarks.push(format!("{path}:{line}: {count} {keyword} {words} ignored"));
+        }
+        if let Some((_, (_, line))) = ignored.get(LISTED) {
+            let (path, more) = (self.path.display(), ignored.len() - LISTED);
+            let message = format!("{path}:{line}: {more} more kinds of statements are ignored");
+            self.obj.remarks.push(message);
         }
         Ok(self.obj)
     }

@@ -344,6 +344,31 @@ fn what_has_no_area_is_left_out_and_remarked_on() {
 }
 
 #[test]
+fn statements_that_are_not_supported_are_remarked_on() {
+    let freeform = "vp 0.1\ncstype bezier\ndeg 1 1\nSURF 0 1 0 1 1 2 4 3\nparm u 0 1\nend\ncall a.obj\nface 1 2 3\n\
+                    curv 0 1 1 2\nsurf 0 1 0 1 1 2 4 3\ns off\nmg 0\n";
+    let scene = Folder::new("freeform", &format!("{OBJ}{freeform}"), MTL).load().unwrap();
+    let said = scene.remarks().join("\n");
+    let expected = [
+        "s.obj:25: 2 surf statements are ignored",
+        "s.obj:28: 1 call statement is ignored",
+        "s.obj:29: 1 face statement is ignored",
+        "s.obj:30: 1 curv statement is ignored",
+    ];
+    assert_eq!(scene.remarks().len(), expected.len(), "{said}");
+    for expected in expected {
+        assert!(said.contains(expected), "{said}");
+    }
+    // Few remarks on what is perhaps no mesh at all.
+    let words: String = (0..100).map(|i| format!("word{i}\u{1b}[2J\n")).collect();
+    let scene = Folder::new("words", &format!("{OBJ}{words}"), MTL).load().unwrap();
+    assert_eq!(scene.remarks().len(), 13);
+    let said = scene.remarks().join("\n");
+    assert!(said.ends_with("s.obj:34: 88 more kinds of statements are ignored"), "{said}");
+    assert!(said.contains("1 word0?[2j statement is ignored"), "{said}");
+}
+
+#[test]
 fn a_face_without_uv_or_normal_concerns_itself_alone() {
     let tilted = OBJ.replace("vn 0 0 1", "vn 0 0.6 0.8");
     let more = tilted.replace("o lamp", "f 1//1 2//1 3//1\nf 1/1 3/3 4/4\nf 2 3 4\no lamp");

@@ -112,6 +112,11 @@ pub(super) fn unquoted(name: &str) -> &str {
     name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).map_or(name, str::trim)
 }
 
+/// A character as a message shows it.
+pub(super) fn visible(c: char) -> char {
+    if c.is_control() { '?' } else { c }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

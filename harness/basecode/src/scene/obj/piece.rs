@@ -1,5 +1,7 @@
 //! The statements of a piece of an OBJ file.
 
+use std::collections::BTreeMap;
+
 use glam::{Vec2, Vec3};
 
 use super::super::text::{Statements, split_keyword, unquoted, without_comment};
@@ -54,7 +56,38 @@ pub(super) struct Piece {
     pub not_finite: Vec<(&'static str, usize, usize)>,
     /// Points, lines, faces of fewer than three corners: how many, the first's line.
     pub without_area: [(usize, usize); 3],
+    /// Statements that are not supported: how many of each keyword, the first's line.
+    pub ignored: BTreeMap<String, (usize, usize)>,
 }
+
+/// Statements that change no picture here: smoothing and merging groups, attributes of a display, and what only
+/// describes the free-form curves and surfaces that other statements draw.
+const WITHOUT_EFFECT: [&str; 24] = [
+    "s",
+    "mg",
+    "bevel",
+    "c_interp",
+    "d_interp",
+    "lod",
+    "shadow_obj",
+    "trace_obj",
+    "maplib",
+    "ctech",
+    "stech",
+    "cstype",
+    "deg",
+    "bmat",
+    "step",
+    "vp",
+    "parm",
+    "trim",
+    "hole",
+    "scrv",
+    "sp",
+    "end",
+    "con",
+    "usemap",
+];
 
 impl Piece {
     /// Reads a text, up to the first statement that cannot be understood.
@@ -84,7 +117,7 @@ impl Piece {
         let (keyword, rest) = split_keyword(statement);
         // Some write them in upper case.
         let lower = keyword.to_ascii_lowercase();
-        let keyword = if keyword.len() <= 6 { lower.as_str() } else { keyword };
+        let keyword = lower.as_str();
         match keyword {
             "v" => {
                 let position = self.position(line, rest)?;
@@ -118,8 +151,8 @@ impl Piece {
                 self.marks.push((self.faces.len(), name));
             }
             "mtllib" => self.libraries.push(Named { line, name: rest.to_owned() }),
-            // Smoothing groups, free-form geometry, whatever else there is.
-            _ => {}
+            other if WITHOUT_EFFECT.contains(&other) => {}
+            other => self.ignored.entry(other.to_owned()).or_insert((0, line)).0 += 1,
         }
         Ok(())
     }
