@@ -103,6 +103,42 @@ fn mistakes_in_mesh_and_materials_name_file_and_line() {
             "s.obj:20: f uses v number 99, the file has 8",
         ),
         (
+            "before",
+            OBJ.replace("f 5 6 7", "f -50 6 7"),
+            MTL.to_owned(),
+            "s.obj:20: f uses v number -50, the file has 8 before it",
+        ),
+        (
+            "vnbefore",
+            OBJ.replace("f 1/1/1", "f 1/1/-99999999999999999999"),
+            MTL.to_owned(),
+            "s.obj:13: f uses vn number -99999999999999999999, the file has 1 before it",
+        ),
+        (
+            "billions",
+            OBJ.replace("f 5 6 7", "f 5 6 7000000000"),
+            MTL.to_owned(),
+            "s.obj:20: f uses v number 7000000000, the file has 8",
+        ),
+        (
+            "vtbillions",
+            OBJ.replace("3/3/1", "3/99999999999999999999/1"),
+            MTL.to_owned(),
+            "s.obj:13: f uses vt number 99999999999999999999, the file has 4",
+        ),
+        (
+            "last",
+            OBJ.replace("f 5 6 7", "f 5 6 4294967295"),
+            MTL.to_owned(),
+            "s.obj:20: f uses v number 4294967295, the file has 8",
+        ),
+        (
+            "word corner",
+            OBJ.replace("f 5 6 7", "f 5 6 7x"),
+            MTL.to_owned(),
+            "s.obj:20: f has \"7x\" where a corner is expected",
+        ),
+        (
             "vt",
             OBJ.replace("f 1/1/1", "f 1/9/1"),
             MTL.to_owned(),
