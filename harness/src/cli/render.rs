@@ -189,6 +189,7 @@ fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
         eprintln!("umbra: warning: {}: {said}", config.mesh.display());
     }
     for file in &mesh.files {
+        let file = &file.path;
         if !real(file)?.starts_with(&root) {
             bail!(
                 "{}: a renderer sees only the folder of the mesh, {}; hint: put the file there",

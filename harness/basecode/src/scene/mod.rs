@@ -17,6 +17,7 @@ use glam::{Vec2, Vec3};
 pub use config::SceneConfig;
 pub use material::{Material, MaterialModel};
 pub use mesh::{MeshFile, Shape};
+pub use mtl::UsedFile;
 pub use texture::{Bitmap, Texture};
 
 use crate::bvh::{Bvh, Hit};

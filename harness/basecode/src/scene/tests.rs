@@ -380,6 +380,36 @@ fn what_has_no_area_is_left_out_and_remarked_on() {
 }
 
 #[test]
+fn a_broken_material_that_no_face_uses_is_remarked_on() {
+    let plain = Folder::new("plain-spare", OBJ, MTL).load().unwrap();
+    let count = MTL.lines().count();
+    for (statement, expected) in [
+        ("map_Kd gone.png", "map_Kd: cannot read the texture"),
+        ("map_Ks s.mtl", "map_Ks: cannot decode the texture"),
+        ("map_Kd -bm 2 x.png", "map_Kd: the option -bm is not supported"),
+        ("Kd -1 1 1", "Kd is"),
+        ("Ns many", "Ns is"),
+        ("illum x", "illum is"),
+    ] {
+        // A second material of one name is never used.
+        for name in ["spare", "grey"] {
+            let mtl = format!("{MTL}newmtl {name}\n{statement}\nillum 7\n");
+            let scene = Folder::new("spare", OBJ, &mtl).load().unwrap();
+            let said = scene.remarks().join("\n");
+            let place = format!("s.mtl:{}: material \"{name}\": {expected}", count + 2);
+            assert!(said.contains(&place), "{said}");
+            assert!(said.ends_with("; no face uses this material"), "{said}");
+            assert_eq!(scene.first_light_intensity(), plain.first_light_intensity());
+            let used = OBJ.replacen("usemtl grey", "usemtl spare", 1);
+            if name == "spare" {
+                let error = Folder::new("used", &used, &mtl).error();
+                assert!(error.contains(&place) && !error.contains("no face"), "{error}");
+            }
+        }
+    }
+}
+
+#[test]
 fn statements_that_are_not_supported_are_remarked_on() {
     let freeform = "vp 0.1\ncstype bezier\ndeg 1 1\nSURF 0 1 0 1 1 2 4 3\nparm u 0 1\nend\ncall a.obj\nface 1 2 3\n\
                     curv 0 1 1 2\nsurf 0 1 0 1 1 2 4 3\ns off\nmg 0\n";

@@ -75,7 +75,7 @@ pub(super) struct Piece {
 
 /// Statements that change no picture here: smoothing and merging groups, attributes of a display, and what only
 /// describes the free-form curves and surfaces that other statements draw.
-const WITHOUT_EFFECT: [&str; 24] = [
+const WITHOUT_EFFECT: [&str; 23] = [
     "s",
     "mg",
     "bevel",
@@ -99,7 +99,6 @@ const WITHOUT_EFFECT: [&str; 24] = [
     "sp",
     "end",
     "con",
-    "usemap",
 ];
 
 impl Piece {
