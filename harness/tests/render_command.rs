@@ -464,6 +464,31 @@ fn an_image_is_written_as_its_name_says_or_refused() {
 }
 
 #[test]
+fn a_pipe_in_the_place_of_a_file_is_refused_not_waited_for() {
+    let uvs = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    let obj = mesh(&format!("{uvs}f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"));
+    for (file, expected) in [
+        ("s.toml", "umbra: s.toml: cannot read the scene"),
+        ("s.obj", "cannot read the mesh"),
+        ("m.mtl", "umbra: s.obj:1: cannot read the material file m.mtl"),
+        ("t.png", "umbra: m.mtl:4: material \"floor\": map_Kd: cannot read the texture t.png"),
+    ] {
+        let scene = Scene::new(&obj, TEXTURED);
+        fs::remove_file(scene.path(file)).unwrap();
+        assert!(Command::new("mkfifo").arg(scene.path(file)).status().unwrap().success());
+        let said = scene.error();
+        assert!(said.contains(expected), "{said}");
+        assert!(said.contains(": expected a file, found a pipe or device"), "{said}");
+        fs::remove_file(scene.path(file)).unwrap();
+        fs::create_dir(scene.path(file)).unwrap();
+        assert!(scene.error().contains(": expected a file, found a folder"));
+    }
+    let scene = Scene::new(&plain(), MTL);
+    assert!(Command::new("mkfifo").arg(scene.path("config.json")).status().unwrap().success());
+    scene.image();
+}
+
+#[test]
 fn an_output_that_cannot_be_written_is_refused_before_any_work() {
     // Work would find that there is no mesh.
     let scene = Scene::new("", MTL);

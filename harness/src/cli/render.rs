@@ -217,10 +217,11 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     let plugin = plugin_as_given
         .canonicalize()
         .with_context(|| format!("plugin {}", plugin_as_given.display()))?;
-    if plugin.is_dir() {
+    if !plugin.is_file() {
         bail!(
-            "plugin {}: it is a folder, expected a library such as {}",
+            "plugin {}: it is {}, expected a library such as {}",
             plugin_as_given.display(),
+            kind_of(&plugin),
             library_name("plugin")
         );
     }
@@ -333,7 +334,8 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
 fn own_seed(file: &Path) -> Option<u64> {
     let file = std::path::absolute(file).ok()?;
     let configs = file.ancestors().skip(1).take(2).map(|folder| folder.join("config.json"));
-    let mut found = configs.filter_map(|path| std::fs::read(path).ok());
+    let mut found =
+        configs.filter(|path| path.is_file()).filter_map(|path| std::fs::read(path).ok());
     found.find_map(|bytes| SubmittedConfig::parse(&bytes).0.sampler_seed())
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::text::decode;
+use super::text::{decode, read};
 use crate::exr_io::{MAX_PIXELS, MAX_SIDE};
 use crate::{CameraConfig, Error, Result, ShadingKind};
 
@@ -99,7 +99,7 @@ impl SceneConfig {
     /// When the file cannot be read, is not TOML, lacks `input.objfile`, or holds a value outside
     /// its range; names file, line and key.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path)
+        let bytes = read(path)
             .map_err(|error| Error::file(path, format!("cannot read the scene: {error}")))?;
         Self::parse(path, &bytes)
     }

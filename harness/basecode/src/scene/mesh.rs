@@ -8,7 +8,7 @@ use super::Material;
 use super::mtl::{Library, UsedFile};
 use super::obj::{Corner, MISSING, Obj, Part};
 use super::polygon::triangulate;
-use super::text::{decode, visible};
+use super::text::{decode, read, visible};
 use crate::{Error, Result};
 
 /// A triangle mesh with one material.
@@ -62,7 +62,7 @@ impl MeshFile {
     /// # Errors
     /// When a file cannot be used; names file, line, expected and found.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path)
+        let bytes = read(path)
             .map_err(|error| Error::file(path, format!("cannot read the mesh: {error}")))?;
         let text = decode(&bytes);
         let obj = Obj::parse(path, &text)?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{Vec2, Vec3};
 
 use super::obj::Named;
-use super::text::{Statements, decode, split_keyword, unquoted, without_comment};
+use super::text::{Statements, decode, read, split_keyword, unquoted, without_comment};
 use super::texture::Mapping;
 use super::{Material, MaterialModel, Texture};
 use crate::{Error, Result};
@@ -58,7 +58,7 @@ impl Library {
                 if library.files.iter().any(|known| known.path == file) {
                     continue;
                 }
-                let bytes = std::fs::read(&file).map_err(|error| {
+                let bytes = read(&file).map_err(|error| {
                     let why = why_missing(&statement.name, &file);
                     wrong(format!("cannot read the material file {}: {error}{why}", file.display()))
                 })?;
