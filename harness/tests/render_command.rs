@@ -218,7 +218,7 @@ fn errors_name_the_user_s_own_file_and_line() {
     fs::write(outside.path("s.toml"), TOML.replace("s.obj", "obj/s.obj")).unwrap();
     let said = outside.error();
     assert!(
-        said.starts_with("umbra: obj/../mesh/t.png: a renderer sees only the folder"),
+        said.starts_with("umbra: obj/m.mtl:4: obj/../mesh/t.png: a renderer sees only the folder"),
         "{said}"
     );
     let kind = TOML.replace("spp = 4", "type = \"glass\"");
@@ -460,6 +460,41 @@ fn an_image_is_written_as_its_name_says_or_refused() {
         let (code, said) = scene.run(&["s.toml", "--output", output]);
         assert!(code == 2 && said.starts_with(expected), "{said}");
         assert!(!scene.path(output).exists());
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_to_a_scene_is_the_scene_and_a_link_out_of_it_is_named() {
+    use std::os::unix::fs::symlink;
+    let right = Scene::new(&plain(), MTL).image();
+    let scene = Scene::new(&plain(), MTL);
+    fs::create_dir(scene.path("link")).unwrap();
+    symlink("../s.toml", scene.path("link/s.toml")).unwrap();
+    let draw = || scene.run(&["link/s.toml", "--output", "o.exr"]);
+    assert_eq!(draw().0, 0, "{}", draw().1);
+    assert_eq!(read_exr(scene.path("o.exr")).unwrap().pixels, right.pixels);
+    // Beside the link lies another mesh, which is not the scene's.
+    fs::write(scene.path("link/s.obj"), plain()).unwrap();
+    fs::write(scene.path("link/m.mtl"), MTL).unwrap();
+    fs::write(scene.path("s.obj"), plain().replace("f 1 3 4", "f 1 3 40")).unwrap();
+    let (code, said) = draw();
+    let real = scene.path("s.obj").canonicalize().unwrap();
+    let expected = format!("umbra: {}:11: f uses v number 40", real.display());
+    assert!(code == 2 && said.starts_with(&expected), "{said}");
+
+    let uvs = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    let obj = mesh(&format!("{uvs}f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"));
+    let other = tempfile::tempdir().unwrap();
+    for (file, place) in [("s.obj", ""), ("m.mtl", "s.obj:1: "), ("t.png", "m.mtl:4: ")] {
+        let scene = Scene::new(&obj, TEXTURED);
+        let target = other.path().canonicalize().unwrap().join(file);
+        fs::rename(scene.path(file), &target).unwrap();
+        symlink(&target, scene.path(file)).unwrap();
+        let said = scene.error();
+        let target = target.display();
+        let expected = format!("umbra: {place}{file}: is a link to {target}; a renderer sees only");
+        assert!(said.starts_with(&expected), "{said}");
     }
 }
 

@@ -189,14 +189,24 @@ fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
         eprintln!("umbra: warning: {}: {said}", config.mesh.display());
     }
     for file in &mesh.files {
-        let file = &file.path;
-        if !real(file)?.starts_with(&root) {
-            bail!(
-                "{}: a renderer sees only the folder of the mesh, {}; hint: put the file there",
-                file.display(),
-                folder.display()
-            );
+        let path = &file.path;
+        let target = real(path)?;
+        if target.starts_with(&root) {
+            continue;
         }
+        let named_at = file.named_at.as_ref();
+        let place = named_at.map(|(by, line)| format!("{}:{line}: ", by.display()));
+        let link = if path.is_symlink() {
+            format!("is a link to {}; ", target.display())
+        } else {
+            String::new()
+        };
+        bail!(
+            "{}{}: {link}a renderer sees only the folder of the mesh, {}; hint: put the file there",
+            place.unwrap_or_default(),
+            path.display(),
+            folder.display()
+        );
     }
     Ok(config)
 }
@@ -206,7 +216,12 @@ fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
 pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
     let format = Format::of(&arguments.output)?;
-    let config = check_scene(&arguments.scene, arguments.size)?;
+    // A scene's other files lie where the file is, not where a link to it is.
+    let scene_file = match arguments.scene.canonicalize() {
+        Ok(target) if arguments.scene.is_symlink() => target,
+        _ => arguments.scene.clone(),
+    };
+    let config = check_scene(&scene_file, arguments.size)?;
     let plugin = match arguments.plugin.as_str() {
         "reference" => context.reference().context(
             "there is no reference renderer here (a student's kit has none); hint: cargo build --release --workspace",
@@ -227,7 +242,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     }
     let (width, height) = (config.width as u32, config.height as u32);
     let scene = SceneRef {
-        path: arguments.scene.canonicalize().context("scene")?,
+        path: scene_file.canonicalize().context("scene")?,
         options: arguments.options.clone(),
     };
     let request = if config.realtime {
@@ -320,7 +335,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
                 Some(outcome) => outcome.to_string(),
                 None => "the worker gave no answer".to_owned(),
             };
-            let as_given = |said: &str| as_given(said, &arguments.scene, &plugin_as_given);
+            let as_given = |said: &str| as_given(said, &scene_file, &plugin_as_given);
             eprint!("{}", as_given(&printed));
             if outcome.and_then(Outcome::fault) == Some(Fault::Environment) {
                 return Err(super::MachineLacks(as_given(&said)).into());
