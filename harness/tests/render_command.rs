@@ -206,7 +206,25 @@ fn errors_name_the_user_s_own_file_and_line() {
     assert!(scene.error().starts_with("umbra: s.toml:7: camera.fov is 0"));
     fs::write(scene.path("s.toml"), TOML.replace("eye = [0.0, 3.0, 4.0]", "eye = [0, 0, 0]"))
         .unwrap();
-    assert!(scene.error().starts_with("umbra: s.toml: camera eye"));
+    assert!(scene.error().starts_with("umbra: s.toml:4: camera eye"));
+    fs::write(scene.path("s.toml"), TOML.replace("up = [0.0, 1.0", "up = [0.0, 3.0, 4.0] #"))
+        .unwrap();
+    assert!(scene.error().starts_with("umbra: s.toml:4: camera eye"));
+    for (mesh, expected) in [
+        ("gone.obj", "No such file or directory (os error 2)\n"),
+        ("S.OBJ", "there is s.obj: upper and lower case count\n"),
+        ("Meshes/s.obj", "there is meshes: upper and lower case count\n"),
+    ] {
+        fs::create_dir_all(scene.path("meshes")).unwrap();
+        fs::write(scene.path("s.toml"), TOML.replace("s.obj", mesh)).unwrap();
+        let said = scene.error();
+        let start = format!("umbra: s.toml:2: cannot read the mesh {mesh}: ");
+        assert!(said.starts_with(&start) && said.ends_with(expected), "{said}");
+    }
+    fs::write(scene.path("s.toml"), TOML.replace("spp = 4", "ssp = 4")).unwrap();
+    assert!(scene.error().starts_with("umbra: warning: s.toml:11: unknown key renderer.ssp\n"));
+    let (_, said) = scene.run(&["s.obj", "--output", "o.exr"]);
+    assert!(said.starts_with("umbra: s.obj:1: expected a scene's TOML file: "), "{said}");
     // What the renderer would not see.
     let outside = Scene::new(&plain(), &TEXTURED.replace("t.png", "../mesh/t.png"));
     fs::create_dir(outside.path("mesh")).unwrap();

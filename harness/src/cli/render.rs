@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail, ensure};
 use basecode::exr_io::{MAX_PIXELS, MAX_SIDE, Precision, write_exr};
-use basecode::scene::{MeshFile, SceneConfig};
+use basecode::scene::SceneConfig;
 use basecode::{Camera, Image, Vec3};
 
 use super::context::{Context, INTERRUPTED, cores};
@@ -170,13 +170,10 @@ fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
     if let Some(Size(width, height)) = size {
         (config.width, config.height) = (width as usize, height as usize);
     }
-    for key in &config.unknown_keys {
-        eprintln!("umbra: {}: warning: unknown key {key}", toml.display());
-    }
     let camera = Camera::new(config.camera, config.width, config.height)
         .with_context(|| toml.display().to_string())?;
-    let mesh = MeshFile::load(&config.mesh)?;
-    for remark in &mesh.remarks {
+    let mesh = config.load_mesh()?;
+    for remark in config.remarks.iter().chain(&mesh.remarks) {
         eprintln!("umbra: warning: {remark}");
     }
     let folder = config.mesh.parent().filter(|folder| !folder.as_os_str().is_empty());

@@ -417,12 +417,13 @@ fn taken_beside(path: &Path, line: usize, name: &str, file: &Path) -> String {
 }
 
 /// A hint for the message about a missing file.
-fn why_missing(name: &str, file: &Path) -> String {
-    if file.exists() {
-        return String::new();
-    }
-    let wanted = file.file_name().unwrap_or_default();
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+pub(super) fn why_missing(name: &str, file: &Path) -> String {
+    // The first of its folders that is not there, or the file itself.
+    let missing =
+        file.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists());
+    let Some(missing) = missing.last() else { return String::new() };
+    let wanted = missing.file_name().unwrap_or_default();
+    let folder = missing.parent().filter(|folder| !folder.as_os_str().is_empty());
     let entries = folder.unwrap_or(Path::new(".")).read_dir().into_iter().flatten().flatten();
     let mut alike = entries.map(|entry| entry.file_name());
     if let Some(other) = alike.find(|other| other.eq_ignore_ascii_case(wanted)) {
