@@ -483,6 +483,28 @@ fn an_image_is_written_as_its_name_says_or_refused() {
 
 #[cfg(unix)]
 #[test]
+fn a_folder_whose_name_is_not_utf_8_holds_scenes_like_any_other() {
+    use std::os::unix::ffi::OsStrExt;
+    let right = Scene::new(&plain(), MTL).image();
+    let scene = Scene::new(&plain(), MTL);
+    let folder = scene.path("").join(std::ffi::OsStr::from_bytes(b"d\xff"));
+    fs::create_dir(&folder).unwrap();
+    for file in ["s.toml", "s.obj", "m.mtl"] {
+        fs::rename(scene.path(file), folder.join(file)).unwrap();
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let output = scene.path("o.exr");
+    let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
+        .args(["render", "--plugin", "reference", "--root"])
+        .args([root, &folder.join("s.toml"), Path::new("--output"), &output])
+        .output()
+        .unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    assert_eq!(read_exr(output).unwrap().pixels, right.pixels);
+}
+
+#[cfg(unix)]
+#[test]
 fn a_link_to_a_scene_is_the_scene_and_a_link_out_of_it_is_named() {
     use std::os::unix::fs::symlink;
     let right = Scene::new(&plain(), MTL).image();
