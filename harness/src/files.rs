@@ -186,6 +186,84 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Paths in JSON, which has no bytes: a text where a path is UTF-8, else its bytes as numbers. For `serde(with)`.
+pub mod path_json {
+    use std::path::{Path, PathBuf};
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    #[serde(untagged)]
+    enum Written {
+        Text(String),
+        Bytes(Vec<u8>),
+    }
+
+    impl Written {
+        fn of(path: &Path) -> Self {
+            match path.to_str() {
+                Some(text) => Self::Text(text.to_owned()),
+                None => Self::Bytes(path.as_os_str().as_encoded_bytes().to_vec()),
+            }
+        }
+
+        fn path(self) -> PathBuf {
+            match self {
+                Self::Text(text) => text.into(),
+                #[cfg(unix)]
+                Self::Bytes(bytes) => {
+                    use std::os::unix::ffi::OsStringExt as _;
+                    std::ffi::OsString::from_vec(bytes).into()
+                }
+                #[cfg(not(unix))]
+                Self::Bytes(bytes) => String::from_utf8_lossy(&bytes).into_owned().into(),
+            }
+        }
+    }
+
+    /// Writes a path.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+        Written::of(path).serialize(serializer)
+    }
+
+    /// Reads a path.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PathBuf, D::Error> {
+        Ok(Written::deserialize(deserializer)?.path())
+    }
+
+    /// The same for a path that may be missing.
+    pub mod optional {
+        use super::{Deserialize, Deserializer, PathBuf, Serialize, Serializer, Written};
+
+        /// Writes a path or `null`.
+        ///
+        /// # Errors
+        /// Those of the serializer.
+        pub fn serialize<S: Serializer>(
+            path: &Option<PathBuf>,
+            serializer: S,
+        ) -> Result<S::Ok, S::Error> {
+            path.as_deref().map(Written::of).serialize(serializer)
+        }
+
+        /// Reads a path or `null`.
+        ///
+        /// # Errors
+        /// Those of the deserializer.
+        pub fn deserialize<'de, D: Deserializer<'de>>(
+            deserializer: D,
+        ) -> Result<Option<PathBuf>, D::Error> {
+            Ok(Option::<Written>::deserialize(deserializer)?.map(Written::path))
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

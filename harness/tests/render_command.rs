@@ -206,7 +206,25 @@ fn errors_name_the_user_s_own_file_and_line() {
     assert!(scene.error().starts_with("umbra: s.toml:7: camera.fov is 0"));
     fs::write(scene.path("s.toml"), TOML.replace("eye = [0.0, 3.0, 4.0]", "eye = [0, 0, 0]"))
         .unwrap();
-    assert!(scene.error().starts_with("umbra: s.toml: camera eye"));
+    assert!(scene.error().starts_with("umbra: s.toml:4: camera eye"));
+    fs::write(scene.path("s.toml"), TOML.replace("up = [0.0, 1.0", "up = [0.0, 3.0, 4.0] #"))
+        .unwrap();
+    assert!(scene.error().starts_with("umbra: s.toml:4: camera eye"));
+    for (mesh, expected) in [
+        ("gone.obj", "No such file or directory (os error 2)\n"),
+        ("S.OBJ", "there is s.obj: upper and lower case count\n"),
+        ("Meshes/s.obj", "there is meshes: upper and lower case count\n"),
+    ] {
+        fs::create_dir_all(scene.path("meshes")).unwrap();
+        fs::write(scene.path("s.toml"), TOML.replace("s.obj", mesh)).unwrap();
+        let said = scene.error();
+        let start = format!("umbra: s.toml:2: cannot read the mesh {mesh}: ");
+        assert!(said.starts_with(&start) && said.ends_with(expected), "{said}");
+    }
+    fs::write(scene.path("s.toml"), TOML.replace("spp = 4", "ssp = 4")).unwrap();
+    assert!(scene.error().starts_with("umbra: warning: s.toml:11: unknown key renderer.ssp\n"));
+    let (_, said) = scene.run(&["s.obj", "--output", "o.exr"]);
+    assert!(said.starts_with("umbra: s.obj:1: expected a scene's TOML file: "), "{said}");
     // What the renderer would not see.
     let outside = Scene::new(&plain(), &TEXTURED.replace("t.png", "../mesh/t.png"));
     fs::create_dir(outside.path("mesh")).unwrap();
@@ -218,7 +236,7 @@ fn errors_name_the_user_s_own_file_and_line() {
     fs::write(outside.path("s.toml"), TOML.replace("s.obj", "obj/s.obj")).unwrap();
     let said = outside.error();
     assert!(
-        said.starts_with("umbra: obj/../mesh/t.png: a renderer sees only the folder"),
+        said.starts_with("umbra: obj/m.mtl:4: obj/../mesh/t.png: a renderer sees only the folder"),
         "{said}"
     );
     let kind = TOML.replace("spp = 4", "type = \"glass\"");
@@ -344,6 +362,10 @@ fn slips_in_a_scene_file_are_told_in_plain_words() {
     let (code, said) =
         Scene::new(&plain(), MTL).run(&["s.toml", "--output", "o.exr", "--spp", "0"]);
     assert!(code == 2 && said.contains("0 is not in 1..="), "{said}");
+    let (code, said) =
+        Scene::new(&plain(), MTL).run(&["s.toml", "--output", "o.exr", "--size", "16384x4097"]);
+    let expected = "expected at most 67108864 pixels, found 67125248";
+    assert!(code == 2 && said.contains(expected), "{said}");
 }
 
 /// The scene `scale` times as large, its light as bright.
@@ -459,6 +481,116 @@ fn an_image_is_written_as_its_name_says_or_refused() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn a_folder_whose_name_is_not_utf_8_holds_scenes_like_any_other() {
+    use std::os::unix::ffi::OsStrExt;
+    let right = Scene::new(&plain(), MTL).image();
+    let scene = Scene::new(&plain(), MTL);
+    let folder = scene.path("").join(std::ffi::OsStr::from_bytes(b"d\xff"));
+    fs::create_dir(&folder).unwrap();
+    for file in ["s.toml", "s.obj", "m.mtl"] {
+        fs::rename(scene.path(file), folder.join(file)).unwrap();
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let output = scene.path("o.exr");
+    let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
+        .args(["render", "--plugin", "reference", "--root"])
+        .args([root, &folder.join("s.toml"), Path::new("--output"), &output])
+        .output()
+        .unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    assert_eq!(read_exr(output).unwrap().pixels, right.pixels);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_to_a_scene_is_the_scene_and_a_link_out_of_it_is_named() {
+    use std::os::unix::fs::symlink;
+    let right = Scene::new(&plain(), MTL).image();
+    let scene = Scene::new(&plain(), MTL);
+    fs::create_dir(scene.path("link")).unwrap();
+    symlink("../s.toml", scene.path("link/s.toml")).unwrap();
+    let draw = || scene.run(&["link/s.toml", "--output", "o.exr"]);
+    assert_eq!(draw().0, 0, "{}", draw().1);
+    assert_eq!(read_exr(scene.path("o.exr")).unwrap().pixels, right.pixels);
+    // Beside the link lies another mesh, which is not the scene's.
+    fs::write(scene.path("link/s.obj"), plain()).unwrap();
+    fs::write(scene.path("link/m.mtl"), MTL).unwrap();
+    fs::write(scene.path("s.obj"), plain().replace("f 1 3 4", "f 1 3 40")).unwrap();
+    let (code, said) = draw();
+    let real = scene.path("s.obj").canonicalize().unwrap();
+    let expected = format!("umbra: {}:11: f uses v number 40", real.display());
+    assert!(code == 2 && said.starts_with(&expected), "{said}");
+
+    let uvs = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    let obj = mesh(&format!("{uvs}f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"));
+    let other = tempfile::tempdir().unwrap();
+    for (file, place) in [("s.obj", ""), ("m.mtl", "s.obj:1: "), ("t.png", "m.mtl:4: ")] {
+        let scene = Scene::new(&obj, TEXTURED);
+        let target = other.path().canonicalize().unwrap().join(file);
+        fs::rename(scene.path(file), &target).unwrap();
+        symlink(&target, scene.path(file)).unwrap();
+        let said = scene.error();
+        let target = target.display();
+        let expected = format!("umbra: {place}{file}: is a link to {target}; a renderer sees only");
+        assert!(said.starts_with(&expected), "{said}");
+    }
+}
+
+#[test]
+fn a_pipe_in_the_place_of_a_file_is_refused_not_waited_for() {
+    let uvs = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    let obj = mesh(&format!("{uvs}f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"));
+    for (file, expected) in [
+        ("s.toml", "umbra: s.toml: cannot read the scene"),
+        ("s.obj", "cannot read the mesh"),
+        ("m.mtl", "umbra: s.obj:1: cannot read the material file m.mtl"),
+        ("t.png", "umbra: m.mtl:4: material \"floor\": map_Kd: cannot read the texture t.png"),
+    ] {
+        let scene = Scene::new(&obj, TEXTURED);
+        fs::remove_file(scene.path(file)).unwrap();
+        assert!(Command::new("mkfifo").arg(scene.path(file)).status().unwrap().success());
+        let said = scene.error();
+        assert!(said.contains(expected), "{said}");
+        assert!(said.contains(": expected a file, found a pipe or device"), "{said}");
+        fs::remove_file(scene.path(file)).unwrap();
+        fs::create_dir(scene.path(file)).unwrap();
+        assert!(scene.error().contains(": expected a file, found a folder"));
+    }
+    let scene = Scene::new(&plain(), MTL);
+    assert!(Command::new("mkfifo").arg(scene.path("config.json")).status().unwrap().success());
+    scene.image();
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_refused_before_any_work() {
+    // Work would find that there is no mesh.
+    let scene = Scene::new("", MTL);
+    fs::create_dir(scene.path("d.exr")).unwrap();
+    fs::create_dir(scene.path("d.png")).unwrap();
+    let pipe = Command::new("mkfifo").arg(scene.path("p.exr")).status().unwrap();
+    assert!(pipe.success());
+    for (output, expected) in [
+        ("d.exr", "umbra: d.exr: expected a file, found a folder"),
+        ("d.png", "umbra: d.png: expected a file, found a folder"),
+        ("p.exr", "umbra: p.exr: expected a file, found a pipe or device"),
+        ("/proc/x.exr", "umbra: /proc/x.exr: "),
+    ] {
+        let (code, said) = scene.run(&["s.toml", "--output", output]);
+        assert!(code == 2 && said.starts_with(expected), "{said}");
+        assert!(!said.contains("s.obj"), "{said}");
+    }
+    // What is there stays when there is no image, and nothing is left behind.
+    fs::write(scene.path("old.exr"), "old").unwrap();
+    for output in ["old.exr", "new.exr"] {
+        let (_, said) = scene.run(&["s.toml", "--output", output]);
+        assert!(said.contains("s.obj: mesh holds no triangle"), "{said}");
+    }
+    assert_eq!(fs::read(scene.path("old.exr")).unwrap(), b"old");
+    assert!(!scene.path("new.exr").exists());
+}
+
 #[test]
 fn a_realtime_frame_is_drawn_without_a_word_and_what_lies_out_of_range_is_said() {
     let realtime = |scale: f64| {
@@ -468,9 +600,29 @@ fn a_realtime_frame_is_drawn_without_a_word_and_what_lies_out_of_range_is_said()
         scene.run(&["s.toml", "--output", "o.exr"])
     };
     assert_eq!(realtime(1.0), (0, String::new()));
-    for scale in [3000.0, 1e-3] {
+    assert_eq!(realtime(0.01), (0, String::new()));
+    assert_eq!(realtime(100.0), (0, String::new()));
+    // All of the picture, and a part of it, at either end.
+    for scale in [3000.0, 200.0, 2e-3, 1e-3] {
         let (code, said) = realtime(scale);
-        assert!(code == 0 && said.starts_with("umbra: warning: s.obj: reaches "), "{said}");
+        let expected = "umbra: warning: s.obj: what is in view reaches from ";
+        assert!(code == 0 && said.starts_with(expected), "{scale}: {said}");
+    }
+    // A floor that begins behind the camera is in view from where the film's edge meets it.
+    let under =
+        TOML.replace("spp = 4", "realtime = true").replace("0.0, 3.0, 4.0", "0.0, 0.5, 0.0");
+    for (at, expected) in [
+        ("0.0, 0.5, -1.0", ""),
+        ("0.0, 9.0, -9.0", "umbra: warning: s.obj: nothing of it is in view\n"),
+    ] {
+        let scene = Scene::new(&plain(), MTL);
+        fs::write(
+            scene.path("s.toml"),
+            under.replace("at = [0.0, 0.0, 0.0]", &format!("at = [{at}]")),
+        )
+        .unwrap();
+        let found = scene.run(&["s.toml", "--output", "o.exr"]);
+        assert_eq!(found, (0, expected.to_owned()), "{at}");
     }
 }
 

@@ -61,8 +61,8 @@ impl Camera {
                 config.fov_y_deg
             )));
         }
-        let forward = (config.at - config.eye).normalize_or_zero();
-        let right = forward.cross(config.up).normalize_or_zero();
+        let forward = scaled(config.at - config.eye).normalize_or_zero();
+        let right = forward.cross(scaled(config.up)).normalize_or_zero();
         if right == Vec3::ZERO || !right.is_finite() {
             return Err(Error::Argument(format!(
                 "camera eye {}, at {} and up {} do not span a frame",
@@ -124,6 +124,14 @@ impl Camera {
     }
 }
 
+/// A vector of any length divided by a power of two, so that its square is neither 0 nor infinite. This rounds no
+/// digit of it.
+fn scaled(v: Vec3) -> Vec3 {
+    let largest = v.abs().max_element();
+    // Its exponent alone.
+    v / f32::from_bits(largest.to_bits() & f32::INFINITY.to_bits()).max(f32::MIN_POSITIVE)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -159,6 +167,23 @@ mod tests {
             assert!((0.5 * (ndc.x + 1.0) * 40.0 - x).abs() < 1e-3, "{ndc}");
             assert!((0.5 * (1.0 - ndc.y) * 30.0 - y).abs() < 1e-3, "{ndc}");
             assert!((0.0..=1.0).contains(&ndc.z), "{ndc}");
+        }
+    }
+
+    #[test]
+    fn directions_of_any_length_span_the_same_frame() {
+        let camera = camera();
+        for length in [1e-44, 1e-38, 1e-30, 1e-10, 0.5, 1024.0, 1e10, 1e30, 3e38] {
+            let config = CameraConfig { up: length * Vec3::Y, ..*camera.config() };
+            let view = Camera::new(config, 40, 30).unwrap().view();
+            assert!(view.abs_diff_eq(camera.view(), 1e-6), "up {length}: {view}");
+        }
+        for length in [1e-30, 1e-20, 1e20, 1e30, 1e38] {
+            let (eye, up) = (Vec3::ZERO, Vec3::Y);
+            let config =
+                CameraConfig { eye, at: length * vec3(3.0, 0.0, -1.0), up, fov_y_deg: 40.0 };
+            let forward = Camera::new(config, 40, 30).unwrap().ray(20.0, 15.0).direction;
+            assert!((forward - vec3(3.0, 0.0, -1.0).normalize()).length() < 1e-6, "at {length}");
         }
     }
 

@@ -1,12 +1,14 @@
 //! `umbra render`: one image of one scene by one plugin.
 
+mod range;
+
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail, ensure};
-use basecode::exr_io::{Precision, write_exr};
-use basecode::scene::{MeshFile, SceneConfig};
+use basecode::exr_io::{MAX_PIXELS, MAX_SIDE, Precision, write_exr};
+use basecode::scene::SceneConfig;
 use basecode::{Camera, Image, Vec3};
 
 use super::context::{Context, INTERRUPTED, cores};
@@ -44,7 +46,7 @@ pub struct RenderArguments {
     /// Whether to draw shadows [default: offline on, realtime as the scene's `bonus` says]
     #[arg(long, value_name = "on|off")]
     shadows: Option<Switch>,
-    /// Film size in pixels [default: the scene's]
+    /// Film size in pixels, at most 16384 a side and 67108864 in all [default: the scene's]
     #[arg(long, value_name = "WxH")]
     size: Option<Size>,
     /// Which adapter draws realtime scenes
@@ -108,8 +110,14 @@ impl FromStr for Size {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || format!("expected WIDTHxHEIGHT such as 640x480, found {text}");
         let (width, height) = text.split_once('x').ok_or_else(wrong)?;
-        let side = |text: &str| text.parse().ok().filter(|side| (1..=16_384).contains(side));
-        Ok(Self(side(width).ok_or_else(wrong)?, side(height).ok_or_else(wrong)?))
+        let side =
+            |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE as u32).contains(side));
+        let (width, height) = (side(width).ok_or_else(wrong)?, side(height).ok_or_else(wrong)?);
+        let pixels = width as usize * height as usize;
+        if pixels > MAX_PIXELS {
+            return Err(format!("expected at most {MAX_PIXELS} pixels, found {pixels}"));
+        }
+        Ok(Self(width, height))
     }
 }
 
@@ -121,7 +129,7 @@ enum Format {
 }
 
 impl Format {
-    /// The format of an output file, which must have a folder.
+    /// The format of an output file, which must be possible to write.
     fn of(output: &Path) -> anyhow::Result<Self> {
         let ending = output.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let format = match ending.as_str() {
@@ -133,56 +141,71 @@ impl Format {
         if !folder.as_os_str().is_empty() && !folder.is_dir() {
             bail!("{}: there is no folder {}", output.display(), folder.display());
         }
+        try_to_write(output).with_context(|| output.display().to_string())?;
         Ok(format)
     }
 }
 
-/// Loads what a scene consists of, so that its mistakes are told in the user's own names, with what
-/// it holds that no picture shows.
-fn check_scene(toml: &Path) -> anyhow::Result<SceneConfig> {
-    let config = SceneConfig::load(toml)?;
-    for key in &config.unknown_keys {
-        eprintln!("umbra: {}: warning: unknown key {key}", toml.display());
+/// Opens a file to write it, so that no work is lost on one that cannot be; changes none.
+fn try_to_write(output: &Path) -> anyhow::Result<()> {
+    let is_new = output.symlink_metadata().is_err();
+    // To open a pipe is to wait for its reader.
+    ensure!(!output.exists() || output.is_file(), "expected a file, found {}", kind_of(output));
+    std::fs::OpenOptions::new().write(true).create(true).truncate(false).open(output)?;
+    if is_new {
+        std::fs::remove_file(output)?;
     }
-    Camera::new(config.camera, config.width, config.height)
+    Ok(())
+}
+
+/// What lies at a path that is no file.
+fn kind_of(path: &Path) -> &'static str {
+    if path.is_dir() { "a folder" } else { "a pipe or device" }
+}
+
+/// Loads what a scene consists of, so that its mistakes are told in the user's own names, with what
+/// it holds that no picture shows. The film has the size that is asked for.
+fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
+    let mut config = SceneConfig::load(toml)?;
+    if let Some(Size(width, height)) = size {
+        (config.width, config.height) = (width as usize, height as usize);
+    }
+    let camera = Camera::new(config.camera, config.width, config.height)
         .with_context(|| toml.display().to_string())?;
-    let mesh = MeshFile::load(&config.mesh)?;
-    for remark in &mesh.remarks {
+    let mesh = config.load_mesh()?;
+    for remark in config.remarks.iter().chain(&mesh.remarks) {
         eprintln!("umbra: warning: {remark}");
     }
     let folder = config.mesh.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
     let real = |path: &Path| path.canonicalize().with_context(|| path.display().to_string());
     let root = real(folder)?;
-    if config.realtime {
-        warn_of_range(&config, &mesh);
+    if config.realtime
+        && let Some(said) = range::out_of_range(&camera, &mesh)
+    {
+        eprintln!("umbra: warning: {}: {said}", config.mesh.display());
     }
     for file in &mesh.files {
-        if !real(file)?.starts_with(&root) {
-            bail!(
-                "{}: a renderer sees only the folder of the mesh, {}; hint: put the file there",
-                file.display(),
-                folder.display()
-            );
+        let path = &file.path;
+        let target = real(path)?;
+        if target.starts_with(&root) {
+            continue;
         }
-    }
-    Ok(config)
-}
-
-/// Warns when no vertex lies where the base code's projection draws: the picture would be empty.
-fn warn_of_range(config: &SceneConfig, mesh: &MeshFile) {
-    let forward = (config.camera.at - config.camera.eye).normalize_or_zero();
-    let vertices = mesh.shapes.iter().flat_map(|shape| &shape.positions);
-    let depths = vertices.map(|vertex| (*vertex - config.camera.eye).dot(forward));
-    let farthest = depths.fold(f32::NEG_INFINITY, f32::max);
-    let (near, far) = (Camera::NEAR, Camera::FAR);
-    if !(near..=far).contains(&farthest) {
-        eprintln!(
-            "umbra: warning: {}: reaches {farthest} units before the camera; the base code's projection draws \
-             from {near} to {far}",
-            config.mesh.display()
+        let named_at = file.named_at.as_ref();
+        let place = named_at.map(|(by, line)| format!("{}:{line}: ", by.display()));
+        let link = if path.is_symlink() {
+            format!("is a link to {}; ", target.display())
+        } else {
+            String::new()
+        };
+        bail!(
+            "{}{}: {link}a renderer sees only the folder of the mesh, {}; hint: put the file there",
+            place.unwrap_or_default(),
+            path.display(),
+            folder.display()
         );
     }
+    Ok(config)
 }
 
 /// Renders the image and writes it: float for what is drawn offline, half for realtime as the
@@ -190,7 +213,12 @@ fn warn_of_range(config: &SceneConfig, mesh: &MeshFile) {
 pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
     let format = Format::of(&arguments.output)?;
-    let config = check_scene(&arguments.scene)?;
+    // A scene's other files lie where the file is, not where a link to it is.
+    let scene_file = match arguments.scene.canonicalize() {
+        Ok(target) if arguments.scene.is_symlink() => target,
+        _ => arguments.scene.clone(),
+    };
+    let config = check_scene(&scene_file, arguments.size)?;
     let plugin = match arguments.plugin.as_str() {
         "reference" => context.reference().context(
             "there is no reference renderer here (a student's kit has none); hint: cargo build --release --workspace",
@@ -201,17 +229,17 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     let plugin = plugin_as_given
         .canonicalize()
         .with_context(|| format!("plugin {}", plugin_as_given.display()))?;
-    if plugin.is_dir() {
+    if !plugin.is_file() {
         bail!(
-            "plugin {}: it is a folder, expected a library such as {}",
+            "plugin {}: it is {}, expected a library such as {}",
             plugin_as_given.display(),
+            kind_of(&plugin),
             library_name("plugin")
         );
     }
-    let Size(width, height) =
-        arguments.size.unwrap_or(Size(config.width as u32, config.height as u32));
+    let (width, height) = (config.width as u32, config.height as u32);
     let scene = SceneRef {
-        path: arguments.scene.canonicalize().context("scene")?,
+        path: scene_file.canonicalize().context("scene")?,
         options: arguments.options.clone(),
     };
     let request = if config.realtime {
@@ -304,7 +332,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
                 Some(outcome) => outcome.to_string(),
                 None => "the worker gave no answer".to_owned(),
             };
-            let as_given = |said: &str| as_given(said, &arguments.scene, &plugin_as_given);
+            let as_given = |said: &str| as_given(said, &scene_file, &plugin_as_given);
             eprint!("{}", as_given(&printed));
             if outcome.and_then(Outcome::fault) == Some(Fault::Environment) {
                 return Err(super::MachineLacks(as_given(&said)).into());
@@ -318,7 +346,8 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
 fn own_seed(file: &Path) -> Option<u64> {
     let file = std::path::absolute(file).ok()?;
     let configs = file.ancestors().skip(1).take(2).map(|folder| folder.join("config.json"));
-    let mut found = configs.filter_map(|path| std::fs::read(path).ok());
+    let mut found =
+        configs.filter(|path| path.is_file()).filter_map(|path| std::fs::read(path).ok());
     found.find_map(|bytes| SubmittedConfig::parse(&bytes).0.sampler_seed())
 }
 

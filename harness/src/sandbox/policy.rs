@@ -43,8 +43,10 @@ impl Kind {
 pub struct Bind {
     /// Absolute path outside. The child must not learn it, but where names matter, stage under a
     /// neutral one all the same.
+    #[serde(with = "crate::files::path_json")]
     pub host: PathBuf,
     /// Absolute path inside, without `.` and `..`.
+    #[serde(with = "crate::files::path_json")]
     pub inside: PathBuf,
 }
 
@@ -69,6 +71,7 @@ pub struct Scratch {
     /// How many files and folders fit into it.
     pub files: u64,
     /// A folder of the host that takes its place when the mount layer is off; it has no quota.
+    #[serde(with = "crate::files::path_json::optional")]
     pub without_mount: Option<PathBuf>,
 }
 
@@ -217,6 +220,7 @@ pub struct Policy {
     /// Which layers lock it.
     pub layers: Layers,
     /// A file that the launcher writes and the child cannot reach: see [`read_report`].
+    #[serde(with = "crate::files::path_json::optional")]
     pub report: Option<PathBuf>,
 }
 

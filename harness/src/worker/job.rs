@@ -12,6 +12,7 @@ use crate::plugin::Witness;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Job {
     /// The renderer's library; none for Umbra's own neutral pass, where no foreign code runs.
+    #[serde(with = "crate::files::path_json::optional")]
     pub plugin: Option<PathBuf>,
     /// What to ask.
     pub requests: Vec<Request>,
@@ -21,6 +22,7 @@ pub struct Job {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneRef {
     /// Path of the TOML file.
+    #[serde(with = "crate::files::path_json")]
     pub path: PathBuf,
     /// Empty for every submission; see [`api::SceneRequest::options`].
     #[serde(default)]

@@ -15,6 +15,7 @@ pub const ALIGN: usize = 64 << 10;
 #[derive(Serialize, Deserialize)]
 pub struct WireJob {
     /// The library to load.
+    #[serde(with = "crate::files::path_json::optional")]
     pub plugin: Option<PathBuf>,
     /// The requests, in order.
     pub requests: Vec<WireRequest>,

@@ -3,9 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use toml::de::DeTable;
 
-use super::text::decode;
-use crate::{CameraConfig, Error, Result, ShadingKind};
+use super::mesh::MeshFile;
+use super::mtl::why_missing;
+use super::text::{decode, read};
+use crate::exr_io::{MAX_PIXELS, MAX_SIDE};
+use crate::{Camera, CameraConfig, Error, Result, ShadingKind};
 
 /// A scene file as it was written, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,12 +32,9 @@ pub struct SceneConfig {
     pub spp: usize,
     /// Whether realtime draws shadows (the bonus).
     pub bonus: bool,
-    /// Keys that nobody knows, as `section.key`. Harmless, but perhaps misspelt.
-    pub unknown_keys: Vec<String>,
+    /// Keys that nobody knows, with file and line. Harmless, but perhaps misspelt.
+    pub remarks: Vec<String>,
 }
-
-/// Films larger than this in either direction are taken for a mistake.
-const MAX_FILM_SIDE: i64 = 16_384;
 
 #[derive(Deserialize)]
 struct File {
@@ -95,13 +96,33 @@ const KNOWN_KEYS: &[&str] = &[
 ];
 
 impl SceneConfig {
+    /// Loads the scene's mesh.
+    ///
+    /// # Errors
+    /// As [`MeshFile::load`]; when there is no mesh file, names the line that asks for it.
+    pub fn load_mesh(&self) -> Result<MeshFile> {
+        if let Err(error) = std::fs::metadata(&self.mesh) {
+            let bytes = read(&self.path).unwrap_or_default();
+            let text = plain_lines(&bytes);
+            let table = DeTable::parse(&text).ok();
+            let at = table.and_then(|table| key_at(table.get_ref(), "input", "objfile"));
+            let why = why_missing("", &self.mesh);
+            return Err(Error::File {
+                path: self.path.clone(),
+                line: at.map(|at| line_at(&text, at)),
+                message: format!("cannot read the mesh {}: {error}{why}", self.mesh.display()),
+            });
+        }
+        MeshFile::load(&self.mesh)
+    }
+
     /// Reads a scene file.
     ///
     /// # Errors
     /// When the file cannot be read, is not TOML, lacks `input.objfile`, or holds a value outside
     /// its range; names file, line and key.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path)
+        let bytes = read(path)
             .map_err(|error| Error::file(path, format!("cannot read the scene: {error}")))?;
         Self::parse(path, &bytes)
     }
@@ -111,10 +132,9 @@ impl SceneConfig {
     /// # Errors
     /// As [`SceneConfig::load`].
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
-        // TOML knows no line that ends with CR alone.
-        let text = &decode(bytes).replace("\r\n", "\n").replace('\r', "\n");
+        let text = &plain_lines(bytes);
         let wrong = |line, message: String| Error::File { path: path.to_owned(), line, message };
-        let file: File = toml::from_str(text).map_err(|error| {
+        let misread = |error: toml::de::Error| {
             let line = error.span().map(|span| line_at(text, span.start));
             // The parser names Rust's types.
             let mut message = error.message().to_owned();
@@ -127,52 +147,76 @@ impl SceneConfig {
             ] {
                 message = message.replace(own, plain);
             }
+            if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("toml")) {
+                message = format!("expected a scene's TOML file: {message}");
+            }
             wrong(line, message)
-        })?;
+        };
+        let table = DeTable::parse(text).map_err(misread)?.into_inner();
+        for (name, value) in &table {
+            let name = name.get_ref();
+            let is_section =
+                KNOWN_KEYS.iter().any(|key| key.split('.').next() == Some(name.as_ref()));
+            if is_section && !value.get_ref().is_table() {
+                let line = Some(line_at(text, value.span().start));
+                let found = value.get_ref().type_str();
+                return Err(wrong(
+                    line,
+                    format!("{name} is of type {found}, expected a section [{name}]"),
+                ));
+            }
+        }
+        let file: File = toml::from_str(text).map_err(misread)?;
+        let line_of_key =
+            |section: &str, key: &str| key_at(&table, section, key).map(|at| line_at(text, at));
         let in_range = |section: &str, key: &str, value: i64, max: i64| {
             usize::try_from(value).ok().filter(|_| (1..=max).contains(&value)).ok_or_else(|| {
-                let line = line_of_key(text, section, key);
+                let line = line_of_key(section, key);
                 wrong(line, format!("{section}.{key} is {value} but must lie between 1 and {max}"))
             })
         };
         let camera = file.camera;
         for (key, value) in [("eye", camera.eye), ("at", camera.at), ("up", camera.up)] {
             if !value.is_finite() {
-                let line = line_of_key(text, "camera", key);
+                let line = line_of_key("camera", key);
                 return Err(wrong(line, format!("camera.{key} is {value} but must be finite")));
             }
         }
         let fov = camera.fov_y_deg;
         if !(fov > 0.0 && fov < 180.0) {
-            let line = line_of_key(text, "camera", "fov");
+            let line = line_of_key("camera", "fov");
             let message = format!("camera.fov is {fov} but must lie between 0 and 180 degrees");
             return Err(wrong(line, message));
         }
         // Serde takes the first three of four.
         let numbers = |key| {
-            let table: toml::Table = text.parse().ok()?;
-            Some(table.get("camera")?.get(key)?.as_array()?.len())
+            let value = table.get("camera")?.get_ref().get(key)?;
+            Some(value.get_ref().as_array()?.len())
         };
         for key in ["eye", "at", "up"] {
             if let Some(count) = numbers(key).filter(|count| *count != 3) {
-                let line = line_of_key(text, "camera", key);
+                let line = line_of_key("camera", key);
                 let message = format!("camera.{key} has {count} numbers, expected 3: [x, y, z]");
                 return Err(wrong(line, message));
             }
+        }
+        if let Err(error) = Camera::new(camera, 1, 1) {
+            let line = ["eye", "at", "up"].iter().find_map(|key| line_of_key("camera", key));
+            return Err(wrong(line, error.to_string()));
         }
         let renderer = file.renderer;
         // Written on Windows, perhaps.
         let mesh = file.input.objfile.trim().replace('\\', "/");
         if mesh.is_empty() {
             let message = "input.objfile names no file".to_owned();
-            return Err(wrong(line_of_key(text, "input", "objfile"), message));
+            return Err(wrong(line_of_key("input", "objfile"), message));
         }
         // A worker sees the files under other names; so does whoever moves the folder.
         let on_drive = matches!(mesh.as_bytes(), [b'a'..=b'z' | b'A'..=b'Z', b':', ..]);
         if on_drive || mesh.starts_with('/') || Path::new(&mesh).is_absolute() {
             let message =
                 format!("input.objfile is {mesh} but must be relative to the folder of this file");
-            return Err(wrong(line_of_key(text, "input", "objfile"), message));
+            return Err(wrong(line_of_key("input", "objfile"), message));
         }
         let kind = match renderer.kind.as_deref() {
             None | Some("simple" | "direct") => ShadingKind::Simple,
@@ -181,35 +225,54 @@ impl SceneConfig {
                 let message = format!(
                     "renderer.type is \"{other}\" but must be \"simple\", \"direct\" or \"normal\""
                 );
-                return Err(wrong(line_of_key(text, "renderer", "type"), message));
+                return Err(wrong(line_of_key("renderer", "type"), message));
             }
         };
+        let width = in_range("film", "width", file.film.width, MAX_SIDE as i64)?;
+        let height = in_range("film", "height", file.film.height, MAX_SIDE as i64)?;
+        if width * height > MAX_PIXELS {
+            let line = line_of_key("film", "width");
+            let message =
+                format!("film has {} pixels but must have at most {MAX_PIXELS}", width * height);
+            return Err(wrong(line, message));
+        }
         Ok(Self {
             path: path.to_owned(),
             mesh: path.parent().unwrap_or(Path::new("")).join(mesh),
             camera,
-            width: in_range("film", "width", file.film.width, MAX_FILM_SIDE)?,
-            height: in_range("film", "height", file.film.height, MAX_FILM_SIDE)?,
+            width,
+            height,
             realtime: renderer.realtime,
             kind,
             spp: in_range("renderer", "spp", renderer.spp, 1 << 20)?,
             bonus: renderer.bonus,
-            unknown_keys: unknown_keys(text),
+            remarks: unknown_keys(&table)
+                .into_iter()
+                .map(|(name, at)| {
+                    format!("{}:{}: unknown key {name}", path.display(), line_at(text, at))
+                })
+                .collect(),
         })
     }
 }
 
-fn unknown_keys(text: &str) -> Vec<String> {
-    let Ok(table) = text.parse::<toml::Table>() else { return Vec::new() };
+/// A text whose lines end with LF: TOML knows none that ends with CR alone.
+fn plain_lines(bytes: &[u8]) -> String {
+    decode(bytes).replace("\r\n", "\n").replace('\r', "\n")
+}
+
+/// Keys that nobody knows, as `section.key`, and the byte that each stands at.
+fn unknown_keys(table: &DeTable) -> Vec<(String, usize)> {
     let mut unknown = Vec::new();
-    for (section, value) in &table {
-        match value.as_table() {
+    for (section, value) in table {
+        let name = section.get_ref();
+        match value.get_ref().as_table() {
             Some(keys) => unknown.extend(
                 keys.keys()
-                    .map(|key| format!("{section}.{key}"))
-                    .filter(|key| !KNOWN_KEYS.contains(&key.as_str())),
+                    .map(|key| (format!("{name}.{}", key.get_ref()), key.span().start))
+                    .filter(|(key, _)| !KNOWN_KEYS.contains(&key.as_str())),
             ),
-            None => unknown.push(section.clone()),
+            None => unknown.push((name.to_string(), section.span().start)),
         }
     }
     unknown
@@ -220,20 +283,10 @@ pub(super) fn line_at(text: &str, offset: usize) -> usize {
     1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
 }
 
-/// The line (from 1) where `key` is set in `[section]`, if it is written that way.
-fn line_of_key(text: &str, section: &str, key: &str) -> Option<usize> {
-    let mut current = String::new();
-    for (index, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if let Some(name) = line.strip_prefix('[').and_then(|rest| rest.split(']').next()) {
-            current = name.trim().to_owned();
-        } else if current == section
-            && line.strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='))
-        {
-            return Some(index + 1);
-        }
-    }
-    None
+/// The byte where `key` of `section` stands, however it is written.
+fn key_at(table: &DeTable, section: &str, key: &str) -> Option<usize> {
+    let keys = table.get(section)?.get_ref().as_table()?;
+    keys.keys().find(|own| own.get_ref() == key).map(|own| own.span().start)
 }
 
 #[cfg(test)]
@@ -276,8 +329,29 @@ mod tests {
         for (text, expected) in [
             ("[input\n", "b.toml:1"),
             ("[camera]\nfov = 30\n", "missing field `input`"),
+            (
+                "[[input]]\nobjfile = \"b.obj\"\n",
+                "b.toml:1: input is of type array, expected a section [input]",
+            ),
+            (
+                &format!("film = 3\n{base}"),
+                "b.toml:1: film is of type integer, expected a section [film]",
+            ),
+            (&format!("{base}[[camera]]\nfov = 3\n"), "b.toml:3: camera is of type array"),
+            (&format!("{base}[camera]\nup = [1, 1, 0]\n"), "b.toml:4: camera eye"),
+            (&format!("{base}[camera]\nat = [1, 1, 0]\n"), "b.toml:4: camera eye"),
+            (
+                &format!("film = {{ width = 9,\n height = 0 }}\n{base}"),
+                "b.toml:2: film.height is 0",
+            ),
+            (&format!("film.width = 0\n{base}"), "b.toml:1: film.width is 0"),
+            (&format!("{base}[film]\n\"width\" = 0\n"), "b.toml:4: film.width is 0"),
             (&format!("{base}[film]\nwidth = 0\n"), "b.toml:4: film.width is 0"),
             (&format!("{base}[film]\nheight = 99999\n"), "b.toml:4: film.height is 99999"),
+            (
+                &format!("{base}[film]\nwidth = 16384\nheight = 4097\n"),
+                "b.toml:4: film has 67125248 pixels but must have at most 67108864",
+            ),
             (&format!("{base}[renderer]\nspp = -1\n"), "b.toml:4: renderer.spp is -1"),
             (
                 &format!("{base}[renderer]\nspp = 4\ntype = \"glass\"\n"),
@@ -306,6 +380,12 @@ mod tests {
     }
 
     #[test]
+    fn what_is_no_toml_file_is_said_to_be_none() {
+        let error = SceneConfig::parse(Path::new("s.obj"), b"v 0 0 0\n").unwrap_err().to_string();
+        assert!(error.starts_with("s.obj:1: expected a scene's TOML file: "), "{error}");
+    }
+
+    #[test]
     fn every_encoding_and_line_end_is_read() {
         let plain = "# gr\u{fc}n\n[input]\nobjfile = '..\\mesh\\b.obj'\n[film]\nwidth = 7\n";
         let latin: Vec<u8> = plain.chars().map(|c| c as u8).collect();
@@ -327,6 +407,8 @@ mod tests {
     #[test]
     fn unknown_keys_are_listed_not_refused() {
         let config = parse("title = 1\n[input]\nobjfile = \"b.obj\"\n[film]\nwdth = 3\n").unwrap();
-        assert_eq!(config.unknown_keys, ["film.wdth", "title"]);
+        let path = "a/tinyrender/b.toml";
+        let expected = ["5: unknown key film.wdth", "1: unknown key title"];
+        assert_eq!(config.remarks, expected.map(|expected| format!("{path}:{expected}")));
     }
 }

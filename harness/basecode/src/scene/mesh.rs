@@ -1,14 +1,14 @@
 //! Shapes of an OBJ file, with the materials of its MTL files.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
 use super::Material;
-use super::mtl::Library;
+use super::mtl::{Library, UsedFile};
 use super::obj::{Corner, MISSING, Obj, Part};
 use super::polygon::triangulate;
-use super::text::decode;
+use super::text::{decode, read, visible};
 use crate::{Error, Result};
 
 /// A triangle mesh with one material.
@@ -49,11 +49,11 @@ pub struct MeshFile {
     pub shapes: Vec<Shape>,
     /// All materials.
     pub materials: Vec<Material>,
-    /// What was left out, with file and line: lines and points, which have no area; maps that are
-    /// not supported.
+    /// What was left out, with file and line: lines and points, which have no area; maps and
+    /// statements that are not supported; what is wrong with materials that no face uses.
     pub remarks: Vec<String>,
-    /// The files that it was made of: OBJ, MTL, textures.
-    pub files: Vec<PathBuf>,
+    /// The files that it was made of: OBJ, MTL, textures of materials that a face uses.
+    pub files: Vec<UsedFile>,
 }
 
 impl MeshFile {
@@ -62,17 +62,17 @@ impl MeshFile {
     /// # Errors
     /// When a file cannot be used; names file, line, expected and found.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path)
+        let bytes = read(path)
             .map_err(|error| Error::file(path, format!("cannot read the mesh: {error}")))?;
         let text = decode(&bytes);
         let obj = Obj::parse(path, &text)?;
-        let library = Library::load(path, &obj.libraries)?;
+        let mut library = Library::load(path, &obj.libraries)?;
+        let material = |part| material_of(path, &obj, &library, part);
+        let used = obj.parts.iter().map(material).collect::<Result<Vec<_>>>()?;
+        let files = library.settle(&used)?;
         let mut builder = Builder { obj: &obj, newest: vec![MISSING; obj.positions.len()] };
-        let shape = |part| {
-            let material = material_of(path, &obj, &library, part)?;
-            Ok(builder.shape(part, material))
-        };
-        let shapes = obj.parts.iter().map(shape).collect::<Result<Vec<_>>>()?;
+        let parts = obj.parts.iter().zip(used);
+        let shapes: Vec<_> = parts.map(|(part, used)| builder.shape(part, used)).collect();
         if shapes.is_empty() {
             let what = match (obj.positions.len(), obj.faces.len()) {
                 (0, _) => {
@@ -98,14 +98,10 @@ impl MeshFile {
                 library.materials[first.material].name
             ));
         }
-        let files = std::iter::once(path.to_owned()).chain(library.files().cloned()).collect();
+        let own = UsedFile { path: path.to_owned(), named_at: None };
+        let files = std::iter::once(own).chain(files).collect();
         Ok(Self { shapes, materials: library.materials, remarks, files })
     }
-}
-
-/// A character as a message shows it.
-fn visible(c: char) -> char {
-    if c.is_control() { '?' } else { c }
 }
 
 /// Index of the material of a part.

@@ -17,6 +17,7 @@ use glam::{Vec2, Vec3};
 pub use config::SceneConfig;
 pub use material::{Material, MaterialModel};
 pub use mesh::{MeshFile, Shape};
+pub use mtl::UsedFile;
 pub use texture::{Bitmap, Texture};
 
 use crate::bvh::{Bvh, Hit};
@@ -51,7 +52,7 @@ impl Scene {
     /// When a file cannot be used; names file, line, expected and found.
     pub fn load(path: &Path, make_bsdf: &dyn Fn(&Material) -> Box<dyn Bsdf>) -> Result<Self> {
         let config = SceneConfig::load(path)?;
-        let MeshFile { shapes, materials, remarks, .. } = MeshFile::load(&config.mesh)?;
+        let MeshFile { shapes, materials, remarks, .. } = config.load_mesh()?;
         let emits = |shape: &&Shape| materials[shape.material].is_emitter();
         let light = shapes.iter().find(emits);
         let light = light.map(|light| (light.index_mean(), materials[light.material].emission));

@@ -5,10 +5,19 @@ use std::path::{Path, PathBuf};
 use glam::{Vec2, Vec3};
 
 use super::obj::Named;
-use super::text::{Statements, decode, split_keyword, unquoted, without_comment};
+use super::text::{Statements, decode, read, split_keyword, unquoted, without_comment};
 use super::texture::Mapping;
 use super::{Material, MaterialModel, Texture};
 use crate::{Error, Result};
+
+/// A file of a mesh.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UsedFile {
+    /// The file.
+    pub path: PathBuf,
+    /// File and line that name it; none for the OBJ file.
+    pub named_at: Option<(PathBuf, usize)>,
+}
 
 /// The materials of all MTL files that a mesh names.
 #[derive(Debug, Default)]
@@ -17,10 +26,12 @@ pub(super) struct Library {
     pub materials: Vec<Material>,
     /// The names of each material: as it stands, and without a comment behind it.
     names: Vec<[String; 2]>,
+    /// What is wrong with each material. Only one that a face uses is an error.
+    pub broken: Vec<Option<Error>>,
     /// The MTL files, as they are named.
-    files: Vec<PathBuf>,
-    /// The files of the textures.
-    textures: Vec<PathBuf>,
+    files: Vec<UsedFile>,
+    /// The files of the textures, each with its material.
+    textures: Vec<(usize, UsedFile)>,
     /// What was left out.
     pub remarks: Vec<String>,
 }
@@ -44,10 +55,10 @@ impl Library {
                 return Err(wrong("mtllib names no file".to_owned()));
             }
             for file in files {
-                if library.files.contains(&file) {
+                if library.files.iter().any(|known| known.path == file) {
                     continue;
                 }
-                let bytes = std::fs::read(&file).map_err(|error| {
+                let bytes = read(&file).map_err(|error| {
                     let why = why_missing(&statement.name, &file);
                     wrong(format!("cannot read the material file {}: {error}{why}", file.display()))
                 })?;
@@ -55,15 +66,29 @@ impl Library {
                     library.remarks.push(taken_beside(obj, statement.line, &statement.name, &file));
                 }
                 library.read(&file, &decode(&bytes))?;
-                library.files.push(file);
+                let named_at = Some((obj.to_owned(), statement.line));
+                library.files.push(UsedFile { path: file, named_at });
             }
         }
         Ok(library)
     }
 
-    /// All files: of materials, then of textures.
-    pub(super) fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.files.iter().chain(&self.textures)
+    /// Settles what is wrong with materials: an error where faces use one, else a remark. Answers all
+    /// files that are used: of materials, then of textures.
+    ///
+    /// # Errors
+    /// When a used material cannot be understood.
+    pub(super) fn settle(&mut self, used: &[usize]) -> Result<Vec<UsedFile>> {
+        for &material in used {
+            if let Some(error) = self.broken[material].take() {
+                return Err(error);
+            }
+        }
+        for error in self.broken.iter().flatten() {
+            self.remarks.push(format!("{error}; no face uses this material"));
+        }
+        let textures = self.textures.iter().filter(|(material, _)| used.contains(material));
+        Ok(self.files.iter().chain(textures.map(|(_, file)| file)).cloned().collect())
     }
 
     /// Index of the material of that name. Of several the first one counts, as the specification
@@ -78,7 +103,7 @@ impl Library {
 
     /// The message for a material name that is not found.
     pub(super) fn lacks(&self) -> String {
-        let Some(first) = self.files.first() else {
+        let Some(UsedFile { path: first, .. }) = self.files.first() else {
             return "in no material file: the mesh names none (expected an mtllib statement)"
                 .into();
         };
@@ -92,7 +117,7 @@ impl Library {
         match &self.files[1..] {
             [] => format!("not in {} (it has: {names})", file(first)),
             _ => {
-                let files: Vec<String> = self.files.iter().map(|path| file(path)).collect();
+                let files: Vec<String> = self.files.iter().map(|used| file(&used.path)).collect();
                 format!("in none of {} (they have: {names})", files.join(", "))
             }
         }
@@ -105,29 +130,43 @@ impl Library {
             let (keyword, rest) = split_keyword(&statement);
             let at = Place { path, line };
             if keyword.eq_ignore_ascii_case("newmtl") {
-                self.add(path, current.take())?;
+                self.add(path, current.take());
                 let plain = unquoted(without_comment(rest)).to_owned();
                 if plain.is_empty() {
                     return Err(at.wrong("newmtl names no material".to_owned()));
                 }
                 current = Some(Entry::new(unquoted(rest).to_owned(), plain));
-            } else if let Some(entry) = &mut current
-                && !entry.read(&at, keyword, rest)?
-            {
-                self.remarks.push(format!("{}:{line}: {keyword} is ignored", path.display()));
+            } else if let Some(entry) = &mut current {
+                match entry.read(&at, keyword, rest) {
+                    Ok(true) => {}
+                    Ok(false) => {
+                        let message = format!("{}:{line}: {keyword} is ignored", path.display());
+                        self.remarks.push(message);
+                    }
+                    Err(error) => _ = entry.broken.get_or_insert(error),
+                }
             }
         }
-        self.add(path, current)
+        self.add(path, current);
+        Ok(())
     }
 
-    fn add(&mut self, path: &Path, entry: Option<Entry>) -> Result<()> {
-        if let Some(entry) = entry {
-            let names = [entry.name.clone(), entry.plain.clone()];
-            let material = entry.material(path, &mut self.textures, &mut self.remarks)?;
-            self.materials.push(material);
-            self.names.push(names);
+    fn add(&mut self, path: &Path, entry: Option<Entry>) {
+        let Some(mut entry) = entry else { return };
+        self.names.push([entry.name.clone(), entry.plain.clone()]);
+        let mut files = Vec::new();
+        let mut material = Material { name: entry.name.clone(), ..Material::diffuse(Vec3::ZERO) };
+        let mut broken = entry.broken.take();
+        if broken.is_none() {
+            match entry.material(path, &mut files, &mut self.remarks) {
+                Ok(read) => material = read,
+                Err(error) => broken = Some(error),
+            }
         }
-        Ok(())
+        let index = self.materials.len();
+        self.textures.extend(files.into_iter().map(|file| (index, file)));
+        self.materials.push(material);
+        self.broken.push(broken);
     }
 }
 
@@ -155,6 +194,8 @@ struct Entry {
     illumination: Option<u32>,
     /// Line and text of `map_Kd` and `map_Ks`.
     maps: [Option<(usize, String)>; 2],
+    /// The first statement that cannot be understood.
+    broken: Option<Error>,
 }
 
 impl Entry {
@@ -168,6 +209,7 @@ impl Entry {
             exponent: 1.0,
             illumination: None,
             maps: [None, None],
+            broken: None,
         }
     }
 
@@ -213,7 +255,7 @@ impl Entry {
     fn material(
         self,
         path: &Path,
-        files: &mut Vec<PathBuf>,
+        files: &mut Vec<UsedFile>,
         remarks: &mut Vec<String>,
     ) -> Result<Material> {
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -238,7 +280,7 @@ impl Entry {
             if is_absolute(name) {
                 remarks.push(taken_beside(path, *line, name, &file));
             }
-            files.push(file);
+            files.push(UsedFile { path: file, named_at: Some((path.to_owned(), *line)) });
             Ok(texture)
         };
         Ok(Material {
@@ -375,12 +417,13 @@ fn taken_beside(path: &Path, line: usize, name: &str, file: &Path) -> String {
 }
 
 /// A hint for the message about a missing file.
-fn why_missing(name: &str, file: &Path) -> String {
-    if file.exists() {
-        return String::new();
-    }
-    let wanted = file.file_name().unwrap_or_default();
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+pub(super) fn why_missing(name: &str, file: &Path) -> String {
+    // The first of its folders that is not there, or the file itself.
+    let missing =
+        file.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists());
+    let Some(missing) = missing.last() else { return String::new() };
+    let wanted = missing.file_name().unwrap_or_default();
+    let folder = missing.parent().filter(|folder| !folder.as_os_str().is_empty());
     let entries = folder.unwrap_or(Path::new(".")).read_dir().into_iter().flatten().flatten();
     let mut alike = entries.map(|entry| entry.file_name());
     if let Some(other) = alike.find(|other| other.eq_ignore_ascii_case(wanted)) {

@@ -9,14 +9,16 @@ mod piece;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::text::visible;
 use crate::{Error, Result};
-use piece::{Mark, Piece, Wrong, wrong_corner};
+use piece::{Beyond, Mark, Piece, Wrong};
 
 /// A file is cut into pieces of about so many bytes.
 const PIECE_BYTES: usize = 1 << 20;
@@ -141,7 +143,17 @@ struct Assembly<'a> {
     not_finite: Vec<(&'static str, usize, usize)>,
     /// What has no area: words for one and for several, how many, the first's line.
     without_area: [((&'static str, &'static str), usize, usize); 3],
+    /// Statements that are not supported: how many of each keyword, the first's line.
+    ignored: BTreeMap<String, (usize, usize)>,
+    /// Indices beyond every file.
+    beyond: Vec<Beyond>,
 }
+
+/// The statements that a corner's indices count.
+const STATEMENTS: [&str; 3] = ["v", "vt", "vn"];
+
+/// Keywords of ignored statements that are remarked on at most.
+const LISTED: usize = 12;
 
 const UNNAMED: &str = "unnamed_object";
 
@@ -160,6 +172,8 @@ impl Default for Assembly<'_> {
                 (("line (l) has", "lines (l) have"), 0, 0),
                 (("face of fewer than 3 corners has", "faces of fewer than 3 corners have"), 0, 0),
             ],
+            ignored: BTreeMap::new(),
+            beyond: Vec::new(),
         }
     }
 }
@@ -176,7 +190,11 @@ impl Assembly<'_> {
         for relative in piece.relative {
             let index = before[relative.which] as i64 + relative.index;
             let Some(index) = u32::try_from(index).ok().filter(|&index| index != MISSING) else {
-                let message = wrong_corner(&relative.word);
+                let (statement, before) = (STATEMENTS[relative.which], before[relative.which]);
+                let (here, word) = relative.word.unwrap_or_default();
+                let count = before + here;
+                let message =
+                    format!("f uses {statement} number {word}, the file has {count} before it");
                 return Err(self.wrong(self.lines + relative.line, message));
             };
             if let Some(corner) = piece.corners.get_mut(relative.corner) {
@@ -202,7 +220,7 @@ impl Assembly<'_> {
         let line = |named: Named| Named { line: self.lines + named.line, name: named.name };
         self.obj.libraries.extend(piece.libraries.into_iter().map(line));
         for (statement, index, line) in piece.not_finite {
-            let which = ["v", "vt", "vn"].iter().position(|own| *own == statement);
+            let which = STATEMENTS.iter().position(|own| *own == statement);
             let index = before[which.unwrap_or_default()] + index;
             self.not_finite.push((statement, index, self.lines + line));
         }
@@ -213,6 +231,11 @@ impl Assembly<'_> {
                 *first = self.lines + line;
             }
             *count += more;
+        }
+        let line = |beyond: Beyond| Beyond { line: self.lines + beyond.line, ..beyond };
+        self.beyond.extend(piece.beyond.into_iter().map(line));
+        for (keyword, (more, line)) in piece.ignored {
+            self.ignored.entry(keyword).or_insert((0, self.lines + line)).0 += more;
         }
         self.lines += piece.lines;
         Ok(())
@@ -270,20 +293,39 @@ impl Assembly<'_> {
                     .push(format!("{path}:{line}: {count} {words} no area and will not be seen"));
             }
         }
+        let mut ignored: Vec<_> = self.ignored.iter().collect();
+        ignored.sort_by_key(|(_, (_, line))| *line);
+        for (keyword, (count, line)) in ignored.iter().take(LISTED) {
+            let keyword: String = keyword.chars().take(40).map(visible).collect();
+            let words = if *count == 1 { "statement is" } else { "statements are" };
+            let path = self.path.display();
+            self.obj.remarks.push(format!("{path}:{line}: {count} {keyword} {words} ignored"));
+        }
+        if let Some((_, (_, line))) = ignored.get(LISTED) {
+            let (path, more) = (self.path.display(), ignored.len() - LISTED);
+            let message = format!("{path}:{line}: {more} more kinds of statements are ignored");
+            self.obj.remarks.push(message);
+        }
         Ok(self.obj)
     }
 
     /// Whether what a corner names is there, and finite.
     fn check(&self, line: usize, corner: &Corner) -> Result<()> {
         let obj = &self.obj;
-        for (statement, index, count) in [
-            ("v", corner.v, obj.positions.len()),
-            ("vt", corner.vt, obj.uvs.len()),
-            ("vn", corner.vn, obj.normals.len()),
-        ] {
+        let found = [
+            (corner.v, obj.positions.len()),
+            (corner.vt, obj.uvs.len()),
+            (corner.vn, obj.normals.len()),
+        ];
+        for (which, (index, count)) in found.into_iter().enumerate() {
             if index != MISSING && index as usize >= count {
-                let number = u64::from(index) + 1;
-                let message = format!("f uses {statement} number {number}, the file has {count}");
+                let same = |beyond: &&Beyond| (beyond.line, beyond.which) == (line, which);
+                let word = match self.beyond.iter().find(same) {
+                    Some(beyond) => beyond.word.clone(),
+                    None => (u64::from(index) + 1).to_string(),
+                };
+                let statement = STATEMENTS[which];
+                let message = format!("f uses {statement} number {word}, the file has {count}");
                 return Err(self.wrong(line, message));
             }
         }

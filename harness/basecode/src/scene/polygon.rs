@@ -1,5 +1,7 @@
 //! Triangulation of polygons.
 
+use std::collections::HashSet;
+
 use earcut::Earcut;
 use glam::{DVec2, DVec3, Vec3};
 
@@ -39,8 +41,10 @@ pub(super) fn triangulate(corners: &[Vec3]) -> Vec<[usize; 3]> {
     if !turns_back && sweep.abs() <= std::f64::consts::TAU * (1.0 - ROUNDING) {
         return fan();
     }
+    // An outline that goes on around itself is no polygon, and each lap would cost ever more.
+    let outline = &flat[..before_repetition(corners)];
     let mut indices: Vec<usize> = Vec::new();
-    Earcut::new().earcut(flat.iter().map(|p| p.to_array()), &[], &mut indices);
+    Earcut::new().earcut(outline.iter().map(|p| p.to_array()), &[], &mut indices);
     let mut triangles = indices.as_chunks::<3>().0.to_vec();
     if triangles.is_empty() {
         return fan();
@@ -51,6 +55,20 @@ pub(super) fn triangulate(corners: &[Vec3]) -> Vec<[usize; 3]> {
         }
     }
     triangles
+}
+
+/// How many corners an outline has before it goes along an edge that it went along before, the same way.
+fn before_repetition(corners: &[Vec3]) -> usize {
+    // Both zeros are one place.
+    let place = |corner: &Vec3| (*corner + 0.0).to_array().map(f32::to_bits);
+    let mut edges = HashSet::new();
+    for (index, pair) in corners.windows(2).enumerate() {
+        let edge = (place(&pair[0]), place(&pair[1]));
+        if edge.0 != edge.1 && !edges.insert(edge) {
+            return index;
+        }
+    }
+    corners.len()
 }
 
 #[cfg(test)]
@@ -151,6 +169,34 @@ mod tests {
         // A corner on an edge is no concave corner.
         let straight = polygon(&[(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]);
         assert_eq!(triangulate(&straight), [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+    }
+
+    #[test]
+    fn an_outline_that_goes_on_around_itself_counts_once() {
+        let arrow = [(-2.0, -2.0), (0.0, 1.6), (2.0, -2.0), (0.0, 2.0)];
+        let triangle = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
+        for (outline, area) in [(&arrow[..], 0.8), (&triangle, 0.5)] {
+            for laps in [20, 40_000] {
+                let corners = polygon(&outline.repeat(laps));
+                let triangles = triangulate(&corners);
+                assert_eq!(triangles.len(), outline.len() - 2);
+                assert!((areas(&corners, &triangles).1 - area).abs() < 1e-6);
+            }
+        }
+        // A cut to a hole goes along its edge twice, there and back.
+        let ring = polygon(&[
+            (0.0, 0.0),
+            (3.0, 0.0),
+            (3.0, 3.0),
+            (0.0, 3.0),
+            (0.0, 0.0),
+            (1.0, 1.0),
+            (1.0, 2.0),
+            (2.0, 2.0),
+            (2.0, 1.0),
+            (1.0, 1.0),
+        ]);
+        assert!((areas(&ring, &triangulate(&ring)).1 - 8.0).abs() < 1e-6);
     }
 
     #[test]

@@ -103,6 +103,42 @@ fn mistakes_in_mesh_and_materials_name_file_and_line() {
             "s.obj:20: f uses v number 99, the file has 8",
         ),
         (
+            "before",
+            OBJ.replace("f 5 6 7", "f -50 6 7"),
+            MTL.to_owned(),
+            "s.obj:20: f uses v number -50, the file has 8 before it",
+        ),
+        (
+            "vnbefore",
+            OBJ.replace("f 1/1/1", "f 1/1/-99999999999999999999"),
+            MTL.to_owned(),
+            "s.obj:13: f uses vn number -99999999999999999999, the file has 1 before it",
+        ),
+        (
+            "billions",
+            OBJ.replace("f 5 6 7", "f 5 6 7000000000"),
+            MTL.to_owned(),
+            "s.obj:20: f uses v number 7000000000, the file has 8",
+        ),
+        (
+            "vtbillions",
+            OBJ.replace("3/3/1", "3/99999999999999999999/1"),
+            MTL.to_owned(),
+            "s.obj:13: f uses vt number 99999999999999999999, the file has 4",
+        ),
+        (
+            "last",
+            OBJ.replace("f 5 6 7", "f 5 6 4294967295"),
+            MTL.to_owned(),
+            "s.obj:20: f uses v number 4294967295, the file has 8",
+        ),
+        (
+            "word corner",
+            OBJ.replace("f 5 6 7", "f 5 6 7x"),
+            MTL.to_owned(),
+            "s.obj:20: f has \"7x\" where a corner is expected",
+        ),
+        (
             "vt",
             OBJ.replace("f 1/1/1", "f 1/9/1"),
             MTL.to_owned(),
@@ -341,6 +377,61 @@ fn what_has_no_area_is_left_out_and_remarked_on() {
     }
     let lines = OBJ.replace("f 1/1/1 2/2/1 3/3/1 4/4/1", "l 1 2 3 4").replace("f ", "l ");
     assert!(Folder::new("lines", &lines, MTL).error().contains("holds no triangle"));
+}
+
+#[test]
+fn a_broken_material_that_no_face_uses_is_remarked_on() {
+    let plain = Folder::new("plain-spare", OBJ, MTL).load().unwrap();
+    let count = MTL.lines().count();
+    for (statement, expected) in [
+        ("map_Kd gone.png", "map_Kd: cannot read the texture"),
+        ("map_Ks s.mtl", "map_Ks: cannot decode the texture"),
+        ("map_Kd -bm 2 x.png", "map_Kd: the option -bm is not supported"),
+        ("Kd -1 1 1", "Kd is"),
+        ("Ns many", "Ns is"),
+        ("illum x", "illum is"),
+    ] {
+        // A second material of one name is never used.
+        for name in ["spare", "grey"] {
+            let mtl = format!("{MTL}newmtl {name}\n{statement}\nillum 7\n");
+            let scene = Folder::new("spare", OBJ, &mtl).load().unwrap();
+            let said = scene.remarks().join("\n");
+            let place = format!("s.mtl:{}: material \"{name}\": {expected}", count + 2);
+            assert!(said.contains(&place), "{said}");
+            assert!(said.ends_with("; no face uses this material"), "{said}");
+            assert_eq!(scene.first_light_intensity(), plain.first_light_intensity());
+            let used = OBJ.replacen("usemtl grey", "usemtl spare", 1);
+            if name == "spare" {
+                let error = Folder::new("used", &used, &mtl).error();
+                assert!(error.contains(&place) && !error.contains("no face"), "{error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn statements_that_are_not_supported_are_remarked_on() {
+    let freeform = "vp 0.1\ncstype bezier\ndeg 1 1\nSURF 0 1 0 1 1 2 4 3\nparm u 0 1\nend\ncall a.obj\nface 1 2 3\n\
+                    curv 0 1 1 2\nsurf 0 1 0 1 1 2 4 3\ns off\nmg 0\n";
+    let scene = Folder::new("freeform", &format!("{OBJ}{freeform}"), MTL).load().unwrap();
+    let said = scene.remarks().join("\n");
+    let expected = [
+        "s.obj:25: 2 surf statements are ignored",
+        "s.obj:28: 1 call statement is ignored",
+        "s.obj:29: 1 face statement is ignored",
+        "s.obj:30: 1 curv statement is ignored",
+    ];
+    assert_eq!(scene.remarks().len(), expected.len(), "{said}");
+    for expected in expected {
+        assert!(said.contains(expected), "{said}");
+    }
+    // Few remarks on what is perhaps no mesh at all.
+    let words: String = (0..100).map(|i| format!("word{i}\u{1b}[2J\n")).collect();
+    let scene = Folder::new("words", &format!("{OBJ}{words}"), MTL).load().unwrap();
+    assert_eq!(scene.remarks().len(), 13);
+    let said = scene.remarks().join("\n");
+    assert!(said.ends_with("s.obj:34: 88 more kinds of statements are ignored"), "{said}");
+    assert!(said.contains("1 word0?[2j statement is ignored"), "{said}");
 }
 
 #[test]

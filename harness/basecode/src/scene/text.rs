@@ -1,6 +1,21 @@
 //! The text of scene files, however an editor or exporter saved it.
 
 use std::borrow::Cow;
+use std::io;
+use std::path::Path;
+
+/// The bytes of a file. To read a pipe would be to wait for its writer.
+///
+/// # Errors
+/// When it cannot be read, or is no file.
+pub(super) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let kind = std::fs::metadata(path)?.file_type();
+    if kind.is_file() {
+        return std::fs::read(path);
+    }
+    let found = if kind.is_dir() { "a folder" } else { "a pipe or device" };
+    Err(io::Error::other(format!("expected a file, found {found}")))
+}
 
 /// The text of a file: UTF-8 or UTF-16 by its byte order mark, UTF-16 by its zeros, else UTF-8, else Latin-1.
 pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
@@ -110,6 +125,11 @@ pub(super) fn without_comment(text: &str) -> &str {
 pub(super) fn unquoted(name: &str) -> &str {
     let name = name.trim();
     name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).map_or(name, str::trim)
+}
+
+/// A character as a message shows it.
+pub(super) fn visible(c: char) -> char {
+    if c.is_control() { '?' } else { c }
 }
 
 #[cfg(test)]

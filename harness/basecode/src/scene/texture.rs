@@ -1,11 +1,12 @@
 //! Colors that may vary over a surface.
 
-use std::io::ErrorKind;
+use std::io::{Cursor, ErrorKind};
 use std::path::Path;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
+use super::text::read;
 use crate::SurfaceInteraction;
 
 /// A color, constant or looked up in a bitmap.
@@ -82,8 +83,14 @@ impl Texture {
     /// Loads a bitmap (PNG, JPEG, TGA or BMP). Its 8-bit values are decoded from sRGB.
     pub(super) fn load(path: &Path, mapping: Mapping) -> Result<Self, String> {
         let file = path.display();
-        let mut reader = image::ImageReader::open(path)
-            .and_then(image::ImageReader::with_guessed_format)
+        // The name tells a TGA file, which has no other mark.
+        let named = image::ImageFormat::from_path(path).ok();
+        let mut reader = read(path)
+            .and_then(|bytes| {
+                let mut reader = image::ImageReader::new(Cursor::new(bytes));
+                named.into_iter().for_each(|format| reader.set_format(format));
+                reader.with_guessed_format()
+            })
             .map_err(|error| format!("cannot read the texture {file}: {error}"))?;
         let format = reader.format();
         let mut limits = image::Limits::default();

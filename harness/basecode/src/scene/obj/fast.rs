@@ -85,7 +85,7 @@ impl Piece {
                         which,
                         index: index as i64,
                         line: self.lines + 1,
-                        word: String::new(),
+                        word: None,
                     });
                     indices[which] = 0;
                 }

@@ -1,5 +1,7 @@
 //! The statements of a piece of an OBJ file.
 
+use std::collections::BTreeMap;
+
 use glam::{Vec2, Vec3};
 
 use super::super::text::{Statements, split_keyword, unquoted, without_comment};
@@ -33,9 +35,21 @@ pub(super) struct Relative {
     /// From 0 at the start of the piece; below 0 in what comes before.
     pub index: i64,
     pub line: usize,
-    /// The corner's word, where the index may be too low.
+    /// How many there are before it in the piece, and the index as it is written, where it may be too low.
+    pub word: Option<(usize, String)>,
+}
+
+/// An index beyond every file.
+pub(super) struct Beyond {
+    /// Of position, texture coordinates or normal.
+    pub which: usize,
+    pub line: usize,
+    /// The index as it is written.
     pub word: String,
 }
+
+/// Stands in a corner for an index beyond every file.
+const BEYOND: u32 = MISSING - 1;
 
 /// Statements that follow each other. Lines count from 1, everything else from 0, in the piece.
 #[derive(Default)]
@@ -50,11 +64,42 @@ pub(super) struct Piece {
     pub marks: Vec<(usize, Mark)>,
     pub libraries: Vec<Named>,
     pub relative: Vec<Relative>,
+    pub beyond: Vec<Beyond>,
     /// Numbers that are not finite: statement, index, line.
     pub not_finite: Vec<(&'static str, usize, usize)>,
     /// Points, lines, faces of fewer than three corners: how many, the first's line.
     pub without_area: [(usize, usize); 3],
+    /// Statements that are not supported: how many of each keyword, the first's line.
+    pub ignored: BTreeMap<String, (usize, usize)>,
 }
+
+/// Statements that change no picture here: smoothing and merging groups, attributes of a display, and what only
+/// describes the free-form curves and surfaces that other statements draw.
+const WITHOUT_EFFECT: [&str; 23] = [
+    "s",
+    "mg",
+    "bevel",
+    "c_interp",
+    "d_interp",
+    "lod",
+    "shadow_obj",
+    "trace_obj",
+    "maplib",
+    "ctech",
+    "stech",
+    "cstype",
+    "deg",
+    "bmat",
+    "step",
+    "vp",
+    "parm",
+    "trim",
+    "hole",
+    "scrv",
+    "sp",
+    "end",
+    "con",
+];
 
 impl Piece {
     /// Reads a text, up to the first statement that cannot be understood.
@@ -84,7 +129,7 @@ impl Piece {
         let (keyword, rest) = split_keyword(statement);
         // Some write them in upper case.
         let lower = keyword.to_ascii_lowercase();
-        let keyword = if keyword.len() <= 6 { lower.as_str() } else { keyword };
+        let keyword = lower.as_str();
         match keyword {
             "v" => {
                 let position = self.position(line, rest)?;
@@ -118,8 +163,8 @@ impl Piece {
                 self.marks.push((self.faces.len(), name));
             }
             "mtllib" => self.libraries.push(Named { line, name: rest.to_owned() }),
-            // Smoothing groups, free-form geometry, whatever else there is.
-            _ => {}
+            other if WITHOUT_EFFECT.contains(&other) => {}
+            other => self.ignored.entry(other.to_owned()).or_insert((0, line)).0 += 1,
         }
         Ok(())
     }
@@ -212,21 +257,33 @@ impl Piece {
             if text.is_empty() {
                 continue;
             }
-            let number: i64 = text.parse().ok()?;
+            let digits = text.strip_prefix(['-', '+']).unwrap_or(text);
+            if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
+                return None;
+            }
+            // Beyond every file in any case.
+            let far = if text.starts_with('-') { i64::MIN / 2 } else { i64::MAX / 2 };
+            let number: i64 = text.parse().unwrap_or(far).clamp(i64::MIN / 2, i64::MAX / 2);
             if number < 0 {
-                let here = i64::try_from(known[which]).ok()?.checked_add(number)?;
+                let here = known[which] as i64 + number;
                 self.relative.push(Relative {
                     corner: self.corners.len(),
                     which,
                     index: here,
                     line,
-                    word: if here < 0 { word.to_owned() } else { String::new() },
+                    word: (here < 0).then(|| (known[which], text.to_owned())),
                 });
                 // Until it is known what the pieces before it hold.
                 *index = 0;
                 continue;
             }
-            *index = u32::try_from(number - 1).ok().filter(|&index| index != MISSING)?;
+            if number == 0 {
+                return None;
+            }
+            *index = u32::try_from(number - 1).unwrap_or(BEYOND).min(BEYOND);
+            if *index == BEYOND {
+                self.beyond.push(Beyond { which, line, word: text.to_owned() });
+            }
         }
         let [v, vt, vn] = indices;
         (v != MISSING).then_some(Corner { v, vt, vn })
@@ -234,7 +291,7 @@ impl Piece {
 }
 
 /// What is wrong with the corner of a face.
-pub(super) fn wrong_corner(word: &str) -> String {
+fn wrong_corner(word: &str) -> String {
     format!(
         "f has \"{word}\" where a corner is expected: v, v/vt, v//vn or v/vt/vn, counted from 1, or from \
          -1 backwards"
