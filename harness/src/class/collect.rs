@@ -378,8 +378,8 @@ impl Search<'_> {
         Ok(true)
     }
 
-    /// Whose download an archive among others looks like. What lies in a student's folder, or is named as a student's, is
-    /// the student's.
+    /// Whose download an archive among others looks like. What lies in a student's folder, or is named as a
+    /// student's, is the student's.
     fn looks_like(&self, path: &Path, place: &Path) -> Option<Kind> {
         let is_student_s = place.iter().any(|part| is_labelled(&part.to_string_lossy()));
         if is_student_s || path.is_symlink() || !path.is_file() || !download::may_be(path) {
