@@ -222,7 +222,7 @@ fn errors_name_the_user_s_own_file_and_line() {
         assert!(said.starts_with(&start) && said.ends_with(expected), "{said}");
     }
     fs::write(scene.path("s.toml"), TOML.replace("spp = 4", "ssp = 4")).unwrap();
-    assert!(scene.error().starts_with("umbra: warning: s.toml:11: unknown key renderer.ssp\n"));
+    assert!(scene.error().starts_with("umbra: warning: s.toml:12: unknown key renderer.ssp\n"));
     let (_, said) = scene.run(&["s.obj", "--output", "o.exr"]);
     assert!(said.starts_with("umbra: s.obj:1: expected a scene's TOML file: "), "{said}");
     // What the renderer would not see.

@@ -170,12 +170,12 @@ fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
     if let Some(Size(width, height)) = size {
         (config.width, config.height) = (width as usize, height as usize);
     }
+    let warn = |remark: &String| eprintln!("umbra: warning: {remark}");
+    config.remarks.iter().for_each(warn);
     let camera = Camera::new(config.camera, config.width, config.height)
         .with_context(|| toml.display().to_string())?;
     let mesh = config.load_mesh()?;
-    for remark in config.remarks.iter().chain(&mesh.remarks) {
-        eprintln!("umbra: warning: {remark}");
-    }
+    mesh.remarks.iter().for_each(warn);
     let folder = config.mesh.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
     let real = |path: &Path| path.canonicalize().with_context(|| path.display().to_string());
