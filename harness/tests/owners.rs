@@ -144,7 +144,8 @@ fn a_newer_download_of_a_class_holds_the_same_submissions() {
         let own = |(at, (_, bytes)): (usize, (String, Vec<u8>))| (format!("a2_{at}.zip"), bytes);
         brightspace(students).into_iter().enumerate().map(own).collect()
     };
-    let layouts: [(&str, &dyn Fn(usize) -> Vec<(String, Vec<u8>)>); 4] = [
+    type Files<'a> = &'a dyn Fn(usize) -> Vec<(String, Vec<u8>)>;
+    let layouts: [(&str, Files); 4] = [
         ("Brightspace", &brightspace),
         ("Moodle", &moodle),
         ("Canvas", &canvas),
@@ -268,7 +269,7 @@ fn a_download_among_other_archives_is_no_row_of_zero() {
     let (said, report) = place.grade(&root, &["outer.zip"]);
     assert_eq!(names(&report).len(), 3, "{said}");
     let (_, said, _) = place.run(&["validate", "outer.zip", "--root", root.to_str().unwrap()]);
-    assert!(said.contains("3 submissions, "), "{said}");
+    assert!(said.contains("3 submissions: "), "{said}");
 }
 
 #[test]
@@ -293,5 +294,5 @@ fn two_contents_under_one_name_of_a_download_are_refused() {
     // With one content they are one.
     place.put("dup.zip", &download(&[(name.clone(), ann.clone()), (name, ann)]));
     let (_, said) = run("validate");
-    assert!(said.contains("1 submission, "), "{said}");
+    assert!(said.contains("1 submission: "), "{said}");
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
-    /// Entries in the archive or folder, folders included, besides ignored ones ([`Limits::most_headers`]).
+    /// Entries in the archive or folder, folders included, besides ignored ones (`Limits::most_headers`).
     pub max_entries: u64,
     /// Size of the archive itself, and of all its contents together (MiB).
     pub max_total_mib: u64,
