@@ -26,9 +26,9 @@ const KINDS: [(&str, &str); 3] = [
 /// What is measured: of which kind, and whether Umbra casts eight rays at once.
 const WORK: [(&str, usize, bool); 5] = [
     ("camera rays", 0, false),
-    ("camera rays, eight at once", 0, true),
+    ("camera rays, by eights", 0, true),
     ("shadow rays to a point", 1, false),
-    ("shadow rays, eight at once", 1, true),
+    ("shadow rays, by eights", 1, true),
     ("shuffled bounces", 2, false),
 ];
 /// The pixels of eight rays at once.
