@@ -88,16 +88,19 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// Removes the oldest folders in a folder, so that no more than `most` stay.
+/// Removes the oldest files and folders in a folder, so that at most `most` stay.
 ///
 /// # Errors
-/// When it cannot be read, or one not be removed.
+/// When the folder cannot be read, or an entry cannot be removed.
 pub fn keep_newest(folder: &Path, most: usize) -> io::Result<()> {
     let age = |path: &PathBuf| path.metadata().and_then(|meta| meta.modified()).ok();
     let mut all: Vec<_> = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
     all.sort_by_key(age);
     for old in all.iter().take(all.len().saturating_sub(most)) {
-        std::fs::remove_dir_all(old)?;
+        match old.is_dir() {
+            true => std::fs::remove_dir_all(old)?,
+            false => std::fs::remove_file(old)?,
+        }
     }
     Ok(())
 }

@@ -20,7 +20,7 @@ use crate::process::Exit;
 use crate::rubric::BUILD;
 use crate::worker::Supervisor;
 
-/// Is told what is being done.
+/// Receives messages about progress.
 pub type Say<'a> = &'a (dyn Fn(&str) + Sync);
 
 /// Receives and builds submissions.
@@ -34,15 +34,15 @@ pub struct Workshop<'a> {
     pub(super) cancel: &'a AtomicBool,
 }
 
-/// A submission as far as it is without any scene.
+/// A submission after intake and build.
 pub struct Begun {
-    /// What is to be said of it so far, but for the conditions.
+    /// The record so far, without the conditions.
     pub(super) record: Record,
     pub(super) checks: Vec<Check>,
     pub(super) costs: Costs,
-    /// Its private copy and its config; nothing when it was refused.
+    /// Its private copy and its config; `None` if it was refused.
     pub(super) received: Option<(Submission, SubmittedConfig)>,
-    /// The library, when it was built.
+    /// The library, if it was built.
     pub(super) built: Option<(PathBuf, mend::Built)>,
     /// Where copy and library lie.
     pub(super) _scratch: TempDir,
@@ -54,7 +54,7 @@ impl Begun {
     /// # Errors
     /// When it cannot be written.
     pub fn keep_plugin(&self, file: &Path) -> anyhow::Result<()> {
-        // With files of the template in it, it is not what its author wants to see.
+        // A library with files of the template does not show the author's work.
         let Some((library, _)) = self.built.as_ref().filter(|(_, own)| own.replaced.is_empty())
         else {
             return Ok(());
@@ -68,7 +68,7 @@ impl Workshop<'_> {
     /// Copies the submission at `source`, and looks at the copy.
     ///
     /// # Errors
-    /// The machine's matters; what is wrong with the submission is in the answer.
+    /// When the machine fails; faults of the submission are in the answer.
     pub fn receive(
         &self,
         source: &Path,
@@ -122,7 +122,7 @@ impl Workshop<'_> {
     /// Builds the source, mended where it does not build as it is.
     ///
     /// # Errors
-    /// The machine's matters and Ctrl-C.
+    /// When the machine fails, and at Ctrl-C.
     pub fn build(&self, begun: &mut Begun, say: Say) -> anyhow::Result<()> {
         let Some((submission, _)) = &begun.received else { return Ok(()) };
         say("compiling the source");

@@ -14,11 +14,11 @@ use super::draw::{Frame, draw_each};
 use super::pipeline::Grading;
 use super::session::{KeptFrames, Session};
 use crate::expected::scene_digest;
-use crate::files::{files_below, hex, write_whole};
+use crate::files::{hex, keep_newest, write_whole};
 use crate::sandbox::Isolation;
 use crate::worker::{Adapter, Answer, Outcome, Request};
 
-/// So many sets of frames are kept, of about 4 MB each; the oldest go.
+/// Number of sets of frames that are kept, of about 4 MB each; the oldest go.
 const KEPT: usize = 24;
 
 impl Grading<'_> {
@@ -93,7 +93,7 @@ impl KeptFrames {
     }
 }
 
-/// What is kept of outcomes: the digest of all floats, and these. Nothing when one is no answer.
+/// The bytes that are kept of outcomes: the digest of all floats, and the floats. `None` if one is no answer.
 fn bytes(outcomes: &[Outcome]) -> Option<Vec<u8>> {
     let answers: Option<Vec<&Answer>> = outcomes.iter().map(Outcome::answer).collect();
     let floats = answers?.into_iter().flat_map(|answer| &answer.values);
@@ -101,7 +101,7 @@ fn bytes(outcomes: &[Outcome]) -> Option<Vec<u8>> {
     Some([Sha256::digest(&floats).to_vec(), floats].concat())
 }
 
-/// The outcomes that were kept so; nothing when they are not those of the requests, or not whole.
+/// The outcomes in kept bytes; `None` if they are incomplete or do not fit the requests.
 fn outcomes(bytes: &[u8], requests: impl Iterator<Item = Request>) -> Option<Vec<Outcome>> {
     let (digest, floats) = bytes.split_at_checked(Sha256::output_size())?;
     if Sha256::digest(floats)[..] != *digest {
@@ -120,7 +120,5 @@ fn outcomes(bytes: &[u8], requests: impl Iterator<Item = Request>) -> Option<Vec
 /// Keeps a file, and no more than [`KEPT`] in `all`.
 fn keep(all: &Path, file: &Path, bytes: &[u8]) -> io::Result<()> {
     write_whole(file, bytes)?;
-    let mut files = files_below(all)?;
-    files.sort_by_key(|file| file.metadata().and_then(|meta| meta.modified()).ok());
-    files.iter().take(files.len().saturating_sub(KEPT)).try_for_each(fs::remove_file)
+    keep_newest(all, KEPT)
 }
