@@ -73,13 +73,13 @@ static CASE: LazyLock<PreparedScene> = LazyLock::new(|| {
         mask: shadowed,
         unshadowed_mask: unshadowed_mask.clone(),
         unshadowed: unshadowed.clone(),
-        raw_normals: None,
+        interpolated_normals: None,
         sampled: None,
     };
     let expected = Expected {
         scene,
         offline,
-        raw_normals: Some(unshadowed.clone()),
+        interpolated_normals: Some(unshadowed.clone()),
         unshadowed,
         unshadowed_mask,
     };

@@ -93,8 +93,8 @@ impl Store<'_> {
         let offline = ReferenceImage::new(mean, variance, n, centre, mask)
             .with_context(|| format!("scene \"{}\"", entry.name))?;
         let realtime = self.assignment.root.join(&entry.realtime);
-        let raw_normals = self.raw_normals(&realtime, width, height)?;
-        Ok(Expected { scene, offline, unshadowed, unshadowed_mask, raw_normals })
+        let interpolated_normals = self.interpolated_normals(&realtime, width, height)?;
+        Ok(Expected { scene, offline, unshadowed, unshadowed_mask, interpolated_normals })
     }
 
     /// The regions of a scene, as [`regions`].
@@ -138,7 +138,7 @@ impl Store<'_> {
     ///
     /// # Errors
     /// When the scene or the cache cannot be used.
-    pub fn raw_normals(
+    pub fn interpolated_normals(
         &self,
         toml: &Path,
         width: u32,

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use umbra::build::{BuildOutcome, BuildReport, Recording, compile, default_limits};
-use umbra::grading::mend;
+use umbra::grading::template_fallback;
 use umbra::process::Limits;
 use umbra::worker::{BsdfQuery, BsdfSource, Job, Request, SceneRef, Supervisor};
 
@@ -211,7 +211,7 @@ pub fn light(gpu: &Gpu, position: Vec3) -> wgpu::Buffer {
 type Change<'a> = (&'a str, &'a str, &'a str);
 
 /// A right renderer in which a file has a text instead of another; an empty file is not there.
-fn mend_with(changes: &[Change]) -> mend::Built {
+fn mend_with(changes: &[Change]) -> template_fallback::Built {
     let dir = tempfile::tempdir().unwrap();
     let [src, out, copy] = ["src", "out", "copy"].map(|name| dir.path().join(name));
     std::fs::create_dir(&out).unwrap();
@@ -238,7 +238,7 @@ fn mend_with(changes: &[Change]) -> mend::Built {
     let cancel = AtomicBool::new(false);
     let compile =
         |src: &Path| compile(recording(), &supervisor, src, &out, &default_limits(), &cancel);
-    mend::build(&compile, &src, &template, &copy).unwrap()
+    template_fallback::build(&compile, &src, &template, &copy).unwrap()
 }
 
 #[test]

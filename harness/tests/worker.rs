@@ -440,7 +440,7 @@ fn questions_of_one_worker_have_limits_of_their_own() {
         let job = Job { plugin: Some(plugin.clone()), requests };
         let (never, patience) = (AtomicBool::new(false), RetryBudget::with(None, None));
         let limits = Limits { wall_s: 1.0, cpu_s: 20, ..house.limits.clone() };
-        house.supervisor.run_job_patiently(&job, &limits, &patience, &never, &mut |_| {})
+        house.supervisor.run_job_with_retries(&job, &limits, &patience, &never, &mut |_| {})
     };
     // On a machine so busy that a plain render is late too, nothing is decided: asked again.
     let busy = |report: &JobReport| {
@@ -473,7 +473,7 @@ fn a_timeout_counts_when_it_is_confirmed_alone_on_the_machine() {
         let requests = modes.iter().map(|mode| house.offline(mode, 1, 1)).collect();
         let job = Job { plugin: Some(plugin.clone()), requests };
         let (limits, never) = (&house.limits, AtomicBool::new(false));
-        house.supervisor.run_job_patiently(&job, limits, patience, &never, &mut |_| {})
+        house.supervisor.run_job_with_retries(&job, limits, patience, &never, &mut |_| {})
     };
     // Late once, while another worker runs for two seconds: it is asked again when that one is gone.
     let once = format!("once {}", house.dir.path().join("late").display());

@@ -140,10 +140,13 @@ fn the_kit_is_whole_and_holds_nothing_of_the_reference() {
         assert!(a.expected.offline.centre == b.expected.offline.centre, "{name}: centre");
         assert!(a.expected.offline.mask == b.expected.offline.mask, "{name}: mask");
         assert!(a.expected.unshadowed == b.expected.unshadowed, "{name}: unshadowed");
-        assert!(a.expected.raw_normals == b.expected.raw_normals, "{name}: raw normals");
+        assert!(
+            a.expected.interpolated_normals == b.expected.interpolated_normals,
+            "{name}: raw normals"
+        );
         assert!(a.probe_film.unshadowed == b.probe_film.unshadowed, "{name}: small film");
         assert!(
-            a.probe_film.raw_normals == b.probe_film.raw_normals,
+            a.probe_film.interpolated_normals == b.probe_film.interpolated_normals,
             "{name}: small film, raw normals"
         );
     }

@@ -3,9 +3,8 @@
 #![allow(clippy::unwrap_used)] // its helpers are tests too
 
 use basecode::gpu::{
-    AdapterKind, DEPTH_FORMAT, EMITTER_FS, EVERY_FRAGMENT, Footprint, FrameUniforms, Gpu,
-    MaterialUniforms, Mesh, OUTLINES, ObjectUniforms, ShadowMap, Stage, Target, UNDRAWN_MAPS,
-    Uniform,
+    AdapterKind, DEPTH_FORMAT, EMITTER_FS, EMPTY_MAPS, EVERY_FRAGMENT, Footprint, FrameUniforms,
+    Gpu, MaterialUniforms, Mesh, OUTLINES, ObjectUniforms, ShadowMap, Stage, Target, Uniform,
 };
 use basecode::{Camera, CameraConfig, Error, Mat4, Shape, Vec2, Vec3, vec3, wgpu};
 
@@ -197,7 +196,7 @@ fn the_host_sees_how_a_picture_comes_about() {
         assert!((2..=6).contains(&outlined), "{outlined} pixels: both sides and the diagonal");
     }
     // What is drawn beside the picture alone is left out, and nobody's look outlives the next.
-    assert_eq!(looked_at(&mut gpu, &[UNDRAWN_MAPS]), (vec3(8.5, 8.5, 1e6), 10));
+    assert_eq!(looked_at(&mut gpu, &[EMPTY_MAPS]), (vec3(8.5, 8.5, 1e6), 10));
 }
 
 #[test]
@@ -208,7 +207,10 @@ fn what_a_pass_hands_to_the_device_is_counted() {
     draw(&gpu, POSITION_FS, &target).unwrap();
     let found = gpu.take_footprint();
     assert!((100..2000).contains(&found.uploaded), "{found:?}");
-    assert_eq!((found.targets, found.fed, found.unfed, found.maps), (0, 1, 0, 0));
+    assert_eq!(
+        (found.targets, found.vertex_pipelines, found.vertexless_pipelines, found.maps),
+        (0, 1, 0, 0)
+    );
     assert_eq!(found.to_string().parse(), Ok(found));
     assert!("1 2 3 4".parse::<Footprint>().is_err());
 
@@ -297,7 +299,7 @@ fn a_shadow_map_can_be_left_undrawn() {
     let depth = depth_of_square(&gpu);
     assert!(0.9 < depth && depth < 1.0, "{depth}");
     let found = gpu.take_footprint();
-    assert_eq!((found.maps, found.targets, found.fed), (1, 1, 0));
-    gpu.replace_stages(vec![(UNDRAWN_MAPS.into(), UNDRAWN_MAPS.into())]);
+    assert_eq!((found.maps, found.targets, found.vertex_pipelines), (1, 1, 0));
+    gpu.replace_stages(vec![(EMPTY_MAPS.into(), EMPTY_MAPS.into())]);
     assert_eq!(depth_of_square(&gpu), 1.0);
 }

@@ -30,6 +30,6 @@ pub use late::{Late, Policy};
 pub use layout::{Kind, Label};
 pub use matching::{Claim, MATCHES, Matches};
 pub use owners::Owners;
-pub use pins::{Decided, Pins, Stated};
+pub use pins::{Decisions, Pins, Stated};
 pub use roster::{Roster, Student};
 pub use settle::{Attempt, Class, Deciding, Missing, Standing, Undecided, set_aside, settle};

@@ -19,7 +19,7 @@ pub const FOLDER: &str = "settled";
 
 /// Everything besides the evidence that settles grades.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Decided {
+pub struct Decisions {
     /// What the assignment says.
     pub assignment: Stated,
     /// Which attempt counts.
@@ -61,7 +61,7 @@ pub struct Pin {
     /// The points that it changed.
     pub changes: Vec<Change>,
     /// What holds from then on.
-    pub decided: Decided,
+    pub decided: Decisions,
 }
 
 /// Points that an applied change made others.
@@ -93,7 +93,7 @@ impl Stated {
     }
 }
 
-impl Decided {
+impl Decisions {
     /// The instructor's decisions in the files of a report, and what the assignment says.
     ///
     /// # Errors
@@ -202,7 +202,7 @@ impl Pins {
     /// When it cannot be written, or another process applied one meanwhile.
     pub fn apply(
         &mut self,
-        decided: Decided,
+        decided: Decisions,
         reason: &str,
         changes: Vec<Change>,
         undoes: bool,
@@ -221,7 +221,7 @@ impl Pins {
 
     fn add(
         &mut self,
-        decided: Decided,
+        decided: Decisions,
         reason: &str,
         changes: Vec<Change>,
         before: Option<u32>,
@@ -240,7 +240,7 @@ impl Pins {
     ///
     /// # Errors
     /// When it cannot be read or written, or the report is of another assignment.
-    pub fn begin(instructor: &Path, decided: &Decided) -> anyhow::Result<Self> {
+    pub fn begin(instructor: &Path, decided: &Decisions) -> anyhow::Result<Self> {
         let mut pins = Self::read(instructor)?;
         if pins.all.is_empty() {
             match pins.add(decided.clone(), "graded first", Vec::new(), None) {
@@ -273,7 +273,7 @@ mod tests {
     use super::*;
     use crate::report::sample;
 
-    fn decided(overrides: &str) -> Decided {
+    fn decided(overrides: &str) -> Decisions {
         let report = sample::report();
         let assignment = Stated {
             name: report.assignment,
@@ -284,7 +284,7 @@ mod tests {
             rules: report.rules,
         };
         let (attempt, matches) = (Attempt::Latest, String::new());
-        Decided { assignment, attempt, matches, overrides: overrides.to_owned() }
+        Decisions { assignment, attempt, matches, overrides: overrides.to_owned() }
     }
 
     #[test]

@@ -9,19 +9,19 @@ use std::time::Instant;
 use anyhow::{Context as _, ensure};
 
 use super::MachineLacks;
-use super::asked::Asked;
+use super::assemble::{self, Found};
 use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::class::{self, Source, Telling};
 use super::context::{Context, INTERRUPTED, cores};
 use super::join::join;
 use super::render::AdapterChoice;
-use super::settling::{self, Found};
+use super::selection::Selection;
 use crate::assignment::Assignment;
-use crate::class::{Attempt, Collected, Decided, Kind, Label, Pins, Stated, Wanted, collect};
+use crate::class::{Attempt, Collected, Decisions, Kind, Label, Pins, Stated, Wanted, collect};
 use crate::columns::count;
 use crate::files::write_whole;
 use crate::grading::{
-    Begun, Earlier, Folders, Grading, Mode, Record, RecordCache, Workshop, judge_shared,
+    Begun, Folders, Grading, Mode, Record, RecordCache, StoredRecord, Workshop, judge_shared,
 };
 use crate::held_back::recorded_seed;
 use crate::program::graded;
@@ -54,7 +54,7 @@ pub struct Batch<'a> {
     /// How much time each has in all.
     pub budget: BudgetChoice,
     /// The parts and scenes to ask about; `None` for all.
-    pub asked: Option<&'a Asked>,
+    pub selection: Option<&'a Selection>,
     /// Whose submissions alone are graded, unless it is empty.
     pub only: &'a [String],
     /// Which share of them alone is graded, without a report.
@@ -74,7 +74,7 @@ pub struct Batch<'a> {
 }
 
 /// How a batch ended.
-pub enum Ended {
+pub enum BatchOutcome {
     /// By Ctrl-C.
     Interrupted,
     /// With its report, and what was found.
@@ -99,7 +99,7 @@ impl<'a> Batch<'a> {
             isolation,
             perturb: None,
             budget: BudgetChoice::Config,
-            asked: None,
+            selection: None,
             only: &[],
             slice: None,
             from: None,
@@ -112,7 +112,7 @@ impl<'a> Batch<'a> {
     }
 
     /// Grades all and writes the reports, or the records of a slice.
-    pub fn run(&self, root: Option<&Path>) -> anyhow::Result<Ended> {
+    pub fn run(&self, root: Option<&Path>) -> anyhow::Result<BatchOutcome> {
         for path in &self.paths {
             ensure!(path.exists(), "{} does not exist", path.display());
         }
@@ -154,8 +154,8 @@ impl<'a> Batch<'a> {
             ))
             .into());
         }
-        if let Some(asked) = self.asked {
-            asked.restrict(&mut context.assignment)?;
+        if let Some(selection) = self.selection {
+            selection.restrict(&mut context.assignment)?;
         }
         let instructor = self.output.join(report::INSTRUCTOR);
         let mut pins = match self.mode {
@@ -222,8 +222,9 @@ impl<'a> Batch<'a> {
             if self.budget == BudgetChoice::None {
                 grading.budget = None;
             }
-            grading.paths = self.asked.map_or(grading.paths, |asked| asked.paths(context));
-            grading.compares_submitted = self.asked.is_none_or(Asked::is_all);
+            grading.paths =
+                self.selection.map_or(grading.paths, |selection| selection.paths(context));
+            grading.compares_submitted = self.selection.is_none_or(Selection::is_all);
             let jobs = self.jobs.min(chosen.len()).max(1);
             grading.threads = (cores() / jobs as u32).max(1);
             let records = match (begun, &chosen[..]) {
@@ -254,15 +255,15 @@ impl<'a> Batch<'a> {
                 _ => String::new(),
             };
             eprintln!("umbra: interrupted{goes_on}");
-            return Ok(Ended::Interrupted);
+            return Ok(BatchOutcome::Interrupted);
         }
         let (records, held_back, cache) = result?;
-        let mut records = records.into_iter().collect::<anyhow::Result<Vec<Earlier>>>()?;
+        let mut records = records.into_iter().collect::<anyhow::Result<Vec<StoredRecord>>>()?;
         if self.slice.is_some() {
             let rules = &context.assignment.rules;
-            let entry = |own: &Earlier| Ok(report::outline(graded(own.whole()?, rules)));
+            let entry = |own: &StoredRecord| Ok(report::outline(graded(own.whole()?, rules)));
             let entries = records.iter().map(entry).collect::<anyhow::Result<_>>()?;
-            return Ok(Ended::Slice(entries, counting));
+            return Ok(BatchOutcome::Slice(entries, counting));
         }
         let report = match (&mut pins, cache) {
             (Some((pins, decided)), Some(cache)) => {
@@ -274,14 +275,14 @@ impl<'a> Batch<'a> {
                     );
                 }
                 join(self.output, &found, &mut records);
-                settling::finish(self.output, pins, decided, found, records)?
+                assemble::finish(self.output, pins, decided, found, records)?
             }
             _ => {
                 let rules = &context.assignment.rules;
                 let entry = |record| {
                     let mut entry = graded(record, rules);
-                    if let Some(asked) = self.asked {
-                        asked.only_of(&mut entry.grade);
+                    if let Some(selection) = self.selection {
+                        selection.only_of(&mut entry.grade);
                     }
                     entry
                 };
@@ -296,7 +297,7 @@ impl<'a> Batch<'a> {
         if self.timings {
             print_timings(&report);
         }
-        Ok(Ended::Report(Box::new(report), collected))
+        Ok(BatchOutcome::Report(Box::new(report), collected))
     }
 
     /// What is known of the batch before anything is graded.
@@ -311,11 +312,12 @@ impl<'a> Batch<'a> {
 
     /// What the report is settled by: what is pinned there, which takes the place of what `config.json` says by now,
     /// with the instructor's decisions as they are now.
-    fn pin(&self, assignment: &mut Assignment) -> anyhow::Result<(Pins, Decided)> {
+    fn pin(&self, assignment: &mut Assignment) -> anyhow::Result<(Pins, Decisions)> {
         let stated = Stated::from(&*assignment);
         let attempt = self.attempt.unwrap_or_default();
-        let mut decided = Decided::read(self.output, stated, attempt)?;
-        let first = Decided { matches: String::new(), overrides: String::new(), ..decided.clone() };
+        let mut decided = Decisions::read(self.output, stated, attempt)?;
+        let first =
+            Decisions { matches: String::new(), overrides: String::new(), ..decided.clone() };
         let pins = Pins::begin(&self.output.join(report::INSTRUCTOR), &first)?;
         if let Some(pin) = pins.current() {
             let pinned = &pin.decided.assignment;
@@ -342,7 +344,7 @@ impl<'a> Batch<'a> {
     }
 
     /// The slugs of attempts that need not be graded: another one of the same student counts.
-    fn set_aside(&self, all: &[Source], decided: &Decided) -> anyhow::Result<HashSet<String>> {
+    fn set_aside(&self, all: &[Source], decided: &Decisions) -> anyhow::Result<HashSet<String>> {
         let matches = decided.matches(self.output)?;
         let told = |source: &Source| !matches.mention(&source.claim());
         let labels: Vec<Option<&Label>> =
@@ -383,11 +385,11 @@ impl<'a> Batch<'a> {
         grading: &Grading,
         source: &Source,
         begun: Begun,
-    ) -> anyhow::Result<Earlier> {
+    ) -> anyhow::Result<StoredRecord> {
         let Source { path, name, slug, .. } = source;
         let record = grading.judge(begun, &self.folders(slug), &|stage| context.say(stage));
         let record = record.with_context(|| path.display().to_string())?;
-        Ok(Earlier::held(Record { name: name.clone(), ..record }))
+        Ok(StoredRecord::held(Record { name: name.clone(), ..record }))
     }
 
     /// Takes submissions through all stages, in their order; none is begun after Ctrl-C. One that the machine
@@ -398,7 +400,7 @@ impl<'a> Batch<'a> {
         grading: &Grading,
         sources: &[&Source],
         jobs: usize,
-    ) -> Vec<Earlier> {
+    ) -> Vec<StoredRecord> {
         let next = AtomicUsize::new(0);
         let results = Mutex::new(Vec::new());
         context.progress.count(sources.len());
@@ -450,8 +452,8 @@ impl<'a> Batch<'a> {
                         .step(&format!("{}, {cost}", report::in_a_line(&record, &grade)));
                 }
                 let result = match is_kept {
-                    true => Earlier::kept(record, true, &out.instructor),
-                    false => Earlier::held(record),
+                    true => StoredRecord::kept(record, true, &out.instructor),
+                    false => StoredRecord::held(record),
                 };
                 let Ok(mut results) = results.lock() else { return };
                 results.push((index, result));

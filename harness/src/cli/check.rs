@@ -8,11 +8,11 @@ use std::time::Instant;
 use anyhow::ensure;
 use serde::{Deserialize, Serialize};
 
-use super::asked::Asked;
-use super::batch::{Batch, Ended};
+use super::batch::{Batch, BatchOutcome};
 use super::choices::Perturb;
 use super::context::Context;
 use super::render::AdapterChoice;
+use super::selection::Selection;
 use super::{class, terminal, terminal_pictures};
 use crate::class::Source;
 use crate::files::{files_below, write_whole};
@@ -80,11 +80,11 @@ struct LastCheck {
 /// Checks one working folder and prints the result; exit 1 when points are missing.
 pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let (parts, scenes) = (arguments.part.clone(), arguments.scene.clone());
-    let asked = Asked { parts, scenes };
+    let selection = Selection { parts, scenes };
     let folder = &arguments.submission;
     // Errors come before the announcement of the work.
     let mut assignment = Context::assignment(root)?;
-    asked.restrict(&mut assignment)?;
+    selection.restrict(&mut assignment)?;
     ensure!(folder.exists(), "{} does not exist", folder.display());
     if folder.is_file() {
         let bytes = read_archive(folder, &assignment.limits.archive)?.unwrap_or_default();
@@ -103,18 +103,20 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let last_file = arguments.output.join(&slug).join(LAST);
     let last = fs::read(&last_file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
     let mut last: LastCheck = last.unwrap_or_default();
-    let what = asked.in_words();
+    let what = selection.in_words();
     eprintln!("umbra: {}", plan(folder, &what, last.seconds.get(&what).copied()));
     let batch = Batch {
         adapter: arguments.adapter,
         perturb: Some(Perturb(None)),
-        asked: Some(&asked),
+        selection: Some(&selection),
         keeps_plugin: arguments.keep_plugin.as_deref(),
         timings: arguments.timings,
         ..Batch::of(vec![source], &arguments.output, Mode::Check)
     };
     let begun = Instant::now();
-    let Ended::Report(report, _) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    let BatchOutcome::Report(report, _) = batch.run(root)? else {
+        return Ok(super::EXIT_INTERRUPTED);
+    };
     let entry = &report.entries[0].for_student(&report.rules, false);
     let width = terminal::width().min(READABLE_COLUMNS);
     let look = Look { width, colours: terminal::colours() };

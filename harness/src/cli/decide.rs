@@ -4,10 +4,10 @@ use std::path::Path;
 
 use anyhow::{Context as _, bail, ensure};
 
+use super::assemble::Kept;
 use super::earlier::{Report, Row};
 use super::report_folder::ReportFolder;
-use super::settling::Kept;
-use crate::class::Decided;
+use crate::class::Decisions;
 use crate::class::overrides::{Decision, OVERRIDES, Subject, entry, fingerprint};
 use crate::files::write_whole;
 use crate::report::{self, SubmissionReport, harmless};
@@ -166,7 +166,7 @@ impl DecisionArguments {
         // What is there must be right before anything is added to it.
         let current = kept.decided()?.clone();
         let mut decided =
-            Decided::read(&self.report.path, current.assignment.clone(), current.attempt)?;
+            Decisions::read(&self.report.path, current.assignment.clone(), current.attempt)?;
         decided.matches = current.matches;
         if decided.overrides.is_empty() {
             decided.overrides = String::from(

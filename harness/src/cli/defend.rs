@@ -4,10 +4,10 @@ use std::path::Path;
 
 use anyhow::Context as _;
 
+use super::assemble::Kept;
 use super::context::Context;
 use super::decide::one;
 use super::report_folder::ReportFolder;
-use super::settling::Kept;
 use super::{EXIT_OK, class, terminal};
 use crate::report::{self, Look};
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::batch::{Batch, Ended};
+use super::batch::{Batch, BatchOutcome};
 use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::context::cores;
 use super::export::{self, Format, Item};
@@ -93,7 +93,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         isolation: arguments.isolation,
         perturb: arguments.perturb,
         budget: arguments.budget,
-        asked: None,
+        selection: None,
         only: &arguments.only,
         slice: arguments.partition,
         from: arguments.from,
@@ -104,9 +104,9 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         timings: arguments.timings,
     };
     let (report, collected) = match batch.run(root)? {
-        Ended::Interrupted => return Ok(super::EXIT_INTERRUPTED),
-        Ended::Report(report, collected) => (report, collected),
-        Ended::Slice(entries, all) => {
+        BatchOutcome::Interrupted => return Ok(super::EXIT_INTERRUPTED),
+        BatchOutcome::Report(report, collected) => (report, collected),
+        BatchOutcome::Slice(entries, all) => {
             println!(
                 "{} of {all} graded; `umbra merge --report {}` makes the reports when all tasks are done",
                 count(entries.len(), "submission"),

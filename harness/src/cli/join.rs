@@ -3,15 +3,15 @@
 use std::collections::HashSet;
 use std::path::Path;
 
+use super::assemble::Found;
 use super::class::{folders, some, who};
-use super::settling::Found;
 use crate::columns::count;
-use crate::grading::{Earlier, Record, RecordCache};
+use crate::grading::{Record, RecordCache, StoredRecord};
 use crate::report;
 
 /// Adds to `records`, made of some of the submissions that were found, what earlier runs into the same report
 /// found out about others, and says so.
-pub fn join(output: &Path, found: &Found, records: &mut Vec<Earlier>) {
+pub fn join(output: &Path, found: &Found, records: &mut Vec<StoredRecord>) {
     let graded: HashSet<String> = records.iter().map(|own| own.record.slug.clone()).collect();
     let mut gone = Vec::new();
     let before = Found::read(output).ok().flatten().unwrap_or_default();
@@ -78,7 +78,7 @@ pub fn join(output: &Path, found: &Found, records: &mut Vec<Earlier>) {
 }
 
 /// A record under the name that reports call it by.
-fn named(earlier: Earlier, before: &Found) -> Earlier {
+fn named(earlier: StoredRecord, before: &Found) -> StoredRecord {
     let mut own = [earlier];
     before.name(&mut own);
     let [earlier] = own;

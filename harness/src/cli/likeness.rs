@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 
+use super::assemble::{self, Kept};
 use super::class;
 use super::context::{Context, INTERRUPTED};
 use super::report_folder::ReportFolder;
-use super::settling::{self, Kept};
 use crate::class::jplag::{self, Match, Pair, Place};
 use crate::class::{Wanted, collect};
 use crate::columns::count;
@@ -46,7 +46,7 @@ pub fn run(arguments: &LikenessArguments, root: Option<&Path>) -> anyhow::Result
     }
     show(&kept, &folder)?;
     // The reports name what is alike.
-    settling::write(output, &kept.report(output, kept.decided()?)?)?;
+    assemble::write(output, &kept.report(output, kept.decided()?)?)?;
     Ok(super::EXIT_OK)
 }
 

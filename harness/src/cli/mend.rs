@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
 
-use super::batch::{Batch, Ended};
+use super::assemble::Kept;
+use super::batch::{Batch, BatchOutcome};
 use super::choices::{IsolationChoice, Perturb};
 use super::class;
 use super::context::Context;
 use super::decide::{DecisionArguments, one, said};
 use super::render::AdapterChoice;
-use super::settling::Kept;
 use crate::class::mending;
 use crate::files::files_below;
 use crate::grading::Mode;
@@ -71,7 +71,7 @@ pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8>
         perturb: Some(Perturb(seed)),
         ..Batch::of(vec![source], &folder, Mode::Grade)
     };
-    let Ended::Report(..) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
+    let BatchOutcome::Report(..) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
     let made = decision.mend(&graded, text, mend.penalty)?;
     let kept = decision.add(kept, &made)?;
     let report = kept.report(output, kept.decided()?)?.report;

@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
 
-use super::batch::{Batch, Ended};
+use super::assemble::{self, Found, Seen};
+use super::batch::{Batch, BatchOutcome};
 use super::choices::{IsolationChoice, Perturb};
 use super::class::{self, some};
 use super::context::Context;
 use super::grade;
 use super::join::join;
-use super::settling::{self, Found, Seen};
-use crate::class::{Decided, Pins, Stated};
+use crate::class::{Decisions, Pins, Stated};
 use crate::columns::count;
 use crate::evidence::{Check, Evidence};
-use crate::grading::{Conditions, Earlier, Mode, Record, RecordCache};
+use crate::grading::{Conditions, Mode, Record, RecordCache, StoredRecord};
 use crate::report::{self, harmless};
 use crate::rubric;
 
@@ -84,9 +84,9 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
             );
         }
     }
-    let decided = Decided::read(output, stated, attempt)?;
+    let decided = Decisions::read(output, stated, attempt)?;
     join(output, &found, &mut records);
-    let report = settling::finish(output, &mut pins, &decided, found, records)?;
+    let report = assemble::finish(output, &mut pins, &decided, found, records)?;
     for file in files {
         std::fs::remove_file(&file).with_context(|| format!("cannot remove {}", file.display()))?;
     }
@@ -159,8 +159,8 @@ fn one(output: &Path, begun: Vec<(PathBuf, Found)>) -> anyhow::Result<Found> {
 }
 
 /// Records by the machine that made them.
-fn machines(records: &[Earlier]) -> Vec<(Conditions, Vec<Earlier>)> {
-    let mut machines: Vec<(Conditions, Vec<Earlier>)> = Vec::new();
+fn machines(records: &[StoredRecord]) -> Vec<(Conditions, Vec<StoredRecord>)> {
+    let mut machines: Vec<(Conditions, Vec<StoredRecord>)> = Vec::new();
     for earlier in records {
         let conditions = &earlier.record.conditions;
         match machines.iter_mut().find(|(own, _)| own == conditions) {
@@ -171,7 +171,7 @@ fn machines(records: &[Earlier]) -> Vec<(Conditions, Vec<Earlier>)> {
     machines
 }
 
-fn in_words((conditions, records): &(Conditions, Vec<Earlier>)) -> String {
+fn in_words((conditions, records): &(Conditions, Vec<StoredRecord>)) -> String {
     let Conditions { isolation, adapter, compiler, .. } = conditions;
     let names: Vec<String> = records.iter().map(|own| own.record.name.clone()).collect();
     let compiler = compiler.get(..12).unwrap_or(compiler);
@@ -186,10 +186,10 @@ fn compare(
     root: Option<&Path>,
     output: &Path,
     found: &Found,
-    machines: &[(Conditions, Vec<Earlier>)],
+    machines: &[(Conditions, Vec<StoredRecord>)],
 ) -> anyhow::Result<()> {
     let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
-    let samples = machines.iter().filter_map(|(_, own)| own.first()).map(Earlier::whole);
+    let samples = machines.iter().filter_map(|(_, own)| own.first()).map(StoredRecord::whole);
     let samples = samples.collect::<anyhow::Result<Vec<Record>>>()?;
     let only: Vec<String> = samples.iter().map(|record| record.slug.clone()).collect();
     let again = scratch.path().join("again");
@@ -202,7 +202,7 @@ fn compare(
         ..Batch::of(found.paths.clone(), &again, Mode::Grade)
     };
     eprintln!("umbra: {} graded again on this machine", count(samples.len(), "submission"));
-    let Ended::Report(made, _) = batch.run(root)? else { bail!("interrupted") };
+    let BatchOutcome::Report(made, _) = batch.run(root)? else { bail!("interrupted") };
     for record in samples {
         let folder = again.join(report::INSTRUCTOR).join(&record.slug);
         let Some(here) = RecordCache::record(&folder)? else {

@@ -1,6 +1,6 @@
 //! The command line: parses, calls, prints. Each command is one file.
 
-mod asked;
+mod assemble;
 mod batch;
 mod bless;
 mod check;
@@ -25,7 +25,7 @@ mod regrade;
 mod release;
 mod render;
 mod report_folder;
-mod settling;
+mod selection;
 mod terminal;
 mod terminal_pictures;
 mod tree;

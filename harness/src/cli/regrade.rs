@@ -4,12 +4,12 @@ use std::path::Path;
 
 use anyhow::Context as _;
 
+use super::assemble::{self, Kept, changes};
 use super::context::Context;
 use super::report_folder::ReportFolder;
-use super::settling::{self, Kept, changes};
 use crate::class::overrides::OVERRIDES;
 use crate::class::pins::Change;
-use crate::class::{Decided, MATCHES, Stated};
+use crate::class::{Decisions, MATCHES, Stated};
 use crate::columns::{count, left, right};
 use crate::files::write_whole;
 use crate::report::{BatchReport, harmless};
@@ -54,14 +54,14 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
             current.decided.assignment.name,
             stated.name
         );
-        Decided::read(output, stated, current.decided.attempt)?
+        Decisions::read(output, stated, current.decided.attempt)?
     };
     let differs = decided.differs(&current.decided, output)?;
     let before = kept.report(output, &current.decided)?;
     if differs.is_empty() && !undo {
         println!("config.json, {MATCHES} and {OVERRIDES} say what is pinned: nothing changes");
         if *apply {
-            settling::write(output, &before)?;
+            assemble::write(output, &before)?;
         }
         return Ok(super::EXIT_OK);
     }

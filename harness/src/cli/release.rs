@@ -7,9 +7,9 @@ use anyhow::{Context as _, bail, ensure};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
+use super::assemble::{self, Kept};
 use super::context::Context;
 use super::report_folder::ReportFolder;
-use super::settling::{self, Kept};
 use crate::class::late;
 use crate::files::{files_below, write_whole};
 use crate::held_back;
@@ -68,11 +68,11 @@ pub fn run(arguments: &ReleaseArguments, root: Option<&Path>) -> anyhow::Result<
     let scenes = output.join(SCENES);
     write_whole(&scenes, &zip.finish()?.into_inner())
         .with_context(|| format!("cannot write {}", scenes.display()))?;
-    let flag = output.join(report::INSTRUCTOR).join(settling::RELEASED);
+    let flag = output.join(report::INSTRUCTOR).join(assemble::RELEASED);
     write_whole(&flag, format!("{now}\n").as_bytes())
         .with_context(|| format!("cannot write {}", flag.display()))?;
     report.released = true;
-    settling::write(output, &settled)?;
+    assemble::write(output, &settled)?;
     println!(
         "{}: the {} that were held back, for all students; the page of each shows now what went wrong on them",
         scenes.display(),

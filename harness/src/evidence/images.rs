@@ -3,7 +3,7 @@
 use basecode::Image;
 
 use super::price::Price;
-use super::{Check, CheckId, Measure, RuleId, Verdict, film};
+use super::{Check, CheckId, Measure, RuleId, Verdict, film_slips};
 use crate::expected::Expected;
 use crate::imaging::compare::{
     compare_offline, compare_realtime_linear, compare_srgb8, offline, realtime_linear, srgb8,
@@ -96,7 +96,7 @@ pub fn judge(
             compare_offline(actual, &reference, spp, tolerances)
         }
         Kind::Realtime => {
-            let raw = expected.raw_normals.as_ref();
+            let raw = expected.interpolated_normals.as_ref();
             return judge_shaded(id, scene, actual, (reference, raw), &mask, tolerances);
         }
         Kind::RealtimeShadows => {
@@ -127,7 +127,7 @@ pub fn film_price(image: &Image, right: &Image, mask: &RegionMask, raw: f64) -> 
     if size != (right.width, right.height) {
         return Price::of_raw(raw);
     }
-    film::film_price(size, &colours(image), &colours(right), &room, raw)
+    film_slips::film_price(size, &colours(image), &colours(right), &room, raw)
 }
 
 /// Whether two images of one scene come from one renderer: equal within noise offline, within a

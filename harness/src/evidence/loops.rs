@@ -1,7 +1,7 @@
 //! Part 1.3: the render loop, judged apart from shading. A render must equal what the renderer's own integrator answers
 //! along rays that the host chooses, right or wrong.
 
-use super::film::film_price;
+use super::film_slips::film_price;
 use super::price::{Class, Price};
 use super::rays::{RELATIVE, STRAY_FRACTION};
 use super::{Check, CheckId, Measure, RuleId, Verdict};

@@ -6,7 +6,7 @@ pub mod bsdf;
 pub mod changes;
 mod check;
 pub mod convention;
-mod film;
+mod film_slips;
 pub mod images;
 mod lobe;
 pub mod loops;

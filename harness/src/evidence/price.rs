@@ -146,7 +146,7 @@ pub(super) fn is_explained(check: &Check) -> bool {
 /// more: on one scene a seam or an edge may leave more unexplained. A scene that the mistake leaves without light
 /// (`DARKENING`) is no worse either. And if the answers on most scenes are explained, or follow the right ones, the
 /// others do not count as empty.
-pub fn agree(checks: &mut [Check]) {
+pub fn settle_by_common_mistake(checks: &mut [Check]) {
     let mut of_id: BTreeMap<(CheckId, String), Vec<usize>> = BTreeMap::new();
     for (index, check) in checks.iter().enumerate() {
         if check.verdict == Verdict::Fail {
@@ -460,7 +460,7 @@ mod tests {
         let own = scenes.iter().zip(checks);
         let mut checks: Vec<Check> =
             own.map(|(scene, (mistake, error))| failed(scene, mistake, *error)).collect();
-        agree(&mut checks);
+        settle_by_common_mistake(&mut checks);
         checks.iter().map(|check| check.error).collect()
     }
 

@@ -25,7 +25,7 @@ const VISIBILITY: &str = "lit pixels that are not lit (fraction)";
 
 /// An image that is wrong and so dark that it tells nothing of its shadows leaves the verdict to
 /// another scene that does, if there is one.
-pub fn set_apart(checks: &mut [Check]) {
+pub fn leave_unjudged(checks: &mut [Check]) {
     let is_bonus =
         |check: &Check| check.id == CheckId::BonusImage || check.id == CheckId::BonusProbe;
     let tells = |check: &Check| {
@@ -375,7 +375,7 @@ mod tests {
         let dark = Check::new(CheckId::BonusImage, "cbox", Verdict::Fail, "black");
         let verdicts = |checks: &[Check]| {
             let mut checks = checks.to_vec();
-            set_apart(&mut checks);
+            leave_unjudged(&mut checks);
             checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
         };
         assert_eq!(verdicts(&[wrong.clone(), dark.clone()]), [Verdict::Fail, Verdict::NotJudged]);

@@ -27,5 +27,5 @@ pub struct Expected {
     pub unshadowed_mask: RegionMask,
     /// As `unshadowed`, by stages that do not renormalize the interpolated normal: as good. Absent
     /// where it was neither kept nor can be drawn.
-    pub raw_normals: Option<Image>,
+    pub interpolated_normals: Option<Image>,
 }

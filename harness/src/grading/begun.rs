@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use super::costs::Costs;
 use super::record::{Record, Student};
 use super::tree_checks::{Mode, config_check, refused_checks, tree_check};
-use super::{likeness, mend};
+use super::{likeness, template_fallback};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
@@ -43,9 +43,9 @@ pub struct Begun {
     /// Its private copy and its config; `None` if it was refused.
     pub(super) received: Option<(Submission, SubmittedConfig)>,
     /// The library, if it was built.
-    pub(super) built: Option<(PathBuf, mend::Built)>,
+    pub(super) built: Option<(PathBuf, template_fallback::Built)>,
     /// Where copy and library lie.
-    pub(super) _scratch: TempDir,
+    pub(super) scratch: TempDir,
 }
 
 impl Begun {
@@ -88,7 +88,7 @@ impl Workshop<'_> {
             costs: Costs::begin(),
             received: None,
             built: None,
-            _scratch: scratch,
+            scratch,
         };
         let record = &mut begun.record;
         let (tree, limits) = (&self.assignment.tree, &self.assignment.limits.archive);
@@ -119,7 +119,7 @@ impl Workshop<'_> {
         Ok(begun)
     }
 
-    /// Builds the source, mended where it does not build as it is.
+    /// Builds the source, with files of the template where it does not build as it is.
     ///
     /// # Errors
     /// When the machine fails, and at Ctrl-C.
@@ -131,7 +131,7 @@ impl Workshop<'_> {
             begun.checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no src/lib.rs"));
             return Ok(());
         }
-        let scratch = begun._scratch.path();
+        let scratch = begun.scratch.path();
         let out = scratch.join("out");
         std::fs::create_dir(&out)?;
         let limits = &self.assignment.limits.build;
@@ -141,7 +141,7 @@ impl Workshop<'_> {
             kept.compile(self.recording, self.supervisor, src, &out, limits, self.cancel)
         };
         let template = self.assignment.template();
-        let built = mend::build(&compile, &src, &template, &scratch.join("mended"))?;
+        let built = template_fallback::build(&compile, &src, &template, &scratch.join("mended"))?;
         begun.costs.end("build", built.cpu_s);
         let rendered = built.errors.iter().map(|error| error.rendered.as_str());
         begun.record.diagnostics = rendered.collect::<Vec<_>>().join("\n");

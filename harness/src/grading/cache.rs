@@ -35,7 +35,7 @@ pub struct RecordCache {
 
 /// A record with its place among others. A class may have hundreds, so long parts stay in the file.
 #[derive(Clone)]
-pub struct Earlier {
+pub struct StoredRecord {
     /// The record; without its evidence if that is in its file.
     pub record: Record,
     /// Whether it was made with the same scenes, limits and program.
@@ -44,7 +44,7 @@ pub struct Earlier {
     folder: Option<PathBuf>,
 }
 
-impl Earlier {
+impl StoredRecord {
     /// A record that is in its file, in an instructor's folder.
     pub fn kept(record: Record, comparable: bool, instructor: &Path) -> Self {
         let record = Record {
@@ -184,9 +184,10 @@ impl RecordCache {
     ///
     /// # Errors
     /// When it cannot be read.
-    pub fn earlier(instructor: &Path, conditions: &str) -> anyhow::Result<Option<Earlier>> {
-        let earlier =
-            |file: File<Record>| Earlier::kept(file.record, file.batch == conditions, instructor);
+    pub fn earlier(instructor: &Path, conditions: &str) -> anyhow::Result<Option<StoredRecord>> {
+        let earlier = |file: File<Record>| {
+            StoredRecord::kept(file.record, file.batch == conditions, instructor)
+        };
         Ok(Self::file(instructor)?.map(earlier))
     }
 

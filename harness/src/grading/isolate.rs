@@ -302,7 +302,7 @@ fn fragment(
     let small = &case.probe_film;
     let own = |region: &Region| (region.exponent > 0.0) == phong;
     let wanted = images::only(&small.unshadowed_mask, &own);
-    let expected = (&small.unshadowed, small.raw_normals.as_ref());
+    let expected = (&small.unshadowed, small.interpolated_normals.as_ref());
     let check = images::judge_shaded(id, &case.entry.name, image, expected, &wanted, tolerances);
     let scene = &case.expected.scene;
     check.priced(|raw| pixels::price(scene, image, &small.unshadowed_mask, &own, raw))
@@ -335,7 +335,7 @@ fn swap_failed(
             Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
         }
         Outcome::StageRefused(message) => {
-            session.quote(case.held_back, message);
+            session.keep_compiler_message(case.held_back, message);
             session::unanswered(id, &case.entry.name, &[], outcome)
         }
         Outcome::Failed(message) => not_possible(id, case, message),

@@ -66,8 +66,8 @@ impl Grading<'_> {
             if cases.iter().any(|case| case.probe_film.sampled.is_some()) {
                 checks.push(loops::judge_edges(&answers.edges));
             }
-            rays::set_apart(&mut checks[begin..]);
-            price::agree(&mut checks[begin..]);
+            rays::leave_unjudged(&mut checks[begin..]);
+            price::settle_by_common_mistake(&mut checks[begin..]);
             mark(&mut checks[begin..], cases);
         }
         Ok(())
@@ -111,14 +111,14 @@ impl Grading<'_> {
                 checks.extend(found);
                 drawn.extend(judged.drawn);
             }
-            shadow_map::set_apart(&mut checks[begin..]);
+            shadow_map::leave_unjudged(&mut checks[begin..]);
             self.stop_if_interrupted()?;
             // Right end to end is enough. Where an image is wrong, pass and stages are taken apart on all scenes:
             // what a stage does not test may show only on a scene that a wrong pass draws right.
             if !is_right {
                 checks.extend(isolate::isolate(session, plugin, cases, stages, fails, tolerances));
             }
-            price::agree(&mut checks[begin..]);
+            price::settle_by_common_mistake(&mut checks[begin..]);
             mark(&mut checks[begin..], cases);
         }
         self.stop_if_interrupted()

@@ -191,7 +191,7 @@ impl<'a> Grading<'a> {
             reference: self.reference.as_deref(),
             kept_frames: self.kept_frames.as_ref(),
             observations: Mutex::default(),
-            quotes: Mutex::default(),
+            compiler_messages: Mutex::default(),
         }
     }
 
@@ -228,7 +228,7 @@ impl<'a> Grading<'a> {
     /// # Errors
     /// As [`Grading::submission`].
     pub fn judge(&self, begun: Begun, out: &Folders, say: Say) -> anyhow::Result<Record> {
-        let Begun { mut record, mut checks, mut costs, received, built, _scratch } = begun;
+        let Begun { mut record, mut checks, mut costs, received, built, scratch: _scratch } = begun;
         record.conditions = self.conditions();
         let Some((submission, config)) = received else {
             record.evidence = Evidence { checks };
@@ -243,7 +243,8 @@ impl<'a> Grading<'a> {
             let both = self.both_paths(&session, plugin, &stages, seed, say, &mut costs)?;
             if let Some(realtime) = &both.realtime {
                 record.findings.extend(stages.findings());
-                let said = [std::mem::take(&mut record.diagnostics), realtime.quoted.clone()];
+                let said =
+                    [std::mem::take(&mut record.diagnostics), realtime.compiler_messages.clone()];
                 record.diagnostics =
                     said.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("\n");
             }

@@ -67,8 +67,8 @@ pub struct ProbeFilm {
     pub sampled: Option<Sampled>,
     /// What a stage that shades is compared with: centers, without shadows.
     pub unshadowed: Image,
-    /// The same without renormalized normals; see [`Expected::raw_normals`].
-    pub raw_normals: Option<Image>,
+    /// The same without renormalized normals; see [`Expected::interpolated_normals`].
+    pub interpolated_normals: Option<Image>,
 }
 
 /// A film on which a render of several samples per pixel is judged.
@@ -159,7 +159,7 @@ impl PreparedScene {
             height,
             unshadowed_mask,
             unshadowed: store.unshadowed(&offline, width, height)?,
-            raw_normals: store.raw_normals(&realtime, width, height)?,
+            interpolated_normals: store.interpolated_normals(&realtime, width, height)?,
             // The loop is the same on every scene: those that have most to show are enough.
             sampled: entry.stored.then(|| Sampled::new(scene, film)).transpose()?,
             surface,

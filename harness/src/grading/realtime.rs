@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use basecode::Image;
-use basecode::gpu::{Footprint, UNDRAWN_MAPS};
+use basecode::gpu::{EMPTY_MAPS, Footprint};
 
 use super::draw::{Frame, draw, draw_one_each};
 use super::offline::Drawn;
@@ -142,7 +142,7 @@ fn drawn(
     let scene = &case.entry.name;
     let Outcome::Done(answer) = outcome else {
         if let Outcome::Failed(said) = outcome {
-            session.quote(case.held_back, said);
+            session.keep_compiler_message(case.held_back, said);
         }
         return Err(Box::new(session::unanswered(id, scene, &parts, outcome)));
     };
@@ -270,7 +270,7 @@ fn no_shadow_map(
     with: &Image,
 ) -> Option<String> {
     // A pass whose pipelines are made otherwise is not watched.
-    if footprint.fed == 0 && footprint.unfed == 0 {
+    if footprint.vertex_pipelines == 0 && footprint.vertexless_pipelines == 0 {
         return None;
     }
     if footprint.targets == 0 {
@@ -280,7 +280,7 @@ fn no_shadow_map(
     if footprint.maps == 0 {
         return None;
     }
-    let stage = Stage { name: UNDRAWN_MAPS.to_owned(), text: UNDRAWN_MAPS.to_owned() };
+    let stage = Stage { name: EMPTY_MAPS.to_owned(), text: EMPTY_MAPS.to_owned() };
     let outcome = draw(session, Some(plugin), &Frame { stages: vec![stage], ..frame.clone() });
     let without = session::image(&outcome.answer()?.values, frame.size.0, frame.size.1);
     let mask = &frame.case.expected.offline.mask;
@@ -324,10 +324,10 @@ fn plain_but_for_shadows(
     if !shadows.are_in(image) {
         return None;
     }
-    let Expected { unshadowed, raw_normals, .. } = &case.expected;
+    let Expected { unshadowed, interpolated_normals, .. } = &case.expected;
     let mask = shadows.lit_alone();
     let judged = VIEWS.map(|(id, wanted)| {
-        let expected = (unshadowed, raw_normals.as_ref());
+        let expected = (unshadowed, interpolated_normals.as_ref());
         images::judge_shaded(id, name, image, expected, &images::only(&mask, wanted), tolerances)
     });
     if judged[0].verdict != Verdict::Pass {

@@ -58,13 +58,13 @@ pub struct Session<'a> {
     /// What was answered, for the diagnosis.
     pub observations: Mutex<Observations>,
     /// What compilers said in several lines, each text once: to be shown line by line.
-    pub quotes: Mutex<Vec<String>>,
+    pub compiler_messages: Mutex<Vec<String>>,
 }
 
 impl Session<'_> {
     /// Runs a job, with retries while any are left.
     pub fn run_job(&self, job: &Job) -> Vec<Outcome> {
-        let JobReport { outcomes, runs, .. } = self.supervisor.run_job_patiently(
+        let JobReport { outcomes, runs, .. } = self.supervisor.run_job_with_retries(
             job,
             &self.limits,
             &self.retries,
@@ -107,20 +107,22 @@ impl Session<'_> {
     }
 
     /// Keeps what a compiler said about a scene, unless it is held back, where it is more than its first line.
-    pub fn quote(&self, held_back: bool, said: &str) {
+    pub fn keep_compiler_message(&self, held_back: bool, said: &str) {
         if held_back || said.lines().nth(1).is_none() {
             return;
         }
-        if let Ok(mut quotes) = self.quotes.lock()
-            && !quotes.iter().any(|quote| quote == said)
+        if let Ok(mut compiler_messages) = self.compiler_messages.lock()
+            && !compiler_messages.iter().any(|kept| kept == said)
         {
-            quotes.push(said.to_owned());
+            compiler_messages.push(said.to_owned());
         }
     }
 
     /// All kept compiler messages, one after the other.
-    pub fn quoted(&self) -> String {
-        self.quotes.lock().map_or(String::new(), |quotes| quotes.join("\n\n"))
+    pub fn compiler_messages(&self) -> String {
+        self.compiler_messages
+            .lock()
+            .map_or(String::new(), |compiler_messages| compiler_messages.join("\n\n"))
     }
 
     /// A scene file for a request.

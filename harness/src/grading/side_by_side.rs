@@ -17,7 +17,7 @@ pub(super) struct OnPath {
     pub checks: Vec<Check>,
     pub drawn: Vec<Drawn>,
     /// What compilers said in several lines.
-    pub quoted: String,
+    pub compiler_messages: String,
     /// Seconds since the first path began.
     wall_s: f64,
     cpu_s: f64,
@@ -46,7 +46,7 @@ impl Grading<'_> {
             self.offline(session, plugin, seed, say, &mut checks, &mut drawn)?;
             checks.extend(session.used_up());
             let (wall_s, cpu_s) = (begun.elapsed().as_secs_f64(), session.end_path());
-            anyhow::Ok(OnPath { checks, drawn, quoted: String::new(), wall_s, cpu_s })
+            anyhow::Ok(OnPath { checks, drawn, compiler_messages: String::new(), wall_s, cpu_s })
         };
         // With a budget of its own, and with what it is told later.
         let mut own = self.session("");
@@ -60,7 +60,13 @@ impl Grading<'_> {
                 *all = (*all).max(*printed);
             }
             let (wall_s, cpu_s) = (begun.elapsed().as_secs_f64(), own.end_path());
-            anyhow::Ok(OnPath { checks, drawn, quoted: own.quoted(), wall_s, cpu_s })
+            anyhow::Ok(OnPath {
+                checks,
+                drawn,
+                compiler_messages: own.compiler_messages(),
+                wall_s,
+                cpu_s,
+            })
         };
         let asks = |path| self.paths.contains(&path);
         let (offline, realtime) = match RenderPath::ALL.map(asks) {

@@ -62,7 +62,9 @@ pub fn judge(
 ) -> Uploaded {
     let mut found = Uploaded::default();
     let known = || cases.iter().zip(footprints).filter_map(|(case, of)| Some((case, (*of)?)));
-    if known().next().is_some() && known().all(|(_, of)| of.fed == 0 && of.unfed > 0) {
+    if known().next().is_some()
+        && known().all(|(_, of)| of.vertex_pipelines == 0 && of.vertexless_pipelines > 0)
+    {
         let summary =
             "no pipeline that draws a picture takes vertices: it is made in one piece, or computed";
         found.checks.push(Check::new(CheckId::SubmissionNoVertices, "", Verdict::Fail, summary));

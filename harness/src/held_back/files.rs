@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use basecode::{Scene, Vec3};
 
-use super::draw::Draw;
+use super::changed_scene::ChangedScene;
 use crate::assignment::SceneEntry;
 
 /// A file of a scene: its path below the scene's folder, and what is in it.
@@ -23,7 +23,7 @@ pub fn changed(
     root: &Path,
     entry: &SceneEntry,
     scene: &Scene,
-    draw: &Draw,
+    draw: &ChangedScene,
 ) -> anyhow::Result<Vec<File>> {
     let mut files = Vec::new();
     for toml in [Some(&entry.offline), Some(&entry.realtime), entry.bonus.as_ref()] {
@@ -67,7 +67,7 @@ fn read(path: &Path) -> anyhow::Result<String> {
 }
 
 /// Replaces camera and film.
-fn changed_toml(text: &str, draw: &Draw) -> anyhow::Result<String> {
+fn changed_toml(text: &str, draw: &ChangedScene) -> anyhow::Result<String> {
     let vector = |v: Vec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
     let camera = &draw.camera;
     let mut values = vec![
@@ -96,7 +96,7 @@ fn changed_toml(text: &str, draw: &Draw) -> anyhow::Result<String> {
 }
 
 /// Replaces albedos, exponents and the light's intensity.
-fn changed_mtl(text: &str, scene: &Scene, draw: &Draw) -> String {
+fn changed_mtl(text: &str, scene: &Scene, draw: &ChangedScene) -> String {
     let triple = |key: &str, v: Vec3| format!("{key} {} {} {}", v.x, v.y, v.z);
     let light = light_material(scene);
     let mut current = None;
@@ -120,7 +120,7 @@ fn changed_mtl(text: &str, scene: &Scene, draw: &Draw) -> String {
 }
 
 /// Moves the vertices of the light.
-fn moved_light(text: &str, scene: &Scene, draw: &Draw) -> String {
+fn moved_light(text: &str, scene: &Scene, draw: &ChangedScene) -> String {
     let by = draw.light.as_dvec3() - scene.first_light_position().as_dvec3();
     let light = &scene.materials()[light_material(scene)].name;
     let numbers = |line: &str| -> Vec<String> {

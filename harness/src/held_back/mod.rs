@@ -4,7 +4,7 @@
 //! Light, camera, materials, exponents and film are drawn from the seed and previewed without any renderer; a draw that
 //! shows too little is repeated. The same seed and the same scenes give the same files, byte for byte.
 
-mod draw;
+mod changed_scene;
 mod files;
 mod preview;
 #[cfg(test)]
@@ -21,7 +21,7 @@ use sha2::{Digest, Sha256};
 use crate::assignment::{Assignment, SceneEntry};
 use crate::expected::load_scene;
 use crate::files::{hex, write_new};
-use draw::Draw;
+use changed_scene::ChangedScene;
 use files::File;
 use preview::ScenePreview;
 
@@ -104,10 +104,10 @@ pub fn make(assignment: &Assignment, seed: u64) -> anyhow::Result<(HeldBack, Vec
 /// The files of the first draw of a scene that is worth something.
 fn scene_files(root: &Path, entry: &SceneEntry, seed: u64) -> anyhow::Result<Vec<File>> {
     let scene = load_scene(&root.join(&entry.offline))?;
-    let original = ScenePreview::new(&scene, &Draw::original(&scene))?;
+    let original = ScenePreview::new(&scene, &ChangedScene::original(&scene))?;
     let mut why = "";
     for attempt in 0..TRIES {
-        let draw = Draw::new(&scene, sub_seed(seed, &entry.name, attempt));
+        let draw = ChangedScene::new(&scene, sub_seed(seed, &entry.name, attempt));
         match ScenePreview::new(&scene, &draw)?.problem(&original, entry.bonus.is_some()) {
             None => return files::changed(root, entry, &scene, &draw),
             Some(problem) => why = problem,

@@ -3,7 +3,7 @@
 use basecode::{Camera, Frame, MaterialModel, Result, Scene, Vec3};
 use renderer_api as api;
 
-use super::draw::Draw;
+use super::changed_scene::ChangedScene;
 use crate::evidence::bsdf;
 use crate::expected::{SurfacePoint, Visibility};
 
@@ -59,7 +59,7 @@ impl ScenePreview {
     ///
     /// # Errors
     /// When the camera has no frame.
-    pub fn new(scene: &Scene, draw: &Draw) -> Result<Self> {
+    pub fn new(scene: &Scene, draw: &ChangedScene) -> Result<Self> {
         let [width, height] = draw.film;
         let rows = (WIDTH * height / width).max(1);
         let camera = Camera::new(draw.camera, WIDTH, rows)?;
@@ -142,7 +142,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn of(scene: &Scene, draw: &Draw, point: SurfacePoint) -> Option<Self> {
+    fn of(scene: &Scene, draw: &ChangedScene, point: SurfacePoint) -> Option<Self> {
         let SurfacePoint { shape, wo, wi, distance, visibility, .. } = point;
         let material = scene.material_of(shape);
         let grazes = |w| Frame::cos_theta(w) < MIN_COSINE;

@@ -50,7 +50,7 @@ fn the_required_bonus_takes_no_wider_frustum_than_the_scenes_to_choose_from() {
     let assignment = assignment();
     let preview = |entry: &SceneEntry| {
         let scene = load_scene(&assignment.root.join(&entry.offline)).unwrap();
-        ScenePreview::new(&scene, &Draw::original(&scene)).unwrap()
+        ScenePreview::new(&scene, &ChangedScene::original(&scene)).unwrap()
     };
     let with_bonus = assignment.scenes.iter().filter(|scene| scene.bonus.is_some());
     let (required, free): (Vec<_>, Vec<_>) = with_bonus.partition(|scene| scene.bonus_required);
@@ -68,7 +68,7 @@ fn the_required_bonus_takes_no_wider_frustum_than_the_scenes_to_choose_from() {
 fn files_say_what_was_drawn() {
     let root = assignment().root;
     for (entry, scene) in originals() {
-        let draw = Draw::new(&scene, 99);
+        let draw = ChangedScene::new(&scene, 99);
         let out = tempfile::tempdir().unwrap();
         let folder = write(out.path(), &files::changed(&root, &entry, &scene, &draw).unwrap());
         let folder = folder.unwrap();
@@ -100,11 +100,14 @@ fn files_say_what_was_drawn() {
 #[test]
 fn two_hundred_seeds_give_scenes_that_show_light_shadow_and_highlight() {
     for (entry, scene) in originals() {
-        let original = ScenePreview::new(&scene, &Draw::original(&scene)).unwrap();
+        let original = ScenePreview::new(&scene, &ChangedScene::original(&scene)).unwrap();
         (0..200u64).into_par_iter().for_each(|seed| {
             let attempts = (0..TRIES / 2).map(|attempt| {
-                ScenePreview::new(&scene, &Draw::new(&scene, sub_seed(seed, &entry.name, attempt)))
-                    .unwrap()
+                ScenePreview::new(
+                    &scene,
+                    &ChangedScene::new(&scene, sub_seed(seed, &entry.name, attempt)),
+                )
+                .unwrap()
             });
             let bonus = entry.bonus.is_some();
             let found = attempts.map(|preview| (preview, preview.problem(&original, bonus)));
@@ -151,16 +154,16 @@ fn accepted_scenes_have_enough_pixels_away_from_edges() {
 fn what_shows_too_little_is_drawn_again() {
     let (_, scene) =
         originals().into_iter().find(|(entry, _)| entry.name == "sphere_phong").unwrap();
-    let original = Draw::original(&scene);
+    let original = ChangedScene::original(&scene);
     let first = ScenePreview::new(&scene, &original).unwrap();
-    let problem = |change: &dyn Fn(&mut Draw)| {
-        let mut draw = Draw { film: [96, 96], ..original.clone() };
+    let problem = |change: &dyn Fn(&mut ChangedScene)| {
+        let mut draw = ChangedScene { film: [96, 96], ..original.clone() };
         change(&mut draw);
         ScenePreview::new(&scene, &draw).unwrap().problem(&first, true)
     };
     let centre = Vec3::new(0.0, 0.995, 0.0);
     assert_eq!(problem(&|_| ()), None);
-    type Case<'a> = (&'a str, &'a dyn Fn(&mut Draw));
+    type Case<'a> = (&'a str, &'a dyn Fn(&mut ChangedScene));
     let cases: [Case; 9] = [
         ("too little is lit", &|draw| draw.light = centre),
         ("too little is lit", &|draw| draw.light.y = -9.0),
@@ -178,7 +181,7 @@ fn what_shows_too_little_is_drawn_again() {
         assert_eq!(problem(change), Some(why));
     }
     // A light that comes near sees the shadow under a wider angle.
-    let near = |draw: &mut Draw| {
+    let near = |draw: &mut ChangedScene| {
         draw.light = centre + Vec3::new(-0.75, 0.9, 0.9);
         draw.intensity *= 0.1;
     };

@@ -417,14 +417,14 @@ impl Reader {
                 Ok(item) => items.push(item),
                 Err(Stop) => self.stopped = true,
             }
-            if self.is_over(']') {
+            if self.given_up(']') {
                 return Ok(Value::List(items));
             }
         }
     }
 
     /// Whether a list or an object ends here, by its end or because nothing more can be read.
-    fn is_over(&mut self, close: char) -> bool {
+    fn given_up(&mut self, close: char) -> bool {
         if !self.stopped {
             match self.separator(close) {
                 Ok(more) => return !more,
@@ -447,7 +447,7 @@ impl Reader {
                 Ok(member) => members.push(member),
                 Err(Stop) => self.stopped = true,
             }
-            if self.is_over('}') {
+            if self.given_up('}') {
                 return Ok(Value::Object(members));
             }
         }

@@ -26,7 +26,7 @@ const TICK: Duration = Duration::from_millis(20);
 /// A child that is not done after so many times the seconds that it may stand still got no processor.
 const STARVED: u32 = 20;
 /// The most that is taken from an output stream at a time, so that a flood cannot keep us there.
-const MOUTHFUL: usize = 1 << 20;
+const READ_AT_ONCE: usize = 1 << 20;
 /// How long the output of a process that is gone may still be held open by another.
 const DRAIN: Duration = Duration::from_millis(200);
 
@@ -282,7 +282,7 @@ impl Pipe {
     fn read(&mut self) -> bool {
         let Some(end) = &mut self.end else { return false };
         let (mut buffer, mut taken) = ([0; 64 << 10], 0);
-        while taken < MOUTHFUL {
+        while taken < READ_AT_ONCE {
             match end.read(&mut buffer) {
                 Ok(count @ 1..) => {
                     self.capture.push(&buffer[..count]);

@@ -47,7 +47,7 @@ pub struct LiveWorker {
     files: Files,
     cameras: File,
     frames: File,
-    asked: Arc<Asked>,
+    asked: Arc<FrameCounts>,
     cancel: Arc<AtomicBool>,
     thread: Option<JoinHandle<io::Result<ChildOutcome>>>,
     _private: TempDir,
@@ -55,7 +55,7 @@ pub struct LiveWorker {
 
 /// How many frames were asked for and answered, for who watches the process.
 #[derive(Default)]
-struct Asked {
+struct FrameCounts {
     asked: AtomicU64,
     answered: AtomicU64,
     /// Whether the last one was given up on because nothing was done for it.
@@ -92,7 +92,7 @@ impl LiveWorker {
         let job = Job { plugin: Some(plugin), requests: vec![request.clone()] };
         let Ready { files, command, lock, _program: program } =
             supervisor.ready(private.path(), &job, &[&request], &limits, true)?;
-        let (asked, cancel) = (Arc::<Asked>::default(), Arc::<AtomicBool>::default());
+        let (asked, cancel) = (Arc::<FrameCounts>::default(), Arc::<AtomicBool>::default());
         let (seen, ends) = (Arc::clone(&asked), Arc::clone(&cancel));
         let thread = std::thread::spawn(move || {
             let _program = program;
@@ -178,7 +178,7 @@ impl Drop for LiveWorker {
 
 /// Ends a worker whose frame takes too long, and one that nobody asks.
 struct Watch<'a> {
-    seen: &'a Asked,
+    seen: &'a FrameCounts,
     cancel: &'a AtomicBool,
     /// The frame that is waited for, or the number of all when none is.
     at: (u64, u64),
@@ -187,7 +187,7 @@ struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    fn new(seen: &'a Asked, cancel: &'a AtomicBool) -> Self {
+    fn new(seen: &'a FrameCounts, cancel: &'a AtomicBool) -> Self {
         Self { seen, cancel, at: (0, 0), since: Instant::now(), since_cpu_s: 0.0 }
     }
 

@@ -280,7 +280,7 @@ impl<'a> RetryBudget<'a> {
     }
 
     /// The outcome of a request that is not asked any more because time or retries are used up.
-    pub fn is_over(&self, job: &Job, request: &Request) -> Option<Outcome> {
+    pub fn given_up(&self, job: &Job, request: &Request) -> Option<Outcome> {
         let state = self.state();
         if let (Some(over), Some(_)) = (&state.over, &job.plugin) {
             let reason = format!("not asked: the submission used {over}");

@@ -62,7 +62,7 @@ fn ended(cpu_s: f64, still_s: f64) -> ChildOutcome {
 #[test]
 fn one_confirmed_timeout_speaks_for_all_of_its_kind() {
     let (retries, job) = (RetryBudget::default(), job());
-    let over = |index: usize| retries.is_over(&job, &job.requests[index]);
+    let over = |index: usize| retries.given_up(&job, &job.requests[index]);
     assert!(retries.again(&job, 0, &limits()).is_some());
     assert!(matches!(retries.timed_out(&job, 0, LATE, true), Outcome::TimedOut(_)));
     assert_eq!(over(0), None);
@@ -75,7 +75,7 @@ fn one_confirmed_timeout_speaks_for_all_of_its_kind() {
     if let Request::RenderOffline { shadows, .. } = &mut plain.requests[0] {
         *shadows = false;
     }
-    assert_eq!(retries.is_over(&plain, &plain.requests[0]), None);
+    assert_eq!(retries.given_up(&plain, &plain.requests[0]), None);
     assert!(retries.again(&job, 1, &limits()).is_some());
     retries.renew();
     assert_eq!(over(0), None);
@@ -93,7 +93,7 @@ fn what_nobody_confirms_costs_nothing() {
     let late = || retries.timed_out(&job, 0, LATE, false);
     assert_eq!(late().fault(), Some(Fault::Environment));
     assert_eq!(late().fault(), Some(Fault::Environment));
-    let over = retries.is_over(&job, &job.requests[0]);
+    let over = retries.given_up(&job, &job.requests[0]);
     assert_eq!(over.and_then(|o| o.fault()), Some(Fault::Environment));
     assert!(!is_environment_failure(&late()));
 }
@@ -146,7 +146,7 @@ fn a_budget_ends_a_path_by_cpu_time_of_the_reference_or_by_standing_still() {
     let job = job();
     let neutral = Job { plugin: None, ..job.clone() };
     let retries = RetryBudget::with(Some(&slow), budget());
-    let over = || retries.is_over(&job, &job.requests[0]);
+    let over = || retries.given_up(&job, &job.requests[0]);
     retries.spent(&job, &ended(31.0, 1.0));
     retries.spent(&neutral, &ended(1000.0, 1000.0));
     // Ten times the reference's five seconds.
@@ -157,7 +157,7 @@ fn a_budget_ends_a_path_by_cpu_time_of_the_reference_or_by_standing_still() {
     let said = retries.used_up().unwrap();
     assert!(said.starts_with("50 s of CPU time, where 50 s are allowed, 10 times"), "{said}");
     assert_eq!(over().and_then(|o| o.fault()), Some(Fault::Submission));
-    assert_eq!(retries.is_over(&neutral, &neutral.requests[0]), None);
+    assert_eq!(retries.given_up(&neutral, &neutral.requests[0]), None);
     retries.renew();
     assert_eq!(over(), None);
 
@@ -168,7 +168,7 @@ fn a_budget_ends_a_path_by_cpu_time_of_the_reference_or_by_standing_still() {
     // Nobody has less than the seconds that everybody has, and without a budget nothing ends.
     let none = RetryBudget::with(Some(&slow), None);
     none.spent(&job, &ended(1e6, 1e6));
-    assert_eq!(none.is_over(&job, &job.requests[0]), None);
+    assert_eq!(none.given_up(&job, &job.requests[0]), None);
 }
 
 #[test]

@@ -122,11 +122,11 @@ impl Supervisor {
         cancel: &AtomicBool,
         progress: &mut dyn FnMut(Progress),
     ) -> JobReport {
-        self.run_job_patiently(job, limits, &RetryBudget::none(), cancel, progress)
+        self.run_job_with_retries(job, limits, &RetryBudget::none(), cancel, progress)
     }
 
     /// The same for one job of a submission's path: timeouts are confirmed as `retries` says.
-    pub fn run_job_patiently(
+    pub fn run_job_with_retries(
         &self,
         job: &Job,
         limits: &Limits,
@@ -143,7 +143,7 @@ impl Supervisor {
             // Each worker settles one request at least, so this ends.
             pending.retain(|&index| outcomes[index].is_none());
             for &index in &pending {
-                outcomes[index] = retries.is_over(job, &job.requests[index]);
+                outcomes[index] = retries.given_up(job, &job.requests[index]);
             }
             pending.retain(|&index| outcomes[index].is_none());
             if pending.is_empty() {

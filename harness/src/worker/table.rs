@@ -36,8 +36,8 @@ pub struct Record {
     /// One more than the bytes, so that 0 is not said.
     uploaded: AtomicU64,
     targets: AtomicU32,
-    fed: AtomicU32,
-    unfed: AtomicU32,
+    vertex_pipelines: AtomicU32,
+    vertexless_pipelines: AtomicU32,
     maps: AtomicU32,
     _reserved: [AtomicU8; MESSAGE_AT - 64],
     message: [AtomicU8; MESSAGE_BYTES],
@@ -65,11 +65,12 @@ impl Record {
 
     /// Notes what a frame took.
     pub fn footprint(&self, footprint: &Footprint) {
-        let Footprint { uploaded, targets, fed, unfed, maps } = *footprint;
+        let Footprint { uploaded, targets, vertex_pipelines, vertexless_pipelines, maps } =
+            *footprint;
         self.uploaded.store(uploaded.saturating_add(1), Relaxed);
         self.targets.store(targets, Relaxed);
-        self.fed.store(fed, Relaxed);
-        self.unfed.store(unfed, Relaxed);
+        self.vertex_pipelines.store(vertex_pipelines, Relaxed);
+        self.vertexless_pipelines.store(vertexless_pipelines, Relaxed);
         self.maps.store(maps, Relaxed);
     }
 
@@ -139,8 +140,8 @@ impl SlotState {
                     footprint: u64_at(40).checked_sub(1).map(|uploaded| Footprint {
                         uploaded,
                         targets: u32_at(48),
-                        fed: u32_at(52),
-                        unfed: u32_at(56),
+                        vertex_pipelines: u32_at(52),
+                        vertexless_pipelines: u32_at(56),
                         maps: u32_at(60),
                     }),
                 }
@@ -180,7 +181,13 @@ mod tests {
         };
         assert_eq!((status, message.as_str(), seconds), (2, "task 1.2", 0.25));
         assert_eq!((calls, worst_norm_error, footprint), (0, 0.0, None));
-        let own = Footprint { uploaded: 0, targets: 7, fed: 8, unfed: 9, maps: 10 };
+        let own = Footprint {
+            uploaded: 0,
+            targets: 7,
+            vertex_pipelines: 8,
+            vertexless_pipelines: 9,
+            maps: 10,
+        };
         record.footprint(&own);
         let noted = SlotState::parse(&bytes(&record));
         assert!(matches!(noted, SlotState::Answered { footprint, .. } if footprint == Some(own)));

@@ -67,7 +67,7 @@ impl Item {
 /// A node of the binary tree. Its left child follows it.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-pub struct Half {
+pub struct BinaryNode {
     pub min: [f32; 3],
     pub max: [f32; 3],
     /// Its triangles, as a range of the items.
@@ -97,16 +97,16 @@ impl Bounds {
 }
 
 /// A binary tree of triangles. `items` are in its order, a node's side by side.
-pub struct Binary {
+pub struct BinaryBvh {
     pub items: Vec<Item>,
     /// The root is the first. Between them lie some that belong to no tree.
-    nodes: Vec<Half>,
+    nodes: Vec<BinaryNode>,
 }
 
 /// Items that become a subtree, and the room for it.
 struct Part<'a> {
     items: &'a mut [Item],
-    nodes: &'a mut [Half],
+    nodes: &'a mut [BinaryNode],
     /// Where `items` and `nodes` begin in all.
     first: usize,
     at: usize,
@@ -115,7 +115,7 @@ struct Part<'a> {
     levels: u32,
 }
 
-impl Binary {
+impl BinaryBvh {
     /// Builds it on up to `threads` threads. From depth `deep` on triangles are divided in halves.
     pub fn new(vertices: &[[Vec3; 3]], threads: usize, deep: u32) -> Self {
         let items = vertices.iter().zip(0..).map(|(&corners, triangle)| {
@@ -123,7 +123,7 @@ impl Binary {
             Item { aabb: Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }, triangle }
         });
         let mut items: Vec<Item> = items.collect();
-        let mut nodes: Vec<Half> = bytemuck::zeroed_vec((2 * items.len()).saturating_sub(1));
+        let mut nodes: Vec<BinaryNode> = bytemuck::zeroed_vec((2 * items.len()).saturating_sub(1));
         let mut bounds = Bounds::EMPTY;
         items.iter().for_each(|item| bounds.add(item));
         if !items.is_empty() {
@@ -142,7 +142,7 @@ impl Binary {
     }
 
     /// A node by its number.
-    pub fn node(&self, at: usize) -> &Half {
+    pub fn node(&self, at: usize) -> &BinaryNode {
         &self.nodes[at]
     }
 
@@ -178,7 +178,7 @@ impl Binary {
     }
 }
 
-impl Half {
+impl BinaryNode {
     /// Whether it costs least as a leaf.
     pub fn is_leaf(&self) -> bool {
         self.right == 0 || self.count as usize <= LEAF && self.cost[0] >= self.leaf_cost()

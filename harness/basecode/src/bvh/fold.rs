@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::build::Binary;
+use super::build::BinaryBvh;
 use super::node::{IS_LEAF, Node, Triangles};
 use super::threads::share;
 
@@ -20,7 +20,7 @@ pub struct Wide {
 
 /// Builds one on up to `threads` threads; from level `deep` of the binary tree on in halves.
 pub fn fold(vertices: &[[Vec3; 3]], blocks: &[bool], threads: usize, deep: u32) -> Wide {
-    let binary = Binary::new(vertices, threads, deep);
+    let binary = BinaryBvh::new(vertices, threads, deep);
     let (mut nodes, mut sources, mut most) = (Vec::new(), Vec::new(), 0);
     // Nodes to be folded: from which, into which, and how many children lie beside the path to it.
     let mut todo = Vec::new();

@@ -21,6 +21,7 @@
 
 mod context;
 mod contract;
+mod device;
 mod layouts;
 mod matrices;
 mod mesh;
@@ -29,13 +30,13 @@ mod pipeline;
 mod shadow;
 mod target;
 mod uniform;
-mod watched;
 
 pub use context::{AdapterKind, Gpu};
 pub use contract::{
     COLOR_FORMAT, DEPTH_FORMAT, FRAME_GROUP, FrameUniforms, MATERIAL_GROUP, MaterialUniforms,
     OBJECT_GROUP, ObjectUniforms, SHADOW_GROUP, SHADOW_LAYERS, ShadowUniforms, VERTEX_STRIDE,
 };
+pub use device::{Device, EMPTY_MAPS, EVERY_FRAGMENT, Footprint, OUTLINES, Queue};
 pub use layouts::Layouts;
 pub use matrices::{look_at, orthographic, perspective};
 pub use mesh::Mesh;
@@ -43,7 +44,6 @@ pub use pipeline::{EMITTER_FS, Stage};
 pub use shadow::ShadowMap;
 pub use target::Target;
 pub use uniform::Uniform;
-pub use watched::{Device, EVERY_FRAGMENT, Footprint, OUTLINES, Queue, UNDRAWN_MAPS};
 
 use crate::{Camera, Result};
 

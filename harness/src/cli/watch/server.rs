@@ -158,7 +158,7 @@ impl Server {
         let (host, secret) = (own.host.clone(), secret);
         std::thread::spawn(move || {
             for request in server.incoming_requests() {
-                let asked = Asked::of(&request, &host, &secret);
+                let asked = Route::of(&request, &host, &secret);
                 let (folder, board) = (folder.clone(), Arc::clone(&board));
                 let live = Arc::clone(&live);
                 // One that only waits must not hold up the others.
@@ -192,7 +192,7 @@ impl Server {
 
 /// What a request asks for, after everything that could be wrong with it.
 #[derive(Debug, PartialEq)]
-enum Asked {
+enum Route {
     Page,
     Events,
     /// The scenes of the live view.
@@ -205,7 +205,7 @@ enum Asked {
     Nothing(u16),
 }
 
-impl Asked {
+impl Route {
     fn of(request: &Request, host: &str, secret: &str) -> Self {
         let header = |name: &str| {
             let mut all = request.headers().iter();
@@ -281,15 +281,15 @@ fn plain_path(text: &str) -> Option<PathBuf> {
     (!odd && path.components().count() > 0 && path.components().all(plain)).then_some(path)
 }
 
-fn answer(request: Request, asked: Asked, folder: &Path, board: &Board, live: &LiveView) {
+fn answer(request: Request, asked: Route, folder: &Path, board: &Board, live: &LiveView) {
     // A browser that goes away is no error.
     let _ = match asked {
-        Asked::Page => {
+        Route::Page => {
             request.respond(page("text/html; charset=utf-8", watch_page(HTML_FILE).into_bytes()))
         }
-        Asked::Events => events(request, board),
-        Asked::Scenes => request.respond(page("application/json", live.scenes().into_bytes())),
-        Asked::Frame(question) => match live.picture(&question) {
+        Route::Events => events(request, board),
+        Route::Scenes => request.respond(page("application/json", live.scenes().into_bytes())),
+        Route::Frame(question) => match live.picture(&question) {
             Ok(bytes) => request.respond(page("application/octet-stream", bytes)),
             Err(words) => {
                 let lines: Vec<String> = words.lines().map(crate::report::harmless).collect();
@@ -297,11 +297,11 @@ fn answer(request: Request, asked: Asked, folder: &Path, board: &Board, live: &L
                 request.respond(page("text/plain; charset=utf-8", words).with_status_code(409))
             }
         },
-        Asked::File(path) => match file(folder, &path) {
+        Route::File(path) => match file(folder, &path) {
             Some((kind, bytes)) => request.respond(page(kind, bytes)),
             None => request.respond(refused(404)),
         },
-        Asked::Nothing(status) => request.respond(refused(status)),
+        Route::Nothing(status) => request.respond(refused(status)),
     };
 }
 
@@ -373,15 +373,15 @@ mod tests {
     #[test]
     fn only_the_page_itself_may_ask() {
         let (host, secret) = ("127.0.0.1:4000", "abcdef");
-        let ask = |url: &str, asked, origin| Asked::of_parts(url, asked, origin, host, secret);
+        let ask = |url: &str, asked, origin| Route::of_parts(url, asked, origin, host, secret);
         let own = Some(host);
-        assert_eq!(ask("/abcdef/", own, None), Asked::Page);
-        assert_eq!(ask("/abcdef/frame?path=offline", own, None), Asked::Nothing(400));
+        assert_eq!(ask("/abcdef/", own, None), Route::Page);
+        assert_eq!(ask("/abcdef/frame?path=offline", own, None), Route::Nothing(400));
         let frame = "path=offline&scene=a&shadows=1&spp=4&camera=1,2,3,4,5,6,0,1,0,30";
         let question = Question::parse(frame).unwrap();
-        assert_eq!(ask(&format!("/abcdef/frame?{frame}"), own, None), Asked::Frame(question));
-        assert_eq!(ask("/abcdef/events?x", own, Some("http://127.0.0.1:4000")), Asked::Events);
-        let file = |path: &str| Asked::File(path.into());
+        assert_eq!(ask(&format!("/abcdef/frame?{frame}"), own, None), Route::Frame(question));
+        assert_eq!(ask("/abcdef/events?x", own, Some("http://127.0.0.1:4000")), Route::Events);
+        let file = |path: &str| Route::File(path.into());
         assert_eq!(ask("/abcdef/report/report.html", own, None), file("report.html"));
         assert_eq!(ask("/abcdef/report/viewer/a%20b.js", own, None), file("viewer/a b.js"));
         // Another name for this machine, another origin, another secret.
@@ -398,7 +398,7 @@ mod tests {
             ("/", own, None),
             ("//abcdef", own, None),
         ] {
-            assert_eq!(ask(url, asked, origin), Asked::Nothing(403), "{url} {asked:?} {origin:?}");
+            assert_eq!(ask(url, asked, origin), Route::Nothing(403), "{url} {asked:?} {origin:?}");
         }
         for path in [
             "../record.json",
@@ -414,7 +414,7 @@ mod tests {
             "",
         ] {
             let asked = ask(&format!("/abcdef/report/{path}"), own, None);
-            assert_eq!(asked, Asked::Nothing(404), "{path}");
+            assert_eq!(asked, Route::Nothing(404), "{path}");
         }
     }
 

@@ -19,7 +19,7 @@ pub type OwnValue = (usize, [f32; 3]);
 /// Judges radiance along lit rays without shadows (`radiance`, by ray) by the renderer's own BSDFs,
 /// right or wrong: their values, cosine included, times I / r^2, under any convention.
 ///
-/// Errors of the light belong to another check: see `set_apart`.
+/// Errors of the light belong to another check: see `leave_unjudged`.
 pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]]) -> Check {
     let not_judged = |summary: &str| Check::new(ID, &batch.scene, Verdict::NotJudged, summary);
     if own.is_empty() {
@@ -94,7 +94,7 @@ fn expected(batch: &RayBatch, ray: usize, own: [f32; 3], convention: &Convention
 
 /// Where the light is wrong, the material is not judged: on any scene, since light and material are
 /// the integrator's on all.
-pub fn set_apart(checks: &mut [Check]) {
+pub fn leave_unjudged(checks: &mut [Check]) {
     let of = |id: CheckId, verdict| {
         checks
             .iter()
@@ -172,7 +172,7 @@ mod tests {
             [(Verdict::Fail, Verdict::NotJudged), (Verdict::Pass, Verdict::Fail)]
         {
             let mut checks = [wrong(), lit(light)];
-            set_apart(&mut checks);
+            leave_unjudged(&mut checks);
             assert_eq!(checks[0].verdict, verdict);
         }
     }

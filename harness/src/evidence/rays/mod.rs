@@ -34,9 +34,9 @@ const CONTACTS: usize = 150;
 const BLACK: usize = 200;
 
 /// Adjusts verdicts that depend on another check's verdict, on all scenes together.
-pub fn set_apart(checks: &mut [Check]) {
-    shadows::set_apart(checks);
-    material::set_apart(checks);
+pub fn leave_unjudged(checks: &mut [Check]) {
+    shadows::leave_unjudged(checks);
+    material::leave_unjudged(checks);
 }
 
 /// The rays of one scene, and what is right along them.

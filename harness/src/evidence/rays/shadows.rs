@@ -40,7 +40,7 @@ pub fn judge_shadows(
     }
     // A renderer that ignores the switch draws shadows always: then its own shadows are what is
     // missing without, and no fault of its shading.
-    // Asked of one scene alone: `set_apart` looks at the others.
+    // Asked of one scene alone: `leave_unjudged` looks at the others.
     let ignores_switch = with == without;
     let (mut lit_wrong, mut dark_wrong, mut lit_black) = (0usize, 0usize, 0usize);
     let mut first: Option<(usize, f64)> = None;
@@ -336,7 +336,7 @@ const LIGHT_ELSEWHERE: f64 = 0.9;
 /// unshadowed radiance is wrong nearly everywhere (1.3) shadows are not judged (1.4), as long as
 /// there is another scene whose radiance is right and whose shadows are judged. If one mistake explains the answers
 /// completely with the light in its place, the light is in its place.
-pub fn set_apart(checks: &mut [Check]) {
+pub fn leave_unjudged(checks: &mut [Check]) {
     charge_what_is_never_tested(checks);
     let is = |check: &Check, id: CheckId, verdict| check.id == id && check.verdict == verdict;
     let nearly_all = |check: &&Check| check.measures.iter().any(|m| m.value > LIGHT_ELSEWHERE);

@@ -90,7 +90,7 @@ fn shadows(with: impl Fn(usize) -> f64, without: impl Fn(usize) -> f64) -> Check
     let without = answers(&batch, |index, _| without(index));
     let check = judge_shadows(&batch, &witness, (&with, &without), (&without, &without), &NOTHING);
     let mut checks = [check];
-    set_apart(&mut checks);
+    leave_unjudged(&mut checks);
     let [check] = checks;
     check
 }
@@ -148,7 +148,7 @@ fn shadows_are_judged_where_radiance_is_right() {
     let check = |id: CheckId, scene: &str, verdict| Check::new(id, scene, verdict, "");
     let verdicts = |checks: &[Check]| {
         let mut checks = checks.to_vec();
-        set_apart(&mut checks);
+        leave_unjudged(&mut checks);
         checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
     };
     let (pass, fail) = (Verdict::Pass, Verdict::Fail);
@@ -191,7 +191,7 @@ fn black_rays_are_no_shadows_when_the_switch_is_obeyed_elsewhere() {
     assert_eq!(here.verdict, Verdict::Fail);
     let settle = |other: Check| {
         let mut checks = vec![here.clone(), other];
-        set_apart(&mut checks);
+        leave_unjudged(&mut checks);
         checks[0].verdict
     };
     assert_eq!(settle(shadows(right, |_| 1.0)), Verdict::NotJudged);

@@ -152,7 +152,7 @@ impl<'a> Lost<'a> {
 /// Links to the checks that decided a part.
 fn decided_by(html: &mut Html, part: &PartGrade, all: &[Check]) {
     for (index, name) in part.evidence.iter().enumerate() {
-        html.raw(if index == 0 { "<p class=\"decided\">Decided by " } else { ", " });
+        html.raw(if index == 0 { "<p class=\"decided\">Decisions by " } else { ", " });
         let place = all.iter().position(|check| check.name() == *name || check.id.name() == name);
         match place {
             Some(place) => {

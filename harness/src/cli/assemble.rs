@@ -16,10 +16,10 @@ use crate::class::mending;
 use crate::class::overrides::{Applied, Subject};
 use crate::class::pins::Change;
 use crate::class::{
-    Claim, Collected, Decided, Deciding, Kind, Label, Owners, Pins, Roster, settle,
+    Claim, Collected, Deciding, Decisions, Kind, Label, Owners, Pins, Roster, settle,
 };
 use crate::files::{files_below, hex, write_new, write_whole};
-use crate::grading::{Earlier, Record, RecordCache, Shared};
+use crate::grading::{Record, RecordCache, Shared, StoredRecord};
 use crate::held_back::HeldBack;
 use crate::program::graded;
 use crate::report::{self, BatchReport, ReportError, SubmissionReport, outline};
@@ -122,8 +122,8 @@ impl Found {
     }
 
     /// Gives records the names that reports call them by; in their files they have that of the archive alone.
-    pub fn name(&self, records: &mut [Earlier]) {
-        for Earlier { record, .. } in records {
+    pub fn name(&self, records: &mut [StoredRecord]) {
+        for StoredRecord { record, .. } in records {
             if let Some(seen) = self.seen.iter().find(|seen| seen.slug == record.slug) {
                 record.name.clone_from(&seen.name);
             }
@@ -201,7 +201,7 @@ pub struct Kept {
     pub pins: Pins,
     found: Found,
     roster: Option<Roster>,
-    records: Vec<Earlier>,
+    records: Vec<StoredRecord>,
 }
 
 impl Kept {
@@ -240,7 +240,7 @@ impl Kept {
     }
 
     /// What is pinned.
-    pub fn decided(&self) -> anyhow::Result<&Decided> {
+    pub fn decided(&self) -> anyhow::Result<&Decisions> {
         Ok(&self.pins.current().context("nothing is pinned")?.decided)
     }
 
@@ -248,7 +248,7 @@ impl Kept {
     ///
     /// # Errors
     /// When a decision means nothing.
-    pub fn report(&self, output: &Path, decided: &Decided) -> anyhow::Result<Settled> {
+    pub fn report(&self, output: &Path, decided: &Decisions) -> anyhow::Result<Settled> {
         settled(output, decided, &self.found, self.roster.as_ref(), self.records.clone())
     }
 
@@ -293,7 +293,7 @@ impl Kept {
     pub fn apply(
         &mut self,
         output: &Path,
-        decided: Decided,
+        decided: Decisions,
         reason: &str,
         undoes: bool,
     ) -> anyhow::Result<()> {
@@ -312,9 +312,9 @@ impl Kept {
 pub fn finish(
     output: &Path,
     pins: &mut Pins,
-    decided: &Decided,
+    decided: &Decisions,
     mut found: Found,
-    records: Vec<Earlier>,
+    records: Vec<StoredRecord>,
 ) -> anyhow::Result<BatchReport> {
     found.join(Found::read(output)?.unwrap_or_default(), output);
     found.keep(output)?;
@@ -349,7 +349,7 @@ pub fn write(output: &Path, settled: &Settled) -> anyhow::Result<()> {
 pub struct Settled {
     /// The report.
     pub report: BatchReport,
-    records: Vec<Earlier>,
+    records: Vec<StoredRecord>,
     shared: Shared,
 }
 
@@ -368,14 +368,14 @@ impl Settled {
 }
 
 /// What submissions have in common, also as JPlag says.
-fn shared(output: &Path, records: &[Earlier]) -> anyhow::Result<Shared> {
+fn shared(output: &Path, records: &[StoredRecord]) -> anyhow::Result<Shared> {
     let near = jplag::kept(&output.join(report::INSTRUCTOR).join(report::LIKENESS))?;
     let near = near.iter().map(|pair| (&pair.who, pair.similarity));
     Ok(Shared::of(records.iter().map(|earlier| &earlier.record)).with_near(near))
 }
 
 /// The whole record of a submission.
-fn whole(records: &[Earlier], slug: &str) -> anyhow::Result<Record> {
+fn whole(records: &[StoredRecord], slug: &str) -> anyhow::Result<Record> {
     let own = records.iter().find(|own| own.record.slug == slug);
     own.with_context(|| format!("there is no submission {slug}"))?.whole()
 }
@@ -386,10 +386,10 @@ fn whole(records: &[Earlier], slug: &str) -> anyhow::Result<Record> {
 /// When a decision means nothing.
 pub fn settled(
     output: &Path,
-    decided: &Decided,
+    decided: &Decisions,
     found: &Found,
     roster: Option<&Roster>,
-    mut records: Vec<Earlier>,
+    mut records: Vec<StoredRecord>,
 ) -> anyhow::Result<Settled> {
     let stated = &decided.assignment;
     found.name(&mut records);

@@ -21,7 +21,7 @@ pub const EVERY_FRAGMENT: &str = "every.fs";
 pub const OUTLINES: &str = "outlines";
 /// Not the name of a stage. If the host replaces it, pipelines that do not draw the picture, such as those of a shadow
 /// map, write nothing.
-pub const UNDRAWN_MAPS: &str = "undrawn.maps";
+pub const EMPTY_MAPS: &str = "empty.maps";
 
 /// Name of the entry point in the text of [`EVERY_FRAGMENT`].
 const SHOWN: &str = "umbra_shown";
@@ -40,9 +40,9 @@ pub struct Footprint {
     /// Textures to draw into, 32 texels wide or more.
     pub targets: u32,
     /// Pipelines for pictures that take vertices.
-    pub fed: u32,
+    pub vertex_pipelines: u32,
     /// Pipelines for pictures that take none.
-    pub unfed: u32,
+    pub vertexless_pipelines: u32,
     /// Pipelines that draw beside the picture, such as a shadow map.
     pub maps: u32,
 }
@@ -53,8 +53,10 @@ impl Footprint {
         Self {
             uploaded: self.uploaded.saturating_add(later.uploaded),
             targets: self.targets.saturating_add(later.targets),
-            fed: self.fed.saturating_add(later.fed),
-            unfed: self.unfed.saturating_add(later.unfed),
+            vertex_pipelines: self.vertex_pipelines.saturating_add(later.vertex_pipelines),
+            vertexless_pipelines: self
+                .vertexless_pipelines
+                .saturating_add(later.vertexless_pipelines),
             maps: self.maps.saturating_add(later.maps),
         }
     }
@@ -70,8 +72,8 @@ impl std::str::FromStr for Footprint {
         Ok(Self {
             uploaded: next().parse()?,
             targets: next().parse()?,
-            fed: next().parse()?,
-            unfed: next().parse()?,
+            vertex_pipelines: next().parse()?,
+            vertexless_pipelines: next().parse()?,
             maps: next().parse()?,
         })
     }
@@ -80,8 +82,8 @@ impl std::str::FromStr for Footprint {
 /// The numbers, as `draw_frame` tells the host.
 impl fmt::Display for Footprint {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Self { uploaded, targets, fed, unfed, maps } = self;
-        write!(f, "{uploaded} {targets} {fed} {unfed} {maps}")
+        let Self { uploaded, targets, vertex_pipelines, vertexless_pipelines, maps } = self;
+        write!(f, "{uploaded} {targets} {vertex_pipelines} {vertexless_pipelines} {maps}")
     }
 }
 
@@ -92,8 +94,8 @@ pub(super) struct Overrides {
     pub shown: Option<String>,
     /// [`OUTLINES`].
     pub outlines: bool,
-    /// [`UNDRAWN_MAPS`].
-    pub undrawn_maps: bool,
+    /// [`EMPTY_MAPS`].
+    pub empty_maps: bool,
 }
 
 /// The state that device and queue share.
@@ -101,8 +103,8 @@ pub(super) struct Overrides {
 pub(super) struct Watch {
     uploaded: AtomicU64,
     targets: AtomicU32,
-    fed: AtomicU32,
-    unfed: AtomicU32,
+    vertex_pipelines: AtomicU32,
+    vertexless_pipelines: AtomicU32,
     maps: AtomicU32,
     overrides: Mutex<Overrides>,
 }
@@ -120,8 +122,8 @@ impl Watch {
         Footprint {
             uploaded: self.uploaded.swap(0, Relaxed),
             targets: self.targets.swap(0, Relaxed),
-            fed: self.fed.swap(0, Relaxed),
-            unfed: self.unfed.swap(0, Relaxed),
+            vertex_pipelines: self.vertex_pipelines.swap(0, Relaxed),
+            vertexless_pipelines: self.vertexless_pipelines.swap(0, Relaxed),
             maps: self.maps.swap(0, Relaxed),
         }
     }
@@ -192,7 +194,7 @@ impl Device {
         let mut desc = desc.clone();
         if !draws_picture(&desc) {
             self.watch.maps.fetch_add(1, Relaxed);
-            if overrides.undrawn_maps {
+            if overrides.empty_maps {
                 if let Some(depth) = &mut desc.depth_stencil {
                     depth.depth_write_enabled = Some(false);
                     depth.depth_compare = Some(wgpu::CompareFunction::Never);
@@ -208,8 +210,12 @@ impl Device {
             }
             return self.device.create_render_pipeline(&desc);
         }
-        let fed = desc.vertex.buffers.iter().any(Option::is_some);
-        let pipelines = if fed { &self.watch.fed } else { &self.watch.unfed };
+        let vertex_pipelines = desc.vertex.buffers.iter().any(Option::is_some);
+        let pipelines = if vertex_pipelines {
+            &self.watch.vertex_pipelines
+        } else {
+            &self.watch.vertexless_pipelines
+        };
         pipelines.fetch_add(1, Relaxed);
         let outlined = self.device.features().contains(wgpu::Features::POLYGON_MODE_LINE);
         if overrides.outlines && outlined {

@@ -29,7 +29,7 @@ const HEIGHT: [f32; 2] = [76.0, 112.0];
 /// A changed scene: all that differs from the original. Every number has at most four decimals, so
 /// that the files say exactly what was looked at.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Draw {
+pub struct ChangedScene {
     /// Position of the point light, world space.
     pub light: Vec3,
     /// Its radiant intensity [W sr^-1].
@@ -53,7 +53,7 @@ pub struct Surface {
     pub exponent: f32,
 }
 
-impl Draw {
+impl ChangedScene {
     /// The scene as it is.
     pub fn original(scene: &Scene) -> Self {
         let surface = |material: &basecode::Material| Surface {

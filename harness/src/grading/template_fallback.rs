@@ -25,7 +25,7 @@ pub struct Built {
     pub report: BuildReport,
     /// What the compiler refused in the source as it was submitted.
     pub errors: Vec<Diagnostic>,
-    /// The source that `report` is about: the submitted one, or the mended copy.
+    /// The source that `report` is about: the submitted one, or the copy with files of the template.
     pub src: PathBuf,
     /// The files of the template in it, by their path below `src`, and why each is there.
     pub replaced: BTreeMap<String, String>,

@@ -8,14 +8,14 @@ use crate::grading::RenderPath;
 use crate::rubric::{Grade, Part};
 
 /// What of an assignment is asked.
-pub struct Asked {
+pub struct Selection {
     /// The parts; empty for all.
     pub parts: Vec<String>,
     /// The scenes; empty for all.
     pub scenes: Vec<String>,
 }
 
-impl Asked {
+impl Selection {
     /// Whether nothing is left out.
     pub fn is_all(&self) -> bool {
         self.parts.is_empty() && self.scenes.is_empty()
@@ -100,16 +100,16 @@ mod tests {
 
     use super::*;
 
-    fn asked(parts: &[&str], scenes: &[&str]) -> Asked {
+    fn asked(parts: &[&str], scenes: &[&str]) -> Selection {
         let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
-        Asked { parts: owned(parts), scenes: owned(scenes) }
+        Selection { parts: owned(parts), scenes: owned(scenes) }
     }
 
     #[test]
     fn what_is_not_asked_is_taken_out() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let load = || Assignment::load(&root).unwrap();
-        let restricted = |asked: Asked| {
+        let restricted = |asked: Selection| {
             let mut assignment = load();
             asked.restrict(&mut assignment).map(|()| assignment)
         };
