@@ -203,7 +203,10 @@ fn the_host_sees_how_a_picture_comes_about() {
 fn what_a_pass_hands_to_the_device_is_counted() {
     let gpu = gpu();
     let target = Target::new(&gpu, 40, 40).unwrap();
-    assert_eq!(gpu.take_footprint(), Footprint { targets: 2, ..Footprint::default() });
+    assert_eq!(
+        gpu.take_footprint(),
+        Footprint { targets: 1, picture_targets: 1, ..Footprint::default() }
+    );
     draw(&gpu, POSITION_FS, &target).unwrap();
     let found = gpu.take_footprint();
     assert!((100..2000).contains(&found.uploaded), "{found:?}");

@@ -34,6 +34,11 @@ pub fn diffuse_changes() -> Vec<Change> {
         slip("neither wo nor wi is tested", Shading { tests_wo: false, tests_wi: false, ..right }),
         slip("abs() around cos theta_i", Shading { absolute: true, ..right }),
         slip("abs() around both cosines", Shading { absolute: true, tests_wo: false, ..right }),
+        slip(
+            "black only where both wo and wi lie below",
+            Shading { tests_both_at_once: true, ..right },
+        ),
+        slip("sin theta_i in place of cos theta_i", Shading { sine: true, ..right }),
         slip("x of wi in place of its cosine", Shading { axis: 0, ..right }),
         slip("y of wi in place of its cosine", Shading { axis: 1, ..right }),
         slip("red and blue exchanged", Shading { channels: [2, 1, 0], ..right }),
@@ -72,6 +77,29 @@ pub fn phong_changes() -> Vec<Change> {
         slip("n + 3 for n + 2", lobe(|n| (n + 3.0) / std::f64::consts::TAU)),
         slip("n + 8 over 8 pi", lobe(|n| (n + 8.0) / (8.0 * std::f64::consts::PI))),
         slip("n + 2 without 2 pi", lobe(|n| n + 2.0)),
+        slip("n + 2 / (2 pi): parentheses are missing", lobe(|n| n + 2.0 / std::f64::consts::TAU)),
+        slip("n / (2 pi) + 2: parentheses are missing", lobe(|n| n / std::f64::consts::TAU + 2.0)),
+        slip(
+            "(n + 2) / 2 pi: parentheses are missing",
+            lobe(|n| (n + 2.0) / 2.0 * std::f64::consts::PI),
+        ),
+        slip("2 pi over n + 2", lobe(|n| std::f64::consts::TAU / (n + 2.0))),
+        slip(
+            "the diffuse term is normalized as the lobe is",
+            Shading { diffuse_normalized: true, ..right },
+        ),
+        slip("Ks is raised to n, too", Shading { raised_ks: true, ..right }),
+        slip("n is raised to cos alpha", Shading { swapped_power: true, ..right }),
+        slip(
+            "the specular term is multiplied by Kd",
+            Shading { specular_times_diffuse: true, ..right },
+        ),
+        slip("no power of a negative cos alpha", Shading { clamp: Clamp::NotANumber, ..right }),
+        slip(
+            "the mirror direction lacks its factor 2",
+            Shading { angle: Angle::WithoutTwo, ..right },
+        ),
+        slip("the mirror direction is the negated wo", Shading { angle: Angle::Negated, ..right }),
         concept("the lobe is not normalized", lobe(|_| 1.0)),
         concept("the lobe is divided by pi alone", lobe(|_| std::f64::consts::FRAC_1_PI)),
         concept("the lobe is divided by 2 pi alone", lobe(|_| 1.0 / std::f64::consts::TAU)),
@@ -117,6 +145,9 @@ pub fn light_changes() -> Vec<Change> {
         fit("a factor by channel", Fitted::Channels),
         concept("the light does not fall off with the distance", Shading { falloff: 0.0, ..right }),
         slip("r in place of r^2", Shading { falloff: 1.0, ..right }),
+        slip("the root of r in place of r^2", Shading { falloff: 0.5, ..right }),
+        slip("multiplied by r^2 in place of divided", Shading { falloff: -2.0, ..right }),
+        slip("multiplied by r in place of divided by r^2", Shading { falloff: -1.0, ..right }),
         slip("r^3 in place of r^2", Shading { falloff: 3.0, ..right }),
         slip("r^4 in place of r^2", Shading { falloff: 4.0, ..right }),
         slip("1 + r^2 in place of r^2", Shading { softened: true, ..right }),
@@ -159,6 +190,8 @@ pub fn integrator_changes() -> Vec<Change> {
         concept("wi is the light's position", directions(Directions::LightFromOrigin)),
         concept("wi leads from the viewer to the light", directions(Directions::LightFromViewer)),
         slip("r is the distance along the ray", Shading { along_ray: true, ..right }),
+        slip("r is the light's distance from the origin", Shading { from_origin: true, ..right }),
+        slip("wi is the sum of light and point", directions(Directions::LightPlusPoint)),
     ]);
     changes
 }

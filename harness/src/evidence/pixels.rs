@@ -130,6 +130,14 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
             }),
         ),
         of(
+            "the distance is that of the light from the origin",
+            Class::Slip,
+            Box::new(move |point| ShadedPoint {
+                distance: f64::from(right.light.length()),
+                ..right.shaded_point(scene, point)
+            }),
+        ),
+        of(
             "the direction to the viewer is the viewer's position",
             Class::Slip,
             Box::new(move |point| {

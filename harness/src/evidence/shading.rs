@@ -31,6 +31,16 @@ pub struct Shading {
     pub angle: Angle,
     /// Where cos alpha is clamped to 0.
     pub clamp: Clamp,
+    /// Whether n is raised to cos alpha.
+    pub swapped_power: bool,
+    /// Whether Ks is raised with cos alpha.
+    pub raised_ks: bool,
+    /// Whether the specular term is multiplied by Kd too.
+    pub specular_times_diffuse: bool,
+    /// Whether the diffuse term is multiplied by the lobe's normalization too.
+    pub diffuse_normalized: bool,
+    /// Whether a surface is black only where it is both seen and lit from behind.
+    pub tests_both_at_once: bool,
     /// Whether a surface seen from behind is black.
     pub tests_wo: bool,
     /// Whether a surface lit from behind is black.
@@ -39,6 +49,8 @@ pub struct Shading {
     pub axis: usize,
     /// Whether cos theta_i is replaced by its magnitude.
     pub absolute: bool,
+    /// Whether cos theta_i is replaced by the sine.
+    pub sine: bool,
     /// Which of red, green and blue each channel takes.
     pub channels: [usize; 3],
     /// The same for the specular term alone, after `channels`.
@@ -59,6 +71,8 @@ pub struct Shading {
     pub directions: Directions,
     /// Whether the distance along the camera ray stands for that of the light.
     pub along_ray: bool,
+    /// Whether the distance of the light from the world's origin stands for its distance.
+    pub from_origin: bool,
     /// Whether an integrator asks the BSDF at all.
     pub asks: bool,
     /// What is added where a surface is lit, times the diffuse reflectance.
@@ -94,6 +108,8 @@ pub enum Directions {
     LightFromOrigin,
     /// The direction from the viewer to the light in the place of wi.
     LightFromViewer,
+    /// The sum of the positions of light and surface in the place of their difference.
+    LightPlusPoint,
 }
 
 /// What is clamped to 0.
@@ -107,6 +123,8 @@ pub enum Clamp {
     Nothing,
     /// Nothing, but its magnitude is raised: the lobe shines both ways.
     Magnitude,
+    /// Nothing, and no power of a negative number is one, as in WGSL.
+    NotANumber,
 }
 
 /// The angle that a lobe depends on.
@@ -118,6 +136,10 @@ pub enum Angle {
     Reversed,
     /// Between wi and wo.
     Unmirrored,
+    /// Between wi and the negated wo.
+    Negated,
+    /// Between wi and n cos theta_o - wo: the mirror direction without its factor 2.
+    WithoutTwo,
     /// Between the normal and the half vector (Blinn).
     Half,
     /// Between wi and wo mirrored on this axis of the tangents alone, 0 or 1.
@@ -139,10 +161,16 @@ impl Default for Shading {
             normalization: |n| (n + 2.0) / std::f64::consts::TAU,
             angle: Angle::Mirror,
             clamp: Clamp::Base,
+            swapped_power: false,
+            raised_ks: false,
+            specular_times_diffuse: false,
+            diffuse_normalized: false,
+            tests_both_at_once: false,
             tests_wo: true,
             tests_wi: true,
             axis: 2,
             absolute: false,
+            sine: false,
             channels: [0, 1, 2],
             specular_channels: [0, 1, 2],
             albedo: |albedo| albedo,
@@ -153,6 +181,7 @@ impl Default for Shading {
             long_wi: false,
             directions: Directions::Local,
             along_ray: false,
+            from_origin: false,
             asks: true,
             ambient: 0.0,
             output: |radiance| radiance,
@@ -192,9 +221,11 @@ impl Shading {
         let cos_o = wo[2];
         let length = if self.long_wi { *distance } else { 1.0 };
         let cos_i = length * if self.absolute { wi[self.axis].abs() } else { wi[self.axis] };
-        if (self.tests_wo && cos_o <= 0.0) || (self.tests_wi && cos_i <= 0.0) {
+        let (behind, below) = (self.tests_wo && cos_o <= 0.0, self.tests_wi && cos_i <= 0.0);
+        if if self.tests_both_at_once { behind && below } else { behind || below } {
             return [0.0; 3];
         }
+        let cos_i = if self.sine { (1.0 - cos_i * cos_i).max(0.0).sqrt() } else { cos_i };
         let phong = material.model == api::MATERIAL_PHONG;
         let lobe = if phong && self.factor[1] != 0.0 { self.lobe(point, length) } else { 0.0 };
         let [diffuse, specular] = [0, 1].map(|term| {
@@ -204,7 +235,9 @@ impl Shading {
                 * power(cos_i, self.cos_i[term])
                 * power(cos_o, self.cos_o[term])
         });
-        let diffuse = diffuse / std::f64::consts::PI;
+        let n = f64::from(material.exponent);
+        let normalized = if self.diffuse_normalized { (self.normalization)(n) } else { 1.0 };
+        let diffuse = normalized * diffuse / std::f64::consts::PI;
         let incident = self.attenuation(*distance);
         let (kd, ks) = match self.exchanged && phong {
             true => (material.specular, material.diffuse),
@@ -213,6 +246,8 @@ impl Shading {
         let value = [0, 1, 2].map(|c| {
             let ks = f64::from(ks[self.specular_channels[c]]);
             let own = (f64::from(kd[c]) + ks).max(0.99);
+            let ks = if self.raised_ks { ks.powf(n) } else { ks };
+            let ks = if self.specular_times_diffuse { ks * f64::from(kd[c]) } else { ks };
             let factor = if self.scale_by_channel { 0.99 / own / scale } else { 1.0 };
             factor * (diffuse * (self.albedo)(f64::from(kd[c])) + specular * lobe * ks)
         });
@@ -251,6 +286,8 @@ impl Shading {
                 Angle::Mirror => mirror,
                 Angle::Reversed => -mirror,
                 Angle::Unmirrored => wi[0] * wo[0] + wi[1] * wo[1] + wi[2] * wo[2],
+                Angle::Negated => -wi[0] * wo[0] - wi[1] * wo[1] - wi[2] * wo[2],
+                Angle::WithoutTwo => -wi[0] * wo[0] - wi[1] * wo[1],
                 Angle::OneAxis(axis) => {
                     let signs = [[-1.0, 1.0], [1.0, -1.0]][axis];
                     signs[0] * wi[0] * wo[0] + signs[1] * wi[1] * wo[1] + wi[2] * wo[2]
@@ -265,8 +302,11 @@ impl Shading {
             Clamp::Base => cos_alpha.max(0.0),
             Clamp::Magnitude => cos_alpha.abs(),
             Clamp::Power | Clamp::Nothing => cos_alpha,
+            Clamp::NotANumber if cos_alpha < 0.0 => f64::NAN,
+            Clamp::NotANumber => cos_alpha,
         };
-        let power = base.powf((self.round)(self.exponent[0] * n + self.exponent[1]));
+        let exponent = (self.round)(self.exponent[0] * n + self.exponent[1]);
+        let power = if self.swapped_power { exponent.powf(base) } else { base.powf(exponent) };
         let power = if self.clamp == Clamp::Power { power.max(0.0) } else { power };
         (self.normalization)((self.round)(n)) * power
     }

@@ -147,9 +147,7 @@ pub fn judge_pass(
             let Some(expected) = bound.expected(scene, camera, shape) else { continue };
             counted += 1;
             let found = frame.pixels[index];
-            let close = (found - expected).abs().max_element()
-                <= BOUND_RELATIVE * expected.abs().max_element().max(1e-3);
-            if !close {
+            if !is_close(found, expected) {
                 wrong += 1;
                 example = example.or(Some((index, shape, expected, found)));
             }
@@ -190,11 +188,9 @@ pub fn judge_pass(
                 index % film.surface.width,
                 index / film.surface.width
             );
-            let hint = if found == Vec3::ZERO {
-                "it was never set, or nothing was drawn there"
-            } else {
-                ""
-            };
+            let hint = if found == Vec3::ZERO { "it was never set" } else { "" };
+            let seen = Seen::of(film, frames, positions);
+            let (summary, hint) = seen.in_words(film).unwrap_or((summary, hint));
             let wrong = wrong_total as f64 / total as f64;
             let shapes = wrong_shapes(film, frames);
             // A pass that shows hardly one value, on no shape, is no pass, whatever it draws.
@@ -202,7 +198,11 @@ pub fn judge_pass(
                 true => Price::of_raw(wrong),
                 false => {
                     let other = other_pipeline(film, frames);
-                    shapes.price(price_of_values(wrong, &measures, other))
+                    let price = shapes.price(price_of_values(wrong, &measures, other));
+                    match seen.all_values_right {
+                        true => price.or("surfaces are missing or hidden", Class::Concept, 0.0),
+                        false => price,
+                    }
                 }
             };
             measures.extend(price.measure());
@@ -231,6 +231,81 @@ pub fn judge_pass(
     measures.push(placed);
     check.measures = measures;
     check
+}
+
+/// What a pass with Umbra's stages shows where a surface belongs.
+struct Seen {
+    /// Pixels that show a surface when the pass is right.
+    all: usize,
+    /// Those that nothing is drawn on, and the first.
+    empty: (usize, Option<usize>),
+    /// Those that another surface is seen on, and the first.
+    elsewhere: (usize, Option<usize>),
+    /// Whether all others show the right values.
+    all_values_right: bool,
+}
+
+impl Seen {
+    fn of(film: &StageFilm, frames: &[(BoundValue, Image)], positions: &Image) -> Self {
+        let mut seen =
+            Self { all: 0, empty: (0, None), elsewhere: (0, None), all_values_right: true };
+        let mut right = 0;
+        for (index, shape) in film.interior() {
+            let (ray, Some(point)) = &film.surface.pixels[index] else { continue };
+            seen.all += 1;
+            let shown = frames.iter().map(|(_, frame)| frame).chain([positions]);
+            let found = positions.pixels[index];
+            let distance = (found - point.position).length();
+            let place = if shown.map(|frame| frame.pixels[index]).all(|value| value == Vec3::ZERO) {
+                &mut seen.empty
+            } else if distance > NEAR * (point.position - ray.origin).length() {
+                &mut seen.elsewhere
+            } else {
+                let is_right = |(bound, frame): &(BoundValue, Image)| {
+                    let expected = bound.expected(film.scene, &film.camera, shape);
+                    expected.is_none_or(|expected| is_close(frame.pixels[index], expected))
+                };
+                right += usize::from(frames.iter().all(is_right));
+                continue;
+            };
+            *place = (place.0 + 1, place.1.or(Some(index)));
+        }
+        let shown = seen.all - seen.empty.0 - seen.elsewhere.0;
+        seen.all_values_right = right > 0 && right as f64 >= (1.0 - STRAY_FRACTION) * shown as f64;
+        seen
+    }
+
+    /// A sentence and a hint, where the surfaces themselves are wrong and not only their values.
+    fn in_words(&self, film: &StageFilm) -> Option<(String, &'static str)> {
+        let few = STRAY_FRACTION * self.all as f64;
+        let (what, (count, first), hint) = if self.empty.0 as f64 > few {
+            let hint =
+                "look at what is drawn: indices, culling, depth test, clearing, and matrices";
+            ("nothing is drawn", self.empty, hint)
+        } else if self.elsewhere.0 as f64 > few && self.all_values_right {
+            let hint = "look at depth test, culling and matrices";
+            ("another surface is seen", self.elsewhere, hint)
+        } else {
+            return None;
+        };
+        let index = first?;
+        let shape = film.surface.pixels[index].1.as_ref().map(|point| point.shape)?;
+        let sentence = format!(
+            "{what} on {:.0} % of the pixels that show a surface, with Umbra's own stages; first at ({}, {}), where \
+             \"{}\" belongs",
+            100.0 * count as f64 / self.all as f64,
+            index % film.surface.width,
+            index / film.surface.width,
+            film.scene.shapes()[shape].name
+        );
+        Some((sentence, hint))
+    }
+}
+
+/// Whether a bound value is as expected.
+fn is_close(found: Vec3, expected: Vec3) -> bool {
+    let least = BOUND_RELATIVE * expected.abs().max_element().max(1e-3);
+    (found - expected).abs().max_element() <= least
 }
 
 /// How far surfaces lie from their place under a pass. 0 where most of the film shows nothing near what

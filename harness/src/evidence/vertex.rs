@@ -301,7 +301,7 @@ fn factor_of_positions(film: &StageFilm, positions: &Image) -> bool {
 /// What a normal may be instead: a name, and the normal.
 type Change = (&'static str, Box<dyn Fn(&SurfacePoint) -> Vec3>);
 
-/// Whether normals are those of their pixels, negated, with axes exchanged, or the positions instead.
+/// Whether normals are those of their pixels, negated, with axes exchanged, their magnitudes, or the positions instead.
 fn slip_of_normals(film: &StageFilm, normals: &Image) -> Option<&'static str> {
     const EXCHANGED: &str = "the normal has its axes exchanged";
     let axes = |name, [x, y, z]: [usize; 3], signs: [f32; 3]| -> Change {
@@ -318,6 +318,7 @@ fn slip_of_normals(film: &StageFilm, normals: &Image) -> Option<&'static str> {
     ];
     let orders = [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
     changes.extend(orders.map(|order| axes(EXCHANGED, order, [1.0; 3])));
+    changes.push(("abs() of the normal", Box::new(|p: &SurfacePoint| p.normal.abs())));
     let position = |p: &SurfacePoint| p.position.normalize_or_zero();
     changes.push(("the position stands for the normal", Box::new(position)));
     changes.into_iter().find_map(|(name, change)| {

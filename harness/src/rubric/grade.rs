@@ -257,18 +257,29 @@ fn by_code(rules: &Rules, evidence: &Evidence, part: &Part) -> PartScore {
             if let Some(worth) = unseen.filter(|worth| worth.least < 1.0) {
                 return worth;
             }
-            return PartScore {
-                least: 1.0,
-                most: 1.0,
-                unconfirmed: 0.0,
-                reason: format!("the {} images are right on every scene", part.path),
-                evidence: vec![path.proof.to_string()],
-            };
+            return in_full(
+                format!("the {} images are right on every scene", part.path),
+                path.proof,
+            );
+        }
+    }
+    if let Some(proof) = part.proof {
+        let passed = |check: &Check| check.verdict == Verdict::Pass;
+        let says_nothing = |check: &Check| check.verdict == Verdict::NotJudged;
+        let mut checks = evidence.named(proof);
+        let mut once = evidence.named(proof);
+        if checks.all(|check| passed(check) || says_nothing(check)) && once.any(passed) {
+            return in_full("what it draws is right on every scene".to_owned(), proof);
         }
     }
     by_checks(rules, evidence, &part.evidence, part.any_scene)
         .or_else(|| by_checks(rules, evidence, &part.fallback, part.any_scene))
         .unwrap_or_else(|| unjudged(evidence, part))
+}
+
+/// A part that the end result proves.
+fn in_full(reason: String, proof: CheckId) -> PartScore {
+    PartScore { least: 1.0, most: 1.0, unconfirmed: 0.0, reason, evidence: vec![proof.to_string()] }
 }
 
 /// A part of a submission without code to judge: nothing, until the instructor confirms what the images show.

@@ -85,6 +85,10 @@ pub struct Part {
     pub path: String,
     /// The checks that isolate it; the worst scene counts.
     pub evidence: Vec<CheckId>,
+    /// The check on the end result that, passed on every scene, earns the part in full: it is right by a
+    /// convention of its own.
+    #[serde(default)]
+    pub proof: Option<CheckId>,
     /// Whether the best scene counts instead: the student was free to choose one.
     #[serde(default)]
     pub any_scene: bool,
@@ -144,6 +148,8 @@ impl Rules {
         };
         let proves = self.paths.iter().filter(|(_, path)| path.proof == check);
         let mut roles: Vec<String> = proves.map(|(name, _)| format!("proof of {name}")).collect();
+        let proven = self.parts.iter().filter(|part| part.proof == Some(check));
+        roles.extend(proven.map(|part| format!("proof of {}", part.id)));
         for (role, parts) in [
             ("", named(|part| &part.evidence)),
             ("fallback of ", named(|part| &part.fallback)),

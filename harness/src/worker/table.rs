@@ -39,7 +39,8 @@ pub struct Record {
     vertex_pipelines: AtomicU32,
     vertexless_pipelines: AtomicU32,
     maps: AtomicU32,
-    _reserved: [AtomicU8; MESSAGE_AT - 64],
+    picture_targets: AtomicU32,
+    _reserved: [AtomicU8; MESSAGE_AT - 68],
     message: [AtomicU8; MESSAGE_BYTES],
 }
 
@@ -65,13 +66,14 @@ impl Record {
 
     /// Notes what a frame took.
     pub fn footprint(&self, footprint: &Footprint) {
-        let Footprint { uploaded, targets, vertex_pipelines, vertexless_pipelines, maps } =
-            *footprint;
+        let Footprint { uploaded, targets, picture_targets, .. } = *footprint;
+        let Footprint { vertex_pipelines, vertexless_pipelines, maps, .. } = *footprint;
         self.uploaded.store(uploaded.saturating_add(1), Relaxed);
         self.targets.store(targets, Relaxed);
         self.vertex_pipelines.store(vertex_pipelines, Relaxed);
         self.vertexless_pipelines.store(vertexless_pipelines, Relaxed);
         self.maps.store(maps, Relaxed);
+        self.picture_targets.store(picture_targets, Relaxed);
     }
 
     /// Notes the answer, the state last. A message that is too long is cut.
@@ -143,6 +145,7 @@ impl SlotState {
                         vertex_pipelines: u32_at(52),
                         vertexless_pipelines: u32_at(56),
                         maps: u32_at(60),
+                        picture_targets: u32_at(64),
                     }),
                 }
             }
@@ -187,6 +190,7 @@ mod tests {
             vertex_pipelines: 8,
             vertexless_pipelines: 9,
             maps: 10,
+            picture_targets: 11,
         };
         record.footprint(&own);
         let noted = SlotState::parse(&bytes(&record));

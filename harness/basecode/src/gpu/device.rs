@@ -4,7 +4,6 @@
 //! that the pass asks for: the resulting frame shows how the pass makes its pictures.
 
 use std::fmt;
-use std::ops::Deref;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
@@ -37,8 +36,10 @@ const LONG_WGSL: u64 = 64 << 10;
 pub struct Footprint {
     /// Bytes of buffers, textures and overlong shaders.
     pub uploaded: u64,
-    /// Textures to draw into, 32 texels wide or more.
+    /// Textures to draw into, 32 texels wide or more, of another format than a picture's.
     pub targets: u32,
+    /// The same of a picture's format.
+    pub picture_targets: u32,
     /// Pipelines for pictures that take vertices.
     pub vertex_pipelines: u32,
     /// Pipelines for pictures that take none.
@@ -53,6 +54,7 @@ impl Footprint {
         Self {
             uploaded: self.uploaded.saturating_add(later.uploaded),
             targets: self.targets.saturating_add(later.targets),
+            picture_targets: self.picture_targets.saturating_add(later.picture_targets),
             vertex_pipelines: self.vertex_pipelines.saturating_add(later.vertex_pipelines),
             vertexless_pipelines: self
                 .vertexless_pipelines
@@ -72,6 +74,7 @@ impl std::str::FromStr for Footprint {
         Ok(Self {
             uploaded: next().parse()?,
             targets: next().parse()?,
+            picture_targets: next().parse()?,
             vertex_pipelines: next().parse()?,
             vertexless_pipelines: next().parse()?,
             maps: next().parse()?,
@@ -82,8 +85,10 @@ impl std::str::FromStr for Footprint {
 /// The numbers, as `draw_frame` tells the host.
 impl fmt::Display for Footprint {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Self { uploaded, targets, vertex_pipelines, vertexless_pipelines, maps } = self;
-        write!(f, "{uploaded} {targets} {vertex_pipelines} {vertexless_pipelines} {maps}")
+        let Self { uploaded, targets, picture_targets, .. } = self;
+        let Self { vertex_pipelines, vertexless_pipelines, maps, .. } = self;
+        write!(f, "{uploaded} {targets} {picture_targets} ")?;
+        write!(f, "{vertex_pipelines} {vertexless_pipelines} {maps}")
     }
 }
 
@@ -103,6 +108,7 @@ pub(super) struct Overrides {
 pub(super) struct Watch {
     uploaded: AtomicU64,
     targets: AtomicU32,
+    picture_targets: AtomicU32,
     vertex_pipelines: AtomicU32,
     vertexless_pipelines: AtomicU32,
     maps: AtomicU32,
@@ -122,6 +128,7 @@ impl Watch {
         Footprint {
             uploaded: self.uploaded.swap(0, Relaxed),
             targets: self.targets.swap(0, Relaxed),
+            picture_targets: self.picture_targets.swap(0, Relaxed),
             vertex_pipelines: self.vertex_pipelines.swap(0, Relaxed),
             vertexless_pipelines: self.vertexless_pipelines.swap(0, Relaxed),
             maps: self.maps.swap(0, Relaxed),
@@ -137,39 +144,67 @@ impl Watch {
     }
 }
 
-/// A wrapper of [`wgpu::Device`] that works wherever one is expected.
+/// A wrapper of [`wgpu::Device`]. [`crate::wgpu`] gives it the same name. The device itself cannot be had: what it
+/// takes would not be recorded.
 #[derive(Clone)]
 pub struct Device {
     device: wgpu::Device,
     watch: Arc<Watch>,
 }
 
-/// A wrapper of [`wgpu::Queue`] that works wherever one is expected.
+/// A wrapper of [`wgpu::Queue`], as [`Device`] is of the device.
 #[derive(Clone)]
 pub struct Queue {
     queue: wgpu::Queue,
     watch: Arc<Watch>,
 }
 
-impl Deref for Device {
-    type Target = wgpu::Device;
-
-    fn deref(&self) -> &wgpu::Device {
-        &self.device
-    }
+/// Methods that upload nothing.
+macro_rules! pass_on {
+    ($inner:ident: $wrapped:ident; $($name:ident($($argument:ident: $type:ty),*) $(-> $answer:ty)?;)*) => {
+        impl $wrapped {$(
+            #[doc = concat!("As [`wgpu::", stringify!($wrapped), "::", stringify!($name), "`].")]
+            pub fn $name(&self, $($argument: $type),*) $(-> $answer)? {
+                self.$inner.$name($($argument),*)
+            }
+        )*}
+    };
 }
 
-impl Deref for Queue {
-    type Target = wgpu::Queue;
+pass_on! { device: Device;
+    poll(poll_type: wgpu::PollType) -> Result<wgpu::PollStatus, wgpu::PollError>;
+    features() -> wgpu::Features;
+    limits() -> wgpu::Limits;
+    adapter_info() -> wgpu::AdapterInfo;
+    create_command_encoder(desc: &wgpu::CommandEncoderDescriptor) -> wgpu::CommandEncoder;
+    create_bind_group(desc: &wgpu::BindGroupDescriptor) -> wgpu::BindGroup;
+    create_bind_group_layout(desc: &wgpu::BindGroupLayoutDescriptor) -> wgpu::BindGroupLayout;
+    create_pipeline_layout(desc: &wgpu::PipelineLayoutDescriptor) -> wgpu::PipelineLayout;
+    create_compute_pipeline(desc: &wgpu::ComputePipelineDescriptor) -> wgpu::ComputePipeline;
+    create_sampler(desc: &wgpu::SamplerDescriptor) -> wgpu::Sampler;
+    create_query_set(desc: &wgpu::QuerySetDescriptor) -> wgpu::QuerySet;
+    push_error_scope(filter: wgpu::ErrorFilter) -> wgpu::ErrorScopeGuard;
+    get_internal_counters() -> wgpu::InternalCounters;
+    destroy();
+}
 
-    fn deref(&self) -> &wgpu::Queue {
-        &self.queue
-    }
+pass_on! { queue: Queue;
+    submit(buffers: impl IntoIterator<Item = wgpu::CommandBuffer>) -> wgpu::SubmissionIndex;
+    on_submitted_work_done(callback: impl FnOnce() + Send + 'static);
+    get_timestamp_period() -> f32;
 }
 
 impl Device {
     pub(super) fn new(device: wgpu::Device, watch: &Arc<Watch>) -> Self {
         Self { device, watch: Arc::clone(watch) }
+    }
+
+    /// As [`wgpu::Device::create_render_bundle_encoder`].
+    pub fn create_render_bundle_encoder<'a>(
+        &'a self,
+        desc: &wgpu::RenderBundleEncoderDescriptor,
+    ) -> wgpu::RenderBundleEncoder<'a> {
+        self.device.create_render_bundle_encoder(desc)
     }
 
     /// As [`wgpu::Device::create_shader_module`].
@@ -233,7 +268,9 @@ impl Device {
     /// As [`wgpu::Device::create_texture`].
     pub fn create_texture(&self, desc: &wgpu::TextureDescriptor) -> wgpu::Texture {
         if desc.usage.contains(wgpu::TextureUsages::RENDER_ATTACHMENT) && desc.size.width >= WIDE {
-            self.watch.targets.fetch_add(1, Relaxed);
+            let picture = desc.format == COLOR_FORMAT;
+            let targets = if picture { &self.watch.picture_targets } else { &self.watch.targets };
+            targets.fetch_add(1, Relaxed);
         }
         self.device.create_texture(desc)
     }
@@ -255,13 +292,13 @@ impl Device {
     /// As [`DeviceExt::create_texture_with_data`].
     pub fn create_texture_with_data(
         &self,
-        queue: &wgpu::Queue,
+        queue: &Queue,
         desc: &wgpu::TextureDescriptor,
         order: TextureDataOrder,
         data: &[u8],
     ) -> wgpu::Texture {
         self.watch.upload(data.len() as u64);
-        self.device.create_texture_with_data(queue, desc, order, data)
+        self.device.create_texture_with_data(&queue.queue, desc, order, data)
     }
 }
 

@@ -184,6 +184,7 @@ impl RayBatch {
             Directions::WiTwice => (wi, wi),
             Directions::LightFromOrigin => (local(self.light), wo),
             Directions::LightFromViewer => (local(self.light - point.ray.origin), wo),
+            Directions::LightPlusPoint => (local(self.light + point.position), wo),
         }
     }
 
@@ -199,6 +200,8 @@ impl RayBatch {
         let r = match shading.directions {
             Directions::LightFromOrigin => self.light.length(),
             Directions::LightFromViewer => (self.light - point.ray.origin).length(),
+            Directions::LightPlusPoint => (self.light + point.position).length(),
+            _ if shading.from_origin => self.light.length(),
             _ if shading.along_ray => (point.position - point.ray.origin).length(),
             _ => point.distance,
         };

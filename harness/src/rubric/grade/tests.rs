@@ -11,6 +11,7 @@ fn rules() -> Rules {
         title: format!("part {id}"),
         points,
         bonus: path.is_empty(),
+        proof: None,
         any_scene: path.is_empty(),
         path: path.into(),
         evidence: vec![evidence],
@@ -80,6 +81,25 @@ fn right_end_to_end_is_enough_on_every_scene_only() {
     assert_eq!(points(&all), [10.0, 30.0, 0.0]);
     let one_wrong = [all.as_slice(), &[check(IMAGE, Fail, 0.2), check(RAYS, Pass, 0.0)]].concat();
     assert_eq!(points(&one_wrong), [0.0, 30.0, 0.0]);
+}
+
+#[test]
+fn a_part_that_is_right_end_to_end_is_worth_all_whatever_else_is_wrong() {
+    let mut rules = rules();
+    rules.parts[0].proof = Some(PIXELS);
+    let points = |pixels: &[Verdict]| {
+        let mut checks =
+            vec![check(IMAGE, Fail, 0.5), check(BSDF, Fail, 1.0), check(RAYS, Fail, 0.1)];
+        checks.extend(pixels.iter().map(|verdict| check(PIXELS, *verdict, 0.3)));
+        let grade = grade(&rules, &Evidence { checks });
+        grade.parts.iter().map(|part| part.points).take(2).collect::<Vec<_>>()
+    };
+    assert_eq!(points(&[Pass, Pass]), [10.0, 15.0]);
+    assert_eq!(points(&[Pass, NotJudged]), [10.0, 15.0]);
+    for unproven in [&[][..], &[Pass, Fail], &[NotJudged], &[Pass, NotRun], &[Pass, NotImplemented]]
+    {
+        assert_eq!(points(unproven), [0.0, 15.0], "{unproven:?}");
+    }
 }
 
 #[test]
