@@ -146,6 +146,8 @@ pub(super) fn materials(kind: BsdfKind) -> Vec<api::MaterialValue> {
         }
         BsdfKind::Phong => {
             let mut all = Vec::new();
+            // The largest values of Kd and of Ks sum to more than 1, those of Kd + Ks do not.
+            all.push(material(api::MATERIAL_PHONG, [0.7, 0.25, 0.1], [0.05, 0.2, 0.35], 2.0));
             for exponent in [1.0, 2.0, 9.8, 30.0, 50.0, 101.5, 500.0] {
                 for (diffuse, specular) in [
                     ([0.5, 0.3, 0.1], [0.2, 0.3, 0.5]),
@@ -420,14 +422,14 @@ mod tests {
 
     #[test]
     fn the_formula_has_its_closed_forms() {
-        let material = materials(BsdfKind::Phong)[0];
+        let material = materials(BsdfKind::Phong)[1];
         let up = [0.0, 0.0, 1.0];
         let expected = 0.5 / std::f64::consts::PI + 0.2 * 3.0 / std::f64::consts::TAU;
         assert!((value(&material, 1.0, up, up)[0] - expected).abs() < 1e-7);
         let down = [0.0, 0.0, -1.0];
         assert_eq!(value(&material, 1.0, down, up), [0.0; 3]);
         assert_eq!(value(&material, 1.0, up, down), [0.0; 3]);
-        let scaled = materials(BsdfKind::Phong)[2];
+        let scaled = materials(BsdfKind::Phong)[3];
         assert!((energy_scale(&scaled) - 0.99 / 1.6).abs() < 1e-7);
     }
 

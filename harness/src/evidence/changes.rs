@@ -92,7 +92,11 @@ pub fn phong_changes() -> Vec<Change> {
         slip("n is raised to cos alpha", Shading { swapped_power: true, ..right }),
         slip(
             "the specular term is multiplied by Kd",
-            Shading { specular_times_diffuse: true, ..right },
+            Shading { specular_times_diffuse: Some(0), ..right },
+        ),
+        slip(
+            "the specular term is multiplied by Kd, scaled once more",
+            Shading { specular_times_diffuse: Some(1), ..right },
         ),
         slip("no power of a negative cos alpha", Shading { clamp: Clamp::NotANumber, ..right }),
         slip(

@@ -35,8 +35,8 @@ pub struct Shading {
     pub swapped_power: bool,
     /// Whether Ks is raised with cos alpha.
     pub raised_ks: bool,
-    /// Whether the specular term is multiplied by Kd too.
-    pub specular_times_diffuse: bool,
+    /// The specular term is multiplied by Kd too, itself with this power of the energy scale.
+    pub specular_times_diffuse: Option<i32>,
     /// Whether the diffuse term is multiplied by the lobe's normalization too.
     pub diffuse_normalized: bool,
     /// Whether a surface is black only where it is both seen and lit from behind.
@@ -163,7 +163,7 @@ impl Default for Shading {
             clamp: Clamp::Base,
             swapped_power: false,
             raised_ks: false,
-            specular_times_diffuse: false,
+            specular_times_diffuse: None,
             diffuse_normalized: false,
             tests_both_at_once: false,
             tests_wo: true,
@@ -247,7 +247,9 @@ impl Shading {
             let ks = f64::from(ks[self.specular_channels[c]]);
             let own = (f64::from(kd[c]) + ks).max(0.99);
             let ks = if self.raised_ks { ks.powf(n) } else { ks };
-            let ks = if self.specular_times_diffuse { ks * f64::from(kd[c]) } else { ks };
+            let kd_too =
+                self.specular_times_diffuse.map(|power| scale.powi(power) * f64::from(kd[c]));
+            let ks = ks * kd_too.unwrap_or(1.0);
             let factor = if self.scale_by_channel { 0.99 / own / scale } else { 1.0 };
             factor * (diffuse * (self.albedo)(f64::from(kd[c])) + specular * lobe * ks)
         });

@@ -195,14 +195,13 @@ pub fn judge_pass(
             let shapes = wrong_shapes(film, frames);
             // A pass that shows hardly one value, on no shape, is no pass, whatever it draws.
             let price = match wrong > NO_PASS && shapes.wrong == shapes.shapes {
+                true if seen.all_values_right => {
+                    Price::of_raw(wrong).or("surfaces are missing", Class::Concept, 0.0)
+                }
                 true => Price::of_raw(wrong),
                 false => {
                     let other = other_pipeline(film, frames);
-                    let price = shapes.price(price_of_values(wrong, &measures, other));
-                    match seen.all_values_right {
-                        true => price.or("surfaces are missing or hidden", Class::Concept, 0.0),
-                        false => price,
-                    }
+                    shapes.price(price_of_values(wrong, &measures, other))
                 }
             };
             measures.extend(price.measure());
@@ -447,16 +446,24 @@ fn slips<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Slip<'a>> {
         ),
     ];
     // Another's material, with the other's pipeline or one's own.
-    for other in (0..count).map(Some).chain([None]) {
-        let before = move |shape: usize| other.unwrap_or(shape.saturating_sub(1)).min(count - 1);
-        slips.push((ANOTHERS, Box::new(move |bound, shape| right(bound, before(shape)))));
-        let own_pipeline = move |bound: BoundValue, shape| match bound {
+    let of_index = |shape: usize| {
+        let with_material = scene.shapes().iter().position(|other| other.material == shape);
+        with_material.unwrap_or(shape)
+    };
+    let mut whose: Vec<Vec<usize>> = (0..count).map(|other| vec![other; count]).collect();
+    whose.push((0..count).map(|shape| shape.saturating_sub(1)).collect());
+    whose.push((0..count).map(|shape| (shape + 1).min(count - 1)).collect());
+    whose.push((0..count).map(of_index).collect());
+    for whose in whose {
+        let own_pipeline = whose.clone();
+        let own_pipeline = move |bound: BoundValue, shape: usize| match bound {
             BoundValue::RhoD | BoundValue::RhoS | BoundValue::Exponent => {
-                bound.bound(scene, before(shape), phong(shape))
+                bound.bound(scene, own_pipeline[shape], phong(shape))
             }
             _ => right(bound, shape),
         };
         slips.push((ANOTHERS, Box::new(own_pipeline)));
+        slips.push((ANOTHERS, Box::new(move |bound, shape| right(bound, whose[shape]))));
     }
     slips
 }
@@ -543,6 +550,15 @@ mod tests {
     /// What a right pass binds on the assignment's Cornell box, drawn so many pixels beside its place;
     /// `position` is what shows as a world position.
     fn judged(shift_px: usize, position: impl Fn(Vec3) -> Vec3) -> Check {
+        judged_where(shift_px, position, |_| true)
+    }
+
+    /// The same of a pass that draws some of the pixels alone.
+    fn judged_where(
+        shift_px: usize,
+        position: impl Fn(Vec3) -> Vec3,
+        drawn: impl Fn(usize) -> bool,
+    ) -> Check {
         let (width, height) = (64, 48);
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let scene = root.join("scenes/a2/cbox/tinyrender/cbox_simple_offline.toml");
@@ -561,9 +577,13 @@ mod tests {
         let point = |index: usize| surface.pixels[index].1.as_ref();
         let values = BoundValue::ALL.map(|bound| {
             let of = |index| bound.expected(&scene, &film.camera, point(index)?.shape);
-            (bound, image(&|index| of(index).unwrap_or_default()))
+            let shown = |index| if drawn(index) { of(index) } else { None };
+            (bound, image(&|index| shown(index).unwrap_or_default()))
         });
-        let shown = |index| point(index).map_or(Vec3::ZERO, |point| position(point.position));
+        let shown = |index| {
+            let point = point(index).filter(|_| drawn(index));
+            point.map_or(Vec3::ZERO, |point| position(point.position))
+        };
         judge_pass("s", &film, &values, &image(&|index| shown(index)))
     }
 
@@ -583,6 +603,17 @@ mod tests {
         // A vertex stage of its own may forward anything; nothing is claimed of where that lies.
         let own = judged(0, |p| 5.0 * p);
         assert_eq!((own.verdict, place(&own)), (Verdict::Pass, Some(0.0)), "{}", own.summary);
+    }
+
+    #[test]
+    fn what_is_not_drawn_is_no_wrong_value() {
+        let some = judged_where(0, |p| p, |index| index % 20 == 0);
+        assert!(some.summary.starts_with("nothing is drawn on 95 %"), "{}", some.summary);
+        assert_eq!(some.mistake, "surfaces are missing");
+        assert!((some.error - Class::Concept.price()).abs() < 1e-9, "{}", some.error);
+        let none = judged_where(0, |p| p, |_| false);
+        assert!(none.summary.starts_with("nothing is drawn on 100 %"), "{}", none.summary);
+        assert_eq!(none.error, 1.0);
     }
 
     #[test]

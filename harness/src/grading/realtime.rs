@@ -273,12 +273,8 @@ fn no_shadow_map(
     if footprint.vertex_pipelines == 0 && footprint.vertexless_pipelines == 0 {
         return None;
     }
-    if footprint.targets == 0 && footprint.picture_targets == 0 {
-        let why = "the shadows are right, but the pass makes no texture to draw a shadow map into";
-        return Some(why.to_owned());
-    }
     if footprint.maps == 0 {
-        // A texture of another format takes no pipeline that draws pictures.
+        // Pipelines that draw pictures draw into textures of a picture's format alone.
         let none = footprint.picture_targets == 0;
         let why = "the shadows are right, but the pass makes no pipeline to draw a shadow map with";
         return none.then(|| why.to_owned());

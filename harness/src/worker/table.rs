@@ -35,12 +35,11 @@ pub struct Record {
     total: AtomicU32,
     /// One more than the bytes, so that 0 is not said.
     uploaded: AtomicU64,
-    targets: AtomicU32,
+    picture_targets: AtomicU32,
     vertex_pipelines: AtomicU32,
     vertexless_pipelines: AtomicU32,
     maps: AtomicU32,
-    picture_targets: AtomicU32,
-    _reserved: [AtomicU8; MESSAGE_AT - 68],
+    _reserved: [AtomicU8; MESSAGE_AT - 64],
     message: [AtomicU8; MESSAGE_BYTES],
 }
 
@@ -66,14 +65,13 @@ impl Record {
 
     /// Notes what a frame took.
     pub fn footprint(&self, footprint: &Footprint) {
-        let Footprint { uploaded, targets, picture_targets, .. } = *footprint;
-        let Footprint { vertex_pipelines, vertexless_pipelines, maps, .. } = *footprint;
+        let Footprint { uploaded, picture_targets, vertex_pipelines, vertexless_pipelines, maps } =
+            *footprint;
         self.uploaded.store(uploaded.saturating_add(1), Relaxed);
-        self.targets.store(targets, Relaxed);
+        self.picture_targets.store(picture_targets, Relaxed);
         self.vertex_pipelines.store(vertex_pipelines, Relaxed);
         self.vertexless_pipelines.store(vertexless_pipelines, Relaxed);
         self.maps.store(maps, Relaxed);
-        self.picture_targets.store(picture_targets, Relaxed);
     }
 
     /// Notes the answer, the state last. A message that is too long is cut.
@@ -141,11 +139,10 @@ impl SlotState {
                     worst_norm_error: f32::from_bits(u32_at(24)),
                     footprint: u64_at(40).checked_sub(1).map(|uploaded| Footprint {
                         uploaded,
-                        targets: u32_at(48),
+                        picture_targets: u32_at(48),
                         vertex_pipelines: u32_at(52),
                         vertexless_pipelines: u32_at(56),
                         maps: u32_at(60),
-                        picture_targets: u32_at(64),
                     }),
                 }
             }
@@ -186,11 +183,10 @@ mod tests {
         assert_eq!((calls, worst_norm_error, footprint), (0, 0.0, None));
         let own = Footprint {
             uploaded: 0,
-            targets: 7,
+            picture_targets: 7,
             vertex_pipelines: 8,
             vertexless_pipelines: 9,
             maps: 10,
-            picture_targets: 11,
         };
         record.footprint(&own);
         let noted = SlotState::parse(&bytes(&record));

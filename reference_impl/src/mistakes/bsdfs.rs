@@ -43,8 +43,15 @@ impl Bsdf for Diffuse {
         let untested = has(M::DiffuseNoTests) || has(M::TestsInIntegrator);
         let from_behind = cos_o <= 0.0 && !has(M::DiffuseNoWoTest) && !untested;
         let lit_from_behind = cos_i <= 0.0 && !has(M::DiffuseNoWiTest) && !untested;
-        if from_behind || lit_from_behind || has(M::DiffuseBlack) {
+        let black = match has(M::DiffuseTestsAtOnce) {
+            true => from_behind && lit_from_behind,
+            false => from_behind || lit_from_behind,
+        };
+        if black || has(M::DiffuseBlack) {
             return Vec3::ZERO;
+        }
+        if has(M::DiffuseSine) {
+            cos_i = (1.0 - cos_i * cos_i).max(0.0).sqrt();
         }
         if has(M::DiffuseNoCosine) || has(M::CosineInIntegrator) {
             cos_i = 1.0;

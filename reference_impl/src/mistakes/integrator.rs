@@ -44,7 +44,12 @@ impl Integrator for Mistaken {
         if has(M::TestsInIntegrator) && (cos_i <= 0.0 || cos_o <= 0.0) {
             return Vec3::ZERO;
         }
-        let incident = self.incident(scene, if has(M::RayDistance) { i.t } else { distance });
+        let distance = match () {
+            () if has(M::RayDistance) => i.t,
+            () if has(M::DistanceFromOrigin) => self.light_position(scene).length(),
+            () => distance,
+        };
+        let incident = self.incident(scene, distance);
         let mut radiance = visible * self.reflected(scene, &i) * incident;
         if has(M::TwoCosines) {
             radiance *= cos_i;
@@ -68,6 +73,7 @@ impl Mistaken {
         let light = self.light_position(scene);
         match () {
             () if self.mistakes.has(M::FromOrigin) => light,
+            () if self.mistakes.has(M::LightPlusPoint) => light + i.p,
             () if self.mistakes.has(M::FromCamera) => light - ray.origin,
             () => light - i.p,
         }
@@ -116,6 +122,10 @@ impl Mistaken {
         if has(M::NextMaterial) {
             asked.shape = (i.shape + 1) % scene.shapes().len();
         }
+        if has(M::MaterialOfIndex) {
+            let of_index = scene.shapes().iter().position(|shape| shape.material == i.shape);
+            asked.shape = of_index.unwrap_or(i.shape);
+        }
         scene.bsdf(&asked).eval(i)
     }
 
@@ -146,6 +156,7 @@ impl Mistaken {
         let falloff = match () {
             () if has(M::NoFalloff) => 1.0,
             () if has(M::OverR) => distance,
+            () if has(M::OverRootOfR) => distance.sqrt(),
             () if has(M::OverRCubed) => distance * squared,
             () if has(M::OverRFourth) => squared * squared,
             () if has(M::Softened) => 1.0 + squared,

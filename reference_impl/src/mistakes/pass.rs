@@ -34,7 +34,7 @@ pub fn spoil(mistakes: &Mistakes, gpu: &Gpu, scene: &Scene, pass: &mut SimplePas
     if has(M::PipelinesSwapped) {
         pass.pipelines.diffuse = pipeline(PHONG_FS)?;
     }
-    spoil_objects(mistakes, gpu, pass);
+    spoil_objects(mistakes, gpu, scene, pass);
     Ok(())
 }
 
@@ -64,7 +64,7 @@ pub fn spoil_frame(mistakes: &Mistakes, frame: &mut FrameUniforms) {
     }
 }
 
-fn spoil_objects(mistakes: &Mistakes, gpu: &Gpu, pass: &mut SimplePass) {
+fn spoil_objects(mistakes: &Mistakes, gpu: &Gpu, scene: &Scene, pass: &mut SimplePass) {
     let has = |mistake| mistakes.has(mistake);
     let visible = |object: &Object| !object.material.is_emitter();
     let materials: Vec<Material> = pass
@@ -77,6 +77,7 @@ fn spoil_objects(mistakes: &Mistakes, gpu: &Gpu, pass: &mut SimplePass) {
     for (index, object) in own.enumerate() {
         let material = match () {
             () if has(M::FirstMaterialForAll) => &materials[0],
+            () if has(M::PassMaterialOfIndex) => &scene.materials()[index],
             () if has(M::PreviousMaterial) => &materials[index.saturating_sub(1)],
             () => &materials[index],
         };

@@ -46,6 +46,12 @@ impl Phong {
         if has(M::PhongReflectSign) {
             return wi.dot(-mirrored);
         }
+        if has(M::PhongReflectNoTwo) {
+            return -wi.x * wo.x - wi.y * wo.y;
+        }
+        if has(M::PhongReflectIsNegative) {
+            return -wi.dot(wo);
+        }
         if has(M::PhongReflectForgotten) {
             return wi.dot(wo);
         }
@@ -92,6 +98,8 @@ impl Phong {
         let cos_alpha = self.cos_alpha(wo, wi);
         let peak = if has(M::PhongPowBeforeClamp) {
             cos_alpha.powf(power).max(0.0)
+        } else if has(M::PhongPowSwapped) {
+            power.powf(cos_alpha.max(0.0))
         } else if has(M::PhongNoClamp) {
             cos_alpha.powf(power)
         } else if has(M::PowerByLogarithm) {
@@ -104,6 +112,7 @@ impl Phong {
         let factor = match () {
             () if has(M::PhongUnnormalised) => 1.0,
             () if has(M::PhongNPlusOne) => (n + 1.0) * INV_TWO_PI,
+            () if has(M::PhongNoParentheses) => n + 2.0 * INV_TWO_PI,
             () if has(M::PhongNOverTwoPi) => n * INV_TWO_PI,
             () if has(M::PhongSpecularNoTwoPi) => n + 2.0,
             () if has(M::PhongSpecularOverPi) => (n + 2.0) * INV_PI,
@@ -177,6 +186,12 @@ impl Bsdf for Phong {
         if has(M::PhongPi314) {
             diffuse *= 0.318_471_34 / INV_PI;
         }
+        if has(M::PhongDiffuseNormalised) {
+            diffuse *= (self.exponent + 2.0) * INV_TWO_PI;
+        }
+        if has(M::PhongKsRaised) {
+            ks = ks.powf(self.exponent);
+        }
         let specular = scale_s * ks * self.lobe(i.wo, wi) * cos_s;
         let mut value = match () {
             () if has(M::PhongNoDiffuse) => specular,
@@ -202,6 +217,9 @@ fn scale(mistakes: &Mistakes, material: &Material) -> Vec3 {
     Vec3::splat(match () {
         () if has(M::PhongScalePerChannel) => return sum.to_array().map(below_one).into(),
         () if has(M::PhongScaleAverage) => below_one((kd.average() + ks.average()).max_element()),
+        () if has(M::PhongScaleOfPeaks) => {
+            below_one(kd.max().max_element() + ks.max().max_element())
+        }
         () if has(M::PhongScaleOfKd) => below_one(kd.max().max_element()),
         () if has(M::PhongScaleAlways) => 0.99 / sum.max_element(),
         () if has(M::PhongScaleWithoutMargin) => 1.0 / sum.max_element().max(1.0),

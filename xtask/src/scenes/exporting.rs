@@ -83,7 +83,11 @@ fn toml(scene: &Scene, realtime: bool, bonus: bool) -> String {
 fn mtl(scene: &Scene) -> String {
     let rgb = |c: &[f64; 3]| c.map(|x| decimal(x, DECIMALS)).join(" ");
     let mut text = String::from("# made by xtask scenes\n");
-    for shape in &scene.shapes {
+    let mut shapes: Vec<_> = scene.shapes.iter().collect();
+    if scene.listed_backward {
+        shapes.reverse();
+    }
+    for shape in shapes {
         text += &format!("\nnewmtl {}\n", shape.name);
         let maps = match &shape.material {
             Material::Diffuse { kd, map_kd } => {

@@ -67,6 +67,8 @@ pub struct Scene {
     /// Samples per pixel offline.
     pub spp: u32,
     pub shapes: Vec<Shape>,
+    /// Whether the MTL file lists the materials in the reverse order of the shapes.
+    pub listed_backward: bool,
     pub textures: Vec<Texture>,
 }
 
@@ -83,6 +85,7 @@ impl Scene {
             film,
             spp: 16,
             shapes: Vec::new(),
+            listed_backward: false,
             textures: Vec::new(),
         }
     }

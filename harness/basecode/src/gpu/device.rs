@@ -36,9 +36,7 @@ const LONG_WGSL: u64 = 64 << 10;
 pub struct Footprint {
     /// Bytes of buffers, textures and overlong shaders.
     pub uploaded: u64,
-    /// Textures to draw into, 32 texels wide or more, of another format than a picture's.
-    pub targets: u32,
-    /// The same of a picture's format.
+    /// Textures to draw into, of a picture's format, 32 texels wide or more.
     pub picture_targets: u32,
     /// Pipelines for pictures that take vertices.
     pub vertex_pipelines: u32,
@@ -53,7 +51,6 @@ impl Footprint {
     pub fn and(self, later: Self) -> Self {
         Self {
             uploaded: self.uploaded.saturating_add(later.uploaded),
-            targets: self.targets.saturating_add(later.targets),
             picture_targets: self.picture_targets.saturating_add(later.picture_targets),
             vertex_pipelines: self.vertex_pipelines.saturating_add(later.vertex_pipelines),
             vertexless_pipelines: self
@@ -73,7 +70,6 @@ impl std::str::FromStr for Footprint {
         let mut next = || numbers.next().unwrap_or_default();
         Ok(Self {
             uploaded: next().parse()?,
-            targets: next().parse()?,
             picture_targets: next().parse()?,
             vertex_pipelines: next().parse()?,
             vertexless_pipelines: next().parse()?,
@@ -85,10 +81,8 @@ impl std::str::FromStr for Footprint {
 /// The numbers, as `draw_frame` tells the host.
 impl fmt::Display for Footprint {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Self { uploaded, targets, picture_targets, .. } = self;
-        let Self { vertex_pipelines, vertexless_pipelines, maps, .. } = self;
-        write!(f, "{uploaded} {targets} {picture_targets} ")?;
-        write!(f, "{vertex_pipelines} {vertexless_pipelines} {maps}")
+        let Self { uploaded, picture_targets, vertex_pipelines, vertexless_pipelines, maps } = self;
+        write!(f, "{uploaded} {picture_targets} {vertex_pipelines} {vertexless_pipelines} {maps}")
     }
 }
 
@@ -107,7 +101,6 @@ pub(super) struct Overrides {
 #[derive(Default)]
 pub(super) struct Watch {
     uploaded: AtomicU64,
-    targets: AtomicU32,
     picture_targets: AtomicU32,
     vertex_pipelines: AtomicU32,
     vertexless_pipelines: AtomicU32,
@@ -127,7 +120,6 @@ impl Watch {
     pub(super) fn take_footprint(&self) -> Footprint {
         Footprint {
             uploaded: self.uploaded.swap(0, Relaxed),
-            targets: self.targets.swap(0, Relaxed),
             picture_targets: self.picture_targets.swap(0, Relaxed),
             vertex_pipelines: self.vertex_pipelines.swap(0, Relaxed),
             vertexless_pipelines: self.vertexless_pipelines.swap(0, Relaxed),
@@ -267,10 +259,9 @@ impl Device {
 
     /// As [`wgpu::Device::create_texture`].
     pub fn create_texture(&self, desc: &wgpu::TextureDescriptor) -> wgpu::Texture {
-        if desc.usage.contains(wgpu::TextureUsages::RENDER_ATTACHMENT) && desc.size.width >= WIDE {
-            let picture = desc.format == COLOR_FORMAT;
-            let targets = if picture { &self.watch.picture_targets } else { &self.watch.targets };
-            targets.fetch_add(1, Relaxed);
+        let drawn_into = desc.usage.contains(wgpu::TextureUsages::RENDER_ATTACHMENT);
+        if drawn_into && desc.format == COLOR_FORMAT && desc.size.width >= WIDE {
+            self.watch.picture_targets.fetch_add(1, Relaxed);
         }
         self.device.create_texture(desc)
     }

@@ -60,7 +60,11 @@ fn levels(dark: f64, lit: f64) -> Option<Vec<Deviation>> {
     let is = |value: f64, other: f64| (value - other).abs() < SAME;
     Some(match (dark, lit) {
         _ if is(dark, 1.0) && is(lit, 1.0) => {
-            vec![say("remains", 1.0, "nothing is in shadow: is visibility tested at all?".into())]
+            vec![say(
+                "remains",
+                1.0,
+                "nothing is in shadow: is visibility tested, and toward the light?".into(),
+            )]
         }
         _ if is(dark, 0.0) && is(lit, 0.0) => {
             vec![say("lit_remains", 0.0, "everything is in shadow".into())]

@@ -327,7 +327,7 @@ fn same_shading(with: [f32; 3], without: [f32; 3]) -> bool {
 }
 
 /// The measure of how much of a scene the shadows switch changes.
-const SWITCHED: &str = "rays that the shadows switch changes (fraction)";
+pub(super) const SWITCHED: &str = "rays that the shadows switch changes (fraction)";
 
 /// The least fraction of rays whose radiance is wrong where the light stands elsewhere.
 const LIGHT_ELSEWHERE: f64 = 0.9;
@@ -359,7 +359,10 @@ pub fn leave_unjudged(checks: &mut [Check]) {
     };
     // Black on lit rays, with shadows and without, by a renderer that obeys the switch elsewhere.
     let obeys = checks.iter().any(|check| judged(check) && switched(check) > 0.0);
-    let no_dark_is_lit = |check: &Check| check.measures.last().is_some_and(|dark| dark.passed);
+    let no_dark_is_lit = |check: &Check| {
+        let mut dark = check.measures.iter().filter(|m| m.rule == Some(RuleId::ShadowDark));
+        dark.all(|dark| dark.passed)
+    };
     for check in checks.iter_mut().filter(|check| is(check, CheckId::ShadowRays, Verdict::Fail)) {
         if obeys && switched(check) == 0.0 && no_dark_is_lit(check) {
             check.verdict = Verdict::NotJudged;
@@ -436,7 +439,7 @@ fn shadow_hint(lit: &mut [f64], dark: &mut [f64]) -> String {
     match (wrong(lit, 1.0), wrong(dark, 0.0)) {
         (false, true) => match level(dark) {
             Some(left) if left > 1.0 - HALF_LIGHT => {
-                "no point is in shadow: is visibility tested at all?".into()
+                "no point is in shadow: is visibility tested, and toward the light?".into()
             }
             Some(left) => format!("shadows leave {:.0} % of the light", percent(left)),
             None if bright(dark) => {

@@ -175,6 +175,16 @@ fn shadows_are_judged_where_radiance_is_right() {
     };
     assert_eq!(verdicts(&explained(0.02)), [fail, fail, pass, fail]);
     assert_eq!(verdicts(&explained(0.05)), [fail, Verdict::NotJudged, pass, fail]);
+    // Where the switch changes nothing, what is black without shadows too is judged elsewhere; what is lit is not.
+    let switched = |changed, dark: f64| {
+        let measures = vec![
+            Measure::at_most(RuleId::ShadowDark, "shadowed rays that are not dark", dark, 0.1),
+            Measure::at_most(None, shadows::SWITCHED, changed, 1.0),
+        ];
+        Check { measures, ..check(CheckId::ShadowRays, "cbox", fail) }
+    };
+    assert_eq!(verdicts(&[switched(0.5, 0.5), switched(0.0, 0.0)]), [fail, Verdict::NotJudged]);
+    assert_eq!(verdicts(&[switched(0.5, 0.5), switched(0.0, 1.0)]), [fail, fail]);
     // A scene without shadows is no other scene to judge them on.
     let open = [emitter.as_slice(), &[check(CheckId::RadianceLit, "open", pass)]].concat();
     assert_eq!(verdicts(&open), [fail, fail, pass]);

@@ -55,6 +55,15 @@ mistakes! {
         (PHONG, COS_ALPHA, "let cos_alpha = dot(reflect(-wo, n), wi);"),
         (PHONG, POWER, "pow(abs(cos_alpha), exponent);");
     "phong-fs-blinn": (PHONG, COS_ALPHA, "let cos_alpha = max(dot(normalize(wo + wi), n), 0.0);");
+    "phong-fs-reflect-no-2":
+        (PHONG, COS_ALPHA, "let cos_alpha = max(dot(n * dot(n, wo) - wo, wi), 0.0);");
+    "phong-fs-not-a-number": (PHONG, COS_ALPHA, "let cos_alpha = dot(reflect(-wo, n), wi);");
+    "phong-fs-pow-swapped": (PHONG, POWER, "pow(exponent, cos_alpha);");
+    "phong-fs-no-parentheses": (PHONG, FACTOR, "(exponent + 2.0 / (2.0 * PI)) *");
+    "phong-fs-times-rho-d": (PHONG, SPECULAR, "material.rho_s.rgb * material.rho_d.rgb * lobe;");
+    "phong-fs-over-root-r": (PHONG, FALLOFF, "/ sqrt(sqrt(r2)) *");
+    "phong-fs-distance-from-origin":
+        (PHONG, FALLOFF, "/ dot(frame.light_position.xyz, frame.light_position.xyz) *");
     "phong-fs-n-plus-1": (PHONG, FACTOR, "(exponent + 1.0) / (2.0 * PI) *");
     "phong-fs-n-over-2pi": (PHONG, FACTOR, "exponent / (2.0 * PI) *");
     "phong-fs-specular-no-2pi": (PHONG, FACTOR, "(exponent + 2.0) *");

@@ -124,6 +124,17 @@ impl SimplePass {
         let blockers = buffer(bytemuck::cast_slice(&blockers), wgpu::BufferUsages::STORAGE);
         let surfaces = buffer(bytemuck::cast_slice(&all.surfaces), wgpu::BufferUsages::STORAGE);
         let globals = buffer(&[0; 112], wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST);
+        // As wide as a shadow map, but nothing is ever drawn into it.
+        drop(gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width: 64, height: 64, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Depth32Float,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        }));
         let layout = layout(&gpu.device);
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,

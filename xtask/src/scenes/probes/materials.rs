@@ -37,15 +37,17 @@ pub fn exponents() -> Scene {
         .lit_by(dvec3(0.25, 1.0, -0.5), [5.0, 5.0, 5.0])
 }
 
-/// Three Phong spheres of unlike Kd and Ks; the radiance stays below 1 everywhere.
+/// Three Phong spheres of unlike Kd and Ks; the radiance stays below 1 everywhere. The largest values of Kd and of Ks
+/// of the left one sum to more than 1, those of Kd + Ks do not.
 pub fn coloured() -> Scene {
     let at = |x: f64| ball(dvec3(x, 0.597, 0.0), 0.6);
-    probe("coloured", dvec3(0.0, 2.0, 6.5), dvec3(0.0, 0.45, 0.0), 26.0)
+    let scene = probe("coloured", dvec3(0.0, 2.0, 6.5), dvec3(0.0, 0.45, 0.0), 26.0)
         .with("floor", Material::diffuse([0.35, 0.6, 0.8]), floor(0.0, [-6.0, -7.0], [6.0, 4.0]))
-        .with("left", Material::phong([0.6, 0.25, 0.1], [0.05, 0.2, 0.35], 8.0), at(-1.4))
+        .with("left", Material::phong([0.7, 0.25, 0.1], [0.05, 0.2, 0.35], 8.0), at(-1.4))
         .with("middle", Material::phong([0.1, 0.5, 0.3], [0.35, 0.1, 0.2], 10.0), at(0.0))
         .with("right", Material::phong([0.15, 0.2, 0.6], [0.2, 0.35, 0.05], 12.0), at(1.4))
-        .lit_by(dvec3(1.0, 3.5, 3.0), [16.0, 10.0, 4.5])
+        .lit_by(dvec3(1.0, 3.5, 3.0), [16.0, 10.0, 4.5]);
+    Scene { listed_backward: true, ..scene }
 }
 
 /// A diffuse floor, a Phong wall and a Phong sphere with textures.
