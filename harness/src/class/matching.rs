@@ -341,7 +341,7 @@ impl Decision {
         let students = self.student.is_some() && first.student.is_some();
         let what = if students { "a student" } else { "a time" };
         let hint = if students { "; one submission has one student" } else { "" };
-        format!("{place}: submission {submission:?} has {what} already, on line {line}{hint}")
+        format!("{place}: submission \"{submission}\" has {what} already, on line {line}{hint}")
     }
 
     /// The time with the submission that it is said of; nothing where it says no time.
