@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::class::mending::Mend;
-use crate::class::{Policy, Stated};
+use crate::class::{Policy, Stated, late};
 use crate::files::Scratch;
 use crate::imaging::evidence::Tolerances;
 use crate::rubric::Rules;
@@ -177,6 +177,12 @@ impl Assignment {
         if let Some(message) = assignment.problem() {
             return Err(AssignmentError::Contradiction { path, message });
         }
+        if let Some(late::Problem { at, message, other }) = assignment.problem_of_dates() {
+            let line = |at: &[String]| intake::line_of(&text, at).unwrap_or(1);
+            let there = other.map(|other| format!(", on line {}", line(&other)));
+            let message = message + &there.unwrap_or_default();
+            return Err(AssignmentError::Parse { path, line: line(&at) as usize, message });
+        }
         // Children are told paths from it, and have other folders than this process is in.
         assignment.root = std::path::absolute(root)
             .map_err(|source| AssignmentError::Read { path: path.clone(), source })?;
@@ -199,9 +205,6 @@ impl Assignment {
 
     fn problem(&self) -> Option<String> {
         if let Some(problem) = self.rules.problem() {
-            return Some(problem);
-        }
-        if let Some(problem) = self.late.as_ref().and_then(Policy::problem) {
             return Some(problem);
         }
         if let Some(problem) = self.mend.as_ref().and_then(Mend::problem) {
@@ -227,10 +230,16 @@ impl Assignment {
                 ));
             }
         }
-        if self.scenes.is_empty() {
-            return Some("no scene is named".into());
+        self.scenes.is_empty().then(|| "no scene is named".into())
+    }
+
+    /// What is wrong with the due date or the late policy, if anything.
+    fn problem_of_dates(&self) -> Option<late::Problem> {
+        if let Err(error) = self.due.parse::<jiff::Timestamp>() {
+            let message = format!("due: {error}");
+            return Some(late::Problem { at: vec!["due".into()], message, other: None });
         }
-        self.due.parse::<jiff::Timestamp>().err().map(|error| format!("due: {error}"))
+        self.late.as_ref().and_then(|late| late.problem(&self.due))
     }
 
     /// Where the expected images of a stored scene lie.

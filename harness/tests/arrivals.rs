@@ -117,7 +117,8 @@ fn a_class_as_a_learning_platform_lays_it_out() {
     // Cem: refused, for its own reason.
     assert_eq!(
         remarks(2),
-        "it was not unpacked: ../x: entry name refused: expected a plain relative path, found '..'"
+        "it was not unpacked: ../x: entry name refused: expected a plain relative path, found '..' (hint: archive the \
+         folder itself, without '..')"
     );
     // Dan: what --fix would do.
     assert!(

@@ -16,7 +16,7 @@ fn the_autograder_grades_and_always_leaves_results() {
     let place = tempfile::tempdir().unwrap();
     let at = |name: &str| place.path().join(name);
     let late = serde_json::json!({"penalty": 1, "unit": "points", "per": "day",
-        "extensions": [{"student": "260000001"}]});
+        "extensions": [{"student": "260000001", "late_days": 1}]});
     let root = one_scene(&at("assignment"), |config| config["late"] = late.clone());
     let output = Command::new(env!("CARGO_BIN_EXE_umbra"))
         .args(["gradescope-pack", "autograder.zip", "--perturb", "20191006", "--root"])

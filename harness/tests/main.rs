@@ -17,6 +17,7 @@ mod downloads;
 mod expected;
 mod full_disk;
 mod gradescope;
+mod instructor;
 mod intake;
 mod intake_properties;
 mod isolation;

@@ -78,7 +78,17 @@ fn the_merged_report_is_that_of_one_machine_whatever_becomes_of_the_tasks() {
 fn what_was_judged_otherwise_is_refused_by_name() {
     let batch = Batch::new(&FIVE[..3]);
     assert_eq!(task(&batch, "slice:1/2", &[]).0, Some(0));
+    // Said before it grades; a task on a machine that does not see the others' files yet goes on.
+    let (code, text) = task(&batch, "slice:2/2", &["--perturb", "off"]);
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("all tasks of a partition use the same seed"), "{text}");
+    let (work, aside) = (batch.instructor("work"), batch.out().join("aside"));
+    fs::rename(&work, &aside).unwrap();
     assert_eq!(task(&batch, "slice:2/2", &["--perturb", "off"]).0, Some(0));
+    for file in aside.read_dir().unwrap().flatten() {
+        fs::rename(file.path(), work.join(file.file_name())).unwrap();
+    }
+    fs::remove_dir(&aside).unwrap();
     let (code, text) = merge(&batch, &[]);
     assert_eq!(code, Some(2), "{text}");
     assert!(text.contains("judged by different programs, scenes, limits or seeds"), "{text}");

@@ -173,7 +173,8 @@ pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> 
             let found = &search.found.skipped[said..];
             let other =
                 skipped(found).map_or("it is empty".into(), |names| format!("it holds {names}"));
-            let other = search.found.unopened.first().cloned().unwrap_or(other);
+            let unopened = search.found.unopened.first().map(|(_, why)| why.clone());
+            let other = unopened.unwrap_or(other);
             let platform = wanted.from.filter(|kind| *kind != Kind::Plain);
             let platform = platform.map_or(String::new(), |kind| {
                 format!(", in {} named like {}", kind.title(), kind.pattern())
@@ -195,7 +196,8 @@ pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> 
 struct Found {
     sources: Vec<Source>,
     skipped: Vec<String>,
-    unopened: Vec<String>,
+    /// Names with the reason.
+    unopened: Vec<(String, String)>,
     /// Of clones: their names below the given path.
     clones: Vec<String>,
     /// What Gradescope says of its folders.
@@ -245,8 +247,11 @@ impl Found {
         let kind = from.unwrap_or_else(recognised);
         let labels: Vec<Option<Label>> = names.iter().map(|name| label(kind, name)).collect();
         let mut empty: BTreeMap<String, Empty> = BTreeMap::new();
-        let is_known =
-            |own: &Label| labels.iter().flatten().any(|label| label.submission == own.submission);
+        let unopened: Vec<Label> =
+            self.unopened.iter().filter_map(|(name, _)| label(kind, name)).collect();
+        let is_known = |own: &Label| {
+            labels.iter().flatten().chain(&unopened).any(|label| label.submission == own.submission)
+        };
         for name in &self.skipped {
             if let Some(label) = label(kind, name).filter(|label| !is_known(label)) {
                 let entry = empty.entry(label.submission.clone());
@@ -258,7 +263,8 @@ impl Found {
         for (source, label) in self.sources.iter_mut().zip(labels) {
             source.label = label;
         }
-        let (copies, unopened) = (Vec::new(), self.unopened);
+        let copies = Vec::new();
+        let unopened = self.unopened.into_iter().map(|(_, why)| why).collect();
         Collected { kind, sources: self.sources, skipped: self.skipped, empty, copies, unopened }
     }
 }
@@ -304,17 +310,21 @@ impl Search<'_> {
                     self.found.sources.push(Source { path, name, place, label: None });
                     continue;
                 }
-                let before = (self.found.sources.len(), self.found.skipped.len());
+                let all = |found: &Found| {
+                    (found.sources.len(), found.skipped.len(), found.unopened.len())
+                };
+                let before = all(&self.found);
                 if depth < MAX_DEPTH {
                     self.descend(&path, &place, &format!("{name}/"), depth + 1)?;
                 }
-                if before == (self.found.sources.len(), self.found.skipped.len()) {
+                if before == all(&self.found) {
                     self.found.skipped.push(format!("{name}/{NOTHING}"));
                 }
             } else if downloads && self.download(&path, &place, &format!("{name}/"), None)? {
                 // Its submissions are found.
             } else if let Some(platform) = self.looks_like(&path, &place) {
-                self.found.unopened.push(unopened(&name, platform, &place));
+                let why = unopened(&name, platform, &place);
+                self.found.unopened.push((name, why));
             } else if kind.is_symlink() || (kind.is_file() && is_archive(&path)) {
                 // A link is refused as a submission, so that somebody looks at it.
                 self.found.sources.push(Source { path, name, place, label: None });
@@ -328,8 +338,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether all archives in a folder that was given are zips of many. One among others may be a student's
-    /// that is made to look like one.
+    /// Whether all submissions in a folder that was given are zips of many. One among others, which may lie in folders, may
+    /// be a student's that is made to look like one.
     fn downloads(&self, folder: &Path, depth: usize) -> anyhow::Result<bool> {
         if depth > 0 {
             return Ok(false);
@@ -337,6 +347,9 @@ impl Search<'_> {
         let mut several = false;
         for entry in entries(folder)? {
             let path = entry.path();
+            if path.is_dir() && self.holds_any(&path, depth)? {
+                return Ok(false);
+            }
             if has_end_of_archive(&path.to_string_lossy()) && path.is_file() {
                 let is_one = download::may_be(&path)
                     && !is_labelled(&file_name(&path))
@@ -349,6 +362,36 @@ impl Search<'_> {
             }
         }
         Ok(several)
+    }
+
+    /// Whether a folder is a submission or holds one.
+    fn holds_any(&self, folder: &Path, depth: usize) -> anyhow::Result<bool> {
+        let tree = self.wanted.tree;
+        let name = file_name(folder);
+        let is_output = self
+            .output
+            .as_ref()
+            .is_some_and(|output| folder.canonicalize().is_ok_and(|own| own == *output));
+        if name.starts_with('.') || tree.ignored_by(&name).is_some() || is_output {
+            return Ok(false);
+        }
+        if is_submission(folder, tree)? {
+            return Ok(true);
+        }
+        for entry in entries(folder)? {
+            let path = entry.path();
+            let is_own = path.is_file() && is_archive(&path);
+            let is_link = path.is_symlink();
+            if is_own
+                || (!is_link
+                    && path.is_dir()
+                    && depth < MAX_DEPTH
+                    && self.holds_any(&path, depth + 1)?)
+            {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Unpacks a zip of many and searches it; false where it is none.

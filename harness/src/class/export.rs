@@ -3,7 +3,7 @@
 use super::layout::Kind;
 use super::names;
 use super::roster::{Roster, Student};
-use crate::harmless::csv_cell;
+use crate::harmless::{csv_cell, printable};
 
 /// The points of one student of a class list.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,38 +14,88 @@ pub struct Points<'a> {
     pub points: f64,
 }
 
+/// A grade book to be imported.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Book {
+    /// The file.
+    pub text: String,
+    /// The column that is filled.
+    pub column: String,
+    /// The most that the platform takes in it, where the list says so.
+    pub maximum: Option<f64>,
+    /// The items that the list has instead, where it lacks that column.
+    pub others: Option<Vec<String>>,
+    /// Students whom the platform excuses; they are left out.
+    pub excused: Vec<String>,
+}
+
 /// A grade book of `roster`'s platform with the points of some students in the column `item`; everybody else is left
 /// out, so that an import does not touch them.
 ///
 /// # Errors
-/// When the list is no export of a platform that imports grades, or has no such column.
-pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<String, String> {
+/// When the list is no export of a platform that imports grades, or has no such column, or several, or one that takes no
+/// points.
+pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Book, String> {
     let list = roster.path.display();
     let named = |wanted: &[&str]| -> Vec<usize> {
         let of = |name: &String| wanted.contains(&names::letters(name).as_str());
         roster.header.iter().enumerate().filter(|(_, name)| of(name)).map(|(at, _)| at).collect()
     };
-    // Columns that are copied, and the names of those that are not there yet.
-    let (copied, filled) = match roster.kind {
+    let cell = |row: usize, column: usize| -> &str {
+        let row: &[String] = roster.rows.get(row).map_or(&[], Vec::as_slice);
+        row.get(column).map_or("", |text| text.trim())
+    };
+    let title = |at: &usize| title(roster.kind, &roster.header[*at]);
+    let is_item = |at: &usize| names::plain(title(at)) == names::plain(item.trim());
+    let items: Vec<usize> = (0..roster.header.len()).filter(|at| !title(at).is_empty()).collect();
+    let called = |all: &[usize]| {
+        all.iter().map(|at| roster.header[*at].trim().to_owned()).collect::<Vec<_>>()
+    };
+    // The column as it is written goes before all that only read the same.
+    let exact = items.iter().copied().filter(|at| roster.header[*at] == item).collect::<Vec<_>>();
+    let mut own: Vec<usize> = items.iter().copied().filter(is_item).collect();
+    if !exact.is_empty() {
+        own = exact;
+    }
+    if own.len() > 1 {
+        return Err(format!(
+            "{list}:1: expected one column of the assignment \"{item}\", found {}: {}; hint: {}",
+            own.len(),
+            printable(&called(&own).join(", ")),
+            match roster.kind {
+                Kind::Canvas => {
+                    format!("name one as it is written, --item \"{}\"", roster.header[own[0]])
+                }
+                _ => "rename one on the platform and export again".to_owned(),
+            }
+        ));
+    }
+    let own = own.first().copied();
+    let mut book = Book::default();
+    let copied = match roster.kind {
         Kind::Brightspace => {
-            let points = format!("{item} Points Grade");
-            let own = roster.header.iter().find(|name| {
-                let rest = name.strip_prefix(&points);
-                rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(" <"))
-            });
-            (named(&["orgdefinedid", "username"]), own.cloned().unwrap_or(points))
+            book.column =
+                own.map_or_else(|| format!("{item} Points Grade"), |at| roster.header[at].clone());
+            book.maximum = own.and_then(|at| max_points(&roster.header[at]));
+            let is_grade = |name: &&String| name.contains(" Grade");
+            let others = || roster.header.iter().filter(is_grade).cloned().collect();
+            book.others = own.is_none().then(others);
+            named(&["orgdefinedid", "username"])
         }
         Kind::Canvas => {
-            let title = format!("{item} (");
-            let own = |name: &&String| *name == item || name.starts_with(&title);
-            let found: Vec<&String> = roster.header.iter().filter(own).collect();
-            let [column] = found[..] else {
+            let Some(at) = own else {
                 return Err(format!(
-                    "{list}:1: expected one column of the assignment \"{item}\", found {}; hint: export the grade \
-                     book after the assignment is made, and name it with --item",
-                    found.len()
+                    "{list}:1: expected one column of the assignment \"{item}\", found none; the columns are: {}; hint: \
+                     name one with --item, or export the grade book after the assignment is made",
+                    printable(&called(&items).join(", "))
                 ));
             };
+            book.column.clone_from(&roster.header[at]);
+            let possible = |row: &usize| names::plain(cell(*row, 0)).trim() == "points possible";
+            let possible = (0..roster.rows.len()).find(possible);
+            book.maximum = possible.and_then(|row| number(cell(row, at)));
+            let is_excused = |own: &&Points| cell(own.student.row, at).eq_ignore_ascii_case("EX");
+            book.excused = graded.iter().filter(is_excused).map(|own| own.student.who()).collect();
             let known = [
                 "student",
                 "lastname",
@@ -57,16 +107,29 @@ pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Stri
                 "rootaccount",
                 "section",
             ];
-            (named(&known), column.clone())
+            named(&known)
         }
         Kind::Moodle => {
-            let Some(at) = roster.header.iter().position(|name| names::letters(name) == "grade")
-            else {
+            let Some(&at) = named(&["grade", "note"]).first() else {
                 return Err(format!(
                     "{list}:1: expected a column Grade; hint: download the grading worksheet of the assignment"
                 ));
             };
-            ((0..roster.header.len()).filter(|own| *own != at).collect(), roster.header[at].clone())
+            let has_points =
+                |own: &usize| graded.iter().any(|row| !cell(row.student.row, *own).is_empty());
+            if named(&["scale", "bareme"]).iter().any(has_points) {
+                return Err(format!(
+                    "{list}:1: the assignment is graded on a scale of words, and points are no such word; hint: give it \
+                     a maximum grade in Moodle, and download the worksheet again"
+                ));
+            }
+            book.column.clone_from(&roster.header[at]);
+            let most = named(&["maximumgrade", "notemaximale"]);
+            let most = most.first().into_iter();
+            let most = most
+                .flat_map(|column| graded.iter().map(move |row| cell(row.student.row, *column)));
+            book.maximum = most.filter_map(number).min_by(f64::total_cmp);
+            (0..roster.header.len()).filter(|own| *own != at).collect()
         }
         _ => {
             return Err(format!(
@@ -85,10 +148,13 @@ pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Stri
         }
     };
     let mut head = pick(&roster.header);
-    head.push(filled);
+    head.push(book.column.clone());
     end(&mut head, "End-of-Line Indicator");
     rows.push(head);
     for Points { student, points } in graded {
+        if book.excused.contains(&student.who()) {
+            continue;
+        }
         let mut row = pick(&roster.rows[student.row]);
         row.push(format!("{points:.2}"));
         end(&mut row, "#");
@@ -101,7 +167,38 @@ pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Stri
         writer.write_record(cells).map_err(|error| error.to_string())?;
     }
     let bytes = writer.into_inner().map_err(|error| error.to_string())?;
-    String::from_utf8(bytes).map_err(|error| error.to_string())
+    book.text = String::from_utf8(bytes).map_err(|error| error.to_string())?;
+    Ok(book)
+}
+
+/// The assignment that a column holds the points of; empty where it holds none.
+fn title(kind: Kind, column: &str) -> &str {
+    let column = column.trim();
+    match kind {
+        // `A2 Points Grade <Numeric MaxPoints:100>`
+        Kind::Brightspace => {
+            let name = column.split(" <").next().unwrap_or_default();
+            name.strip_suffix(" Points Grade").unwrap_or_default()
+        }
+        // `A2 (55502)`
+        Kind::Canvas => {
+            let parts = column.strip_suffix(')').and_then(|rest| rest.rsplit_once(" ("));
+            let is_number = |id: &str| !id.is_empty() && id.bytes().all(|b| b.is_ascii_digit());
+            parts.filter(|(_, id)| is_number(id)).map_or("", |(name, _)| name)
+        }
+        _ => "",
+    }
+}
+
+/// What Brightspace says in the heading of a column.
+fn max_points(column: &str) -> Option<f64> {
+    let (_, rest) = column.split_once("MaxPoints:")?;
+    number(rest.split([' ', '>']).next()?)
+}
+
+/// A number with a point or a comma.
+fn number(text: &str) -> Option<f64> {
+    text.trim().replace(',', ".").parse().ok().filter(|number: &f64| number.is_finite())
 }
 
 #[cfg(test)]
@@ -113,6 +210,10 @@ mod tests {
     use super::*;
 
     fn book(list: &str, item: &str) -> Result<String, String> {
+        whole(list, item).map(|book| book.text)
+    }
+
+    fn whole(list: &str, item: &str) -> Result<Book, String> {
         let roster = Roster::parse(list.as_bytes(), Path::new("list.csv")).unwrap();
         // All but the last.
         let graded = &roster.students[..roster.students.len() - 1];
@@ -149,5 +250,64 @@ mod tests {
              Participant 7,'@Zoë,Submitted,100,-,87.50\n"
         );
         assert!(book("Name,SID\nA,1\nB,2\n", "A2").unwrap_err().contains("grade with --class"));
+    }
+
+    #[test]
+    fn the_column_says_what_it_takes() {
+        let brightspace =
+            |columns: &str| format!("OrgDefinedId,{columns},End-of-Line Indicator\n#1,,#\n#2,,#\n");
+        let read = |columns: &str, item: &str| whole(&brightspace(columns), item);
+        let own = read("A2 Points Grade <Numeric MaxPoints:50 Weight:10>", "a2").unwrap();
+        assert_eq!((own.maximum, own.others), (Some(50.0), None));
+        assert_eq!(own.column, "A2 Points Grade <Numeric MaxPoints:50 Weight:10>");
+        let new =
+            read("A1 Points Grade <Numeric MaxPoints:50>,A2 Text Grade <Text>", "a2").unwrap();
+        assert_eq!((new.column.as_str(), new.maximum), ("a2 Points Grade", None));
+        let others = ["A1 Points Grade <Numeric MaxPoints:50>", "A2 Text Grade <Text>"];
+        assert_eq!(new.others.unwrap(), others);
+        let twice =
+            "a2 Points Grade <Numeric MaxPoints:100>,a2 Points Grade <Numeric MaxPoints:50>";
+        let error = read(twice, "a2").unwrap_err();
+        assert!(error.contains("found 2: a2 Points Grade <Numeric MaxPoints:100>, a2"), "{error}");
+
+        let canvas = "Student,ID,SIS User ID,Section,A1 (76),a2 (77),a2 (78)\n    Points Possible,,,,10,50.00,100\n\
+                      \"A, A\",1,1,s,,EX,\n\"B, B\",2,2,s,,,\n\"C, C\",3,3,s,,,\n";
+        let error = whole(canvas, "A2").unwrap_err();
+        assert!(error.contains("found 2: a2 (77), a2 (78); hint: name one as it is"), "{error}");
+        let error = whole(canvas, "A3").unwrap_err();
+        assert!(
+            error.contains("found none; the columns are: A1 (76), a2 (77), a2 (78);"),
+            "{error}"
+        );
+        let own = whole(canvas, "a2 (77)").unwrap();
+        assert_eq!((own.maximum, own.excused), (Some(50.0), vec!["A A (1)".to_owned()]));
+        assert_eq!(own.text.lines().skip(1).collect::<Vec<_>>(), ["\"B, B\",2,2,s,87.50"]);
+        assert_eq!(whole(canvas, "a2 (78)").unwrap().maximum, Some(100.0));
+
+        let moodle = "Identifier,Full name,Grade,LAST,Last modified (grade)\nParticipant 7,A,,VALUE,-\nParticipant 8,B,,VALUE,-\n";
+        let moodle = |last: &str, value: &str| {
+            whole(&moodle.replace("LAST", last).replace("VALUE", value), "")
+        };
+        assert_eq!(moodle("Maximum grade", "50.00").unwrap().maximum, Some(50.0));
+        let error = moodle("Scale", "\"Bad, Good\"").unwrap_err();
+        assert!(error.contains("graded on a scale of words"), "{error}");
+    }
+
+    #[test]
+    fn a_worksheet_of_moodle_in_french() {
+        let list = "Identifiant,\"Nom complet\",\"Num\u{e9}ro d\u{2019}identification\",Statut,Note,\"Note maximale\",\
+                    \"Derni\u{e8}re modification (travail remis)\"\n\
+                    \"Participant 701\",\"Ann Ash\",260000101,x,,\"100,00\",\"mardi 8 octobre 2019, 13:05\"\n\
+                    \"Participant 702\",\"Bob Bay\",260000102,x,,\"100,00\",-\n";
+        let roster = Roster::parse(list.as_bytes(), Path::new("list.csv")).unwrap();
+        let ann = &roster.students[0];
+        assert_eq!((roster.kind, ann.id.as_str()), (Kind::Moodle, "701"));
+        assert_eq!(
+            [ann.number.as_str(), ann.submitted.as_str()],
+            ["260000101", "2019-10-08T13:05:00"]
+        );
+        let own = whole(list, "").unwrap();
+        assert_eq!((own.column.as_str(), own.maximum), ("Note", Some(100.0)));
+        assert!(own.text.ends_with("\"mardi 8 octobre 2019, 13:05\",87.50\n"), "{}", own.text);
     }
 }

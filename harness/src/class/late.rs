@@ -5,7 +5,7 @@ use jiff::{SignedDuration, Timestamp};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::stamps;
+use super::{names, stamps};
 use crate::rubric::Grade;
 
 /// The policy.
@@ -24,7 +24,7 @@ pub struct Policy {
     pub of: Option<Of>,
     /// What is counted.
     pub per: Per,
-    /// From when on a submission is worth nothing, RFC 3339 with offset. An extension that ends later moves it.
+    /// From when on a submission is worth nothing, RFC 3339 with offset. An extension moves it by as much as the due date.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cut_off: Option<String>,
     /// Days, each of 24 hours, that every student may be late without a penalty.
@@ -105,32 +105,112 @@ pub struct Late {
     pub words: String,
 }
 
+/// What is wrong with a policy.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// The key in `config.json`, as the keys and indices on the way to it.
+    pub at: Vec<String>,
+    /// What is wrong there.
+    pub message: String,
+    /// The other key that it contradicts, if there is one.
+    pub other: Option<Vec<String>>,
+}
+
 impl Policy {
-    /// What is wrong with the policy itself, if anything.
-    pub fn problem(&self) -> Option<String> {
+    /// What is wrong with the policy itself, if anything. `due` is the class's due date.
+    pub fn problem(&self, due: &str) -> Option<Problem> {
+        let keys = |at: &[&str]| -> Vec<String> {
+            ["late"].iter().chain(at).map(|key| (*key).to_owned()).collect()
+        };
+        let wrong =
+            |at: &[&str], message: String| Some(Problem { at: keys(at), message, other: None });
         if !(self.penalty.is_finite() && self.penalty >= 0.0) {
-            return Some(format!("late.penalty is {} but must be 0 or more", self.penalty));
+            let message = format!("late.penalty is {} but must be 0 or more", self.penalty);
+            return wrong(&["penalty"], message);
         }
         match (self.unit, self.of) {
             (Unit::Percent, None) => {
-                return Some(
-                    "late: percent of what? expected \"of\": \"maximum\" or \"earned\"".into(),
-                );
+                let message = "late: percent of what? expected \"of\": \"maximum\" or \"earned\"";
+                return wrong(&["unit"], message.into());
             }
             (Unit::Points, Some(_)) => {
-                return Some("late.of is only for percent; expected none beside points".into());
+                let message = "late.of is only for percent; expected none beside points";
+                return wrong(&["of"], message.into());
             }
             _ => {}
         }
-        let zone = self.time_zone.iter().filter_map(|zone| stamps::zone(zone).err());
-        let instants = [("late.cut_off", &self.cut_off)].into_iter();
-        let instants =
-            instants.chain(self.extensions.iter().map(|own| ("late.extensions: due", &own.due)));
-        let instants = instants.filter_map(|(key, text)| {
-            let error = text.as_ref()?.parse::<Timestamp>().err()?;
-            Some(format!("{key}: {error}"))
-        });
-        zone.map(|error| format!("late.time_zone: {error}")).chain(instants).next()
+        if let Some(error) = self.time_zone.as_ref().and_then(|zone| stamps::zone(zone).err()) {
+            return wrong(&["time_zone"], format!("late.time_zone: {error}"));
+        }
+        let due: Timestamp = due.parse().ok()?;
+        match self.cut_off.as_ref().map(|text| text.parse::<Timestamp>()) {
+            Some(Err(error)) => return wrong(&["cut_off"], format!("late.cut_off: {error}")),
+            Some(Ok(cut_off)) if cut_off < due => {
+                let message = "late.cut_off lies before the due date; expected it then or later";
+                return wrong(&["cut_off"], message.into());
+            }
+            _ => {}
+        }
+        for (index, Extension { student, due: own, late_days }) in
+            self.extensions.iter().enumerate()
+        {
+            let name = format!("late.extensions[{index}]");
+            let index = index.to_string();
+            let own_keys = |key: &'static str| ["extensions", index.as_str(), key];
+            let number = names::number(student);
+            if number.is_empty() {
+                let message = format!("{name}.student: expected a student number, found nothing");
+                return wrong(&own_keys("student"), message);
+            }
+            let same = |other: &Extension| names::number(&other.student) == number;
+            let first = self.extensions.iter().position(same).map(|at| at.to_string());
+            if let Some(first) = first.filter(|first| *first != index) {
+                return Some(Problem {
+                    at: keys(&own_keys("student")),
+                    message: format!("{name}: student \"{student}\" has an extension already"),
+                    other: Some(keys(&["extensions", &first, "student"])),
+                });
+            }
+            match own.as_ref().map(|text| text.parse::<Timestamp>()) {
+                Some(Err(error)) => {
+                    return wrong(&own_keys("due"), format!("{name}.due: {error}"));
+                }
+                Some(Ok(own)) if own < due => {
+                    let message = format!(
+                        "{name}.due lies before the due date of the class; expected it then or later"
+                    );
+                    return wrong(&own_keys("due"), message);
+                }
+                None if late_days.is_none() => {
+                    let message =
+                        format!("{name} changes nothing; expected \"due\" or \"late_days\"");
+                    return wrong(&own_keys("student"), message);
+                }
+                _ => {}
+            }
+        }
+        None
+    }
+
+    /// Extensions of students who are not on a class list with these numbers.
+    pub fn strangers<'a>(&self, numbers: impl Iterator<Item = &'a str>) -> Vec<String> {
+        let numbers: Vec<String> = numbers.map(names::number).collect();
+        let all = self.extensions.iter().enumerate();
+        let own = all.filter(|(_, own)| !numbers.contains(&names::number(&own.student)));
+        own.map(|(at, own)| {
+            format!(
+                "config.json: late.extensions[{at}]: nobody on the class list has the student number \"{}\"",
+                own.student
+            )
+        })
+        .collect()
+    }
+
+    /// When the cut-off is for a student whose work is due at `own`: as long after it as the class's is after the class's
+    /// due date.
+    fn cut_off(&self, class_due: Timestamp, own: Timestamp) -> Option<Timestamp> {
+        let cut_off: Timestamp = self.cut_off.as_ref()?.parse().ok()?;
+        cut_off.checked_add(own.duration_since(class_due)).ok()
     }
 
     /// How late a submission of the stamp `submitted` is, for a student whom the numbers `own` name. The time zone is the
@@ -160,10 +240,12 @@ impl Policy {
         let covered = (i64::from(days) * 86_400 / unit_s).min(started);
         let charged = started - covered;
         let late_days = u32::try_from((covered * unit_s + 86_399) / 86_400).unwrap_or(u32::MAX);
-        let cut_off = self.cut_off.as_ref().and_then(|text| text.parse::<Timestamp>().ok());
-        let cut_off = late_s > 0 && cut_off.is_some_and(|cut_off| when > cut_off.max(due));
-        let shown =
-            |at: Timestamp| at.to_zoned(zone.clone()).strftime("%Y-%m-%d %H:%M %:z").to_string();
+        let cut_off = self.cut_off(class_due, due).filter(|at| late_s > 0 && when > *at);
+        let shown = |at: Timestamp| {
+            let at = at.to_zoned(zone.clone());
+            let seconds = if at.second() == 0 { "" } else { ":%S" };
+            at.strftime(&format!("%Y-%m-%d %H:%M{seconds} %:z")).to_string()
+        };
         let unit = match (self.per, started) {
             (Per::Day, 1) => "started day",
             (Per::Day, _) => "started days",
@@ -182,9 +264,13 @@ impl Policy {
                 let plural = if late_days == 1 { "day" } else { "days" };
                 words += &format!(", {covered} of them covered by {late_days} late {plural}");
             }
+            if let Some(cut_off) = cut_off {
+                words += &format!("; after the cut-off ({}) it is worth nothing", shown(cut_off));
+            }
         }
         let [submitted, due] = [when, due].map(|at| at.to_string());
         let (before, after) = ([0.0; 2], [0.0; 2]);
+        let cut_off = cut_off.is_some();
         Some(Late { submitted, due, late_s, charged, late_days, cut_off, before, after, words })
     }
 
@@ -212,7 +298,7 @@ impl Policy {
             if least == most { format!("{least}") } else { format!("{least}..{most}") }
         };
         let why = if late.cut_off {
-            "; after the cut-off it is worth nothing".to_owned()
+            String::new()
         } else if late.charged == 0 {
             late.words += "; that costs nothing";
             grade.remarks.push(late.words.clone());
@@ -253,19 +339,23 @@ pub fn end(due: &str, policy: Option<&Policy>) -> Option<Timestamp> {
     };
     let own = policy.extensions.iter().filter_map(|own| {
         let due = own.due.as_ref().map_or(Some(class_due), |due| due.parse().ok())?;
-        after(due, own.late_days.unwrap_or(policy.late_days))
+        after(due, own.late_days.unwrap_or(policy.late_days)).max(policy.cut_off(class_due, due))
     });
-    let cut_off = policy.cut_off.as_ref().and_then(|at| at.parse().ok());
+    let cut_off = policy.cut_off(class_due, class_due);
     after(class_due, policy.late_days).into_iter().chain(own).chain(cut_off).max()
 }
 
-/// `1 d 2 h 3 min`, its first two units.
+/// `1 d 2 h 3 min 4 s`: a second may cost a day, so nothing is rounded.
 fn span(seconds: i64) -> String {
-    let minutes = (seconds + 59) / 60;
-    let parts = [(minutes / 1440, "d"), (minutes / 60 % 24, "h"), (minutes % 60, "min")];
-    let parts = parts.into_iter().skip_while(|(value, _)| *value == 0).take(2);
-    let parts =
-        parts.filter(|(value, _)| *value > 0).map(|(value, unit)| format!("{value} {unit}"));
+    let minutes = seconds / 60;
+    let parts = [
+        (minutes / 1440, "d"),
+        (minutes / 60 % 24, "h"),
+        (minutes % 60, "min"),
+        (seconds % 60, "s"),
+    ];
+    let parts = parts.into_iter().filter(|(value, _)| *value > 0);
+    let parts = parts.map(|(value, unit)| format!("{value} {unit}"));
     parts.collect::<Vec<_>>().join(" ")
 }
 
@@ -277,7 +367,7 @@ mod tests {
 
     fn policy(text: &str) -> Policy {
         let policy: Policy = serde_json::from_str(text).unwrap();
-        assert_eq!(policy.problem(), None);
+        assert_eq!(policy.problem(DUE), None);
         policy
     }
 
@@ -328,7 +418,7 @@ mod tests {
         }
         assert_eq!(
             judged(&percent, "2019-10-08T01:10:00").1,
-            "submitted 2019-10-08 01:10 -04:00, 1 d 1 h after it was due (2019-10-06 23:59 -04:00): 2 started days; \
+            "submitted 2019-10-08 01:10 -04:00, 1 d 1 h 11 min after it was due (2019-10-06 23:59 -04:00): 2 started days; \
              2 x 10 % of the maximum: 70 instead of 90 points"
         );
     }
@@ -346,12 +436,20 @@ mod tests {
         );
         assert_eq!(judged(&plain, "2019-10-08T12:00:00").0, 80.0);
         let (points, words) = judged(&plain, "2019-10-10T12:00:00");
-        assert!(points == 0.0 && words.contains("after the cut-off"), "{words}");
-        // An extension moves the cut-off, and is one student's.
+        let named = "; after the cut-off (2019-10-09 23:59 -04:00) it is worth nothing: 0 instead of 90 points";
+        assert!(points == 0.0 && words.ends_with(named), "{words}");
+        // An extension of five days moves the cut-off by five days, and is one student's.
         let due = r#"{"student": "1", "due": "2019-10-11T23:59:00-04:00", "late_days": 0}"#;
         let own = policy(&text.replace("EXT", due));
         assert_eq!(judged(&own, "2019-10-11T12:00:00").0, 90.0);
-        assert_eq!(judged(&own, "2019-10-12T12:00:00").0, 0.0);
+        assert_eq!(judged(&own, "2019-10-12T12:00:00").0, 80.0);
+        assert_eq!(judged(&own, "2019-10-14T23:59:00").0, 60.0);
+        assert_eq!(judged(&own, "2019-10-14T23:59:01").0, 0.0);
+        // Also one that ends before the cut-off: by an hour and a half here.
+        let short = r#"{"student": "1", "due": "2019-10-07T01:29:00-04:00", "late_days": 0}"#;
+        let short = policy(&text.replace("EXT", short));
+        assert_eq!(judged(&short, "2019-10-10T01:29:00").0, 60.0);
+        assert_eq!(judged(&short, "2019-10-10T01:29:01").0, 0.0);
         assert_eq!(
             judged(
                 &policy(&text.replace("EXT", &due.replace("\"1\"", "\"2\""))),
@@ -389,13 +487,59 @@ mod tests {
             (r#", "late_days": 2, "cut_off": "2019-10-12T00:00:00Z""#, "2019-10-12T00:00:00Z"),
             (
                 r#", "cut_off": "2019-10-12T00:00:00Z",
-                    "extensions": [{"student": "1", "due": "2019-10-20T00:00:00Z", "late_days": 1}, {"student": "2"}]"#,
-                "2019-10-21T00:00:00Z",
+                    "extensions": [{"student": "1", "due": "2019-10-20T00:00:00Z", "late_days": 1},
+                        {"student": "2", "late_days": 0}]"#,
+                // The cut-off of that student.
+                "2019-10-24T20:01:00Z",
             ),
         ] {
             assert_eq!(end(&format!("{{{plain}{more}}}")), expected, "{more}");
         }
         assert_eq!(super::end("some day", None), None);
+    }
+
+    #[test]
+    fn how_late_is_said_to_the_second() {
+        let policy = policy(r#"{"penalty": 1, "unit": "points", "per": "day"}"#);
+        for (submitted, expected) in [
+            ("2019-10-08T00:20:00", "submitted 2019-10-08 00:20 -04:00, 1 d 21 min after"),
+            ("2019-10-08T23:59:01", "submitted 2019-10-08 23:59:01 -04:00, 2 d 1 s after"),
+            ("2019-10-07T03:59:00", "submitted 2019-10-07 03:59 -04:00, 4 h after"),
+        ] {
+            let words = judged(&policy, submitted).1;
+            assert!(words.starts_with(expected), "{words}");
+        }
+    }
+
+    #[test]
+    fn extensions_that_mean_nothing_are_refused_with_their_place() {
+        let late = DUE.replace("06T", "09T");
+        for (extensions, at, expected) in [
+            (
+                r#"{"student": "1", "late_days": 1}, {"student": "2", "late_days": 1}, {"student": "1 ", "due": "LATE"}"#,
+                "2 student",
+                "has an extension already",
+            ),
+            (
+                r#"{"student": "1", "due": "2019-10-06T23:58:59-04:00"}"#,
+                "0 due",
+                "before the due date",
+            ),
+            (r#"{"student": "1", "due": "tomorrow"}"#, "0 due", "late.extensions[0].due: "),
+            (r#"{"student": "1"}"#, "0 student", "changes nothing"),
+            (r#"{"student": " ", "late_days": 1}"#, "0 student", "expected a student number"),
+        ] {
+            let text = format!(
+                r#"{{"penalty": 1, "unit": "points", "per": "day", "extensions": [{}]}}"#,
+                extensions.replace("LATE", &late)
+            );
+            let problem = serde_json::from_str::<Policy>(&text).unwrap().problem(DUE).unwrap();
+            assert_eq!(problem.at[1..].join(" "), format!("extensions {at}"), "{text}");
+            assert!(problem.message.contains(expected), "{}", problem.message);
+            let other = problem.other.map(|keys| keys.join(" "));
+            let first = at.starts_with('2').then(|| "late extensions 0 student".to_owned());
+            assert_eq!(other, first);
+        }
     }
 
     #[test]
@@ -415,9 +559,13 @@ mod tests {
                 r#"{"penalty": 1, "unit": "points", "per": "day", "cut_off": "2019-10-09"}"#,
                 "late.cut_off",
             ),
+            (
+                r#"{"penalty": 1, "unit": "points", "per": "day", "cut_off": "2019-10-06T23:58:00-04:00"}"#,
+                "late.cut_off lies before the due date",
+            ),
         ] {
             let policy: Policy = serde_json::from_str(text).unwrap();
-            assert!(policy.problem().unwrap().contains(expected), "{text}");
+            assert!(policy.problem(DUE).unwrap().message.contains(expected), "{text}");
         }
     }
 }

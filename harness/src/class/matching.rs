@@ -1,5 +1,6 @@
 //! Matches submissions to students of the class list. The instructor decides uncertain cases in `matches.toml`.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context as _, bail};
@@ -9,6 +10,7 @@ use toml::Spanned;
 use super::layout::{Kind, Label};
 use super::roster::{Roster, Student};
 use super::{names, stamps};
+use crate::harmless::printable;
 
 /// The file of the instructor's decisions on whose submissions are, in the report's folder.
 pub const MATCHES: &str = "matches.toml";
@@ -29,6 +31,8 @@ pub struct Claim {
     pub number: String,
     /// The name in its `config.json`.
     pub full_name: String,
+    /// Digest of what was submitted; empty where nobody could open it.
+    pub digest: String,
 }
 
 /// Whose a submission is.
@@ -54,6 +58,8 @@ struct Decision {
     submitted: Option<String>,
     place: String,
     on: On,
+    /// Folders of submissions with another content than the one that the time was said of.
+    outdated: Vec<String>,
 }
 
 /// The submissions that a decision is on, by their folders.
@@ -80,7 +86,7 @@ struct File {
 struct Entry {
     submission: String,
     student: Option<String>,
-    submitted: Option<String>,
+    submitted: Option<Spanned<toml::Value>>,
 }
 
 impl Matches {
@@ -97,14 +103,25 @@ impl Matches {
                 error.message()
             )
         })?;
-        let mut decisions = Vec::new();
+        let mut decisions: Vec<Decision> = Vec::new();
         for entry in file.matches {
             let place = place(entry.span().start);
             let Entry { submission, student, submitted } = entry.into_inner();
             let submitted = submitted
-                .map(|text| {
-                    stamps::parse(&text).with_context(|| {
-                        format!("{place}: expected a time such as 2019-10-06T23:59:00-04:00, found {text}")
+                .map(|said| {
+                    let at = line_of(text, said.span().start);
+                    // TOML has dates of its own, without quotes.
+                    let said = match said.into_inner() {
+                        toml::Value::String(text) => text,
+                        toml::Value::Datetime(time) => time.to_string(),
+                        other => other.to_string(),
+                    };
+                    stamps::parse(&said).with_context(|| {
+                        format!(
+                            "{}:{at}: expected a time such as \"2019-10-06T23:59:00-04:00\", found {}",
+                            path.display(),
+                            printable(&said)
+                        )
                     })
                 })
                 .transpose()?;
@@ -113,8 +130,18 @@ impl Matches {
                     "{place}: expected student = \"NUMBER\" or \"{NOBODY}\", or submitted = \"TIME\""
                 );
             }
-            let on = On::Any;
-            decisions.push(Decision { submission, student, submitted, place, on });
+            if student.as_ref().is_some_and(|word| word.trim().is_empty()) {
+                bail!("{place}: student says nothing; expected a student number, or \"{NOBODY}\"");
+            }
+            let (on, outdated) = (On::Any, Vec::new());
+            let own = Decision { submission, student, submitted, place, on, outdated };
+            if let Some(first) = decisions
+                .iter()
+                .find(|first| first.submission == own.submission && first.says_as_much(&own))
+            {
+                bail!("{}", own.is_there_already(first));
+            }
+            decisions.push(own);
         }
         Ok(Self(decisions))
     }
@@ -148,6 +175,71 @@ impl Matches {
         Self(self.0.iter().map(|own| Decision { on: on(own), ..own.clone() }).collect())
     }
 
+    /// Makes sure that no two decisions are on one submission and say the same thing of it, by whatever names.
+    ///
+    /// # Errors
+    /// When two are; names both lines. One submission has one student.
+    pub fn check(&self, claims: &[Claim]) -> anyhow::Result<()> {
+        for claim in claims {
+            let own: Vec<&Decision> = self.of(claim).collect();
+            for (at, later) in own.iter().enumerate() {
+                // What is said of a folder of a platform holds where nothing is said of the one submission.
+                let same = |first: &&&Decision| {
+                    first.says_as_much(later) && first.is_on_one() == later.is_on_one()
+                };
+                if let Some(first) = own[..at].iter().find(same) {
+                    bail!("{}", later.is_there_already(first));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes sure that all students who are named are on the list.
+    ///
+    /// # Errors
+    /// When one is not; names the line.
+    pub fn check_list(&self, roster: &Roster) -> anyhow::Result<()> {
+        self.0.iter().try_for_each(|decision| decision.student_of(roster).map(|_| ()))
+    }
+
+    /// Whether a time is said of any.
+    pub fn has_times(&self) -> bool {
+        self.0.iter().any(|own| own.submitted.is_some())
+    }
+
+    /// Each decision on a time, with the folders of the submissions that it is on; see [`Matches::among`].
+    pub fn times(&self) -> impl Iterator<Item = (String, &[String])> {
+        self.0.iter().filter_map(|own| match &own.on {
+            On::Folders(slugs) => Some((own.time()?, slugs.as_slice())),
+            _ => None,
+        })
+    }
+
+    /// Leaves out times that were said of other content: `known` is the digests of the submissions that each was first
+    /// on, `digest` that of the submission in a folder now. Answers what was left out, with the lines.
+    pub fn without_outdated(
+        &mut self,
+        known: &BTreeMap<String, Vec<String>>,
+        digest: impl Fn(&str) -> String,
+    ) -> Vec<String> {
+        let mut lines = Vec::new();
+        for own in &mut self.0 {
+            let (On::Folders(slugs), Some(time)) = (&own.on, own.time()) else { continue };
+            let Some(known) = known.get(&time) else { continue };
+            own.outdated =
+                slugs.iter().filter(|own| !known.contains(&digest(own))).cloned().collect();
+            if !own.outdated.is_empty() {
+                lines.push(format!(
+                    "{}: the time was of an older submission and is not used for {}; say the new one's, or delete it",
+                    own.place,
+                    own.outdated.join(", ")
+                ));
+            }
+        }
+        lines
+    }
+
     /// Decisions on nothing that is there, with their lines; `is_seen` says what is there, graded or not.
     pub fn lost(&self, is_seen: impl Fn(&str) -> bool) -> Vec<String> {
         let lost = self.0.iter().filter_map(|Decision { submission, place, on, .. }| match on {
@@ -165,7 +257,7 @@ impl Matches {
 
     /// Whose the instructor says that a submission is, where there is no class list.
     pub fn word<'a>(&'a self, claim: &'a Claim) -> Option<&'a str> {
-        self.of(claim).find_map(|decision| decision.student.as_deref())
+        self.owner(claim)?.student.as_deref()
     }
 
     fn of<'a>(&'a self, claim: &'a Claim) -> impl Iterator<Item = &'a Decision> {
@@ -188,12 +280,22 @@ impl Matches {
 
     /// When the instructor says that a submission was submitted.
     pub fn submitted<'a>(&'a self, claim: &'a Claim) -> Option<&'a str> {
-        self.of(claim).find_map(|decision| decision.submitted.as_deref())
+        let own = self.of(claim).filter(|own| !own.outdated.contains(&claim.slug));
+        own.filter_map(|own| Some((own.submitted.as_deref()?, own.is_on_one())))
+            .max_by_key(|(_, is_on_one)| *is_on_one)
+            .map(|(time, _)| time)
+    }
+
+    /// Whose the instructor says that a submission is; what is said of it alone goes before what is said of all in a
+    /// platform's folder.
+    fn owner<'a>(&'a self, claim: &'a Claim) -> Option<&'a Decision> {
+        let own = self.of(claim).filter(|own| own.student.is_some());
+        own.max_by_key(|own| own.is_on_one())
     }
 
     /// Whether the instructor says that a submission does not count.
     pub fn is_nobody(&self, claim: &Claim) -> bool {
-        self.of(claim).any(|decision| decision.student.as_deref() == Some(NOBODY))
+        self.word(claim) == Some(NOBODY)
     }
 
     /// The student that the instructor names, by index.
@@ -201,19 +303,50 @@ impl Matches {
     /// # Errors
     /// When nobody of the list is called so.
     fn student(&self, claim: &Claim, roster: &Roster) -> anyhow::Result<Option<usize>> {
-        let named =
-            self.of(claim).find_map(|decision| Some((decision.student.as_ref()?, decision)));
-        let Some((word, decision)) = named.filter(|(word, _)| *word != NOBODY) else {
+        self.owner(claim).map_or(Ok(None), |decision| decision.student_of(roster))
+    }
+}
+
+impl Decision {
+    /// The student that it names, by index; none where it names nobody.
+    fn student_of(&self, roster: &Roster) -> anyhow::Result<Option<usize>> {
+        let Some(word) = self.student.as_ref().filter(|word| *word != NOBODY) else {
             return Ok(None);
         };
         let at = roster.students.iter().position(|student| student.is_called(word));
         at.map(Some).with_context(|| {
             format!(
                 "{}: nobody on {} has the number or account \"{word}\"; expected one of the list, or \"{NOBODY}\"",
-                decision.place,
+                self.place,
                 roster.path.display()
             )
         })
+    }
+
+    /// Whether it is on one submission alone.
+    fn is_on_one(&self) -> bool {
+        !matches!(&self.on, On::Folders(slugs) if slugs.len() > 1)
+    }
+
+    /// Whether another one says something that it says, too.
+    fn says_as_much(&self, other: &Self) -> bool {
+        (self.student.is_some() && other.student.is_some())
+            || (self.submitted.is_some() && other.submitted.is_some())
+    }
+
+    /// What is wrong where it follows another one on the same submission.
+    fn is_there_already(&self, first: &Self) -> String {
+        let line = first.place.rsplit(':').next().unwrap_or_default();
+        let Self { submission, place, .. } = self;
+        let students = self.student.is_some() && first.student.is_some();
+        let what = if students { "a student" } else { "a time" };
+        let hint = if students { "; one submission has one student" } else { "" };
+        format!("{place}: submission \"{submission}\" has {what} already, on line {line}{hint}")
+    }
+
+    /// The time with the submission that it is said of; nothing where it says no time.
+    fn time(&self) -> Option<String> {
+        Some(format!("{} {}", self.submission, self.submitted.as_ref()?))
     }
 }
 
@@ -260,8 +393,22 @@ pub fn find(claim: &Claim, roster: &Roster, matches: &Matches) -> anyhow::Result
     }
     let label = claim.label.clone().unwrap_or_default();
     if !label.others.is_empty() {
+        let of = |name: &str| {
+            let all = roster.students.iter().enumerate();
+            all.filter(move |(_, own)| is_named(name, own)).map(|(at, _)| at).collect::<Vec<_>>()
+        };
+        let mut members = by_number(roster, &label.number);
+        if members.is_empty() {
+            members = of(&label.name);
+        }
+        members.extend(label.others.iter().flat_map(|name| of(name)));
+        members.sort_unstable();
+        members.dedup();
         let who = [std::slice::from_ref(&label.name), &label.others].concat().join(", ");
-        return Ok(Match::Undecided(format!("it is a group's: {who}"), Vec::new()));
+        let reason = format!(
+            "it is a group's: {who}; one submission has one student, and the others' grades are yours to enter"
+        );
+        return Ok(Match::Undecided(reason, members));
     }
     let of = |wanted: &dyn Fn(&Student) -> bool| -> Vec<usize> {
         let all = roster.students.iter().enumerate();
@@ -293,7 +440,8 @@ pub fn find(claim: &Claim, roster: &Roster, matches: &Matches) -> anyhow::Result
         evidence.iter().filter(|(_, found)| !found.is_empty()).collect();
     let Some((_, first)) = said.first() else {
         let known = [label.who(), claim.full_name.clone(), claim.number.clone()];
-        let known: Vec<String> = known.into_iter().filter(|text| !text.is_empty()).collect();
+        let mut known: Vec<String> = known.into_iter().filter(|text| !text.is_empty()).collect();
+        known.dedup();
         let said = if known.is_empty() {
             "it says neither name nor number".to_owned()
         } else {
@@ -383,6 +531,7 @@ mod tests {
             label: (!platform.is_empty()).then_some(label),
             number: number.into(),
             full_name: full_name.into(),
+            digest: String::new(),
         }
     }
 
@@ -449,11 +598,82 @@ mod tests {
             ("\n[[match]]\nsubmission = \"a\"", "matches.toml:2: expected student"),
             (
                 "[[match]]\nsubmission = \"a\"\nsubmitted = \"noon\"",
-                "matches.toml:1: expected a time",
+                "matches.toml:3: expected a time",
+            ),
+            (
+                "[[match]]\nsubmission = \"a\"\nstudent = \"1\"\nsubmitted = \"2019-10-07\"",
+                "matches.toml:4: expected a time",
+            ),
+            (
+                "[[match]]\nsubmission = \"a\"\nstudent = \"\"",
+                "matches.toml:1: student says nothing",
+            ),
+            (
+                "[[match]]\nsubmission = \"a\"\nstudent = \"1\"\n[[match]]\nsubmission = \"a\"\nstudent = \"2\"",
+                "matches.toml:4: submission \"a\" has a student already, on line 1; one submission has one student",
+            ),
+            (
+                "[[match]]\nsubmission = \"a\"\nsubmitted = \"2019-10-07 10:00\"\n\
+                 [[match]]\nsubmission = \"a\"\nsubmitted = \"2019-10-07 11:00\"",
+                "matches.toml:4: submission \"a\" has a time already, on line 1",
             ),
         ] {
             let error = read(text).unwrap_err().to_string();
             assert!(error.starts_with(expected), "{error}");
         }
+        // Two that say different things are one decision, and TOML's own dates are read.
+        let both = "[[match]]\nsubmission = \"x/a2.zip\"\nstudent = \"none\"\n\
+                    [[match]]\nsubmission = \"x/a2.zip\"\nsubmitted = 2019-10-07T10:00:00-04:00\n";
+        let both = read(both).unwrap();
+        assert!(both.is_nobody(&own));
+        assert_eq!(both.submitted(&own), Some("2019-10-07T14:00:00Z"));
+    }
+
+    #[test]
+    fn one_submission_under_two_names_has_one_student() {
+        let own = claim("Ann Lee", "", "");
+        let check = |second: &str| {
+            let text =
+                format!("[[match]]\nsubmission = \"x/a2.zip\"\nstudent = \"260000002\"\n{second}");
+            let matches = Matches::parse(&text, Path::new("matches.toml")).unwrap();
+            let claims = [own.clone()];
+            matches.among(&claims).check(&claims).map_err(|error| error.to_string())
+        };
+        let second = "[[match]]\nsubmission = \"a2\"\nstudent = \"none\"\n";
+        let error = check(second).unwrap_err();
+        assert!(
+            error.starts_with("matches.toml:4: submission \"a2\" has a student already, on line 1")
+        );
+        check(&second.replace("a2", "b2")).unwrap();
+        check("[[match]]\nsubmission = \"a2\"\nsubmitted = \"2019-10-07 11:00\"\n").unwrap();
+    }
+
+    #[test]
+    fn a_time_is_of_the_content_that_it_was_said_of() {
+        let text = "[[match]]\nsubmission = \"x/a2.zip\"\nsubmitted = \"2019-10-07 10:00\"\n";
+        let claims = [claim("Ann Lee", "", "")];
+        let with = |known: &str| {
+            let mut own = Matches::parse(text, Path::new("matches.toml")).unwrap().among(&claims);
+            let time = own.times().next().unwrap().0;
+            let known = BTreeMap::from([(time, vec![known.to_owned()])]);
+            let lines = own.without_outdated(&known, |_| "new".to_owned());
+            (own.submitted(&claims[0]).map(str::to_owned), lines)
+        };
+        assert_eq!(with("new"), (Some("2019-10-07T10:00:00".to_owned()), Vec::new()));
+        let (time, lines) = with("old");
+        assert_eq!(time, None);
+        assert!(
+            lines[0].starts_with("matches.toml:1: the time was of an older submission"),
+            "{lines:?}"
+        );
+    }
+
+    #[test]
+    fn a_group_is_decided_between_its_members() {
+        let mut group = claim("Zo\u{eb} O'Neil", "", "");
+        group.label.as_mut().unwrap().others = vec!["J\u{f6}rg M\u{fc}ller Dr".to_owned()];
+        let Match::Undecided(reason, members) = found(&group) else { panic!("it is decided") };
+        assert_eq!(members, [0, 3]);
+        assert!(reason.contains("one submission has one student"), "{reason}");
     }
 }

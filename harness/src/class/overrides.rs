@@ -13,7 +13,7 @@ use super::matching::line_of;
 use super::owners::Owners;
 use crate::evidence::Evidence;
 use crate::files::hex;
-use crate::rubric::{Grade, PartGrade};
+use crate::rubric::{Grade, PartGrade, Rules};
 
 /// The file of decisions, in the report's folder.
 pub const OVERRIDES: &str = "overrides.toml";
@@ -146,6 +146,25 @@ impl Overrides {
         }
         decisions.sort_by_key(|entry| entry.line);
         Ok(Self(decisions))
+    }
+
+    /// Makes sure that all parts that are set are there, and worth that much. `path` is the file.
+    ///
+    /// # Errors
+    /// When one is not; names the line.
+    pub fn check(&self, rules: &Rules, path: &Path) -> anyhow::Result<()> {
+        for Entry { decision, line, .. } in &self.0 {
+            let (Some(id), Some(points)) = (&decision.part, decision.points) else { continue };
+            let place = format!("{}:{line}", path.display());
+            let Some(part) = rules.parts.iter().find(|part| part.id == *id) else {
+                let ids: Vec<&str> = rules.parts.iter().map(|part| part.id.as_str()).collect();
+                bail!("{place}: there is no part {id}; it has {}", ids.join(", "));
+            };
+            if points > part.points {
+                bail!("{place}: part {id} is worth 0 to {} points, found {points}", part.points);
+            }
+        }
+        Ok(())
     }
 
     /// What is decided, in its order.

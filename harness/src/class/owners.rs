@@ -103,6 +103,12 @@ impl<'a> Owners<'a> {
         (!all.is_empty()).then(|| all.join(" or "))
     }
 
+    /// Whether a word means a student of the class list.
+    pub fn listed_is(&self, word: &str, student: &Student) -> bool {
+        let students = self.roster.map_or(&[][..], |roster| &roster.students);
+        self.listed(word).into_iter().any(|at| students[at] == *student)
+    }
+
     /// Whether some submissions are of one person.
     pub fn is_one(&self, all: &[usize]) -> bool {
         all.windows(2).all(|pair| self.people[pair[0]] == self.people[pair[1]])
@@ -192,6 +198,7 @@ mod tests {
             label: label_of(Kind::Brightspace, slug),
             number: number.into(),
             full_name: full_name.into(),
+            digest: String::new(),
         }
     }
 

@@ -129,6 +129,14 @@ impl Decisions {
         Overrides::parse(&self.overrides, &output.join(OVERRIDES))
     }
 
+    /// Makes sure that decisions on points fit the rules.
+    ///
+    /// # Errors
+    /// When one does not; names the file and line.
+    pub fn check(&self, output: &Path) -> anyhow::Result<()> {
+        self.overrides(output)?.check(&self.assignment.rules, &output.join(OVERRIDES))
+    }
+
     /// What differs, in words; comments in the files do not.
     ///
     /// # Errors

@@ -100,6 +100,7 @@ const COLUMNS: [(Column, &[&str]); 8] = [
             "numero",
             "numerodetudiant",
             "numeroetudiant",
+            "numerodidentification",
             "matricule",
             "codepermanent",
             "matricola",
@@ -112,7 +113,7 @@ const COLUMNS: [(Column, &[&str]); 8] = [
             "\u{5b66}\u{53f7}",
         ],
     ),
-    (Column::Id, &["id", "identifier", "githubid", "userid"]),
+    (Column::Id, &["id", "identifier", "identifiant", "githubid", "userid"]),
     (
         Column::Username,
         &[
@@ -188,9 +189,17 @@ const COLUMNS: [(Column, &[&str]); 8] = [
     ),
     (
         Column::Email,
-        &["email", "emailaddress", "mail", "courriel", "adressecourriel", "adresseelectronique"],
+        &[
+            "email",
+            "emailaddress",
+            "mail",
+            "courriel",
+            "adressecourriel",
+            "adressedecourriel",
+            "adresseelectronique",
+        ],
     ),
-    (Column::Submitted, &["lastmodifiedsubmission"]),
+    (Column::Submitted, &["lastmodifiedsubmission", "dernieremodificationtravailremis"]),
 ];
 
 /// Words of a heading for a number of a person, such as `Banner ID`, `Student #` or `N\u{b0} de dossier`.
@@ -236,6 +245,9 @@ const SUMS: [&str; 12] = [
     "somme",
     "points possible",
 ];
+
+/// Number of lines above a header that are looked through for a hint.
+const MAX_TITLES: usize = 10;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Column {
@@ -307,14 +319,18 @@ impl Roster {
         let columns = columns(&header, kind);
         let at = |column: Column| columns.iter().position(|own| *own == Some(column));
         let has = |column: Column| at(column).is_some();
-        let named = has(Column::Full) || has(Column::Last);
-        if !has(Column::Number) && !has(Column::Username) && !has(Column::Email) && !named {
+        if !tells_students(&header) {
             bail!(
                 "{}:{line}: expected a header with a column of student numbers or names, such as OrgDefinedId, \
-                 SIS User ID, ID number, SID, Student or Full name; found {}; hint: export the class list or the \
-                 grade book from your learning platform",
+                 SIS User ID, ID number, SID, Student or Full name; found {}; hint: {}",
                 path.display(),
-                printable(&header.iter().take(6).cloned().collect::<Vec<_>>().join(", "))
+                printable(&header.iter().take(6).cloned().collect::<Vec<_>>().join(", ")),
+                match records.take(MAX_TITLES).find(|(_, cells)| tells_students(cells)) {
+                    Some((line, _)) =>
+                        format!("line {line} looks like the header: delete what is above it"),
+                    None => "export the class list or the grade book from your learning platform"
+                        .to_owned(),
+                }
             );
         }
         let mut roster = Self {
@@ -328,15 +344,23 @@ impl Roster {
         for (line, cells) in records {
             let cell = |column: Column| {
                 let cell = at(column).and_then(|at| cells.get(at));
-                cell.map(|text| text.trim().to_owned()).unwrap_or_default()
+                cell.map(|text| unwrapped(text.trim()).to_owned()).unwrap_or_default()
             };
             let row = roster.rows.len();
             roster.rows.push(cells.clone());
             let unsigned = |text: String| text.trim_start_matches('#').to_owned();
+            let number = unsigned(cell(Column::Number));
+            if is_rounded(&number) {
+                bail!(
+                    "{}:{line}: the student number is {number}: a spreadsheet rounded it, and its digits are lost; hint: \
+                     export the list again, and do not open it in a spreadsheet, or only with that column as text",
+                    path.display()
+                );
+            }
             let mut student = Student {
                 line,
                 row,
-                number: unsigned(cell(Column::Number)),
+                number: whole(&number).to_owned(),
                 id: cell(Column::Id),
                 username: unsigned(cell(Column::Username)),
                 first_name: cell(Column::First),
@@ -503,6 +527,41 @@ fn columns(header: &[String], kind: Kind) -> Vec<Option<Column>> {
     columns
 }
 
+/// Whether a header has a column that tells students apart.
+fn tells_students(header: &[String]) -> bool {
+    let columns = columns(header, kind(header));
+    let telling =
+        [Column::Number, Column::Username, Column::Email, Column::Full, Column::Last].map(Some);
+    columns.iter().any(|own| telling.contains(own))
+}
+
+/// What is in `="0260"`, by which spreadsheets keep zeros.
+fn unwrapped(cell: &str) -> &str {
+    cell.strip_prefix("=\"").and_then(|rest| rest.strip_suffix('"')).unwrap_or(cell)
+}
+
+/// `260000101` of `260000101.0`, as programs write numbers that they read as fractions.
+fn whole(number: &str) -> &str {
+    let is = |part: &str, wanted: fn(&u8) -> bool| {
+        !part.is_empty() && part.as_bytes().iter().all(wanted)
+    };
+    match number.split_once('.') {
+        Some((digits, zeros)) if is(digits, u8::is_ascii_digit) && is(zeros, |b| *b == b'0') => {
+            digits
+        }
+        _ => number,
+    }
+}
+
+/// Whether a number is written as spreadsheets write large ones: `2.60000E+08`.
+fn is_rounded(number: &str) -> bool {
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let parts = number
+        .split_once(['E', 'e'])
+        .and_then(|(digits, power)| Some((digits.replace(',', "."), power.strip_prefix('+')?)));
+    parts.is_some_and(|(number, power)| digits(&number.replacen('.', "", 1)) && digits(power))
+}
+
 fn column(name: &str) -> Option<Column> {
     let name = names::letters(name);
     COLUMNS.iter().find(|(_, known)| known.contains(&name.as_str())).map(|(column, _)| *column)
@@ -586,7 +645,9 @@ fn kind(header: &[String]) -> Kind {
         Kind::Canvas
     } else if has("githubusername") {
         Kind::Github
-    } else if has("identifier") && (has("fullname") || has("grade")) {
+    } else if (has("identifier") && (has("fullname") || has("grade")))
+        || (has("identifiant") && (has("nomcomplet") || has("note")))
+    {
         Kind::Moodle
     } else if has("sid") {
         Kind::Gradescope
@@ -706,6 +767,16 @@ mod tests {
         let names: Vec<String> = list.students.iter().map(Student::full_name).collect();
         assert_eq!(names, ["Ann Lee", "Bo"]);
         assert!(list.reading().ends_with("; no student: line 3, Total"), "{}", list.reading());
+        let list = read("SID,Name\n\"=\"\"0260\"\"\",A\n26.0,B\n27.50,C\n12E5,D\n");
+        let numbers: Vec<&str> = list.students.iter().map(|own| own.number.as_str()).collect();
+        assert_eq!(numbers, ["0260", "26", "27.50", "12E5"]);
+        let titled = "ECSE 446,,\nFall 2019,,\nName,ID,x\nAnn Ash,1,\n";
+        let error =
+            Roster::parse(titled.as_bytes(), Path::new("list.csv")).unwrap_err().to_string();
+        assert!(
+            error.ends_with("; hint: line 3 looks like the header: delete what is above it"),
+            "{error}"
+        );
         // A cell of several lines is none of its business.
         let list = read("SID,Name,Note\n7,Ann Lee,\"a\n\"\"b\"\" c\"\n8,\"Bo \"\"B\"\" Ode\",\n");
         assert_eq!((list.students.len(), list.students[1].line), (2, 4));
@@ -717,6 +788,14 @@ mod tests {
             (b"\xd0\xcf\x11\xe0\xa1", "list.csv: expected a CSV file, found an old Excel workbook"),
             (b"Name,SID\nA\0,1\n", "list.csv: expected a CSV file, found a file that is no text"),
             (b"\x1b[31m,b\n1,2\n", "list.csv:1: expected a header"),
+            (
+                b"SID,Name\n2.60000E+08,A\n",
+                "list.csv:2: the student number is 2.60000E+08: a spreadsheet",
+            ),
+            (
+                b"SID,Name\n1,A\n\"2,6E+8\",B\n",
+                "list.csv:3: the student number is 2,6E+8: a spreadsheet",
+            ),
             (
                 b"SID,Name\n3,\"Li\n4,Ann Lee\n",
                 "list.csv:2: the quote that opens here is not closed",

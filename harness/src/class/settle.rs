@@ -15,6 +15,9 @@ use super::roster::{Roster, Student};
 use super::{names, owners, stamps};
 use crate::rubric::Grade;
 
+/// What is added where the instructor names several attempts as one student's.
+const BOTH: &str = "; matches.toml names several of them: keep the entry of the one that counts, and say \"none\" of the others";
+
 /// Which of a student's attempts counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
@@ -164,6 +167,10 @@ pub fn settle(
     deciding: &Deciding,
 ) -> anyhow::Result<(Vec<(usize, Standing)>, Class)> {
     let matches = &deciding.matches.among(claims);
+    matches.check(claims)?;
+    if let Some(roster) = deciding.roster {
+        matches.check_list(roster)?;
+    }
     let deciding = &Deciding { matches, ..*deciding };
     let called = |at: usize| address(&claims[at], claims);
     let list = deciding.roster.and_then(|roster| roster.path.file_name());
@@ -171,6 +178,19 @@ pub fn settle(
     let mut class = Class { kind, list, ..Class::default() };
     let mut standings = Vec::new();
     let persons = owners::people(claims);
+    // Without a list: what the instructor says of one attempt is said of the person, unless it says two things.
+    let named = |index: usize| -> Option<String> {
+        let word = |at: usize| matches.word(&claims[at]).map(names::number);
+        let own = word(index).map(|own| BTreeSet::from([own]));
+        let of_person = || -> BTreeSet<String> {
+            (0..claims.len())
+                .filter(|at| persons[*at] == persons[index] && !matches.is_nobody(&claims[*at]))
+                .filter_map(word)
+                .collect()
+        };
+        let mut words = own.unwrap_or_else(of_person).into_iter();
+        words.next().filter(|_| words.next().is_none())
+    };
     let mut people: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     let mut own_person = Vec::new();
     let mut expected: BTreeMap<usize, String> = BTreeMap::new();
@@ -204,8 +224,8 @@ pub fn settle(
                 }
                 Match::Nobody => {}
             }
-        } else if let Some(word) = matches.word(claim) {
-            person = format!("number {}", names::number(word));
+        } else if let Some(number) = named(index) {
+            person = format!("number {number}");
         }
         own_person.push((index, person.clone()));
         standing.late = charge(claim, &standing, grade, deciding);
@@ -230,8 +250,9 @@ pub fn settle(
                     class.undecided.push(Undecided {
                         submission: called(own),
                         reason: format!(
-                            "which of the attempts counts is not certain, there is also {}",
-                            others.join(", ")
+                            "which of the attempts counts is not certain, there is also {}{}",
+                            others.join(", "),
+                            if matches.word(&claims[own]).is_some() { BOTH } else { "" }
                         ),
                         candidates: standings[own].student.clone().into_iter().collect(),
                     });
@@ -313,7 +334,20 @@ fn choose(
     }
     let stamps: Vec<&str> =
         attempts.iter().map(|at| stamp(&claims[*at], &standings[*at], deciding)).collect();
-    by_time(&stamps, deciding.attempt).map(|at| attempts[at])
+    let digest = |at: &usize| claims[*at].digest.as_str();
+    let first = &attempts[0];
+    let alike = !digest(first).is_empty()
+        && attempts.iter().all(|at| digest(at) == digest(first))
+        && stamps.iter().all(|stamp| *stamp == stamps[0]);
+    by_time(&stamps, deciding.attempt).map(|at| attempts[at]).or_else(|| {
+        // Which of two that are the same counts does not matter.
+        if alike {
+            return Some(*first);
+        }
+        // The one that the instructor names as the student's.
+        let mut named = attempts.iter().filter(|at| deciding.matches.word(&claims[**at]).is_some());
+        named.next().filter(|_| named.next().is_none()).copied()
+    })
 }
 
 /// When a submission was submitted: as the instructor says, else the platform's names, else the class list.
@@ -372,7 +406,8 @@ impl Class {
         let mut text = String::from(
             "# Whose submissions are, where the class list and the submissions do not tell. Umbra reads this file on\n\
              # every run and never changes it. `submission` is its name or its folder in the report. `student` is a\n\
-             # student number, or \"none\" for a submission that does not count; `submitted` is a time stamp.\n",
+             # student number, or \"none\" for a submission that does not count; `submitted` is a time stamp.\n\
+             # Of several attempts of a student, name the one that counts, and it alone.\n",
         );
         for Undecided { submission, reason, candidates } in &self.undecided {
             let quoted = toml::Value::String(submission.clone());
@@ -424,6 +459,7 @@ mod tests {
             label: Kind::PLATFORMS.into_iter().find_map(|kind| label_of(kind, folder)),
             number: number.to_owned(),
             full_name: String::new(),
+            digest: String::new(),
         }
     }
 
@@ -545,6 +581,7 @@ mod tests {
             label: None,
             number: number.to_owned(),
             full_name: name.to_owned(),
+            digest: String::new(),
         };
         let reasons = |claims: &[Claim], attempt, matches: &str| -> Vec<String> {
             let settled = run(claims, &vec![1.0; claims.len()], false, attempt, matches);
@@ -573,6 +610,43 @@ mod tests {
         assert_eq!(reasons(&two, Attempt::Latest, &both), [""; 0]);
         assert_eq!(reasons(&two, Attempt::Latest, &is("a.zip", "none")), [""; 0]);
         assert_eq!(reasons(&[ann, two[0].clone()], Attempt::Latest, ""), [""; 0]);
+    }
+
+    #[test]
+    fn the_attempt_that_the_instructor_names_counts() {
+        let claims = [
+            claim("Bo Ode_7_assignsubmission_file", "3"),
+            claim("Bo Ode_7_assignsubmission_file_x", "3"),
+        ];
+        let is = |at: usize, who: &str| {
+            let name = &claims[at].name;
+            format!("[[match]]\nsubmission = \"{name}\"\nstudent = \"{who}\"\n")
+        };
+        for with_list in [true, false] {
+            for (matches, counts, undecided) in [
+                (is(0, "3"), vec![0], 0),
+                (is(1, "3"), vec![1], 0),
+                (is(0, "3") + &is(1, "none"), vec![0], 0),
+                (is(1, "none"), vec![0], 0),
+                (is(0, "3") + &is(1, "3"), vec![0, 1], 2),
+            ] {
+                let settled = run(&claims, &[1.0, 2.0], with_list, Attempt::Latest, &matches);
+                let slugs: Vec<&str> = counts.iter().map(|at| claims[*at].slug.as_str()).collect();
+                assert_eq!(settled.names, slugs, "{matches}");
+                assert_eq!(settled.class.undecided.len(), undecided, "{matches}");
+                let asks =
+                    |own: &Undecided| own.reason.contains("keep the entry of the one that counts");
+                assert!(settled.class.undecided.iter().all(asks));
+            }
+        }
+        // Times go before it: the later one counts, whoever is named.
+        let timed = [claim(FIRST, "3"), claim(SECOND, "3")];
+        let first = format!("[[match]]\nsubmission = \"{FIRST}\"\nstudent = \"3\"\n");
+        assert_eq!(run(&timed, &[1.0, 2.0], true, Attempt::Latest, &first).names, [SECOND]);
+        // The same content twice is no question.
+        let same = claims.clone().map(|own| Claim { digest: "d".into(), ..own });
+        let settled = run(&same, &[1.0, 1.0], true, Attempt::Latest, "");
+        assert_eq!((settled.names.len(), settled.class.undecided.len()), (1, 0));
     }
 
     #[test]

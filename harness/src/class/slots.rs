@@ -23,10 +23,25 @@ pub fn slot(label: Option<&Label>, name: &str) -> String {
     };
     let below = match parts.iter().rposition(is) {
         Some(at) if at + 1 < parts.len() => parts[at + 1..].join("/"),
-        Some(at) => parts[at].to_owned(),
+        Some(at) => flat(label, parts[at]).to_owned(),
         None => name.to_owned(),
     };
     format!("{}: {}/{below}", label.kind.title(), label.submission)
+}
+
+/// What a file is called below the platform's name of the submission, where files lie flat beside each other: the same
+/// as in a folder of that name.
+fn flat<'a>(label: &Label, part: &'a str) -> &'a str {
+    let rest = part.strip_prefix(&label.submission).unwrap_or_default();
+    let file = match label.kind {
+        Kind::Brightspace => Some(rest.trim_start_matches([' ', '-'])),
+        Kind::Moodle => {
+            let rest = rest.strip_prefix("_assignsubmission_");
+            rest.and_then(|rest| rest.split_once('_')).map(|(_, file)| file)
+        }
+        _ => None,
+    };
+    file.filter(|file| !file.is_empty()).unwrap_or(part)
 }
 
 /// Digest of the bytes of an archive, or of the files of a folder with their paths.
@@ -90,6 +105,11 @@ mod tests {
             slot(Kind::Moodle, moodle, &format!("x/{moodle}/a2.zip")),
             "Moodle: Ann Lee_7/a2.zip"
         );
+        // Flat files, as the platforms also name them.
+        let flat = format!("{moodle}_a2.zip");
+        assert_eq!(slot(Kind::Moodle, &flat, &flat), "Moodle: Ann Lee_7/a2.zip");
+        let flat = format!("{own} - a2.zip");
+        assert_eq!(slot(Kind::Brightspace, &flat, &format!("x/{flat}")), expected);
         assert_eq!(super::slot(None, "ann/a2.zip"), "ann/a2.zip");
     }
 

@@ -2,11 +2,11 @@
 //! submission and renders nothing.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, bail, ensure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
@@ -30,6 +30,9 @@ pub const RELEASED: &str = "released.txt";
 
 /// The file of [`Found`], in the instructor's folder.
 const FILE: &str = "batch.json";
+
+/// The file that says of which content the times in `matches.toml` were said, in the instructor's folder.
+const TIMES: &str = "times.json";
 
 /// The remark on a submission that was judged differently from the others of its class.
 const OTHER_CONDITIONS: &str = "graded before with other scenes, limits or another version of Umbra: \
@@ -213,6 +216,12 @@ impl Kept {
         let instructor = output.join(report::INSTRUCTOR);
         let pins = Pins::read(&instructor)?;
         let Some(found) = Found::read(output)?.filter(|_| pins.current().is_some()) else {
+            ensure!(
+                Found::begun(output)?.is_empty(),
+                "{}: the tasks of a partition are not merged yet; hint: umbra merge --report {}",
+                output.display(),
+                output.display()
+            );
             bail!(
                 "{}: expected the --report of an earlier `umbra grade` of this version; hint: grade once more",
                 output.display()
@@ -303,6 +312,55 @@ impl Kept {
         self.pins.apply(decided, reason, changes, undoes)?;
         write(output, &after)
     }
+}
+
+/// Notes of which content each time in the pinned `matches.toml` was said, before a run grades other content.
+///
+/// # Errors
+/// When a file cannot be read or written.
+pub fn remember_times(output: &Path, pinned: &Decisions) -> anyhow::Result<()> {
+    let matches = pinned.matches(output)?;
+    if !matches.has_times() {
+        return Ok(());
+    }
+    let instructor = output.join(report::INSTRUCTOR);
+    let mut records = Vec::new();
+    for slug in class::folders(output) {
+        // What cannot be read is told where it is needed.
+        records.extend(RecordCache::earlier(&instructor.join(slug), "").ok().flatten());
+    }
+    Found::read(output)?.unwrap_or_default().name(&mut records);
+    let claims: Vec<Claim> = records.iter().map(|own| class::claim(output, &own.record)).collect();
+    let mut known = times(output)?;
+    let before = known.len();
+    for (time, slugs) in matches.among(&claims).times() {
+        let digests = || slugs.iter().map(|slug| digest(&records, slug)).collect();
+        known.entry(time).or_insert_with(digests);
+    }
+    if known.len() > before {
+        let file = instructor.join(TIMES);
+        write_whole(&file, &serde_json::to_vec_pretty(&known)?)
+            .with_context(|| format!("cannot write {}", file.display()))?;
+    }
+    Ok(())
+}
+
+/// Digests of the submissions that each time in `matches.toml` was said of.
+fn times(output: &Path) -> anyhow::Result<BTreeMap<String, Vec<String>>> {
+    let file = output.join(report::INSTRUCTOR).join(TIMES);
+    match std::fs::read(&file) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(BTreeMap::new()),
+        bytes => {
+            let bytes = bytes.with_context(|| format!("cannot read {}", file.display()))?;
+            serde_json::from_slice(&bytes)
+                .with_context(|| format!("{}: expected digests", file.display()))
+        }
+    }
+}
+
+fn digest(records: &[StoredRecord], slug: &str) -> String {
+    let own = records.iter().find(|own| own.record.slug == slug);
+    own.map(|own| own.record.digest.clone()).unwrap_or_default()
 }
 
 /// The report of a run that graded all that it was given: keeps what it found, pins what is decided by now, and writes.
@@ -398,7 +456,8 @@ pub fn settled(
     let shared = shared(output, &records)?;
     let claims: Vec<Claim> =
         records.iter().map(|earlier| class::claim(output, &earlier.record)).collect();
-    let matches = decided.matches(output)?.among(&claims);
+    let mut matches = decided.matches(output)?.among(&claims);
+    let outdated = matches.without_outdated(&times(output)?, |slug| digest(&records, slug));
     let owners = Owners::of(&claims, roster, &matches)?;
     let deciding = Deciding {
         roster,
@@ -460,6 +519,11 @@ pub fn settled(
     };
     class.unused.extend(matches.lost(is_seen));
     class.unopened.clone_from(&found.unopened);
+    class.stale.extend(outdated);
+    if let (Some(roster), Some(policy)) = (roster, &stated.late) {
+        let strangers = policy.strangers(roster.students.iter().map(|own| own.number.as_str()));
+        class.unused.extend(strangers);
+    }
     if !found.list.is_empty() {
         class.list.clone_from(&found.list);
     }

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 
 use super::MachineLacks;
 use super::assemble::{self, Found};
@@ -180,12 +180,26 @@ impl<'a> Batch<'a> {
             );
         }
         let mut telling = Telling::default();
-        if let Some((_, decided)) = &pins {
+        if let Some((pins, decided)) = &pins {
+            let matches = decided.matches(self.output)?;
             let roster = class::roster(self.list, self.output)?;
-            if let (Some(_), Some(roster)) = (self.list, &roster) {
-                eprintln!("umbra: {}", roster.reading());
+            if let Some(roster) = &roster {
+                matches.check_list(roster)?;
             }
-            telling = Telling { roster, matches: decided.matches(self.output)? };
+            if let (Some(list), Some(roster)) = (self.list, &roster) {
+                eprintln!("umbra: {}", roster.reading());
+                if self.slice.is_some() {
+                    same_list(list, self.output)?;
+                }
+                class::keep_roster(list, self.output)?;
+            }
+            if let Some(pin) = pins.current() {
+                assemble::remember_times(self.output, &pin.decided)?;
+            }
+            telling = Telling { roster, matches };
+        }
+        if self.slice.is_some() {
+            same_seed(seed, self.output)?;
         }
         let aside = match &pins {
             Some((_, decided)) => self.set_aside(&all, decided)?,
@@ -232,7 +246,8 @@ impl<'a> Batch<'a> {
                     vec![begun.and_then(|begun| self.go_on(context, &grading, source, begun))]
                 }
                 _ => {
-                    let all = self.grade_all(context, &grading, &chosen, jobs);
+                    let (all, gone) = self.grade_all(context, &grading, &chosen, jobs);
+                    found.unopened.extend(gone);
                     all.into_iter().map(Ok).collect()
                 }
             };
@@ -340,6 +355,7 @@ impl<'a> Batch<'a> {
             );
             decided.attempt = self.attempt.unwrap_or(attempt);
         }
+        decided.check(self.output)?;
         Ok((pins, decided))
     }
 
@@ -393,16 +409,18 @@ impl<'a> Batch<'a> {
     }
 
     /// Takes submissions through all stages, in their order; none is begun after Ctrl-C. One that the machine
-    /// failed on has a record that says so: the others' are no worse for it.
+    /// failed on has a record that says so: the others' are no worse for it. One that is not there any more has none, and
+    /// a line among those that come second.
     fn grade_all(
         &self,
         context: &Context,
         grading: &Grading,
         sources: &[&Source],
         jobs: usize,
-    ) -> Vec<StoredRecord> {
+    ) -> (Vec<StoredRecord>, Vec<String>) {
         let next = AtomicUsize::new(0);
         let results = Mutex::new(Vec::new());
+        let gone = Mutex::new(Vec::new());
         context.progress.count(sources.len());
         let work = || {
             loop {
@@ -417,6 +435,13 @@ impl<'a> Batch<'a> {
                     .and_then(|()| grading.one_of_batch(path, slug, &out, &say));
                 if INTERRUPTED.load(Ordering::Relaxed) && result.is_err() {
                     return;
+                }
+                if result.is_err() && path.symlink_metadata().is_err() {
+                    // An earlier grade stays.
+                    let why = format!("{name}: {} is not there any more", path.display());
+                    context.progress.note(&why);
+                    gone.lock().map(|mut gone| gone.push(why)).unwrap_or_default();
+                    continue;
                 }
                 let result = result.unwrap_or_else(|error| {
                     let message = format!("{}: {}", path.display(), super::told_once(&error));
@@ -466,8 +491,47 @@ impl<'a> Batch<'a> {
         });
         let mut results = results.into_inner().unwrap_or_default();
         results.sort_by_key(|(index, _)| *index);
-        results.into_iter().map(|(_, result)| result).collect()
+        let records = results.into_iter().map(|(_, result)| result).collect();
+        (records, gone.into_inner().unwrap_or_default())
     }
+}
+
+/// Makes sure that a task of a partition uses the class list that other tasks at work use.
+fn same_list(list: &Path, output: &Path) -> anyhow::Result<()> {
+    let read = |path: &Path| {
+        std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+    };
+    let kept = class::kept_list(output);
+    ensure!(
+        Found::begun(output)?.is_empty() || !kept.is_file() || read(list)? == read(&kept)?,
+        "--class: {} differs from {}, which the other tasks use; all tasks of a partition use the same list",
+        list.display(),
+        kept.display()
+    );
+    Ok(())
+}
+
+/// Makes sure that a task of a partition uses the seed of one of the tasks that graded something, if any did.
+fn same_seed(seed: Option<u64>, output: &Path) -> anyhow::Result<()> {
+    let words = |seed: Option<u64>| seed.map_or("off".to_owned(), |seed| seed.to_string());
+    let begun = Found::begun(output)?;
+    let seed_of = |found: &Found| found.held_back.as_ref().map(|held_back| held_back.seed);
+    if begun.iter().any(|(_, found)| seed_of(found) == seed) {
+        return Ok(());
+    }
+    let instructor = output.join(report::INSTRUCTOR);
+    let graded = |(_, found): &&(PathBuf, Found)| {
+        let made = |slug: &String| RecordCache::conditions_of(&instructor.join(slug));
+        class::folders(output).iter().filter_map(made).any(|made| made == found.conditions)
+    };
+    let Some((file, found)) = begun.iter().find(graded) else { return Ok(()) };
+    let other = words(seed_of(found));
+    bail!(
+        "--perturb: this task would use {}, another one used {other}: all tasks of a partition use the same seed; hint: \
+         --perturb {other}, or delete {} and run its task again",
+        words(seed),
+        file.display()
+    );
 }
 
 fn print_timings(report: &BatchReport) {

@@ -57,21 +57,30 @@ impl Source {
     }
 }
 
-/// The class list of a report: the one that is given, which is kept from now on, else the one that was kept.
+/// Where the class list of a report is kept.
+pub fn kept_list(output: &Path) -> PathBuf {
+    output.join(report::INSTRUCTOR).join(LIST)
+}
+
+/// Keeps a class list for later runs.
 ///
 /// # Errors
-/// When it cannot be read, is no class list, or cannot be kept.
+/// When it cannot be read or written.
+pub fn keep_roster(given: &Path, output: &Path) -> anyhow::Result<()> {
+    let kept = kept_list(output);
+    let bytes = fs::read(given).with_context(|| format!("cannot read {}", given.display()))?;
+    write_whole(&kept, &bytes)
+        .with_context(|| format!("cannot keep the class list as {}", kept.display()))
+}
+
+/// The class list of a report: the one that is given, else the one that was kept.
+///
+/// # Errors
+/// When it cannot be read, or is no class list.
 pub fn roster(given: Option<&Path>, output: &Path) -> anyhow::Result<Option<Roster>> {
-    let kept = output.join(report::INSTRUCTOR).join(LIST);
+    let kept = kept_list(output);
     match given {
-        Some(given) => {
-            let roster = Roster::read(given)?;
-            let bytes =
-                fs::read(given).with_context(|| format!("cannot read {}", given.display()))?;
-            write_whole(&kept, &bytes)
-                .with_context(|| format!("cannot keep the class list as {}", kept.display()))?;
-            Ok(Some(roster))
-        }
+        Some(given) => Roster::read(given).map(Some),
         None if kept.is_file() => Roster::read(&kept).map(Some),
         None => Ok(None),
     }
@@ -240,6 +249,7 @@ pub fn claim(output: &Path, record: &Record) -> Claim {
         label: label(output, &record.slug),
         number: record.student.id.clone(),
         full_name: record.student.full_name(),
+        digest: record.digest.clone(),
     }
 }
 
@@ -324,10 +334,17 @@ pub fn only<'a>(
         if found.is_empty() && listed.is_none() {
             found = of(&|at| last_names[at].trim().to_lowercase() == word);
         }
+        ensure!(
+            owners.is_one(&found),
+            "--only: {} are \"{wanted}\", of several students; name the folder of one: {}",
+            count(found.len(), "submission"),
+            some(&owners.folders(&found).into_iter().map(str::to_owned).collect::<Vec<_>>())
+        );
         found.iter().for_each(|at| chosen[*at] = true);
         if let (true, Some(who)) = (found.is_empty(), listed) {
             bail!(
-                "--only: {who} has no submission that is theirs for certain; hint: name its file"
+                "--only: {who} has no submission among those given that is theirs for certain; hint: name the folder \
+                 that it lies in, or its file"
             );
         }
         let mut names = claims

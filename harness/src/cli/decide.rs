@@ -20,6 +20,7 @@ pub struct OverrideArguments {
     /// The part, such as 1.3
     part: String,
     /// Its points from now on
+    #[arg(value_parser = points)]
     points: f64,
     #[command(flatten)]
     decision: DecisionArguments,
@@ -67,6 +68,11 @@ impl Graded {
         let record = &self.entry.record;
         Subject { slug: &record.slug, digest: &record.digest, evidence: &record.evidence }
     }
+}
+
+fn points(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+    number.ok_or_else(|| "expected points, such as 12.5".to_owned())
 }
 
 /// Sets the points of a part.
@@ -175,6 +181,7 @@ impl DecisionArguments {
             );
         }
         decided.overrides += &entry(decision)?;
+        decided.check(&self.report.path)?;
         write_whole(&file, decided.overrides.as_bytes())
             .with_context(|| format!("cannot write {}", file.display()))?;
         kept.apply(&self.report.path, decided, &decision.reason, false)?;
@@ -196,6 +203,17 @@ pub fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
         }
         [] => {
             if let Some(who) = owners.listed_as(wanted) {
+                let report = kept.report(output, kept.decided()?)?.report;
+                let undecided = report.class.is_some_and(|class| {
+                    class.undecided.iter().any(|own| {
+                        own.candidates.is_empty()
+                            || own
+                                .candidates
+                                .iter()
+                                .any(|student| owners.listed_is(wanted, student))
+                    })
+                });
+                ensure!(undecided, "{}: {who} has no submission", output.display());
                 bail!(
                     "{}: {who} has no submission that is theirs for certain; hint: decide in matches.toml whose it \
                      is, or name the submission's folder",
@@ -247,6 +265,8 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
         let private = own.remarks.iter().filter(|remark| report::is_private(remark, rules));
         private.map(move |remark| row(own, remark))
     });
+    let unread = report.submissions.iter().filter(|own| own.is_unread());
+    let unread = unread.map(|own| row(own, own.remarks.first().map_or("", String::as_str)));
     let late = report.submissions.iter().filter(|own| own.standing.time_unknown);
     let late = late.map(|own| row(own, "when it was submitted is not known"));
     let ranges = report.submissions.iter().filter(|own| own.points < own.points_max);
@@ -261,6 +281,7 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
     for (title, lines) in [
         ("whose they are, to be decided in matches.toml", undecided.collect()),
         ("neither opened nor graded", class.unopened.clone()),
+        ("nobody could open them: ask for other archives, or `umbra confirm`", unread.collect()),
         ("images without code, for `umbra confirm` or `umbra override`", images),
         ("to be looked at, then `umbra confirm` or `umbra override`", remarks.collect::<Vec<_>>()),
         (

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use serde::Deserialize;
 
+use super::assemble::Found;
 use crate::class::{Class, Standing};
 use crate::grading::StageCost;
 use crate::report;
@@ -33,6 +34,8 @@ pub struct About {
 pub struct Row {
     pub name: String,
     pub slug: String,
+    /// Of what was submitted; empty where nobody could open it.
+    pub digest: String,
     pub points: f64,
     pub points_max: f64,
     pub unconfirmed: f64,
@@ -42,6 +45,20 @@ pub struct Row {
     pub standing: Standing,
 }
 
+impl Row {
+    /// Whether the archive could not be opened, and the instructor has not decided on it.
+    pub fn is_unread(&self) -> bool {
+        self.digest.is_empty()
+            && self.points == self.points_max
+            && self.standing.decisions.iter().all(|own| own.stale)
+    }
+}
+
+/// Whether tasks of a partition graded into a report that nobody merged.
+pub fn is_begun(output: &Path) -> bool {
+    Found::begun(output).is_ok_and(|begun| !begun.is_empty())
+}
+
 impl Report {
     /// Reads the report in a folder.
     ///
@@ -49,6 +66,12 @@ impl Report {
     /// When there is none, or it is another version's.
     pub fn read(output: &Path) -> anyhow::Result<Self> {
         let file = output.join(report::JSON_FILE);
+        ensure!(
+            file.exists() || !is_begun(output),
+            "{}: the tasks of a partition are not merged yet; hint: umbra merge --report {}",
+            output.display(),
+            output.display()
+        );
         let opened = std::fs::File::open(&file).with_context(|| {
             format!(
                 "cannot read {}: expected the --report of an earlier `umbra grade`",

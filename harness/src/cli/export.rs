@@ -2,21 +2,27 @@
 
 mod junit;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
 use serde_json::json;
+use sha2::{Digest as _, Sha256};
 
 use super::class;
 use super::earlier::{Report, Row};
 use super::report_folder::ReportFolder;
 use crate::class::export::{Points, grade_book};
 use crate::class::feedback::{self, Feedback};
-use crate::class::{Kind, Roster};
+use crate::class::overrides::OVERRIDES;
+use crate::class::{Kind, MATCHES, Roster};
 use crate::columns::count;
-use crate::files::write_whole;
+use crate::files::{hex, write_whole};
 use crate::report::{self, harmless};
 use crate::rubric::Rules;
+
+/// The file that says what was exported, in the instructor's folder.
+const EXPORTS: &str = "exports.json";
 
 /// What takes the grades.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -124,7 +130,7 @@ pub fn check(formats: &[Format], output: &Path, list: Option<&Path>) -> anyhow::
         };
         of_platform(roster, kind, output)?;
     }
-    Ok(())
+    formats.iter().try_for_each(|format| may_replace(&output.join(format.file()), *format, output))
 }
 
 /// Writes a report that was just made in some formats, into its folder.
@@ -148,23 +154,94 @@ fn write(
     item: &Item,
     report: &Report,
 ) -> anyhow::Result<()> {
+    may_replace(file, format, output)?;
+    let mut said = Vec::new();
     let bytes = match format {
         Format::Brightspace | Format::Canvas | Format::Moodle => {
             let kind = format.platform().unwrap_or_default();
-            book(file, output, item, report, kind)?.into_bytes()
+            book(file, output, item, report, kind, &mut said)?.into_bytes()
         }
-        Format::Feedback => feedback_archive(file, output, report)?,
+        Format::Feedback => feedback_archive(file, output, report, &mut said)?,
         Format::Gradescope => gradescope(report)?.into_bytes(),
         Format::Junit => junit::junit(report, output).into_bytes(),
         Format::Csv | Format::Json => {
             let own = output.join(format.file());
-            if own == file {
+            if is_same(&own, file) {
                 return Ok(());
             }
             std::fs::read(&own).with_context(|| format!("cannot read {}", own.display()))?
         }
     };
-    write_whole(file, &bytes).with_context(|| format!("cannot write {}", file.display()))
+    write_whole(file, &bytes).with_context(|| format!("cannot write {}", file.display()))?;
+    note(file, &bytes, output)?;
+    said.iter().for_each(|line| println!("{line}"));
+    Ok(())
+}
+
+/// Digests of what was exported, by path.
+type Exports = BTreeMap<PathBuf, String>;
+
+/// What was exported from a report; nothing where that cannot be read.
+fn exports(output: &Path) -> Exports {
+    let file = output.join(report::INSTRUCTOR).join(EXPORTS);
+    let bytes = std::fs::read(file).unwrap_or_default();
+    serde_json::from_slice(&bytes).unwrap_or_default()
+}
+
+/// The path of a file that may not be there yet, by the folder that it lies in.
+fn whole_path(file: &Path) -> PathBuf {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    file.file_name().map_or_else(|| folder.clone(), |name| folder.join(name))
+}
+
+fn is_same(a: &Path, b: &Path) -> bool {
+    whole_path(a) == whole_path(b)
+}
+
+/// Makes sure that an export replaces nothing but an earlier export from this report, which nobody changed since.
+///
+/// # Errors
+/// When it would.
+fn may_replace(file: &Path, format: Format, output: &Path) -> anyhow::Result<()> {
+    if matches!(format, Format::Csv | Format::Json) && is_same(file, &output.join(format.file())) {
+        return Ok(());
+    }
+    let whole = whole_path(file);
+    let inside =
+        output.canonicalize().ok().and_then(|own| whole.strip_prefix(own).ok().map(Path::to_owned));
+    let own = [report::HTML_FILE, report::JSON_FILE, report::CSV_FILE, MATCHES, OVERRIDES];
+    if let Some(inside) = inside {
+        let is_own = own.iter().any(|name| inside == Path::new(name));
+        ensure!(
+            !is_own && inside.components().count() == 1,
+            "{} belongs to the report, so nothing is exported there; hint: name a file beside {}",
+            file.display(),
+            output.display()
+        );
+    }
+    let Ok(meta) = file.symlink_metadata() else { return Ok(()) };
+    let is_export = meta.is_file()
+        && exports(output).get(&whole).is_some_and(|noted| {
+            std::fs::read(file).is_ok_and(|bytes| *noted == hex(&Sha256::digest(bytes)))
+        });
+    ensure!(
+        is_export,
+        "{} is there already, and is no export from this report, or was changed since; nothing is written; hint: \
+         name another file, or remove that one",
+        file.display()
+    );
+    Ok(())
+}
+
+/// Notes what was exported, so that a later export may replace it.
+fn note(file: &Path, bytes: &[u8], output: &Path) -> anyhow::Result<()> {
+    let mut exports = exports(output);
+    exports.insert(whole_path(file), hex(&Sha256::digest(bytes)));
+    let notes = output.join(report::INSTRUCTOR).join(EXPORTS);
+    write_whole(&notes, &serde_json::to_vec_pretty(&exports)?)
+        .with_context(|| format!("cannot write {}", notes.display()))
 }
 
 /// The class list, where it is this platform's.
@@ -176,6 +253,16 @@ fn of_platform(roster: Option<Roster>, kind: Kind, output: &Path) -> anyhow::Res
             kind.title()
         );
     };
+    ensure!(
+        roster.kind != Kind::Plain,
+        "{}: expected the export of {}, found a list of no platform that Umbra knows; hint: grade with --class and the \
+         file that {} exports, with its headings as they are; if they are not in English, switch {} to English and \
+         download it again",
+        roster.path.display(),
+        kind.title(),
+        kind.title(),
+        kind.title()
+    );
     ensure!(
         roster.kind == kind,
         "{}: expected the export of {}, found that of {}; hint: the format {}",
@@ -201,7 +288,12 @@ fn waits(row: &Row, report: &Report) -> Option<&'static str> {
 }
 
 /// What each student may read.
-fn feedback_archive(file: &Path, output: &Path, report: &Report) -> anyhow::Result<Vec<u8>> {
+fn feedback_archive(
+    file: &Path,
+    output: &Path,
+    report: &Report,
+    said: &mut Vec<String>,
+) -> anyhow::Result<Vec<u8>> {
     let (mut all, mut left) = (Vec::new(), Vec::new());
     let folders: Vec<PathBuf> =
         report.submissions.iter().map(|row| output.join(&row.slug)).collect();
@@ -219,15 +311,13 @@ fn feedback_archive(file: &Path, output: &Path, report: &Report) -> anyhow::Resu
     ensure!(!all.is_empty(), "no feedback to export: {}", harmless(&left.join("; ")));
     let bytes = feedback::archive(&all)
         .with_context(|| format!("cannot pack the pages in {}", output.display()))?;
-    println!("{}: feedback on {}", file.display(), count(all.len(), "submission"));
-    say_left(&left);
+    said.push(format!("{}: feedback on {}", file.display(), count(all.len(), "submission")));
+    said.extend(left_out(&left));
     Ok(bytes)
 }
 
-fn say_left(left: &[String]) {
-    for line in left {
-        println!("left out: {}", harmless(line));
-    }
+fn left_out(left: &[String]) -> impl Iterator<Item = String> {
+    left.iter().map(|line| format!("left out: {}", harmless(line)))
 }
 
 /// The class list's own columns with the points in one of them.
@@ -237,19 +327,20 @@ fn book(
     item: &Item,
     report: &Report,
     kind: Kind,
+    said: &mut Vec<String>,
 ) -> anyhow::Result<String> {
     let roster = of_platform(class::roster(None, output)?, kind, output)?;
-    let (mut graded, mut left, mut over) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut graded, mut left) = (Vec::new(), Vec::new());
     for row in &report.submissions {
         let student = row.standing.student.as_ref();
         let student = student.and_then(|own| roster.students.iter().find(|other| *other == own));
         let why = match (student, waits(row, report)) {
-            (None, _) => "nobody of the class list",
             (_, Some(why)) => why,
+            (None, _) => "nobody of the class list",
+            (Some(_), None) if row.is_unread() => {
+                "nobody could open it; hint: ask for another archive, or `umbra confirm` its points"
+            }
             (Some(student), None) => {
-                if row.points > row.out_of {
-                    over.push(student.who());
-                }
                 graded.push(Points { student, points: row.points });
                 continue;
             }
@@ -258,16 +349,45 @@ fn book(
     }
     ensure!(!graded.is_empty(), "no grade to export: {}", harmless(&left.join("; ")));
     let item = item.item.as_ref().unwrap_or(&report.assignment.name);
-    let text = grade_book(&roster, item, &graded).map_err(anyhow::Error::msg)?;
-    println!("{}: {} for {}", file.display(), count(graded.len(), "grade"), kind.title());
-    if !over.is_empty() {
-        println!(
-            "warning: more than the maximum, which the platform may cut (Brightspace: turn on \"Can Exceed\"): {}",
-            harmless(&over.join(", "))
-        );
+    let book = grade_book(&roster, item, &graded).map_err(anyhow::Error::msg)?;
+    left.extend(book.excused.iter().map(|who| format!("{who}: excused, says {}", kind.title())));
+    let written = graded.len() - book.excused.len();
+    ensure!(written > 0, "no grade to export: {}", harmless(&left.join("; ")));
+    said.push(format!("{}: {} for {}", file.display(), count(written, "grade"), kind.title()));
+    let out_of = report.submissions.first().map_or(0.0, |row| row.out_of);
+    let list = roster.path.display();
+    if let Some(others) = &book.others {
+        let others = if others.is_empty() {
+            "and no other grade".to_owned()
+        } else {
+            format!("only {}", others.join(", "))
+        };
+        said.push(harmless(&format!(
+            "warning: {list} has no column \"{}\", {others}; {} may ignore it or make a new item; hint: --item \
+             NAME, or make the item there first",
+            book.column,
+            kind.title()
+        )));
     }
-    say_left(&left);
-    Ok(text)
+    let maximum = book.maximum.unwrap_or(out_of);
+    if maximum != out_of {
+        said.push(harmless(&format!(
+            "warning: \"{}\" is out of {maximum} in {list}, and the grades are out of {out_of}: they are not scaled; \
+             hint: set the maximum to {out_of} on the platform",
+            book.column
+        )));
+    }
+    let over = graded.iter().filter(|own| own.points > maximum);
+    let over: Vec<String> = over.map(|own| own.student.who()).collect();
+    if !over.is_empty() {
+        said.push(format!(
+            "warning: more than the maximum of {maximum}, which the platform may cut or refuse (Brightspace: turn on \
+             \"Can Exceed\"): {}",
+            harmless(&over.join(", "))
+        ));
+    }
+    said.extend(left_out(&left));
+    Ok(book.text)
 }
 
 /// What was said for the student's eyes about the whole.

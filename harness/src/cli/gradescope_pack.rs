@@ -2,7 +2,7 @@
 
 use std::ffi::OsStr;
 use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::{BufWriter, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
@@ -23,6 +23,8 @@ const SCRIPTS: [(&str, &str); 2] = [
 const LEFT_OUT: [&str; 3] = ["docs", "samples", "target"];
 /// What Umbra is built from; a student's kit lacks the first.
 const NEEDED: [&str; 3] = ["harness/Cargo.toml", "Cargo.toml", "scenes"];
+/// The file of the seed in the zip.
+const SEED_FILE: &str = "held-back-seed.txt";
 /// The folder of all but the scripts.
 const FOLDER: &str = "umbra";
 
@@ -47,8 +49,15 @@ pub fn run(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8>
             assignment.root.display()
         );
     }
-    let seed = arguments.perturb.map_or_else(secret_seed, Ok)?;
     let out = &arguments.out;
+    // A new seed would give half of the class other scenes.
+    let kept = if out.symlink_metadata().is_ok() { Some(seed_of(out)?) } else { None };
+    let seed = arguments.perturb.or(kept).map_or_else(secret_seed, Ok)?;
+    match kept {
+        Some(kept) if kept == seed => println!("it keeps the seed of the zip that it replaces"),
+        Some(kept) => println!("warning: the zip that it replaces had another seed, {kept}"),
+        None => {}
+    }
     let written = write(&assignment.root, seed, out)
         .with_context(|| format!("cannot write {}", out.display()))?;
     println!(
@@ -61,6 +70,22 @@ pub fn run(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8>
          counts: the one in config.json is left out. Students submit their archive, or what is in it"
     );
     Ok(super::EXIT_OK)
+}
+
+/// The seed in a zip that was packed before.
+///
+/// # Errors
+/// When it is no such zip.
+fn seed_of(out: &Path) -> anyhow::Result<u64> {
+    let read = || -> Option<u64> {
+        let mut zip = zip::ZipArchive::new(File::open(out).ok()?).ok()?;
+        let mut text = String::new();
+        zip.by_name(SEED_FILE).ok()?.take(64).read_to_string(&mut text).ok()?;
+        text.trim().parse().ok()
+    };
+    read().with_context(|| {
+        format!("{} is there already, and is no autograder; hint: name another file", out.display())
+    })
 }
 
 /// Writes the zip under another name and renames it; answers how many files are in it.
@@ -80,7 +105,7 @@ fn write(root: &Path, seed: u64, out: &Path) -> anyhow::Result<usize> {
     for (name, text) in SCRIPTS {
         put(name, text.as_bytes(), true)?;
     }
-    put("held-back-seed.txt", format!("{seed}\n").as_bytes(), false)?;
+    put(SEED_FILE, format!("{seed}\n").as_bytes(), false)?;
     for path in content(root)? {
         let bytes =
             std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;

@@ -85,6 +85,7 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
         }
     }
     let decided = Decisions::read(output, stated, attempt)?;
+    decided.check(output)?;
     join(output, &found, &mut records);
     let report = assemble::finish(output, &mut pins, &decided, found, records)?;
     for file in files {

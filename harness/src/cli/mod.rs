@@ -258,6 +258,11 @@ fn machine_lacks(error: &anyhow::Error) -> bool {
 /// When not, with the folder's name.
 fn writable(output: &Path) -> anyhow::Result<()> {
     has_temporary_folder()?;
+    anyhow::ensure!(
+        output.is_dir() || output.symlink_metadata().is_err(),
+        "--report: expected a folder, or a name for a new one, found the file {}",
+        output.display()
+    );
     takes_files(output)
 }
 

@@ -54,7 +54,9 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
             current.decided.assignment.name,
             stated.name
         );
-        Decisions::read(output, stated, current.decided.attempt)?
+        let decided = Decisions::read(output, stated, current.decided.attempt)?;
+        decided.check(output)?;
+        decided
     };
     let differs = decided.differs(&current.decided, output)?;
     let before = kept.report(output, &current.decided)?;
@@ -69,6 +71,9 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
     let after = kept.report(output, &decided)?;
     print!("{}", table(&changes(&before.report, &after.report)));
     println!("{}", summary(&before.report, &after.report));
+    for line in after.report.class.iter().flat_map(|class| &class.unused) {
+        println!("warning: on nothing that is there: {}", harmless(line));
+    }
     if *undo {
         // The files first: a change that is applied without them would come back with the next run.
         for (name, text, old) in [

@@ -26,11 +26,12 @@ pub fn refused_checks(validation: &Validation) -> Vec<Check> {
         Some(path) => format!("{path}: {}", finding.message),
         None => finding.message.clone(),
     });
-    let summary = format!("it was not unpacked: {}", why.unwrap_or_default());
     let hint = error.and_then(|finding| finding.hint.clone()).unwrap_or_default();
+    let what_to_do = if hint.is_empty() { String::new() } else { format!(" (hint: {hint})") };
+    let summary = format!("it was not unpacked: {}{what_to_do}", why.unwrap_or_default());
     vec![
         Check::new(TREE, "", Verdict::NotJudged, summary.clone()),
-        Check::new(BUILD, "", Verdict::Fail, summary).with_hint(hint),
+        Check::new(BUILD, "", Verdict::Fail, summary),
     ]
 }
 

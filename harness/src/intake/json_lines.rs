@@ -63,6 +63,26 @@ pub(super) fn parse(bytes: &[u8]) -> Read {
     Read { node, stopped: reader.stopped, text, findings: reader.findings }
 }
 
+/// The line of a key in a JSON file, from 1; `at` is the keys and indices on the way to it.
+pub fn line_of(text: &str, at: &[String]) -> Option<u32> {
+    let mut node = parse(text.as_bytes()).node?;
+    let mut line = node.line;
+    for step in at {
+        (line, node) = match node.value {
+            Value::Object(members) => members
+                .into_iter()
+                .find(|(key, ..)| key == step)
+                .map(|(_, line, node)| (line, node))?,
+            Value::List(items) => {
+                let item = items.into_iter().nth(step.parse().ok()?)?;
+                (item.line, item)
+            }
+            _ => return None,
+        };
+    }
+    Some(line)
+}
+
 /// Quotes that editors and keyboards put in the place of `"`, also doubled single ones as they open and close.
 fn is_quote(c: char) -> bool {
     matches!(

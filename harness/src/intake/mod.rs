@@ -41,6 +41,7 @@ mod zip_headers;
 
 pub use check_config::check_config;
 pub use finding::{Excerpt, Finding, Severity};
+pub use json_lines::line_of;
 pub use limits::Limits;
 pub use pack::{Packed, archive_name, fix, mends, pack};
 pub use source_rules::{INCLUDE_INSIDE, scan_source, scan_text};
