@@ -26,7 +26,11 @@ pub fn refused_checks(validation: &Validation) -> Vec<Check> {
         Some(path) => format!("{path}: {}", finding.message),
         None => finding.message.clone(),
     });
-    let summary = format!("it was not unpacked: {}", why.unwrap_or_default());
+    let refused = match validation.format {
+        Some(intake::Format::Folder) => "it was not read",
+        _ => "it was not unpacked",
+    };
+    let summary = format!("{refused}: {}", why.unwrap_or_default());
     let hint = error.and_then(|finding| finding.hint.clone()).unwrap_or_default();
     vec![
         Check::new(TREE, "", Verdict::NotJudged, summary.clone()),

@@ -135,6 +135,11 @@ impl<'a> ExrRows<'a> {
         Some(all.map(|Vec2(x, y)| [x, y]))
     }
 
+    /// Width over height of a pixel as it is shown; 1 for square ones.
+    pub fn pixel_aspect(&self) -> f32 {
+        self.header.shared_attributes.pixel_aspect
+    }
+
     /// The layers with R, G and B: name, sorted, and the indices of the three channels; and what a
     /// reader may want to know about the file, such as channels of no layer.
     ///
@@ -251,10 +256,13 @@ impl<'a> ExrRows<'a> {
         let header = header.clone();
         drop(reader);
         let mut notes = Vec::new();
+        let io = |source| ImageError::Io { path: path.into(), source };
+        let after_header = cursor.stream_position().map_err(io)?;
+        let mut bytes = vec![0; after_header as usize];
+        source.read(&mut bytes, 0).map_err(io)?;
+        checks.windows(&bytes)?;
+        drop(bytes);
         let (width, height) = checks.header(&header, &mut notes)?;
-        let after_header = cursor
-            .stream_position()
-            .map_err(|source| ImageError::Io { path: path.into(), source })?;
         let blocks = find_blocks(&source, &checks, &header, after_header)?;
         let mut before = Vec::new();
         let mut bytes = 0;
