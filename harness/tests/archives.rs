@@ -1243,9 +1243,9 @@ fn a_backslash_that_is_half_a_letter_separates_nothing() {
     // Folders called "source" in Shift-JIS, "homework Hsu" in Big5, a name in GBK, and one in EUC-KR.
     for (folder, shown) in [
         (&b"\x83\x5c\x81\x5b\x83\x58"[..], "_x83_x5C_x81[_x83X"),
-        (b"\xa5\x5c\xbd\xd2\xb3\x5c", "_xA5_x5C_xBD_xD2_xB3_x5C"),
+        (b"\xa5\x5c\xbd\xd2\xb3\x5c", "_xA5_x5C_xBD\u{4b3}_x5C"),
         (b"\xd5\x5c", "_xD5_x5C"),
-        (b"\xc7\xd1\xb1\xdb", "_xC7_xD1_xB1_xDB"),
+        (b"\xc7\xd1\xb1\xdb", "_xC7\u{471}_xDB"),
     ] {
         for host in [0, 3, 10, 11] {
             let bytes = zip_below(folder, b"/", host);

@@ -86,6 +86,7 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
                     code: TWO_IMAGES.to_owned(),
                     ..ambiguous(&file.path, &placed)
                 });
+                unclear.extend(&placed[1..]);
                 Lost::One(found)
             }
             [] if file.path == CONFIG_FILE => config.found.clone(),
