@@ -165,10 +165,10 @@ fn placed<'a>(file: &TreeFile, submission: &'a Submission) -> Vec<&'a str> {
     }
     let mut found: Vec<&SubmittedFile> =
         file.aliases.iter().filter_map(|alias| submission.file(alias)).collect();
-    if let Some(first) = found.first().map(|first| &first.sha256) {
-        if found.iter().all(|other| other.sha256 == *first) {
-            found.truncate(1);
-        }
+    if let Some(first) = found.first().map(|first| &first.sha256)
+        && found.iter().all(|other| other.sha256 == *first)
+    {
+        found.truncate(1);
     }
     found.into_iter().map(|file| file.path.as_str()).collect()
 }

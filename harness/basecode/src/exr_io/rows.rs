@@ -22,6 +22,8 @@ use super::{ExrLayers, ImageError, MAX_FILE_BYTES, read_file};
 use crate::Vec3;
 use crate::image::Image;
 
+/// Bytes in which a header's windows are looked for; most headers have a few hundred.
+const HEAD: u64 = 1 << 16;
 /// About so many bytes of samples are decoded at a time: what a core's own cache holds.
 const BAND_BYTES: usize = 256 << 10;
 
@@ -248,6 +250,9 @@ impl<'a> ExrRows<'a> {
         let start = &mut start[..source.len().min(24) as usize];
         source.read(start, 0).map_err(|source| ImageError::Io { path: path.into(), source })?;
         checks.signature(start)?;
+        let mut head = vec![0; source.len().min(HEAD) as usize];
+        source.read(&mut head, 0).map_err(|source| ImageError::Io { path: path.into(), source })?;
+        checks.windows(&head)?;
         let mut cursor = BufReader::new(Cursor { source: &source, at: 0 });
         let reader = block::read(&mut cursor, false).map_err(|e| checks.error(e, "the header"))?;
         let [header] = reader.headers() else {
@@ -256,13 +261,10 @@ impl<'a> ExrRows<'a> {
         let header = header.clone();
         drop(reader);
         let mut notes = Vec::new();
-        let io = |source| ImageError::Io { path: path.into(), source };
-        let after_header = cursor.stream_position().map_err(io)?;
-        let mut bytes = vec![0; after_header as usize];
-        source.read(&mut bytes, 0).map_err(io)?;
-        checks.windows(&bytes)?;
-        drop(bytes);
         let (width, height) = checks.header(&header, &mut notes)?;
+        let after_header = cursor
+            .stream_position()
+            .map_err(|source| ImageError::Io { path: path.into(), source })?;
         let blocks = find_blocks(&source, &checks, &header, after_header)?;
         let mut before = Vec::new();
         let mut bytes = 0;
