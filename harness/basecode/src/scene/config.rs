@@ -157,7 +157,7 @@ impl SceneConfig {
             let statement =
                 line.and_then(|line: usize| text.lines().nth(line - 1)).unwrap_or_default();
             if let Some((key, value)) = statement.split_once('=') {
-                if !message.contains(key.trim()) {
+                if !message.contains(&format!("`{}`", key.trim())) {
                     message = format!("{}: {message}", key.trim());
                 }
                 message += slip(value);
