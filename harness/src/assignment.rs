@@ -242,6 +242,25 @@ impl Assignment {
         self.late.as_ref().and_then(|late| late.problem(&self.due))
     }
 
+    /// Width and height of the image at this place of a submission; nothing where it is no scene's, or the scene's file
+    /// cannot be read.
+    pub fn film_of(&self, image: &str) -> Option<[usize; 2]> {
+        self.scenes.iter().find_map(|scene| {
+            let paths = scene.submitted.as_ref()?;
+            let toml = match image {
+                image if image == paths.offline => &scene.offline,
+                image if image == paths.realtime => &scene.realtime,
+                image if image == paths.bonus => scene.bonus.as_ref()?,
+                _ => return None,
+            };
+            if let Some([width, height]) = scene.film {
+                return Some([width as usize, height as usize]);
+            }
+            let config = basecode::scene::SceneConfig::load(&self.root.join(toml)).ok()?;
+            Some([config.width, config.height])
+        })
+    }
+
     /// Where the expected images of a stored scene lie.
     pub fn expected_file(&self, scene: &SceneEntry) -> PathBuf {
         self.root.join("expected").join(&self.name).join(format!("{}.exr", scene.name))

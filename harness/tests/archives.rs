@@ -960,6 +960,12 @@ fn gz_data_after_zeros() {
     let more = gz(&tar(&[Tar::file("hidden", b"x")]));
     let bytes = [gz(&tar(&[Tar::file("config.json", b"{}")])), vec![0; 600], more].concat();
     assert_refused(&bytes, "a.tar.gz", "gz_data_after", "");
+    // Also in the middle of a file, which is not cut off.
+    let whole = tar(&[Tar::file("config.json", b"{}"), Tar::file("src/lib.rs", &[7; 3000])]);
+    let (head, tail) = whole.split_at(2500);
+    let bytes = [gz(head), vec![0; 100], gz(tail)].concat();
+    let found = assert_refused(&bytes, "a.tar.gz", "gz_data_after", "src/lib.rs");
+    assert!(found.message.contains("behind 100 zeros: this can be read in two ways"), "{found}");
 }
 
 #[test]
@@ -1187,7 +1193,9 @@ fn an_archive_in_nothing_but_another_is_opened() {
     assert_refused(&Zip::of([Entry::stored("x.zip", &bomb)]).bytes(), "a.zip", "limit_ratio", "x");
     // Once is enough.
     let deep = Zip::of([Entry::stored("b.zip", &outer)]).bytes();
-    assert_accepted(&deep, "a.zip", "nested_archive");
+    let (submission, _scratch) = assert_accepted(&deep, "a.zip", "nested_archive");
+    let said = &submission.findings[0].message;
+    assert!(said.ends_with("'inner.zip', which is not opened: two are, not more"), "{said}");
 }
 
 #[test]
@@ -1207,6 +1215,80 @@ fn backslashes_of_windows_are_folders_beside_slashes_too() {
         let paths: Vec<&str> = submission.files.iter().map(|file| file.path.as_str()).collect();
         assert_eq!(paths, ["config.json", "src/lib.rs"], "{host}");
     }
+}
+
+/// A zip of files below a folder, whose names are made of both, as made on a host.
+fn zip_below(folder: &[u8], slash: &[u8], host: u8) -> Vec<u8> {
+    let entry = |name: &[u8], data: &[u8]| {
+        Entry::with(&[folder, slash, name].concat(), 0, data.to_vec(), data)
+    };
+    let lib = [b"src", slash, b"lib.rs"].concat();
+    let mut bytes = Zip::of([entry(b"config.json", b"{}"), entry(&lib, b"x")]).bytes();
+    let made_by: Vec<usize> =
+        (0..bytes.len() - 4).filter(|&at| bytes[at..].starts_with(b"PK\x01\x02")).collect();
+    made_by.iter().for_each(|at| bytes[at + 5] = host);
+    bytes
+}
+
+#[test]
+fn a_backslash_that_is_half_a_letter_separates_nothing() {
+    let paths = ["config.json", "src/lib.rs"].map(str::to_owned);
+    let listed = |bytes: &[u8], code: &str| {
+        let (submission, _scratch) = assert_accepted(bytes, "a.zip", code);
+        let backslash = submission.findings.iter().any(|finding| finding.code == "zip_backslash");
+        let found = submission.files.iter().map(|file| file.path.clone()).collect::<Vec<_>>();
+        assert_eq!(found, paths);
+        (submission.wrapped_in.unwrap(), backslash)
+    };
+    // Folders called "source" in Shift-JIS, "homework Hsu" in Big5, a name in GBK, and one in EUC-KR.
+    for (folder, shown) in [
+        (&b"\x83\x5c\x81\x5b\x83\x58"[..], "_x83_x5C_x81[_x83X"),
+        (b"\xa5\x5c\xbd\xd2\xb3\x5c", "_xA5_x5C_xBD\u{4b3}_x5C"),
+        (b"\xd5\x5c", "_xD5_x5C"),
+        (b"\xc7\xd1\xb1\xdb", "_xC7\u{471}_xDB"),
+    ] {
+        for host in [0, 3, 10, 11] {
+            let bytes = zip_below(folder, b"/", host);
+            assert_eq!(listed(&bytes, "name_not_utf8"), (shown.to_owned(), false), "{host}");
+            // Where no name holds a slash, the others separate.
+            let bytes = zip_below(folder, b"\\", host);
+            assert_eq!(listed(&bytes, "zip_backslash"), (shown.to_owned(), true), "{host}");
+        }
+    }
+    // In a code page of one byte a letter, one behind an accent separates: no file were config.json else.
+    let bytes = zip_below(b"Ren\x82", b"\\", 0);
+    assert_eq!(listed(&bytes, "zip_backslash"), ("Ren_x82".to_owned(), true));
+}
+
+#[test]
+fn backslashes_in_a_tar_are_folders_where_no_name_holds_a_slash() {
+    let entries = [
+        Tar::of(b"src\\", b'5', b""),
+        Tar::file("config.json", b"{}"),
+        Tar::file("src\\lib.rs", b"x"),
+        Tar::link("src\\mod.rs", b'1', "src\\lib.rs"),
+    ];
+    for (bytes, name) in [(tar(&entries), "a.tar"), (gz(&tar(&entries)), "a.tar.gz")] {
+        let (submission, _scratch) = assert_accepted(&bytes, name, "tar_backslash");
+        let paths: Vec<&str> = submission.files.iter().map(|file| file.path.as_str()).collect();
+        assert_eq!(paths, ["config.json", "src/lib.rs", "src/mod.rs"]);
+    }
+    let beside = Tar::file("src/a.rs", b"x");
+    tar_refused(&[beside, Tar::file("src\\lib.rs", b"x")], "name_backslash", "src\\lib.rs");
+    tar_refused(&[Tar::file("..\\x", b"x")], "path_escape", "../x");
+}
+
+#[test]
+fn names_that_our_own_signs_make_equal_are_told_apart() {
+    let entry = |name: &[u8]| Entry::with(name, 0, b"x".to_vec(), b"x");
+    for names in [[&b"src/\x81.rs"[..], b"src/_x81.rs"], [b"src/_x81.rs", b"src/\x81.rs"]] {
+        let message = zip_refused(names.map(entry), "name_written_alike", "src/_x81.rs");
+        assert!(message.contains("not UTF-8"), "{message}");
+    }
+    // The same name twice is that.
+    let twice = [entry(b"src/\x81.rs"), entry(b"./src//\x81.rs")];
+    let bytes = Zip::of([good()].into_iter().chain(twice)).bytes();
+    assert_accepted(&bytes, "a.zip", "duplicate_entry");
 }
 
 #[test]

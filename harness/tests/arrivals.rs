@@ -198,6 +198,54 @@ fn a_submission_that_is_a_link_is_refused_with_and_without_a_slash() {
 }
 
 #[test]
+fn images_that_cannot_be_their_scenes_are_warned_of() {
+    let place = tempfile::tempdir().unwrap();
+    let work = place.path().join("work");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let film = |scene: &str| {
+        let toml = format!("scenes/a2/{scene}/tinyrender/{scene}_simple_offline.toml");
+        let config = basecode::scene::SceneConfig::load(&root.join(toml)).unwrap();
+        (config.width, config.height)
+    };
+    let (width, height) = film("teapot");
+    let config = config("Ada", "Lampglow", "260123456");
+    for (path, text) in submission(&config, "src/lib.rs", "") {
+        put(work.join(path), text.as_bytes());
+    }
+    let write = |path: &str, (width, height): (usize, usize), values: &[f32]| {
+        let mut image = basecode::Image::new(width, height);
+        image.pixels.fill(basecode::Vec3::splat(values[0]));
+        image.pixels[0] = basecode::Vec3::splat(values[values.len() - 1]);
+        let precision = basecode::exr_io::Precision::Half;
+        basecode::exr_io::write_exr(work.join(path), &image, precision, &[]).unwrap();
+    };
+    write(IMAGES[0], (1, 1), &[0.5]);
+    write(IMAGES[1], (width, height), &[f32::NAN]);
+    write(IMAGES[2], film("cbox"), &[0.0]);
+    write(IMAGES[3], (width, height), &[f32::NAN, 0.5]);
+    let expected = [
+        format!(
+            "the image is 1x1, expected {}x{}, the film of its scene",
+            film("cbox").0,
+            film("cbox").1
+        ),
+        "no pixel of the image is finite".to_owned(),
+        "every pixel of the image is black".to_owned(),
+    ];
+    let (code, said, _) = umbra(&["validate"], &[&work]);
+    assert_eq!(code, Some(0), "{said}");
+    let out = place.path().join("out.zip");
+    let (code, _, warned) = umbra(&["pack", "-o"], &[&out, &work]);
+    assert_eq!(code, Some(0), "{warned}");
+    for said in [said, warned] {
+        for (path, expected) in IMAGES.iter().zip(&expected) {
+            assert!(said.contains(&format!("{path}: {expected}")), "{said}");
+        }
+        assert!(!said.contains(&format!("{}: ", IMAGES[3])), "{said}");
+    }
+}
+
+#[test]
 fn fix_repacks_names_with_backslashes() {
     let place = tempfile::tempdir().unwrap();
     let config = config("Ada", "Lampglow", "260123456");

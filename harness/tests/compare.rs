@@ -418,7 +418,7 @@ fn a_silhouette_may_move_inside_its_mask_but_a_blob_may_not_appear() {
     assert_eq!((area.x, area.y, area.width, area.height, area.pixels), (30, 40, 2, 2, 4));
     assert_eq!(
         evidence.check("blob").unwrap().detail,
-        "4 pixels that touch differ, in columns 30 to 31 and rows 40 to 41"
+        "1 block of 2x2 differing pixels; the largest area has 4 pixels, in columns 30 to 31 and rows 40 to 41"
     );
 
     // Half a pixel off, the whole rim moves.

@@ -36,6 +36,31 @@ fn file(folder: &tempfile::TempDir, name: &str, pixels: &[(usize, Vec3)]) -> Pat
 }
 
 #[test]
+fn pixels_of_another_shape_are_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    let square = file(&folder, "a.exr", &[]);
+    let wide = folder.path().join("b.exr");
+    let mut bytes = std::fs::read(&square).unwrap();
+    let name = b"pixelAspectRatio\0float\0\x04\0\0\0";
+    let at = bytes.windows(name.len()).position(|bytes| bytes == name).unwrap() + name.len();
+    bytes[at..at + 4].copy_from_slice(&2f32.to_le_bytes());
+    std::fs::write(&wide, bytes).unwrap();
+    let (code, said, _) = compare(&[&wide, &square]);
+    assert!(code == 0 && said.contains("pixel aspect ratios differ"), "{said}");
+    assert!(said.contains("actual 2, expected 1"), "{said}");
+    let (_, said, _) = compare(&[&wide, &wide]);
+    assert!(!said.contains("aspect"), "{said}");
+}
+
+#[test]
+fn numbers_far_from_one_have_exponents() {
+    let folder = tempfile::tempdir().unwrap();
+    let far = file(&folder, "a.exr", &[(0, Vec3::new(1e-40, 3.4e38, 0.5))]);
+    let (_, said, _) = compare(&[&far, &file(&folder, "b.exr", &[])]);
+    assert!(said.contains("actual [1e-40, 3.4e38, 0.5], expected [0.5, 0.5, 0.5]"), "{said}");
+}
+
+#[test]
 fn equal_infinities_and_nan_are_equal_unless_told_otherwise() {
     let inf = golden("inf.exr");
     let (code, said, _) = compare(&[&inf, &inf]);

@@ -344,6 +344,82 @@ fn limits_hold_for_folders() {
 
 #[cfg(unix)]
 #[test]
+fn what_is_no_part_of_the_tree_refuses_no_working_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("work");
+    write_folder(&source, &working_folder());
+    fs::File::create(source.join("scene.blend")).unwrap().set_len(100 << 20).unwrap();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("/usr/bin/python3", source.join("python")).unwrap();
+    let scratch = Scratch::new();
+    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    let submission = unpack(&source, &scratch.dest, &tree, &limits).unwrap();
+    assert!(submission.file("src/lib.rs").is_some() && submission.file("config.json").is_some());
+    let warned = |code: &str, path: &str| {
+        let mut found = submission.findings.iter().filter(|finding| finding.code == code);
+        let found = found.find(|finding| finding.path.as_deref() == Some(path)).unwrap();
+        assert_eq!(found.severity, Severity::Warning);
+        assert!(found.message.ends_with("; only what belongs to the tree is read"), "{found}");
+    };
+    warned("limit_file", "scene.blend");
+    // In the tree itself it refuses.
+    let large = source.join("src/large.rs");
+    fs::File::create(&large).unwrap().set_len(100 << 20).unwrap();
+    let scratch = Scratch::new();
+    assert!(unpack(&source, &scratch.dest, &tree, &limits).is_err());
+}
+
+#[test]
+fn fix_chooses_between_neither_images_nor_people() {
+    let refused = |more: &[(&str, &[u8])]| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut files = perfect();
+        files.extend(more.iter().map(|(path, content)| ((*path).to_owned(), content.to_vec())));
+        let source = folder.path().join("work");
+        write_folder(&source, &files);
+        let (tree, limits) = (TreeSpec::default(), Limits::default());
+        let scratch = Scratch::new();
+        let submission = unpack(&source, &scratch.dest, &tree, &limits).unwrap();
+        match fix(&submission, &folder.path().join("out.zip"), &tree, &limits) {
+            Ok(_) => String::new(),
+            Err(IntakeError::Refused(refusal)) => {
+                refusal.findings.iter().map(|f| format!("{}: {f}", f.code)).collect()
+            }
+            Err(other) => panic!("{other}"),
+        }
+    };
+    let bonus = ["renders/teapot_bonus.exr", "realtime/teapot_simple_realtime_bonus.exr"];
+    let said = refused(&[(bonus[0], b"one"), (bonus[1], b"two")]);
+    assert!(
+        said.starts_with("tree_two_images") && bonus.iter().all(|b| said.contains(b)),
+        "{said}"
+    );
+    assert_eq!(refused(&[(bonus[0], b"one"), (bonus[1], b"one")]), "");
+    let eve =
+        br#"{"firstName": "Eve", "lastName": "Other", "studentID": "260999999", "renders": []}"#;
+    for path in ["Config.json", "old/config.json", "config.json.txt"] {
+        let said = refused(&[(path, eve)]);
+        assert!(said.starts_with("config_other_person"), "{path}: {said}");
+        assert!(said.contains(path) && said.contains("names Eve Other 260999999"), "{said}");
+    }
+    // A template's names nobody.
+    assert_eq!(refused(&[("old/config.json", br#"{"firstName": "First"}"#)]), "");
+}
+
+#[test]
+fn source_that_the_compiler_cannot_read_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut files = working_folder();
+    let latin = |path: &str| (path.to_owned(), b"x\n// r\xe9sum\xe9\n".to_vec());
+    files.extend(["src/a.wgsl", "src/b.rs", "src/notes.txt"].map(latin));
+    let packed = pack_in(folder.path(), &files).unwrap();
+    let findings = packed.validation.findings.iter();
+    let warned = findings.filter(|finding| finding.code == "source_not_utf8");
+    let places: Vec<_> = warned.map(|f| (f.path.clone().unwrap(), f.line)).collect();
+    assert_eq!(places, [("src/a.wgsl".to_owned(), Some(2)), ("src/b.rs".to_owned(), Some(2))]);
+}
+
+#[test]
 fn sparse_file_in_a_folder_counts_its_apparent_size() {
     let sparse =
         |folder: &Path| fs::File::create(folder.join("sparse")).unwrap().set_len(3 << 20).unwrap();

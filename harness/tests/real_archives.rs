@@ -62,7 +62,7 @@ fn a_submission_of_2019_lacks_nothing_but_the_language() {
     let scratch = Scratch::new();
     let (validation, images) = with_decoder(|decoder| {
         let received = decoder.receive(&path, &scratch.dest, &tree, &limits).unwrap();
-        let images = decoder.image_findings(&received.submission, &tree).unwrap();
+        let images = decoder.image_findings(&received.submission, &tree, &|_| None).unwrap();
         (received.validation, images)
     });
     let validation = validation.with(images);

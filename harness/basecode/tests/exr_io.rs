@@ -380,6 +380,28 @@ fn wrong_channels_are_named() {
 }
 
 #[test]
+fn what_can_be_read_in_two_ways_is_damaged() {
+    let values = |values: [i32; 4]| values.map(i32::to_le_bytes).concat();
+    for (name, what) in [("dataWindow", "data"), ("displayWindow", "display")] {
+        let attribute = [name.as_bytes(), b"\0box2i\0"].concat();
+        let said = message(&patched(plain(), &attribute, 4, &values([10, 10, 0, 0])));
+        let expected =
+            format!("damaged: the {what} window ends at (0, 0), before it starts at (10, 10)");
+        assert!(said.contains(&expected), "{said}");
+    }
+    let twice = patched(plain(), b"channels\0chlist\0", 4 + 18, b"B");
+    assert!(message(&twice).contains("damaged: channel B is listed twice"), "{}", message(&twice));
+    for (place, with, expected) in [
+        (&b"compression\0compression\0"[..], &[99][..], "expected none, RLE, ZIP"),
+        (b"\x76\x2f\x31\x01", &[3], "expected version 2"),
+    ] {
+        let skip = if place.len() == 4 { 0 } else { 4 };
+        let said = message(&patched(plain(), place, skip, with));
+        assert!(said.contains(expected), "{said}");
+    }
+}
+
+#[test]
 fn windows_must_agree() {
     let cropped = foreign(&BGR, Compression::Uncompressed, LINES, |h| {
         h.own_attributes.layer_position = Vec2(1, 2);

@@ -186,6 +186,7 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
     let [actual, expected] = open([actual, expected], arguments.layer.as_deref())?;
     let mut notes = Vec::new();
     notes.extend(different_primaries(&actual.file, &expected.file));
+    notes.extend(different_aspects(&actual.file, &expected.file));
     let keep = arguments.metrics || arguments.pictures.is_some() || arguments.html.is_some();
     let same_size = actual.size() == expected.size();
     let mut found = if same_size {
@@ -369,6 +370,18 @@ fn different_primaries(actual: &ExrRows, expected: &ExrRows) -> Option<String> {
             "chromaticities differ, and values are compared as they are: actual {}, expected {}",
             primaries(&actual),
             primaries(&expected)
+        )
+    })
+}
+
+/// The remark on files whose pixels are shown at different widths.
+fn different_aspects(actual: &ExrRows, expected: &ExrRows) -> Option<String> {
+    let [actual, expected] = [actual, expected].map(ExrRows::pixel_aspect);
+    // As not equal counts what is no number.
+    let differ = (actual - expected).abs() > 1e-6 || actual.is_nan() != expected.is_nan();
+    differ.then(|| {
+        format!(
+            "pixel aspect ratios differ, and values are compared as they are: actual {actual}, expected {expected}"
         )
     })
 }

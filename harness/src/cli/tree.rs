@@ -222,7 +222,8 @@ fn look(
     let decoder = context.decoder();
     match decoder.receive(archive, copy, tree, limits) {
         Ok(received) => {
-            let images = decoder.image_findings(&received.submission, tree)?;
+            let film = |image: &str| context.assignment.film_of(image);
+            let images = decoder.image_findings(&received.submission, tree, &film)?;
             Ok((received.validation.with(images), Ok(received.submission)))
         }
         Err(IntakeError::Refused(refusal)) => {
@@ -251,7 +252,8 @@ pub fn pack(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8
             let private = tempfile::tempdir_in(&context.supervisor.scratch)?;
             let decoder = context.decoder();
             let received = decoder.receive(&packed.archive, private.path(), tree, limits)?;
-            let images = decoder.image_findings(&received.submission, tree)?;
+            let film = |image: &str| context.assignment.film_of(image);
+            let images = decoder.image_findings(&received.submission, tree, &film)?;
             let validation = received.validation.with(images);
             for finding in validation.findings.iter().filter(|f| f.severity != Severity::Note) {
                 eprintln!("umbra: {finding}");

@@ -183,7 +183,8 @@ impl<'a> Decoder<'a> {
         })
     }
 
-    /// Findings on the tree's images in a private copy before grading: images that are empty or cannot be decoded.
+    /// Findings on the tree's images in a private copy before grading: images that are empty, cannot be decoded, or
+    /// cannot be their scene's. `film` answers the width and height of the image at a place of the tree.
     ///
     /// # Errors
     /// The machine's matters and Ctrl-C.
@@ -191,12 +192,16 @@ impl<'a> Decoder<'a> {
         &self,
         submission: &Submission,
         tree: &TreeSpec,
+        film: &dyn Fn(&str) -> Option<[usize; 2]>,
     ) -> io::Result<Vec<Finding>> {
         let mut findings = Vec::new();
         let images = tree.files.iter().filter(|file| is_image(&file.path));
-        for path in images.filter_map(|file| tree.found_in(&submission.root, &file.path)) {
+        for file in images {
+            let Some(path) = tree.found_in(&submission.root, &file.path) else { continue };
             let image = self.image(&submission.root.join(path), path)?;
             findings.extend(image_finding(&submission.root, path, &image));
+            findings
+                .extend(image.ok().and_then(|image| impossible(path, &image, film(&file.path))));
         }
         Ok(findings)
     }
@@ -302,6 +307,24 @@ pub fn image_finding(root: &Path, path: &str, image: &Result<Image, String>) -> 
         let message = format!("the image cannot be read: {}", printable(error));
         Finding::warning("image_unreadable", message).at(path).hint("render it again, as EXR")
     })
+}
+
+/// The warning on an image that cannot be its scene's.
+fn impossible(path: &str, image: &Image, film: Option<[usize; 2]>) -> Option<Finding> {
+    let found = [image.width, image.height];
+    let words = |[width, height]: [usize; 2]| format!("{width}x{height}");
+    let all = |is: fn(&basecode::Vec3) -> bool| image.pixels.iter().all(is);
+    let (code, message) = if let Some(film) = film.filter(|film| *film != found) {
+        let (film, found) = (words(film), words(found));
+        ("image_size", format!("the image is {found}, expected {film}, the film of its scene"))
+    } else if all(|pixel| !pixel.is_finite()) {
+        ("image_not_finite", "no pixel of the image is finite".to_owned())
+    } else if all(|pixel| *pixel == basecode::Vec3::ZERO) {
+        ("image_black", "every pixel of the image is black".to_owned())
+    } else {
+        return None;
+    };
+    Some(Finding::warning(code, message).at(path).hint("render the scene again, as its file says"))
 }
 
 fn died(how: &str) -> NoAnswer {

@@ -6,7 +6,7 @@ use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
-use crate::build::{BuildOutcome, BuildReport, Diagnostic};
+use crate::build::{BuildOutcome, BuildReport, Diagnostic, Place};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::files::{copy_tree, files_below};
 use crate::intake::Finding;
@@ -57,8 +57,8 @@ pub fn build(
     let BuildOutcome::CompileError { errors } = &first.outcome else {
         return Ok(as_it_is(first, Vec::new(), cpu_s));
     };
-    let submitted = errors.clone();
-    let mut errors = errors.clone();
+    let submitted = located(errors, src);
+    let mut errors = submitted.clone();
     copy_tree(src, copy)?;
     let mut replaced = BTreeMap::new();
     for _ in 0..ROUNDS {
@@ -72,11 +72,7 @@ pub fn build(
             break;
         }
         for file in replaced.keys() {
-            let to = copy.join(file);
-            if let Some(parent) = to.parent() {
-                fs::create_dir_all(parent)?;
-            }
-            fs::copy(template.join(file), to)?;
+            put(&template.join(file), copy, file)?;
         }
         let report = compile(copy)?;
         cpu_s += report.cpu_s;
@@ -85,12 +81,54 @@ pub fn build(
                 let src = copy.to_owned();
                 return Ok(Built { report, errors: submitted, src, replaced, cpu_s });
             }
-            BuildOutcome::CompileError { errors } => errors,
+            BuildOutcome::CompileError { errors } => located(&errors, copy),
             BuildOutcome::Ended(Exit::Cancelled) => return Ok(as_it_is(report, submitted, cpu_s)),
             _ => break,
         };
     }
     Ok(as_it_is(first, submitted, cpu_s))
+}
+
+/// Copies a file of the template to its place below `copy`, whatever stands there or above it.
+fn put(from: &Path, copy: &Path, file: &str) -> io::Result<()> {
+    let to = copy.join(file);
+    for above in to.ancestors().skip(1).take_while(|above| *above != copy) {
+        if above.is_file() {
+            fs::remove_file(above)?;
+        }
+    }
+    if to.is_dir() {
+        fs::remove_dir_all(&to)?;
+    }
+    fs::create_dir_all(to.parent().unwrap_or(copy))?;
+    fs::copy(from, to).map(drop)
+}
+
+/// The errors with the files that they are about. Of an included file that is not UTF-8, the compiler repeats the path
+/// as the macro names it, and does not say where the macro stands.
+fn located(errors: &[Diagnostic], src: &Path) -> Vec<Diagnostic> {
+    let located = |error: &Diagnostic| {
+        let mut error = error.clone();
+        let Some(path) = error.message.strip_suffix(" wasn't a utf-8 file") else { return error };
+        let named =
+            path.trim_matches('`').split('/').filter(|part| !matches!(*part, "" | "." | ".."));
+        let named: PathBuf = named.collect();
+        let files = files_below(src).unwrap_or_default();
+        let unreadable = |file: &PathBuf| {
+            let bytes = fs::read(src.join(file)).ok()?;
+            let end = std::str::from_utf8(&bytes).err()?.valid_up_to();
+            Some(1 + bytes[..end].iter().filter(|byte| **byte == b'\n').count() as u32)
+        };
+        let files = files.iter().filter_map(|file| Some(file.strip_prefix(src).ok()?.to_owned()));
+        let mut files = files.filter(|file| named.ends_with(file) || file.ends_with(&named));
+        let found = files.find_map(|file| Some((below(&file)?, unreadable(&file)?)));
+        if let Some((file, line)) = found {
+            error.place = Some(Place { file: seen(&file), line });
+            error.message = "the file is not UTF-8; save it as UTF-8".to_owned();
+        }
+        error
+    };
+    errors.iter().map(located).collect()
 }
 
 impl Built {
@@ -109,8 +147,7 @@ impl Built {
                 let verdicts: Vec<Verdict> = images.map(|check| check.verdict).collect();
                 if verdicts.contains(&Verdict::Pass) && !verdicts.contains(&Verdict::Fail) {
                     let message = format!(
-                        "its part {} earns nothing by code, but the submitted images of it are right: an \
-                         instructor decides",
+                        "its part {} earns nothing by code, though the submitted images of it are right",
                         part.id
                     );
                     findings.push(Finding::warning("replaced_image_right", message).at(seen(file)));
@@ -157,14 +194,28 @@ fn to_replace(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
             false => culprits(error, template, copy).into_iter().filter(known).collect(),
         };
     }
-    let stem = Path::new(&file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let uses = |file: &String| {
-        let text = fs::read_to_string(copy.join(file)).unwrap_or_default();
-        text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == stem)
+    let users = users(&file, copy);
+    let direct: Vec<String> = users.iter().filter(|file| known(file)).cloned().collect();
+    if !direct.is_empty() {
+        return direct;
+    }
+    users.iter().flat_map(|file| self::users(file, copy)).filter(known).collect()
+}
+
+/// The files that name a module, or the file itself.
+fn users(file: &str, copy: &Path) -> Vec<String> {
+    let path = Path::new(file);
+    let [stem, name] = [path.file_stem(), path.file_name()]
+        .map(|name| name.unwrap_or_default().to_string_lossy().into_owned());
+    let uses = |other: &String| {
+        let text = fs::read_to_string(copy.join(other)).unwrap_or_default();
+        other != file
+            && (text.contains(&name)
+                || text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == stem))
     };
-    let files = files_below(template).unwrap_or_default();
-    let files = files.iter().filter_map(|path| below(path.strip_prefix(template).ok()?));
-    files.filter(known).filter(uses).collect()
+    let files = files_below(copy).unwrap_or_default();
+    let files = files.iter().filter_map(|path| below(path.strip_prefix(copy).ok()?));
+    files.filter(uses).collect()
 }
 
 /// Whether a file is another than the template's of that name.
@@ -255,7 +306,6 @@ fn below(path: &Path) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::Place;
 
     fn error(message: &str, file: &str, rendered: &str) -> Diagnostic {
         let place = (!file.is_empty()).then(|| Place { file: file.into(), line: 7 });
@@ -331,6 +381,50 @@ mod tests {
         assert!(matches!(given_up.report.outcome, BuildOutcome::CompileError { .. }));
         assert_eq!((files(&given_up), phong.as_deref()), (vec![], Some("todo")));
         assert!(given_up.src.ends_with("src"), "the source as it was");
+    }
+
+    #[test]
+    fn an_included_file_that_is_no_text_costs_itself_or_those_that_include_it() {
+        let folder = tempfile::tempdir().expect("scratch");
+        let [template, copy] = ["template", "copy"].map(|name| folder.path().join(name));
+        for place in [&template, &copy] {
+            write(place, &TEMPLATE);
+            write(place, &[("shaders/a.wgsl", "x"), ("renderpasses/a.rs", "x")]);
+        }
+        write(&copy, &[("renderpasses/a.rs", "include_str!(\"own.wgsl\")")]);
+        write(
+            &copy,
+            &[
+                ("renderpasses/b.rs", "mod c; include_str!(\"other.txt\")"),
+                ("renderer.rs", "mod b;"),
+            ],
+        );
+        for file in ["shaders/a.wgsl", "renderpasses/own.wgsl", "renderpasses/other.txt"] {
+            fs::write(copy.join(file), b"x\n// r\xe9sum\xe9\n").expect("scratch");
+        }
+        let of = |included: &str| {
+            let said = error(&format!("`{included}` wasn't a utf-8 file"), included, "");
+            let [error] = &located(&[said], &copy)[..] else { panic!("one") };
+            let line = error.place.as_ref().map(|place| place.line);
+            (to_replace(error, &template, &copy), line, error.headline())
+        };
+        let own = vec!["shaders/a.wgsl".to_owned()];
+        for path in ["../shaders/a.wgsl", "./../shaders/a.wgsl", "/src/shaders/a.wgsl", "a.wgsl"] {
+            let said = "src/shaders/a.wgsl:2: the file is not UTF-8; save it as UTF-8".to_owned();
+            assert_eq!(of(path), (own.clone(), Some(2), said), "{path}");
+        }
+        assert_eq!(of("own.wgsl").0, ["renderpasses/a.rs"]);
+        // Of a file of one's own that another of one's own includes.
+        assert_eq!(of("other.txt").0, ["renderer.rs"]);
+        // Nothing such is there.
+        assert_eq!(of("../../config.json").0, [""; 0]);
+        // A folder in the file's place, and a file in its folder's.
+        let taken = folder.path().join("taken");
+        write(&taken, &[("shaders/a.wgsl/x", ""), ("bsdfs", "")]);
+        for file in ["shaders/a.wgsl", "bsdfs/phong.rs"] {
+            put(&template.join(file), &taken, file).expect("scratch");
+            assert!(taken.join(file).is_file(), "{file}");
+        }
     }
 
     #[test]

@@ -26,9 +26,13 @@ pub fn refused_checks(validation: &Validation) -> Vec<Check> {
         Some(path) => format!("{path}: {}", finding.message),
         None => finding.message.clone(),
     });
+    let refused = match validation.format {
+        Some(intake::Format::Folder) => "it was not read",
+        _ => "it was not unpacked",
+    };
     let hint = error.and_then(|finding| finding.hint.clone()).unwrap_or_default();
     let what_to_do = if hint.is_empty() { String::new() } else { format!(" (hint: {hint})") };
-    let summary = format!("it was not unpacked: {}{what_to_do}", why.unwrap_or_default());
+    let summary = format!("{refused}: {}{what_to_do}", why.unwrap_or_default());
     vec![
         Check::new(TREE, "", Verdict::NotJudged, summary.clone()),
         Check::new(BUILD, "", Verdict::Fail, summary),

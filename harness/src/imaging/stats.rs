@@ -8,6 +8,7 @@ use super::evidence::{
     Check, ComparedWith, FailingArea, ImageEvidence, RegionBias, Tolerances, WorstPixel,
 };
 use super::reference::RegionMask;
+use crate::columns::count;
 
 /// A dim lit region's bias is relative to this fraction of the median lit value at least.
 const DIM: f64 = 0.01;
@@ -262,8 +263,9 @@ impl ComparisonStats {
             passed: blocks == 0,
             detail: match largest {
                 Some(a) if blocks > 0 => format!(
-                    "{} pixels that touch differ, in columns {} to {} and rows {} to {}",
-                    a.pixels,
+                    "{} of 2x2 differing pixels; the largest area has {}, in columns {} to {} and rows {} to {}",
+                    count(blocks, "block"),
+                    count(a.pixels, "pixel"),
                     a.x,
                     a.x + a.width - 1,
                     a.y,
@@ -328,7 +330,13 @@ impl RegionSums {
             (0, false) => {
                 format!("{name}: {} pixels are too few for a mean; judged one by one", self.pixels)
             }
-            (n, _) => format!("{name}: {n} of {} pixels are not finite", self.pixels),
+            (n, _) if n == self.pixels => format!("{name}: no pixel of {n} is finite"),
+            (n, _) => format!(
+                "{name}: {n} of {} pixels are not finite, the others {:.3} % {side} {unit} (bound {:.3} %)",
+                self.pixels,
+                100.0 * bias.abs(),
+                100.0 * bound
+            ),
         };
         let check = Check {
             id: format!("bias: {name}"),

@@ -13,7 +13,7 @@ use unicode_normalization::UnicodeNormalization as _;
 
 use super::finding::{Finding, Findings};
 use super::limits::{Limits, mib};
-use super::name::safe_path;
+use super::name::{Backslashes, safe_path};
 use super::submission::{Format, IntakeError, Refusal, Submission, SubmittedFile, archive_magic};
 use super::tree::{CONFIG_FILE, TreeSpec};
 use crate::files::hex;
@@ -63,6 +63,9 @@ pub(super) struct PrivateCopy<'a> {
     tree: &'a TreeSpec,
     pub(super) limits: &'a Limits,
     pub(super) findings: Findings,
+    pub(super) backslashes: Backslashes,
+    /// The bytes of names that are not UTF-8, by what they are written as.
+    replaced: HashMap<String, Option<Vec<u8>>>,
     files: BTreeMap<String, Option<SubmittedFile>>,
     folders: BTreeSet<String>,
     /// Lower-cased path to the first spelling seen.
@@ -89,6 +92,8 @@ impl<'a> PrivateCopy<'a> {
             tree,
             limits,
             findings: Findings::default(),
+            backslashes: Backslashes::default(),
+            replaced: HashMap::new(),
             files: BTreeMap::new(),
             folders: BTreeSet::new(),
             spellings: HashMap::new(),
@@ -157,7 +162,15 @@ impl<'a> PrivateCopy<'a> {
         if self.count_kept().is_err() {
             return EntryAction::Refused;
         }
-        if safe.replaced {
+        let first = self.replaced.entry(path.clone()).or_insert_with(|| safe.replaced.clone());
+        if *first != safe.replaced {
+            let message =
+                "two names are written so, one with bytes that are not UTF-8: shown as _xHH";
+            let finding = Finding::error("name_written_alike", message).at(path);
+            self.findings.push(finding.hint("use plain letters in file names"));
+            return EntryAction::Refused;
+        }
+        if safe.replaced.is_some() {
             self.findings.push(
                 Finding::warning(
                     "name_not_utf8",

@@ -34,11 +34,6 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop>
             copy.findings.push(Finding::note("gz_padding", message));
             Ok(())
         }
-        // Some programs go on with a member behind zeros, others do not.
-        Some(rest) if rest.windows(3).any(|bytes| bytes == MEMBER) => {
-            let message = format!("{} bytes follow the gzip data, and hold more of it", rest.len());
-            Err(copy.refuse(Finding::error("gz_data_after", message).hint(AGAIN)))
-        }
         Some(rest) => {
             let message =
                 format!("{} after the gzip data: no part of it", count(rest.len(), "byte"));
@@ -85,6 +80,18 @@ impl Read for Gz<'_> {
                 break n;
             }
             if !rest.starts_with(b"\x1f\x8b") {
+                // Some programs go on with a member behind zeros, others do not.
+                if rest.windows(3).any(|bytes| bytes == MEMBER) {
+                    let zeros = rest.iter().take_while(|byte| **byte == 0).count();
+                    let between = match zeros {
+                        0 => "other bytes".to_owned(),
+                        _ => count(zeros, "zero"),
+                    };
+                    let message = format!(
+                        "the gzip data end, and more of it follows behind {between}: this can be read in two ways"
+                    );
+                    return Err(refused("gz_data_after", message, AGAIN));
+                }
                 self.rest = Some(rest);
                 break 0;
             }

@@ -10,13 +10,13 @@ use ::zip::{CompressionMethod, DateTime, ZipWriter};
 use serde::{Deserialize, Serialize};
 
 use super::copy::Kind;
-use super::finding::Finding;
+use super::finding::{Finding, Severity};
 use super::limits::Limits;
 use super::submission::{Format, IntakeError, Refusal, Submission};
 use super::submitted_config::{Field, SubmittedConfig};
 use super::tree::TreeSpec;
 use super::tree_lost::is_source;
-use super::tree_match::{Mark, Matched, TreeLine, match_tree};
+use super::tree_match::{Mark, Matched, TreeLine, is_choice, match_tree};
 use super::unpack::{copy_folder, format_of_bytes, unpack_bytes};
 use super::validate::{Validation, validate_submission};
 use crate::columns::count;
@@ -47,20 +47,7 @@ pub fn pack(
     tree: &TreeSpec,
     limits: &Limits,
 ) -> Result<Packed, IntakeError> {
-    let is_wanted = |path: &str, kind: Kind| {
-        let below = |file: &str| file.strip_prefix(path).is_some_and(|rest| rest.starts_with('/'));
-        tree.open_folder_of(path).is_some()
-            || match kind {
-                Kind::File => tree.file_at(path).is_some(),
-                Kind::Folder => {
-                    tree.open_folders.iter().any(|folder| folder == path)
-                        || tree
-                            .files
-                            .iter()
-                            .any(|file| below(&file.path) || file.aliases.iter().any(|a| below(a)))
-                }
-            }
-    };
+    let is_wanted = |path: &str, kind| tree.may_hold(path, kind == Kind::Folder);
     let scratch = scratch_folder()?;
     let submission = copy_folder(dir, &is_wanted, scratch.path(), tree, limits)?;
     write(&submission, out, tree, limits, &|validation| validation.conforms, write_over_archive)
@@ -94,6 +81,13 @@ pub fn fix(
     tree: &TreeSpec,
     limits: &Limits,
 ) -> Result<Packed, IntakeError> {
+    let mut findings = match_tree(submission, tree)?.findings;
+    findings.retain(is_choice);
+    if !findings.is_empty() {
+        // Nobody guesses whose it is, or which counts.
+        findings.iter_mut().for_each(|finding| finding.severity = Severity::Error);
+        return Err(refused(submission, findings));
+    }
     write(submission, out, tree, limits, &Validation::follows_tree, write_new)
 }
 

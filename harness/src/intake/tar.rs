@@ -421,7 +421,9 @@ fn names(
         return Err(copy
             .refuse(Finding::error("tar_header", message).at(printable_bytes(&name)).hint(AGAIN)));
     }
-    name = sparse.as_ref().and_then(Records::name).unwrap_or(name);
+    let name = sparse.as_ref().and_then(Records::name).unwrap_or(name);
+    let name = copy.backslashes.read(name, false);
+    let link = if link.is_empty() { link } else { copy.backslashes.read(link, false) };
     Ok(Named { name, link, sparse })
 }
 

@@ -116,6 +116,20 @@ impl TreeSpec {
             .find(|folder| path.strip_prefix(folder).is_some_and(|rest| rest.starts_with('/')))
     }
 
+    /// Whether a file at `path` belongs to the tree, or one in the folder at `path` may.
+    pub(crate) fn may_hold(&self, path: &str, is_folder: bool) -> bool {
+        let below = |file: &str| file.strip_prefix(path).is_some_and(|rest| rest.starts_with('/'));
+        let holds = |file: &TreeFile| below(&file.path) || file.aliases.iter().any(|a| below(a));
+        self.open_folder_of(path).is_some()
+            || match is_folder {
+                true => {
+                    self.open_folders.iter().any(|folder| folder == path)
+                        || self.files.iter().any(holds)
+                }
+                false => self.file_at(path).is_some(),
+            }
+    }
+
     /// Whether a folder of this name may stand at the root, so that it is no wrapping folder.
     pub(crate) fn is_top_folder(&self, name: &str) -> bool {
         let starts = |path: &str| {

@@ -7,6 +7,7 @@ use super::submission::{IntakeError, Submission};
 use super::submitted_config::{Field, SubmittedConfig};
 use super::tree::CONFIG_FILE;
 use super::tree_lost::{Lost, base, is_named_after};
+use crate::harmless::printable;
 
 /// Largest `config.json` that is read [bytes].
 pub(super) const MAX_CONFIG: u64 = 64 << 10;
@@ -15,6 +16,8 @@ pub(super) const MAX_CONFIG: u64 = 64 << 10;
 struct Person {
     number: Option<String>,
     name: String,
+    /// Both, as they are written.
+    shown: String,
 }
 
 impl Person {
@@ -28,7 +31,10 @@ impl Person {
         let name = [said(&config.first_name), said(&config.last_name)];
         let is_known = number.is_some() || name.iter().all(Option::is_some);
         let name = name.into_iter().flatten().collect::<Vec<_>>().join(" ");
-        is_known.then_some(Self { number, name })
+        let fields = [&config.first_name, &config.last_name, &config.student_id];
+        let shown: Vec<&str> =
+            fields.into_iter().flatten().map(|field| field.text.trim()).collect();
+        is_known.then(|| Self { number, name, shown: printable(&shown.join(" ")) })
     }
 
     fn is(&self, other: &Self) -> bool {
@@ -39,9 +45,21 @@ impl Person {
     }
 }
 
+/// The configuration, and other files of its name that name another person: what to say of each.
+pub(super) struct Config<'a> {
+    pub(super) found: Lost<'a>,
+    pub(super) others: Vec<(&'a str, String)>,
+}
+
+impl<'a> From<Lost<'a>> for Config<'a> {
+    fn from(found: Lost<'a>) -> Self {
+        Self { found, others: Vec::new() }
+    }
+}
+
 /// The configuration: `config.json` at the root, unless it names nobody and another names somebody; else the one file
 /// that may be it. Several that name the same person are one.
-pub(super) fn find_config(submission: &Submission) -> Result<Lost<'_>, IntakeError> {
+pub(super) fn find_config(submission: &Submission) -> Result<Config<'_>, IntakeError> {
     let paths = || submission.files.iter().map(|file| file.path.as_str());
     let own = paths().find(|path| *path == CONFIG_FILE);
     let others = paths().filter(|path| Some(*path) != own);
@@ -51,28 +69,33 @@ pub(super) fn find_config(submission: &Submission) -> Result<Lost<'_>, IntakeErr
     }
     found.sort_by_key(|path| path.matches('/').count());
     match (own, &found[..]) {
-        (Some(own), []) => return Ok(Lost::One(own)),
-        (None, []) => return Ok(Lost::None),
-        (None, [only]) => return Ok(Lost::One(only)),
+        (Some(own), []) => return Ok(Lost::One(own).into()),
+        (None, []) => return Ok(Lost::None.into()),
+        (None, [only]) => return Ok(Lost::One(only).into()),
         _ => {}
-    }
-    if let Some(own) = own
-        && person(submission, own)?.is_some()
-    {
-        return Ok(Lost::One(own));
     }
     let mut named: Vec<(&str, Person)> = Vec::new();
     for path in &found {
         named.extend(person(submission, path)?.map(|person| (*path, person)));
     }
+    if let Some(own) = own
+        && let Some(owner) = person(submission, own)?
+    {
+        let others = named.iter().filter(|(_, other)| !other.is(&owner));
+        let others = others.map(|(path, other)| {
+            (*path, format!("names {}, and {own} names {}: {own} counts", other.shown, owner.shown))
+        });
+        return Ok(Config { found: Lost::One(own), others: others.collect() });
+    }
     let [(first, someone), others @ ..] = &named[..] else {
-        return Ok(Lost::One(own.unwrap_or(found[0])));
+        return Ok(Lost::One(own.unwrap_or(found[0])).into());
     };
-    Ok(if others.iter().all(|(_, other)| other.is(someone)) {
+    let found = if others.iter().all(|(_, other)| other.is(someone)) {
         Lost::One(first)
     } else {
         Lost::Several(named.iter().map(|(path, _)| *path).collect())
-    })
+    };
+    Ok(found.into())
 }
 
 /// Whom the configuration at a path names.

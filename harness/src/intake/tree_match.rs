@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-use super::finding::Finding;
+use super::finding::{Finding, Severity};
 use super::submission::{IntakeError, Submission, SubmittedFile};
 use super::tree::{CONFIG_FILE, TreeFile, TreeSpec};
 use super::tree_config::find_config;
@@ -41,6 +41,16 @@ pub struct TreeLine {
     pub advice: String,
 }
 
+/// The code of the warning on a configuration of somebody else.
+const OTHER_PERSON: &str = "config_other_person";
+/// The code of the warning on two images for one place.
+const TWO_IMAGES: &str = "tree_two_images";
+
+/// Whether a warning says that somebody must choose.
+pub(super) fn is_choice(finding: &Finding) -> bool {
+    [OTHER_PERSON, TWO_IMAGES].contains(&finding.code.as_str())
+}
+
 /// The comparison, and what it means for the verdict.
 pub(super) struct Matched {
     pub(super) lines: Vec<TreeLine>,
@@ -55,30 +65,32 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
     let files = &submission.files;
     let config = find_config(submission)?;
     // What lies beside the configuration comes before what lies elsewhere.
-    let root = match config {
+    let root = match config.found {
         Lost::One(path) => path.rsplit_once('/').map_or("", |(folder, _)| folder),
         Lost::None | Lost::Several(_) => "",
     };
     // Files in their place first, so that no search for a lost file takes them.
-    let placed: Vec<Option<&str>> = tree
-        .files
-        .iter()
-        .map(|file| {
-            let mut names = std::iter::once(&file.path).chain(&file.aliases);
-            let is_config = file.path == CONFIG_FILE;
-            let found = names.find_map(|wanted| submission.file(wanted));
-            found.filter(|_| !is_config).map(|file| file.path.as_str())
-        })
-        .collect();
-    let mut taken: BTreeSet<&str> = placed.iter().flatten().copied().collect();
+    let placed: Vec<Vec<&str>> = tree.files.iter().map(|file| placed(file, submission)).collect();
+    let mut taken: BTreeSet<&str> =
+        placed.iter().filter_map(|found| found.first()).copied().collect();
     // Of these the finding on the expected file says all.
     let mut unclear: BTreeSet<&str> = BTreeSet::new();
     let mut matched = Matched { lines: Vec::new(), findings: Vec::new() };
     for (file, placed) in tree.files.iter().zip(placed) {
-        let found = match placed {
-            Some(path) => Lost::One(path),
-            None if file.path == CONFIG_FILE => config.clone(),
-            None => {
+        let found = match placed[..] {
+            [found] => Lost::One(found),
+            // It is optional: to refuse it would cost more than it is worth.
+            [found, ..] => {
+                matched.findings.push(Finding {
+                    severity: Severity::Warning,
+                    code: TWO_IMAGES.to_owned(),
+                    ..ambiguous(&file.path, &placed)
+                });
+                unclear.extend(&placed[1..]);
+                Lost::One(found)
+            }
+            [] if file.path == CONFIG_FILE => config.found.clone(),
+            [] => {
                 let free: Vec<&SubmittedFile> =
                     files.iter().filter(|file| !taken.contains(file.path.as_str())).collect();
                 find_lost(file, &free, tree, root)
@@ -134,7 +146,31 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
             None => matched.unexpected(path),
         }
     }
+    matched.findings.extend(config.others.iter().map(|(path, message)| {
+        Finding::warning(OTHER_PERSON, message.as_str())
+            .at(*path)
+            .hint("leave it out if it is not yours")
+    }));
     Ok(matched)
+}
+
+/// Where an expected file lies: by its own name, or by names that are as good, where their contents differ. The
+/// configuration is looked for otherwise.
+fn placed<'a>(file: &TreeFile, submission: &'a Submission) -> Vec<&'a str> {
+    if file.path == CONFIG_FILE {
+        return Vec::new();
+    }
+    if let Some(own) = submission.file(&file.path) {
+        return vec![&own.path];
+    }
+    let mut found: Vec<&SubmittedFile> =
+        file.aliases.iter().filter_map(|alias| submission.file(alias)).collect();
+    if let Some(first) = found.first().map(|first| &first.sha256)
+        && found.iter().all(|other| other.sha256 == *first)
+    {
+        found.truncate(1);
+    }
+    found.into_iter().map(|file| file.path.as_str()).collect()
 }
 
 impl Matched {

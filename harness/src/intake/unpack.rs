@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop, clear};
 use super::encoding::text_of;
-use super::finding::Finding;
+use super::finding::{Finding, Severity};
 use super::limits::{Limits, mib};
 use super::submission::{Format, IntakeError, Refusal, Submission, archive_magic};
 use super::tree::TreeSpec;
@@ -27,7 +27,39 @@ pub fn unpack(
 ) -> Result<Submission, IntakeError> {
     match read_archive(source, limits)? {
         Some(bytes) => unpack_bytes(&bytes, &name_of(source), dest, tree, limits),
-        None => copy_folder(source, &|_, _| true, dest, tree, limits),
+        None => copy_working_folder(source, dest, tree, limits),
+    }
+}
+
+/// Copies a folder; where that is refused for what is no part of the tree, without it, as `pack` would.
+fn copy_working_folder(
+    source: &Path,
+    dest: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<Submission, IntakeError> {
+    let refusal = match copy_folder(source, &|_, _| true, dest, tree, limits) {
+        Err(IntakeError::Refused(refusal)) => refusal,
+        other => return other,
+    };
+    let wanted = |path: &str, kind| tree.may_hold(path, kind == Kind::Folder);
+    match copy_folder(source, &wanted, dest, tree, limits) {
+        Ok(mut submission)
+            if submission.files.iter().any(|file| tree.open_folder_of(&file.path).is_some()) =>
+        {
+            let beyond = refusal.findings.into_iter().filter(|f| f.severity == Severity::Error);
+            submission.findings.extend(beyond.map(|finding| {
+                let message = format!("{}; only what belongs to the tree is read", finding.message);
+                Finding { severity: Severity::Warning, message, ..finding }
+            }));
+            Ok(submission)
+        }
+        Ok(_) => {
+            clear(dest)?;
+            Err(IntakeError::Refused(refusal))
+        }
+        Err(IntakeError::Refused(_)) => Err(IntakeError::Refused(refusal)),
+        other => other,
     }
 }
 
@@ -157,9 +189,17 @@ pub fn unpack_bytes(
         return Ok(outer);
     }
     clear(dest)?;
-    let message = format!("holds nothing but the archive '{}'", printable(&only.path));
-    let found = Finding::warning("packed_twice", message);
-    within(found, unpack_once(&inner, name, dest, tree, limits))
+    let mut message = format!("holds nothing but the archive '{}'", printable(&only.path));
+    let inner = unpack_once(&inner, name, dest, tree, limits);
+    if let Ok(Submission { files, root, .. }) = &inner
+        && let [only] = &files[..]
+        && fs::read(root.join(&only.path)).is_ok_and(|bytes| format_of_bytes(&bytes).is_some())
+    {
+        let third = printable(&only.path);
+        message +=
+            &format!(", and that nothing but '{third}', which is not opened: two are, not more");
+    }
+    within(Finding::warning("packed_twice", message), inner)
 }
 
 /// The result for the inner one of two archives, with the findings on the outer one.
@@ -198,13 +238,30 @@ fn unpack_once(
     let Some(format) = format_of_bytes(bytes) else {
         return refused(name, None, unknown_format(bytes));
     };
-    check_extension(name, format, &mut copy);
-    let result = match format {
-        Format::Zip => zip::read(bytes, &mut copy),
-        Format::Tar => tar::read(bytes, &mut copy),
-        Format::TarGz => gz::read(bytes, &mut copy),
-        Format::Folder => Err(Stop::Refused),
+    let read = |copy: &mut PrivateCopy<'_>| {
+        check_extension(name, format, copy);
+        match format {
+            Format::Zip => zip::read(bytes, copy),
+            Format::Tar => tar::read(bytes, copy),
+            Format::TarGz => gz::read(bytes, copy),
+            Format::Folder => Err(Stop::Refused),
+        }
     };
+    let mut result = read(&mut copy);
+    if copy.findings.has_errors()
+        && let Some(backslashes) = copy.backslashes.other_reading()
+    {
+        clear(dest)?;
+        copy = PrivateCopy::new(dest, tree, limits)?;
+        copy.backslashes = backslashes;
+        let (code, again) = match format {
+            Format::Zip => ("zip_backslash", zip::AGAIN),
+            _ => ("tar_backslash", tar::AGAIN),
+        };
+        let message = "names with a backslash between folders: read as '/'";
+        copy.findings.push(Finding::warning(code, message).hint(again));
+        result = read(&mut copy);
+    }
     copy.finish(name, format, result)
 }
 
@@ -259,7 +316,18 @@ fn unknown_format(bytes: &[u8]) -> Finding {
             let is_markup = |rest: &str| {
                 rest.starts_with(|c: char| "!?".contains(c) || c.is_ascii_alphabetic())
             };
-            let found = if start.strip_prefix('<').is_some_and(is_markup) {
+            const KINDS: [(&[u8], &str); 6] = [
+                (b"\x89PNG", "a PNG image"),
+                (b"\xff\xd8\xff", "a JPEG image"),
+                (b"MZ", "a program of Windows"),
+                (b"\x7fELF", "a program of Linux"),
+                (b"version https://git-lfs", "the pointer that Git LFS leaves in a file's place"),
+                (b"{", "JSON"),
+            ];
+            let kind = KINDS.iter().find(|(magic, _)| bytes.starts_with(magic));
+            let found = if let Some((_, kind)) = kind {
+                kind
+            } else if start.strip_prefix('<').is_some_and(is_markup) {
                 "a web page"
             } else if start.starts_with("%pdf") {
                 "a PDF"

@@ -12,6 +12,7 @@ use super::submission::{Format, IntakeError, Refusal, Submission};
 use super::submitted_config::SubmittedConfig;
 use super::tree::{CONFIG_FILE, TreeSpec};
 use super::tree_config::MAX_CONFIG;
+use super::tree_lost::is_source;
 use super::tree_match::{Mark, Matched, TreeLine, match_tree};
 use crate::columns::count;
 
@@ -44,6 +45,7 @@ pub fn validate_submission(
     let mut findings = submission.findings.clone();
     findings.extend(said);
     findings.extend(empty_source(submission, &lines)?);
+    findings.extend(encoded_source(submission, tree)?);
     let mut config = None;
     // One in the wrong place says whose submission it is all the same.
     let config_line = lines.iter().find(|line| line.expected.as_deref() == Some(CONFIG_FILE));
@@ -106,6 +108,22 @@ fn empty_source(submission: &Submission, lines: &[TreeLine]) -> Result<Vec<Findi
             let finding = Finding::warning("source_empty", message).at(file.path.as_str());
             findings.push(finding.hint("save your source, then pack again"));
         }
+    }
+    Ok(findings)
+}
+
+/// The warnings on source files that the compiler cannot read.
+fn encoded_source(submission: &Submission, tree: &TreeSpec) -> Result<Vec<Finding>, IntakeError> {
+    let mut findings = Vec::new();
+    let is_text = |path: &str| is_source(path) && tree.open_folder_of(path).is_some();
+    for file in submission.files.iter().filter(|file| is_text(&file.path)) {
+        let path = submission.root.join(&file.path);
+        let bytes = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
+        let Err(error) = std::str::from_utf8(&bytes) else { continue };
+        let line = 1 + bytes[..error.valid_up_to()].iter().filter(|b| **b == b'\n').count() as u32;
+        let message = "expected UTF-8, found another encoding: it does not compile";
+        let finding = Finding::warning("source_not_utf8", message).at(file.path.as_str());
+        findings.push(finding.on_line(line).hint("save it as UTF-8"));
     }
     Ok(findings)
 }

@@ -17,8 +17,9 @@ use flate2::read::DeflateDecoder;
 use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
 use super::finding::Finding;
 use super::limits::Limits;
+pub(super) use super::zip_headers::AGAIN;
 use super::zip_headers::{
-    AGAIN, CENTRAL, Central, Entry, LOCAL, ZIP64, check_entry, u16_at, u32_at, u64_at,
+    CENTRAL, Central, Entry, LOCAL, ZIP64, check_entry, u16_at, u32_at, u64_at,
 };
 use crate::columns::count;
 use crate::harmless::printable_bytes;
@@ -47,7 +48,9 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop>
     let directory = find_directory(bytes, copy.limits).map_err(|f| copy.refuse(f))?;
     let mut entries = read_directory(bytes, &directory, copy)?;
     check_ranges(bytes, &entries, &directory, copy);
-    slashes(&mut entries, copy);
+    for entry in &mut entries {
+        entry.name = copy.backslashes.read(std::mem::take(&mut entry.name), entry.of_windows);
+    }
     let mut files = Vec::new();
     for entry in &entries {
         let kind = if entry.is_folder() { Kind::Folder } else { Kind::File };
@@ -67,25 +70,6 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop>
         extract(entry, &path, copy)?;
     }
     Ok(())
-}
-
-/// Some Windows programs write a backslash between folders. Where no name holds a slash, or all such names are
-/// of Windows, nothing else can be meant.
-fn slashes(entries: &mut [Entry<'_>], copy: &mut PrivateCopy<'_>) {
-    let holds = |entry: &Entry<'_>, sign: u8| entry.name.contains(&sign);
-    let mut with_backslash = entries.iter().filter(|entry| holds(entry, b'\\')).peekable();
-    let is_clear = !entries.iter().any(|entry| holds(entry, b'/'))
-        || with_backslash.clone().all(|entry| entry.of_windows);
-    if with_backslash.peek().is_none() || !is_clear {
-        return;
-    }
-    for sign in entries.iter_mut().flat_map(|entry| &mut entry.name) {
-        if *sign == b'\\' {
-            *sign = b'/';
-        }
-    }
-    let message = "names with a backslash between folders: read as '/'";
-    copy.findings.push(Finding::warning("zip_backslash", message).hint(AGAIN));
 }
 
 /// Where the central directory lies and how many entries it announces.

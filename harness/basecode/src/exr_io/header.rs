@@ -17,6 +17,9 @@ const MAX_CHANNELS: usize = 64;
 /// bytes of four.
 const MAX_COMPRESSION_RATIO: usize = 1376;
 
+/// What is read.
+const COMPRESSIONS: &str = "none, RLE, ZIP, PIZ, PXR24 or B44";
+
 /// The components of a color, in the order of an [`crate::Image`]'s pixels.
 const RGB: [&str; 3] = ["R", "G", "B"];
 
@@ -68,6 +71,27 @@ impl Checks<'_> {
         }
     }
 
+    /// A window must not end before it starts; the decoder would turn it round.
+    pub(super) fn windows(&self, header: &[u8]) -> Result<(), ImageError> {
+        for (name, what) in [("dataWindow", "data"), ("displayWindow", "display")] {
+            let attribute = [name.as_bytes(), b"\0box2i\0\x10\0\0\0"].concat();
+            let at = header.windows(attribute.len()).position(|bytes| bytes == attribute);
+            let Some(value) = at.and_then(|at| header.get(at + attribute.len()..)) else {
+                continue;
+            };
+            let [left, top, right, bottom] = [0, 1, 2, 3]
+                .map(|i| value.as_chunks::<4>().0.get(i).map(|b| i32::from_le_bytes(*b)));
+            if let (Some(left), Some(top), Some(right), Some(bottom)) = (left, top, right, bottom)
+                && (right < left || bottom < top)
+            {
+                return Err(self.malformed(format!(
+                    "the {what} window ends at ({right}, {bottom}), before it starts at ({left}, {top})"
+                )));
+            }
+        }
+        Ok(())
+    }
+
     /// Everything that must hold before memory for pixels is taken; returns width and height.
     pub(super) fn header(
         &self,
@@ -115,13 +139,18 @@ impl Checks<'_> {
                 )));
             }
         }
+        let mut names = header.channels.list.windows(2);
+        if let Some([twice, _]) = names.find(|pair| pair[0].name == pair[1].name) {
+            let name = visible(&twice.name.to_string());
+            return Err(self.malformed(format!("channel {name} is listed twice")));
+        }
         use Compression::{B44, B44A, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
         if !matches!(
             header.compression,
             Uncompressed | RLE | ZIP1 | ZIP16 | PIZ | PXR24 | B44 | B44A
         ) {
             let found = header.compression.to_string();
-            return Err(self.unsupported(&found, "none, RLE, ZIP, PIZ, PXR24 or B44"));
+            return Err(self.unsupported(&found, COMPRESSIONS));
         }
         if header.channels.list.len() > MAX_CHANNELS {
             return Err(
@@ -228,7 +257,13 @@ impl Checks<'_> {
                 self.truncated(place)
             }
             exr::error::Error::NotSupported(what) => {
-                self.unsupported(&what, "R, G and B in scan lines, each for every pixel")
+                let expected = match &*what {
+                    what if what.contains("compression") => COMPRESSIONS,
+                    what if what.contains("version") => "version 2",
+                    what if what.contains("subsampling") => "R, G and B for every pixel",
+                    _ => "R, G and B in scan lines",
+                };
+                self.unsupported(&what, expected)
             }
             other => self.malformed(format!("{place}: {other}")),
         }

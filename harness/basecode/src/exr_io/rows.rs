@@ -22,6 +22,8 @@ use super::{ExrLayers, ImageError, MAX_FILE_BYTES, read_file};
 use crate::Vec3;
 use crate::image::Image;
 
+/// Bytes in which a header's windows are looked for; most headers have a few hundred.
+const HEAD: u64 = 1 << 16;
 /// About so many bytes of samples are decoded at a time: what a core's own cache holds.
 const BAND_BYTES: usize = 256 << 10;
 
@@ -135,6 +137,11 @@ impl<'a> ExrRows<'a> {
         Some(all.map(|Vec2(x, y)| [x, y]))
     }
 
+    /// Width over height of a pixel as it is shown; 1 for square ones.
+    pub fn pixel_aspect(&self) -> f32 {
+        self.header.shared_attributes.pixel_aspect
+    }
+
     /// The layers with R, G and B: name, sorted, and the indices of the three channels; and what a
     /// reader may want to know about the file, such as channels of no layer.
     ///
@@ -243,6 +250,9 @@ impl<'a> ExrRows<'a> {
         let start = &mut start[..source.len().min(24) as usize];
         source.read(start, 0).map_err(|source| ImageError::Io { path: path.into(), source })?;
         checks.signature(start)?;
+        let mut head = vec![0; source.len().min(HEAD) as usize];
+        source.read(&mut head, 0).map_err(|source| ImageError::Io { path: path.into(), source })?;
+        checks.windows(&head)?;
         let mut cursor = BufReader::new(Cursor { source: &source, at: 0 });
         let reader = block::read(&mut cursor, false).map_err(|e| checks.error(e, "the header"))?;
         let [header] = reader.headers() else {

@@ -101,7 +101,11 @@ impl SceneConfig {
     /// # Errors
     /// As [`MeshFile::load`]; when there is no mesh file, names the line that asks for it.
     pub fn load_mesh(&self) -> Result<MeshFile> {
-        if let Err(error) = std::fs::metadata(&self.mesh) {
+        let found = std::fs::metadata(&self.mesh).and_then(|found| match found.is_dir() {
+            true => Err(std::io::Error::other("expected a file, found a folder")),
+            false => Ok(()),
+        });
+        if let Err(error) = found {
             let bytes = read(&self.path).unwrap_or_default();
             let text = plain_lines(&bytes);
             let table = DeTable::parse(&text).ok();
@@ -146,6 +150,17 @@ impl SceneConfig {
                 (" as u128", ""),
             ] {
                 message = message.replace(own, plain);
+            }
+            if message.starts_with("invalid type: integer") && message.ends_with("number") {
+                message = message.replace("invalid type: integer", "out of range: integer");
+            }
+            let statement =
+                line.and_then(|line: usize| text.lines().nth(line - 1)).unwrap_or_default();
+            if let Some((key, value)) = statement.split_once('=') {
+                if !message.contains(&format!("`{}`", key.trim())) {
+                    message = format!("{}: {message}", key.trim());
+                }
+                message += slip(value);
             }
             if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("toml")) {
                 message = format!("expected a scene's TOML file: {message}");
@@ -256,6 +271,25 @@ impl SceneConfig {
     }
 }
 
+/// The hint on a value that was written as text is, or as a calculator shows it.
+fn slip(value: &str) -> &'static str {
+    let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+    let value = value.split('#').next().unwrap_or_default();
+    if value.contains(['\u{201c}', '\u{201d}', '\u{201e}', '\u{2018}', '\u{2019}']) {
+        return "; hint: write straight quotes: \"";
+    }
+    match value.split_once(',') {
+        Some((whole, rest))
+            if !value.contains(['[', '"', '\''])
+                && is_digit(whole.trim().chars().last())
+                && is_digit(rest.trim().chars().next()) =>
+        {
+            "; hint: write a point in a number, as in 50.0"
+        }
+        _ => "",
+    }
+}
+
 /// A text whose lines end with LF: TOML knows none that ends with CR alone.
 fn plain_lines(bytes: &[u8]) -> String {
     decode(bytes).replace("\r\n", "\n").replace('\r', "\n")
@@ -359,13 +393,20 @@ mod tests {
             ),
             (&format!("{base}[renderer]\ntype = \"Simple\"\n"), "b.toml:4: renderer.type is"),
             (&format!("{base}[renderer]\ntype = \"\"\n"), "b.toml:4: renderer.type is \"\""),
-            (&format!("{base}[renderer]\ntype = 1\n"), "b.toml:4: invalid type: integer"),
+            (&format!("{base}[renderer]\ntype = 1\n"), "b.toml:4: type: invalid type: integer"),
             (&format!("{base}[camera]\neye = [0, nan, 0]\n"), "b.toml:4: camera.eye"),
             (
                 &format!("{base}[camera]\nfov = \"wide\"\n"),
-                "b.toml:4: invalid type: string \"wide\", expected a number",
+                "b.toml:4: fov: invalid type: string \"wide\", expected a number",
             ),
             (&format!("{base}[film]\nwidth = \"7\"\n"), "expected a whole number"),
+            (&format!("{base}[film]\nwidth = \"7\"\n"), "b.toml:4: width: invalid type"),
+            (
+                &format!("{base}[film]\nwidth = 99999999999999999999\n"),
+                "b.toml:4: width: out of range: integer",
+            ),
+            (&format!("{base}[camera]\nfov = 50,0\n"), "write a point in a number"),
+            ("[input]\nobjfile = \u{201c}b.obj\u{201d}\n", "write straight quotes"),
             (&format!("{base}[camera]\nfov = 180\n"), "b.toml:4: camera.fov is 180"),
             (&format!("{base}[camera]\nfov = nan\n"), "b.toml:4: camera.fov is NaN"),
             ("[input]\nobjfile = \"\"\n", "b.toml:2: input.objfile names no file"),

@@ -1,11 +1,14 @@
 //! Materials of MTL files.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{Vec2, Vec3};
 
 use super::obj::Named;
-use super::text::{Statements, decode, read, split_keyword, unquoted, without_comment};
+use super::text::{
+    Statements, decode, ignored_remarks, read, split_keyword, unquoted, without_comment,
+};
 use super::texture::Mapping;
 use super::{Material, MaterialModel, Texture};
 use crate::{Error, Result};
@@ -126,28 +129,39 @@ impl Library {
     /// Adds the materials of one file.
     fn read(&mut self, path: &Path, text: &str) -> Result<()> {
         let mut current: Option<Entry> = None;
+        let mut ignored: BTreeMap<String, (usize, usize)> = BTreeMap::new();
         for (line, statement) in Statements::new(text) {
             let (keyword, rest) = split_keyword(&statement);
             let at = Place { path, line };
+            let mut ignore = || ignored.entry(keyword.to_owned()).or_insert((0, line)).0 += 1;
             if keyword.eq_ignore_ascii_case("newmtl") {
                 self.add(path, current.take());
                 let plain = unquoted(without_comment(rest)).to_owned();
                 if plain.is_empty() {
                     return Err(at.wrong("newmtl names no material".to_owned()));
                 }
+                if self.find(&plain).is_some() {
+                    let message =
+                        format!("material \"{plain}\" is there already: the first counts");
+                    self.remarks.push(format!("{}:{line}: {message}", path.display()));
+                }
                 current = Some(Entry::new(unquoted(rest).to_owned(), plain));
             } else if let Some(entry) = &mut current {
                 match entry.read(&at, keyword, rest) {
-                    Ok(true) => {}
-                    Ok(false) => {
-                        let message = format!("{}:{line}: {keyword} is ignored", path.display());
-                        self.remarks.push(message);
+                    Ok(Effect::Taken) => {}
+                    Ok(Effect::Unknown) => ignore(),
+                    Ok(Effect::None(why)) => {
+                        self.remarks.push(format!("{}:{line}: {why}", path.display()));
                     }
                     Err(error) => _ = entry.broken.get_or_insert(error),
                 }
+            } else {
+                // It belongs to no material.
+                ignore();
             }
         }
         self.add(path, current);
+        self.remarks.extend(ignored_remarks(path, &ignored));
         Ok(())
     }
 
@@ -187,8 +201,8 @@ struct Entry {
     name: String,
     /// The name without a comment.
     plain: String,
-    diffuse: Vec3,
-    specular: Vec3,
+    /// `Kd` and `Ks`, with their lines.
+    colors: [Option<(usize, Vec3)>; 2],
     emission: Vec3,
     exponent: f32,
     illumination: Option<u32>,
@@ -198,13 +212,25 @@ struct Entry {
     broken: Option<Error>,
 }
 
+/// The last illumination model of the MTL specification.
+const LAST_MODEL: u32 = 10;
+
+/// What a statement does.
+enum Effect {
+    /// What it says, or nothing that shows.
+    Taken,
+    /// Nothing, and it would change the picture elsewhere: what to say.
+    None(String),
+    /// Nothing: it is none of MTL.
+    Unknown,
+}
+
 impl Entry {
     fn new(name: String, plain: String) -> Self {
         Self {
             name,
             plain,
-            diffuse: Vec3::ZERO,
-            specular: Vec3::ZERO,
+            colors: [None, None],
             emission: Vec3::ZERO,
             exponent: 1.0,
             illumination: None,
@@ -213,12 +239,13 @@ impl Entry {
         }
     }
 
-    /// Applies a statement. Returns false if it has no effect here but would change the picture elsewhere.
-    fn read(&mut self, at: &Place, keyword: &str, rest: &str) -> Result<bool> {
+    /// Applies a statement.
+    fn read(&mut self, at: &Place, keyword: &str, rest: &str) -> Result<Effect> {
         let wrong = |message: String| at.wrong(format!("material \"{}\": {message}", self.name));
+        let none = || Ok(Effect::None(format!("{keyword} is ignored")));
         match keyword.to_ascii_lowercase().as_str() {
-            "kd" => self.diffuse = colour(keyword, rest).map_err(wrong)?,
-            "ks" => self.specular = colour(keyword, rest).map_err(wrong)?,
+            "kd" => self.colors[0] = Some((at.line, colour(keyword, rest).map_err(wrong)?)),
+            "ks" => self.colors[1] = Some((at.line, colour(keyword, rest).map_err(wrong)?)),
             "ke" => self.emission = colour(keyword, rest).map_err(wrong)?,
             "ns" => {
                 let word = words(rest).next().unwrap_or_default();
@@ -231,24 +258,33 @@ impl Entry {
             "illum" => {
                 let word = words(rest).next().unwrap_or_default();
                 let model = word.parse().ok().filter(|model: &u32| *model <= u32::from(u8::MAX));
-                self.illumination = Some(model.ok_or_else(|| {
+                let model = model.ok_or_else(|| {
                     wrong(format!("illum is \"{word}\" but must be a whole number from 0 to 255"))
-                })?);
+                })?;
+                self.illumination = Some(model);
+                if model > LAST_MODEL {
+                    return Ok(Effect::None(format!(
+                        "illum {model} is no model of MTL (0 to {LAST_MODEL}): Phong is taken"
+                    )));
+                }
             }
             "map_kd" => self.maps[0] = Some((at.line, rest.to_owned())),
             "map_ks" => self.maps[1] = Some((at.line, rest.to_owned())),
-            "bump" | "disp" | "decal" | "refl" | "norm" => return Ok(false),
-            other if other.starts_with("map_") => return Ok(false),
+            "bump" | "disp" | "decal" | "refl" | "norm" => return none(),
+            other if other.starts_with("map_") => return none(),
             // Everything is opaque here. `-halo` may precede the number.
             "d" | "tr" => {
                 let opaque = if keyword.eq_ignore_ascii_case("d") { 1.0 } else { 0.0 };
                 let value = words(rest).last().and_then(|word| word.parse::<f32>().ok());
-                return Ok(value.is_none_or(|value| value == opaque));
+                if value.is_some_and(|value| value != opaque) {
+                    return none();
+                }
             }
-            // Ambient light, refraction and whatever else the assignment does not use.
-            _ => {}
+            // Ambient light, refraction and the sharpness of reflections, which the assignment does not use.
+            "ka" | "ni" | "tf" | "sharpness" => {}
+            _ => return Ok(Effect::Unknown),
         }
-        Ok(true)
+        Ok(Effect::Taken)
     }
 
     /// Loads the textures, which lie beside the MTL file at `path`.
@@ -259,8 +295,11 @@ impl Entry {
         remarks: &mut Vec<String>,
     ) -> Result<Material> {
         let folder = path.parent().unwrap_or(Path::new(""));
-        let mut texture = |map: &Option<(usize, String)>, keyword: &str, colour: Vec3| {
-            let Some((line, statement)) = map else { return Ok(Texture::Constant(colour)) };
+        let mut texture = |index: usize, keyword: &str| {
+            let color = self.colors[index];
+            let Some((line, statement)) = &self.maps[index] else {
+                return Ok(Texture::Constant(color.map_or(Vec3::ZERO, |(_, color)| color)));
+            };
             let wrong = |message| {
                 Place { path, line: *line }
                     .wrong(format!("material \"{}\": {keyword}: {message}", self.name))
@@ -281,11 +320,20 @@ impl Entry {
                 remarks.push(taken_beside(path, *line, name, &file));
             }
             files.push(UsedFile { path: file, named_at: Some((path.to_owned(), *line)) });
+            // Elsewhere it is a factor.
+            if let Some((line, _)) = color.filter(|(_, color)| *color != Vec3::ONE) {
+                let color = keyword.trim_start_matches("map_");
+                remarks.push(format!(
+                    "{}:{line}: material \"{}\": {color} is ignored: {keyword} takes its place",
+                    path.display(),
+                    self.name
+                ));
+            }
             Ok(texture)
         };
         Ok(Material {
-            diffuse: texture(&self.maps[0], "map_Kd", self.diffuse)?,
-            specular: texture(&self.maps[1], "map_Ks", self.specular)?,
+            diffuse: texture(0, "map_Kd")?,
+            specular: texture(1, "map_Ks")?,
             model: match self.illumination {
                 Some(7) => MaterialModel::Diffuse,
                 Some(5) => MaterialModel::Mirror,

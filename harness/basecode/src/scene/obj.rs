@@ -16,7 +16,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::text::visible;
+use super::text::ignored_remarks;
 use crate::{Error, Result};
 use piece::{Beyond, Mark, Piece, Wrong};
 
@@ -151,9 +151,6 @@ struct Assembly<'a> {
 
 /// The statements that a corner's indices count.
 const STATEMENTS: [&str; 3] = ["v", "vt", "vn"];
-
-/// Keywords of ignored statements that are remarked on at most.
-const LISTED: usize = 12;
 
 const UNNAMED: &str = "unnamed_object";
 
@@ -293,19 +290,7 @@ impl Assembly<'_> {
                     .push(format!("{path}:{line}: {count} {words} no area and will not be seen"));
             }
         }
-        let mut ignored: Vec<_> = self.ignored.iter().collect();
-        ignored.sort_by_key(|(_, (_, line))| *line);
-        for (keyword, (count, line)) in ignored.iter().take(LISTED) {
-            let keyword: String = keyword.chars().take(40).map(visible).collect();
-            let words = if *count == 1 { "statement is" } else { "statements are" };
-            let path = self.path.display();
-            self.obj.remarks.push(format!("{path}:{line}: {count} {keyword} {words} ignored"));
-        }
-        if let Some((_, (_, line))) = ignored.get(LISTED) {
-            let (path, more) = (self.path.display(), ignored.len() - LISTED);
-            let message = format!("{path}:{line}: {more} more kinds of statements are ignored");
-            self.obj.remarks.push(message);
-        }
+        self.obj.remarks.extend(ignored_remarks(self.path, &self.ignored));
         Ok(self.obj)
     }
 

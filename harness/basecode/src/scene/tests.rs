@@ -435,6 +435,41 @@ fn statements_that_are_not_supported_are_remarked_on() {
 }
 
 #[test]
+fn what_a_material_says_in_vain_is_remarked_on() {
+    let folder = Folder::new("vain", OBJ, MTL);
+    let picture = image::RgbImage::from_pixel(1, 1, image::Rgb([255, 0, 0]));
+    picture.save(folder.0.join("t.png")).unwrap();
+    let said = |mtl: &str| {
+        std::fs::write(folder.0.join("s.mtl"), mtl).unwrap();
+        folder.load().unwrap().remarks().join("\n")
+    };
+    assert_eq!(said(MTL), "");
+    let lines = MTL.lines().count();
+    for (statements, expected) in [
+        ("Kd 0.5 1 1\nmap_Kd t.png", "1: material \"m\": Kd is ignored: map_Kd takes its place"),
+        ("map_Ks t.png\nKs 0 0 0", "2: material \"m\": Ks is ignored: map_Ks takes its place"),
+        ("Kd 1 1 1\nmap_Kd t.png\nKs .5 .5 .5", ""),
+        ("foo 1\nPr 0.5\nfoo 2", "1: 2 foo statements are ignored"),
+        ("foo 1\nPr 0.5\nfoo 2", "2: 1 Pr statement is ignored"),
+        ("Ka 1 1 1\nNi 1.5\nTf 1 1 1\nsharpness 60\nd 1\nTr 0", ""),
+        ("illum 99", "1: illum 99 is no model of MTL (0 to 10): Phong is taken"),
+        ("illum 10", ""),
+        ("newmtl m", "1: material \"m\" is there already: the first counts"),
+    ] {
+        // The first line of these statements is behind `newmtl m`.
+        let found = said(&format!("{MTL}newmtl m\n{statements}\n"));
+        let expected = expected.split_once(": ").map(|(line, words)| {
+            format!("s.mtl:{}: {words}", lines + 1 + line.parse::<usize>().unwrap())
+        });
+        match expected {
+            None => assert_eq!(found, "", "{statements}"),
+            Some(expected) => assert!(found.contains(&expected), "{statements}: {found}"),
+        }
+    }
+    assert!(said(&format!("Kd 1 1 1\n{MTL}")).contains("s.mtl:1: 1 Kd statement is ignored"));
+}
+
+#[test]
 fn a_face_without_uv_or_normal_concerns_itself_alone() {
     let tilted = OBJ.replace("vn 0 0 1", "vn 0 0.6 0.8");
     let more = tilted.replace("o lamp", "f 1//1 2//1 3//1\nf 1/1 3/3 4/4\nf 2 3 4\no lamp");

@@ -1,6 +1,7 @@
 //! The text of scene files, however an editor or exporter saved it.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
@@ -125,6 +126,30 @@ pub(super) fn without_comment(text: &str) -> &str {
 pub(super) fn unquoted(name: &str) -> &str {
     let name = name.trim();
     name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).map_or(name, str::trim)
+}
+
+/// Keywords of ignored statements that are remarked on at most.
+const LISTED: usize = 12;
+
+/// The remarks on statements that are not supported: how many of each keyword, and the first's line.
+pub(super) fn ignored_remarks(
+    path: &Path,
+    ignored: &BTreeMap<String, (usize, usize)>,
+) -> Vec<String> {
+    let path = path.display();
+    let mut ignored: Vec<_> = ignored.iter().collect();
+    ignored.sort_by_key(|(_, (_, line))| *line);
+    let remark = |(keyword, (count, line)): &(&String, &(usize, usize))| {
+        let keyword: String = keyword.chars().take(40).map(visible).collect();
+        let words = if *count == 1 { "statement is" } else { "statements are" };
+        format!("{path}:{line}: {count} {keyword} {words} ignored")
+    };
+    let mut remarks: Vec<String> = ignored.iter().take(LISTED).map(remark).collect();
+    if let Some((_, (_, line))) = ignored.get(LISTED) {
+        let more = ignored.len() - LISTED;
+        remarks.push(format!("{path}:{line}: {more} more kinds of statements are ignored"));
+    }
+    remarks
 }
 
 /// A character as a message shows it.

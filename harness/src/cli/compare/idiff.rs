@@ -106,7 +106,8 @@ impl Options {
             let mut value = || rest.next().with_context(|| format!("-{name} has no value"));
             let mut number = || -> anyhow::Result<f32> {
                 let value = value()?.to_string_lossy().into_owned();
-                let number = value.parse().ok().filter(|number: &f32| !number.is_nan());
+                let number = value.parse().ok().or_else(|| hexadecimal(&value));
+                let number = number.filter(|number: &f32| !number.is_nan());
                 number.with_context(|| format!("-{name} has \"{value}\", expected a number"))
             };
             match name {
@@ -330,6 +331,23 @@ fn in_idiff_order(file: &ExrRows) -> Vec<(String, usize)> {
     named
 }
 
+/// A number as C's `%a` writes it: `0x1.8p-3`.
+fn hexadecimal(text: &str) -> Option<f32> {
+    let lower = text.to_ascii_lowercase();
+    let (sign, digits) = match lower.strip_prefix('-') {
+        Some(rest) => (-1.0, rest),
+        None => (1.0, lower.strip_prefix('+').unwrap_or(&lower)),
+    };
+    let digits = digits.strip_prefix("0x")?;
+    let (mantissa, exponent) = digits.split_once('p').unwrap_or((digits, "0"));
+    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let all = [whole, fraction].concat();
+    // More digits than 64 bits hold make no other number of 24.
+    let value = u64::from_str_radix(&all, 16).ok().filter(|_| !all.starts_with('+'))? as f64;
+    let exponent = exponent.parse::<i32>().ok()? - 4 * i32::try_from(fraction.len()).ok()?;
+    Some((sign * value * f64::from(exponent).exp2()) as f32)
+}
+
 /// A number with so many significant digits, as C's `%g` writes it.
 fn general(value: f64, digits: usize) -> String {
     if !value.is_finite() {
@@ -355,7 +373,19 @@ fn general(value: f64, digits: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::general;
+    use super::{general, hexadecimal};
+
+    #[test]
+    fn hexadecimal_numbers_are_read_as_c_reads_them() {
+        for (text, value) in
+            [("0x1p-3", 0.125), ("-0x1.8P1", -3.0), ("0xff", 255.0), ("+0x.8p0", 0.5)]
+        {
+            assert_eq!(hexadecimal(text), Some(value), "{text}");
+        }
+        for text in ["", "0x", "1p3", "0xg", "0x+1", "0x1p", "0x1pz", "0x1.2.3"] {
+            assert_eq!(hexadecimal(text), None, "{text}");
+        }
+    }
 
     #[test]
     fn numbers_are_written_as_c_writes_them() {

@@ -1,6 +1,6 @@
 //! The report on two images, as text.
 
-use basecode::Vec3;
+use std::fmt::{Display, LowerExp};
 
 use super::{Comparison, Difference, Pixels};
 use crate::harmless::harmless;
@@ -38,8 +38,10 @@ pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
     };
     writeln!(out, "{} of {} pixels differ", values.differing, values.pixels)?;
     let mut tell = |what: &str, found: &Difference| {
-        let (a, b) = (Vec3::from(found.actual), Vec3::from(found.expected));
-        let by = found.difference.map_or(String::new(), |size| format!(", difference {size}"));
+        let color = |color: [f32; 3]| format!("[{}]", color.map(short).join(", "));
+        let (a, b) = (color(found.actual), color(found.expected));
+        let by = found.difference.map(|size| format!(", difference {}", short(size)));
+        let by = by.unwrap_or_default();
         writeln!(out, "{what} at ({}, {}): actual {a}, expected {b}{by}", found.x, found.y)
     };
     if let Some(largest) = &values.largest {
@@ -59,6 +61,14 @@ pub(super) fn text(comparison: &Comparison) -> anyhow::Result<String> {
     }
     files(&mut out, comparison)?;
     Ok(out)
+}
+
+/// A number with all its digits, with an exponent where zeros would make it long.
+fn short<T: Display + LowerExp + Copy>(value: T) -> String {
+    /// Digits and zeros that are easily read.
+    const LONG: usize = 14;
+    let plain = value.to_string();
+    if plain.len() > LONG { format!("{value:e}") } else { plain }
 }
 
 /// What has been written.

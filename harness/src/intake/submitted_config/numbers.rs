@@ -23,7 +23,7 @@ const LONGEST_IN_GROUPS: usize = 12;
 pub(super) fn number_in(text: &str) -> Option<String> {
     let is_hidden = |c: &char| matches!(c, '\u{200b}'..='\u{200f}' | '\u{2060}' | '\u{feff}');
     // Wide digits are digits.
-    let text: String = text.nfkc().filter(|c| !is_hidden(c)).collect();
+    let text: String = text.nfkc().filter(|c| !is_hidden(c)).map(plain_digit).collect();
     let between = |c: char| c.is_whitespace() || "-_".contains(c);
     let own = text.trim_start_matches('#');
     let own = own.trim_matches(|c: char| c.is_whitespace() || "_,'".contains(c));
@@ -63,6 +63,15 @@ pub(super) fn number_in(text: &str) -> Option<String> {
 
 fn digit_runs(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !c.is_ascii_digit()).filter(|run| !run.is_empty())
+}
+
+/// A digit of another script as that of ASCII.
+fn plain_digit(c: char) -> char {
+    /// Zeros: Arabic-Indic and extended, Devanagari, Bengali, Thai.
+    const ZEROS: [u32; 5] = [0x660, 0x6f0, 0x966, 0x9e6, 0xe50];
+    let digit =
+        ZEROS.iter().find_map(|zero| (c as u32).checked_sub(*zero).filter(|digit| *digit < 10));
+    digit.and_then(|digit| char::from_digit(digit, 10)).unwrap_or(c)
 }
 
 /// Digits before the exponent.

@@ -83,7 +83,11 @@ fn next(report: &BatchReport, entry: &SubmissionReport, closing: &Closing) -> St
     let checks = &entry.record.evidence.checks;
     let failed = |check: &&Check| check.verdict == Verdict::Fail;
     if let Some(check) = checks.iter().filter(failed).find(|check| check.id == BUILD) {
-        return format!("{}; the compiler's words are above", check.summary);
+        // Of a submission that was refused, the compiler saw nothing.
+        return match entry.record.diagnostics.is_empty() {
+            true => check.said().into_owned(),
+            false => format!("{}; the compiler's words are above", check.summary),
+        };
     }
     let open = |bonus: bool| {
         let mut parts = entry.grade.parts.iter();
