@@ -274,7 +274,7 @@ fn until_told(report: &Path, words: &str) {
 #[test]
 fn a_folder_that_is_replaced_is_watched_again() {
     let place = tempfile::tempdir().unwrap();
-    let work = place.path().join("work");
+    let work = place.path().join("mine");
     let write = |word: &str| {
         fs::create_dir_all(work.join("src")).unwrap();
         fs::write(work.join("src/lib.rs"), format!("fn main() {{ {word} }}")).unwrap();
@@ -282,7 +282,7 @@ fn a_folder_that_is_replaced_is_watched_again() {
     write("first_word");
     let out = place.path().join("out");
     let (_watch, _said) = watching(&work, &["1.1"], &out);
-    let report = out.join("work/report.html");
+    let report = out.join("mine/report.html");
     until_told(&report, "first_word");
     let pause = std::time::Duration::from_millis;
     for (turn, [apart, moved]) in [[0, 0], [1500, 0], [0, 1]].into_iter().enumerate() {
