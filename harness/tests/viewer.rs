@@ -341,8 +341,7 @@ fn numbers_are_those_of_the_whole_image() {
         Some("most 0")
     );
     assert_eq!(
-        browser
-            .value(&format!("[...layerValues(stage.layers[2], 501, 3, {{ metric: 'relative' }})]")),
+        browser.value("[...layerValues(stage.layers[2], 501, 3, { metric: 'relative' })]"),
         json!([0, 0, 0])
     );
     browser.key("p", 0);
