@@ -52,6 +52,18 @@ impl Scratch {
     }
 }
 
+/// A new folder among the system's temporary ones that only its owner can look into.
+///
+/// # Errors
+/// When it cannot be made.
+pub fn private_folder(prefix: &str) -> io::Result<TempDir> {
+    let mut builder = tempfile::Builder::new();
+    // The default is what the umask allows, as for any folder.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
+    builder.prefix(prefix).tempdir()
+}
+
 /// Writes a file under another name, syncs and renames it: whoever looks sees the old content or the new.
 /// Folders above it are made when missing.
 ///

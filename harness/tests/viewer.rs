@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use basecode::exr_io::{Precision, read_exr, write_exr};
+use basecode::exr_io::{Precision, read_exr, write_exr, write_exr_channels};
 use basecode::{Image, Vec3};
 use serde_json::{Value, json};
 
@@ -216,6 +216,284 @@ fn pixels_modes_keys_and_addresses() {
     browser.until(&format!("get('message').textContent.includes('{name} is missing')"));
 }
 
+/// The page of `umbra view`, and whether all files could be shown.
+fn viewed(out: &Path, files: &[PathBuf]) -> (PathBuf, bool) {
+    let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
+        .arg("view")
+        .args(files)
+        .arg("-o")
+        .arg(out)
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .output()
+        .unwrap();
+    let page = out.join("view.html");
+    assert_eq!(String::from_utf8_lossy(&run.stdout).trim_end(), page.display().to_string());
+    (page, run.status.success())
+}
+
+/// Writes images beside each other, as floats.
+fn written<const N: usize>(folder: &Path, images: [(&str, &Image); N]) -> Vec<PathBuf> {
+    let write = |(name, image): (&str, &Image)| {
+        let file = folder.join(name);
+        write_exr(&file, image, Precision::Float, &[]).unwrap();
+        file
+    };
+    images.map(write).into()
+}
+
+fn flat(pixel: Vec3) -> Image {
+    Image { width: WIDTH, height: HEIGHT, pixels: vec![pixel; WIDTH * HEIGHT] }
+}
+
+#[test]
+fn what_differs_looks_different() {
+    let Some(mut browser) = Chromium::start() else { return };
+    let browser = &mut browser;
+    let folder = tempfile::tempdir().unwrap();
+    let exposures = "stage.layers.map((layer) => settingsOf(layer).exposure)";
+    let color = "shade(layerValues(stage.layers[2], 5, 5, settingsOf(stage.layers[2])), stage.layers[2], settingsOf(stage.layers[2]))";
+
+    // One exposure for all images, that of the first: a constant factor stays visible, also after N.
+    let (one, two, black) = (image(1.0), image(1000.0), flat(Vec3::ZERO));
+    let files = written(folder.path(), [("a.exr", &one), ("b.exr", &two), ("black.exr", &black)]);
+    let (page, _) = viewed(&folder.path().join("factor"), &files[..2]);
+    opened(browser, &page, "");
+    for _ in 0..2 {
+        let stops = browser.value(exposures);
+        assert_eq!(stops[0], stops[1]);
+        assert!(
+            stops[0].as_f64().unwrap().abs() < 1.5 && stops[2].as_f64().unwrap() < -8.0,
+            "{stops}"
+        );
+        browser.key("2", 0);
+        browser.key("n", 0);
+    }
+    // Of a black one nothing can be found: the next decides.
+    let files = [files[2].clone(), files[1].clone(), files[0].clone()];
+    let (page, _) = viewed(&folder.path().join("black"), &files);
+    opened(browser, &page, "");
+    let stops = browser.value(exposures);
+    assert!(stops[0] == stops[2] && stops[0].as_f64().unwrap() < -8.0, "{stops}");
+    assert_eq!(stops[3], stops[4], "one exposure for all differences");
+    // Of a comparison it is that of the expected one.
+    let out = folder.path().join("compared");
+    let mut compare = Command::new(env!("CARGO_BIN_EXE_umbra"));
+    compare.arg("compare").args(&files[1..]).args(["--no-metrics", "--html"]).arg(&out);
+    compare.output().unwrap();
+    opened(browser, &out.join("view.html"), "");
+    let stops = browser.value(exposures);
+    assert!(stops[0] == stops[1] && stops[0].as_f64().unwrap().abs() < 1.5, "{stops}");
+
+    // Channels that are exchanged differ, with a sign, relatively and absolutely, on both canvases.
+    let pixels = [Vec3::new(0.8, 0.2, 0.5), Vec3::new(0.2, 0.8, 0.5)].map(flat);
+    let files = written(folder.path(), [("s.exr", &pixels[0]), ("t.exr", &pixels[1])]);
+    let (page, _) = viewed(&folder.path().join("swapped"), &files);
+    for suffix in ["", "?plain"] {
+        opened(browser, &page, suffix);
+        browser.key("3", 0);
+        for metric in ["signed", "absolute", "relative"] {
+            assert_eq!(browser.value("state.metric"), metric);
+            let shown = browser.value(color);
+            let [r, b] = [0, 2].map(|c| shown[c].as_i64().unwrap());
+            assert!((r - b).abs() > 100, "{metric}{suffix}: {shown}");
+            assert!(browser.value(SCREEN_IS_WRONG_BY).as_f64().unwrap() <= 2.0, "{metric}{suffix}");
+            let unit = browser.value("get('unit').textContent");
+            assert!(unit.as_str().unwrap().contains("of the channel that differs most"), "{unit}");
+            browser.key("x", 0);
+        }
+    }
+}
+
+#[test]
+fn numbers_are_those_of_the_whole_image() {
+    let Some(mut browser) = Chromium::start() else { return };
+    let browser = &mut browser;
+    let folder = tempfile::tempdir().unwrap();
+    // More pixels than are looked at for a histogram, and the odd ones not among these.
+    let (width, height) = (900, 500);
+    let value = |index: usize| 0.25 + 0.5 * (index % 7) as f32 / 7.0;
+    let pixels = (0..width * height).map(|index| Vec3::splat(value(index))).collect();
+    let mut one = Image { width, height, pixels };
+    one.pixels[width + 1].x = 1234567.0;
+    one.pixels[width + 3].y = -77.0;
+    one.pixels[3 * width + 501] = Vec3::new(f32::NAN, f32::INFINITY, 0.5);
+    let mut two = one.clone();
+    two.pixels[201 * width + 103].z += 0.25;
+    let files = written(folder.path(), [("one.exr", &one), ("two.exr", &two)]);
+    let (page, _) = viewed(&folder.path().join("out"), &files);
+    opened(browser, &page, "");
+    let facts = browser.value("get('facts').textContent");
+    let facts = facts.as_str().unwrap();
+    assert!(facts.starts_with("least -77 · mean "), "{facts}");
+    assert!(facts.ends_with(" · most 1234567 · 1 pixel not finite"), "{facts}");
+
+    // Moving the image counts nothing anew.
+    browser.value("window.counted = 0; { const own = forPixels; forPixels = (...all) => { counted++; own(...all); }; } 0");
+    browser.key("h", 0);
+    browser.key("+", 0);
+    assert_eq!(browser.value("counted"), 0);
+
+    // What is no number in both is no difference, as for `umbra compare`.
+    browser.key("3", 0);
+    assert_eq!(
+        browser.value("get('facts').textContent").as_str().unwrap().rsplit(" · ").next(),
+        Some("most 0")
+    );
+    assert_eq!(
+        browser.value("[...layerValues(stage.layers[2], 501, 3, { metric: 'relative' })]"),
+        json!([0, 0, 0])
+    );
+    browser.key("p", 0);
+    assert_eq!(browser.value("state.pin"), json!({"x": 103, "y": 201}));
+    assert!(browser.value(SCREEN_IS_WRONG_BY).as_f64().unwrap() <= 2.0);
+
+    // An image and itself have no worst pixel.
+    let (page, _) = viewed(&folder.path().join("same"), &[files[0].clone(), files[0].clone()]);
+    opened(browser, &page, "");
+    browser.key("p", 0);
+    assert!(browser.value("state.pin").is_null());
+    assert_eq!(browser.value("get('message').textContent"), "one.exr - one.exr: no pixel differs.");
+
+    // The probe's digits give the very value back.
+    let probed = |browser: &mut Chromium, value: f32, kind: &str| {
+        let words = browser.value(&format!("exact({}, '{kind}')", f64::from(value)));
+        words.as_str().unwrap().to_owned()
+    };
+    for value in [
+        0.1,
+        1234567.0,
+        16777216.0,
+        123456792.0,
+        0.333_333_34,
+        3.402_823_5e38,
+        1e-45,
+        -0.000_123_4,
+        12345.67,
+    ] {
+        let words = probed(browser, value, "float");
+        assert_eq!(words.parse::<f32>().unwrap(), value, "{words}");
+    }
+    assert_eq!(probed(browser, 1234567.0, "float"), "1234567");
+    assert_eq!(probed(browser, 0.1, "float"), "0.1");
+    for bits in (0..0x7c00u16).step_by(13) {
+        let half = half::f16::from_bits(bits);
+        let words = probed(browser, half.to_f32(), "half");
+        assert_eq!(half::f16::from_f64(words.parse().unwrap()), half, "{words}");
+        assert!(words.len() <= 10, "{words}");
+    }
+    assert_eq!(probed(browser, half::f16::from_f32(0.1).to_f32(), "half"), "0.1");
+    // Values over pixels never lose digits in front of the point.
+    assert_eq!(
+        browser.value("[digits(12345), digits(1234567), digits(12345.6), digits(0.123456)]"),
+        json!(["12345", "1234567", "1.23e+4", "0.1235"])
+    );
+}
+
+#[test]
+fn keys_reach_what_has_the_focus_and_a_lost_context_is_replaced() {
+    let Some(mut browser) = Chromium::start() else { return };
+    let browser = &mut browser;
+    let folder = tempfile::tempdir().unwrap();
+    let (one, two) = (image(1.0), image(0.9));
+    let files = written(folder.path(), [("a.exr", &one), ("b.exr", &two)]);
+    let (page, _) = viewed(&folder.path().join("out"), &files);
+    opened(browser, &page, "");
+    let slider =
+        |browser: &mut Chromium| browser.value("Number(get('exposure').value)").as_f64().unwrap();
+
+    // A slider that has the focus takes the arrows, and leaves letters to the images.
+    browser.value("get('exposure').focus()");
+    let before = slider(browser);
+    for _ in 0..3 {
+        browser.key("ArrowRight", 0);
+    }
+    assert!((slider(browser) - before - 0.3).abs() < 1e-6);
+    assert!((browser.value("lookNow().exposure").as_f64().unwrap() - before - 0.3).abs() < 1e-6);
+    browser.key("Home", 0);
+    assert_eq!(slider(browser), -20.0);
+    assert_eq!(browser.value("[state.layer, state.channel]"), json!([0, "rgb"]));
+    browser.key("2", 0);
+    assert_eq!(browser.value("state.layer"), 1);
+
+    // A list used by keys keeps them; one used by the mouse gives them back.
+    let choose = "get('tone').focus(); get('tone').value = 'gamma'; get('tone').dispatchEvent(new Event('change'))";
+    browser.value(choose);
+    assert_eq!(browser.value("document.activeElement.id"), "tone");
+    browser.value(&format!("get('tone').dispatchEvent(new Event('pointerdown')); {choose}"));
+    assert_eq!(browser.value("document.activeElement.id"), "stage");
+    browser.key("1", 0);
+    assert_eq!(browser.value("state.layer"), 0);
+    // So does a button.
+    let at = browser
+        .value("(({ left, top }) => [left + 4, top + 4])(get('fit').getBoundingClientRect())");
+    let [x, y] = [0, 1].map(|axis| at[axis].as_f64().unwrap());
+    browser.mouse("mousePressed", x, y);
+    browser.mouse("mouseReleased", x, y);
+    browser.key_down(" ", 0);
+    assert_eq!(browser.value("stage.held"), true);
+    browser.key_up(" ");
+
+    assert_eq!(browser.value("stage.painter.name"), "WebGL 2");
+    browser.value("stage.gl.gl.getExtension('WEBGL_lose_context').loseContext()");
+    browser.until("stage.painter.name === 'plain canvas' && !stage.pending");
+    assert!(browser.value(SCREEN_IS_WRONG_BY).as_f64().unwrap() <= 1.0);
+    let said = browser.value("get('painter').textContent");
+    assert!(said.as_str().unwrap().starts_with("Without WebGL"), "{said}");
+    assert_eq!(browser.serious_findings(), Vec::<String>::new());
+}
+
+#[test]
+fn every_channel_is_shown_and_a_file_that_cannot_be_read_ends_nothing() {
+    let Some(mut browser) = Chromium::start() else { return };
+    let browser = &mut browser;
+    let folder = tempfile::tempdir().unwrap();
+    let [gray, deep, other, broken] =
+        ["gray.exr", "deep.exr", "other.exr", "broken.exr"].map(|name| folder.path().join(name));
+    let plane = |scale: f32| (0..12).map(|index| scale * index as f32).collect::<Vec<f32>>();
+    write_exr_channels(&gray, 4, &[("Y", plane(1.0))]).unwrap();
+    for (file, scale) in [(&deep, 10.0), (&other, 20.0)] {
+        let colors = ["B", "G", "R"].map(|name| (name, plane(1.0)));
+        let all: Vec<_> = colors.into_iter().chain([("depth.Z", plane(scale))]).collect();
+        write_exr_channels(file, 4, &all).unwrap();
+    }
+    std::fs::write(&broken, "no image").unwrap();
+    let files = [gray, broken.clone(), deep, other];
+    let (page, whole) = viewed(&folder.path().join("out"), &files);
+    assert!(!whole, "one was left out");
+    opened(browser, &page, "");
+    let cases = browser
+        .value("manifest.cases.map((own) => [own.id, ...own.layers.map((layer) => layer.name)])");
+    assert_eq!(
+        cases,
+        json!([
+            ["4x3", "deep.exr", "other.exr", "deep.exr - other.exr"],
+            ["4x3 Y", "gray.exr Y"],
+            [
+                "4x3 depth.Z",
+                "deep.exr depth.Z",
+                "other.exr depth.Z",
+                "deep.exr depth.Z - other.exr depth.Z"
+            ],
+        ])
+    );
+    opened(browser, &page, "#case=4x3%20depth.Z&layer=3");
+    assert_eq!(
+        browser.value("[...layerValues(stage.layers[2], 3, 1, { metric: 'signed' })]"),
+        json!([-70])
+    );
+    for key in ["1", "3"] {
+        browser.key(key, 0);
+        assert!(browser.value(SCREEN_IS_WRONG_BY).as_f64().unwrap() <= 2.0, "{key}");
+    }
+    // Nothing is left if none can be read.
+    let mut view = Command::new(env!("CARGO_BIN_EXE_umbra"));
+    let run =
+        view.arg("view").arg(&broken).arg("-o").arg(folder.path().join("none")).output().unwrap();
+    assert_eq!(run.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("broken.exr"));
+}
+
 #[test]
 fn a_name_injects_nothing() {
     let Some(mut browser) = Chromium::start() else { return };
@@ -224,18 +502,7 @@ fn a_name_injects_nothing() {
         "<img src=x onerror=window.pwned=1><\u{202e}script>window.pwned=2<\\script>&quot;.exr";
     let file = folder.path().join(evil);
     write_exr(&file, &image(1.0), Precision::Half, &[]).unwrap();
-    let out = folder.path().join("out");
-    let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
-        .arg("view")
-        .arg(&file)
-        .arg("-o")
-        .arg(&out)
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .output()
-        .unwrap();
-    let page = out.join("view.html");
-    assert_eq!(String::from_utf8_lossy(&run.stdout).trim_end(), page.display().to_string());
+    let (page, _) = viewed(&folder.path().join("out"), &[file]);
     opened(&mut browser, &page, "");
     let shown = browser.value("stage.layers[0].name");
     assert_eq!(shown, evil.replace('\u{202e}', "\\u{202e}"));

@@ -122,6 +122,39 @@ fn looks_around(browser: &mut Chromium) {
     assert_eq!(browser.value("live.views.realtime.asked"), asked);
 }
 
+/// A page that asks for a picture takes no picture from another one; its own older one it does.
+fn several_pages_share_it(browser: &mut Chromium) {
+    let asked = |pages: [u32; 2]| {
+        format!(
+            "Promise.all({pages:?}.map((page, turn) => new Promise((done) => setTimeout(done, 50 * turn)).then(() => \
+             fetch(address('offline', 64).replace(/viewer=\\d+/, `viewer=${{page}}`).replace('camera=', turn ? 'camera=' : 'camera=1'))) \
+             .then((answer) => answer.status)))"
+        )
+    };
+    assert_eq!(browser.value(&asked([1, 2])), serde_json::json!([200, 200]));
+    assert_eq!(browser.value(&asked([3, 3])), serde_json::json!([204, 200]));
+
+    // Nearer and further than any camera can be.
+    for (way, times) in [("+", 200), ("-", 400)] {
+        browser.value(&format!(
+            "for (let i = 0; i < {times}; i++) zoom('{way}' === '+' ? 0.8 : 1.25)"
+        ));
+        browser.until("!live.views.realtime.under && !live.views.realtime.dirty");
+        assert_eq!(
+            browser.value(
+                "live.views.realtime.problem.hidden && Math.hypot(...live.camera.eye) < 1e6"
+            ),
+            true
+        );
+    }
+    browser.value("reset()");
+    assert_eq!(
+        browser.value("[...document.body.children].map((one) => one.localName).join() + document.querySelectorAll('h1').length"),
+        "main,script1"
+    );
+    until_drawn(browser);
+}
+
 /// A watch of a folder, for some parts on one scene, and the lines that it prints.
 fn watching(
     work: &Path,
@@ -159,6 +192,7 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
 
     until_drawn(&mut browser);
     looks_around(&mut browser);
+    several_pages_share_it(&mut browser);
 
     let file = work.join("src/bsdfs/diffuse.rs");
     let right = fs::read_to_string(&file).unwrap();
@@ -166,7 +200,10 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     browser.until("document.body.className === 'running'");
     browser
         .until(&format!("{report}.querySelector('pre').textContent.includes('mismatched types')"));
-    assert_eq!(browser.value("document.body.className"), "done");
+    // It is not said to be done: title and status line carry the verdict.
+    assert_eq!(browser.value("document.body.className"), "refused");
+    assert_eq!(browser.value("document.title"), "does not compile - umbra watch");
+    browser.until("document.getElementById('status').textContent.includes('mismatched types')");
     let shown = browser.value(&format!("{report}.querySelector('main h2').textContent"));
     assert_eq!(shown, "The compiler says", "the error comes first");
     browser.until("live.views.realtime.figure.classList.contains('earlier')");
@@ -182,6 +219,8 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     fs::write(&file, right.replace(eval, "-> Vec3 { panic!(\"on purpose\");")).unwrap();
     browser.until(&problem("realtime", "the renderer panicked: in a frame"));
     browser.until(&format!("{report}.body.textContent.includes('on purpose')"));
+    browser.until("document.body.className === 'lost' && document.title.includes('of 30 points')");
+    browser.until("document.getElementById('status').textContent.includes('panicked: on purpose')");
 
     // One that hangs is ended by the next save; a frame that hangs, after a while.
     let second = "static DRAWN: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false); \
@@ -221,6 +260,71 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     drop(watch);
     browser.until("document.getElementById('status').textContent === 'umbra watch has ended'");
     assert!(!Path::new(&door).exists());
+}
+
+/// Waits until the report tells of some words in the source.
+fn until_told(report: &Path, words: &str) {
+    let begun = std::time::Instant::now();
+    while !fs::read_to_string(report).is_ok_and(|page| page.contains(words)) {
+        assert!(begun.elapsed().as_secs() < 100, "{words} was not seen");
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+}
+
+#[test]
+fn a_folder_that_is_replaced_is_watched_again() {
+    let place = tempfile::tempdir().unwrap();
+    let work = place.path().join("mine");
+    let write = |word: &str| {
+        fs::create_dir_all(work.join("src")).unwrap();
+        fs::write(work.join("src/lib.rs"), format!("fn main() {{ {word} }}")).unwrap();
+    };
+    write("first_word");
+    let out = place.path().join("out");
+    let (_watch, _said) = watching(&work, &["1.1"], &out);
+    let report = out.join("mine/report.html");
+    until_told(&report, "first_word");
+    let pause = std::time::Duration::from_millis;
+    for (turn, [apart, moved]) in [[0, 0], [1500, 0], [0, 1]].into_iter().enumerate() {
+        match moved {
+            0 => fs::remove_dir_all(&work).unwrap(),
+            _ => fs::rename(&work, place.path().join("away")).unwrap(),
+        }
+        std::thread::sleep(pause(apart));
+        write(&format!("back_{turn}"));
+        until_told(&report, &format!("back_{turn}"));
+        write(&format!("saved_{turn}"));
+        until_told(&report, &format!("saved_{turn}"));
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_terminal_that_closes_leaves_nothing_behind() {
+    let place = tempfile::tempdir().unwrap();
+    let work = place.path().join("work");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    copy(&root.join("student_template/src"), &work.join("src"));
+    let (mut watch, mut said) = watching(&work, &["1.1"], &place.path().join("out"));
+    let door = said.next().unwrap().unwrap();
+    let own = work.display().to_string();
+    let running = || {
+        let all = fs::read_dir("/proc").unwrap().flatten();
+        let lines = all.filter_map(|entry| fs::read_to_string(entry.path().join("cmdline")).ok());
+        lines.filter(|line| line.contains(&own)).count()
+    };
+    let begun = std::time::Instant::now();
+    while running() < 2 {
+        assert!(begun.elapsed().as_secs() < 20, "no check was begun");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    // The shell and the system may both tell it.
+    for _ in 0..2 {
+        kill(Pid::from_raw(watch.0.id() as i32), Signal::SIGHUP).unwrap();
+    }
+    assert!(watch.0.wait().unwrap().success());
+    assert!(!Path::new(&door).parent().unwrap().exists());
+    assert_eq!(running(), 0);
 }
 
 #[test]

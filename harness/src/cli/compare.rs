@@ -230,8 +230,8 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
         comparison.pictures = pictures::write(folder, images)?;
     }
     if let (Some(folder), Some([actual, expected])) = (&arguments.html, images) {
-        let images = [("actual".to_owned(), actual), ("expected".to_owned(), expected)];
-        comparison.page = Some(super::view::write_page(folder, &images)?.display().to_string());
+        let page = super::view::compared_page(folder, [&actual, &expected])?;
+        comparison.page = Some(page.display().to_string());
     }
     if arguments.json {
         println!("{}", harmless_json(&comparison)?);

@@ -117,12 +117,14 @@ pub fn on_interrupt(body: impl FnOnce() + Send + 'static) -> std::io::Result<()>
     Ok(())
 }
 
-/// A second Ctrl-C ends the program at once.
+/// Ends the program in good order at Ctrl-C, a polite kill, and when its terminal is closed. A second Ctrl-C ends it at
+/// once.
 pub fn catch_interrupts() {
     #[cfg(unix)]
     {
-        extern "C" fn interrupted(_: i32) {
-            if INTERRUPTED.swap(true, Ordering::SeqCst) {
+        extern "C" fn interrupted(signal: i32) {
+            // A terminal that closes may say so twice.
+            if INTERRUPTED.swap(true, Ordering::SeqCst) && signal != nix::libc::SIGHUP {
                 crate::process::exit_now(i32::from(super::EXIT_INTERRUPTED));
             }
             let waiting = WAITING.load(Ordering::SeqCst);
@@ -137,6 +139,14 @@ pub fn catch_interrupts() {
         for signal in [Signal::SIGINT, Signal::SIGTERM] {
             // SAFETY: the handler touches one atomic and may call `_exit`: both are allowed there.
             let _ = unsafe { sigaction(signal, &action) };
+        }
+        // SAFETY: as above. Where it was ignored, as `nohup` does, it still is.
+        unsafe {
+            if let Ok(before) = sigaction(Signal::SIGHUP, &action)
+                && matches!(before.handler(), SigHandler::SigIgn)
+            {
+                let _ = sigaction(Signal::SIGHUP, &before);
+            }
         }
     }
 }

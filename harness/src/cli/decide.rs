@@ -261,9 +261,10 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
     let images = open().filter(|own| own.unconfirmed > 0.0);
     let images: Vec<String> =
         images.map(|own| row(own, &format!("{} points for its images", own.unconfirmed))).collect();
-    let remarks = open().flat_map(|own| {
+    let remarks = open().filter_map(|own| {
         let private = own.remarks.iter().filter(|remark| report::is_private(remark, rules));
-        private.map(move |remark| row(own, remark))
+        let private: Vec<&str> = private.map(String::as_str).collect();
+        (!private.is_empty()).then(|| row(own, &private.join("; ")))
     });
     let unread = report.submissions.iter().filter(|own| own.is_unread());
     let unread = unread.map(|own| row(own, own.remarks.first().map_or("", String::as_str)));

@@ -43,6 +43,9 @@ pub struct Row {
     pub remarks: Vec<String>,
     pub parts: Vec<PartGrade>,
     pub standing: Standing,
+    /// What the compiler of the code and that of the shaders said.
+    #[serde(default)]
+    pub diagnostics: String,
 }
 
 impl Row {

@@ -23,7 +23,7 @@ use crate::report::{self, Alike, AlikePage};
 const SUBMISSIONS: &str = "submissions";
 /// The template's folder in it, which all submissions started from.
 const TEMPLATE: &str = "template";
-/// Number of JPlag's pairs that are shown: further pairs tell nothing more.
+/// Number of pairs that are shown, JPlag's and those with equal files each: further pairs tell nothing more.
 const SHOWN: usize = 100;
 
 /// Options of `umbra likeness`.
@@ -208,7 +208,10 @@ fn show(kept: &Kept, folder: &Path) -> anyhow::Result<()> {
         own.similarity = Some(pair.similarity);
         own.matches = pair.matches;
     }
-    for same in shared.same_files() {
+    // Those with the most files first: in a large class many share one, and the class page names all of them.
+    let mut same_files = shared.same_files();
+    same_files.sort_by_key(|same| std::cmp::Reverse(same.paths.len()));
+    for same in same_files.into_iter().take(SHOWN) {
         let own = all.entry(same.who.clone()).or_insert_with(|| alike(&same.who));
         own.same_files = same.paths.len();
         for paths in same.paths {

@@ -189,7 +189,8 @@ fn compare(
     found: &Found,
     machines: &[(Conditions, Vec<StoredRecord>)],
 ) -> anyhow::Result<()> {
-    let scratch = tempfile::tempdir().context("cannot make a temporary folder")?;
+    let scratch =
+        crate::files::private_folder("umbra-merge-").context("cannot make a temporary folder")?;
     let samples = machines.iter().filter_map(|(_, own)| own.first()).map(StoredRecord::whole);
     let samples = samples.collect::<anyhow::Result<Vec<Record>>>()?;
     let only: Vec<String> = samples.iter().map(|record| record.slug.clone()).collect();

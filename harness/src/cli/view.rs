@@ -1,15 +1,14 @@
 //! `umbra view`: EXR images in the browser.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use basecode::Image;
-use basecode::exr_io::read_exr_layers;
+use basecode::exr_io::{Band, ExrRows};
 
-use crate::files::write_whole;
+use crate::files::{private_folder, write_whole};
 use crate::report::html_viewer;
-use crate::viewer::{ImageFile, Layer, ViewedCase, write_image};
+use crate::viewer::{ImageFile, Layer, ViewedCase, write_channels, write_image};
 
 /// The page's file.
 const PAGE: &str = "view.html";
@@ -17,7 +16,7 @@ const PAGE: &str = "view.html";
 /// Options of `umbra view`.
 #[derive(clap::Args)]
 pub struct ViewArguments {
-    /// The images; all layers of each are shown, and the first of a size less each other
+    /// The images; all layers and channels of each are shown, and the first of a size less each other
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
     /// The folder for the page and its data [default: a new one in the system's temporary folder]
@@ -25,30 +24,90 @@ pub struct ViewArguments {
     pub(super) output: Option<PathBuf>,
 }
 
-/// Writes the page, opens it where there is a browser, and prints its path.
+/// One image of a page.
+struct Shown {
+    name: String,
+    /// The channel that it is, or empty where it is one of colors.
+    channel: String,
+    file: ImageFile,
+}
+
+/// Writes the page, opens it where there is a browser, and prints its path; exit 1 when a file could not be read.
 pub fn run(arguments: &ViewArguments) -> anyhow::Result<u8> {
-    let mut images = Vec::new();
-    for path in &arguments.images {
-        let file = read_exr_layers(path)?;
-        for note in &file.notes {
-            eprintln!("umbra: {}: {note}", path.display());
-        }
-        for (layer, image) in file.layers {
-            let name = path.display().to_string();
-            images.push((if layer.is_empty() { name } else { format!("{name} {layer}") }, image));
-        }
-    }
     let names: Vec<&Path> = arguments.images.iter().map(PathBuf::as_path).collect();
-    let named = |(name, image): &(String, Image)| (short(name, &names), image.clone());
-    let images: Vec<_> = images.iter().map(named).collect();
     let folder = match &arguments.output {
         Some(folder) => folder.clone(),
-        None => tempfile::Builder::new().prefix("umbra-view-").tempdir()?.keep(),
+        None => private_folder("umbra-view-")?.keep(),
     };
-    let page = write_page(&folder, &images)?;
+    let mut shown = Vec::new();
+    let mut failed = None;
+    for path in &arguments.images {
+        match unpack(path, &short(&path.display().to_string(), &names), &folder) {
+            Ok(images) => shown.extend(images),
+            Err(error) => {
+                if let Some(earlier) = failed.replace(error) {
+                    eprintln!("umbra: {}", super::told_once(&earlier));
+                }
+            }
+        }
+    }
+    match failed {
+        Some(error) if shown.is_empty() => return Err(error),
+        Some(ref error) => eprintln!("umbra: {}", super::told_once(error)),
+        None => {}
+    }
+    let page = write_page(&folder, shown, None)?;
     println!("{}", page.display());
     open_page(&page);
-    Ok(super::EXIT_OK)
+    Ok(if failed.is_some() { super::EXIT_NOT_IN_ORDER } else { super::EXIT_OK })
+}
+
+/// Writes the images of a file into the page's folder: each layer of colors, and every other channel by itself.
+fn unpack(path: &Path, name: &str, folder: &Path) -> anyhow::Result<Vec<Shown>> {
+    let file = ExrRows::open(path)?;
+    for note in file.notes() {
+        eprintln!("umbra: {}: {note}", path.display());
+    }
+    let channels = file.channels();
+    // A file without colors is shown by its channels.
+    let colors = file.layers().map(|(layers, _)| layers).unwrap_or_default();
+    let mut images: Vec<(String, String, Vec<usize>)> = Vec::new();
+    for (layer, channels) in &colors {
+        let name = if layer.is_empty() { name.to_owned() } else { format!("{name} {layer}") };
+        images.push((name, String::new(), channels.to_vec()));
+    }
+    for (index, channel) in channels.iter().enumerate() {
+        if !colors.iter().any(|(_, own)| own.contains(&index)) {
+            images.push((format!("{name} {channel}"), channel.clone(), vec![index]));
+        }
+    }
+    let mut shown = Vec::new();
+    let mut band = Band::default();
+    for (name, channel, own) in images {
+        let mut values = vec![Vec::with_capacity(file.width() * file.height()); own.len()];
+        for top in (0..file.height()).step_by(file.band_height()) {
+            let rows = top..file.height().min(top + file.band_height());
+            file.read(rows.clone(), &own, &mut band)?;
+            for (at, plane) in values.iter_mut().enumerate() {
+                rows.clone().for_each(|y| plane.extend_from_slice(band.row(at, y - top)));
+            }
+        }
+        for (&index, plane) in own.iter().zip(&mut values) {
+            // An integer was read as a fraction of the largest.
+            if file.is_integer(index) {
+                let whole = |value: f32| (f64::from(value) * f64::from(u32::MAX)).round() as f32;
+                plane.iter_mut().for_each(|value| *value = whole(*value));
+            }
+        }
+        let size = (file.width(), file.height(), own.len());
+        let file = write_channels(folder, size, &values.concat()).with_context(cannot(folder))?;
+        shown.push(Shown { name, channel, file });
+    }
+    Ok(shown)
+}
+
+fn cannot(folder: &Path) -> impl Fn() -> String {
+    move || format!("cannot write to {}", folder.display())
 }
 
 /// A name without the folder that all files share.
@@ -63,40 +122,57 @@ fn short(name: &str, files: &[&Path]) -> String {
     }
 }
 
-/// Writes the viewer's page and its data into a folder; answers the page's absolute path. Images of one size make a
-/// case, the first of them less each other shown as differences.
+/// Writes the viewer's page of an image beside the expected one, and its data, into a folder; answers the page's absolute
+/// path.
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn write_page(folder: &Path, images: &[(String, Image)]) -> anyhow::Result<PathBuf> {
-    let cannot = || format!("cannot write to {}", folder.display());
-    let mut sizes: Vec<(usize, usize)> = Vec::new();
-    let mut cases: BTreeMap<(usize, usize), Vec<(&str, ImageFile)>> = BTreeMap::new();
-    for (name, image) in images {
-        let size = (image.width, image.height);
-        if !sizes.contains(&size) {
-            sizes.push(size);
+pub fn compared_page(folder: &Path, images: [&Image; 2]) -> anyhow::Result<PathBuf> {
+    let names = ["actual", "expected"].into_iter();
+    let shown = names.zip(images).map(|(name, image)| {
+        let file = write_image(folder, image).with_context(cannot(folder))?;
+        Ok(Shown { name: name.to_owned(), channel: String::new(), file })
+    });
+    write_page(folder, shown.collect::<anyhow::Result<_>>()?, Some(1))
+}
+
+/// Writes the page of images whose data lie in a folder. Images of one size make a case, those of each channel their own,
+/// with the first of them less each other as differences.
+fn write_page(
+    folder: &Path,
+    mut images: Vec<Shown>,
+    reference: Option<usize>,
+) -> anyhow::Result<PathBuf> {
+    let title = images.first().map_or_else(|| "Images".to_owned(), |image| image.name.clone());
+    // Colors come first.
+    images.sort_by_key(|image| !image.channel.is_empty());
+    let mut cases: Vec<(String, Vec<Shown>)> = Vec::new();
+    for image in images {
+        let id = format!("{}x{} {}", image.file.width, image.file.height, image.channel);
+        let id = id.trim_end().to_owned();
+        match cases.iter_mut().find(|(own, _)| *own == id) {
+            Some((_, own)) => own.push(image),
+            None => cases.push((id, vec![image])),
         }
-        let file = write_image(folder, image).with_context(cannot)?;
-        cases.entry(size).or_default().push((name, file));
     }
-    let case = |size: &(usize, usize)| {
-        let files = cases.get(size).map(Vec::as_slice).unwrap_or_default();
-        let mut layers: Vec<Layer> =
-            files.iter().map(|(name, file)| Layer::image(*name, file)).collect();
-        if let Some(((first, image), others)) = files.split_first() {
-            let less = |(other, file): &(&str, ImageFile)| {
-                Layer::difference(format!("{first} - {other}"), image, file)
+    let case = |(id, images): (String, Vec<Shown>)| {
+        let layer = |image: &Shown| Layer::image(&image.name, &image.file);
+        let mut layers: Vec<Layer> = images.iter().map(layer).collect();
+        if let Some((first, others)) = images.split_first() {
+            let less = |other: &Shown| {
+                let name = format!("{} - {}", first.name, other.name);
+                Layer::difference(name, &first.file, &other.file)
             };
             layers.extend(others.iter().map(less));
         }
-        let id = format!("{}x{}", size.0, size.1);
-        ViewedCase { title: id.clone(), id, layers, ..ViewedCase::default() }
+        // Images of different sizes stand alone.
+        let reference = reference.filter(|index| *index < images.len());
+        ViewedCase { title: id.clone(), id, layers, reference, ..ViewedCase::default() }
     };
-    let cases: Vec<ViewedCase> = sizes.iter().map(case).collect();
-    let title = images.first().map_or("Images", |(name, _)| name);
+    let cases: Vec<ViewedCase> = cases.into_iter().map(case).collect();
     let page = folder.join(PAGE);
-    write_whole(&page, html_viewer(title, None, &cases).as_bytes()).with_context(cannot)?;
+    let html = html_viewer(&title, None, &cases);
+    write_whole(&page, html.as_bytes()).with_context(cannot(folder))?;
     Ok(std::path::absolute(&page)?)
 }
 

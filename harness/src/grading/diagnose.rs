@@ -277,6 +277,7 @@ fn pictures(
         id: Diagnosis::view_of(&diagnosis.part),
         title: format!("{}: what part {} looks like", view.scene, diagnosis.part),
         note: "every few pixels".to_owned(),
+        reference: (layers.len() > 1).then_some(1),
         layers,
         ..ViewedCase::default()
     };

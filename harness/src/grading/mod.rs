@@ -44,6 +44,6 @@ pub use pipeline::{Grading, RenderPath};
 pub use prepared_scene::{PreparedScene, ProbeFilm};
 pub use record::{Conditions, Folders, Record, SceneErrors, StageCost, Student};
 pub use sampler::{CORRELATED, row_correlation};
-pub use shared::{ALIKE, SameFiles, Shared, judge_shared};
+pub use shared::{ALIKE, SameFiles, Shared, SharedFiles, judge_shared};
 pub use stages::Stages;
 pub use tree_checks::{Mode, TREE};

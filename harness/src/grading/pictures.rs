@@ -219,6 +219,7 @@ fn view(
         false => image(folder),
     };
     let right = write(&|folder| write_image(folder, reference))?;
+    view.reference = Some(view.layers.len());
     view.layers.push(Layer::image("expected", &right));
     view.layers.push(Layer::difference("difference", &mine, &right));
     let size = (actual.width, actual.height);

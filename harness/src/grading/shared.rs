@@ -16,6 +16,9 @@ const NUMBER: CheckId = CheckId::SubmissionNumber;
 /// are alike in much, and nobody loses points by it.
 pub const ALIKE: f64 = 0.8;
 
+/// Number of other submissions that a sentence names.
+const NAMES: usize = 8;
+
 /// The check of sources.
 const LIKENESS: CheckId = CheckId::SubmissionLikeness;
 
@@ -53,6 +56,15 @@ pub struct SameFiles {
     pub who: [String; 2],
     /// The paths of each file in the two.
     pub paths: Vec<[String; 2]>,
+}
+
+/// Files that are the same in all of some submissions.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SharedFiles {
+    /// Each file's path; of one that has several, all of them, as `a or b`.
+    pub paths: Vec<String>,
+    /// The submissions' folders in the report.
+    pub who: Vec<String>,
 }
 
 /// Adds to every record of a batch what it shares with others, see [`Shared::judge`].
@@ -108,6 +120,28 @@ impl Shared {
     pub fn is_one_person(&self, who: &[String; 2]) -> bool {
         let [first, second] = who.each_ref().map(|slug| self.persons.get(slug));
         first.is_some() && first == second
+    }
+
+    /// Which files several persons submitted; those of the same submissions together, the most files first.
+    pub fn shared_files(&self) -> Vec<SharedFiles> {
+        let mut groups: BTreeMap<Vec<&str>, Vec<String>> = BTreeMap::new();
+        for authors in self.sources.values() {
+            let persons: BTreeSet<&str> = authors.iter().map(|own| own.person.as_str()).collect();
+            if persons.len() < 2 {
+                continue;
+            }
+            let who: BTreeSet<&str> = authors.iter().map(|own| own.slug.as_str()).collect();
+            let paths: BTreeSet<&str> = authors.iter().map(|own| own.path.as_str()).collect();
+            let paths = Vec::from_iter(paths).join(" or ");
+            groups.entry(who.into_iter().collect()).or_default().push(paths);
+        }
+        let groups = groups.into_iter().map(|(who, mut paths)| {
+            paths.sort();
+            SharedFiles { paths, who: who.into_iter().map(str::to_owned).collect() }
+        });
+        let mut groups: Vec<SharedFiles> = groups.collect();
+        groups.sort_by_key(|group| std::cmp::Reverse(group.paths.len()));
+        groups
     }
 
     /// Which submissions of two persons share files, in the order of their folders.
@@ -169,11 +203,17 @@ impl Shared {
         let mut same = Vec::new();
         for SourceDigest { path, signs, sha256 } in &record.sources {
             let others = self.sources[sha256].iter().filter(|author| author.person != person);
-            let others: Vec<_> =
-                others.map(|Author { slug, path, .. }| format!("{slug}: {path}")).collect();
+            // The path is said where it is another one.
+            let others = others.map(|author| match author.path == *path {
+                true => author.slug.clone(),
+                false => format!("{} (there {})", author.slug, author.path),
+            });
+            let others: Vec<String> = others.collect();
             if !others.is_empty() {
-                let others = others.join(", ");
-                same.push(format!("{path} ({signs} signs of its own) is {others}"));
+                let others = some(others.iter().map(String::as_str));
+                same.push(format!(
+                    "{path}, {signs} characters beyond the template, is also in {others}"
+                ));
             }
         }
         let near = self.near.get(&record.slug).map(Vec::as_slice).unwrap_or_default();
@@ -189,7 +229,11 @@ impl Shared {
         let near = near.iter().map(|(slug, similarity)| {
             format!("{:.0} % of the tokens match {slug} (JPlag)", 100.0 * similarity)
         });
-        same.extend(near);
+        let more = near.len().saturating_sub(NAMES);
+        same.extend(near.take(NAMES));
+        if more > 0 {
+            same.push(format!("as alike to {more} more"));
+        }
         let check = Check::new(LIKENESS, "", Verdict::Fail, summary);
         Some(Check { private: same.join("; "), ..check })
     }
@@ -198,7 +242,17 @@ impl Shared {
 /// The submissions of others than `own`.
 fn others(all: &Owners, own: &str) -> String {
     let others = all.iter().filter(|(owner, _)| owner != own).map(|(_, slug)| slug.as_str());
-    others.collect::<Vec<_>>().join(", ")
+    some(others)
+}
+
+/// The first names of a list, and how many more there are: of a large class all would be read by nobody.
+fn some<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.collect();
+    let first = names[..names.len().min(NAMES)].join(", ");
+    match names.len().saturating_sub(NAMES) {
+        0 => first,
+        more => format!("{first} and {more} more"),
+    }
 }
 
 /// The student number, its digits alone.
@@ -319,10 +373,13 @@ mod tests {
         ];
         judge_shared(&mut batch);
         let found = failed(&batch, LIKENESS);
-        assert_eq!(found["ada"], "src/a.rs (300 signs of its own) is bob: src/mine.rs");
+        assert_eq!(
+            found["ada"],
+            "src/a.rs, 300 characters beyond the template, is also in bob (there src/mine.rs)"
+        );
         assert_eq!(
             found["bob"],
-            "src/mine.rs (300 signs of its own) is ada: src/a.rs, ada-again: src/a.rs"
+            "src/mine.rs, 300 characters beyond the template, is also in ada (there src/a.rs), ada-again (there src/a.rs)"
         );
         assert_eq!(found["eve"], "");
         let again = batch.clone();

@@ -54,7 +54,8 @@ pub fn pack(
 }
 
 fn scratch_folder() -> Result<tempfile::TempDir, IntakeError> {
-    tempfile::tempdir().map_err(|e| IntakeError::io("create a folder in", &std::env::temp_dir(), e))
+    crate::files::private_folder("umbra-pack-")
+        .map_err(|e| IntakeError::io("create a folder in", &std::env::temp_dir(), e))
 }
 
 /// `a2_first_last.zip` by the credentials: lower case, other signs than letters and digits as `-`.

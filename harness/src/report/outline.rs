@@ -33,7 +33,6 @@ pub fn outline(mut entry: SubmissionReport) -> SubmissionReport {
     record.diagnostics = String::new();
     record.views = Vec::new();
     record.error_maps = Vec::new();
-    record.sources = Vec::new();
     record.images = Vec::new();
     entry
 }

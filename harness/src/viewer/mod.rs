@@ -4,7 +4,9 @@ mod pack;
 
 use serde::{Deserialize, Serialize};
 
-pub use pack::{remove_others, write_excess, write_image, write_mask, write_shared};
+pub use pack::{
+    remove_others, write_channels, write_excess, write_image, write_mask, write_shared,
+};
 
 /// The folder of the data files, beside the page.
 pub const DATA_FOLDER: &str = "viewer";
@@ -24,6 +26,9 @@ pub struct ViewedCase {
     pub held_back: bool,
     /// The images, in the order of their numbers.
     pub layers: Vec<Layer>,
+    /// The layer whose values set the exposure of all images where it is found from values; the first if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<usize>,
     /// The exposure to begin with, in stops; found from the values if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<f64>,

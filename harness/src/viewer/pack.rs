@@ -29,13 +29,24 @@ const DIGITS: usize = 20;
 pub fn write_image(folder: &Path, image: &Image) -> io::Result<ImageFile> {
     let plane = |c: usize| image.pixels.iter().map(move |pixel| pixel[c]);
     let values: Vec<f32> = (0..3).flat_map(plane).collect();
+    write_channels(folder, (image.width, image.height, 3), &values)
+}
+
+/// Writes channels below `folder` one after the other, as [`write_image`] does three.
+///
+/// # Errors
+/// When they cannot be written.
+pub fn write_channels(
+    folder: &Path,
+    (width, height, channels): (usize, usize, usize),
+    values: &[f32],
+) -> io::Result<ImageFile> {
     let halves: Option<Vec<u16>> = values.iter().map(|&value| exact_half(value)).collect();
     let (samples, planes) = match halves {
         Some(halves) => (Samples::Half, byte_planes(halves.into_iter().map(u32::from), 2)),
         None => (Samples::Float, byte_planes(values.iter().map(|value| value.to_bits()), 4)),
     };
-    let about = (image.width, image.height, 3, samples);
-    write(folder, about, &planes)
+    write(folder, (width, height, channels, samples), &planes)
 }
 
 /// Writes what `write` does into the folder above, which the pages in several folders share: of a class, each image that

@@ -212,8 +212,18 @@ impl Chromium {
         };
         let mut event =
             json!({"type": "keyDown", "key": key, "code": code, "modifiers": modifiers});
-        if key == "Escape" {
-            event["windowsVirtualKeyCode"] = json!(27); // else no dialog closes
+        // Else no dialog closes and no slider moves.
+        let number = match key {
+            "Escape" => Some(27),
+            "Home" => Some(36),
+            "ArrowLeft" => Some(37),
+            "ArrowUp" => Some(38),
+            "ArrowRight" => Some(39),
+            "ArrowDown" => Some(40),
+            _ => None,
+        };
+        if let Some(number) = number {
+            event["windowsVirtualKeyCode"] = json!(number);
         }
         if key.chars().count() == 1 && modifiers & CONTROL == 0 {
             event["text"] = json!(key);

@@ -130,6 +130,16 @@ impl<'a> ExrRows<'a> {
         self.header.channels.list.iter().map(|channel| channel.name.to_string()).collect()
     }
 
+    /// Whether a channel (an index of [`ExrRows::channels`]) holds integers.
+    pub fn is_integer(&self, channel: usize) -> bool {
+        self.header.channels.list[channel].sample_type == SampleType::U32
+    }
+
+    /// What a reader may want to know about the file, but for its channels.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     /// The primaries that the file declares, see [`ExrLayers::chromaticities`].
     pub fn chromaticities(&self) -> Option<[[f32; 2]; 4]> {
         let found = self.header.shared_attributes.chromaticities?;

@@ -3,6 +3,8 @@
    picture that follows when it rests. Pixels come as 16-bit floats; exposure is applied here. */
 
 const live = {
+  /** Tells this page from others of the same watch. */
+  viewer: crypto.getRandomValues(new Uint32Array(1))[0],
   panel: document.getElementById("live"),
   scenes: [],
   camera: null,
@@ -17,6 +19,8 @@ const live = {
 const control = (name) => document.getElementById(name);
 /** Questions on their way at a time: while one picture travels, the next is drawn. */
 const REALTIME_AT_A_TIME = 2;
+/** The camera comes so many times nearer than the scene's, and goes so many times further away. */
+const FAR = 100;
 /** So long after the last move the offline picture begins [ms]. */
 const REST = 200;
 /** Samples per pixel of one offline picture after the other. */
@@ -70,9 +74,15 @@ function pan(dx, dy) {
   moved();
 }
 
+/** Comes nearer or goes away, within what a camera can be: too near, eye and target are the same number. */
 function zoom(factor) {
   const { eye, at } = live.camera;
-  live.camera.eye = add(at, scale(sub(eye, at), factor));
+  const own = sceneNow().camera;
+  const usual = Math.hypot(...sub(own.eye, own.at));
+  const offset = sub(eye, at);
+  const now = Math.hypot(...offset);
+  const wanted = Math.min(Math.max(now * factor, usual / FAR), usual * FAR);
+  live.camera.eye = add(at, scale(offset, wanted / now));
   moved();
 }
 
@@ -90,7 +100,7 @@ function address(path, spp) {
   const { eye, at, up, fov_y_deg: fov } = live.camera;
   const shadows = control(path === "realtime" ? "map" : "shadows").checked ? 1 : 0;
   const camera = [...eye, ...at, ...up, fov].map((value) => Number(value.toPrecision(7))).join(",");
-  return `frame?path=${path}&scene=${control("scene").value}&shadows=${shadows}&spp=${spp}&camera=${camera}`;
+  return `frame?path=${path}&scene=${control("scene").value}&shadows=${shadows}&spp=${spp}&viewer=${live.viewer}&camera=${camera}`;
 }
 
 /** Asks for a picture and shows it, or why there is none; whether that is what was asked for last. */
@@ -106,7 +116,9 @@ async function ask(view, path, spp, signal) {
     view.about.textContent = "";
     return false;
   }
-  if (!answer.ok) return false;
+  // Given up for a question that came before this one: it is asked again.
+  if (answer.status === 204 && !signal?.aborted) restLater();
+  if (answer.status !== 200) return false;
   const bytes = await answer.arrayBuffer();
   if (signal?.aborted || number < view.shown || view.stopped) return false;
   view.shown = number;
@@ -154,6 +166,10 @@ function moved() {
   live.views.realtime.dirty = true;
   draw();
   live.views.offline.abort?.abort();
+  restLater();
+}
+
+function restLater() {
   clearTimeout(rest);
   rest = setTimeout(() => refine().catch(gone), REST);
 }

@@ -12,7 +12,8 @@
 //! picture when it is ready for one, with the camera of that moment, so a slow renderer skips frames and never lags.
 //!
 //! **Offline.** A renderer takes its camera from a scene file. So each picture is a job with a scene file of its own:
-//! the scene's, with the camera replaced, beside a link to the folder of its mesh. A camera that moved ends the job.
+//! the scene's, with the camera replaced, beside a link to the folder of its mesh. A camera that moved ends the job of its own page;
+//! other pages wait for theirs.
 //!
 //! **Pixels** reach the browser as 16-bit floats; exposure is applied there, without asking anybody.
 //!
@@ -21,6 +22,7 @@
 //!
 //! **Idle.** A worker without requests for a while ends, so an idle watch has no other process.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -58,10 +60,12 @@ pub struct Question {
     /// Samples per pixel, offline.
     spp: u32,
     camera: CameraValue,
+    /// Which page asks: several may be open.
+    viewer: u64,
 }
 
 impl Question {
-    /// Reads `path=realtime&scene=NAME&shadows=1&spp=4&camera=` with ten numbers: eye, at, up, and the vertical field
+    /// Reads `path=realtime&scene=NAME&shadows=1&spp=4&viewer=7&camera=` with ten numbers: eye, at, up, and the vertical field
     /// of view in degrees. None for anything else.
     pub fn parse(query: &str) -> Option<Self> {
         let value =
@@ -87,6 +91,7 @@ impl Question {
             shadows: value("shadows")? == "1",
             spp,
             camera,
+            viewer: value("viewer")?.parse().ok()?,
         })
     }
 }
@@ -122,8 +127,8 @@ pub struct LiveView {
     realtime: Mutex<Option<(Purpose, LiveWorker)>>,
     /// The folder for scene files; held by who draws offline.
     offline: Mutex<TempDir>,
-    /// Ends the offline picture that was asked for last; by which camera it is.
-    newest: Mutex<(Arc<AtomicBool>, Option<CameraValue>)>,
+    /// Of each page, what ends the offline picture that it asked for last; by which camera that is.
+    newest: Mutex<HashMap<u64, (Arc<AtomicBool>, CameraValue)>>,
     ended: AtomicBool,
 }
 
@@ -185,18 +190,23 @@ impl LiveView {
     /// Draws a picture: width, height, seconds, then red, green and blue of each pixel from the top, as 16-bit floats,
     /// all little-endian.
     ///
+    /// None when the same page asked for another picture meanwhile.
+    ///
     /// # Errors
     /// With the words for the browser when there is none.
-    pub fn picture(&self, question: &Question) -> Result<Vec<u8>, String> {
+    pub fn picture(&self, question: &Question) -> Result<Option<Vec<u8>>, String> {
         let scene = self.scenes.iter().find(|scene| scene.name == question.scene);
         let scene = scene.ok_or("there is no such scene")?;
         let library = self.library_time().map_err(|_| "nothing has compiled yet".to_owned())?;
         let outcome = match question.path {
             RenderPath::Realtime => self.draw(scene, question, library),
-            RenderPath::Offline => self.render(scene, question),
+            RenderPath::Offline => match self.render(scene, question) {
+                Some(outcome) => outcome,
+                None => return Ok(None),
+            },
         };
         match outcome {
-            Ok(Outcome::Done(answer)) => Ok(bytes(scene, &answer)),
+            Ok(Outcome::Done(answer)) => Ok(Some(bytes(scene, &answer))),
             Ok(outcome) => Err(outcome.to_string()),
             Err(error) => Err(format!("not drawn here: {error:#}")),
         }
@@ -208,12 +218,11 @@ impl LiveView {
         question: &Question,
         library: SystemTime,
     ) -> anyhow::Result<Outcome> {
+        // A camera that moves on needs no picture of where it was.
+        if let Some((cancel, camera)) = lock(&self.newest).get(&question.viewer)
+            && *camera != question.camera
         {
-            // A camera that moves on needs no picture of where it was.
-            let newest = lock(&self.newest);
-            if newest.1.is_some_and(|camera| camera != question.camera) {
-                newest.0.store(true, Ordering::Release);
-            }
+            cancel.store(true, Ordering::Release);
         }
         let mut current = lock(&self.realtime);
         let bonus = scene.entry.bonus.as_ref().filter(|_| question.shadows);
@@ -251,10 +260,29 @@ impl LiveView {
         anyhow::bail!("the worker ended at once")
     }
 
-    fn render(&self, scene: &Scene, question: &Question) -> anyhow::Result<Outcome> {
+    /// None when it was given up for another question.
+    fn render(&self, scene: &Scene, question: &Question) -> Option<anyhow::Result<Outcome>> {
         let cancel = Arc::<AtomicBool>::default();
-        let new = (Arc::clone(&cancel), Some(question.camera));
-        std::mem::replace(&mut *lock(&self.newest), new).0.store(true, Ordering::Release);
+        let new = (Arc::clone(&cancel), question.camera);
+        if let Some((older, _)) = lock(&self.newest).insert(question.viewer, new) {
+            older.store(true, Ordering::Release);
+        }
+        let outcome = self.render_until(scene, question, &cancel);
+        let mut newest = lock(&self.newest);
+        if newest.get(&question.viewer).is_some_and(|(own, _)| Arc::ptr_eq(own, &cancel)) {
+            newest.remove(&question.viewer);
+        }
+        let given_up = cancel.load(Ordering::Acquire);
+        (!given_up || matches!(outcome, Ok(Outcome::Done(_)))).then_some(outcome)
+    }
+
+    fn render_until(
+        &self,
+        scene: &Scene,
+        question: &Question,
+        cancel: &Arc<AtomicBool>,
+    ) -> anyhow::Result<Outcome> {
+        // Other pages wait their turn.
         let folder = lock(&self.offline);
         if self.ended.load(Ordering::Acquire) {
             cancel.store(true, Ordering::Release);
@@ -275,14 +303,16 @@ impl LiveView {
         let [fixed, each] = OFFLINE_CPU_S;
         let limits =
             Limits { cpu_s: fixed + each * u64::from(question.spp), ..self.limits.clone() };
-        let mut report = self.supervisor.run_job(&job, &limits, &cancel, &mut |_| ());
+        let mut report = self.supervisor.run_job(&job, &limits, cancel, &mut |_| ());
         report.outcomes.pop().context("the worker gave no answer")
     }
 
     /// Ends what is drawn, for good.
     pub fn end(&self) {
         self.ended.store(true, Ordering::Release);
-        lock(&self.newest).0.store(true, Ordering::Release);
+        for (cancel, _) in lock(&self.newest).values() {
+            cancel.store(true, Ordering::Release);
+        }
         drop(lock(&self.offline));
         lock(&self.realtime).take();
     }
@@ -347,7 +377,8 @@ mod tests {
 
     #[test]
     fn a_question_says_all_or_is_none() {
-        let whole = "path=offline&scene=cbox&shadows=1&spp=4&camera=1,2,3,4,5,6,0,1,0,30.5";
+        let whole =
+            "path=offline&scene=cbox&shadows=1&spp=4&viewer=7&camera=1,2,3,4,5,6,0,1,0,30.5";
         let question = Question::parse(whole).unwrap();
         assert_eq!((question.path, question.spp, question.shadows), (RenderPath::Offline, 4, true));
         assert_eq!((question.camera.at, question.camera.fov_y_deg), ([4.0, 5.0, 6.0], 30.5));
@@ -362,6 +393,7 @@ mod tests {
             ("30.5", "NaN"),
             ("=1,2", "=inf,2"),
             ("&camera", "&kamera"),
+            ("viewer=7&", ""),
         ] {
             assert_eq!(Question::parse(&whole.replace(part, other)), None, "{part} {other}");
         }

@@ -7,13 +7,14 @@ mod live;
 mod page;
 mod server;
 
-use std::io::{BufRead as _, BufReader};
+use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Context as _;
 use notify::{EventKind, RecursiveMode, Watcher as _};
@@ -21,10 +22,15 @@ use notify::{EventKind, RecursiveMode, Watcher as _};
 use self::live::LiveView;
 use self::server::{Board, Server, Stage};
 use super::context::{Context, on_interrupt};
+use super::earlier::{Report, Row};
+use crate::columns::count;
+use crate::rubric::PartGrade;
 
 /// A save is over after this long without another change: an editor may write several files, and one file in several
 /// steps.
 const QUIET: Duration = Duration::from_millis(150);
+/// How often it is looked whether a folder that is gone is back.
+const LOOK: Duration = Duration::from_millis(500);
 /// Time that a check has to end once it is told to.
 const GRACE: Duration = Duration::from_secs(10);
 
@@ -80,6 +86,7 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
         }
     })?;
     watcher.watch(&folder, RecursiveMode::Recursive).with_context(name)?;
+    let mut watched = identity(&folder);
 
     let board = Arc::new(Board::default());
     let given = [crate::class::Source::given(&folder)];
@@ -108,10 +115,27 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     // Whether the last whole report tells how the offline half of the source is now.
     let mut offline_holds = false;
     loop {
-        match wait(&happens) {
+        match wait(&happens, watched.is_none()) {
             Happened::Saved(change) => {
+                let (now, before) = (identity(&folder), watched);
+                if now.is_none() && before.is_none() {
+                    continue;
+                }
                 if let Some(older) = running.take() {
                     older.end();
+                }
+                if now != before {
+                    // A folder that was replaced, or is back, is another one to the system.
+                    let _ = watcher.unwatch(&folder);
+                    watched =
+                        now.filter(|_| watcher.watch(&folder, RecursiveMode::Recursive).is_ok());
+                }
+                if watched.is_none() {
+                    let gone =
+                        format!("{} is gone; it is checked when it is back", folder.display());
+                    eprintln!("umbra: {gone}");
+                    board.show(Stage::Failed, &gone);
+                    continue;
                 }
                 offline_holds &= change == Change::Shader;
                 let change = if offline_holds { Change::Shader } else { Change::Other };
@@ -135,6 +159,27 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
             }
         }
     }
+}
+
+/// What tells a folder from another one of its name; none where there is no folder.
+fn identity(folder: &Path) -> Option<Identity> {
+    let about = folder.metadata().ok().filter(std::fs::Metadata::is_dir)?;
+    #[cfg(unix)]
+    let (device, number) = {
+        use std::os::unix::fs::MetadataExt as _;
+        (about.dev(), about.ino())
+    };
+    #[cfg(not(unix))]
+    let (device, number) = (0, 0);
+    Some(Identity { device, number, created: about.created().ok() })
+}
+
+/// See [`identity`]. The system gives the number of a folder that was removed to a new one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Identity {
+    device: u64,
+    number: u64,
+    created: Option<SystemTime>,
 }
 
 /// Whether a change of a file can change what a check finds.
@@ -170,8 +215,17 @@ enum Happened {
 }
 
 /// What happens next; of a save, all that belongs to it. Nothing is looked at until then: an idle watch costs nothing.
-fn wait(happens: &Receiver<Happened>) -> Happened {
-    let Ok(first) = happens.recv() else { return Happened::Interrupted };
+/// Only a folder that is `gone` sends no word when it is back: then a while without any counts as a save.
+fn wait(happens: &Receiver<Happened>, gone: bool) -> Happened {
+    let first = match gone {
+        true => happens.recv_timeout(LOOK),
+        false => happens.recv().map_err(RecvTimeoutError::from),
+    };
+    let first = match first {
+        Ok(first) => first,
+        Err(RecvTimeoutError::Timeout) => return Happened::Saved(Change::Other),
+        Err(RecvTimeoutError::Disconnected) => return Happened::Interrupted,
+    };
     let Happened::Saved(mut all) = first else { return first };
     while let Ok(next) = happens.recv_timeout(QUIET) {
         match next {
@@ -189,6 +243,8 @@ struct Running {
     /// Tells it from others.
     number: usize,
     child: Child,
+    /// Whether it was told to end: nobody needs to read that it did.
+    ended: Arc<AtomicBool>,
     /// Puts what it says on the board.
     said: Option<JoinHandle<()>>,
 }
@@ -196,6 +252,7 @@ struct Running {
 impl Running {
     /// Lets a check clean up after itself, and ends it if it does not.
     fn end(mut self) {
+        self.ended.store(true, Ordering::Release);
         #[cfg(unix)]
         if let Ok(id) = i32::try_from(self.child.id()) {
             use nix::sys::signal::{Signal, kill};
@@ -236,13 +293,40 @@ fn is_judged(status: ExitStatus) -> bool {
     matches!(status.code(), Some(0 | 1))
 }
 
+/// What a report comes to: in a few words, and in a sentence with what is to be mended first.
+fn verdict(row: &Row) -> (Stage, String, String) {
+    let points = format!("{} of {} points", row.points, row.out_of);
+    if let Some(first) = row.diagnostics.lines().find(|line| !line.trim().is_empty()) {
+        return (Stage::Refused, "does not compile".to_owned(), format!("{first} ({points})"));
+    }
+    // A bonus that nobody tried for is nothing lost.
+    let is_lost =
+        |part: &&PartGrade| part.points < part.out_of && !(part.bonus && part.points_max == 0.0);
+    let lost: Vec<&PartGrade> = row.parts.iter().filter(is_lost).collect();
+    match lost.split_first() {
+        None => (Stage::Done, points.clone(), points),
+        Some((first, others)) => {
+            let others = match others.len() {
+                0 => String::new(),
+                more => format!(", and {} lost points too", count(more, "other part")),
+            };
+            let message = format!("{points}. {}: {}{others}", first.id, first.reason);
+            (Stage::Lost, points, message)
+        }
+    }
+}
+
 impl Check<'_> {
     /// Shows how a check ended.
     fn show(&self, status: ExitStatus) {
-        match is_judged(status) {
-            true => self.board.report("everything that was asked is on the page"),
+        let row = is_judged(status).then(|| Report::read(self.output).ok()).flatten();
+        match row.and_then(|report| report.submissions.into_iter().next()) {
+            Some(row) => {
+                let (stage, verdict, message) = verdict(&row);
+                self.board.report(stage, &verdict, &message);
+            }
             // The last line said why.
-            false => self.board.show(Stage::Failed, ""),
+            None => self.board.show(Stage::Failed, ""),
         }
     }
 
@@ -268,23 +352,29 @@ impl Check<'_> {
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         command.stdin(Stdio::null()).stderr(Stdio::piped());
         let mut child = command.spawn().context("cannot start umbra check")?;
+        let ended = Arc::<AtomicBool>::default();
+        let quiet = Arc::clone(&ended);
         let said = child.stderr.take().map(|said| {
             let (board, live) = (Arc::clone(self.board), Arc::clone(self.live));
             let happened = self.happened.clone();
             std::thread::spawn(move || {
                 for line in BufReader::new(said).lines().map_while(Result::ok) {
+                    if quiet.load(Ordering::Acquire) {
+                        continue;
+                    }
                     let line = line.strip_prefix("umbra: ").unwrap_or(&line);
                     board.show(Stage::Running, line);
                     if live.has_new_library() {
                         board.compiled();
                     }
-                    eprintln!("umbra: {line}");
+                    // The terminal may be gone.
+                    let _ = writeln!(std::io::stderr(), "umbra: {line}");
                 }
                 // It says nothing more: it has ended, or is about to.
                 let _ = happened.send(Happened::Ended(number));
             })
         });
-        Ok(Running { number, child, said })
+        Ok(Running { number, child, ended, said })
     }
 }
 
@@ -324,12 +414,58 @@ mod tests {
             saved.iter().for_each(|&change| happened.send(Happened::Saved(change)).unwrap());
             // What ends meanwhile was about the save before.
             happened.send(Happened::Ended(7)).unwrap();
-            assert_eq!(wait(&happens), Happened::Saved(told), "{saved:?}");
+            assert_eq!(wait(&happens, false), Happened::Saved(told), "{saved:?}");
             happened.send(Happened::Ended(8)).unwrap();
-            assert_eq!(wait(&happens), Happened::Ended(8));
+            assert_eq!(wait(&happens, false), Happened::Ended(8));
             happened.send(Happened::Saved(Change::Other)).unwrap();
             happened.send(Happened::Interrupted).unwrap();
-            assert_eq!(wait(&happens), Happened::Interrupted);
+            assert_eq!(wait(&happens, false), Happened::Interrupted);
         }
+    }
+
+    #[test]
+    fn a_verdict_is_green_only_where_nothing_is_wrong() {
+        let part = |id: &str, bonus: bool, points: f64, reason: &str| PartGrade {
+            id: id.into(),
+            title: id.into(),
+            out_of: 10.0,
+            bonus,
+            points,
+            points_max: points,
+            unconfirmed: 0.0,
+            reason: reason.into(),
+            evidence: Vec::new(),
+        };
+        let row = |parts: Vec<PartGrade>, diagnostics: &str| Row {
+            name: "work".into(),
+            slug: "work".into(),
+            points: parts.iter().map(|part| part.points).sum(),
+            points_max: 0.0,
+            unconfirmed: 0.0,
+            out_of: 20.0,
+            remarks: Vec::new(),
+            parts,
+            standing: crate::class::Standing::default(),
+            diagnostics: diagnostics.into(),
+        };
+        let told = |parts, diagnostics| verdict(&row(parts, diagnostics));
+        let full = || vec![part("1.1", false, 10.0, ""), part("1.2", false, 10.0, "")];
+        let (stage, short, _) = told(full(), "");
+        assert_eq!((stage, short.as_str()), (Stage::Done, "20 of 20 points"));
+        // A bonus that nobody tried for is nothing lost; one that was begun is.
+        let bonus = |points| [full(), vec![part("2.5", true, points, "the map is black")]].concat();
+        assert_eq!(told(bonus(0.0), "").0, Stage::Done);
+        let (stage, _, words) = told(bonus(4.0), "");
+        assert_eq!(
+            (stage, words.as_str()),
+            (Stage::Lost, "24 of 20 points. 2.5: the map is black")
+        );
+        let (stage, short, words) =
+            told(full(), "\nerror[E0308]: mismatched types\n --> src/lib.rs");
+        assert_eq!((stage, short.as_str()), (Stage::Refused, "does not compile"));
+        assert_eq!(words, "error[E0308]: mismatched types (20 of 20 points)");
+        let lost = vec![part("1.1", false, 0.0, "it panics"), part("1.2", false, 1.0, "dark")];
+        let (_, _, words) = told(lost, "");
+        assert_eq!(words, "1 of 20 points. 1.1: it panics, and 1 other part lost points too");
     }
 }

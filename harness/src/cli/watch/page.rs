@@ -20,10 +20,12 @@ pub fn page(report: &'static str) -> String {
          form-action 'none'; connect-src 'self'; frame-src 'self'; style-src 'sha256-{style}'; \
          script-src 'sha256-{script}'\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>Umbra watches</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
-         <p id=\"status\" role=\"status\">Checking</p>\n\
+         <title>umbra watch</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n\
+         <h1>umbra watch</h1>\n<p id=\"status\" role=\"status\">Checking</p>\n\
+         <noscript><p>This page needs JavaScript. The report alone: \
+         <a href=\"report/{report}\">{report}</a></p></noscript>\n\
          {LIVE}<p id=\"mark\" role=\"status\" hidden></p>\n\
-         <iframe id=\"report\" title=\"Report\" data-page=\"{report}\"></iframe>\n\
+         <iframe id=\"report\" title=\"Report\" data-page=\"{report}\"></iframe>\n</main>\n\
          <script>{SCRIPT}</script>\n</body>\n</html>\n"
     )
 }

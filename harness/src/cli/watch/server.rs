@@ -30,8 +30,12 @@ pub enum Stage {
     /// It is being checked.
     #[default]
     Running,
-    /// Its report is there.
+    /// Its report is there, and nothing is wrong.
     Done,
+    /// Its report is there, and tells of lost points.
+    Lost,
+    /// Its report is there; something of it does not compile.
+    Refused,
     /// There is no report.
     Failed,
 }
@@ -56,6 +60,8 @@ struct Shown {
     version: u64,
     stage: Stage,
     message: String,
+    /// What the page's title says of the last report.
+    verdict: String,
     /// How many reports there were: the page loads it again when this rises.
     reports: u64,
     /// How many libraries there were for the live view, which asks again when this rises.
@@ -79,10 +85,11 @@ impl Board {
         self.change(stage, message, |_| ());
     }
 
-    /// Shows that there is a new report.
-    pub fn report(&self, message: &str) {
-        self.change(Stage::Done, message, |shown| {
+    /// Shows that there is a new report, with its verdict in a few words and in a sentence.
+    pub fn report(&self, stage: Stage, verdict: &str, message: &str) {
+        self.change(stage, message, |shown| {
             shown.holds = Holds::All;
+            shown.verdict = crate::report::harmless(verdict);
             shown.reports += 1;
         });
     }
@@ -173,9 +180,7 @@ impl Server {
     /// # Errors
     /// When it cannot be written.
     pub fn door(&self) -> io::Result<Door> {
-        // The folder's mode is 0700.
-        let folder = tempfile::Builder::new().prefix("umbra-watch-").tempdir()?;
-        let door = Door { folder };
+        let door = Door { folder: crate::files::private_folder("umbra-watch-")? };
         let mut options = std::fs::OpenOptions::new();
         options.write(true).create_new(true);
         #[cfg(unix)]
@@ -290,7 +295,8 @@ fn answer(request: Request, asked: Route, folder: &Path, board: &Board, live: &L
         Route::Events => events(request, board),
         Route::Scenes => request.respond(page("application/json", live.scenes().into_bytes())),
         Route::Frame(question) => match live.picture(&question) {
-            Ok(bytes) => request.respond(page("application/octet-stream", bytes)),
+            Ok(Some(bytes)) => request.respond(page("application/octet-stream", bytes)),
+            Ok(None) => request.respond(page("text/plain", Vec::new()).with_status_code(204)),
             Err(words) => {
                 let lines: Vec<String> = words.lines().map(crate::report::harmless).collect();
                 let words = lines.join("\n").into_bytes();
@@ -377,7 +383,7 @@ mod tests {
         let own = Some(host);
         assert_eq!(ask("/abcdef/", own, None), Route::Page);
         assert_eq!(ask("/abcdef/frame?path=offline", own, None), Route::Nothing(400));
-        let frame = "path=offline&scene=a&shadows=1&spp=4&camera=1,2,3,4,5,6,0,1,0,30";
+        let frame = "path=offline&scene=a&shadows=1&spp=4&viewer=1&camera=1,2,3,4,5,6,0,1,0,30";
         let question = Question::parse(frame).unwrap();
         assert_eq!(ask(&format!("/abcdef/frame?{frame}"), own, None), Route::Frame(question));
         assert_eq!(ask("/abcdef/events?x", own, Some("http://127.0.0.1:4000")), Route::Events);
@@ -477,8 +483,9 @@ mod tests {
         };
         board.show(Stage::Running, "compiling\u{1b}[2J");
         until("\"message\":\"compiling\\\\u{1b}[2J\"");
-        board.report("");
-        until("\"stage\":\"done\",\"message\":\"compiling");
+        board.report(Stage::Lost, "3 of 5 points", "");
+        until("\"stage\":\"lost\",\"message\":\"compiling");
+        until("\"verdict\":\"3 of 5 points\"");
         until("\"reports\":1");
         until("\"holds\":\"all\"");
         board.saved(true);
@@ -490,7 +497,9 @@ mod tests {
         #[cfg(unix)]
         {
             use std::os::unix::fs::MetadataExt as _;
-            assert_eq!(door.path().metadata().unwrap().mode() & 0o777, 0o600);
+            let mode = |path: &Path| path.metadata().unwrap().mode() & 0o777;
+            assert_eq!(mode(&door.path()), 0o600);
+            assert_eq!(mode(door.path().parent().unwrap()), 0o700);
         }
     }
 }

@@ -3,16 +3,17 @@
 const report = document.getElementById("report");
 const mark = document.getElementById("mark");
 const status = document.getElementById("status");
-const NAMES = { running: "Checking", done: "Done", failed: "No report" };
+const NAMES = { running: "Checking", done: "Nothing is wrong", lost: "Points are missing", refused: "Does not compile", failed: "No report" };
 const EARLIER = {
   nothing: "The report below is of an earlier save.",
   offline: "The report below is of an earlier save. Shaders alone changed since: its offline results hold, and are run again.",
 };
 let reports = -1;
 
-function show({ stage, message, reports: count, libraries, fresh, holds }) {
+function show({ stage, message, verdict, reports: count, libraries, fresh, holds }) {
   document.body.className = stage;
   status.textContent = `${NAMES[stage]}: ${message}`;
+  document.title = `${{ running: "checking …", failed: "no report" }[stage] ?? verdict} - umbra watch`;
   tellLive({ stage, libraries, fresh });
   mark.hidden = count === 0 || holds === "all";
   mark.textContent = EARLIER[holds] ?? "";
@@ -45,5 +46,6 @@ const events = new EventSource("events");
 events.addEventListener("message", (event) => show(JSON.parse(event.data)));
 events.addEventListener("error", () => {
   document.body.className = "failed";
+  document.title = "ended - umbra watch";
   status.textContent = "umbra watch has ended";
 });

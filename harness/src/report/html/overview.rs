@@ -1,17 +1,19 @@
 //! The class at a glance, in front of its table: what waits for the instructor, which mistakes were made, how points are
 //! spread, and where errors lie.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::super::number::{is_failure, is_range, percent, points, range, value};
 use super::super::{
     BatchReport, ERRORS, ErrorPicture, HTML_FILE, INSTRUCTOR, SubmissionReport, is_private,
 };
 use super::likeness::LIKENESS;
+use super::lost::is_lost;
 use super::markup::Html;
 use crate::columns::count;
 use crate::evidence::{Check, CheckId, Verdict};
-use crate::rubric::Part;
+use crate::grading::{Shared, SharedFiles};
+use crate::rubric::{Part, PartGrade};
 
 /// Number of names in a list before the rest is collapsed.
 const NAMES: usize = 12;
@@ -23,6 +25,10 @@ const SHARE: &str = "share something with another: see their pages";
 
 /// What a part that nobody began looks like.
 const UNDONE: &str = "not implemented";
+/// What every part looks like where the source does not build at all.
+const NO_CODE: &str = "no code that builds";
+/// What a part looks like whose mistake has no name.
+const OTHER: &str = "wrong in a way that is not recognized";
 /// What a check says of a renderer or a compiler that was ended for its time.
 const OUT_OF_TIME: &str = "ran out of time";
 
@@ -70,13 +76,21 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
         (own > 0.0).then(|| format!("{} points for images", points(own)))
     });
     add("to be looked at before their points count", &|entry| {
-        let mut private = entry.grade.remarks.iter().filter(|r| is_private(r, &report.rules));
-        private.next().cloned()
+        let private = entry.grade.remarks.iter().filter(|r| is_private(r, &report.rules));
+        let private: Vec<&str> = private.map(String::as_str).collect();
+        (!private.is_empty()).then(|| private.join("; "))
     });
+    // Which files are the same is said once for all that share them.
+    let shared = Shared::of(report.entries.iter().map(|entry| &entry.record)).shared_files();
+    let share_files: HashSet<&str> =
+        shared.iter().flat_map(|group| &group.who).map(String::as_str).collect();
     add(SHARE, &|entry| {
-        let mut told =
-            entry.record.evidence.checks.iter().filter(|check| !check.private.is_empty());
-        told.next().map(|check| check.private.clone())
+        let checks = entry.record.evidence.checks.iter();
+        let told: Vec<&Check> = checks.filter(|check| !check.private.is_empty()).collect();
+        let grouped = share_files.contains(entry.record.slug.as_str());
+        let own = told.iter().filter(|own| !grouped || own.id != CheckId::SubmissionLikeness);
+        let words: Vec<&str> = own.map(|check| check.private.as_str()).collect();
+        (!told.is_empty()).then(|| words.join("; "))
     });
     add("ran out of time", &|entry| {
         let late = |check: &&Check| is_failure(check) && check.summary.contains(OUT_OF_TIME);
@@ -98,8 +112,14 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
             html.raw("<p><a href=\"").address(&format!("{INSTRUCTOR}/{LIKENESS}/{HTML_FILE}"));
             html.raw("\">Sources side by side</a></p>\n");
         }
+        if kind == SHARE {
+            shared_files(html, report, &shared);
+        }
         html.raw("<ul class=\"names\">\n");
         for (entry, why) in found {
+            if kind == SHARE && why.is_empty() {
+                continue;
+            }
             html.raw("<li>");
             link(html, report, entry, "");
             html.text(&who(entry)).raw("</a> <small>").text(&why).raw("</small></li>\n");
@@ -109,14 +129,59 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
     html.raw("</section>\n");
 }
 
+/// Files that several submissions share but for comments and blanks, each group of submissions once.
+fn shared_files(html: &mut Html, report: &BatchReport, shared: &[SharedFiles]) {
+    if shared.is_empty() {
+        return;
+    }
+    let by_slug: HashMap<&str, &SubmissionReport> =
+        report.entries.iter().map(|entry| (entry.record.slug.as_str(), entry)).collect();
+    html.raw("<p>Files with a text of the students' own that are equal but for comments and blanks:</p>\n");
+    html.raw("<ul class=\"groups\">\n");
+    for SharedFiles { paths, who } in shared {
+        let entries: Vec<_> =
+            who.iter().filter_map(|slug| by_slug.get(slug.as_str())).copied().collect();
+        html.raw("<li><strong>").text(&count(entries.len(), "submission")).raw("</strong> share ");
+        html.text(&paths.join(", ")).raw(" <span class=\"names\">");
+        some_names(html, report, "", &entries);
+        html.raw("</span></li>\n");
+    }
+    html.raw("</ul>\n");
+}
+
 /// What a group of submissions has in common.
 struct Group<'a> {
-    part: &'a str,
+    parts: Vec<&'a str>,
     words: &'a str,
     entries: Vec<&'a SubmissionReport>,
 }
 
-/// Groups by the mistake that a part looks like, the most frequent first; then what was not begun.
+impl Group<'_> {
+    fn slugs(&self) -> impl Iterator<Item = &str> {
+        self.entries.iter().map(|entry| entry.record.slug.as_str())
+    }
+}
+
+/// What ended the judgement of a part, from the sentence that says why it lost points.
+fn what_happened(reason: &str) -> Option<&'static str> {
+    const LATE: &[&str] = &["endless loop in", "stuck in", OUT_OF_TIME, "no answer within"];
+    let says = |words: &[&str]| words.iter().any(|words| reason.contains(words));
+    let is_place = |extension: &str| {
+        reason
+            .split_once(extension)
+            .is_some_and(|(path, _)| path.starts_with("src/") && !path.contains(' '))
+    };
+    let kinds = [
+        ("the renderer panics", says(&["panicked"])),
+        ("endless loop, or far too slow", says(LATE)),
+        ("the renderer crashes", says(&["crashed", "exited early", "out of memory"])),
+        ("a shader does not compile", is_place(".wgsl:")),
+        ("the code does not compile", is_place(".rs:")),
+    ];
+    kinds.into_iter().find(|(_, is_so)| *is_so).map(|(words, _)| words)
+}
+
+/// Groups by the mistake that a part looks like, the most frequent first; then what has no name, and what was not begun.
 pub(super) fn mistakes(html: &mut Html, report: &BatchReport) {
     let mut groups: BTreeMap<(&str, String), Group> = BTreeMap::new();
     for entry in &report.entries {
@@ -126,42 +191,85 @@ pub(super) fn mistakes(html: &mut Html, report: &BatchReport) {
             let key = if names.is_empty() { found.words.clone() } else { names.join(" and ") };
             let (part, words) = (found.part.as_str(), found.words.as_str());
             let group = groups.entry((part, key));
-            let group = group.or_insert(Group { part, words, entries: Vec::new() });
+            let group = group.or_insert(Group { parts: vec![part], words, entries: Vec::new() });
             group.entries.push(entry);
         }
-        let undone = |check: &&Check| check.verdict == Verdict::NotImplemented;
-        for part in &report.rules.parts {
-            let lost =
-                entry.grade.parts.iter().any(|own| own.id == part.id && own.points_max == 0.0);
-            let mut own = entry.record.evidence.checks.iter().filter(undone);
-            if lost && own.any(|check| part.evidence.contains(&check.id)) {
-                let (part, words) = (part.id.as_str(), UNDONE);
-                let group = groups.entry((part, words.to_owned()));
-                group.or_insert(Group { part, words, entries: Vec::new() }).entries.push(entry);
+        // What no diagnosis names is grouped by what happened.
+        let gated = report
+            .rules
+            .gates
+            .iter()
+            .any(|gate| gate.ceiling < 1.0 && entry.grade.remarks.contains(&gate.reason));
+        let no_code =
+            entry.record.evidence.checks.iter().any(|check| {
+                check.id == CheckId::SubmissionBuild && check.verdict == Verdict::Fail
+            });
+        let judged = |own: &&PartGrade| !is_range(own.points, own.points_max);
+        for own in entry.grade.parts.iter().filter(|own| is_lost(own)).filter(judged) {
+            if entry.record.diagnoses.iter().any(|found| found.part == own.id) {
+                continue;
             }
+            let rule = report.rules.parts.iter().find(|part| part.id == own.id);
+            let undone = own.points_max == 0.0
+                && entry.record.evidence.checks.iter().any(|check| {
+                    check.verdict == Verdict::NotImplemented
+                        && rule.is_some_and(|part| part.evidence.contains(&check.id))
+                });
+            let words = match what_happened(&own.reason) {
+                _ if no_code => NO_CODE,
+                Some(words) => words,
+                None if undone => UNDONE,
+                // What another thing took is no mistake of this part; the remark says it.
+                None if gated => continue,
+                None => OTHER,
+            };
+            let part = own.id.as_str();
+            let group = groups.entry((part, words.to_owned()));
+            group
+                .or_insert(Group { parts: vec![part], words, entries: Vec::new() })
+                .entries
+                .push(entry);
         }
     }
-    let mut groups: Vec<Group> = groups.into_values().collect();
+    // What happened to the same submissions in several parts is one line.
+    let mut merged: Vec<Group> = Vec::new();
+    for group in groups.into_values() {
+        let same = |own: &&mut Group| own.words == group.words && own.slugs().eq(group.slugs());
+        match merged.iter_mut().find(same) {
+            Some(own) => own.parts.extend(group.parts),
+            None => merged.push(group),
+        }
+    }
+    let mut groups = merged;
     if groups.is_empty() {
         return;
     }
-    groups.sort_by_key(|group| (group.words == UNDONE, std::cmp::Reverse(group.entries.len())));
+    let last = |words| [OTHER, UNDONE].iter().position(|own| *own == words).map_or(0, |at| at + 1);
+    groups.sort_by_key(|group| (last(group.words), std::cmp::Reverse(group.entries.len())));
     html.raw("<section>\n<h2>Mistakes in this class</h2>\n<ul class=\"groups\">\n");
-    for Group { part, words, entries } in groups {
+    for Group { parts, words, entries } in groups {
         html.raw("<li><strong>").text(&percent(entries.len(), report.entries.len()));
-        html.raw("</strong> <span class=\"id\">").text(part).raw("</span> ").text(words);
+        html.raw("</strong> <span class=\"id\">")
+            .text(&parts.join(", "))
+            .raw("</span> ")
+            .text(words);
         html.raw(" <span class=\"names\">");
-        let (first, others) = entries.split_at(entries.len().min(NAMES));
-        names(html, report, part, first);
-        if !others.is_empty() {
-            html.raw("<details><summary>and ").text(&count(others.len(), "other"));
-            html.raw("</summary>");
-            names(html, report, part, others);
-            html.raw("</details>");
-        }
+        some_names(html, report, parts[0], &entries);
         html.raw("</span></li>\n");
     }
     html.raw("</ul>\n</section>\n");
+}
+
+/// The first names of a list, and the others collapsed.
+fn some_names(html: &mut Html, report: &BatchReport, part: &str, entries: &[&SubmissionReport]) {
+    let (first, others) = entries.split_at(entries.len().min(NAMES));
+    names(html, report, part, first);
+    if !others.is_empty() {
+        html.raw("<details><summary>and ").text(&count(others.len(), "other"));
+        html.raw("</summary>");
+        names(html, report, part, others);
+        html.raw("</details>");
+    }
 }
 
 fn names(html: &mut Html, report: &BatchReport, part: &str, entries: &[&SubmissionReport]) {
@@ -288,5 +396,84 @@ fn heat(mean: f64) -> &'static str {
         m if m < 0.05 => "h2",
         m if m < 0.2 => "h3",
         _ => "h4",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{html_batch, sample};
+    use super::*;
+    use crate::grading::SourceDigest;
+
+    #[test]
+    fn no_part_that_lost_points_is_left_out_of_the_mistakes() {
+        let panics = "the renderer panicked: index out of bounds (at src/bsdfs/phong.rs:46)";
+        for (reason, words) in [
+            (panics, "the renderer panics"),
+            (
+                "endless loop in 1.4 on scene \"open\": no answer within 3 s of CPU time",
+                "endless loop, or far too slow",
+            ),
+            (
+                "stuck in 1.4: no answer, and nothing done for 30 s: a deadlock or a sleep",
+                "endless loop, or far too slow",
+            ),
+            ("not asked: the renderer ran out of time before", "endless loop, or far too slow"),
+            (
+                "src/shaders/phong.fs.wgsl:69:1: expected `;`, found \"}\"",
+                "a shader does not compile",
+            ),
+            (
+                "src/integrators/simple.rs:36: cannot divide `Vec3` by `f64`",
+                "the code does not compile",
+            ),
+            ("the renderer crashed: SIGSEGV", "the renderer crashes"),
+            ("1175 of 15477 directions are wrong", OTHER),
+        ] {
+            let mut report = sample::report();
+            let entry = &mut report.entries[0];
+            entry.record.diagnoses.clear();
+            let part = &mut entry.grade.parts[1];
+            (part.points, part.points_max, part.reason) = (0.0, 0.0, reason.into());
+            let page = html_batch(&report, &[]).unwrap();
+            let found = format!(
+                "<span class=\"id\">1.2</span> {words} <span class=\"names\">\
+                 <a href=\"./instructor/a2_ada/report.html#part-1.2\">"
+            );
+            assert!(page.contains(&found), "{reason}");
+            // Of one without code, all parts in one line.
+            let found = format!("<span class=\"id\">1.1, 1.2, 1.3, 1.4, 2.4</span> {NO_CODE}");
+            assert!(page.contains(&found), "{page}");
+        }
+    }
+
+    #[test]
+    fn files_that_many_share_are_named_once() {
+        let mut report = sample::report();
+        let mut first = report.entries[0].clone();
+        first.record.sources = ["src/a.rs", "src/b.rs"]
+            .map(|path| SourceDigest { path: path.into(), signs: 300, sha256: path.into() })
+            .into();
+        report.entries = Vec::new();
+        for index in 0..200 {
+            let mut entry = first.clone();
+            entry.record.slug = format!("hand_in_{index:03}");
+            entry.record.student.id = format!("{}", 100_000 + index);
+            report.entries.push(entry);
+        }
+        let size = |report: &BatchReport| html_batch(report, &[]).unwrap().len();
+        let without = size(&report);
+        let mut records: Vec<_> = report.entries.iter().map(|entry| entry.record.clone()).collect();
+        crate::grading::judge_shared(&mut records);
+        for (entry, record) in report.entries.iter_mut().zip(records) {
+            let private = &record.evidence.checks.last().unwrap().private;
+            assert!(private.len() < 400 && private.ends_with(" and 191 more"), "{private}");
+            entry.record = record;
+        }
+        let page = html_batch(&report, &[]).unwrap();
+        let group = "<strong>200 submissions</strong> share src/a.rs, src/b.rs";
+        assert_eq!(page.matches(group).count(), 1);
+        // One link for each submission.
+        assert!(page.len() < without + 200 * 150, "{} after {without}", page.len());
     }
 }

@@ -2,6 +2,7 @@
 
 class CanvasPainter {
   constructor(canvas) {
+    this.canvas = canvas;
     this.context = canvas.getContext("2d");
     this.name = "plain canvas";
     this.colored = new Map();

@@ -42,11 +42,26 @@ const METRICS = ["signed", "absolute", "relative"];
 const TONES = ["srgb", "gamma", "false", "signed"];
 const TONE_NAMES = { srgb: "sRGB", gamma: "gamma 2.2", false: "false color", signed: "blue to red" };
 
-/** One channel, or the mean of all. */
-function pick(values, channel) {
+/** The single number that a layer shows of a pixel: one channel, the mean of all, or of a difference in all channels the
+    one that differs most, with its sign, since opposite signs would cancel in a mean. */
+function pick(values, channel, kind) {
   if (values.length === 1) return values[0];
   const index = CHANNELS.indexOf(channel) - 1;
-  return index >= 0 && index < 3 ? values[index] : (values[0] + values[1] + values[2]) / 3;
+  if (index >= 0 && index < 3) return values[index];
+  if (kind === "difference" && channel === "rgb") {
+    let most = values[0];
+    for (const value of values) if (!(Math.abs(value) <= Math.abs(most))) most = value;
+    return most;
+  }
+  return (values[0] + values[1] + values[2]) / 3;
+}
+
+/** How far two values are apart; as for `umbra compare`, equal infinities and NaN twice are not. */
+function apart(a, b, metric, floor) {
+  if (a === b || (a !== a && b !== b)) return 0;
+  const d = a - b;
+  if (metric === "absolute") return Math.abs(d);
+  return metric === "relative" ? d / Math.max(b, floor) : d;
 }
 
 /** The values that a layer shows at a pixel. */
@@ -54,12 +69,7 @@ function layerValues(layer, x, y, settings) {
   const a = [...layer.image.at(x, y)];
   if (layer.kind !== "difference") return a;
   const b = layer.other.at(x, y);
-  return a.map((value, c) => {
-    const d = value - b[c];
-    if (settings.metric === "absolute") return Math.abs(d);
-    if (settings.metric === "relative") return d / Math.max(b[c], layer.floor);
-    return d;
-  });
+  return a.map((value, c) => apart(value, b[c], settings.metric, layer.floor));
 }
 
 /** The color, 8 bits a channel, of values as a layer shows them. */
@@ -68,12 +78,12 @@ function shade(values, layer, settings) {
   const gain = 2 ** settings.exposure;
   const tone = settings.tone;
   if (tone === "false" || tone === "signed") {
-    const value = pick(values, settings.channel) * gain;
+    const value = pick(values, settings.channel, layer.kind) * gain;
     if (tone === "signed") return colorAt(DIVERGING, 0.5 + 0.5 * value);
     if (layer.kind === "excess") return colorAt(VIRIDIS, 0.5 + Math.log2(Math.max(value, 1e-9)) / LOG_RANGE);
     return colorAt(VIRIDIS, value);
   }
-  const one = settings.channel === "rgb" && values.length >= 3 ? null : pick(values, settings.channel);
+  const one = settings.channel === "rgb" && values.length >= 3 ? null : pick(values, settings.channel, layer.kind);
   return [0, 1, 2].map((c) => {
     const value = Math.min(Math.max((one ?? values[c]) * gain, 0), 1);
     return Math.round(255 * CURVES[tone](value));

@@ -16,14 +16,25 @@ uniform float zoom, gain, smallest;
 uniform int channels, metric, channel, tone, scale;
 out vec4 color;
 
+vec3 fetch(sampler2D image, ivec2 at) {
+  vec3 value = texelFetch(image, at, 0).rgb;
+  return channels == 1 ? value.rrr : value;
+}
+
+float apart(float a, float b) {
+  // By their bits: a driver may take NaN for a number.
+  uint bits = floatBitsToUint(a), others = floatBitsToUint(b);
+  const uint infinite = 0x7f800000u;
+  if (bits == others || ((bits & ~0x80000000u) > infinite && (others & ~0x80000000u) > infinite)) return 0.0;
+  float d = a - b;
+  return metric == 1 ? d : metric == 2 ? abs(d) : d / max(b, smallest);
+}
+
 vec3 valueAt(ivec2 at) {
-  vec3 a = texelFetch(actual, at, 0).rgb;
-  if (channels == 1) a = a.rrr;
+  vec3 a = fetch(actual, at);
   if (metric == 0) return a;
-  vec3 b = texelFetch(expected, at, 0).rgb;
-  if (metric == 1) return a - b;
-  if (metric == 2) return abs(a - b);
-  return (a - b) / max(b, vec3(smallest));
+  vec3 b = fetch(expected, at);
+  return vec3(apart(a.r, b.r), apart(a.g, b.g), apart(a.b, b.b));
 }
 
 float curve(float v) {
@@ -51,8 +62,12 @@ void main() {
   value /= float(steps * steps);
   color = vec4(1.0, 0.0, 1.0, 1.0);
   if (bad) return;
-  float mean = (value.r + value.g + value.b) / 3.0;
-  float single = channel == 1 ? value.r : channel == 2 ? value.g : channel == 3 ? value.b : mean;
+  float single = channel == 1 ? value.r : channel == 2 ? value.g : channel == 3 ? value.b : (value.r + value.g + value.b) / 3.0;
+  if (channel == 0 && metric != 0) {
+    single = value.r;
+    if (abs(value.g) > abs(single)) single = value.g;
+    if (abs(value.b) > abs(single)) single = value.b;
+  }
   if (tone >= 2) {
     float at = single * gain;
     if (tone == 3) at = 0.5 + 0.5 * at;
@@ -79,6 +94,7 @@ class GlPainter {
 
   constructor(gl) {
     this.gl = gl;
+    this.canvas = gl.canvas;
     this.name = "WebGL 2";
     this.largest = gl.getParameter(gl.MAX_TEXTURE_SIZE);
     this.program = gl.createProgram();

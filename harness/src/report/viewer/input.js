@@ -55,9 +55,13 @@ function goTo({ x, y, width = 1, height = 1 }) {
 
 function goToWorst() {
   const { about, layers } = stage;
-  const difference = layers.find((layer) => layer.kind === "difference");
-  const worst = about.worst ? { x: about.worst[0], y: about.worst[1] } : difference && worstPixel(difference);
+  const differences = layers.filter((layer) => layer.kind === "difference");
+  const { image } = layers[state.layer];
+  const difference = differences.find((layer) => layer === layers[state.layer])
+    ?? differences.find((layer) => layer.image === image || layer.other === image) ?? differences[0];
+  const worst = about.worst ? { x: about.worst[0], y: about.worst[1] } : difference && kept(difference, {}, [], worstPixel);
   if (worst) goTo(worst);
+  else say(difference ? `${difference.name}: no pixel differs.` : "");
 }
 
 function goToBlock() {
@@ -125,10 +129,12 @@ function reset() {
 }
 
 function listen(change) {
-  const typing = (target) => target instanceof HTMLElement && target.matches("select, input[type=text]");
+  /** Whether a control needs a key itself: a list takes letters too. */
+  const needs = (target, { key }) => target instanceof HTMLElement && (target.matches("select, input:not([type=range])")
+    || (target.matches("input") && /^(Arrow|Page|Home$|End$)/.test(key)));
   const holds = ({ key }) => key === "Shift" || key === " ";
   addEventListener("keydown", (event) => {
-    if (!stage.about || get("help").open || typing(event.target)) return;
+    if (!stage.about || get("help").open || needs(event.target, event)) return;
     // A button keeps its space bar.
     if (event.key === " " && event.target instanceof HTMLButtonElement) return;
     if (holds(event)) {

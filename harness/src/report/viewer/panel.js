@@ -15,11 +15,23 @@ function makePanel(change) {
     select.replaceChildren(...values.map((value) => element("option", { value, textContent: names(value) })));
     select.addEventListener("change", () => change(() => set(select.value)));
   };
+  for (const control of document.querySelectorAll("header select, aside select, aside input")) returnKeys(control);
   choose("metric", METRICS, (name) => name, (value) => { state.metric = value; toneOfMetric(); });
   choose("channel", CHANNELS, (name) => (name === "mean" ? "mean of R, G, B" : name.toUpperCase()), (value) => { state.channel = value; });
   choose("tone", TONES, (name) => TONE_NAMES[name], (value) => { lookNow().tone = value; });
   get("exposure").addEventListener("input", () => change(() => { lookNow().exposure = Number(get("exposure").value); }));
   get("auto").addEventListener("click", () => change(() => { lookNow().exposure = null; }));
+}
+
+/** Gives the keys back to the images once the mouse has changed a control. Who came to it by keys stays there. */
+function returnKeys(control) {
+  let byPointer = false;
+  control.addEventListener("pointerdown", () => { byPointer = true; });
+  control.addEventListener("keydown", () => { byPointer = false; });
+  control.addEventListener("change", () => {
+    if (byPointer) get("stage").focus({ preventScroll: true });
+    byPointer = false;
+  });
 }
 
 /** The look of the layer that is shown. */
@@ -64,11 +76,20 @@ function showState() {
   get("exposure-value").textContent = `${settings.exposure > 0 ? "+" : ""}${short(settings.exposure)} stops`;
   get("auto").setAttribute("aria-pressed", lookNow().exposure === null);
   for (const id of ["exposure", "auto", "tone", "channel"]) get(id).disabled = layer.kind === "regions";
+  for (const mode of ["side", "wipe"]) get(`mode-${mode}`).disabled = stage.layers.length < 2;
   get("metric").disabled = !stage.layers.some((one) => one.kind === "difference");
   get("zoom").textContent = `${Math.round(100 * view().zoom)} %`;
+  get("painter").textContent = stage.painter === stage.plain
+    ? `${stage.gl ? "An image is too large for the graphics card" : "Without WebGL"}: zoomed out, pixels are left out instead of averaged.` : "";
   showLegend(layer, settings);
   showHistogram(layer, settings);
   showProbe();
+}
+
+/** Which number stands for a pixel of several channels, where colors show only one. */
+function numberOf(layer, settings) {
+  if (layer.image.channels === 1 || settings.channel !== "rgb" || !["false", "signed"].includes(settings.tone)) return "";
+  return layer.kind === "difference" ? "; of the channel that differs most" : "; mean of R, G, B";
 }
 
 /** What a layer's values are, with their unit. */
@@ -108,17 +129,22 @@ function showLegend(layer, settings) {
     }), element("li", { textContent: "half gray: edges; dark: the light source, not compared" }));
   }
   ends.forEach((value, i) => { get(`legend-${i}`).textContent = digits(value, 3); });
-  get("unit").textContent = unitOf(layer);
+  get("unit").textContent = `${unitOf(layer)}${numberOf(layer, settings)}`;
 }
 
 function showHistogram(layer, settings) {
+  const regions = layer.kind === "regions";
+  const counts = regions ? null : kept(layer, settings, ["metric", "channel", "tone", "exposure"], histogram);
+  // Moving the image changes none of it.
+  if (counts === stage.histogram) return;
+  stage.histogram = counts;
   const canvas = get("histogram");
   const context = canvas.getContext("2d");
   const { width, height } = canvas;
+  context.globalCompositeOperation = "source-over";
   context.clearRect(0, 0, width, height);
   get("facts").textContent = "";
-  if (layer.kind === "regions") return;
-  const { counts, least, most, sum, count, bad } = histogram(layer, settings, 96);
+  if (regions) return;
   // Black pixels are many: the second largest bin sets the height.
   const highest = Math.max(...counts.map((bins) => [...bins].sort((a, b) => b - a)[1])) || 1;
   const colors = counts.length === 3 ? ["#e0453a", "#2fa84f", "#3b7de0"] : ["#8a93a3"];
@@ -130,10 +156,14 @@ function showHistogram(layer, settings) {
       context.fillRect((i * width) / bins.length, height - h, width / bins.length, h);
     });
   });
+  const { least, most, sum, count, bad } = kept(layer, settings, ["metric", "channel"], factsOf);
   const words = count ? [`least ${digits(least)}`, `mean ${digits(sum / count)}`, `most ${digits(most)}`] : [];
-  if (bad) words.push(`${bad} not finite`);
+  if (bad) words.push(`${bad} pixel${bad > 1 ? "s" : ""} not finite`);
   get("facts").textContent = words.join(" · ");
 }
+
+/** So many images are probed at most, unless they are looked at. */
+const PROBED = 8;
 
 /** The values at the probed pixel, in every layer, and which rule counts it. */
 function showProbe() {
@@ -141,13 +171,19 @@ function showProbe() {
   const { width, height } = sizeOf();
   const rows = [];
   if (at && at.x >= 0 && at.y >= 0 && at.x < width && at.y < height) {
-    for (const layer of stage.layers) {
-      if (layer.kind === "regions") continue;
-      const values = [...layerValues(layer, at.x, at.y, settingsOf(layer))];
-      const name = layer.kind === "difference" ? `${state.metric} ${layer.name}` : layer.name;
-      rows.push(element("tr", {}, element("th", { scope: "row", textContent: name }),
-        element("td", { colSpan: values.length === 1 ? 3 : 1, textContent: digits(values[0], 6) }),
-        ...values.slice(1).map((value) => element("td", { textContent: digits(value, 6) }))));
+    // Of many images, those that are looked at.
+    const few = stage.layers.length <= PROBED;
+    const looked = new Set([...panes().map(({ index }) => index), state.layer, state.reference]);
+    for (const [index, layer] of stage.layers.entries()) {
+      if (layer.kind === "regions" || !(few || looked.has(index))) continue;
+      const values = layerValues(layer, at.x, at.y, settingsOf(layer));
+      const difference = layer.kind === "difference";
+      const name = difference ? `${state.metric} ${layer.name}` : layer.name;
+      // A difference as 32 bits hold it, like its values.
+      const words = (value) => (difference && Number.isFinite(Math.fround(value))
+        ? exact(Math.fround(value), "float") : exact(value, layer.image.type));
+      rows.push(element("tr", {}, element("th", { scope: "rowgroup", colSpan: 3, textContent: name })),
+        element("tr", {}, ...[...values].map((value) => element("td", { colSpan: values.length === 1 ? 3 : 1, textContent: words(value) }))));
     }
     get("probe-place").textContent = `(${at.x}, ${at.y})`;
     get("probe-rule").textContent = ruleAt(at);

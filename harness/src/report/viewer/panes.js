@@ -4,7 +4,7 @@
 const TEXT_ZOOM = 44;
 const GRID_ZOOM = 14;
 
-const stage = { width: 0, height: 0, ratio: 1, layers: [], about: null, painter: null, marks: [] };
+const stage = { width: 0, height: 0, ratio: 1, layers: [], about: null, painter: null, marks: [], auto: new Map() };
 
 const sizeOf = () => stage.layers[0].image;
 
@@ -92,9 +92,8 @@ function settingsOf(layer) {
   const settings = { metric: state.metric, channel: state.channel, tone: look.tone };
   if (layer.kind === "regions") return { ...settings, channel: "rgb", exposure: 0 };
   if (look.exposure !== null) return { ...settings, exposure: look.exposure };
-  const key = [layer.kind, layer.name, look.tone, state.metric, state.channel].join();
-  stage.auto ??= new Map();
-  if (!stage.auto.has(key)) stage.auto.set(key, autoExposure(layer, settings));
+  const key = [layer.kind, look.tone, state.metric, state.channel].join();
+  if (!stage.auto.has(key)) stage.auto.set(key, autoExposure(layer.kind, settings));
   return { ...settings, exposure: stage.auto.get(key) };
 }
 

@@ -4,6 +4,7 @@ const manifest = JSON.parse(get("manifest").textContent);
 
 /** Does something to the state, then draws once. */
 function change(what) {
+  say("");
   what();
   const count = stage.layers.length;
   state.layer = clamp(Math.floor(state.layer), [0, count - 1]);
@@ -61,7 +62,7 @@ async function openCase(about) {
   const loaded = (kind) => imageOf(kind) ? loadImage(imageOf(kind)) : null;
   [stage.mask, stage.excess] = await Promise.all([loaded("regions"), loaded("excess")]);
   Object.assign(stage, { layers, about, auto: new Map(), marks: [], hover: null });
-  if (!layers.every(({ image }) => stage.painter.holds(image))) usePlainCanvas();
+  choosePainter();
   say("");
 }
 
@@ -70,10 +71,17 @@ function say(words) {
   get("message").hidden = words === "";
 }
 
-function usePlainCanvas() {
-  const canvas = element("canvas", { id: "images" });
-  get("images").replaceWith(canvas);
-  stage.painter = new CanvasPainter(canvas);
+/** Draws with WebGL where there is one and it holds all images, else on the plain canvas. */
+function choosePainter() {
+  const fits = stage.gl && stage.layers.every(({ image }) => stage.gl.holds(image));
+  if (!fits) stage.plain ??= new CanvasPainter(element("canvas"));
+  const painter = fits ? stage.gl : stage.plain;
+  if (painter === stage.painter) return;
+  stage.painter = painter;
+  const old = get("images");
+  for (const { name, value } of old.attributes) painter.canvas.setAttribute(name, value);
+  old.replaceWith(painter.canvas);
+  measureStage();
 }
 
 /** Shows what the address says. */
@@ -112,13 +120,24 @@ function start() {
   get("nojs").remove();
   const plain = new URLSearchParams(location.search).has("plain");
   stage.over = get("over");
-  stage.painter = (!plain && GlPainter.make(get("images"))) || null;
-  if (!stage.painter) usePlainCanvas();
+  stage.gl = plain ? null : GlPainter.make(get("images"));
+  stage.painter = stage.gl;
+  choosePainter();
+  // A driver that was reset, or a computer that slept.
+  stage.gl?.canvas.addEventListener("webglcontextlost", () => {
+    stage.gl = null;
+    choosePainter();
+    if (stage.about) change(() => {});
+  });
   get("keys").replaceChildren(...KEYS.flatMap(([keys, what]) => [
     element("dt", {}, element("kbd", { textContent: keys })), element("dd", { textContent: what })]));
   get("case").replaceChildren(...manifest.cases.map(({ id, title }) => element("option", { value: id, textContent: title })));
   get("case").addEventListener("change", () => { location.hash = `case=${encodeURIComponent(get("case").value)}`; });
   const on = (id, what) => get(id).addEventListener("click", () => stage.about && change(what));
+  for (const button of document.querySelectorAll("header button, aside button")) {
+    // Of a click by the mouse: the space bar is for the images again.
+    button.addEventListener("click", (event) => event.detail > 0 && button !== get("help-button") && get("stage").focus({ preventScroll: true }));
+  }
   for (const mode of MODES) on(`mode-${mode}`, () => { state.mode = mode; });
   on("fit", () => { state.view = null; });
   on("pixels", () => { state.view = { ...view(), zoom: 1 / stage.ratio }; });
