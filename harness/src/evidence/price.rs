@@ -155,8 +155,13 @@ pub fn settle_by_common_mistake(checks: &mut [Check]) {
         }
     }
     for own in of_id.into_values() {
+        // A mistake that leaves most unexplained is no explanation.
+        let unexplained = |check: &Check| {
+            let barely = check.error > Class::Unknown.price() && check.mistake != BLACK;
+            check.mistake.is_empty() || barely
+        };
         let (nothing, others): (Vec<usize>, Vec<usize>) =
-            own.iter().partition(|&&index| checks[index].mistake.is_empty());
+            own.iter().partition(|&&index| unexplained(&checks[index]));
         if others.iter().filter(|&&index| checks[index].mistake != BLACK).count() >= nothing.len() {
             for index in nothing {
                 checks[index].error = checks[index].error.min(Class::Unknown.price());
@@ -476,6 +481,7 @@ mod tests {
         assert_eq!(agreed(&[(slip, 0.02), (BLACK, 1.0)]), [0.02, 1.0]);
         // What follows the right answers on most scenes is more than nothing on the others.
         assert_eq!(agreed(&[(UNKNOWN, 0.4), (UNKNOWN, 0.4), ("", 1.0)]), [0.4, 0.4, 0.4]);
+        assert_eq!(agreed(&[(UNKNOWN, 0.4), (UNKNOWN, 0.4), (slip, 0.8)]), [0.4, 0.4, 0.4]);
         assert_eq!(agreed(&[(UNKNOWN, 0.4), ("", 0.3), ("", 1.0)]), [0.4, 0.3, 1.0]);
         assert_eq!(agreed(&[(UNKNOWN, 0.4), (BLACK, 1.0)]), [0.4, 1.0]);
     }

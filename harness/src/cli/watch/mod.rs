@@ -439,6 +439,7 @@ mod tests {
         let row = |parts: Vec<PartGrade>, diagnostics: &str| Row {
             name: "work".into(),
             slug: "work".into(),
+            digest: String::new(),
             points: parts.iter().map(|part| part.points).sum(),
             points_max: 0.0,
             unconfirmed: 0.0,
