@@ -342,11 +342,15 @@ fn slips_in_a_scene_file_are_told_in_plain_words() {
             "[0, 3, 4, 1]",
             "s.toml:4: camera.eye has 4 numbers, expected 3: [x, y, z]",
         ),
-        ("[0.0, 3.0, 4.0]", "[0, 3]", "s.toml:4: invalid length 2, expected 3 numbers: [x, y, z]"),
+        (
+            "[0.0, 3.0, 4.0]",
+            "[0, 3]",
+            "s.toml:4: eye: invalid length 2, expected 3 numbers: [x, y, z]",
+        ),
         (
             "spp = 4",
             "spp = 99999999999999999999",
-            "invalid type: integer `99999999999999999999`, expected a whole",
+            "s.toml:12: spp: out of range: integer `99999999999999999999`, expected a whole",
         ),
         (
             "s.obj",
