@@ -474,8 +474,8 @@ fn downloads_of_other_platforms() {
     }
 }
 
-/// Names that break a naive import or grade book: signs of other scripts, a comma, an apostrophe, two of one name, zeros
-/// in front; an archive without a byte, and a submission of another course by somebody who is not on the list.
+/// Names that break a naive import or grade book: signs of other scripts, a comma, an apostrophe, two of one name,
+/// zeros in front; an archive without a byte, and a submission of another course by somebody who is not on the list.
 #[test]
 fn odd_names_come_back_in_the_grade_books_of_canvas_and_moodle() {
     let own = |first: &str, last: &str, number: &str| submission(&config(first, last, number));

@@ -338,8 +338,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether all submissions in a folder that was given are zips of many. One among others, which may lie in folders, may
-    /// be a student's that is made to look like one.
+    /// Whether all submissions in a folder that was given are zips of many. One among others, which may lie in folders,
+    /// may be a student's that is made to look like one.
     fn downloads(&self, folder: &Path, depth: usize) -> anyhow::Result<bool> {
         if depth > 0 {
             return Ok(false);

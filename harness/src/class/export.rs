@@ -33,8 +33,8 @@ pub struct Book {
 /// out, so that an import does not touch them.
 ///
 /// # Errors
-/// When the list is no export of a platform that imports grades, or has no such column, or several, or one that takes no
-/// points.
+/// When the list is no export of a platform that imports grades, or has no such column, or several, or one that takes
+/// no points.
 pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Book, String> {
     let list = roster.path.display();
     let named = |wanted: &[&str]| -> Vec<usize> {

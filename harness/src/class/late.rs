@@ -24,13 +24,15 @@ pub struct Policy {
     pub of: Option<Of>,
     /// What is counted.
     pub per: Per,
-    /// From when on a submission is worth nothing, RFC 3339 with offset. An extension moves it by as much as the due date.
+    /// From when on a submission is worth nothing, RFC 3339 with offset. An extension moves it by as much as the due
+    /// date.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cut_off: Option<String>,
     /// Days, each of 24 hours, that every student may be late without a penalty.
     #[serde(default)]
     pub late_days: u32,
-    /// Where time stamps without an offset are local to: `America/Toronto` or `-05:00`; the due date's offset when absent.
+    /// Where time stamps without an offset are local to: `America/Toronto` or `-05:00`; the due date's offset when
+    /// absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_zone: Option<String>,
     /// Students with another due date or other late days.
@@ -206,15 +208,15 @@ impl Policy {
         .collect()
     }
 
-    /// When the cut-off is for a student whose work is due at `own`: as long after it as the class's is after the class's
-    /// due date.
+    /// When the cut-off is for a student whose work is due at `own`: as long after it as the class's is after the
+    /// class's due date.
     fn cut_off(&self, class_due: Timestamp, own: Timestamp) -> Option<Timestamp> {
         let cut_off: Timestamp = self.cut_off.as_ref()?.parse().ok()?;
         cut_off.checked_add(own.duration_since(class_due)).ok()
     }
 
-    /// How late a submission of the stamp `submitted` is, for a student whom the numbers `own` name. The time zone is the
-    /// policy's, else the offset of `due`. None where the stamp or the due date says nothing.
+    /// How late a submission of the stamp `submitted` is, for a student whom the numbers `own` name. The time zone is
+    /// the policy's, else the offset of `due`. None where the stamp or the due date says nothing.
     pub fn judge(&self, due: &str, submitted: &str, own: impl Fn(&str) -> bool) -> Option<Late> {
         let zone = self.zone(due)?;
         let extension = self.extensions.iter().find(|extension| own(&extension.student));

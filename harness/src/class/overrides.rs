@@ -226,7 +226,8 @@ impl Overrides {
         self.of(subject).rfind(|own| own.patch.is_some())
     }
 
-    /// Applies to a grade what was decided on its submission, and notes it in the remarks. Fixes are no matter of points.
+    /// Applies to a grade what was decided on its submission, and notes it in the remarks. Fixes are no matter of
+    /// points.
     pub fn apply(&self, subject: &Subject, grade: &mut Grade) -> Vec<Applied> {
         let own: Vec<&Decision> = self.of(subject).filter(|own| own.patch.is_none()).collect();
         let last = own

@@ -151,7 +151,8 @@ impl Found {
         }
     }
 
-    /// Keeps it for `umbra merge`, as long as tasks of a partition are at work: those that found the same keep one file.
+    /// Keeps it for `umbra merge`, as long as tasks of a partition are at work: those that found the same keep one
+    /// file.
     ///
     /// # Errors
     /// When it cannot be written.

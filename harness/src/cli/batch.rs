@@ -409,8 +409,8 @@ impl<'a> Batch<'a> {
     }
 
     /// Takes submissions through all stages, in their order; none is begun after Ctrl-C. One that the machine
-    /// failed on has a record that says so: the others' are no worse for it. One that is not there any more has none, and
-    /// a line among those that come second.
+    /// failed on has a record that says so: the others' are no worse for it. One that is not there any more has none,
+    /// and a line among those that come second.
     fn grade_all(
         &self,
         context: &Context,

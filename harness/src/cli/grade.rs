@@ -59,7 +59,8 @@ pub struct GradeArguments {
     /// Grade only this student's submission, by number, name or file name; the others keep their grades
     #[arg(long, value_name = "STUDENT")]
     only: Vec<String>,
-    /// Grade only this share of the submissions, such as slice:2/4, and write no report: tasks on several machines share
+    /// Grade only this share of the submissions, such as slice:2/4, and write no report: tasks on several machines
+    /// share
     /// --report, and `umbra merge` makes the reports
     #[arg(long, value_name = "slice:K/N", conflicts_with = "only")]
     partition: Option<Slice>,

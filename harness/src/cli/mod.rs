@@ -99,7 +99,8 @@ enum Command {
     Defend(defend::DefendArguments),
     /// Give students the held-back scenes and what went wrong on them, when nobody can submit any more
     Release(release::ReleaseArguments),
-    /// Show what other rules, policies, matches or overrides make of a graded class; --apply writes it. Nothing is rendered
+    /// Show what other rules, policies, matches or overrides make of a graded class; --apply writes it. Nothing is
+    /// rendered
     Regrade(regrade::RegradeArguments),
     /// List what a report still leaves to the instructor; exits with 0 when nothing waits, 1 when something does
     Status(decide::StatusArguments),

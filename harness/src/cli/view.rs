@@ -122,8 +122,8 @@ fn short(name: &str, files: &[&Path]) -> String {
     }
 }
 
-/// Writes the viewer's page of an image beside the expected one, and its data, into a folder; answers the page's absolute
-/// path.
+/// Writes the viewer's page of an image beside the expected one, and its data, into a folder; answers the page's
+/// absolute path.
 ///
 /// # Errors
 /// When it cannot be written.
@@ -136,8 +136,8 @@ pub fn compared_page(folder: &Path, images: [&Image; 2]) -> anyhow::Result<PathB
     write_page(folder, shown.collect::<anyhow::Result<_>>()?, Some(1))
 }
 
-/// Writes the page of images whose data lie in a folder. Images of one size make a case, those of each channel their own,
-/// with the first of them less each other as differences.
+/// Writes the page of images whose data lie in a folder. Images of one size make a case, those of each channel their
+/// own, with the first of them less each other as differences.
 fn write_page(
     folder: &Path,
     mut images: Vec<Shown>,

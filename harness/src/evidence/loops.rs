@@ -184,8 +184,8 @@ const Z_LIMIT: f64 = 4.0;
 const OFF_FRACTION: f64 = 0.01;
 /// Number of further pixels that may be off, on any film.
 const SPARE_PIXELS: f64 = 4.0;
-/// Mean square of z, by the largest variance around, on edges of one direction: 0.4 for independent samples and rays in strata, less
-/// where the samples are spread better; 4 where all samples of a pixel are the same.
+/// Mean square of z, by the largest variance around, on edges of one direction: 0.4 for independent samples and rays in
+/// strata, less where the samples are spread better; 4 where all samples of a pixel are the same.
 const EDGE_RATIO: f64 = 1.1;
 /// Sum of z on all edges over its standard deviation: under 4 for a right renderer, for points of a
 /// Sobol sequence too, whose mean is half a stratum off; 17 where black samples are not counted.

@@ -165,9 +165,9 @@ impl Shared {
         pairs.collect()
     }
 
-    /// Adds to a record of the batch which of its images and sources another person submitted too, and whether its student
-    /// number is another person's. The result depends only on the set of records; calling this again changes nothing.
-    /// Names of other submissions are private.
+    /// Adds to a record of the batch which of its images and sources another person submitted too, and whether its
+    /// student number is another person's. The result depends only on the set of records; calling this again changes
+    /// nothing. Names of other submissions are private.
     pub fn judge(&self, record: &mut Record) {
         let person = person(record);
         record.evidence.checks.retain(|check| ![SHARED, NUMBER, LIKENESS].contains(&check.id));

@@ -49,8 +49,8 @@ pub fn write_channels(
     write(folder, (width, height, channels, samples), &planes)
 }
 
-/// Writes what `write` does into the folder above, which the pages in several folders share: of a class, each image that
-/// all are compared with is there once.
+/// Writes what `write` does into the folder above, which the pages in several folders share: of a class, each image
+/// that all are compared with is there once.
 ///
 /// # Errors
 /// When it cannot be written.

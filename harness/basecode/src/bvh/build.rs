@@ -1,6 +1,6 @@
 //! A binary tree by the surface area heuristic, in bins (Wald, "On fast Construction of SAH-based Bounding Volume
-//! Hierarchies", 2007), and what each of its subtrees would cost as part of a tree of eight children (Ylitie, Karras and
-//! Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", 2017).
+//! Hierarchies", 2007), and what each of its subtrees would cost as part of a tree of eight children (Ylitie, Karras
+//! and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", 2017).
 //!
 //! The tree does not depend on the number of threads: each task's part of it has its own place from the beginning.
 
@@ -146,8 +146,8 @@ impl BinaryBvh {
         &self.nodes[at]
     }
 
-    /// The numbers of up to eight nodes that together hold all that is below one, at the least cost: of itself, where it
-    /// is best as a leaf.
+    /// The numbers of up to eight nodes that together hold all that is below one, at the least cost: of itself, where
+    /// it is best as a leaf.
     pub fn children(&self, at: usize, out: &mut Vec<usize>) {
         out.clear();
         if self.nodes[at].is_leaf() {

@@ -170,8 +170,8 @@ impl<'a> ExrRows<'a> {
         (BAND_BYTES / row.max(1)).max(1).next_multiple_of(block)
     }
 
-    /// Reads these rows of these channels (indices of [`ExrRows::channels`]) as 32-bit floats; integers as a fraction of
-    /// the largest, as OpenImageIO does.
+    /// Reads these rows of these channels (indices of [`ExrRows::channels`]) as 32-bit floats; integers as a fraction
+    /// of the largest, as OpenImageIO does.
     ///
     /// # Errors
     /// When a block is damaged.

@@ -12,8 +12,8 @@
 //! picture when it is ready for one, with the camera of that moment, so a slow renderer skips frames and never lags.
 //!
 //! **Offline.** A renderer takes its camera from a scene file. So each picture is a job with a scene file of its own:
-//! the scene's, with the camera replaced, beside a link to the folder of its mesh. A camera that moved ends the job of its own page;
-//! other pages wait for theirs.
+//! the scene's, with the camera replaced, beside a link to the folder of its mesh. A camera that moved ends the job of
+//! its own page; other pages wait for theirs.
 //!
 //! **Pixels** reach the browser as 16-bit floats; exposure is applied there, without asking anybody.
 //!
@@ -65,8 +65,8 @@ pub struct Question {
 }
 
 impl Question {
-    /// Reads `path=realtime&scene=NAME&shadows=1&spp=4&viewer=7&camera=` with ten numbers: eye, at, up, and the vertical field
-    /// of view in degrees. None for anything else.
+    /// Reads `path=realtime&scene=NAME&shadows=1&spp=4&viewer=7&camera=` with ten numbers: eye, at, up, and the
+    /// vertical field of view in degrees. None for anything else.
     pub fn parse(query: &str) -> Option<Self> {
         let value =
             |key: &str| query.split('&').find_map(|pair| pair.strip_prefix(key)?.strip_prefix('='));

@@ -1,5 +1,5 @@
-//! The class at a glance, in front of its table: what waits for the instructor, which mistakes were made, how points are
-//! spread, and where errors lie.
+//! The class at a glance, in front of its table: what waits for the instructor, which mistakes were made, how points
+//! are spread, and where errors lie.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -181,7 +181,8 @@ fn what_happened(reason: &str) -> Option<&'static str> {
     kinds.into_iter().find(|(_, is_so)| *is_so).map(|(words, _)| words)
 }
 
-/// Groups by the mistake that a part looks like, the most frequent first; then what has no name, and what was not begun.
+/// Groups by the mistake that a part looks like, the most frequent first; then what has no name, and what was not
+/// begun.
 pub(super) fn mistakes(html: &mut Html, report: &BatchReport) {
     let mut groups: BTreeMap<(&str, String), Group> = BTreeMap::new();
     for entry in &report.entries {
