@@ -470,10 +470,6 @@ fn slips<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Slip<'a>> {
 
 fn wrong_shapes(film: &StageFilm, frames: &[(BoundValue, Image)]) -> WrongShapes {
     let (scene, camera) = (film.scene, &film.camera);
-    let close = |found: Vec3, expected: Vec3| {
-        (found - expected).abs().max_element()
-            <= BOUND_RELATIVE * expected.abs().max_element().max(1e-3)
-    };
     let mut pixels: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (index, shape) in film.interior() {
         pixels.entry(shape).or_default().push(index);
@@ -483,7 +479,7 @@ fn wrong_shapes(film: &StageFilm, frames: &[(BoundValue, Image)]) -> WrongShapes
         frames.iter().all(|(bound, frame)| {
             let Some(expected) = expected(*bound) else { return true };
             let wrong =
-                pixels.iter().filter(|index| !close(frame.pixels[**index], expected)).count();
+                pixels.iter().filter(|index| !is_close(frame.pixels[**index], expected)).count();
             wrong as f64 <= STRAY_FRACTION * pixels.len() as f64
         })
     };
