@@ -24,8 +24,8 @@ const MOSTLY: f64 = 0.02;
 const VISIBILITY: &str = "lit pixels that are not lit (fraction)";
 
 /// An image that is wrong and so dark that it tells nothing of its shadows leaves the verdict to
-/// another scene that does, if there is one.
-pub fn leave_unjudged(checks: &mut [Check]) {
+/// another scene that does, if there is one. Only the checks from `begin` on are changed.
+pub fn leave_unjudged(checks: &mut [Check], begin: usize) {
     let is_bonus =
         |check: &Check| check.id == CheckId::BonusImage || check.id == CheckId::BonusProbe;
     let tells = |check: &Check| {
@@ -39,7 +39,7 @@ pub fn leave_unjudged(checks: &mut [Check]) {
     let is_right = |check: &Check| {
         !check.measures.is_empty() && check.measures.iter().all(|measure| measure.passed)
     };
-    for check in checks.iter_mut() {
+    for check in &mut checks[begin..] {
         let dark = !tells(check) && !is_right(check);
         if is_bonus(check) && check.verdict == Verdict::Fail && dark {
             check.verdict = Verdict::NotJudged;
@@ -375,7 +375,7 @@ mod tests {
         let dark = Check::new(CheckId::BonusImage, "cbox", Verdict::Fail, "black");
         let verdicts = |checks: &[Check]| {
             let mut checks = checks.to_vec();
-            leave_unjudged(&mut checks);
+            leave_unjudged(&mut checks, 0);
             checks.iter().map(|check| check.verdict).collect::<Vec<_>>()
         };
         assert_eq!(verdicts(&[wrong.clone(), dark.clone()]), [Verdict::Fail, Verdict::NotJudged]);
@@ -387,7 +387,16 @@ mod tests {
             ..probe
         };
         assert_eq!(verdicts(&[right, no_map]), [Verdict::Pass, Verdict::Fail]);
-        assert_eq!(verdicts(&[dark.clone(), dark]), [Verdict::Fail, Verdict::Fail]);
+        assert_eq!(verdicts(&[dark.clone(), dark.clone()]), [Verdict::Fail, Verdict::Fail]);
+
+        // A held-back scene, which comes later, leaves it to a public one, and not the other way round.
+        let right = Check::new(CheckId::BonusProbe, "both_shadows", Verdict::Pass, "");
+        let mut public_is_right = [right.clone(), dark.clone()];
+        leave_unjudged(&mut public_is_right, 1);
+        assert_eq!(public_is_right.map(|check| check.verdict), [Verdict::Pass, Verdict::NotJudged]);
+        let mut public_is_dark = [dark, right];
+        leave_unjudged(&mut public_is_dark, 1);
+        assert_eq!(public_is_dark.map(|check| check.verdict), [Verdict::Fail, Verdict::Pass]);
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use crate::diagnosis::{self, LoopSeen, Thumbnail, View};
 use crate::evidence::images::{self, Kind};
+use crate::evidence::price::Class;
 use crate::evidence::shading::{ShadedPoint, Shading};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::evidence::{loops, rays};
@@ -230,7 +231,11 @@ pub fn judge_scene<'a>(
         (check, Some(Drawn { scene: name.clone(), kind, image }))
     };
     let Some(first) = first else {
-        let (check, drawn) = judge(full, &case.expected);
+        let (mut check, drawn) = judge(full, &case.expected);
+        let mut small = sampled.iter().chain([one_spp]);
+        if case.first.is_some() && small.all(|outcome| outcome.answer().is_some()) {
+            settle_slow(&mut check, full);
+        }
         checks.push(check);
         return (checks, drawn);
     };
@@ -248,6 +253,17 @@ pub fn judge_scene<'a>(
     // An image that is wrong on any film is wrong; the larger one is shown.
     checks.push(if whole.verdict == Verdict::Fail { whole } else { check });
     (checks, drawn)
+}
+
+/// A renderer that draws the small films in time is slow on a large one, no endless loop: a slip. Whether the loop is
+/// right, the small ones show.
+fn settle_slow(check: &mut Check, full: &Outcome) {
+    if let Outcome::TimedOut(late) = full
+        && late.computing
+    {
+        check.error = Class::Slip.price();
+        check.summary = format!("too slow on the whole film of scene \"{}\": {late}", check.scene);
+    }
 }
 
 /// Whether an answer is there, and says that no light comes from anywhere.

@@ -361,6 +361,9 @@ fn hold_back(store: &Store, seed: u64, cases: &mut Vec<PreparedScene>) -> anyhow
     (store.progress)("making the held-back scenes");
     let (held_back, entries) = held_back::make(store.assignment, seed)?;
     let made = PreparedScene::all(store, &entries).with_context(|| format!("seed {seed}"))?;
-    cases.extend(made.into_iter().map(|case| PreparedScene { held_back: true, ..case }));
+    for case in made {
+        // What the loop does wrong must explain the wrong images here as well.
+        cases.push(PreparedScene { held_back: true, ..case.with_samples()? });
+    }
     Ok(held_back)
 }

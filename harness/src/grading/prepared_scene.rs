@@ -160,13 +160,12 @@ impl PreparedScene {
             unshadowed_mask,
             unshadowed: store.unshadowed(&offline, width, height)?,
             interpolated_normals: store.interpolated_normals(&realtime, width, height)?,
-            // The loop is the same on every scene: those that have most to show are enough.
-            sampled: entry.stored.then(|| Sampled::new(scene, film)).transpose()?,
+            sampled: None,
             surface,
             mask,
             batch,
         };
-        Ok(Self {
+        let case = Self {
             offline,
             realtime,
             bonus: entry.bonus.as_ref().map(at).transpose()?,
@@ -177,7 +176,19 @@ impl PreparedScene {
             probe_film,
             entry: entry.clone(),
             held_back: false,
-        })
+        };
+        // The loop is the same on every scene: those that have most to show are enough.
+        if entry.stored { case.with_samples() } else { Ok(case) }
+    }
+
+    /// The scene with what the render loop is asked at several samples per pixel.
+    ///
+    /// # Errors
+    /// When its camera has no rays.
+    pub(super) fn with_samples(mut self) -> anyhow::Result<Self> {
+        let film = [self.expected.unshadowed.width as u32, self.expected.unshadowed.height as u32];
+        self.probe_film.sampled = Some(Sampled::new(&self.expected.scene, film)?);
+        Ok(self)
     }
 
     /// The files that the reference renderer makes for a scene, on all its films; some may be

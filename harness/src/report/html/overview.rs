@@ -164,7 +164,8 @@ impl Group<'_> {
 
 /// What ended the judgement of a part, from the sentence that says why it lost points.
 fn what_happened(reason: &str) -> Option<&'static str> {
-    const LATE: &[&str] = &["endless loop in", "stuck in", OUT_OF_TIME, "no answer within"];
+    const LATE: &[&str] =
+        &["endless loop in", "too slow on", "stuck in", OUT_OF_TIME, "no answer within"];
     let says = |words: &[&str]| words.iter().any(|words| reason.contains(words));
     let is_place = |extension: &str| {
         reason
