@@ -47,7 +47,7 @@ pub struct Arguments {
     #[arg(long)]
     full: bool,
     /// What CI runs: of right renderers one for each number of samples and half of the other ways to
-    /// be right; at 4 spp a sixth of the mistakes, 60 pairs and 20 triples of these; of each the path,
+    /// be right; at 4 spp an eighth of the mistakes, 60 pairs and 20 triples of these; of each the path,
     /// offline or realtime, that it can show on; half of the unseen scenes; and the samples that are no
     /// known mistake
     #[arg(long, conflicts_with = "full")]

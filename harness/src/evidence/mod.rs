@@ -21,6 +21,7 @@ pub mod shadow_map;
 pub mod stage_film;
 pub mod stages;
 pub mod submitted;
+pub mod varyings;
 pub mod vertex;
 
 pub use check::{Check, Evidence, Lobe, Measure, Picture, Verdict};

@@ -17,6 +17,7 @@ use crate::diagnosis::{Kind, Thumbnail, View};
 use crate::evidence::premultiplied::Premultiplied;
 use crate::evidence::stage_film::StageFilm;
 use crate::evidence::stages::{BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass};
+use crate::evidence::varyings::vertex_for;
 use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::evidence::{images, pixels};
@@ -63,7 +64,8 @@ pub fn isolate(
     let is_right =
         |index, frames: &[Outcome]| pass_check(&cases[index], frames).verdict == Verdict::Pass;
     let passes = draw_scenes(session, plugin, &under(cases, &pass_shown()), &is_right);
-    let own = |stage: &Stage| stage.name == STAGES[0] && stage.text != VERTEX;
+    let own =
+        |stage: &Stage| stage.name == STAGES[0] && stages.own[0].as_ref() == Some(&stage.text);
     let frame = |case, set: &Vec<Stage>| Frame {
         each_matrices: set.iter().any(own),
         ..Frame::probe(case, set.clone())
@@ -218,7 +220,7 @@ fn swaps(stages: &Stages) -> ([Swap; 3], Vec<Vec<Stage>>) {
             let under = |show: &str| named([own.clone(), show.to_owned(), show.to_owned()]);
             sets.extend([SHOW_POSITION, SHOW_NORMAL].map(under));
         } else {
-            let mut texts = [VERTEX, BLACK, BLACK].map(str::to_owned);
+            let mut texts = [vertex_for(own), BLACK.to_owned(), BLACK.to_owned()];
             texts[index].clone_from(own);
             sets.push(named(texts));
         }
