@@ -178,8 +178,8 @@ impl CheckId {
                 "Do surfaces lie where they should, whatever their colors, and does light fall on them at \
                     all? Asked where a part's own evidence does not apply.",
                 "The fraction of wrong pixels.",
-                "0.5 % may differ. Within a surface, brightness (cube root) must correlate with what is \
-                    expected by 0.2. Silhouettes do not.",
+                "0.5 % may differ. Within a surface, on most scenes, brightness (cube root) must \
+                    correlate with what is expected by 0.2. Silhouettes do not.",
                 &[],
             ),
             Self::ImageRealtimeDiffuse => info(
