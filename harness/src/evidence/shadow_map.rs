@@ -24,7 +24,8 @@ const MOSTLY: f64 = 0.02;
 const VISIBILITY: &str = "lit pixels that are not lit (fraction)";
 
 /// An image that is wrong and so dark that it tells nothing of its shadows leaves the verdict to
-/// another scene that does, if there is one. Only the checks from `begin` on are changed.
+/// another scene that does, if there is one. Only the checks from `begin` on are changed. Where none of these tells,
+/// what they count for is decided before them: what is drawn and dark passes.
 pub fn leave_unjudged(checks: &mut [Check], begin: usize) {
     let is_bonus =
         |check: &Check| check.id == CheckId::BonusImage || check.id == CheckId::BonusProbe;
@@ -39,10 +40,12 @@ pub fn leave_unjudged(checks: &mut [Check], begin: usize) {
     let is_right = |check: &Check| {
         !check.measures.is_empty() && check.measures.iter().all(|measure| measure.passed)
     };
+    let told_before = !checks[begin..].iter().any(tells);
     for check in &mut checks[begin..] {
-        let dark = !tells(check) && !is_right(check);
+        let is_drawn = !check.measures.is_empty();
+        let dark = !tells(check) && !is_right(check) && (is_drawn || !told_before);
         if is_bonus(check) && check.verdict == Verdict::Fail && dark {
-            check.verdict = Verdict::NotJudged;
+            check.verdict = if told_before { Verdict::Pass } else { Verdict::NotJudged };
             check.summary = format!(
                 "too dark to tell where shadows fall; another scene does ({})",
                 check.summary
@@ -391,9 +394,13 @@ mod tests {
 
         // A held-back scene, which comes later, leaves it to a public one, and not the other way round.
         let right = Check::new(CheckId::BonusProbe, "both_shadows", Verdict::Pass, "");
-        let mut public_is_right = [right.clone(), dark.clone()];
+        let measures =
+            vec![Measure::at_most(RuleId::ImageInterior, "pixels that differ", 1.0, 0.0)];
+        let drawn_dark = Check { measures, ..dark.clone() };
+        let mut public_is_right = [right.clone(), drawn_dark, dark.clone()];
         leave_unjudged(&mut public_is_right, 1);
-        assert_eq!(public_is_right.map(|check| check.verdict), [Verdict::Pass, Verdict::NotJudged]);
+        let verdicts = public_is_right.map(|check| check.verdict);
+        assert_eq!(verdicts, [Verdict::Pass, Verdict::Pass, Verdict::Fail]);
         let mut public_is_dark = [dark, right];
         leave_unjudged(&mut public_is_dark, 1);
         assert_eq!(public_is_dark.map(|check| check.verdict), [Verdict::Fail, Verdict::Pass]);

@@ -25,6 +25,9 @@ pub struct Bitmap {
     height: usize,
     texels: Vec<Vec3>,
     mapping: Mapping,
+    /// The largest value of each component.
+    max: Vec3,
+    average: Vec3,
 }
 
 /// How texture coordinates become coordinates of a bitmap: scaled, then moved; beyond [0, 1] they
@@ -63,9 +66,7 @@ impl Texture {
     pub fn max(&self) -> Vec3 {
         match self {
             Self::Constant(colour) => *colour,
-            Self::Bitmap(bitmap) => {
-                bitmap.texels.iter().fold(Vec3::ZERO, |max, texel| max.max(*texel))
-            }
+            Self::Bitmap(bitmap) => bitmap.max,
         }
     }
 
@@ -73,10 +74,7 @@ impl Texture {
     pub fn average(&self) -> Vec3 {
         match self {
             Self::Constant(colour) => *colour,
-            Self::Bitmap(bitmap) => {
-                let sum = bitmap.texels.iter().fold(glam::DVec3::ZERO, |sum, t| sum + t.as_dvec3());
-                (sum / bitmap.texels.len() as f64).as_vec3()
-            }
+            Self::Bitmap(bitmap) => bitmap.average,
         }
     }
 
@@ -124,7 +122,7 @@ impl Texture {
             .pixels()
             .map(|p| Vec3::from(p.0.map(|level| srgb_to_linear(f32::from(level) / 255.0))))
             .collect();
-        Ok(Self::Bitmap(Arc::new(Bitmap { width, height, texels, mapping })))
+        Ok(Self::Bitmap(Arc::new(Bitmap::new(width, height, texels, mapping))))
     }
 }
 
@@ -135,6 +133,13 @@ impl From<Vec3> for Texture {
 }
 
 impl Bitmap {
+    fn new(width: usize, height: usize, texels: Vec<Vec3>, mapping: Mapping) -> Self {
+        let max = texels.iter().fold(Vec3::ZERO, |max, texel| max.max(*texel));
+        let sum = texels.iter().fold(glam::DVec3::ZERO, |sum, texel| sum + texel.as_dvec3());
+        let average = (sum / texels.len() as f64).as_vec3();
+        Self { width, height, texels, mapping, max, average }
+    }
+
     /// The nearest texel; v = 0 is the bottom row.
     fn lookup(&self, uv: Vec2) -> Vec3 {
         let Mapping { scale, offset, clamp } = self.mapping;
@@ -164,7 +169,7 @@ mod tests {
     #[test]
     fn lookups_wrap_and_v_points_up() {
         let texels = vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE]; // top row: X Y
-        let bitmap = Bitmap { width: 2, height: 2, texels, mapping: Mapping::default() };
+        let bitmap = Bitmap::new(2, 2, texels, Mapping::default());
         assert_eq!(bitmap.lookup(vec2(0.25, 0.75)), Vec3::X);
         assert_eq!(bitmap.lookup(vec2(1.75, -0.25)), Vec3::Y);
         assert_eq!(bitmap.lookup(vec2(0.0, 0.0)), Vec3::Z);
