@@ -105,7 +105,8 @@ impl Input<'_> {
         let mut found = self.by_findings();
         for question in &QUESTIONS {
             let known = |diagnosis: &Diagnosis| diagnosis.part == question.part;
-            if self.fails(question.part) && !self.unwritten(question) && !found.iter().any(known) {
+            let told = self.unwritten(question) || self.by_another_convention(question);
+            if self.fails(question.part) && !told && !found.iter().any(known) {
                 found.extend(self.part(question));
             }
         }
@@ -120,6 +121,13 @@ impl Input<'_> {
     fn verdict_of(&self, check: CheckId, verdict: Verdict) -> bool {
         let seen = |check: &crate::evidence::Check| !check.held_back && check.verdict == verdict;
         self.evidence.named(check).any(seen)
+    }
+
+    /// Whether what fails was judged under another convention than the handout's: what a part answers alone is no
+    /// mistake then, and says nothing of one.
+    fn by_another_convention(&self, question: &Question) -> bool {
+        let mut checks = question.checks.iter().flat_map(|check| self.evidence.named(*check));
+        checks.any(|check| check.verdict == Verdict::Fail && !check.convention.is_empty())
     }
 
     fn unwritten(&self, question: &Question) -> bool {

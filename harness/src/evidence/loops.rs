@@ -155,7 +155,8 @@ impl Pixel {
         });
         // The larger of both sets': a small one makes much of little.
         let other = judging.iter().map(|v| (v - judged) * (v - judged)).sum::<f64>() / (n - 1.0);
-        let found = variance > EDGE_VARIANCE * (largest - smallest).powi(2);
+        // Negative radiance is no light that an edge cuts off.
+        let found = smallest >= 0.0 && variance > EDGE_VARIANCE * (largest - smallest).powi(2);
         let range = if found { largest - smallest } else { 0.0 };
         let pixel = Self { mean: judged, variance: variance.max(other), range, slope };
         (mean + judged).is_finite().then_some(pixel)
