@@ -168,14 +168,15 @@ fn judge_together(
         own.any(|(question, check)| question.party == party && check.verdict == Verdict::Fail)
     };
     let is_explained_alone = |party: Party| {
-        let mut own = questions.iter().zip(handouts);
-        own.any(|(question, check)| question.party == party && price::is_explained(check))
+        let own = questions.iter().zip(handouts);
+        let own = own.filter(|(question, _)| question.party == party).map(|(_, check)| check);
+        price::are_mostly_explained(own)
     };
     let mends = |party: Party| {
-        let mut failed = of(party).map(|(_, check)| check);
-        let mut failed = failed.by_ref().filter(|check| check.verdict == Verdict::Fail).peekable();
-        let right = failed.peek().is_none();
-        let but_for_a_slip = failed.all(price::is_a_slip) && !is_explained_alone(party);
+        let failed = of(party).map(|(_, check)| check);
+        let failed: Vec<&Check> = failed.filter(|check| check.verdict == Verdict::Fail).collect();
+        let right = failed.is_empty();
+        let but_for_a_slip = price::are_of_a_slip(failed) && !is_explained_alone(party);
         is_wrong_alone(party) && judged(party) && (right || but_for_a_slip)
     };
     if !is_wrong_alone(Party::Integrator) || ![Party::Diffuse, Party::Phong].into_iter().any(mends)

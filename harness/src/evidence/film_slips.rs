@@ -96,7 +96,8 @@ impl<'a> Film<'a> {
         Change { name, noise, value: Box::new(move |index| Some([sums[index]; 2])) }
     }
 
-    /// Whole rows or columns are black where something should be: at most half of the film. Nothing where none is.
+    /// Whole rows or columns are black or no numbers where something should be: at most half of the film. Nothing where
+    /// none is.
     fn missing(self, image: &[[f32; 3]]) -> Option<Change<'a>> {
         let is_black = |pixels: &[[f32; 3]], index: usize| pixels[index] == [0.0; 3];
         let row = |y: usize| (0..self.width).map(move |x| y * self.width + x).collect::<Vec<_>>();
@@ -104,8 +105,10 @@ impl<'a> Film<'a> {
             |x: usize| (0..self.height).map(move |y| y * self.width + x).collect::<Vec<_>>();
         let lines = (0..self.height).map(row).chain((0..self.width).map(column));
         let is_missing = |line: &Vec<usize>| {
-            line.iter().all(|index| is_black(image, *index))
-                && line.iter().any(|index| !is_black(self.pixels, *index))
+            let is_drawn = |index: &usize| {
+                !is_black(image, *index) && image[*index].iter().all(|v| v.is_finite())
+            };
+            !line.iter().any(is_drawn) && line.iter().any(|index| !is_black(self.pixels, *index))
         };
         let mut missing = vec![false; image.len()];
         lines.filter(is_missing).flatten().for_each(|index| missing[index] = true);
@@ -237,7 +240,9 @@ pub fn film_price(
                 if !(least.is_finite() && most.is_finite()) {
                     continue;
                 }
-                pairs.add(1.0, f64::from(a), f64::from(least + most) / 2.0);
+                if a.is_finite() {
+                    pairs.add(1.0, f64::from(a), f64::from(least + most) / 2.0);
+                }
                 let size = f64::from(least.abs().max(most.abs()));
                 total += size;
                 let difference = match a.is_finite() {
@@ -291,10 +296,15 @@ mod tests {
             film(&|x, y| if wanted(x, y) { right[y * width + x][0] } else { 0.0 })
         };
         let tiles = drawn(&|x, y| x < 32 && y < 16);
+        let broken = film(&|x, y| if y < 16 { right[y * width + x][0] } else { f32::NAN });
         let rows = drawn(&|_, y| y.is_multiple_of(2));
-        for (image, what) in
-            [(film(&row), "sum"), (exchanged, "camera"), (tiles, "tiles"), (rows, "rows")]
-        {
+        for (image, what) in [
+            (film(&row), "sum"),
+            (exchanged, "camera"),
+            (tiles, "tiles"),
+            (broken, "no numbers"),
+            (rows, "rows"),
+        ] {
             let price = price(&image);
             assert!(price.error < 0.04, "{what}: {} {}", price.error, price.name());
         }

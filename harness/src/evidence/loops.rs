@@ -136,6 +136,8 @@ struct Pixel {
     range: f64,
     /// Slope across the pixel, in x and in y.
     slope: [f64; 2],
+    /// Whether a ray's radiance is negative: no light that an edge cuts off.
+    negative: bool,
 }
 
 impl Pixel {
@@ -155,10 +157,10 @@ impl Pixel {
         });
         // The larger of both sets': a small one makes much of little.
         let other = judging.iter().map(|v| (v - judged) * (v - judged)).sum::<f64>() / (n - 1.0);
-        // Negative radiance is no light that an edge cuts off.
-        let found = smallest >= 0.0 && variance > EDGE_VARIANCE * (largest - smallest).powi(2);
+        let found = variance > EDGE_VARIANCE * (largest - smallest).powi(2);
+        let negative = sums.iter().chain(judging).any(|sum| *sum < 0.0);
         let range = if found { largest - smallest } else { 0.0 };
-        let pixel = Self { mean: judged, variance: variance.max(other), range, slope };
+        let pixel = Self { mean: judged, variance: variance.max(other), range, slope, negative };
         (mean + judged).is_finite().then_some(pixel)
     }
 
@@ -258,7 +260,8 @@ pub fn judge_samples(
             inside += usize::from(!near(index).any(|i| own[i].is_some_and(|p| p.is_edge(typical))));
             first = first.or(Some((index, found, pixel.mean)));
         }
-        if pixel.is_edge(typical) {
+        let negative = near(index).any(|i| own[i].is_some_and(|p| p.negative));
+        if pixel.is_edge(typical) && !negative {
             let z = difference / error;
             let (count, squares) = &mut edges.0[pixel.direction()];
             (*count, *squares) = (*count + 1, *squares + z * z);

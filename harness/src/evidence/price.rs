@@ -149,10 +149,26 @@ pub fn is_explained(check: &Check) -> bool {
     is_known && [Class::Slip, Class::Concept].into_iter().any(leaves_nothing)
 }
 
-/// Whether one slip explains a check's answers, and leaves no more than a seam does.
-pub fn is_a_slip(check: &Check) -> bool {
-    let is_known = ![UNKNOWN, ""].contains(&check.mistake.as_str());
-    is_known && check.error <= 1.5 * Class::Slip.price()
+/// Whether single mistakes explain the failed ones of these checks on most scenes.
+pub fn are_mostly_explained<'a>(checks: impl IntoIterator<Item = &'a Check>) -> bool {
+    let failed = checks.into_iter().filter(|check| check.verdict == Verdict::Fail);
+    let (all, explained) = failed.fold((0usize, 0usize), |(all, explained), check| {
+        (all + 1, explained + usize::from(is_explained(check)))
+    });
+    2 * explained > all
+}
+
+/// Whether slips explain failed checks on some scenes, leaving no more than a seam does, and the others are no further
+/// off than that.
+pub fn are_of_a_slip<'a>(checks: impl IntoIterator<Item = &'a Check>) -> bool {
+    let is_known = |check: &Check| ![UNKNOWN, ""].contains(&check.mistake.as_str());
+    let mut known = false;
+    let slight = checks.into_iter().all(|check| {
+        known |= is_known(check);
+        let room = if is_known(check) { 1.5 } else { 1.0 };
+        check.error <= room * Class::Slip.price()
+    });
+    slight && known
 }
 
 /// If one mistake explains a check on most scenes, and nothing known explains it on the others, the others cost no

@@ -226,6 +226,20 @@ pub fn judge_pass(
             .with_hint(hint)
         }
     };
+    // Values that other surfaces share do not tell that these are seen.
+    if check.verdict == Verdict::Pass && all_wanted {
+        let seen = Seen::of(film, frames, positions);
+        let fraction = seen.elsewhere.0 as f64 / seen.all.max(1) as f64;
+        if fraction > STRAY_FRACTION
+            && fraction < HALF
+            && let Some((summary, hint)) = seen.in_words(film)
+        {
+            let error = Class::Slip.price();
+            check = Check { error, ..Check::new(id, scene_name, Verdict::Fail, summary) };
+            check = check.with_hint(hint);
+            check.mistake = "another surface is seen".to_owned();
+        }
+    }
     let offset_px = if all_wanted { median_offset_px(film, positions) } else { 0.0 };
     let placed = Measure::at_most(
         RuleId::PassPlace,
@@ -334,6 +348,9 @@ fn median_offset_px(film: &StageFilm, positions: &Image) -> f64 {
     }
     if 2 * offsets.len() < all { 0.0 } else { median_length(&mut offsets) }
 }
+
+/// From this fraction on, positions that are not those of the pixels tell of a vertex stage with outputs of its own.
+const HALF: f64 = 0.5;
 
 /// Positions are near, relative to their distance from the camera: a few pixels of the small film.
 const NEAR: f32 = 0.1;
@@ -612,6 +629,17 @@ mod tests {
         // A vertex stage of its own may forward anything; nothing is claimed of where that lies.
         let own = judged(0, |p| 5.0 * p);
         assert_eq!((own.verdict, place(&own)), (Verdict::Pass, Some(0.0)), "{}", own.summary);
+    }
+
+    #[test]
+    fn another_surface_of_the_same_values_is_seen() {
+        let all = |far: f32| judged(0, move |p| if p.x > far { p + Vec3::splat(50.0) } else { p });
+        let some = (0..40).map(|step| all(0.25 * step as f32 - 5.0)).find(|check| {
+            check.verdict == Verdict::Fail && check.summary.starts_with("another surface is seen")
+        });
+        assert!(some.is_some_and(|check| check.error == Class::Slip.price()));
+        // Elsewhere everywhere: outputs of a vertex stage of its own.
+        assert_eq!(all(-1e9).verdict, Verdict::Pass);
     }
 
     #[test]

@@ -54,18 +54,23 @@ pub fn judge(alone: &[Check], own: &[Check], pass_of: &dyn Fn(Wanted) -> Vec<Che
         frames(of).all(said) && frames(of).any(|check| check.verdict == Verdict::Pass)
     };
     let is_a_slip = |of: Surfaces| {
-        let wrong = wrong_frames(of);
-        !wrong.is_empty()
-            && wrong.into_iter().all(price::is_a_slip)
-            && !failed(of.stage).any(price::is_explained)
+        price::are_of_a_slip(wrong_frames(of)) && !price::are_mostly_explained(failed(of.stage))
     };
     let mends = |of: Surfaces| {
         let pass_fails = || {
             let checks = pass_of(&|bound, phong| of.hang_on(bound, phong));
             checks.iter().any(|check| check.verdict == Verdict::Fail)
         };
-        let stages = [CheckId::StageVertex, of.stage].map(|id| failed(id).next().is_some());
-        let wrong = stages.into_iter().filter(|fails| *fails).count();
+        // A stage that cannot be exchanged takes other inputs than the contract's.
+        let takes_others = alone.iter().any(|check| check.id == of.stage)
+            && alone
+                .iter()
+                .filter(|check| check.id == of.stage)
+                .all(|check| check.verdict == Verdict::NotJudged);
+        let wrong = [failed(CheckId::StageVertex).next().is_some(), {
+            takes_others || failed(of.stage).next().is_some()
+        }];
+        let wrong = wrong.into_iter().filter(|fails| *fails).count();
         (is_right(of) || is_a_slip(of)) && wrong > 0 && (wrong > 1 || pass_fails())
     };
     let all = [DIFFUSE, PHONG];
@@ -74,9 +79,8 @@ pub fn judge(alone: &[Check], own: &[Check], pass_of: &dyn Fn(Wanted) -> Vec<Che
     }
     // Where one mistake of the stage explains the frame, the pass has none.
     let is_known = |of: Surfaces| {
-        let wrong = wrong_frames(of);
-        let explained =
-            wrong.into_iter().all(|check| price::is_explained(check) || price::is_a_slip(check));
+        let explained = price::are_of_a_slip(wrong_frames(of))
+            || wrong_frames(of).into_iter().all(price::is_explained);
         is_right(of) || (explained && failed(of.stage).next().is_some())
     };
     let known: Vec<Surfaces> = all.into_iter().filter(|of| is_known(*of)).collect();

@@ -130,7 +130,8 @@ pub fn judge_shadows(
         let price = match residual_of_inverted(batch, bsdf, (with, without)) {
             left if left <= LEFT => {
                 check.hint = format!("the switch is inverted: {INVERTED}");
-                price.or(INVERTED, Class::Slip, left)
+                // Nothing else explains what is drawn without shadows.
+                Price { error: Class::Slip.price() + left, mistake: Some(INVERTED), ..price }
             }
             _ => match color_of_shadows(batch, bsdf, with) {
                 Some(light) if lit_fraction <= LEFT => {
