@@ -11,6 +11,7 @@ use super::loops;
 use super::nearest::{Comparison, Hypothesis, Nearest, is_black, nearest};
 use super::stored::{Material, Stored};
 use super::view::{Kind, Observations, View};
+use crate::evidence::rays::INVERTED;
 use crate::evidence::{CheckId, Evidence, Picture, Verdict};
 use crate::imaging::ratio::ratio_name;
 
@@ -156,6 +157,12 @@ impl Input<'_> {
         // Shadows where none should be: images of the bonus do not show how it draws them.
         if part == "2.5" && self.verdict_of(CheckId::BonusDefault, Verdict::Fail) {
             return None;
+        }
+        // Its image is that of a renderer that tests nothing.
+        let inverted = |check: &crate::evidence::Check| check.mistake == INVERTED;
+        if part == "1.4" && self.evidence.named(CheckId::ShadowRays).any(inverted) {
+            let words = format!("the switch is inverted: {INVERTED}");
+            return Some(Diagnosis { part: part.to_owned(), words, ..self.known(&[], 0.0, 1.0) });
         }
         if part == "1.3" {
             return self.direct_light(&isolated, &image);

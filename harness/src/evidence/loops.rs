@@ -136,8 +136,6 @@ struct Pixel {
     range: f64,
     /// Slope across the pixel, in x and in y.
     slope: [f64; 2],
-    /// Whether a ray's radiance is negative: no light that an edge cuts off.
-    negative: bool,
 }
 
 impl Pixel {
@@ -158,9 +156,8 @@ impl Pixel {
         // The larger of both sets': a small one makes much of little.
         let other = judging.iter().map(|v| (v - judged) * (v - judged)).sum::<f64>() / (n - 1.0);
         let found = variance > EDGE_VARIANCE * (largest - smallest).powi(2);
-        let negative = sums.iter().chain(judging).any(|sum| *sum < 0.0);
         let range = if found { largest - smallest } else { 0.0 };
-        let pixel = Self { mean: judged, variance: variance.max(other), range, slope, negative };
+        let pixel = Self { mean: judged, variance: variance.max(other), range, slope };
         (mean + judged).is_finite().then_some(pixel)
     }
 
@@ -260,9 +257,9 @@ pub fn judge_samples(
             inside += usize::from(!near(index).any(|i| own[i].is_some_and(|p| p.is_edge(typical))));
             first = first.or(Some((index, found, pixel.mean)));
         }
-        let negative = near(index).any(|i| own[i].is_some_and(|p| p.negative));
-        if pixel.is_edge(typical) && !negative {
-            let z = difference / error;
+        let z = difference / error;
+        // One that is off counts above: a glint that no ray met is no edge.
+        if pixel.is_edge(typical) && z.abs() <= Z_LIMIT {
             let (count, squares) = &mut edges.0[pixel.direction()];
             (*count, *squares) = (*count + 1, *squares + z * z);
             (bias, edge_count) = (bias + z, edge_count + 1);
