@@ -176,7 +176,7 @@ fn judge_together(
         let failed = of(party).map(|(_, check)| check);
         let failed: Vec<&Check> = failed.filter(|check| check.verdict == Verdict::Fail).collect();
         let right = failed.is_empty();
-        let but_for_a_slip = price::are_of_a_slip(failed) && !is_explained_alone(party);
+        let but_for_a_slip = price::are_slight(failed) && !is_explained_alone(party);
         is_wrong_alone(party) && judged(party) && (right || but_for_a_slip)
     };
     if !is_wrong_alone(Party::Integrator) || ![Party::Diffuse, Party::Phong].into_iter().any(mends)

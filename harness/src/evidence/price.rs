@@ -149,26 +149,24 @@ pub fn is_explained(check: &Check) -> bool {
     is_known && [Class::Slip, Class::Concept].into_iter().any(leaves_nothing)
 }
 
-/// Whether single mistakes explain the failed ones of these checks on most scenes.
+/// Whether a failed check is no further off than a slip: what one explains may leave as much as a seam does.
+fn is_slight(check: &Check) -> bool {
+    let is_known = ![UNKNOWN, ""].contains(&check.mistake.as_str());
+    check.error <= if is_known { 1.5 } else { 1.0 } * Class::Slip.price()
+}
+
+/// Whether failed checks are no further off than a slip.
+pub fn are_slight<'a>(checks: impl IntoIterator<Item = &'a Check>) -> bool {
+    checks.into_iter().all(is_slight)
+}
+
+/// Whether the failed ones of these checks are slight, or explained by single mistakes, on most scenes.
 pub fn are_mostly_explained<'a>(checks: impl IntoIterator<Item = &'a Check>) -> bool {
     let failed = checks.into_iter().filter(|check| check.verdict == Verdict::Fail);
     let (all, explained) = failed.fold((0usize, 0usize), |(all, explained), check| {
-        (all + 1, explained + usize::from(is_explained(check)))
+        (all + 1, explained + usize::from(is_explained(check) || is_slight(check)))
     });
     2 * explained > all
-}
-
-/// Whether slips explain failed checks on some scenes, leaving no more than a seam does, and the others are no further
-/// off than that.
-pub fn are_of_a_slip<'a>(checks: impl IntoIterator<Item = &'a Check>) -> bool {
-    let is_known = |check: &Check| ![UNKNOWN, ""].contains(&check.mistake.as_str());
-    let mut known = false;
-    let slight = checks.into_iter().all(|check| {
-        known |= is_known(check);
-        let room = if is_known(check) { 1.5 } else { 1.0 };
-        check.error <= room * Class::Slip.price()
-    });
-    slight && known
 }
 
 /// If one mistake explains a check on most scenes, and nothing known explains it on the others, the others cost no
@@ -297,7 +295,10 @@ impl Answers<'_> {
                 false => price,
             }
         });
-        match price.error > TWO_SLIPS && self.are_of_two_slips(&questions) {
+        // A concept that explains them is one: without falloff is no r in place of r^2, made twice.
+        let of_concept = Class::Concept.price() + LEFT_BY_TWO;
+        let is_concept = price.mistake.is_some() && price.error <= of_concept;
+        match price.error > TWO_SLIPS && !is_concept && self.are_of_two_slips(&questions) {
             true => Price { error: TWO_SLIPS, mistake: Some("two slips"), ..price },
             false => price,
         }
@@ -643,7 +644,9 @@ mod tests {
         ] {
             assert_eq!(price(&made, factor).error, TWO_SLIPS, "{made:?}");
         }
-        // One is cheaper, and a third is more.
+        // One is cheaper, a third is more, and a concept is a concept.
+        let no_falloff = Shading { falloff: 0.0, ..right };
+        assert_eq!(price(&no_falloff, 1.0).error, Class::Concept.price());
         assert_eq!(price(&two_cosines, 1.0).error, Class::Slip.price());
         let three = Shading { falloff: 1.0, normalization: lobe, ..two_cosines };
         assert!(price(&three, 2.0).error > TWO_SLIPS);

@@ -54,7 +54,10 @@ pub fn judge(alone: &[Check], own: &[Check], pass_of: &dyn Fn(Wanted) -> Vec<Che
         frames(of).all(said) && frames(of).any(|check| check.verdict == Verdict::Pass)
     };
     let is_a_slip = |of: Surfaces| {
-        price::are_of_a_slip(wrong_frames(of)) && !price::are_mostly_explained(failed(of.stage))
+        let wrong = wrong_frames(of);
+        let is_wrong_alone = failed(of.stage).next().is_some();
+        let explained = price::are_mostly_explained(failed(of.stage));
+        !wrong.is_empty() && price::are_slight(wrong) && is_wrong_alone && !explained
     };
     let mends = |of: Surfaces| {
         let pass_fails = || {
@@ -62,15 +65,12 @@ pub fn judge(alone: &[Check], own: &[Check], pass_of: &dyn Fn(Wanted) -> Vec<Che
             checks.iter().any(|check| check.verdict == Verdict::Fail)
         };
         // A stage that cannot be exchanged takes other inputs than the contract's.
-        let takes_others = alone.iter().any(|check| check.id == of.stage)
-            && alone
-                .iter()
-                .filter(|check| check.id == of.stage)
-                .all(|check| check.verdict == Verdict::NotJudged);
-        let wrong = [failed(CheckId::StageVertex).next().is_some(), {
-            takes_others || failed(of.stage).next().is_some()
-        }];
-        let wrong = wrong.into_iter().filter(|fails| *fails).count();
+        let mut stage = alone.iter().filter(|check| check.id == of.stage).peekable();
+        let takes_others =
+            stage.peek().is_some() && stage.all(|check| check.verdict == Verdict::NotJudged);
+        let vertex_fails = failed(CheckId::StageVertex).next().is_some();
+        let stage_fails = takes_others || failed(of.stage).next().is_some();
+        let wrong = usize::from(vertex_fails) + usize::from(stage_fails);
         (is_right(of) || is_a_slip(of)) && wrong > 0 && (wrong > 1 || pass_fails())
     };
     let all = [DIFFUSE, PHONG];
@@ -79,7 +79,7 @@ pub fn judge(alone: &[Check], own: &[Check], pass_of: &dyn Fn(Wanted) -> Vec<Che
     }
     // Where one mistake of the stage explains the frame, the pass has none.
     let is_known = |of: Surfaces| {
-        let explained = price::are_of_a_slip(wrong_frames(of))
+        let explained = price::are_slight(wrong_frames(of))
             || wrong_frames(of).into_iter().all(price::is_explained);
         is_right(of) || (explained && failed(of.stage).next().is_some())
     };
