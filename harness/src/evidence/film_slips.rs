@@ -295,7 +295,7 @@ mod tests {
         let drawn = |wanted: &dyn Fn(usize, usize) -> bool| {
             film(&|x, y| if wanted(x, y) { right[y * width + x][0] } else { 0.0 })
         };
-        let tiles = drawn(&|x, y| x < 32 && y < 16);
+        let tiles = drawn(&|x, y| x < 32 && y < 24);
         let broken = film(&|x, y| if y < 16 { right[y * width + x][0] } else { f32::NAN });
         let rows = drawn(&|_, y| y.is_multiple_of(2));
         for (image, what) in [

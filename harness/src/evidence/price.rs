@@ -296,8 +296,12 @@ impl Answers<'_> {
             }
         });
         // A concept that explains them is one: without falloff is no r in place of r^2, made twice.
-        let of_concept = Class::Concept.price() + LEFT_BY_TWO;
-        let is_concept = price.mistake.is_some() && price.error <= of_concept;
+        let is_concept = self.changes.iter().any(|change| {
+            let left = price.error - Class::Concept.price();
+            price.mistake == Some(change.name)
+                && left <= LEFT_BY_TWO
+                && (change.class == Class::Concept || left >= 0.0)
+        });
         match price.error > TWO_SLIPS && !is_concept && self.are_of_two_slips(&questions) {
             true => Price { error: TWO_SLIPS, mistake: Some("two slips"), ..price },
             false => price,
@@ -305,7 +309,7 @@ impl Answers<'_> {
     }
 
     /// Whether two slips explain the answers, or a slip and a constant factor. Of two factors of the right value their
-    /// product is taken, of two that light what should be black the sum.
+    /// product is taken, of two that light what should be black the sum. Tests that are missing go with any other slip.
     fn are_of_two_slips(&self, questions: &[usize]) -> bool {
         let slips: Vec<Shading> = self
             .changes
@@ -352,6 +356,25 @@ impl Answers<'_> {
         let pairs = (0..slips.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
         let two = pairs
             .filter(|&(a, b)| explains(&|at, c| both(plain[at][c], all[a][at][c], all[b][at][c])));
+        let is_untested = |shading: &&Shading| {
+            !(shading.tests_wi && shading.tests_wo) || shading.tests_both_at_once
+        };
+        let untested = slips.iter().filter(is_untested).flat_map(|a| {
+            let tested = slips.iter().filter(|b| !is_untested(b));
+            tested.map(|b| Shading {
+                tests_wi: a.tests_wi,
+                tests_wo: a.tests_wo,
+                tests_both_at_once: a.tests_both_at_once,
+                ..*b
+            })
+        });
+        let mut untested = untested.filter(|shading| {
+            let values = values(shading);
+            explains(&|at, c| values[at][c])
+        });
+        if untested.any(|shading| surely(&|index| (self.of)(index, &shading))) {
+            return true;
+        }
         let one_and_factor = (0..slips.len()).filter_map(|a| {
             let mut ratios: Vec<f64> = Vec::new();
             for (at, &index) in few.iter().enumerate() {
