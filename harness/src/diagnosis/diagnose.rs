@@ -11,6 +11,7 @@ use super::loops;
 use super::nearest::{Comparison, Hypothesis, Nearest, is_black, nearest};
 use super::stored::{Material, Stored};
 use super::view::{Kind, Observations, View};
+use crate::evidence::rays::INVERTED;
 use crate::evidence::{CheckId, Evidence, Picture, Verdict};
 use crate::imaging::ratio::ratio_name;
 
@@ -105,7 +106,8 @@ impl Input<'_> {
         let mut found = self.by_findings();
         for question in &QUESTIONS {
             let known = |diagnosis: &Diagnosis| diagnosis.part == question.part;
-            if self.fails(question.part) && !self.unwritten(question) && !found.iter().any(known) {
+            let told = self.unwritten(question) || self.by_another_convention(question);
+            if self.fails(question.part) && !told && !found.iter().any(known) {
                 found.extend(self.part(question));
             }
         }
@@ -120,6 +122,13 @@ impl Input<'_> {
     fn verdict_of(&self, check: CheckId, verdict: Verdict) -> bool {
         let seen = |check: &crate::evidence::Check| !check.held_back && check.verdict == verdict;
         self.evidence.named(check).any(seen)
+    }
+
+    /// Whether what fails was judged under another convention than the handout's: what a part answers alone is no
+    /// mistake then, and says nothing of one.
+    fn by_another_convention(&self, question: &Question) -> bool {
+        let mut checks = question.checks.iter().flat_map(|check| self.evidence.named(*check));
+        checks.any(|check| check.verdict == Verdict::Fail && !check.convention.is_empty())
     }
 
     fn unwritten(&self, question: &Question) -> bool {
@@ -148,6 +157,12 @@ impl Input<'_> {
         // Shadows where none should be: images of the bonus do not show how it draws them.
         if part == "2.5" && self.verdict_of(CheckId::BonusDefault, Verdict::Fail) {
             return None;
+        }
+        // Its image is that of a renderer that tests nothing.
+        let inverted = |check: &crate::evidence::Check| check.mistake == INVERTED;
+        if part == "1.4" && self.evidence.named(CheckId::ShadowRays).any(inverted) {
+            let words = format!("the switch is inverted: {INVERTED}");
+            return Some(Diagnosis { part: part.to_owned(), words, ..self.known(&[], 0.0, 1.0) });
         }
         if part == "1.3" {
             return self.direct_light(&isolated, &image);

@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 
 use super::shading::Shading;
-use super::{Check, Verdict};
+use super::{Check, Verdict, price};
 
 /// What the integrator does in place of the BSDFs: it multiplies by
 /// `cos(theta_i)^cos_i pi^pi r^-length`, and the BSDFs divide by it.
@@ -77,6 +77,9 @@ impl Convention {
     }
 }
 
+/// A convention that no factor expresses: it shows in what the integrator makes of the BSDFs.
+const OF_ITS_OWN: &str = "integrator and BSDFs keep a convention of their own";
+
 /// Who keeps a convention.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Party {
@@ -106,7 +109,9 @@ const FURTHER: f64 = 1.5;
 
 /// The checks under the handout's convention, and under each other that enough parties keep: what the BSDFs leave out,
 /// an integrator must supply, so it must not be much further off than under the handout's.
-pub fn judge(questions: &[Conventional]) -> Vec<Check> {
+///
+/// `together` judges a BSDF by the radiance that the renderer's own integrator makes of it.
+pub fn judge(questions: &[Conventional], together: &dyn Fn() -> Vec<(Party, Check)>) -> Vec<Check> {
     let mut checks: Vec<Check> =
         questions.iter().map(|question| (question.judge)(&Convention::default())).collect();
     if checks.iter().all(|check| check.verdict != Verdict::Fail) {
@@ -137,7 +142,70 @@ pub fn judge(questions: &[Conventional]) -> Vec<Check> {
             }));
         }
     }
+    let handouts = &checks[..questions.len()];
+    if limit > 0.0 {
+        let own = judge_together(questions, handouts, &together());
+        checks.extend(own);
+    }
     checks
+}
+
+/// The checks under a convention of the renderer's own, if it has one: integrator and one BSDF are wrong each alone, and
+/// right together on every scene, or so but for a slip that does not explain the BSDF alone. Then the integrator is
+/// right, and what it makes of the other BSDF is that one's matter. A BSDF that is right alone mends nothing: what an
+/// integrator does wrong may not show on its surfaces.
+fn judge_together(
+    questions: &[Conventional],
+    handouts: &[Check],
+    together: &[(Party, Check)],
+) -> Vec<Check> {
+    let of = |party: Party| together.iter().filter(move |(own, _)| *own == party);
+    let judged = |party: Party| {
+        of(party).any(|(_, check)| matches!(check.verdict, Verdict::Pass | Verdict::Fail))
+    };
+    let is_wrong_alone = |party: Party| {
+        let mut own = questions.iter().zip(handouts);
+        own.any(|(question, check)| question.party == party && check.verdict == Verdict::Fail)
+    };
+    let is_explained_alone = |party: Party| {
+        let own = questions.iter().zip(handouts);
+        let own = own.filter(|(question, _)| question.party == party).map(|(_, check)| check);
+        price::are_mostly_explained(own)
+    };
+    let mends = |party: Party| {
+        let failed = of(party).map(|(_, check)| check);
+        let failed: Vec<&Check> = failed.filter(|check| check.verdict == Verdict::Fail).collect();
+        let right = failed.is_empty();
+        let but_for_a_slip = price::are_slight(failed) && !is_explained_alone(party);
+        is_wrong_alone(party) && judged(party) && (right || but_for_a_slip)
+    };
+    if !is_wrong_alone(Party::Integrator) || ![Party::Diffuse, Party::Phong].into_iter().any(mends)
+    {
+        return Vec::new();
+    }
+    let alone = questions.iter().zip(handouts).map(|(question, check)| {
+        let verdict = match (question.party, check.verdict) {
+            (Party::Integrator, Verdict::Fail) => Verdict::Pass,
+            // Its surfaces tell.
+            (Party::Diffuse | Party::Phong, Verdict::Pass | Verdict::Fail)
+                if judged(question.party) =>
+            {
+                Verdict::NotJudged
+            }
+            (_, verdict) => verdict,
+        };
+        if verdict == check.verdict {
+            return check.clone();
+        }
+        let summary = "right together with the BSDFs".to_owned();
+        Check::new(check.id, &check.scene, verdict, summary)
+    });
+    let all = alone.chain(together.iter().map(|(_, check)| check.clone()));
+    let named = all.map(|check| {
+        let summary = format!("{} (judged so: {OF_ITS_OWN})", check.summary);
+        Check { convention: OF_ITS_OWN.to_owned(), summary, ..check }
+    });
+    named.collect()
 }
 
 #[cfg(test)]
@@ -164,7 +232,10 @@ mod tests {
             let parties = [Party::Diffuse, Party::Phong, Party::Integrator];
             let questions: Vec<_> =
                 parties.into_iter().zip(kept).map(|(party, kept)| question(party, kept)).collect();
-            judge(&questions).into_iter().map(|check| check.convention).collect::<Vec<_>>()
+            judge(&questions, &Vec::new)
+                .into_iter()
+                .map(|check| check.convention)
+                .collect::<Vec<_>>()
         };
         assert_eq!(names([own; 3]), [""; 3]);
         let name = cosine.name();
@@ -175,6 +246,50 @@ mod tests {
         // An integrator that is wrong either way does not tell.
         let other = Convention { pi: -1, ..own };
         assert_eq!(names([cosine, cosine, other]), ["", "", "", &name, &name, &name]);
+    }
+
+    #[test]
+    fn a_convention_of_its_own_is_told_by_what_integrator_and_bsdfs_make_of_each_other() {
+        let of = |verdict: Verdict, id: CheckId, mistake: &str| {
+            let error = if mistake.is_empty() { 0.9 } else { 0.02 };
+            let check = Check { error, ..Check::new(id, "s", verdict, "") };
+            Check { mistake: mistake.to_owned(), ..check }
+        };
+        let (pass, fail) = (Verdict::Pass, Verdict::Fail);
+        let ids = [CheckId::BsdfDiffuse, CheckId::BsdfPhong, CheckId::RadianceLit];
+        let parties = [Party::Diffuse, Party::Phong, Party::Integrator];
+        let judge = |alone: [(Verdict, &'static str); 3], together: [(Verdict, &str); 2]| {
+            let questions: Vec<Conventional> = (0..3)
+                .map(|index| Conventional {
+                    party: parties[index],
+                    passes: Box::new(|_| false),
+                    judge: Box::new(move |_| of(alone[index].0, ids[index], alone[index].1)),
+                })
+                .collect();
+            let together = || {
+                let check = |index: usize| of(together[index].0, ids[index], together[index].1);
+                (0..2).map(|index| (parties[index], check(index))).collect()
+            };
+            let checks = judge(&questions, &together);
+            let own = checks.iter().filter(|check| check.convention == OF_ITS_OWN);
+            let judged = own.filter(|check| check.verdict != Verdict::NotJudged);
+            judged.map(|check| (check.id, check.verdict, check.error)).collect::<Vec<_>>()
+        };
+        let (wrong, slip) = ((fail, ""), (fail, "n + 1 for n + 2"));
+        let right = (pass, "");
+        let [diffuse, phong, light] = ids;
+        let passes = |id| (id, pass, 0.9);
+        // Both BSDFs keep it, and one has a slip besides: that is what it loses.
+        let found = judge([wrong, wrong, wrong], [right, slip]);
+        assert_eq!(found, [(light, pass, 0.0), passes(diffuse), (phong, fail, 0.02)]);
+        // Neither is right, but a slip is all that one lacks.
+        let found = judge([wrong, wrong, wrong], [wrong, slip]);
+        assert_eq!(found, [(light, pass, 0.0), (diffuse, fail, 0.9), (phong, fail, 0.02)]);
+        // A BSDF that is right alone mends nothing, nor one that a slip explains alone and together.
+        assert_eq!(judge([right, wrong, wrong], [right, wrong]), []);
+        assert_eq!(judge([wrong, slip, wrong], [wrong, slip]), []);
+        // An integrator that is right keeps the handout's convention.
+        assert_eq!(judge([wrong, wrong, right], [right, right]), []);
     }
 
     #[test]

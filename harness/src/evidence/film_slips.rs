@@ -83,6 +83,47 @@ impl<'a> Film<'a> {
         Change { name, noise, value: Box::new(value) }
     }
 
+    /// Each pixel shows the sum of all before it in its row, and its own.
+    fn summed(self, name: &'static str) -> Change<'a> {
+        let rows = self.pixels.chunks(self.width).flat_map(|row| {
+            row.iter().scan([0.0f64; 3], |sum, pixel| {
+                *sum = std::array::from_fn(|c| sum[c] + f64::from(pixel[c]));
+                Some(sum.map(|v| v as f32))
+            })
+        });
+        let sums: Vec<[f32; 3]> = rows.collect();
+        let noise = (self.width as f32).sqrt();
+        Change { name, noise, value: Box::new(move |index| Some([sums[index]; 2])) }
+    }
+
+    /// Whole rows or columns are black or no numbers where something should be: at most half of the film. Nothing where
+    /// none is.
+    fn missing(self, image: &[[f32; 3]]) -> Option<Change<'a>> {
+        let is_black = |pixels: &[[f32; 3]], index: usize| pixels[index] == [0.0; 3];
+        let row = |y: usize| (0..self.width).map(move |x| y * self.width + x).collect::<Vec<_>>();
+        let column =
+            |x: usize| (0..self.height).map(move |y| y * self.width + x).collect::<Vec<_>>();
+        let lines = (0..self.height).map(row).chain((0..self.width).map(column));
+        let is_missing = |line: &Vec<usize>| {
+            let is_drawn = |index: &usize| {
+                !is_black(image, *index) && image[*index].iter().all(|v| v.is_finite())
+            };
+            !line.iter().any(is_drawn) && line.iter().any(|index| !is_black(self.pixels, *index))
+        };
+        let mut missing = vec![false; image.len()];
+        lines.filter(is_missing).flatten().for_each(|index| missing[index] = true);
+        let count = missing.iter().filter(|missing| **missing).count();
+        let value = move |index: usize| {
+            Some([if missing[index] { [0.0; 3] } else { self.pixels[index] }; 2])
+        };
+        let name = "some rows or columns are not drawn";
+        (count > 0 && 2 * count <= image.len()).then(|| Change {
+            name,
+            noise: 1.0,
+            value: Box::new(value),
+        })
+    }
+
     /// The slips that are looked for; `factor` is what most pixels are multiplied by.
     fn changes(self, factor: f32) -> Vec<Change<'a>> {
         let (width, height) = (self.width as f64, self.height as f64);
@@ -136,6 +177,12 @@ impl<'a> Film<'a> {
             changes.push(zoomed("the aspect ratio is missing", by, 1.0));
             changes.push(zoomed("the aspect ratio is missing", 1.0, by));
         }
+        // Width and height in each other's place.
+        changes.push(self.moved("the film's width and height are exchanged for the camera", {
+            let by = height / width;
+            move |x, y| (0.5 * width + by * (x + 0.5 - 0.5 * height) - 0.5, by * (y + 0.5) - 0.5)
+        }));
+        changes.push(self.summed("the sum goes on from pixel to pixel of a row"));
         // Half an angle, a whole one, degrees of another: within an eighth of any.
         changes.extend((-24..=24).filter(|step| *step != 0).map(|step: i32| {
             let by = 2f64.powf(f64::from(step) / 16.0);
@@ -178,7 +225,9 @@ pub fn film_price(
         true => Price::of_raw(raw).or(price::UNKNOWN, Class::Unknown, 0.0),
         false => Price::of_raw(raw),
     };
-    film.changes(factor).iter().fold(start, |price, change| {
+    let mut changes = film.changes(factor);
+    changes.extend(film.missing(image));
+    changes.iter().fold(start, |price, change| {
         let (mut apart, mut total) = (0.0, 0.0);
         let (mut all, mut known) = (0usize, 0usize);
         let mut pairs = Moments::default();
@@ -191,7 +240,9 @@ pub fn film_price(
                 if !(least.is_finite() && most.is_finite()) {
                     continue;
                 }
-                pairs.add(1.0, f64::from(a), f64::from(least + most) / 2.0);
+                if a.is_finite() {
+                    pairs.add(1.0, f64::from(a), f64::from(least + most) / 2.0);
+                }
                 let size = f64::from(least.abs().max(most.abs()));
                 total += size;
                 let difference = match a.is_finite() {
@@ -225,6 +276,44 @@ fn factor(image: &[[f32; 3]], expected: &[[f32; 3]]) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slips_of_loop_and_camera_explain_an_image() {
+        let (width, height) = (40usize, 30usize);
+        let at = |x: f32, y: f32| 3.0 + 2.0 * (0.11 * x).sin() * (0.13 * y + 0.1 * x).cos();
+        let film = |of: &dyn Fn(usize, usize) -> f32| -> Vec<[f32; 3]> {
+            (0..width * height).map(|index| [of(index % width, index / width); 3]).collect()
+        };
+        let right = film(&|x, y| at(x as f32 + 0.5, y as f32 + 0.5));
+        let price =
+            |image: &[[f32; 3]]| film_price((width, height), image, &right, &|_| Some(0.0), 0.9);
+        let row = |x: usize, y: usize| (0..=x).map(|x| right[y * width + x][0]).sum::<f32>();
+        let exchanged = film(&|x, y| {
+            let (x, y, by) = (x as f32 + 0.5, y as f32 + 0.5, 30.0 / 40.0);
+            at(20.0 + by * (x - 15.0), by * y)
+        });
+        let drawn = |wanted: &dyn Fn(usize, usize) -> bool| {
+            film(&|x, y| if wanted(x, y) { right[y * width + x][0] } else { 0.0 })
+        };
+        let tiles = drawn(&|x, y| x < 32 && y < 24);
+        let broken = film(&|x, y| if y < 16 { right[y * width + x][0] } else { f32::NAN });
+        let rows = drawn(&|_, y| y.is_multiple_of(2));
+        for (image, what) in [
+            (film(&row), "sum"),
+            (exchanged, "camera"),
+            (tiles, "tiles"),
+            (broken, "no numbers"),
+            (rows, "rows"),
+        ] {
+            let price = price(&image);
+            assert!(price.error < 0.04, "{what}: {} {}", price.error, price.name());
+        }
+        // Little is drawn, or what is drawn is wrong: no slip.
+        assert!(price(&drawn(&|x, _| x < 10)).error > 0.3);
+        assert!(
+            price(&film(&|x, y| if y < 16 { at(y as f32, x as f32) } else { 0.0 })).error > 0.1
+        );
+    }
 
     #[test]
     fn an_image_that_does_not_follow_the_right_one_is_explained_by_no_slip() {

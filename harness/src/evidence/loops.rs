@@ -257,8 +257,9 @@ pub fn judge_samples(
             inside += usize::from(!near(index).any(|i| own[i].is_some_and(|p| p.is_edge(typical))));
             first = first.or(Some((index, found, pixel.mean)));
         }
-        if pixel.is_edge(typical) {
-            let z = difference / error;
+        let z = difference / error;
+        // One that is off counts above: a glint that no ray met is no edge.
+        if pixel.is_edge(typical) && z.abs() <= Z_LIMIT {
             let (count, squares) = &mut edges.0[pixel.direction()];
             (*count, *squares) = (*count + 1, *squares + z * z);
             (bias, edge_count) = (bias + z, edge_count + 1);

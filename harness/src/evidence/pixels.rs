@@ -157,6 +157,17 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
             }),
         ),
         of(
+            "the normal is that of a triangle's first corner",
+            Class::Slip,
+            Box::new(move |point| {
+                let shape = &scene.shapes()[point.shape];
+                let corner = shape.triangles[point.primitive][0] as usize;
+                let normal = shape.normals.get(corner).copied().unwrap_or(point.normal);
+                let normal = normal.try_normalize().unwrap_or(point.normal);
+                right.shaded_point(scene, &SurfacePoint { normal, ..*point })
+            }),
+        ),
+        of(
             "the normal points up",
             Class::Concept,
             Box::new(move |point| {

@@ -33,6 +33,13 @@ impl Class {
     }
 }
 
+/// The error of two slips together: they lose what both lose alone.
+const TWO_SLIPS: f64 = 0.0686;
+/// What two slips may leave unexplained.
+const LEFT_BY_TWO: f64 = 0.01;
+/// Number of questions that tell which two they may be.
+const FEW: usize = 200;
+
 /// Answers to be compared with the right ones.
 pub struct Answers<'a> {
     /// What was answered.
@@ -136,10 +143,30 @@ impl Check {
 }
 
 /// Whether one mistake explains a check's answers and leaves next to nothing.
-pub(super) fn is_explained(check: &Check) -> bool {
+pub fn is_explained(check: &Check) -> bool {
     let leaves_nothing = |class: Class| (check.error - class.price()).abs() < 1e-3;
     let is_known = ![UNKNOWN, ""].contains(&check.mistake.as_str());
     is_known && [Class::Slip, Class::Concept].into_iter().any(leaves_nothing)
+}
+
+/// Whether a failed check is no further off than a slip: what one explains may leave as much as a seam does.
+fn is_slight(check: &Check) -> bool {
+    let is_known = ![UNKNOWN, ""].contains(&check.mistake.as_str());
+    check.error <= if is_known { 1.5 } else { 1.0 } * Class::Slip.price()
+}
+
+/// Whether failed checks are no further off than a slip.
+pub fn are_slight<'a>(checks: impl IntoIterator<Item = &'a Check>) -> bool {
+    checks.into_iter().all(is_slight)
+}
+
+/// Whether the failed ones of these checks are slight, or explained by single mistakes, on most scenes.
+pub fn are_mostly_explained<'a>(checks: impl IntoIterator<Item = &'a Check>) -> bool {
+    let failed = checks.into_iter().filter(|check| check.verdict == Verdict::Fail);
+    let (all, explained) = failed.fold((0usize, 0usize), |(all, explained), check| {
+        (all + 1, explained + usize::from(is_explained(check) || is_slight(check)))
+    });
+    2 * explained > all
 }
 
 /// If one mistake explains a check on most scenes, and nothing known explains it on the others, the others cost no
@@ -254,7 +281,7 @@ impl Answers<'_> {
             true => price.or(UNKNOWN, Class::Unknown, 0.0),
             false => price,
         };
-        self.changes.iter().fold(price, |price, change| {
+        let price = self.changes.iter().fold(price, |price, change| {
             let (shading, factors, class) = match (change.shading, change.fitted) {
                 (Some(shading), _) => (shading, Factors::default(), change.class),
                 (None, Some(fitted)) => match self.fit(&questions, fitted) {
@@ -267,7 +294,110 @@ impl Answers<'_> {
                 true => price.or(change.name, class, self.residual(&questions, &shading, &factors)),
                 false => price,
             }
-        })
+        });
+        // A concept that explains them is one: without falloff is no r in place of r^2, made twice.
+        let is_concept = self.changes.iter().any(|change| {
+            let left = price.error - Class::Concept.price();
+            price.mistake == Some(change.name)
+                && left <= LEFT_BY_TWO
+                && (change.class == Class::Concept || left >= 0.0)
+        });
+        match price.error > TWO_SLIPS && !is_concept && self.are_of_two_slips(&questions) {
+            true => Price { error: TWO_SLIPS, mistake: Some("two slips"), ..price },
+            false => price,
+        }
+    }
+
+    /// Whether two slips explain the answers, or a slip and a constant factor. Of two factors of the right value their
+    /// product is taken, of two that light what should be black the sum. Tests that are missing go with any other slip.
+    fn are_of_two_slips(&self, questions: &[usize]) -> bool {
+        let slips: Vec<Shading> = self
+            .changes
+            .iter()
+            .filter(|change| change.class == Class::Slip)
+            .filter_map(|change| change.shading)
+            .collect();
+        let right = Shading::default();
+        let both = |right: f64, a: f64, b: f64| {
+            if right != 0.0 { a / right * b } else { a + b }
+        };
+        let few: Vec<usize> =
+            questions.iter().copied().step_by(questions.len().div_ceil(FEW).max(1)).collect();
+        let values = |shading: &Shading| -> Vec<[f64; 3]> {
+            few.iter().map(|&index| (self.of)(index, shading)).collect()
+        };
+        let found: Vec<[f64; 3]> =
+            few.iter().map(|&index| self.found[index].map(f64::from)).collect();
+        let (plain, all) = (values(&right), slips.iter().map(values).collect::<Vec<_>>());
+        // Most pairs are told by a few questions.
+        let explains = |of: &dyn Fn(usize, usize) -> f64| {
+            let (mut apart, mut total) = (0.0, 0.0);
+            for (at, &index) in few.iter().enumerate() {
+                let unit = (self.unit)(index);
+                for c in 0..3 {
+                    let (found, told) = (found[at][c], of(at, c));
+                    if found.is_finite() != told.is_finite() {
+                        return false;
+                    }
+                    if told.is_finite() {
+                        let room = self.relative * told.abs() + 1e-6 * unit;
+                        let difference = (found - told).abs();
+                        apart += if difference <= room { 0.0 } else { difference / unit };
+                        total += told.abs() / unit;
+                    }
+                }
+            }
+            total > 0.0 && apart <= LEFT_BY_TWO * total
+        };
+        let surely = |of: &dyn Fn(usize) -> [f64; 3]| {
+            let residual = self.residual_of(questions, of);
+            residual <= LEFT_BY_TWO
+        };
+        let pairs = (0..slips.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+        let two = pairs
+            .filter(|&(a, b)| explains(&|at, c| both(plain[at][c], all[a][at][c], all[b][at][c])));
+        let is_untested = |shading: &&Shading| {
+            !(shading.tests_wi && shading.tests_wo) || shading.tests_both_at_once
+        };
+        let untested = slips.iter().filter(is_untested).flat_map(|a| {
+            let tested = slips.iter().filter(|b| !is_untested(b));
+            tested.map(|b| Shading {
+                tests_wi: a.tests_wi,
+                tests_wo: a.tests_wo,
+                tests_both_at_once: a.tests_both_at_once,
+                ..*b
+            })
+        });
+        let mut untested = untested.filter(|shading| {
+            let values = values(shading);
+            explains(&|at, c| values[at][c])
+        });
+        if untested.any(|shading| surely(&|index| (self.of)(index, &shading))) {
+            return true;
+        }
+        let one_and_factor = (0..slips.len()).filter_map(|a| {
+            let mut ratios: Vec<f64> = Vec::new();
+            for (at, &index) in few.iter().enumerate() {
+                let tells = |c: &usize| all[a][at][*c].abs() > 0.01 * (self.unit)(index);
+                ratios.extend((0..3).filter(tells).map(|c| found[at][c] / all[a][at][c]));
+            }
+            ratios.retain(|ratio| ratio.is_finite());
+            ratios.sort_by(f64::total_cmp);
+            let factor = *ratios.get(ratios.len() / 2)?;
+            let told = factor.abs() >= NOTHING && explains(&|at, c| factor * all[a][at][c]);
+            told.then_some((a, factor))
+        });
+        let of_two = |(a, b): (usize, usize)| {
+            surely(&|index| {
+                let [plain, a, b] =
+                    [&right, &slips[a], &slips[b]].map(|shading| (self.of)(index, shading));
+                std::array::from_fn(|c| both(plain[c], a[c], b[c]))
+            })
+        };
+        let of_factor = |(a, factor): (usize, f64)| {
+            surely(&|index| (self.of)(index, &slips[a]).map(|value| factor * value))
+        };
+        two.map(of_two).any(|told| told) || one_and_factor.map(of_factor).any(|told| told)
     }
 
     /// Whether the answers follow those of a changed renderer.
@@ -312,15 +442,22 @@ impl Answers<'_> {
 
     /// Sum of differences from what `shading` answers over the sum of that, in the worst group.
     fn residual(&self, questions: &[usize], shading: &Shading, factors: &Factors) -> f64 {
+        self.residual_of(questions, &|index| {
+            let (changed, factors) = ((self.of)(index, shading), self.factors(factors, index));
+            std::array::from_fn(|c| factors[c] * changed[c])
+        })
+    }
+
+    /// The same for any answers.
+    fn residual_of(&self, questions: &[usize], of: &dyn Fn(usize) -> [f64; 3]) -> f64 {
         let mut groups: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
         for &index in questions {
             let unit = (self.unit)(index);
-            let changed = (self.of)(index, shading);
+            let changed = of(index);
             let group = (self.group)(index);
-            let factors = self.factors(factors, index);
             let (apart, total) = groups.entry(group).or_default();
             for c in 0..3 {
-                let (a, b) = (f64::from(self.found[index][c]), factors[c] * changed[c]);
+                let (a, b) = (f64::from(self.found[index][c]), changed[c]);
                 let difference = match (a.is_finite(), b.is_finite()) {
                     (true, true) => (a - b).abs(),
                     (false, false) => 0.0,
@@ -453,6 +590,7 @@ pub fn partly(price: Price, lit_wrong: f64, dark_wrong: f64) -> Price {
 #[cfg(test)]
 mod tests {
     use super::super::changes::shader_changes;
+    use super::super::shading::ShadedPoint;
     use super::*;
 
     fn failed(scene: &str, mistake: &str, error: f64) -> Check {
@@ -484,6 +622,57 @@ mod tests {
         assert_eq!(agreed(&[(UNKNOWN, 0.4), (UNKNOWN, 0.4), (slip, 0.8)]), [0.4, 0.4, 0.4]);
         assert_eq!(agreed(&[(UNKNOWN, 0.4), ("", 0.3), ("", 1.0)]), [0.4, 0.3, 1.0]);
         assert_eq!(agreed(&[(UNKNOWN, 0.4), (BLACK, 1.0)]), [0.4, 1.0]);
+    }
+
+    #[test]
+    fn two_slips_lose_what_both_lose() {
+        let right = Shading::default();
+        let point = |index: usize| {
+            let z = 0.05 + 0.9 * (index as f64 * 0.37).fract();
+            let x = (1.0 - z * z).sqrt();
+            let material = renderer_api::MaterialValue {
+                model: renderer_api::MATERIAL_PHONG,
+                diffuse: [0.5, 0.25, 0.1],
+                specular: [0.2, 0.3, 0.4],
+                exponent: 4.0,
+            };
+            let wi = [x, 0.0, if index.is_multiple_of(5) { -z } else { z }];
+            let wo = [-0.6, 0.0, 0.8];
+            let distance = 1.0 + index as f64 / 50.0;
+            ShadedPoint { material, scale: 1.0, wo, wi, intensity: [1.0, 2.0, 4.0], distance }
+        };
+        let of = |index: usize, shading: &Shading| shading.radiance(&point(index));
+        let changes = shader_changes(true);
+        let price = |made: &Shading, factor: f64| {
+            let shown = |index| of(index, made).map(|value| (factor * value) as f32);
+            let found: Vec<[f32; 3]> = (0..200).map(shown).collect();
+            let (unit, group) = (|_| 0.3, |_| 0);
+            let answers = Answers {
+                found: &found,
+                of: &of,
+                unit: &unit,
+                group: &group,
+                relative: 1e-3,
+                changes: &changes,
+            };
+            answers.price(None)
+        };
+        let lobe = |n: f64| (n + 1.0) / std::f64::consts::TAU;
+        let two_cosines = Shading { cos_i: [2.0; 2], ..right };
+        for (made, factor) in [
+            (two_cosines, 3.0),
+            (Shading { normalization: lobe, ..two_cosines }, 1.0),
+            (Shading { normalization: lobe, tests_wi: false, ..right }, 1.0),
+            (Shading { falloff: 1.0, ..two_cosines }, 1.0),
+        ] {
+            assert_eq!(price(&made, factor).error, TWO_SLIPS, "{made:?}");
+        }
+        // One is cheaper, a third is more, and a concept is a concept.
+        let no_falloff = Shading { falloff: 0.0, ..right };
+        assert_eq!(price(&no_falloff, 1.0).error, Class::Concept.price());
+        assert_eq!(price(&two_cosines, 1.0).error, Class::Slip.price());
+        let three = Shading { falloff: 1.0, normalization: lobe, ..two_cosines };
+        assert!(price(&three, 2.0).error > TWO_SLIPS);
     }
 
     #[test]

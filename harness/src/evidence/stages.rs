@@ -128,23 +128,30 @@ const BOUND_RELATIVE: f32 = 1e-4;
 pub(super) const STRAY_FRACTION: f64 = 5e-3;
 
 /// Part 2.1: judges the frames that a student's pass drew with stages that show one bound value each.
-/// `positions` is the frame that shows world positions.
+/// `positions` is the frame that shows world positions. Asks for the values of a shape that are `wanted`; surfaces are
+/// in their place if any is not.
 pub fn judge_pass(
     scene_name: &str,
     film: &StageFilm,
     frames: &[(BoundValue, Image)],
     positions: &Image,
+    wanted: &dyn Fn(BoundValue, usize) -> bool,
 ) -> Check {
     let id = CheckId::PassUniforms;
     let (scene, camera) = (film.scene, &film.camera);
     let mut measures = Vec::new();
     let mut first_wrong = None;
+    let mut all_wanted = true;
     let (mut wrong_total, mut total) = (0usize, 0usize);
     for (bound, frame) in frames {
         let (mut wrong, mut counted) = (0usize, 0usize);
         let mut example = None;
         for (index, shape) in film.interior() {
             let Some(expected) = bound.expected(scene, camera, shape) else { continue };
+            if !wanted(*bound, shape) {
+                all_wanted = false;
+                continue;
+            }
             counted += 1;
             let found = frame.pixels[index];
             if !is_close(found, expected) {
@@ -204,6 +211,12 @@ pub fn judge_pass(
                     shapes.price(price_of_values(wrong, &measures, other))
                 }
             };
+            // What is seen has its values: one state of the pipeline is wrong, such as the depth test.
+            let few = STRAY_FRACTION * seen.all as f64;
+            let price = match seen.all_values_right && seen.empty.0 as f64 <= few {
+                true => price.or("another surface is seen", Class::Slip, 0.0),
+                false => price,
+            };
             measures.extend(price.measure());
             Check {
                 error: price.error,
@@ -213,7 +226,21 @@ pub fn judge_pass(
             .with_hint(hint)
         }
     };
-    let offset_px = median_offset_px(film, positions);
+    // Values that other surfaces share do not tell that these are seen.
+    if check.verdict == Verdict::Pass && all_wanted {
+        let seen = Seen::of(film, frames, positions);
+        let fraction = seen.elsewhere.0 as f64 / seen.all.max(1) as f64;
+        if fraction > STRAY_FRACTION
+            && fraction < HALF
+            && let Some((summary, hint)) = seen.in_words(film)
+        {
+            let error = Class::Slip.price();
+            check = Check { error, ..Check::new(id, scene_name, Verdict::Fail, summary) };
+            check = check.with_hint(hint);
+            check.mistake = "another surface is seen".to_owned();
+        }
+    }
+    let offset_px = if all_wanted { median_offset_px(film, positions) } else { 0.0 };
     let placed = Measure::at_most(
         RuleId::PassPlace,
         "surfaces off their place on the film (pixels, median)",
@@ -321,6 +348,9 @@ fn median_offset_px(film: &StageFilm, positions: &Image) -> f64 {
     }
     if 2 * offsets.len() < all { 0.0 } else { median_length(&mut offsets) }
 }
+
+/// From this fraction on, positions that are not those of the pixels tell of a vertex stage with outputs of its own.
+const HALF: f64 = 0.5;
 
 /// Positions are near, relative to their distance from the camera: a few pixels of the small film.
 const NEAR: f32 = 0.1;
@@ -580,7 +610,7 @@ mod tests {
             let point = point(index).filter(|_| drawn(index));
             point.map_or(Vec3::ZERO, |point| position(point.position))
         };
-        judge_pass("s", &film, &values, &image(&|index| shown(index)))
+        judge_pass("s", &film, &values, &image(&|index| shown(index)), &|_, _| true)
     }
 
     #[test]
@@ -599,6 +629,17 @@ mod tests {
         // A vertex stage of its own may forward anything; nothing is claimed of where that lies.
         let own = judged(0, |p| 5.0 * p);
         assert_eq!((own.verdict, place(&own)), (Verdict::Pass, Some(0.0)), "{}", own.summary);
+    }
+
+    #[test]
+    fn another_surface_of_the_same_values_is_seen() {
+        let all = |far: f32| judged(0, move |p| if p.x > far { p + Vec3::splat(50.0) } else { p });
+        let some = (0..40).map(|step| all(0.25 * step as f32 - 5.0)).find(|check| {
+            check.verdict == Verdict::Fail && check.summary.starts_with("another surface is seen")
+        });
+        assert!(some.is_some_and(|check| check.error == Class::Slip.price()));
+        // Elsewhere everywhere: outputs of a vertex stage of its own.
+        assert_eq!(all(-1e9).verdict, Verdict::Pass);
     }
 
     #[test]

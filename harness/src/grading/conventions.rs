@@ -14,7 +14,7 @@ use crate::evidence::changes;
 use crate::evidence::convention::{self, Convention, Conventional, Party};
 use crate::evidence::loops::Edges;
 use crate::evidence::physical::Probes;
-use crate::evidence::rays::{self, Unshadowed};
+use crate::evidence::rays::{self, RayBatch, Unshadowed};
 use crate::evidence::shading::{ShadedPoint, Shading};
 use crate::evidence::{Check, CheckId};
 use crate::expected::SurfacePoint;
@@ -26,6 +26,7 @@ use crate::worker::{Outcome, Request};
 pub struct Answers<'a> {
     bsdfs: Vec<BsdfAnswer>,
     lights: Vec<LightAnswer<'a>>,
+    together: Vec<TogetherAnswer>,
     /// The edges of all films of several samples per pixel.
     pub edges: Edges,
 }
@@ -45,6 +46,14 @@ struct LightAnswer<'a> {
     /// What the lit points look like to an integrator that asks the scene for no BSDF; empty for
     /// one that does.
     own: Vec<ShadedPoint>,
+}
+
+/// Radiance without shadows of the renderer's own integrator and BSDFs, where rays meet surfaces of one kind.
+struct TogetherAnswer {
+    kind: BsdfKind,
+    batch: RayBatch,
+    points: Vec<ShadedPoint>,
+    values: Vec<[f32; 3]>,
 }
 
 /// Radiance under one witness.
@@ -189,11 +198,54 @@ impl<'a> Answers<'a> {
         self.lights.push(LightAnswer { case, values, own });
     }
 
+    /// Keeps what the renderer's own integrator and BSDFs make of each other along a scene's rays, without shadows.
+    pub fn push_together(&mut self, case: &PreparedScene, radiance: &Outcome) {
+        let Some(answer) = radiance.answer() else { return };
+        let (scene, batch) = (&case.expected.scene, &case.probe_film.batch);
+        let values = session::colours(&answer.values);
+        for (kind, model) in
+            [(BsdfKind::Diffuse, MaterialModel::Diffuse), (BsdfKind::Phong, MaterialModel::Phong)]
+        {
+            let is_own = |shape| scene.material_of(shape).model == model;
+            let wanted = |index: usize| match batch.points.get(index) {
+                Some(point) => is_own(point.shape),
+                None => scene.intersect(&batch.rays[index]).is_none_or(|hit| is_own(hit.shape)),
+            };
+            let (batch, chosen) = batch.without_shadows(&wanted);
+            if batch.lit > 0 {
+                let points = batch.points.iter().map(|point| shaded_point(case, point)).collect();
+                let values = chosen.iter().map(|index| values[*index]).collect();
+                self.together.push(TogetherAnswer { kind, batch, points, values });
+            }
+        }
+    }
+
     /// The checks under the handout's convention, and under others that the plugin keeps.
     pub fn judge(&self) -> Vec<Check> {
         let bsdfs = self.bsdfs.iter().map(BsdfAnswer::question);
         let lights = self.lights.iter().map(LightAnswer::question);
-        convention::judge(&bsdfs.chain(lights).collect::<Vec<_>>())
+        let together = || self.together.iter().map(TogetherAnswer::judge).collect();
+        convention::judge(&bsdfs.chain(lights).collect::<Vec<_>>(), &together)
+    }
+}
+
+impl TogetherAnswer {
+    fn judge(&self) -> (Party, Check) {
+        let (party, id, changes) = match self.kind {
+            BsdfKind::Diffuse => (Party::Diffuse, CheckId::BsdfDiffuse, changes::diffuse_changes()),
+            BsdfKind::Phong => (Party::Phong, CheckId::BsdfPhong, changes::phong_changes()),
+        };
+        let answer = Unshadowed {
+            witness: "the renderer's own",
+            of: &|index, shading| shading.radiance(&self.points[index]),
+            values: &self.values,
+            black_below: true,
+        };
+        let handout = Convention::default();
+        let mut check = rays::judge_unshadowed(&self.batch, &[answer], &handout, &changes);
+        // The rules are those of another check.
+        check.measures.iter_mut().for_each(|measure| measure.rule = None);
+        (party, Check { id, ..check })
     }
 }
 

@@ -48,7 +48,8 @@ impl Grading<'_> {
         drawn: &[Drawn],
         out: Option<&Path>,
     ) -> anyhow::Result<(Vec<Diagnosis>, Vec<ViewedCase>)> {
-        let (evidence, failing) = (public(evidence), self.failing(evidence));
+        let failing = self.failing(evidence);
+        let evidence = rubric::settle(&self.assignment.rules, &public(evidence));
         let nothing = Stored::default();
         let stored = match self.stored.get() {
             _ if failing.is_empty() => &nothing,

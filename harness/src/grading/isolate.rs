@@ -4,11 +4,12 @@
 use std::ops::Range;
 use std::path::Path;
 
-use basecode::{Image, Vec3};
+use basecode::{Image, MaterialModel, Vec3};
 
 use super::draw::{Frame, draw_scenes};
 use super::kept_frames::draw_sets;
 use super::observe;
+use super::own_frames;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session, headline};
 use super::stages::Stages;
@@ -50,14 +51,14 @@ struct PassFrames {
 
 /// Judges the student's pass with Umbra's stages (2.1) and the student's stages in Umbra's pass (2.2 to 2.4) on scenes.
 /// One worker draws all frames of the former; another, without any of the student's Rust code, draws those of the
-/// latter. `fails` says whether the student's own frame of some scene got no answer: then a stage that does not compile
-/// is to blame, otherwise no frame needs it.
+/// latter. `own_frames` is what the student's own frames show. The flag says whether one of some scene got no answer: then a
+/// stage that does not compile is to blame, otherwise no frame needs it.
 pub fn isolate(
     session: &Session,
     plugin: &Path,
     cases: &[PreparedScene],
     stages: &Stages,
-    fails: bool,
+    (own_frames, fails): (&[Check], bool),
     tolerances: &Tolerances,
 ) -> Vec<Check> {
     let (swaps, sets) = swaps(stages);
@@ -133,6 +134,9 @@ pub fn isolate(
         checks.extend((0..STAGES.len()).map(&mut stage));
     }
     checks.extend(shown.judge_premultiplied(tolerances));
+    let pass_of = |wanted: own_frames::Wanted| shown.judge_passes(wanted);
+    let together = own_frames::judge(&checks, own_frames, &pass_of);
+    checks.extend(together);
     checks
 }
 
@@ -145,6 +149,16 @@ struct Shown<'a> {
 }
 
 impl Shown<'_> {
+    /// The checks of the pass by the values that are wanted of a scene's shapes.
+    fn judge_passes(&self, wanted: own_frames::Wanted) -> Vec<Check> {
+        let judge = |(case, frames): &(&PreparedScene, PassFrames)| {
+            let scene = &case.expected.scene;
+            let phong = |shape| scene.material_of(shape).model == MaterialModel::Phong;
+            judge_pass_by(case, frames, &|bound, shape| wanted(bound, phong(shape)))
+        };
+        self.passes.iter().map(judge).collect()
+    }
+
     /// The checks under each convention that the pass keeps on all scenes, and a fragment stage with it.
     fn judge_premultiplied(&self, tolerances: &Tolerances) -> Vec<Check> {
         let fits = |check: &Check| check.verdict != Verdict::Fail;
@@ -273,9 +287,17 @@ fn pass_frames(case: &PreparedScene, outcomes: &[Outcome]) -> Result<PassFrames,
 }
 
 fn judge_pass_frames(case: &PreparedScene, frames: &PassFrames) -> Check {
-    let judge =
-        |film: &StageFilm, name: &str| judge_pass(name, film, &frames.bound, &frames.positions);
-    on_film(CheckId::PassUniforms, case, judge)
+    judge_pass_by(case, frames, &|_, _| true)
+}
+
+fn judge_pass_by(
+    case: &PreparedScene,
+    frames: &PassFrames,
+    wanted: &dyn Fn(BoundValue, usize) -> bool,
+) -> Check {
+    on_film(CheckId::PassUniforms, case, |film, name| {
+        judge_pass(name, film, &frames.bound, &frames.positions, wanted)
+    })
 }
 
 /// Judges on the small film of a scene.

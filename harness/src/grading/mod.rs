@@ -16,6 +16,7 @@ mod measure_reference;
 mod observe;
 mod offline;
 mod one_of_batch;
+mod own_frames;
 mod paths;
 mod pictures;
 mod pipeline;

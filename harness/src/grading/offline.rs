@@ -148,6 +148,7 @@ pub fn judge_scene<'a>(
             asked.map(|(outcome, (witness, name))| (*outcome, witness, name)).collect();
         asked.push((flat_off, FLAT, "constant, below the surface too"));
         answers.push_light(case, &asked);
+        answers.push_together(case, true_off);
         let flat = |point: &SurfacePoint| value(FLAT, point.wi, point.wo);
         let shadows = judge_shadows(case, &flat, (flat_on, flat_off), (true_on, true_off));
         for ((witness, _), outcome) in WITNESSES.iter().zip(witnessed) {
@@ -156,7 +157,10 @@ pub fn judge_scene<'a>(
             }
         }
         let both = observe::colours(flat_on).zip(observe::colours(flat_off));
-        if let (Verdict::Fail, Some((with, without))) = (shadows.verdict, both) {
+        // Of a switch that does the opposite, visibility by its position says something else.
+        let is_inverted = shadows.mistake == rays::INVERTED;
+        if let (Verdict::Fail, Some((with, without)), false) = (shadows.verdict, both, is_inverted)
+        {
             observe::shadows(session, case, with, without);
         }
         checks.push(shadows);
@@ -166,7 +170,8 @@ pub fn judge_scene<'a>(
             let radiance = session::colours(&radiance.values);
             checks.push(rays::judge_material(&small.batch, &own, radiance));
         }
-        record_rays(session, case, w1, (flat_on, flat_off));
+        let flat = if is_inverted { (flat_off, flat_on) } else { (flat_on, flat_off) };
+        record_rays(session, case, w1, flat);
     }
     if let (Outcome::Done(image), Outcome::Done(along)) = (one_spp, along_centres) {
         record_loop(session, case, (&image.values, &along.values));

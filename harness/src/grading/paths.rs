@@ -117,7 +117,9 @@ impl Grading<'_> {
             // Right end to end is enough. Where an image is wrong, pass and stages are taken apart on all scenes:
             // what a stage does not test may show only on a scene that a wrong pass draws right.
             if !is_right {
-                checks.extend(isolate::isolate(session, plugin, cases, stages, fails, tolerances));
+                let own = (&checks[begin..], fails);
+                let found = isolate::isolate(session, plugin, cases, stages, own, tolerances);
+                checks.extend(found);
             }
             price::settle_by_common_mistake(&mut checks[begin..]);
             mark(&mut checks[begin..], cases);

@@ -42,7 +42,7 @@ pub fn judge(session: &Session, plugin: &Path, scene: &Path) -> anyhow::Result<V
     let bits = |image: &[f32]| image.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
     let same = bits(one) == bits(four) && bits(four) == bits(again);
     let correlation = row_correlation(one, other, 3 * width as usize);
-    Ok(vec![
+    let mut checks = vec![
         check(
             CheckId::SamplerThreads,
             same,
@@ -69,7 +69,16 @@ pub fn judge(session: &Session, plugin: &Path, scene: &Path) -> anyhow::Result<V
             },
             "seed the samplers with the job's seed, the student id",
         ),
-    ])
+    ];
+    checks.retain(|check| {
+        check.id == CheckId::SamplerThreads || shows_samples(one) || shows_samples(other)
+    });
+    Ok(checks)
+}
+
+/// Whether an image can tell of samples: one color, such as black, cannot.
+fn shows_samples(image: &[f32]) -> bool {
+    image.chunks(3).any(|pixel| pixel != &image[..3])
 }
 
 /// How alike the noise of neighboring rows is: 0 when it is independent, 1 when it is the same.
@@ -83,6 +92,13 @@ pub fn row_correlation(one: &[f32], other: &[f32], row_floats: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_color_tells_of_no_samples() {
+        assert!(!shows_samples(&[0.0; 12]) && !shows_samples(&[]));
+        assert!(!shows_samples(&[0.1, 0.2, 0.3, 0.1, 0.2, 0.3]));
+        assert!(shows_samples(&[0.0, 0.0, 0.0, 0.0, 0.1, 0.0]));
+    }
 
     #[test]
     fn rows_of_one_seed_are_told_from_rows_of_their_own() {

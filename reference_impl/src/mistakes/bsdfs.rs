@@ -34,6 +34,7 @@ impl Diffuse {
 impl Bsdf for Diffuse {
     fn eval(&self, i: &SurfaceInteraction) -> Vec3 {
         let has = |mistake| self.mistakes.has(mistake);
+        let i = &turned(&self.mistakes, i);
         let wi = incoming(&self.mistakes, i);
         let mut cos_i = if has(M::DiffuseAxisY) { wi.y } else { Frame::cos_theta(wi) };
         let cos_o = Frame::cos_theta(i.wo);
@@ -88,6 +89,19 @@ impl Bsdf for Diffuse {
         }
         if has(M::DiffuseChannelsSwapped) { blue_first(value) } else { value }
     }
+}
+
+/// The point with its directions in the local frame, where the integrator has not turned them.
+pub fn turned(mistakes: &Mistakes, i: &SurfaceInteraction) -> SurfaceInteraction {
+    let mut turned = *i;
+    if mistakes.has(M::DirectionsInWorld) {
+        turned.wi = i.frame_ns.to_local(i.wi);
+        turned.wo = i.frame_ns.to_local(i.wo);
+    }
+    if mistakes.has(M::WiFromLight) {
+        turned.wi = -turned.wi;
+    }
+    turned
 }
 
 /// The direction toward the light, of unit length where the integrator has not seen to it.

@@ -32,11 +32,14 @@ impl Integrator for Mistaken {
         let cos_i = Frame::cos_theta(i.wi);
         let cos_o = Frame::cos_theta(i.wo);
         let mut visible = 1.0;
-        if self.shadows && !has(M::NoShadows) {
+        if (self.shadows != has(M::SwitchInverted)) && !has(M::NoShadows) {
             // Whatever the BSDF is told, the shadow ray leads from the surface to the light.
             let way = self.light_position(scene) - i.p;
             let far = way.length();
             visible = visibility(&self.mistakes, scene, ray, &mut i, (way / far, far));
+        }
+        if visible == 0.0 && has(M::ShadowColor) {
+            return Vec3::splat(0.05);
         }
         if visible == 0.0 || has(M::IntegratorBlack) {
             return Vec3::ZERO;
@@ -101,7 +104,10 @@ impl Mistaken {
         let long = has(M::WiNotNormalised) || has(M::WiUnnormalised);
         let wi = if long { to_light } else { direction };
         i.wi = if has(M::WorldWi) { wi } else { i.frame_ns.to_local(wi) };
-        if has(M::WiReversed) {
+        if has(M::DirectionsInWorld) {
+            (i.wi, i.wo) = (direction, -ray.direction);
+        }
+        if has(M::WiReversed) || has(M::WiFromLight) {
             i.wi = -i.wi;
         }
         if has(M::WiIsWo) {

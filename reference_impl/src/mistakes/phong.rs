@@ -4,7 +4,7 @@ use basecode::{
     Bsdf, Frame, INV_PI, INV_TWO_PI, Material, SurfaceInteraction, Texture, Vec3, vec3,
 };
 
-use super::bsdfs::{blue_first, first_texel, incoming};
+use super::bsdfs::{blue_first, first_texel, incoming, turned};
 use super::{Mistake as M, Mistakes};
 
 pub struct Phong {
@@ -158,6 +158,7 @@ impl Phong {
 
 impl Bsdf for Phong {
     fn eval(&self, i: &SurfaceInteraction) -> Vec3 {
+        let i = &turned(&self.mistakes, i);
         let has = |mistake| self.mistakes.has(mistake);
         let wi = incoming(&self.mistakes, i);
         let (mut cos_i, cos_o) = (Frame::cos_theta(wi), Frame::cos_theta(i.wo));

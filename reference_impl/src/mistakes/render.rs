@@ -26,8 +26,17 @@ pub fn render(
         let row_seed = if has(M::SameSeed) { 0 } else { y as u64 };
         let own = Sampler::new(seed.wrapping_add(row_seed));
         let sampler = if has(M::SharedSampler) { &shared } else { &own };
+        let whole = |size: usize| size / 16 * 16;
+        let mut before = Vec3::ZERO;
         for (x, pixel) in row.iter_mut().enumerate() {
+            if has(M::WholeTilesOnly) && (x >= whole(job.width) || y >= whole(job.height)) {
+                continue;
+            }
             *pixel = work.pixel(x, y, sampler);
+            if has(M::SumGoesOn) {
+                *pixel += before;
+                before = *pixel;
+            }
         }
     };
     if has(M::OwnThreads) {
@@ -159,6 +168,9 @@ impl Eye {
             // The film is taken for a square one.
             let camera = Camera::new(config, job.height, job.height)?;
             return Ok(Self { camera, column: job.height as f32 / job.width as f32 });
+        }
+        if mistakes.has(M::CameraSides) {
+            return Ok(Self { camera: scene.camera(job.height, job.width)?, column: 1.0 });
         }
         let config = match () {
             // The angle is taken across the film's width.

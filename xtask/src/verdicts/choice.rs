@@ -24,9 +24,9 @@ pub const TRIPLES: usize = 500;
 /// The seed of what stands for the other path.
 pub const PLAIN_SEED: u64 = SEEDS[0];
 
-/// Pairs of mistakes that a student may well make together. Not among them: one that hides the
+/// Pairs of mistakes that a student may well make together, and mistakes of renderers that do something otherwise. Not among them: one that hides the
 /// other, such as an intensity that was never set.
-const PAIRS: [[&str; 2]; 26] = [
+const PAIRS: [[&str; 2]; 30] = [
     ["diffuse-no-pi", "phong-n-plus-1"],
     ["diffuse-no-pi", "light-two-cosines"],
     ["diffuse-no-wi-test", "shadow-none"],
@@ -53,6 +53,10 @@ const PAIRS: [[&str; 2]; 26] = [
     ["light-two-cosines", "diffuse-fs-two-cosines"],
     [ELSEWHERE, "diffuse-fs-no-pi"],
     [ELSEWHERE, "phong-fs-n-plus-1"],
+    ["directions-in-world", "shadow-none"],
+    ["directions-in-world", "phong-no-scale"],
+    ["wi-from-light", "phong-n-plus-1"],
+    ["normals-negated-twice", "phong-fs-n-plus-1"],
 ];
 
 /// The stages lie in no file of the contract's: none can be exchanged, pixels by material decide.
@@ -194,7 +198,9 @@ pub fn singles(catalogue: &Catalogue) -> Vec<Subject> {
 pub fn pairs(catalogue: &Catalogue) -> Result<Vec<Subject>> {
     let pair = |names: &[&str; 2]| {
         let (mut parts, mut findings) = (Vec::new(), Vec::new());
-        for name in names.iter().filter(|name| **name != ELSEWHERE) {
+        // A right variant stays right beside a mistake.
+        let is_right = |name: &str| catalogue.right.iter().any(|right| right.name == name);
+        for name in names.iter().filter(|name| **name != ELSEWHERE && !is_right(name)) {
             let mistake = catalogue.named(name);
             let mistake = mistake.with_context(|| format!("there is no mistake {name}"))?;
             parts.extend(mistake.parts.iter().cloned());

@@ -82,7 +82,12 @@ fn of_uniform(bound: &[Bound], name: &'static str) -> Option<Deviation> {
         value,
         words,
     };
-    if own.iter().all(|bound| bound.found == Vec3::ZERO) {
+    // The exponent's other channels are ours.
+    let is_zero = |bound: &&Bound| match name {
+        "material.exponent" => bound.found.x == 0.0,
+        _ => bound.found == Vec3::ZERO,
+    };
+    if own.iter().all(is_zero) {
         return Some(say(
             "factor",
             Value::Number(0.0),
@@ -103,7 +108,6 @@ fn of_uniform(bound: &[Bound], name: &'static str) -> Option<Deviation> {
     let brightest =
         own.iter().max_by(|a, b| a.expected.length().total_cmp(&b.expected.length()))?;
     let factor = brightest.found.length() / brightest.expected.length();
-    // The exponent's other channels are ours.
     let times = |b: &Bound, factor: f32| match name {
         "material.exponent" => Vec3::new(b.expected.x * factor, b.expected.y, b.expected.z),
         _ => b.expected * factor,

@@ -16,7 +16,7 @@ use crate::expected::{FARTHEST_START, SurfaceBuffer, SurfacePoint, Visibility};
 use crate::imaging::reference::RegionMask;
 
 pub use material::judge_material;
-pub use shadows::{Occluders, judge_shadows};
+pub use shadows::{INVERTED, Occluders, judge_shadows};
 pub use unshadowed::{Unshadowed, judge_unshadowed, passes_unshadowed};
 
 /// Directions closer to the surface than this cosine are left out.
@@ -150,6 +150,26 @@ impl RayBatch {
     /// The pixels of the lit and of the shadowed rays, without those of contacts: another film chose them.
     pub fn met(&self) -> impl Iterator<Item = &usize> {
         self.pixels.iter().take(self.points.len() - self.contacts)
+    }
+
+    /// The rays that are `wanted`, without shadows: all that end on surfaces are lit. And which they are.
+    pub fn without_shadows(&self, wanted: &dyn Fn(usize) -> bool) -> (Self, Vec<usize>) {
+        let end = self.points.len();
+        let contacts = end - self.contacts..end;
+        let is_wanted = |index: &usize| !contacts.contains(index) && wanted(*index);
+        let chosen: Vec<usize> = (0..self.rays.len()).filter(is_wanted).collect();
+        let met = chosen.iter().filter(|index| **index < end);
+        let points: Vec<SurfacePoint> = met.map(|index| self.points[*index]).collect();
+        let part = Self {
+            scene: self.scene.clone(),
+            rays: chosen.iter().map(|index| self.rays[*index]).collect(),
+            pixels: chosen.iter().map(|index| self.pixels[*index]).collect(),
+            lit: points.len(),
+            points,
+            contacts: 0,
+            ..*self
+        };
+        (part, chosen)
     }
 
     /// Unshadowed radiance along ray `index` when the BSDF (cosine included) is `bsdf`.

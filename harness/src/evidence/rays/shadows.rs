@@ -14,6 +14,14 @@ const NEARLY_ALL: f64 = 0.99;
 const LEAVES_LIGHT: &str = "shadows leave some light";
 /// The mistake of lit points that are darker with shadows on.
 const LOSES_LIGHT: &str = "lit points lose some light";
+/// The mistake of shadows that are all of one color.
+const ONE_COLOR: &str = "shadows have a color of their own";
+/// The mistake of a switch that does the opposite.
+pub const INVERTED: &str = "shadows are drawn where none are asked for, and none where they are";
+/// What a slip may leave unexplained: the fraction of wrong rays, lit and dark ones together.
+const LEFT: f64 = 0.02;
+/// Light that a color of shadows counts as, at most: it is one constant.
+const BRIGHTEST: f64 = 0.6;
 /// Fraction of the lit rays that must not be black without shadows.
 const LEAST_KNOWN: f64 = 0.25;
 /// A visibility below this is dark, above one minus it lit; anything between is neither.
@@ -119,11 +127,77 @@ pub fn judge_shadows(
     if check.verdict == Verdict::Fail {
         check.wrong_rays = wrong_rays;
         let price = price(batch, &known, lit_fraction + dark_fraction, occluders);
+        let price = match residual_of_inverted(batch, bsdf, (with, without)) {
+            left if left <= LEFT => {
+                check.hint = format!("the switch is inverted: {INVERTED}");
+                // Nothing else explains what is drawn without shadows.
+                Price { error: Class::Slip.price() + left, mistake: Some(INVERTED), ..price }
+            }
+            _ => match color_of_shadows(batch, bsdf, with) {
+                Some(light) if lit_fraction <= LEFT => {
+                    let light = price::fading(light.min(BRIGHTEST));
+                    price.or(ONE_COLOR, Class::Slip, light + lit_fraction)
+                }
+                _ => price,
+            },
+        };
         check.error = price.error;
         check.mistake = price.name();
         check.measures.extend(price.measure());
     }
     check
+}
+
+/// The fractions of lit and of dark rays, added up, that are wrong where the switch is taken for its opposite.
+fn residual_of_inverted(
+    batch: &RayBatch,
+    bsdf: &dyn Fn(&SurfacePoint) -> [f64; 3],
+    (with, without): (&[[f32; 3]], &[[f32; 3]]),
+) -> f64 {
+    if with == without {
+        return 1.0;
+    }
+    let is_wrong = |index: &usize| {
+        let expected = batch.unshadowed(*index, bsdf(&batch.points[*index]));
+        let visibility = visibility(without[*index], with[*index], expected);
+        let right = (visibility - f64::from(u8::from(*index < batch.lit))).abs() < HALF_LIGHT;
+        !right
+    };
+    let fraction = |rays: std::ops::Range<usize>| {
+        let all = rays.len().max(1);
+        rays.filter(is_wrong).count() as f64 / all as f64
+    };
+    fraction(0..batch.lit) + fraction(batch.lit..batch.points.len())
+}
+
+/// How much of the light a color amounts to that nearly all dark rays show, whatever they meet: the median. Nothing
+/// where there is none, or where it is that of lit points.
+fn color_of_shadows(
+    batch: &RayBatch,
+    bsdf: &dyn Fn(&SurfacePoint) -> [f64; 3],
+    with: &[[f32; 3]],
+) -> Option<f64> {
+    let dark = batch.lit..batch.points.len();
+    let median = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    };
+    let channel = |c: usize| median(dark.clone().map(|index| f64::from(with[index][c])).collect());
+    let color = [channel(0)?, channel(1)?, channel(2)?];
+    let largest = color.iter().copied().fold(0.0, f64::max);
+    let is_other = |index: &usize| {
+        let apart = |c: usize| (f64::from(with[*index][c]) - color[c]).abs();
+        // NaN is another.
+        !(0..3).all(|c| apart(c) <= RELATIVE * largest)
+    };
+    let sum = |value: [f64; 3]| value.iter().sum::<f64>();
+    let of_light = dark
+        .clone()
+        .map(|index| sum(color) / sum(batch.unshadowed(index, bsdf(&batch.points[index]))));
+    let light = median(of_light.collect())?;
+    let others = dark.clone().filter(is_other).count();
+    let told = largest > 0.0 && (light - 1.0).abs() > HALF_LIGHT;
+    (told && others as f64 <= LEFT * dark.len() as f64).then_some(light)
 }
 
 /// What a scene says of shadow rays.
@@ -399,7 +473,8 @@ fn charge_what_is_never_tested(checks: &mut [Check]) {
         return;
     }
     for check in checks.iter_mut().filter(|check| check.verdict == Verdict::Fail) {
-        let left = [LEAVES_LIGHT, LOSES_LIGHT].contains(&check.mistake.as_str());
+        let left =
+            [LEAVES_LIGHT, LOSES_LIGHT, ONE_COLOR, INVERTED].contains(&check.mistake.as_str());
         if let Some((lit, dark)) = fractions(check).filter(|_| !left) {
             check.error = Price::of_raw(lit + dark).error;
         }

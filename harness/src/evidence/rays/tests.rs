@@ -3,6 +3,7 @@ use basecode::Vec3;
 use super::shadows::judge_shadows;
 use super::*;
 use crate::evidence::convention::Convention;
+use crate::evidence::price::Class;
 use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict, changes};
 use crate::expected::Visibility;
 
@@ -109,6 +110,30 @@ fn a_shadow_query_that_moves_what_is_shaded_is_seen() {
     for wrong_in_both in [0.7, 0.0, f64::NAN] {
         assert_eq!(judge(wrong_in_both, wrong_in_both), Verdict::Pass, "{wrong_in_both}");
     }
+}
+
+#[test]
+fn an_inverted_switch_and_a_color_of_shadows_are_slips() {
+    let right = |index| if index < 40 { 1.0 } else { 0.0 };
+    let inverted = shadows(|_| 1.0, right);
+    assert_eq!(inverted.mistake, INVERTED);
+    assert_eq!(inverted.error, Class::Slip.price());
+    assert!(inverted.hint.contains("inverted"), "{}", inverted.hint);
+    let batch = batch();
+    let without = answers(&batch, |_, _| 1.0);
+    let judge = |dark: &dyn Fn(usize) -> f32| {
+        let mut with = answers(&batch, |index, _| right(index));
+        (40..60).for_each(|index| with[index] = [dark(index), 0.5 * dark(index), 0.0]);
+        let shaded = (without.as_slice(), without.as_slice());
+        let mut checks = [judge_shadows(&batch, &witness, (&with, &without), shaded, &NOTHING)];
+        leave_unjudged(&mut checks);
+        checks[0].error
+    };
+    for color in [0.01, 0.1, 7.0] {
+        assert!((0.02..0.04).contains(&judge(&|_| color)), "{color}: {}", judge(&|_| color));
+    }
+    // A color for each point is not one.
+    assert!(judge(&|index| 0.1 * (index % 7) as f32) > 0.3);
 }
 
 #[test]

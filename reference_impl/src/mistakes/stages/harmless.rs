@@ -12,6 +12,10 @@ const CLAMPED: &str = "let cos_i = max(dot(n, wi), 0.0);";
 mistakes! {
     "normals-raw": (DIFFUSE, NORMAL, "let n = world_normal;"), (PHONG, NORMAL, "let n = world_normal;");
     "normals-doubled": (VS, VS_NORMAL, "2.0 * (object.normal_matrix * vec4f(normal, 0.0)).xyz;");
+    "normals-negated-twice":
+        (VS, VS_NORMAL, "-(object.normal_matrix * vec4f(normal, 0.0)).xyz;"),
+        (DIFFUSE, NORMAL, "let n = -normalize(world_normal);"),
+        (PHONG, NORMAL, "let n = -normalize(world_normal);");
     "normals-as-they-are": (VS, VS_NORMAL, "normal;");
     "no-model-matrix": (VS, "object.model * vec4f(position, 1.0);", "vec4f(position, 1.0);");
     "matrices-first": (VS, CLIP, "(frame.projection * frame.view) * world;");

@@ -1,11 +1,13 @@
 //! Mistakes of `simple.vs`.
 
-use super::{VS, mistakes};
+use super::{DIFFUSE, PHONG, VS, mistakes};
 
 const CLIP: &str = "frame.projection * frame.view * world;";
 const POSITION: &str = "out.world_position = world.xyz;";
 const NORMAL: &str = "out.world_normal = (object.normal_matrix * vec4f(normal, 0.0)).xyz;";
 const RETURN: &str = "return out;";
+const VARYING: &str = "@location(1) world_normal: vec3f,";
+const FLAT: &str = "@location(1) @interpolate(flat) world_normal: vec3f,";
 
 mistakes! {
     "vertex-normal-zero": (VS, NORMAL, "out.world_normal = vec3f(0.0);");
@@ -22,6 +24,8 @@ mistakes! {
         (VS, POSITION, "out.world_position = (frame.projection * frame.view * world).xyz;");
     "vertex-position-halved": (VS, POSITION, "out.world_position = 0.5 * world.xyz;");
     "vertex-position-zero": (VS, POSITION, "out.world_position = vec3f(0.0);");
+    "vertex-normal-flat":
+        (VS, VARYING, FLAT), (DIFFUSE, VARYING, FLAT), (PHONG, VARYING, FLAT);
     "vertex-no-view": (VS, CLIP, "frame.projection * world;");
     "vertex-no-projection": (VS, CLIP, "frame.view * world;");
     "vertex-matrices-swapped": (VS, CLIP, "frame.view * frame.projection * world;");
