@@ -6,6 +6,7 @@
 mod appeals;
 mod archives;
 mod arrivals;
+mod attempts;
 mod batch;
 mod brute_force;
 mod build;
@@ -38,6 +39,7 @@ mod sandbox;
 mod statistics;
 mod submitted;
 mod support;
+mod suspicions;
 mod tasks;
 mod viewer;
 mod watch;

@@ -49,7 +49,7 @@ fn a_decision_is_never_on_another_who_typed_the_same_number() {
     assert_eq!(points(&place), of(&[("a2_ann", 0.0), ("a2_mal", 3.0)]));
     let (code, said) = set("260000104", "1.1", "1");
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("Ann Lee (a2_ann): part 1.1 has 1 points"), "{said}");
+    assert!(said.contains("Ann Lee (a2_ann): part 1.1 has 1 point from now on"), "{said}");
     assert_eq!(points(&place), of(&[("a2_ann", 1.0), ("a2_mal", 3.0)]));
     let (code, said) = set("260000106", "1.1", "2");
     assert_eq!(code, Some(2), "{said}");

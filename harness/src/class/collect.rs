@@ -75,7 +75,7 @@ impl Empty {
 /// What was found.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Collected {
-    /// Where it comes from.
+    /// Where it comes from; of several downloads, where most of it does.
     pub kind: Kind,
     /// The submissions, in the order of their names below each given path.
     pub sources: Vec<Source>,
@@ -123,13 +123,31 @@ impl Collected {
         Ok(())
     }
 
+    /// Where the submissions come from, in words; nothing where that is no platform.
+    pub fn recognised(&self) -> Option<String> {
+        let labels = self.sources.iter().filter_map(|source| source.label.as_ref());
+        recognised(self.kind, labels)
+    }
+
     /// What was skipped, in words; nothing when nothing was.
     pub fn skipped(&self) -> Option<String> {
         skipped(&self.skipped)
     }
 }
 
-fn skipped(names: &[String]) -> Option<String> {
+/// As what downloads were recognised, in words; nothing where they are no platform's.
+pub fn recognised<'a>(kind: Kind, labels: impl Iterator<Item = &'a Label>) -> Option<String> {
+    let kinds: Vec<Kind> = labels.map(|label| label.kind).chain([kind]).collect();
+    let titles = Kind::PLATFORMS.into_iter().filter(|kind| kinds.contains(kind)).map(Kind::title);
+    match &titles.collect::<Vec<_>>()[..] {
+        [] => None,
+        [only] => Some(format!("recognised as a download of {only}")),
+        several => Some(format!("recognised as downloads of {}", several.join(" and "))),
+    }
+}
+
+/// What was skipped, in words; nothing when nothing was.
+pub fn skipped(names: &[String]) -> Option<String> {
     let named = names.iter().take(NAMED).map(|name| printable(name));
     let named = named.collect::<Vec<_>>().join(", ");
     let more = names.len().saturating_sub(NAMED);
@@ -161,14 +179,19 @@ pub struct Wanted<'a> {
 pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> {
     let output = wanted.output.and_then(|output| output.canonicalize().ok());
     let mut search = Search { wanted, output, unpacked: 0, found: Found::default() };
-    for path in paths {
+    // Of each submission, with which others it was found: those of a folder, or those that the command line names.
+    let mut groups: Vec<usize> = Vec::new();
+    for (index, path) in paths.iter().enumerate() {
         let before = search.found.sources.len();
+        let mut group = index + 1;
         let said = search.found.skipped.len();
         if path.is_dir() && !is_submission(path, wanted.tree)? {
             search.descend(path, path, "", 0)?;
         } else if !search.wrapped(path)? && !search.download(path, path, "", wanted.from)? {
             search.found.sources.push(Source::given(path));
+            group = 0;
         }
+        groups.resize(search.found.sources.len(), group);
         if search.found.sources.len() == before {
             let found = &search.found.skipped[said..];
             let other =
@@ -186,7 +209,7 @@ pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> 
             );
         }
     }
-    let mut collected = search.found.labelled(wanted.from);
+    let mut collected = search.found.labelled(wanted, &groups);
     collected.leave_out_copies(paths)?;
     Ok(collected)
 }
@@ -205,8 +228,9 @@ struct Found {
 }
 
 impl Found {
-    /// Recognizes the kind and reads all names by it.
-    fn labelled(mut self, from: Option<Kind>) -> Collected {
+    /// Recognizes the kinds and reads all names by them. Each download has its own, and so has each of the `groups`,
+    /// which are of the submissions in their order.
+    fn labelled(mut self, wanted: &Wanted, groups: &[usize]) -> Collected {
         // The path that was given may itself be a student's folder.
         let full = |source: &Source| match source.place.to_string_lossy() {
             place if place.ends_with(&source.name) => {
@@ -237,23 +261,45 @@ impl Found {
                 .map(|label| metadata.get(&label.submission).cloned().unwrap_or(label)),
             kind => name.split('/').find_map(|part| label_of(kind, part)),
         };
-        let votes = |kind: &Kind| names.iter().filter(|name| label(*kind, name).is_some()).count();
-        let recognised = || {
+        let recognised = |names: &[&str]| {
+            let votes =
+                |kind: &Kind| names.iter().filter(|name| label(*kind, name).is_some()).count();
             // The first of those with most.
             let best = Kind::PLATFORMS.into_iter().rev().max_by_key(votes);
             let most_are = |kind: &Kind| votes(kind) > 0 && 2 * votes(kind) >= names.len();
             best.filter(most_are).unwrap_or_default()
         };
-        let kind = from.unwrap_or_else(recognised);
-        let labels: Vec<Option<Label>> = names.iter().map(|name| label(kind, name)).collect();
+        // What is unpacked lies below the scratch folder, each download in one of its own.
+        let download = |source: &Source| {
+            let below = source.path.strip_prefix(wanted.scratch).ok()?;
+            Some(below.iter().next()?.to_owned())
+        };
+        let together: Vec<_> = self.sources.iter().map(download).zip(groups).collect();
+        let mut kinds: BTreeMap<_, Kind> = BTreeMap::new();
+        for own in &together {
+            if !kinds.contains_key(own) {
+                let all = together.iter().zip(&names).filter(|(other, _)| *other == own);
+                let all: Vec<&str> = all.map(|(_, name)| name.as_str()).collect();
+                kinds.insert(own, wanted.from.unwrap_or_else(|| recognised(&all)));
+            }
+        }
+        let of_each: Vec<Kind> = together.iter().map(|own| kinds[own]).collect();
+        let number = |kind: &Kind| of_each.iter().filter(|own| *own == kind).count();
+        let found = Kind::PLATFORMS.into_iter().filter(|kind| number(kind) > 0).collect::<Vec<_>>();
+        let most = found.iter().rev().max_by_key(|kind| number(kind)).copied();
+        let kind = wanted.from.or(most).unwrap_or_default();
+        let own = names.iter().zip(&of_each);
+        let labels: Vec<Option<Label>> = own.map(|(name, kind)| label(*kind, name)).collect();
+        let kinds = if found.is_empty() { vec![kind] } else { found };
+        let any_label = |name: &str| kinds.iter().find_map(|kind| label(*kind, name));
         let mut empty: BTreeMap<String, Empty> = BTreeMap::new();
         let unopened: Vec<Label> =
-            self.unopened.iter().filter_map(|(name, _)| label(kind, name)).collect();
+            self.unopened.iter().filter_map(|(name, _)| any_label(name)).collect();
         let is_known = |own: &Label| {
             labels.iter().flatten().chain(&unopened).any(|label| label.submission == own.submission)
         };
         for name in &self.skipped {
-            if let Some(label) = label(kind, name).filter(|label| !is_known(label)) {
+            if let Some(label) = any_label(name).filter(|label| !is_known(label)) {
                 let entry = empty.entry(label.submission.clone());
                 let files = &mut entry.or_insert(Empty { label, files: Vec::new() }).files;
                 files.extend(Some(last(name)).filter(|file| file != NOTHING));

@@ -146,7 +146,7 @@ impl Policy {
         }
         let due: Timestamp = due.parse().ok()?;
         match self.cut_off.as_ref().map(|text| text.parse::<Timestamp>()) {
-            Some(Err(error)) => return wrong(&["cut_off"], format!("late.cut_off: {error}")),
+            Some(Err(_)) => return wrong(&["cut_off"], no_time("late.cut_off")),
             Some(Ok(cut_off)) if cut_off < due => {
                 let message = "late.cut_off lies before the due date; expected it then or later";
                 return wrong(&["cut_off"], message.into());
@@ -174,9 +174,7 @@ impl Policy {
                 });
             }
             match own.as_ref().map(|text| text.parse::<Timestamp>()) {
-                Some(Err(error)) => {
-                    return wrong(&own_keys("due"), format!("{name}.due: {error}"));
-                }
+                Some(Err(_)) => return wrong(&own_keys("due"), no_time(&format!("{name}.due"))),
                 Some(Ok(own)) if own < due => {
                     let message = format!(
                         "{name}.due lies before the due date of the class; expected it then or later"
@@ -243,11 +241,7 @@ impl Policy {
         let charged = started - covered;
         let late_days = u32::try_from((covered * unit_s + 86_399) / 86_400).unwrap_or(u32::MAX);
         let cut_off = self.cut_off(class_due, due).filter(|at| late_s > 0 && when > *at);
-        let shown = |at: Timestamp| {
-            let at = at.to_zoned(zone.clone());
-            let seconds = if at.second() == 0 { "" } else { ":%S" };
-            at.strftime(&format!("%Y-%m-%d %H:%M{seconds} %:z")).to_string()
-        };
+        let shown = |at: Timestamp| in_zone(at, &zone);
         let unit = match (self.per, started) {
             (Per::Day, 1) => "started day",
             (Per::Day, _) => "started days",
@@ -313,21 +307,43 @@ impl Policy {
             };
             format!("; {} x {} {what}", late.charged, self.penalty)
         };
-        late.words +=
-            &format!("{why}: {} instead of {} points", range(late.after), range(late.before));
+        late.words += &if late.after == late.before {
+            "; it earned nothing, so that costs nothing".to_owned()
+        } else {
+            format!("{why}: {} instead of {} points", range(late.after), range(late.before))
+        };
         grade.remarks.push(late.words.clone());
     }
 
     fn zone(&self, due: &str) -> Option<TimeZone> {
         match &self.time_zone {
             Some(zone) => stamps::zone(zone).ok(),
-            None => {
-                // `...T23:59:00-04:00`
-                let sign = due.rfind(['+', '-']).filter(|at| *at > 10);
-                sign.and_then(|at| stamps::zone(&due[at..]).ok()).or(Some(TimeZone::UTC))
-            }
+            None => Some(zone_of(due)),
         }
     }
+}
+
+/// The time zone of a time stamp, such as `...T23:59:00-04:00`.
+fn zone_of(due: &str) -> TimeZone {
+    let sign = due.rfind(['+', '-']).filter(|at| *at > 10);
+    sign.and_then(|at| stamps::zone(&due[at..]).ok()).unwrap_or(TimeZone::UTC)
+}
+
+fn in_zone(at: Timestamp, zone: &TimeZone) -> String {
+    let at = at.to_zoned(zone.clone());
+    let seconds = if at.second() == 0 { "" } else { ":%S" };
+    at.strftime(&format!("%Y-%m-%d %H:%M{seconds} %:z")).to_string()
+}
+
+/// A time as the class reads it: in the policy's time zone, else in that of the due date.
+pub fn shown(at: Timestamp, due: &str, policy: Option<&Policy>) -> String {
+    let zone = policy.and_then(|policy| policy.zone(due));
+    in_zone(at, &zone.unwrap_or_else(|| zone_of(due)))
+}
+
+/// The message on a key that holds no time.
+fn no_time(key: &str) -> String {
+    format!("{key}: expected a time with its offset, such as \"2019-10-13T23:59:00-04:00\"")
 }
 
 /// From when on nobody submits any more: the due date, the cut-off and the last extension, with late days and grace.

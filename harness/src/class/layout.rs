@@ -207,6 +207,19 @@ fn canvas(component: &str) -> Option<Label> {
     (!name.is_empty()).then(|| label(name, tokens[at], at + 1, late))
 }
 
+/// Of a file that Canvas names: its number there, which grows from upload to upload, and what the student called it.
+/// Canvas puts `-1`, `-2` and so on behind the name of a file that was submitted before; that is left out.
+pub fn canvas_upload(component: &str) -> Option<(u64, String)> {
+    let own = canvas(component)?;
+    let rest = component.strip_prefix(&own.submission)?.strip_prefix('_')?;
+    let (number, file) = rest.split_once('_')?;
+    let (stem, end) = file.split_once('.').unwrap_or((file, ""));
+    let again = stem.rsplit_once('-').filter(|(stem, again)| {
+        !stem.is_empty() && !again.is_empty() && again.bytes().all(|byte| byte.is_ascii_digit())
+    });
+    Some((number.parse().ok()?, format!("{}.{end}", again.map_or(stem, |(stem, _)| stem))))
+}
+
 /// `First Last_123_assignsubmission_file`, and more after it where files lie flat.
 fn moodle(component: &str) -> Option<Label> {
     let at = component.rfind("_assignsubmission_")?;
@@ -365,6 +378,11 @@ mod tests {
         let anonymous = label_of(Kind::Canvas, "LATE_anon_x7Yz_2004_a2.zip").unwrap();
         assert_eq!((anonymous.id.as_str(), anonymous.marked_late), ("x7Yz", true));
         assert_eq!(own("anon_x7Yz_2004_a2.zip").unwrap()[1], "");
+        let upload = |component: &str| canvas_upload(component).unwrap();
+        assert_eq!(upload("leeann_101_2001_a2.zip"), (2001, "a2.zip".to_owned()));
+        assert_eq!(upload("leeann_LATE_101_2051_a2-1.zip"), (2051, "a2.zip".to_owned()));
+        assert_eq!(upload("LATE_anon_x7Yz_2004_a2-x.tar.gz"), (2004, "a2-x.tar.gz".to_owned()));
+        assert_eq!(canvas_upload("a2_ann_lee.zip"), None);
         for other in ["a2_ann_lee.zip", "_101_2001_a2.zip", "101_2001_a2.zip", "ann_101_a2.zip"] {
             assert_eq!(own(other), None, "{other}");
         }

@@ -25,7 +25,7 @@ pub mod settle;
 pub mod slots;
 pub mod stamps;
 
-pub use collect::{Collected, Empty, Source, Wanted, collect};
+pub use collect::{Collected, Empty, Source, Wanted, collect, recognised, skipped};
 pub use late::{Late, Policy};
 pub use layout::{Kind, Label};
 pub use matching::{Claim, MATCHES, Matches};

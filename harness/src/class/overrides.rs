@@ -13,7 +13,10 @@ use super::matching::line_of;
 use super::owners::Owners;
 use crate::evidence::Evidence;
 use crate::files::hex;
-use crate::rubric::{Grade, PartGrade, Rules};
+use crate::rubric::{Grade, IMAGES_EARN, ONCE_CONFIRMED, PartGrade, Rules};
+
+/// What takes the place of [`ONCE_CONFIRMED`] in the reason of a part whose images are confirmed.
+const CONFIRMED: &str = ", confirmed by the instructor";
 
 /// The file of decisions, in the report's folder.
 pub const OVERRIDES: &str = "overrides.toml";
@@ -251,6 +254,15 @@ impl Overrides {
                         part.points += part.unconfirmed;
                         part.points_max += part.unconfirmed;
                         part.unconfirmed = 0.0;
+                        part.reason = part.reason.replacen(ONCE_CONFIRMED, CONFIRMED, 1);
+                    }
+                    // What was to be confirmed is.
+                    for remark in &mut grade.remarks {
+                        if let Some(at) = remark.find(IMAGES_EARN)
+                            && remark.ends_with(ONCE_CONFIRMED)
+                        {
+                            remark.truncate(at);
+                        }
                     }
                     (before, totals(&grade.parts), fingerprint(subject, &original))
                 }
@@ -422,6 +434,10 @@ mod tests {
         let confirm = format!("[[confirm]]\nstudent = \"{slug}\"\nreason = \"his noise\"\n");
         let (grade, applied, _) = run(2, &confirm);
         assert_eq!((grade.points, grade.points_max, grade.unconfirmed), (11.44, 11.44, 0.0));
+        // What was said to wait is said no more.
+        assert_eq!(grade.remarks[0], "the source does not build");
+        let reasons: Vec<&str> = grade.parts.iter().map(|part| part.reason.as_str()).collect();
+        assert!(!reasons.concat().contains("once the instructor confirms"), "{reasons:?}");
         assert!(
             applied[0].words().contains("confirms what the images show, 11.44 points instead of 0")
         );

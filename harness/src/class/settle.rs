@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::late::{Late, Policy};
-use super::layout::{Kind, Label};
+use super::layout::{Kind, Label, canvas_upload};
 use super::matching::{Claim, Match, Matches, address, find};
 use super::mending::Mended;
 use super::overrides::Applied;
@@ -68,6 +68,13 @@ pub struct Standing {
     pub late: Option<Late>,
 }
 
+impl Standing {
+    /// Whether the instructor looked at what is left to them, and confirmed it.
+    pub fn is_confirmed(&self) -> bool {
+        self.decisions.iter().any(|own| own.decision.part.is_none() && !own.stale)
+    }
+}
+
 /// What is known of the class as a whole.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
@@ -88,6 +95,8 @@ pub struct Class {
     pub stale: Vec<String>,
     /// Decisions on points that are on nothing that is there.
     pub unused: Vec<String>,
+    /// Attempts that count for less than another attempt of the student, such as one after the cut-off.
+    pub worse: Vec<String>,
 }
 
 /// A student without a submission that counts.
@@ -194,6 +203,7 @@ pub fn settle(
     let mut people: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     let mut own_person = Vec::new();
     let mut expected: BTreeMap<usize, String> = BTreeMap::new();
+    let mut perhaps: BTreeMap<usize, Vec<String>> = BTreeMap::new();
     for (index, (claim, grade)) in claims.iter().zip(grades.iter_mut()).enumerate() {
         let mut standing = Standing { label: claim.label.clone(), ..Standing::default() };
         let mut person = persons[index].clone();
@@ -212,9 +222,7 @@ pub fn settle(
                 }
                 Match::Undecided(reason, candidates) => {
                     for at in &candidates {
-                        expected.entry(*at).or_insert_with(|| {
-                            format!("perhaps {}: decide in matches.toml", called(index))
-                        });
+                        perhaps.entry(*at).or_default().push(called(index));
                     }
                     let candidates =
                         candidates.into_iter().map(|at| roster.students[at].clone()).collect();
@@ -239,6 +247,17 @@ pub fn settle(
     for attempts in people.into_values() {
         match choose(&attempts, claims, &standings, grades, deciding) {
             Some(own) => {
+                let worth = |at: usize| grades[at].points_max;
+                let better = attempts.iter().max_by(|a, b| worth(**a).total_cmp(&worth(**b)));
+                if let Some(better) = better.filter(|at| worth(**at) > worth(own)) {
+                    class.worse.push(format!(
+                        "{}: {} points, {} would have {}; `umbra grade --attempt best` counts the better one",
+                        called(own),
+                        worth(own),
+                        called(*better),
+                        worth(*better)
+                    ));
+                }
                 let others = attempts.iter().filter(|at| **at != own);
                 standings[own].set_aside = others.map(|at| called(*at)).collect();
                 counts.push(own);
@@ -263,6 +282,10 @@ pub fn settle(
     }
     if deciding.roster.is_none() {
         class.undecided.extend(doubles(claims, &own_person, matches));
+    }
+    for (at, may_be) in perhaps {
+        let words = || format!("perhaps {}: decide in matches.toml", may_be.join(" or "));
+        expected.entry(at).or_insert_with(words);
     }
     if let Some(roster) = deciding.roster {
         for (label, reason) in absent {
@@ -340,14 +363,36 @@ fn choose(
         && attempts.iter().all(|at| digest(at) == digest(first))
         && stamps.iter().all(|stamp| *stamp == stamps[0]);
     by_time(&stamps, deciding.attempt).map(|at| attempts[at]).or_else(|| {
-        // Which of two that are the same counts does not matter.
+        let uploads: Option<Vec<(u64, String)>> =
+            attempts.iter().map(|at| upload(&claims[*at])).collect();
+        let by_upload = |uploads: &[(u64, String)]| {
+            let all = uploads.iter().zip(attempts);
+            let chosen = match deciding.attempt {
+                Attempt::First => all.min_by_key(|(own, _)| own.0),
+                _ => all.max_by_key(|(own, _)| own.0),
+            };
+            chosen.map(|(_, at)| *at)
+        };
+        // Which of two that are the same counts does not matter; Canvas takes feedback on the newer one.
         if alike {
-            return Some(*first);
+            return uploads.as_deref().and_then(by_upload).or(Some(*first));
         }
         // The one that the instructor names as the student's.
         let mut named = attempts.iter().filter(|at| deciding.matches.word(&claims[**at]).is_some());
-        named.next().filter(|_| named.next().is_none()).copied()
+        if let Some(only) = named.next() {
+            return named.next().is_none().then_some(*only);
+        }
+        // One file of Canvas, submitted again: its numbers there tell. Others may be files of one attempt.
+        let uploads = uploads?;
+        let one_file = uploads.iter().all(|own| own.1 == uploads[0].1);
+        one_file.then(|| by_upload(&uploads)).flatten()
     })
+}
+
+/// Of a file from Canvas, its number there and its name.
+fn upload(claim: &Claim) -> Option<(u64, String)> {
+    claim.label.as_ref().filter(|label| label.kind == Kind::Canvas)?;
+    canvas_upload(claim.name.rsplit('/').next()?)
 }
 
 /// When a submission was submitted: as the instructor says, else the platform's names, else the class list.
@@ -395,7 +440,7 @@ fn charge(
 impl Class {
     /// Whether there is anything to say.
     pub fn is_quiet(&self) -> bool {
-        let decisions = [&self.not_counted, &self.unopened, &self.stale, &self.unused];
+        let decisions = [&self.not_counted, &self.unopened, &self.stale, &self.unused, &self.worse];
         self.missing.is_empty()
             && self.undecided.is_empty()
             && decisions.iter().all(|lines| lines.is_empty())

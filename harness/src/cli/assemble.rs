@@ -2,7 +2,7 @@
 //! submission and renders nothing.
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -54,6 +54,9 @@ pub struct Found {
     /// Zips that look like the download of a class, among other archives.
     #[serde(default)]
     pub unopened: Vec<String>,
+    /// What is no submission.
+    #[serde(default)]
+    pub skipped: Vec<String>,
     /// The version of Umbra.
     pub umbra: String,
     /// Where the submissions were looked for.
@@ -96,7 +99,8 @@ impl Found {
         }));
         let umbra = env!("CARGO_PKG_VERSION").to_owned();
         let unopened = collected.unopened.clone();
-        Self { kind: collected.kind, seen, unopened, umbra, ..Self::default() }
+        let skipped = collected.skipped.clone();
+        Self { kind: collected.kind, seen, unopened, skipped, umbra, ..Self::default() }
     }
 
     /// Adds what an earlier run into `output` found of those that this one was not given.
@@ -242,6 +246,11 @@ impl Kept {
     /// What is held back, if anything.
     pub fn held_back(&self) -> Option<&HeldBack> {
         self.found.held_back.as_ref()
+    }
+
+    /// Where the submissions come from.
+    pub fn kind(&self) -> Kind {
+        self.found.kind
     }
 
     /// Where the submissions were looked for.
@@ -401,7 +410,32 @@ pub fn write(output: &Path, settled: &Settled) -> anyhow::Result<()> {
             |error: anyhow::Error| ReportError::Entry { slug, reason: format!("{error:#}") };
         settled.whole(entry).map(Cow::Owned).map_err(failed)
     });
-    Ok(written?)
+    written?;
+    mark_superseded(output, settled)
+}
+
+/// Says on the pages of attempts that count no more which one does.
+fn mark_superseded(output: &Path, settled: &Settled) -> anyhow::Result<()> {
+    let entries = &settled.report.entries;
+    let counting: HashSet<&str> = entries.iter().map(|own| own.record.slug.as_str()).collect();
+    let superseded = settled.records.iter().map(|own| &own.record);
+    for Record { slug, name, .. } in superseded.filter(|own| !counting.contains(&*own.slug)) {
+        let is = |own: &String| own == name || own.trim_end_matches('/') == slug;
+        let instead = entries.iter().find(|own| own.standing.set_aside.iter().any(is));
+        let instead = instead.map(|own| own.record.slug.as_str());
+        let address = instead.map(|own| format!("../{own}/{}", report::HTML_FILE));
+        let public = output.join(slug).join(report::HTML_FILE);
+        let private = output.join(report::INSTRUCTOR).join(slug).join(report::HTML_FILE);
+        // A student has their own folder alone.
+        let link = address
+            .as_deref()
+            .filter(|own| private.parent().is_some_and(|f| f.join(own).is_file()));
+        for (page, link) in [(public, None), (private, link)] {
+            report::mark_superseded(&page, instead.map(|own| (own, link)))
+                .with_context(|| format!("cannot mark {}", page.display()))?;
+        }
+    }
+    Ok(())
 }
 
 /// The report of a class. Its entries are outlines: what was found out is in the files of records.
@@ -558,7 +592,25 @@ pub fn settled(
     Ok(Settled { report: BatchReport { released, has_alike, ..settled }, records, shared })
 }
 
-/// Points that are others in `after`, by submission and part.
+/// The attempt in `of` of the student whose attempt `own` is in `with` alone; that one is not in `with`.
+pub fn other_attempt<'a>(
+    own: &SubmissionReport,
+    of: &'a BatchReport,
+    with: &BatchReport,
+) -> Option<&'a SubmissionReport> {
+    let student = own.standing.student.as_ref();
+    let label = own.standing.label.as_ref().map(Label::person);
+    let is_theirs = |other: &&SubmissionReport| match student {
+        Some(student) => other.standing.student.as_ref() == Some(student),
+        None => label.is_some() && other.standing.label.as_ref().map(Label::person) == label,
+    };
+    let gone = |other: &&SubmissionReport| {
+        !with.entries.iter().any(|own| own.record.slug == other.record.slug)
+    };
+    of.entries.iter().filter(gone).find(is_theirs)
+}
+
+/// Points that are others in `after`, by student and part; an attempt that counts instead of another is the student's.
 pub fn changes(before: &BatchReport, after: &BatchReport) -> Vec<Change> {
     let of = |report: &BatchReport, slug: &str| {
         report.entries.iter().find(|entry| entry.record.slug == slug).cloned()
@@ -570,6 +622,15 @@ pub fn changes(before: &BatchReport, after: &BatchReport) -> Vec<Change> {
     let mut changes = Vec::new();
     for slug in slugs {
         let (old, new) = (of(before, slug), of(after, slug));
+        // Another attempt of the same student is told in one line.
+        let other = |own: &SubmissionReport, of: &BatchReport, with: &BatchReport| {
+            other_attempt(own, of, with).cloned()
+        };
+        let (old, new) = match (old, new) {
+            (None, Some(new)) => (other(&new, before, after), Some(new)),
+            (Some(old), None) if other(&old, after, before).is_some() => continue,
+            both => both,
+        };
         let who = new.as_ref().or(old.as_ref()).map(SubmissionReport::who).unwrap_or_default();
         let mut add = |part: &str, before: Option<[f64; 2]>, after: Option<[f64; 2]>| {
             if before != after {

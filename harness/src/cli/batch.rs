@@ -179,6 +179,17 @@ impl<'a> Batch<'a> {
                 class::some(&collected.copies)
             );
         }
+        let names = earlier.names();
+        for source in all.iter().filter(|source| source.moved.is_some()) {
+            let last = |name: &str| name.rsplit('/').next().unwrap_or_default().to_owned();
+            let before = names.get(&source.slug).map(|name| last(name));
+            if let Some(before) = before.filter(|own| *own != last(&source.name)) {
+                eprintln!(
+                    "umbra: {} is {before} under another name: it holds the same",
+                    source.name
+                );
+            }
+        }
         let mut telling = Telling::default();
         if let Some((pins, decided)) = &pins {
             let matches = decided.matches(self.output)?;

@@ -149,7 +149,38 @@ pub fn sources(
             || noted().is_ok_and(|noted| content(&given.path).is_ok_and(|own| own == noted));
         (newer.get(&slot) == Some(&1) && same).then(|| (slug.clone(), at.clone()))
     };
-    let older: Vec<Option<(String, String)>> = given.iter().map(older).collect();
+    let mut older: Vec<Option<(String, String)>> = given.iter().map(older).collect();
+    let is_new = |(given, older): &(&class::Source, &Option<(String, String)>)| {
+        older.is_none()
+            && given.label.is_none()
+            && !given.path.is_symlink()
+            && !known.contains_key(&place(&given.place))
+    };
+    if given.iter().zip(&older).any(|own| is_new(&own)) {
+        // Of the rest, the bytes tell: a file that was only renamed is the one that was graded.
+        let found: HashSet<&String> = older.iter().flatten().map(|(slug, _)| slug).collect();
+        let mut noted: HashMap<String, Vec<(String, String)>> = HashMap::new();
+        for (at, slugs) in known.iter().filter(|(at, _)| !places.contains(*at)) {
+            for slug in slugs.iter().filter(|slug| !found.contains(slug)) {
+                let file = output.join(report::INSTRUCTOR).join(slug).join(CONTENT);
+                if let Ok(own) = fs::read_to_string(file) {
+                    noted.entry(own).or_default().push((slug.clone(), at.clone()));
+                }
+            }
+        }
+        let contents: Vec<Option<String>> = given
+            .iter()
+            .zip(&older)
+            .map(|own| is_new(&own).then(|| content(&own.0.path).ok()).flatten())
+            .collect();
+        for (at, own) in contents.iter().enumerate() {
+            let Some(own) = own else { continue };
+            let alone = contents.iter().flatten().filter(|other| *other == own).count() == 1;
+            if let (true, Some([only])) = (alone, noted.get(own).map(Vec::as_slice)) {
+                older[at] = Some(only.clone());
+            }
+        }
+    }
     let source = |(given, older): (&class::Source, Option<(String, String)>)| {
         let class::Source { path, name, place: at, label } = given.clone();
         let before = known.get_mut(&place(&at)).and_then(VecDeque::pop_front);

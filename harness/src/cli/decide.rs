@@ -2,15 +2,16 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, ensure};
 
 use super::assemble::Kept;
+use super::chosen::{Graded, one};
 use super::earlier::{Report, Row};
 use super::report_folder::ReportFolder;
 use crate::class::Decisions;
-use crate::class::overrides::{Decision, OVERRIDES, Subject, entry, fingerprint};
+use crate::class::overrides::{Decision, OVERRIDES, entry, fingerprint};
 use crate::files::write_whole;
-use crate::report::{self, SubmissionReport, harmless};
+use crate::report::{self, harmless};
 
 /// Options of `umbra override`.
 #[derive(clap::Args)]
@@ -55,21 +56,6 @@ pub struct StatusArguments {
     report: ReportFolder,
 }
 
-/// A submission of a report, as it was kept.
-pub struct Graded {
-    /// What it is worth before anything is decided.
-    pub entry: SubmissionReport,
-    /// By what decisions name it.
-    key: String,
-}
-
-impl Graded {
-    fn subject(&self) -> Subject<'_> {
-        let record = &self.entry.record;
-        Subject { slug: &record.slug, digest: &record.digest, evidence: &record.evidence }
-    }
-}
-
 fn points(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
     number.ok_or_else(|| "expected points, such as 12.5".to_owned())
@@ -97,10 +83,11 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
     let made = decision.of(&graded, evidence)?;
     decision.add(kept, &Decision { part: Some(part.clone()), points: Some(*points), ..made })?;
     println!(
-        "{}: part {part} has {points} points from now on, the evidence says {before}",
-        harmless(&graded.entry.who())
+        "{}: part {part} has {points} {} from now on, the evidence says {before}",
+        harmless(&graded.entry.who()),
+        if *points == 1.0 { "point" } else { "points" }
     );
-    said(&decision.report.path)
+    said(&decision.report.path, &graded)
 }
 
 /// Confirms what was left to the instructor.
@@ -108,23 +95,44 @@ pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     let ConfirmArguments { student, decision } = arguments;
     let kept = Kept::read(&decision.report.path)?;
     let graded = one(student, &decision.report.path, &kept)?;
-    let grade = &graded.entry.grade;
-    let evidence = fingerprint(&graded.subject(), &grade.parts);
-    decision.add(kept, &decision.of(&graded, evidence)?)?;
-    let name = harmless(&graded.entry.who());
-    match grade.unconfirmed {
-        0.0 => println!("{name}: confirmed, no points hang on it"),
-        points => println!("{name}: {points} points for the images are confirmed"),
-    }
-    said(&decision.report.path)
+    let evidence = fingerprint(&graded.subject(), &graded.entry.grade.parts);
+    let kept = decision.add(kept, &decision.of(&graded, evidence)?)?;
+    println!("{}: {}", harmless(&graded.entry.who()), confirmed(&graded, &kept, decision)?);
+    said(&decision.report.path, &graded)
 }
 
-/// Says where a decision is kept.
-pub fn said(output: &Path) -> anyhow::Result<u8> {
-    println!(
-        "kept in {}; the reports show it; `umbra regrade --undo` takes it back",
-        output.join(OVERRIDES).display()
-    );
+/// What a confirmation is worth, beside all other decisions on the submission.
+fn confirmed(graded: &Graded, kept: &Kept, decision: &DecisionArguments) -> anyhow::Result<String> {
+    let report = kept.report(&decision.report.path, kept.decided()?)?.report;
+    let slug = &graded.entry.record.slug;
+    let entry = report.entries.iter().find(|own| own.record.slug == *slug);
+    let decisions = entry.map(|own| own.standing.decisions.as_slice()).unwrap_or_default();
+    let own = decisions.iter().rfind(|own| own.decision.part.is_none());
+    let (from, to) = match own {
+        Some(own) => (own.before[0], own.after[0]),
+        None => (0.0, graded.entry.grade.unconfirmed),
+    };
+    let points = ((to - from) * 100.0).round() / 100.0;
+    Ok(match points {
+        0.0 => "confirmed, no points hang on it".to_owned(),
+        points => format!("{points} points for the images are confirmed"),
+    })
+}
+
+/// Says where a decision is kept, and whether it shows.
+pub fn said(output: &Path, graded: &Graded) -> anyhow::Result<u8> {
+    let file = output.join(OVERRIDES);
+    match &graded.instead {
+        None => println!(
+            "kept in {}; the reports show it; `umbra regrade --undo` takes it back",
+            file.display()
+        ),
+        Some(instead) => println!(
+            "kept in {}, but no report shows it: this submission does not count{}; `umbra regrade --undo` takes it back",
+            file.display(),
+            harmless(instead)
+        ),
+    }
     Ok(super::EXIT_OK)
 }
 
@@ -189,52 +197,6 @@ impl DecisionArguments {
     }
 }
 
-/// The one submission of a student in a report.
-///
-/// # Errors
-/// When there is none, or several.
-pub fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
-    let claims = kept.claims(output);
-    let owners = kept.owners(&claims, output)?;
-    match owners.meant(wanted)[..] {
-        [at] => {
-            let (key, slug) = (owners.key(at), &claims[at].slug);
-            Ok(Graded { entry: kept.graded(output, slug)?, key })
-        }
-        [] => {
-            if let Some(who) = owners.listed_as(wanted) {
-                let report = kept.report(output, kept.decided()?)?.report;
-                let undecided = report.class.is_some_and(|class| {
-                    class.undecided.iter().any(|own| {
-                        own.candidates.is_empty()
-                            || own
-                                .candidates
-                                .iter()
-                                .any(|student| owners.listed_is(wanted, student))
-                    })
-                });
-                ensure!(undecided, "{}: {who} has no submission", output.display());
-                bail!(
-                    "{}: {who} has no submission that is theirs for certain; hint: decide in matches.toml whose it \
-                     is, or name the submission's folder",
-                    output.display()
-                );
-            }
-            let first = claims.first().map_or("a2_ada_lampglow", |claim| &claim.slug);
-            bail!(
-                "nobody in {} is \"{wanted}\"; expected a student number, a name, or a submission's folder such as \
-                 {first}",
-                output.display()
-            )
-        }
-        ref several => bail!(
-            "{} submissions are \"{wanted}\"; name the folder of one: {}",
-            several.len(),
-            owners.folders(several).join(", ")
-        ),
-    }
-}
-
 /// The name of the account that runs this; nothing where the system knows none.
 fn account() -> Option<String> {
     let named = ["USER", "LOGNAME", "USERNAME"].into_iter();
@@ -254,10 +216,7 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
     let class = report.class.unwrap_or_default();
     let rules = &report.assignment.rules;
     let row = |row: &Row, what: &str| format!("{} ({}): {what}", row.name, row.slug);
-    let confirmed = |row: &Row| {
-        row.standing.decisions.iter().any(|own| own.decision.part.is_none() && !own.stale)
-    };
-    let open = || report.submissions.iter().filter(|row| !confirmed(row));
+    let open = || report.submissions.iter().filter(|row| !row.standing.is_confirmed());
     let images = open().filter(|own| own.unconfirmed > 0.0);
     let images: Vec<String> =
         images.map(|own| row(own, &format!("{} points for its images", own.unconfirmed))).collect();
@@ -296,6 +255,7 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
         waits |= !lines.is_empty();
         list(title, &lines);
     }
+    list("attempts that count for less than another", &class.worse);
     list("without a submission", &missing.collect::<Vec<_>>());
     if !waits {
         println!("nothing waits for a decision");

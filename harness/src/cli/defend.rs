@@ -5,11 +5,15 @@ use std::path::Path;
 use anyhow::Context as _;
 
 use super::assemble::Kept;
+use super::chosen::one;
 use super::context::Context;
-use super::decide::one;
+use super::lying::{Lying, quoted};
 use super::report_folder::ReportFolder;
 use super::{EXIT_OK, class, terminal};
-use crate::report::{self, Look};
+use crate::class::overrides::Subject;
+use crate::program::graded;
+use crate::report::{self, Look, SubmissionReport, harmless};
+use crate::rubric::{self, Rules};
 
 /// Options of `umbra defend`.
 #[derive(clap::Args)]
@@ -27,24 +31,44 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
     let DefendArguments { student, part, report: ReportFolder { path: output } } = arguments;
     let kept = Kept::read(output)?;
     let decided = kept.decided()?;
-    let slug = one(student, output, &kept)?.entry.record.slug;
+    let chosen = one(student, output, &kept)?;
+    let slug = chosen.entry.record.slug;
     let settled = kept.report(output, decided)?;
     let report = &settled.report;
-    let entry = report.entries.iter().find(|entry| entry.record.slug == slug).with_context(|| {
-        format!("the submission {slug} does not count; `umbra status` and report.html say which does")
-    })?;
-    let entry = &settled.whole(entry)?;
+    let entry =
+        report.entries.iter().find(|entry| entry.record.slug == slug).with_context(|| {
+            format!(
+                "the submission {slug} does not count{}",
+                harmless(&chosen.instead.unwrap_or_default())
+            )
+        })?;
+    let entry = &mut settled.whole(entry)?;
+    let is_mended = entry.standing.mended.as_ref().is_some_and(|mended| mended.counts);
+    let mended = class::mended_record(output, &slug)?.filter(|_| is_mended);
+    if let Some(mended) = &mended {
+        // The points are those of the mended source, so its evidence belongs to them.
+        entry.record.evidence = rubric::settle(&report.rules, &mended.evidence);
+    }
     let look = Look { width: terminal::width(), colours: terminal::colours() };
     let text = report::defend(report, entry, part, look).map_err(anyhow::Error::msg)?;
     print!("{text}");
     // How to see it again.
     println!("\nTo reproduce it");
     println!("  the student, on public scenes:  umbra check DIR --part {part}");
-    let source = class::place_of(output, &slug).unwrap_or_else(|| "SUBMISSION".to_owned());
+    let source = class::mended(output, &slug).join(report::MENDED_SOURCE);
+    let lying = match &mended {
+        Some(_) => Lying::Here(source.canonicalize().unwrap_or(source)),
+        None => Lying::of(output, &slug),
+    };
     let seed = report.held_back.as_ref().map_or("off".to_owned(), |own| own.seed.to_string());
+    let at_root = root.map_or(String::new(), |root| format!(" --root {}", quoted(root)));
     println!(
-        "  the instructor, on all:  umbra grade \"{source}\" --perturb {seed} --report ANOTHER"
+        "  the instructor, on all:  umbra grade {} --perturb {seed} --report ANOTHER{at_root}",
+        lying.arguments()
     );
+    if let Lying::Gone(place) = &lying {
+        println!("  (SUBMISSION: it was graded from {}, where it is no more)", place.display());
+    }
     match (report.held_back.is_some(), report.released) {
         (false, _) => {}
         (true, true) => println!(
@@ -56,8 +80,8 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
         }
     }
     let mend = Context::assignment(root).ok().and_then(|assignment| assignment.mend);
-    if let (Some(mend), Some(own)) = (mend, entry.grade.parts.iter().find(|own| own.id == *part)) {
-        let with = entry.grade.points_max - own.points_max + own.out_of - mend.penalty;
+    if let Some(mend) = mend {
+        let with = with_part_right(&kept, output, &report.rules, entry, part, mend.penalty)?;
         println!(
             "\nMended\n  with this part right, `umbra mend` would give {:.2} points instead of {:.2} (at most {} lines, less {} \
              points), never fewer",
@@ -68,4 +92,33 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
         );
     }
     Ok(EXIT_OK)
+}
+
+/// What a settled submission would be worth, had a mend made a part right: after the instructor's decisions, the
+/// mend's penalty and lateness, as [`Kept::report`] settles it.
+fn with_part_right(
+    kept: &Kept,
+    output: &Path,
+    rules: &Rules,
+    entry: &SubmissionReport,
+    part: &str,
+    penalty: f64,
+) -> anyhow::Result<f64> {
+    let record = &entry.record;
+    let mut grade = graded(record.clone(), rules).grade;
+    let full = grade.parts.iter().find(|own| own.id == part).map_or(0.0, |own| own.out_of);
+    // A fix of the source opens no gate, such as that of a wrong tree.
+    grade.set_part(part, full * rubric::ceiling(rules, &record.evidence));
+    let claims = kept.claims(output);
+    let decided = kept.decided()?;
+    let overrides = decided.overrides(output)?.on(&kept.owners(&claims, output)?);
+    let subject =
+        Subject { slug: &record.slug, digest: &record.digest, evidence: &record.evidence };
+    overrides.apply(&subject, &mut grade);
+    grade.points = (grade.points_max - penalty).max(0.0);
+    grade.points_max = grade.points;
+    if let (Some(policy), Some(late)) = (&decided.assignment.late, &entry.standing.late) {
+        policy.charge(&mut late.clone(), &mut grade);
+    }
+    Ok(grade.points)
 }

@@ -57,6 +57,24 @@ impl Row {
     }
 }
 
+impl Row {
+    /// What waits for the instructor, though the points are a number: nothing that a grade book shows.
+    pub fn open(&self, rules: &Rules) -> Vec<String> {
+        let mut open = Vec::new();
+        if !self.standing.is_confirmed() {
+            if self.unconfirmed > 0.0 {
+                open.push(format!("{} points for its images are not confirmed", self.unconfirmed));
+            }
+            let private = self.remarks.iter().filter(|remark| report::is_private(remark, rules));
+            open.extend(private.cloned());
+        }
+        if self.standing.time_unknown {
+            open.push("no penalty, since nobody knows when it was submitted".to_owned());
+        }
+        open
+    }
+}
+
 /// Whether tasks of a partition graded into a report that nobody merged.
 pub fn is_begun(output: &Path) -> bool {
     Found::begun(output).is_ok_and(|begun| !begun.is_empty())

@@ -9,6 +9,8 @@ use anyhow::{Context as _, bail, ensure};
 use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
+use super::assemble::Kept;
+use super::chosen::one;
 use super::class;
 use super::earlier::{Report, Row};
 use super::report_folder::ReportFolder;
@@ -20,6 +22,9 @@ use crate::columns::count;
 use crate::files::{hex, write_whole};
 use crate::report::{self, harmless};
 use crate::rubric::Rules;
+
+/// The column of a worksheet of Moodle that says whether it takes a grade.
+const CHANGEABLE: &str = "Grade can be changed";
 
 /// The file that says what was exported, in the instructor's folder.
 const EXPORTS: &str = "exports.json";
@@ -83,8 +88,8 @@ pub struct ExportArguments {
     report: ReportFolder,
     #[command(flatten)]
     item: Item,
-    /// Only this submission: the name of its folder in the report
-    #[arg(long, value_name = "NAME")]
+    /// Only this student's submission: a number, a name, or its folder in the report
+    #[arg(long, value_name = "STUDENT")]
     only: Option<String>,
 }
 
@@ -106,11 +111,11 @@ pub fn export(arguments: &ExportArguments) -> anyhow::Result<u8> {
             !matches!(format, Format::Csv | Format::Json),
             "--only: expected a format that can hold one submission, such as gradescope or junit"
         );
-        report.submissions.retain(|row| row.slug == *only);
+        let slug = one(only, output, &Kept::read(output)?)?.entry.record.slug;
+        report.submissions.retain(|row| row.slug == slug);
         ensure!(
             !report.submissions.is_empty(),
-            "{} has no submission \"{only}\"",
-            output.display()
+            "the submission {slug} does not count, so there is nothing to export"
         );
     }
     write(*format, file, output, item, &report)?;
@@ -162,13 +167,25 @@ fn write(
             book(file, output, item, report, kind, &mut said)?.into_bytes()
         }
         Format::Feedback => feedback_archive(file, output, report, &mut said)?,
-        Format::Gradescope => gradescope(report)?.into_bytes(),
-        Format::Junit => junit::junit(report, output).into_bytes(),
+        Format::Gradescope | Format::Junit => {
+            said.push(format!(
+                "{}: {}",
+                file.display(),
+                count(report.submissions.len(), "submission")
+            ));
+            match format {
+                Format::Junit => junit::junit(report, output).into_bytes(),
+                _ => gradescope(report)?.into_bytes(),
+            }
+        }
         Format::Csv | Format::Json => {
             let own = output.join(format.file());
             if is_same(&own, file) {
+                println!("{}: the report keeps it there already", file.display());
                 return Ok(());
             }
+            let all = count(report.submissions.len(), "submission");
+            said.push(format!("{}: {all}, as {}", file.display(), own.display()));
             std::fs::read(&own).with_context(|| format!("cannot read {}", own.display()))?
         }
     };
@@ -263,13 +280,21 @@ fn of_platform(roster: Option<Roster>, kind: Kind, output: &Path) -> anyhow::Res
         kind.title(),
         kind.title()
     );
+    let hint = match roster.kind {
+        Kind::Brightspace | Kind::Canvas | Kind::Moodle => {
+            format!("the format {}", roster.kind.title().to_lowercase())
+        }
+        other => format!(
+            "Umbra fills no grade book of {}; the format csv holds all points by student number",
+            other.title()
+        ),
+    };
     ensure!(
         roster.kind == kind,
-        "{}: expected the export of {}, found that of {}; hint: the format {}",
+        "{}: expected the export of {}, found that of {}; hint: {hint}",
         roster.path.display(),
         kind.title(),
-        roster.kind.title(),
-        roster.kind.title().to_lowercase()
+        roster.kind.title()
     );
     Ok(roster)
 }
@@ -330,7 +355,7 @@ fn book(
     said: &mut Vec<String>,
 ) -> anyhow::Result<String> {
     let roster = of_platform(class::roster(None, output)?, kind, output)?;
-    let (mut graded, mut left) = (Vec::new(), Vec::new());
+    let (mut graded, mut left, mut open) = (Vec::new(), Vec::new(), Vec::new());
     for row in &report.submissions {
         let student = row.standing.student.as_ref();
         let student = student.and_then(|own| roster.students.iter().find(|other| *other == own));
@@ -342,6 +367,10 @@ fn book(
             }
             (Some(student), None) => {
                 graded.push(Points { student, points: row.points });
+                let waits = row.open(&report.assignment.rules);
+                if !waits.is_empty() {
+                    open.push(format!("{}: {}", student.who(), waits.join("; ")));
+                }
                 continue;
             }
         };
@@ -385,6 +414,27 @@ fn book(
              \"Can Exceed\"): {}",
             harmless(&over.join(", "))
         ));
+    }
+    let column = roster.header.iter().position(|own| own.trim() == CHANGEABLE);
+    let is_locked = |own: &&Points| {
+        let cell = column.and_then(|at| roster.rows.get(own.student.row)?.get(at));
+        cell.is_some_and(|cell| cell.trim() == "No")
+    };
+    let locked: Vec<String> =
+        graded.iter().filter(is_locked).map(|own| own.student.who()).collect();
+    if !locked.is_empty() {
+        said.push(format!(
+            "warning: {} says that these grades cannot be changed, and may pass them over: {}",
+            kind.title(),
+            harmless(&locked.join(", "))
+        ));
+    }
+    if !open.is_empty() {
+        said.push(format!(
+            "warning: {} with points that still wait for you; `umbra status` lists them:",
+            count(open.len(), "grade")
+        ));
+        said.extend(open.iter().map(|line| format!("  {}", harmless(line))));
     }
     said.extend(left_out(&left));
     Ok(book.text)

@@ -17,7 +17,7 @@ use crate::columns::count;
 use crate::files::{files_below, write_whole};
 use crate::grading::{ALIKE, Shared};
 use crate::harmless::harmless;
-use crate::report::{self, Alike, AlikePage};
+use crate::report::{self, Alike, AlikePage, BatchReport};
 
 /// A folder of sources for each submission, in [`report::LIKENESS`].
 const SUBMISSIONS: &str = "submissions";
@@ -44,7 +44,8 @@ pub fn run(arguments: &LikenessArguments, root: Option<&Path>) -> anyhow::Result
         Some(result) => take(result, &folder)?,
         None => write_sources(&kept, output, root, &folder)?,
     }
-    show(&kept, &folder)?;
+    let settled = kept.report(output, kept.decided()?)?;
+    show(&kept, &settled.report, &folder)?;
     // The reports name what is alike.
     assemble::write(output, &kept.report(output, kept.decided()?)?)?;
     Ok(super::EXIT_OK)
@@ -184,11 +185,15 @@ fn copy_sources(from: &Path, to: &Path) -> anyhow::Result<bool> {
 }
 
 /// Writes the pages, and says what is alike.
-fn show(kept: &Kept, folder: &Path) -> anyhow::Result<()> {
+fn show(kept: &Kept, settled: &BatchReport, folder: &Path) -> anyhow::Result<()> {
     let shared = Shared::of(kept.records());
     let near = jplag::kept(folder)?;
     let mut all: BTreeMap<[String; 2], Alike> = BTreeMap::new();
     let name = |slug: &String| {
+        // As all pages call them: by the class list, where it knows them.
+        if let Some(entry) = settled.entries.iter().find(|own| own.record.slug == *slug) {
+            return entry.student().full_name();
+        }
         let record = kept.records().find(|record| record.slug == *slug);
         record.map(|record| record.student.full_name()).unwrap_or_default()
     };

@@ -8,13 +8,15 @@ use anyhow::{Context as _, bail, ensure};
 use super::assemble::Kept;
 use super::batch::{Batch, BatchOutcome};
 use super::choices::{IsolationChoice, Perturb};
+use super::chosen::one;
 use super::class;
 use super::context::Context;
-use super::decide::{DecisionArguments, one, said};
+use super::decide::{DecisionArguments, said};
+use super::lying::{Lying, fetch};
 use super::render::AdapterChoice;
 use crate::class::mending;
 use crate::files::files_below;
-use crate::grading::Mode;
+use crate::grading::{Mode, Record};
 use crate::harmless::harmless;
 use crate::report;
 
@@ -63,7 +65,7 @@ pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8>
     let graded = one(student, output, &kept)?;
     let record = &graded.entry.record;
     let folder = class::mended(output, &record.slug);
-    let source = mended_source(arguments, root, &text, &record.slug, &record.digest)?;
+    let source = mended_source(arguments, root, &text, &kept, record)?;
     let seed = kept.held_back().map(|held_back| held_back.seed);
     let batch = Batch {
         adapter: arguments.adapter,
@@ -80,7 +82,7 @@ pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8>
     if let Some(mended) = entry.and_then(|entry| entry.standing.mended.as_ref()) {
         println!("{}: {}", harmless(&graded.entry.who()), harmless(&mended.words));
     }
-    said(output)
+    said(output, &graded)
 }
 
 /// A copy of the submission with the fix in it, in the instructor's folder.
@@ -88,23 +90,31 @@ fn mended_source(
     arguments: &MendArguments,
     root: Option<&Path>,
     patch: &str,
-    slug: &str,
-    digest: &str,
+    kept: &Kept,
+    record: &Record,
 ) -> anyhow::Result<PathBuf> {
     let output = &arguments.decision.report.path;
-    let place = class::place_of(output, slug).map(PathBuf::from);
-    let given = arguments.submission.clone().or(place).filter(|path| path.exists());
-    let given = given.with_context(|| {
-        format!("the submission {slug} is not where it was graded from; hint: --submission PATH, the archive or folder")
-    })?;
+    let Record { slug, digest, .. } = record;
+    let lying = match &arguments.submission {
+        Some(path) if path.exists() => Lying::Here(path.clone()),
+        Some(path) => Lying::Gone(path.clone()),
+        None => Lying::of(output, slug),
+    };
     let context = Context::new(root)?;
     let scratch = tempfile::tempdir_in(&context.supervisor.scratch)?;
+    let unpacked = scratch.path().join("download");
+    fs::create_dir(&unpacked)?;
+    let given = fetch(&lying, kept.kind(), &context, &unpacked).with_context(|| {
+        format!(
+            "the submission {slug} cannot be read; hint: --submission PATH, the archive or folder"
+        )
+    })?;
     let copy = scratch.path().join("copy");
     fs::create_dir(&copy)?;
     let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
     let received = context.decoder().receive(&given, &copy, tree, limits)?;
     ensure!(
-        received.submission.digest == digest,
+        received.submission.digest == *digest,
         "{} is not what was graded as {slug}; expected the same files",
         given.display()
     );

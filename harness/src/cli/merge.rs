@@ -45,7 +45,11 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
     let instructor = output.join(report::INSTRUCTOR);
     let begun = Found::begun(output)?;
     let files: Vec<PathBuf> = begun.iter().map(|(file, _)| file.clone()).collect();
-    let found = one(output, begun)?;
+    // What is merged already is made again, with what the instructor decided since.
+    let found = match Found::read(output)?.filter(|_| begun.is_empty()) {
+        Some(merged) => merged,
+        None => one(output, begun)?,
+    };
     let (mut records, mut absent) = (Vec::new(), Vec::new());
     for Seen { slug, name, .. } in graded(&found) {
         let earlier = RecordCache::earlier(&instructor.join(slug), &found.conditions)?;
@@ -87,11 +91,12 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
     let decided = Decisions::read(output, stated, attempt)?;
     decided.check(output)?;
     join(output, &found, &mut records);
+    let skipped = crate::class::skipped(&found.skipped);
     let report = assemble::finish(output, &mut pins, &decided, found, records)?;
     for file in files {
         std::fs::remove_file(&file).with_context(|| format!("cannot remove {}", file.display()))?;
     }
-    grade::shown(&report, output, None)
+    grade::shown(&report, output, skipped)
 }
 
 /// The submissions that must have a record.

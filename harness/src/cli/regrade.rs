@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Context as _;
 
-use super::assemble::{self, Kept, changes};
+use super::assemble::{self, Kept, changes, other_attempt};
 use super::context::Context;
 use super::report_folder::ReportFolder;
 use crate::class::overrides::OVERRIDES;
@@ -12,7 +12,7 @@ use crate::class::pins::Change;
 use crate::class::{Decisions, MATCHES, Stated};
 use crate::columns::{count, left, right};
 use crate::files::write_whole;
-use crate::report::{BatchReport, harmless};
+use crate::report::{BatchReport, SubmissionReport, harmless};
 
 /// Options of `umbra regrade`.
 #[derive(clap::Args)]
@@ -132,21 +132,26 @@ fn table(changes: &[Change]) -> String {
 
 /// How many rise and fall.
 fn summary(before: &BatchReport, after: &BatchReport) -> String {
-    let total = |report: &BatchReport, slug: &str| {
-        let own = report.entries.iter().find(|entry| entry.record.slug == slug);
-        own.map(|entry| entry.grade.points + entry.grade.points_max)
+    let total = |own: &SubmissionReport| own.grade.points + own.grade.points_max;
+    let find = |of: &'_ BatchReport, slug: &str| {
+        of.entries.iter().find(|own| own.record.slug == slug).map(total)
     };
     let (mut rise, mut fall, mut stay, mut new) = (0, 0, 0, 0);
     for entry in &after.entries {
-        let now = entry.grade.points + entry.grade.points_max;
-        match total(before, &entry.record.slug) {
+        let now = total(entry);
+        // Of a student whose other attempt counts now, that one.
+        let other = || other_attempt(entry, before, after).map(total);
+        match find(before, &entry.record.slug).or_else(other) {
             None => new += 1,
             Some(old) if now > old => rise += 1,
             Some(old) if now < old => fall += 1,
             Some(_) => stay += 1,
         }
     }
-    let gone = before.entries.iter().filter(|own| total(after, &own.record.slug).is_none()).count();
+    let is_gone = |own: &&SubmissionReport| {
+        find(after, &own.record.slug).is_none() && other_attempt(own, after, before).is_none()
+    };
+    let gone = before.entries.iter().filter(is_gone).count();
     let mut words = format!(
         "{}: {rise} rise, {fall} fall, {stay} stay",
         count(after.entries.len(), "submission")

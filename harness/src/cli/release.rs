@@ -37,7 +37,8 @@ pub fn run(arguments: &ReleaseArguments, root: Option<&Path>) -> anyhow::Result<
     let now = jiff::Timestamp::now();
     ensure!(
         now >= end,
-        "nothing is released before {end}: the due date, the cut-off, late days and the last extension come first"
+        "nothing is released before {}: the due date, the cut-off, late days and the last extension come first",
+        late::shown(end, &stated.due, stated.late.as_ref())
     );
     let mut settled = kept.report(output, decided)?;
     let report = &mut settled.report;

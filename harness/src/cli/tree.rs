@@ -170,8 +170,8 @@ fn many(arguments: &ValidateArguments, found: &Collected, context: &Context) -> 
             println!("{name}{gap}  {}", harmless(&in_a_line(validation)));
         }
         println!();
-        if found.kind != Kind::Plain {
-            println!("recognised as a download of {}", found.kind.title());
+        if let Some(recognised) = found.recognised() {
+            println!("{recognised}");
         }
         let all = validations.len();
         println!("{}: {} conforming, {wrong} not", count(all, "submission"), all - wrong);

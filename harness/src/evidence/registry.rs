@@ -14,6 +14,9 @@ use serde::{Deserialize, Serialize};
 
 pub use info::CheckInfo;
 
+/// From here on, of 1,000,000, two names are alike enough to be taken for a slip.
+const ALIKE: u64 = 800_000;
+
 /// Defines an enum with a name in text for each variant: `ALL`, `name`, `FromStr`, `Display`, serde.
 macro_rules! named {
     ($(#[$doc:meta])* $type:ident, $what:literal, $($(#[$entry:meta])* $variant:ident = $name:literal,)+) => {
@@ -43,8 +46,13 @@ macro_rules! named {
                 let found = Self::ALL.iter().copied().find(|one| one.name() == text);
                 found.ok_or_else(|| {
                     let alike = |one: &&Self| (1e6 * strsim::jaro_winkler(one.name(), text)) as u64;
-                    let nearest = Self::ALL.iter().max_by_key(alike).map_or("", |one| one.name());
-                    format!("there is no {} \"{text}\"; did you mean \"{nearest}\"?", $what)
+                    let nearest = Self::ALL.iter().filter(|one| alike(one) >= ALIKE).max_by_key(alike);
+                    match nearest {
+                        Some(one) => {
+                            format!("there is no {} \"{text}\"; did you mean \"{}\"?", $what, one.name())
+                        }
+                        None => format!("there is no {} \"{text}\"", $what),
+                    }
                 })
             }
         }

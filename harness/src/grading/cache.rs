@@ -271,11 +271,12 @@ impl RecordCache {
     }
 
     /// The key of a record that intake has begun: what was submitted, what is to be said of it so
-    /// far, and all that the rest depends on.
+    /// far, and all that the rest depends on. What its file is called is none of that.
     pub(super) fn key(&self, begun: &Record, checks: &[Check]) -> anyhow::Result<String> {
         let mut hash = Sha256::new();
         hash.update(self.batch);
-        hash.update(serde_json::to_vec(&(begun, checks))?);
+        let content = Record { name: String::new(), ..begun.clone() };
+        hash.update(serde_json::to_vec(&(&content, checks))?);
         Ok(hex(&hash.finalize()))
     }
 

@@ -65,7 +65,9 @@ pub(super) fn is_template_value(text: &str) -> bool {
         "123456789",
         "260000000",
     ];
-    TEMPLATE.contains(&plain.as_str()) || text.contains(['<', '>'])
+    // `<first name>`: a place to be filled in, and not a sign in a name.
+    let is_place = text.trim().starts_with('<') && text.trim().ends_with('>');
+    TEMPLATE.contains(&plain.as_str()) || is_place
 }
 
 fn check_name(field: &Option<Field>, key: &str, findings: &mut Vec<Finding>) {
@@ -374,5 +376,15 @@ mod tests {
         }
         assert_eq!(with("Ada", ""), ["config_credentials@3"]);
         assert_eq!(codes("{}", &[]).len(), 4);
+    }
+
+    #[test]
+    fn a_place_to_be_filled_in_is_no_name_and_a_sign_in_a_name_is() {
+        for text in ["<first name>", " <your name> ", "First", "TODO"] {
+            assert!(is_template_value(text), "{text}");
+        }
+        for text in ["Bob\"<b>", "<3 Ann", "Ann > Bo", "Ada"] {
+            assert!(!is_template_value(text), "{text}");
+        }
     }
 }

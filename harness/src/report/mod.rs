@@ -36,8 +36,8 @@ use thiserror::Error;
 pub use self::csv::grades as csv_grades;
 pub use self::errors::{ClassErrors, ERRORS, ErrorPicture};
 pub use self::html::{
-    Alike, AlikePage, LIKENESS, Reader, batch as html_batch, submission as html_submission,
-    viewer as html_viewer, write_alike,
+    Alike, AlikePage, LIKENESS, Reader, batch as html_batch, mark_superseded,
+    submission as html_submission, viewer as html_viewer, write_alike,
 };
 pub use self::json::{SCHEMA, VERSION, report_json};
 pub use self::outline::outline;
@@ -51,7 +51,7 @@ pub use crate::harmless::harmless;
 
 use crate::assignment::Assignment;
 use crate::class::{Class, Standing, Stated};
-use crate::evidence::{Check, CheckId};
+use crate::evidence::Check;
 use crate::files::{write_whole, write_whole_by};
 use crate::grading::{Record, Student};
 use crate::held_back::HeldBack;
@@ -149,8 +149,21 @@ impl SubmissionReport {
     /// The entry as its student may read it; `released` where that includes held-back scenes.
     pub fn for_student(&self, rules: &Rules, released: bool) -> Self {
         let mut entry = self.clone();
-        // A likeness is for the instructor to look at, and no verdict.
-        entry.record.evidence.checks.retain(|check| check.id != CheckId::SubmissionLikeness);
+        // A likeness or a copied image is for the instructor to look at, and no verdict. Ones that passed would tell
+        // which did not.
+        let private = |check: &Check| rules.is_private(check.id);
+        let hidden: Vec<String> = entry
+            .record
+            .evidence
+            .checks
+            .iter()
+            .filter(|own| private(own))
+            .map(Check::name)
+            .collect();
+        entry.record.evidence.checks.retain(|check| !private(check));
+        for part in &mut entry.grade.parts {
+            part.evidence.retain(|name| !hidden.contains(name));
+        }
         for check in &mut entry.record.evidence.checks {
             *check = if released {
                 Check { private: String::new(), ..check.clone() }

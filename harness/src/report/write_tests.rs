@@ -137,7 +137,10 @@ fn a_student_folder_names_nobody_else_has_no_note_for_instructors_and_leads_nowh
         let bytes = all_bytes(&folder);
         let has =
             |needle: &str| bytes.windows(needle.len()).any(|window| window == needle.as_bytes());
-        assert!(has(&entry.record.name) && has("another submission"));
+        assert!(has(&entry.record.name));
+        for suspicion in ["another submission", "same image", "two names", "submitted.shared"] {
+            assert!(!has(suspicion), "{suspicion} is for the instructor alone");
+        }
         assert!(!has("or the instructor:"), "a note for the instructor");
         assert!(
             !has("SECRET") && has("image.offline @ cbox"),

@@ -11,6 +11,15 @@ use crate::evidence::{Check, CheckId, Evidence, Verdict};
 /// The check that says whether the source was built; images alone count when it failed.
 pub const BUILD: CheckId = CheckId::SubmissionBuild;
 
+/// The reason of a part that a private check decides.
+const FOR_THE_INSTRUCTOR: &str = "what its images are worth is for the instructor to decide";
+
+/// What follows in a remark where images alone are worth something.
+pub const IMAGES_EARN: &str = "; the images alone earn ";
+
+/// What says in remarks and reasons that images count only by the instructor's word.
+pub const ONCE_CONFIRMED: &str = " once the instructor confirms";
+
 /// The points of one submission.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Grade {
@@ -196,12 +205,11 @@ fn grade_together(rules: &Rules, evidence: &Evidence) -> Grade {
         charge_unexplained(rules, evidence, &mut worths);
     }
     let mut remarks = Vec::new();
-    let mut ceiling = 1.0f64;
+    let ceiling = ceiling(rules, evidence);
     for gate in &rules.gates {
         let failed = |check: &&Check| check.verdict == Verdict::Fail;
         let hints = evidence.named(gate.check).filter(failed).map(|check| &check.hint);
         if let Some(hint) = hints.min() {
-            ceiling = ceiling.min(gate.ceiling);
             remarks.push(if gate.private || hint.is_empty() {
                 gate.reason.clone()
             } else {
@@ -239,6 +247,24 @@ fn grade_together(rules: &Rules, evidence: &Evidence) -> Grade {
         })
         .collect();
     sum(parts, rules.total_points(), remarks)
+}
+
+/// The share of the points that closed gates leave.
+pub fn ceiling(rules: &Rules, evidence: &Evidence) -> f64 {
+    let failed = |check: &Check| check.verdict == Verdict::Fail;
+    let closed = rules.gates.iter().filter(|gate| evidence.named(gate.check).any(failed));
+    closed.map(|gate| gate.ceiling).fold(1.0, f64::min)
+}
+
+impl Grade {
+    /// Sets a part to some points, and sums up again.
+    pub fn set_part(&mut self, id: &str, points: f64) {
+        for part in self.parts.iter_mut().filter(|part| part.id == id) {
+            (part.points, part.points_max, part.unconfirmed) = (points, points, 0.0);
+        }
+        let Self { parts, out_of, remarks, .. } = std::mem::take(self);
+        *self = sum(parts, out_of, remarks);
+    }
 }
 
 /// Points are published with two digits.
@@ -309,13 +335,13 @@ fn by_images(rules: &Rules, evidence: &Evidence, part: &Part) -> PartScore {
         shown.reason
     } else if trust.is_some() {
         format!(
-            "{points} once the instructor confirms: there is no code to judge, but an image with the noise of \
+            "{points}{ONCE_CONFIRMED}: there is no code to judge, but an image with the noise of \
              the student's number: {}",
             shown.reason
         )
     } else {
         format!(
-            "{points} once the instructor confirms: there is no code to judge, only an image, which anybody's \
+            "{points}{ONCE_CONFIRMED}: there is no code to judge, only an image, which anybody's \
              program may have drawn: {}",
             shown.reason
         )
@@ -338,7 +364,7 @@ fn without_code(
     Some(if unconfirmed == 0.0 {
         why.clone()
     } else {
-        format!("{why}; the images alone earn {unconfirmed} points once the instructor confirms")
+        format!("{why}{IMAGES_EARN}{unconfirmed} points{ONCE_CONFIRMED}")
     })
 }
 
@@ -378,7 +404,11 @@ fn by_checks(
         .collect();
     evidence.sort();
     evidence.dedup();
-    let reason = deciding.said().into_owned();
+    let reason = match deciding.verdict {
+        // Students read the reasons of their parts.
+        Verdict::Fail if rules.is_private(deciding.id) => FOR_THE_INSTRUCTOR.to_owned(),
+        _ => deciding.said().into_owned(),
+    };
     Some(PartScore { least, most: least, unconfirmed: 0.0, reason, evidence })
 }
 

@@ -19,5 +19,5 @@ mod grade;
 mod rules;
 
 pub use curve::Curve;
-pub use grade::{BUILD, Grade, PartGrade, grade, settle};
+pub use grade::{BUILD, Grade, IMAGES_EARN, ONCE_CONFIRMED, PartGrade, ceiling, grade, settle};
 pub use rules::{Gate, Part, PathRule, Rules, Trust};

@@ -49,7 +49,7 @@ pub struct Gate {
     pub ceiling: f64,
     /// Why, in the words of the handout.
     pub reason: String,
-    /// Whether the reason is for the instructor alone.
+    /// Whether the check and the reason are for the instructor alone.
     #[serde(default)]
     pub private: bool,
 }
@@ -105,6 +105,11 @@ pub struct Part {
 }
 
 impl Rules {
+    /// Whether what a check says is for the instructor alone: a suspicion that somebody is to look at.
+    pub fn is_private(&self, check: CheckId) -> bool {
+        self.gates.iter().any(|gate| gate.private && gate.check == check)
+    }
+
     /// What is wrong with the rules themselves, if anything.
     pub fn problem(&self) -> Option<String> {
         for part in &self.parts {

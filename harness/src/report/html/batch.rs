@@ -124,21 +124,6 @@ fn about(html: &mut Html, report: &BatchReport, class: &Class) {
         return;
     }
     html.raw("<section>\n<h2>The class</h2>\n");
-    if !class.undecided.is_empty() {
-        html.raw("<p class=\"notice\">To be decided in <code>matches.toml</code>:</p>\n<ul>\n");
-        for own in &class.undecided {
-            html.raw("<li>").text(&own.submission).raw(": ").text(&own.reason).raw("</li>\n");
-        }
-        html.raw("</ul>\n");
-    }
-    for line in &class.unopened {
-        html.raw("<p class=\"notice\">Neither opened nor graded: ").text(line).raw("</p>\n");
-    }
-    for line in class.stale.iter().chain(&class.unused) {
-        html.raw("<p class=\"notice\">A decision on points to look at again: ")
-            .text(line)
-            .raw("</p>\n");
-    }
     if !class.missing.is_empty() {
         html.raw("<p>").text(&count(class.missing.len(), "student")).raw(" of ");
         html.text(&class.list).raw(" without a submission:</p>\n<ul>\n");
@@ -154,6 +139,13 @@ fn about(html: &mut Html, report: &BatchReport, class: &Class) {
         for SubmissionReport { record, standing, .. } in aside {
             html.raw("<li>").text(&record.name).raw(", not ");
             html.text(&standing.set_aside.join(", ")).raw("</li>\n");
+        }
+        html.raw("</ul>\n");
+    }
+    if !class.worse.is_empty() {
+        html.raw("<p>Attempts that count for less than another:</p>\n<ul>\n");
+        for line in &class.worse {
+            html.raw("<li>").text(line).raw("</li>\n");
         }
         html.raw("</ul>\n");
     }

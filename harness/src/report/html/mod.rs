@@ -11,6 +11,7 @@ mod markup;
 mod overview;
 mod pictures;
 mod submission;
+mod superseded;
 #[cfg(test)]
 mod tests;
 mod viewer;
@@ -22,6 +23,7 @@ pub use batch::batch;
 pub use likeness::{Alike, AlikePage, LIKENESS, write_alike};
 pub use overview::is_read_by_class;
 pub use submission::submission;
+pub use superseded::mark_superseded;
 pub use viewer::viewer;
 
 use self::markup::Html;

@@ -10,6 +10,7 @@ use super::super::{
 use super::likeness::LIKENESS;
 use super::lost::is_lost;
 use super::markup::Html;
+use crate::class::Class;
 use crate::columns::count;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::grading::{Shared, SharedFiles};
@@ -57,6 +58,21 @@ pub(super) fn link(html: &mut Html, report: &BatchReport, entry: &SubmissionRepo
     html.raw("\">");
 }
 
+/// What waits for the instructor in the class as a whole, each kind with its lines.
+fn decisions(class: &Class) -> Vec<(String, Vec<String>)> {
+    let undecided = class.undecided.iter().map(|own| format!("{}: {}", own.submission, own.reason));
+    let again = class.stale.iter().chain(&class.unused).cloned().collect::<Vec<_>>();
+    let kinds = [
+        ("submission", "decide in matches.toml", undecided.collect()),
+        ("download", "neither opened nor graded", class.unopened.clone()),
+        ("decision", "to look at again", again),
+    ];
+    let kinds = kinds.into_iter().filter(|(.., lines)| !lines.is_empty());
+    kinds
+        .map(|(noun, what, lines)| (format!("{}: {what}", count(lines.len(), noun)), lines))
+        .collect()
+}
+
 /// What the instructor must look at, each kind with its submissions; the page begins with it.
 pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
     let mut kinds: Vec<(&str, Vec<(&SubmissionReport, String)>)> = Vec::new();
@@ -75,7 +91,11 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
         let own = entry.grade.unconfirmed;
         (own > 0.0).then(|| format!("{} points for images", points(own)))
     });
-    add("to be looked at before their points count", &|entry| {
+    add("to be looked at, then confirmed", &|entry| {
+        // What the instructor confirmed, they have looked at.
+        if entry.standing.is_confirmed() {
+            return None;
+        }
         let private = entry.grade.remarks.iter().filter(|r| is_private(r, &report.rules));
         let private: Vec<&str> = private.map(String::as_str).collect();
         (!private.is_empty()).then(|| private.join("; "))
@@ -90,7 +110,7 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
         let grouped = share_files.contains(entry.record.slug.as_str());
         let own = told.iter().filter(|own| !grouped || own.id != CheckId::SubmissionLikeness);
         let words: Vec<&str> = own.map(|check| check.private.as_str()).collect();
-        (!told.is_empty()).then(|| words.join("; "))
+        (!told.is_empty() && !entry.standing.is_confirmed()).then(|| words.join("; "))
     });
     add("ran out of time", &|entry| {
         let late = |check: &&Check| is_failure(check) && check.summary.contains(OUT_OF_TIME);
@@ -99,10 +119,20 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
     add("when it was submitted is not known", &|entry| {
         entry.standing.time_unknown.then(String::new)
     });
-    if kinds.is_empty() {
+    let class = report.class.as_ref();
+    let lines = class.map_or_else(Vec::new, decisions);
+    if kinds.is_empty() && lines.is_empty() {
         return;
     }
     html.raw("<section>\n<h2>For you to decide</h2>\n");
+    for (title, lines) in lines {
+        html.raw("<details class=\"waiting\"><summary>").text(&title);
+        html.raw("</summary>\n<ul class=\"names\">\n");
+        for line in lines {
+            html.raw("<li>").text(&line).raw("</li>\n");
+        }
+        html.raw("</ul></details>\n");
+    }
     for (kind, found) in kinds {
         html.raw("<details class=\"waiting\"><summary>")
             .text(&count(found.len(), "submission"))

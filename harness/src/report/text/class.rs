@@ -2,15 +2,15 @@
 
 use super::super::BatchReport;
 use super::page::{Page, Style};
-use crate::class::{Class, Kind};
+use crate::class::{Class, recognised};
 
 /// Number of names that are listed of a kind.
 const NAMED: usize = 30;
 
 /// The lines below the table.
 pub(super) fn class(page: &mut Page, report: &BatchReport, class: &Class) {
-    if class.kind != Kind::Plain {
-        let text = format!("recognised as a download of {}", class.kind.title());
+    let labels = report.entries.iter().filter_map(|entry| entry.standing.label.as_ref());
+    if let Some(text) = recognised(class.kind, labels) {
         page.wrapped(&[], Style::Plain, &text);
     }
     let aside = report.entries.iter().filter(|entry| !entry.standing.set_aside.is_empty());
@@ -24,6 +24,7 @@ pub(super) fn class(page: &mut Page, report: &BatchReport, class: &Class) {
     let list = if class.list.is_empty() { String::new() } else { format!(", by {}", class.list) };
     for (title, style, lines) in [
         ("attempts that count".to_owned(), Style::Plain, aside.collect::<Vec<_>>()),
+        ("attempts that count for less than another".to_owned(), Style::Open, class.worse.clone()),
         ("not counted, as matches.toml says".to_owned(), Style::Plain, class.not_counted.clone()),
         (format!("without a submission{list}"), Style::Open, missing.collect()),
         ("decisions whose evidence has changed".to_owned(), Style::Bad, class.stale.clone()),

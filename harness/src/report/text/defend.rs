@@ -33,6 +33,18 @@ pub fn defend(
             page.wrapped(&[], Style::Plain, &applied.words());
         }
     }
+    let standing = &entry.standing;
+    let late = standing.late.as_ref().map(|late| late.words.as_str());
+    let mended = standing.mended.as_ref();
+    for words in late.into_iter().chain(mended.map(|mended| mended.words.as_str())) {
+        if !words.is_empty() {
+            page.wrapped(&[], Style::Plain, words);
+        }
+    }
+    if mended.is_some_and(|mended| mended.counts) {
+        let words = "All below is of the mended source.";
+        page.wrapped(&[], Style::Plain, words);
+    }
     let rule = report.rules.parts.iter().find(|own| own.id == part);
     let decides = |check: &&Check| graded.evidence.contains(&check.name());
     let asked = |check: &&Check| {

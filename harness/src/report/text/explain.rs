@@ -30,7 +30,11 @@ pub fn explain(rules: &Rules, name: &str, look: Look) -> Result<String, String> 
                 explain_check(&mut page, rules, check);
             }
         }
-        (Err(error), _) => return Err(not_found(rules, name).unwrap_or(error)),
+        (Err(error), _) => {
+            let hint = "; hint: `umbra explain` lists all";
+            let hint = if error.contains("did you mean") { "" } else { hint };
+            return Err(not_found(rules, name).unwrap_or(error + hint));
+        }
     }
     Ok(page.finish())
 }
@@ -129,6 +133,10 @@ mod tests {
             "there is no check \"shadow.ray\"; did you mean \"shadow.rays\"?"
         );
         assert!(of(" Shadow_Rays ").is_ok());
+        assert_eq!(
+            of("nonsense").unwrap_err(),
+            "there is no check \"nonsense\"; hint: `umbra explain` lists all"
+        );
         let error = of("9.9").unwrap_err();
         assert!(error.starts_with("there is no part 9.9; expected one of 1.1, 1.2"), "{error}");
         let error = of("phong").unwrap_err();

@@ -181,6 +181,18 @@ fn images_alone_earn_nothing_until_the_instructor_confirms() {
     let half = [check(NOISE, Pass, 0.0), check(NOISE, NotJudged, 0.0)];
     assert_eq!(without_code(&half).0[..2], [2.5, 3.75]);
 
+    // A suspicion is for the instructor: the student's reason does not name it.
+    let mut suspects = rules();
+    suspects.gates.push(Gate {
+        check: IMAGES_2,
+        ceiling: 1.0,
+        reason: "for the instructor: x".into(),
+        private: true,
+    });
+    let checks = vec![check(BUILD, Fail, 1.0), check(IMAGES_2, Fail, 1.0)];
+    let suspected = grade(&suspects, &Evidence { checks });
+    assert_eq!(suspected.parts[1].reason, FOR_THE_INSTRUCTOR);
+
     let nothing = grade(&rules(), &Evidence { checks: vec![check(BUILD, Fail, 1.0)] });
     assert_eq!(
         (nothing.unconfirmed, &nothing.remarks[..]),

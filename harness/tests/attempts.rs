@@ -1,0 +1,236 @@
+//! Several attempts of a student: which one a number or a name means, where it lies, and what tells which counts.
+
+#![cfg(unix)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::{Value, json};
+use similar_asserts::assert_eq;
+
+use crate::downloads::{LATE, Place, config, rows, submission, text, zip};
+use crate::support::one_scene;
+
+const LIST: &str = "OrgDefinedId,Last Name,First Name\n#260000104,Lee,Ann\n#260000106,Ode,Bo\n";
+
+fn umbra(place: &Place, root: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+    let fixed = ["--report", "out", "--root", root.to_str().unwrap()];
+    let without_root = ["status", "export"].contains(&arguments[0]);
+    let fixed = if without_root { &fixed[..2] } else { &fixed[..] };
+    let (code, said, errors) = place.run(&[arguments, fixed].concat());
+    (code, said + &errors)
+}
+
+fn download(files: &[(&str, &str)]) -> Vec<u8> {
+    let own = |(name, config): &(&str, &str)| ((*name).to_owned(), submission(config));
+    let files: Vec<(String, Vec<u8>)> = files.iter().map(own).collect();
+    zip(&files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect::<Vec<_>>())
+}
+
+fn report(place: &Place) -> Value {
+    serde_json::from_slice(&fs::read(place.at("out/report.json")).unwrap()).unwrap()
+}
+
+const FIRST: &str = "1-9 - Ann Lee - Oct 5, 2019 1000 PM/a2.zip";
+const SECOND: &str = "1-9 - Ann Lee - Oct 6, 2019 1000 PM/a2.zip";
+const FIRST_SLUG: &str = "1-9---Ann-Lee---Oct-5--2019-1000-PM-a2";
+const SECOND_SLUG: &str = "1-9---Ann-Lee---Oct-6--2019-1000-PM-a2";
+
+/// Ann submitted twice, between two downloads.
+fn twice(edit: impl Fn(&mut Value)) -> (Place, PathBuf) {
+    let place = Place::new();
+    let root = one_scene(&place.at("assignment"), |config| {
+        config["late"] = serde_json::from_str(LATE).unwrap();
+        edit(config);
+    });
+    let ann = config("Ann", "Lee", "260000104");
+    let bo = ("2-9 - Bo Ode - Oct 8, 2019 1200 AM/a2.zip", &*config("Bo", "Ode", "260000106"));
+    place.put("mon.zip", &download(&[(FIRST, &ann), bo]));
+    let newer = config("Ann", "Lee", " 260000104");
+    place.put("A2 Download.zip", &download(&[(FIRST, &ann), (SECOND, &newer), bo]));
+    place.put("list.csv", LIST.as_bytes());
+    place.grade(&root, &["mon.zip", "--class", "list.csv"]);
+    place.grade(&root, &["A2 Download.zip"]);
+    (place, root)
+}
+
+#[test]
+fn a_number_or_name_means_the_attempt_that_counts() {
+    let (place, root) = twice(|_| ());
+    for (word, points) in [("260000104", "3"), ("Lee, Ann", "4"), (SECOND_SLUG, "5")] {
+        let set = ["override", word, "1.4", points, "--reason", "x"];
+        let (code, said) = umbra(&place, &root, &set);
+        assert_eq!(code, Some(0), "{word}: {said}");
+        assert!(said.contains(&format!("({SECOND_SLUG}): part 1.4 has {points} points")), "{said}");
+        assert!(said.contains("the reports show it"), "{said}");
+        assert_eq!(report(&place)["submissions"][0]["points"].to_string(), format!("{points}.0"));
+    }
+    let (code, said) = umbra(&place, &root, &["confirm", "260000104", "--reason", "seen"]);
+    assert_eq!(code, Some(0), "{said}");
+    // By its folder the other one, which shows nowhere.
+    let (code, said) =
+        umbra(&place, &root, &["override", FIRST_SLUG, "1.4", "15", "--reason", "x"]);
+    assert_eq!(code, Some(0), "{said}");
+    let expected =
+        format!("no report shows it: this submission does not count, {SECOND_SLUG} does");
+    assert!(said.contains(&expected), "{said}");
+    assert_eq!(report(&place)["submissions"][0]["points"], 5.0);
+    // One that counts for less is named.
+    let (_, said) = umbra(&place, &root, &["status"]);
+    assert!(said.contains("attempts that count for less than another: 1"), "{said}");
+    assert!(said.contains(&format!("{SECOND}: 5 points, {FIRST} would have 15")), "{said}");
+    let (code, said) = umbra(&place, &root, &["defend", FIRST_SLUG, "1.4"]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains(&format!("does not count, {SECOND_SLUG} does")), "{said}");
+    let export = ["export", "one.json", "--format", "gradescope", "--only", "260000104"];
+    let (code, said) = umbra(&place, &root, &export);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("one.json: 1 submission"), "{said}");
+    assert!(fs::read_to_string(place.at("one.json")).unwrap().contains("\"score\": 5.0"));
+    // Its old page says so, and the instructor's leads to the other.
+    let page = |name: &str| fs::read_to_string(place.at(name)).unwrap();
+    let old = page(&format!("out/{FIRST_SLUG}/report.html"));
+    assert!(old.contains(&format!("does not count: {SECOND_SLUG} does.")), "{old}");
+    assert!(!page(&format!("out/{SECOND_SLUG}/report.html")).contains("does not count:"));
+    // Its other attempt instead is one student's fall or rise.
+    let (said, _) = place.grade(&root, &["A2 Download.zip", "--attempt", "first"]);
+    assert!(said.contains(&format!("{FIRST}, not {SECOND}")), "{said}");
+    let (code, said) = umbra(&place, &root, &["regrade", "--undo"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("0 rise, 1 fall, 1 stay"), "{said}");
+    assert!(!said.contains("counts"), "{said}");
+    assert!(page(&format!("out/{FIRST_SLUG}/report.html")).contains("does not count:"));
+}
+
+#[test]
+fn what_lies_in_a_download_is_found_and_mended() {
+    let (place, root) = twice(|config| {
+        config["mend"] = json!({"lines": 2, "penalty": 5});
+        config["late"]["of"] = json!("earned");
+    });
+    let (code, said) = umbra(&place, &root, &["defend", "260000104", "1.4"]);
+    assert_eq!(code, Some(0), "{said}");
+    // The command that it prints works.
+    let line = said.lines().find_map(|line| line.split_once("on all:  umbra "));
+    let (_, line) = line.unwrap();
+    assert!(line.contains("A2 Download.zip' --only ") && line.contains("--root "), "{line}");
+    let command = format!("'{}' {line} --isolation reduced", env!("CARGO_BIN_EXE_umbra"));
+    let ran =
+        Command::new("sh").args(["-c", &command]).current_dir(place.at(".")).output().unwrap();
+    assert_eq!(ran.status.code(), Some(0), "{command}: {}", String::from_utf8_lossy(&ran.stderr));
+    let again = fs::read(place.at("ANOTHER/report.json")).unwrap();
+    let again: Value = serde_json::from_slice(&again).unwrap();
+    assert_eq!(again["submissions"][0]["slug"], SECOND_SLUG);
+
+    let patch = "--- a/src/lib.rs\n+++ b/src/lib.rs\n@@ -1 +1 @@\n\
+                 -fn main() { not_rust }\n\\ No newline at end of file\n\
+                 +fn main() { nor_this }\n\\ No newline at end of file\n";
+    place.put("fix.patch", patch.as_bytes());
+    let mend = ["mend", "260000104", "fix.patch", "--reason", "x", "--isolation", "reduced"];
+    let (code, said) = umbra(&place, &root, &mend);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains(&format!("({SECOND_SLUG}): mended by the instructor, 1 line")), "{said}");
+    let mended = format!("out/instructor/{SECOND_SLUG}/mended");
+    assert!(place.at(&mended).join("report.html").is_file());
+
+    // Bo is late by two days, of ten per cent of what was earned: of nothing that is nothing.
+    let bo = || {
+        let report = report(&place);
+        let own = report["submissions"].as_array().unwrap().iter();
+        own.clone().find(|row| text(&row["name"]).contains("Bo Ode")).unwrap().clone()
+    };
+    let late = text(&bo()["standing"]["late"]["words"]).to_owned();
+    assert!(late.ends_with("it earned nothing, so that costs nothing"), "{late}");
+    let (code, said) = umbra(&place, &root, &["override", "Bo Ode", "1.3", "10", "--reason", "x"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(bo()["points"], 8.0);
+    let (code, said) = umbra(&place, &root, &["defend", "Bo Ode", "1.4"]);
+    assert_eq!(code, Some(0), "{said}");
+    // 10 by hand and 15, less 5, less twice a tenth of that.
+    assert!(said.contains("would give 16.00 points instead of 8.00"), "{said}");
+    // What is set by hand stays so.
+    let (_, said) = umbra(&place, &root, &["defend", "Bo Ode", "1.3"]);
+    assert!(said.contains("would give 8.00 points instead of 8.00"), "{said}");
+    // Gone.
+    fs::remove_file(place.at("A2 Download.zip")).unwrap();
+    let (code, said) = umbra(&place, &root, &mend);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(
+        said.contains("is not there any more") && said.contains("hint: --submission PATH"),
+        "{said}"
+    );
+}
+
+#[test]
+fn canvas_numbers_its_uploads() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    let (one, two) = (config("Zoe", "Oz", "260000107"), config("Zoe", "Oz", "260000107 "));
+    let three = config("Zoe", "Oz", " 260000107");
+    place.put("mon.zip", &download(&[("ozzoe_107_9001_a2.zip", &one)]));
+    place.put("tue.zip", &download(&[("ozzoe_107_9051_a2-1.zip", &two)]));
+    place.put("wed.zip", &download(&[("ozzoe_107_9057_final.zip", &two)]));
+    place.put("thu.zip", &download(&[("ozzoe_107_9061_other.zip", &three)]));
+    place.grade(&root, &["mon.zip"]);
+    let counts = |report: &Value| -> Vec<String> {
+        rows(report).into_iter().map(|(name, ..)| name).collect()
+    };
+    let (said, report) = place.grade(&root, &["tue.zip"]);
+    assert_eq!(counts(&report), ["ozzoe_107_9051_a2-1.zip"], "{said}");
+    assert_eq!(report["class"]["undecided"], json!([]), "{said}");
+    let (_, report) = place.grade(&root, &["tue.zip", "--attempt", "first"]);
+    assert_eq!(counts(&report), ["ozzoe_107_9001_a2.zip"]);
+    // The same content under another number: the newer one, which the platform takes feedback on.
+    fs::remove_dir_all(place.at("out")).unwrap();
+    place.grade(&root, &["tue.zip"]);
+    let (said, report) = place.grade(&root, &["wed.zip"]);
+    assert_eq!(counts(&report), ["ozzoe_107_9057_final.zip"], "{said}");
+    // Two files of other names may be one attempt's.
+    let (said, report) = place.grade(&root, &["thu.zip"]);
+    assert_eq!(report["class"]["undecided"].as_array().unwrap().len(), 3, "{said}");
+}
+
+#[test]
+fn a_file_that_was_renamed_is_the_same_submission() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    let ann = submission(&config("Ann", "Lee", "260000104"));
+    place.put("in/a2_ann.zip", &ann);
+    place.grade(&root, &["in"]);
+    fs::rename(place.at("in/a2_ann.zip"), place.at("in/lee.zip")).unwrap();
+    place.put("in/a2_bo.zip", &submission(&config("Bo", "Ode", "260000106")));
+    let (said, report) = place.grade(&root, &["in"]);
+    assert!(said.contains("lee.zip is a2_ann.zip under another name"), "{said}");
+    assert!(said.contains("1 of 2 submissions keep their earlier grades"), "{said}");
+    let names: Vec<String> = rows(&report).into_iter().map(|(name, ..)| name).collect();
+    assert_eq!(names, ["lee.zip", "a2_bo.zip"], "{said}");
+    // Both are there: two of one content, of which one counts.
+    place.put("in/copy.zip", &ann);
+    let (said, report) = place.grade(&root, &["in"]);
+    assert!(said.contains("lee.zip, not copy.zip"), "{said}");
+    assert_eq!(rows(&report).len(), 2, "{said}");
+}
+
+#[test]
+fn each_download_of_several_is_of_its_own_platform() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    let own = |first: &str, number: &str| config(first, "Lee", number);
+    place.put(
+        "b.zip",
+        &download(&[("1-9 - Ann Lee - Oct 7, 2019 1000 PM/a2.zip", &own("Ann", "260000104"))]),
+    );
+    place.put("c.zip", &download(&[("leebo_106_9001_a2.zip", &own("Bo", "260000106"))]));
+    place.put("mail/a2_cy.zip", &submission(&own("Cy", "260000107")));
+    place.put("mail/a2_di.zip", &submission(&own("Di", "260000108")));
+    let (said, report) = place.grade(&root, &["b.zip", "c.zip", "mail"]);
+    assert!(said.contains("recognised as downloads of Brightspace and Canvas"), "{said}");
+    let late = report["submissions"].as_array().unwrap().iter();
+    let late: Vec<(&str, &Value)> =
+        late.map(|row| (text(&row["name"]), &row["standing"]["late"]["charged"])).collect();
+    let of = |name: &str| late.iter().find(|own| own.0.contains(name)).unwrap().1.clone();
+    assert_eq!(of("Ann Lee"), 1, "{said}");
+    assert_eq!(of("leebo"), Value::Null);
+    assert_eq!(report["class"]["undecided"], json!([]), "{said}");
+}
