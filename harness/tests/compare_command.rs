@@ -53,6 +53,41 @@ fn pixels_of_another_shape_are_noted() {
 }
 
 #[test]
+fn a_difference_is_written_over_neither_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (file(&folder, "a.exr", &[]), file(&folder, "b.exr", &[(0, Vec3::ONE)]));
+    let before = std::fs::read(&b).unwrap();
+    let (code, _, said) = compare(&[Path::new("--idiff"), Path::new("-o"), &b, &a, &b]);
+    assert!(code == 4 && said.contains("b.exr: this is one of the images; hint: "), "{said}");
+    assert_eq!(std::fs::read(&b).unwrap(), before);
+}
+
+#[test]
+fn many_channels_and_names_in_utf_8_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = file(&folder, "a.exr", &[]);
+    let names: Vec<String> = ["R", "G", "B"]
+        .iter()
+        .map(|c| (*c).to_owned())
+        .chain((0..200).map(|i| format!("z{i}.V")))
+        .collect();
+    let channels: Vec<(&str, Vec<f32>)> =
+        names.iter().map(|name| (name.as_str(), vec![0.5; 4])).collect();
+    let many = folder.path().join("many.exr");
+    write_exr_channels(&many, 2, &channels).unwrap();
+    let (code, said, _) = compare(&[Path::new("--no-metrics"), &many, &plain]);
+    assert!(code == 0 && said.contains("0 of 4 pixels differ"), "{said}");
+    // Two characters of Latin-1 are one of UTF-8.
+    let named = folder.path().join("named.exr");
+    let layer = ["R", "G", "B"].map(|c| format!("\u{c3}\u{a9}.{c}"));
+    let channels = layer.each_ref().map(|name| (name.as_str(), vec![0.5; 4]));
+    write_exr_channels(&named, 2, &channels).unwrap();
+    let arguments = ["--no-metrics", "--layer", "\u{e9}"].map(Path::new);
+    let (code, said, errors) = compare(&[&arguments[..], &[&named, &plain]].concat());
+    assert!(code == 0 && said.contains("0 of 4 pixels differ"), "{said}{errors}");
+}
+
+#[test]
 fn numbers_far_from_one_have_exponents() {
     let folder = tempfile::tempdir().unwrap();
     let far = file(&folder, "a.exr", &[(0, Vec3::new(1e-40, 3.4e38, 0.5))]);

@@ -9,6 +9,7 @@ use serde_json::Value;
 use similar_asserts::assert_eq;
 
 use crate::downloads::{LATE, Place, config, rows, submission, text, zip};
+use crate::support::zip_bytes::{Entry, Zip};
 
 const LIST: &str = "Student ID,Last Name,First Name\n260000104,Lee,Ann\n260000106,Ode,Bo\n";
 
@@ -141,6 +142,10 @@ fn what_nobody_could_open_waits_for_the_instructor() {
         ("2-9 - Bo Ode - Oct 5, 2019 1159 PM/a2.rar", b"Rar!\x1a\x07\0xxxx".to_vec()),
         ("3-9 - Cy Cox - Oct 5, 2019 1159 PM/a2.zip", b"PK\x03\x04trunc".to_vec()),
         ("4-9 - Di Doe - Oct 5, 2019 1159 PM/a2.zip", Vec::new()),
+        (
+            "5-9 - Ed Fox - Oct 5, 2019 1159 PM/a2.zip",
+            Zip::of([Entry::stored("i.7z", b"7z\xbc\xaf\x27\x1cxxxx")]).bytes(),
+        ),
     ]
     .map(|(name, bytes)| (name.to_owned(), bytes))
     .to_vec();
@@ -148,20 +153,21 @@ fn what_nobody_could_open_waits_for_the_instructor() {
         place.put(&format!("in/{name}"), bytes);
     }
     let list = "OrgDefinedId,Last Name,First Name,a2 Points Grade <Numeric MaxPoints:50>,End-of-Line Indicator\n\
-                #260000104,Lee,Ann,,#\n#260000106,Ode,Bo,,#\n#260000107,Cox,Cy,,#\n#260000108,Doe,Di,,#\n";
+                #260000104,Lee,Ann,,#\n#260000106,Ode,Bo,,#\n#260000107,Cox,Cy,,#\n#260000108,Doe,Di,,#\n\
+                #260000109,Fox,Ed,,#\n";
     place.put("list.csv", list.as_bytes());
     place.grade(&root, &["in", "--class", "list.csv"]);
     let (code, said) = umbra(&place, &root, &["status"]);
     assert_eq!(code, Some(1), "{said}");
     assert!(
-        said.contains("nobody could open them: ask for other archives, or `umbra confirm`: 3"),
+        said.contains("nobody could open them: ask for other archives, or `umbra confirm`: 4"),
         "{said}"
     );
     assert!(said.contains("zip the folder"), "{said}");
     let export = ["export", "grades.csv", "--format", "brightspace"];
     let (code, said) = umbra(&place, &root, &export);
     assert_eq!(code, Some(0), "{said}");
-    assert_eq!(said.matches("nobody could open it").count(), 3, "{said}");
+    assert_eq!(said.matches("nobody could open it").count(), 4, "{said}");
     assert!(
         said.contains("is out of 50 in out/instructor/class.csv, and the grades are out of 100"),
         "{said}"

@@ -752,6 +752,68 @@ fn nobody_is_taken_where_two_people_are_named() {
 }
 
 #[test]
+fn no_hand_in_is_taken_where_one_person_has_two() {
+    let two = |places: [&str; 2], second: &dyn Fn(&str, &mut Vec<u8>)| {
+        let mut files = Vec::new();
+        for (number, place) in places.iter().enumerate() {
+            files.extend(perfect().into_iter().map(|(path, mut content)| {
+                if number == 1 {
+                    second(&path, &mut content);
+                }
+                (format!("{place}{path}"), content)
+            }));
+        }
+        files
+    };
+    let newer = |path: &str, content: &mut Vec<u8>| {
+        if path == "src/lib.rs" {
+            content.extend(b"// newer");
+        }
+    };
+    let more = |path: &str, content: &mut Vec<u8>| {
+        if path == "config.json" {
+            content.extend(b"\n");
+        } else {
+            newer(path, content);
+        }
+    };
+    for places in [["backup/", "work/"], ["v1/", "v2/"], ["a/old/", "a/new/"], ["x/", "y/z/"]] {
+        for change in [&newer as &dyn Fn(&str, &mut Vec<u8>), &more] {
+            let files = two(places, change);
+            let found = validate_files(&files);
+            let text = found.to_text();
+            let said = found.findings.iter().find(|f| f.code == "tree_ambiguous").expect(&text);
+            for place in places {
+                // One wrapping folder is the root.
+                let place = place.strip_prefix("a/").unwrap_or(place);
+                assert!(said.message.contains(&format!("{place}src/lib.rs")), "{said}");
+            }
+            assert!(fix_files(&files).is_err(), "{text}");
+            assert!(found.config.is_some(), "who it is is known: {text}");
+        }
+    }
+    // Copies of one hand-in are one, and so is a folder with an older one in it.
+    let same = |_: &str, _: &mut Vec<u8>| {};
+    let digest = fix_files(&perfect()).unwrap().digest;
+    assert_eq!(fix_files(&two(["v1/", "v2/"], &same)).unwrap().digest, digest);
+    assert_eq!(fix_files(&two(["x/", "x/old/"], &newer)).unwrap().digest, digest);
+}
+
+/// Where files are missing, the cause comes before what it causes.
+#[test]
+fn what_may_hide_missing_files_is_said_first() {
+    let without_images = moved(|path| (!path.ends_with(".exr")).then(|| path.to_owned()));
+    let mut files = without_images.clone();
+    files.push(("images.7z".to_owned(), b"7z\xbc\xaf\x27\x1cxxxx".to_vec()));
+    let found = validate_files(&files);
+    let first = &found.findings[0];
+    assert!(first.code == "nested_archive" && first.severity == Severity::Error, "{first}");
+    let mut whole = perfect();
+    whole.push(("more.7z".to_owned(), b"7z\xbc\xaf\x27\x1cxxxx".to_vec()));
+    assert!(validate_files(&whole).conforms);
+}
+
+#[test]
 fn a_source_without_code_is_noticed() {
     for source in ["", " \n", "\u{feff}", "// nothing\n/* yet */"] {
         let mut files = perfect();

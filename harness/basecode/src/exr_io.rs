@@ -18,6 +18,7 @@ mod encode;
 mod header;
 mod rows;
 
+pub(crate) use header::kind_of;
 pub use rows::{Band, ExrRows};
 
 /// The longest side that is read or written, in pixels.

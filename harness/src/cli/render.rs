@@ -12,7 +12,7 @@ use basecode::scene::SceneConfig;
 use basecode::{Camera, Image, Vec3};
 
 use super::context::{Context, INTERRUPTED, cores};
-use crate::files::library_name;
+use crate::files::{is_same_file, library_name};
 use crate::imaging::pictures::clamped;
 use crate::intake::SubmittedConfig;
 use crate::process::Limits;
@@ -165,7 +165,7 @@ fn kind_of(path: &Path) -> &'static str {
 
 /// Loads what a scene consists of, so that its mistakes are told in the user's own names, with what
 /// it holds that no picture shows. The film has the size that is asked for.
-fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
+fn check_scene(toml: &Path, size: Option<Size>, output: &Path) -> anyhow::Result<SceneConfig> {
     let mut config = SceneConfig::load(toml)?;
     if let Some(Size(width, height)) = size {
         (config.width, config.height) = (width as usize, height as usize);
@@ -175,6 +175,10 @@ fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
     let camera = Camera::new(config.camera, config.width, config.height)
         .with_context(|| toml.display().to_string())?;
     let mesh = config.load_mesh()?;
+    let own = mesh.files.iter().map(|file| file.path.as_path());
+    if own.chain([toml, config.mesh.as_path()]).any(|file| is_same_file(file, output)) {
+        bail!("{}: this is a file of the scene; hint: name another one", output.display());
+    }
     mesh.remarks.iter().for_each(warn);
     let folder = config.mesh.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
@@ -218,7 +222,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
         Ok(target) if arguments.scene.is_symlink() => target,
         _ => arguments.scene.clone(),
     };
-    let config = check_scene(&scene_file, arguments.size)?;
+    let config = check_scene(&scene_file, arguments.size, &arguments.output)?;
     let plugin = match arguments.plugin.as_str() {
         "reference" => context.reference().context(
             "there is no reference renderer here (a student's kit has none); hint: cargo build --release --workspace",
@@ -242,6 +246,9 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
         path: scene_file.canonicalize().context("scene")?,
         options: arguments.options.clone(),
     };
+    if config.realtime && arguments.spp.is_some() {
+        eprintln!("umbra: warning: --spp has no effect: the scene is drawn in realtime");
+    }
     let request = if config.realtime {
         let shadow_map = arguments.shadows.map_or(config.bonus, |Switch(on)| on);
         let (adapter, cameras) =

@@ -25,8 +25,12 @@ pub fn check_config(
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
     if is_whole || config.first_name.is_some() {
-        check_name(&config.first_name, "firstName", &mut findings);
-        check_name(&config.last_name, "lastName", &mut findings);
+        for (field, key) in [(&config.first_name, "firstName"), (&config.last_name, "lastName")] {
+            // What is said twice is remarked on already.
+            if !config.disputed.iter().any(|own| own == key) {
+                check_name(field, key, &mut findings);
+            }
+        }
     }
     check_id(&config.student_id, &mut findings);
     if is_whole {

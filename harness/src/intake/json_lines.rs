@@ -47,6 +47,8 @@ pub(super) struct Read {
     pub(super) node: Option<Node>,
     /// Whether reading stopped before the end.
     pub(super) stopped: bool,
+    /// What was not read, from the member or value at which reading stopped or ended, and its line from 1.
+    pub(super) rest: (String, u32),
     /// The file as text.
     pub(super) text: String,
     /// Warnings; where there is none, the file is JSON.
@@ -57,10 +59,18 @@ pub(super) struct Read {
 pub(super) fn parse(bytes: &[u8]) -> Read {
     let (text, encoding) = decode(bytes);
     let findings = encoding.into_iter().collect();
-    let mut reader =
-        Reader { chars: text.chars().collect(), at: 0, line: 1, stopped: false, findings };
+    let mut reader = Reader {
+        chars: text.chars().collect(),
+        at: 0,
+        line: 1,
+        begun: (0, 1),
+        stopped: false,
+        findings,
+    };
     let node = reader.document();
-    Read { node, stopped: reader.stopped, text, findings: reader.findings }
+    let (at, line) = if reader.stopped { reader.begun } else { (reader.at, reader.line) };
+    let rest = (reader.chars[at..].iter().collect(), line);
+    Read { node, stopped: reader.stopped, rest, text, findings: reader.findings }
 }
 
 /// The line of a key in a JSON file, from 1; `at` is the keys and indices on the way to it.
@@ -103,17 +113,26 @@ fn closes(open: char, c: char) -> bool {
 /// Parsing cannot go on; the finding is recorded.
 struct Stop;
 
+/// Where a value stands.
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    Member,
+    Item,
+}
+
 struct Reader {
     chars: Vec<char>,
     at: usize,
     line: u32,
+    /// Where the latest member begins, and its line.
+    begun: (usize, u32),
     stopped: bool,
     findings: Vec<Finding>,
 }
 
 impl Reader {
     fn document(&mut self) -> Option<Node> {
-        let node = self.value(0);
+        let node = self.value(0, Place::Member);
         self.stopped |= node.is_err();
         let node = node.ok()?;
         self.skip_space();
@@ -177,11 +196,16 @@ impl Reader {
             let following = self.chars.get(self.at + 1).copied();
             if c.is_whitespace() {
                 self.next();
+            } else if self.at_merge_marker() {
+                self.warn(
+                    "json_merge",
+                    "a merge conflict is not resolved",
+                    "keep one of the two sides, and remove the lines of <<<<<<<, ======= and >>>>>>>",
+                );
+                self.skip_line();
             } else if c == '#' || (c == '/' && following == Some('/')) {
                 self.warn("json_comment", "JSON has no comments", "remove the comment");
-                while self.peek().is_some_and(|c| !['\n', '\r'].contains(&c)) {
-                    self.next();
-                }
+                self.skip_line();
             } else if c == '/' && following == Some('*') {
                 self.warn("json_comment", "JSON has no comments", "remove the comment");
                 self.next();
@@ -198,7 +222,20 @@ impl Reader {
         }
     }
 
-    fn value(&mut self, depth: u32) -> Result<Node, Stop> {
+    fn skip_line(&mut self) {
+        while self.peek().is_some_and(|c| !['\n', '\r'].contains(&c)) {
+            self.next();
+        }
+    }
+
+    /// Whether a line begins here that a version control system leaves round a conflict.
+    fn at_merge_marker(&self) -> bool {
+        let is_first = self.at == 0 || ['\n', '\r'].contains(&self.chars[self.at - 1]);
+        let marks = self.chars[self.at..].iter().take_while(|c| **c == self.chars[self.at]).count();
+        is_first && marks == 7 && "<|=>".contains(self.chars[self.at])
+    }
+
+    fn value(&mut self, depth: u32, place: Place) -> Result<Node, Stop> {
         self.skip_space();
         if depth > MAX_DEPTH {
             self.warn(
@@ -213,7 +250,7 @@ impl Reader {
             Some('{') => self.object(depth)?,
             Some('[') => self.list(depth)?,
             Some(c) if is_quote(c) => Value::Text(self.text()),
-            Some(c) if c == '-' || c.is_ascii_digit() => Value::Number(self.number()),
+            Some(c) if c == '-' || c.is_ascii_digit() => self.number(place),
             Some(c) if c.is_alphabetic() => {
                 let begin = self.at;
                 let word = self.words();
@@ -275,27 +312,53 @@ impl Reader {
         }
     }
 
-    /// A number, also one in groups: `260 123 456`.
-    fn number(&mut self) -> String {
-        let mut number = self.word();
+    /// A number, also one in groups: `260 123 456`, `260,123,456`. Whatever else stands behind it up to the next key or
+    /// item is part of it, so that no piece of a number is taken for the whole.
+    fn number(&mut self, place: Place) -> Value {
+        let (begin, mut number) = (self.at, self.word());
+        let mut is_plain = true;
         loop {
-            let space = |c: &&char| c.is_whitespace() && !['\n', '\r'].contains(*c);
             let rest = &self.chars[self.at..];
+            let space = |c: &&char| c.is_whitespace() && !['\n', '\r'].contains(*c);
             let gap = rest.iter().take_while(space).count();
-            if gap == 0 || !rest.get(gap).is_some_and(char::is_ascii_digit) {
-                return number;
+            let is_digit = |at: usize| rest.get(at).is_some_and(char::is_ascii_digit);
+            let more = match rest.get(gap) {
+                Some('0'..='9') => gap > 0,
+                Some(',' | ';') => {
+                    let more = rest[gap + 1..].iter().take_while(space).count();
+                    place == Place::Member && is_digit(gap + 1 + more)
+                }
+                Some('/') => !matches!(rest.get(gap + 1), Some('/' | '*')),
+                Some(c) if c.is_alphabetic() => {
+                    let word = rest[gap..].iter().take_while(|c| !"\n\r,;}]:=\"".contains(**c));
+                    let after = rest.get(gap + word.count());
+                    after.is_none_or(|c| !":=\"".contains(*c))
+                }
+                Some('\'') => is_digit(gap + 1),
+                Some(c) => !"\n\r}]#\"".contains(*c) && !is_quote(*c),
+                None => false,
+            };
+            if !more {
+                break;
             }
-            self.warn(
-                "json_number",
-                "a number with spaces in it",
-                "write its digits without spaces",
-            );
-            for _ in 0..gap {
-                self.next();
-            }
-            number.push(' ');
+            is_plain &= is_digit(gap);
+            let end = gap + 1;
+            let piece: String = rest[..end].iter().collect();
+            number.push_str(if gap > 0 && is_digit(gap) { " " } else { piece.trim_end() });
+            self.at += if is_digit(gap) { gap } else { end };
             number.push_str(&self.word());
         }
+        if number.chars().any(|c| !(c.is_alphanumeric() || "+-._".contains(c))) {
+            let signs = if is_plain { "spaces" } else { "other signs" };
+            let message = format!("a number with {signs} in it");
+            self.warn_at(
+                begin,
+                "json_number",
+                &message,
+                "write its digits without spaces or signs",
+            );
+        }
+        if is_plain { Value::Number(number) } else { Value::Text(number) }
     }
 
     /// A text in quotes; one that is not closed ends with its line.
@@ -420,7 +483,10 @@ impl Reader {
                 );
                 Ok(true)
             }
-            _ => self.stop(&format!("',' or '{close}'")),
+            _ => {
+                self.begun = (self.at, self.line);
+                self.stop(&format!("',' or '{close}'"))
+            }
         }
     }
 
@@ -433,7 +499,7 @@ impl Reader {
             return Ok(Value::List(items));
         }
         loop {
-            match self.value(depth + 1) {
+            match self.value(depth + 1, Place::Item) {
                 Ok(item) => items.push(item),
                 Err(Stop) => self.stopped = true,
             }
@@ -477,6 +543,7 @@ impl Reader {
     fn member(&mut self, depth: u32) -> Result<(String, u32, Node), Stop> {
         self.skip_space();
         let line = self.line;
+        self.begun = (self.at, line);
         let key = match self.peek() {
             Some(c) if is_quote(c) => self.text(),
             Some(c) if c.is_alphabetic() => {
@@ -513,7 +580,7 @@ impl Reader {
             }
             _ => return self.stop("':' after the key"),
         }
-        Ok((key, line, self.value(depth + 1)?))
+        Ok((key, line, self.value(depth + 1, Place::Member)?))
     }
 }
 

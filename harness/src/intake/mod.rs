@@ -24,6 +24,7 @@ mod lexer;
 mod limits;
 mod name;
 mod pack;
+mod source_paths;
 mod source_rules;
 mod submission;
 mod submitted_config;

@@ -2,6 +2,8 @@
 
 mod keys;
 mod numbers;
+mod said;
+mod salvage;
 
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +15,7 @@ use crate::harmless::printable;
 use keys::{Key, known_key};
 pub(super) use numbers::why_no_number;
 use numbers::{is_digits, number_in};
+use said::{Said, Word};
 
 /// What the submission's `config.json` says; absent where it does not say it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,6 +32,9 @@ pub struct SubmittedConfig {
     pub renders: Vec<ListedRender>,
     /// Whether a list of renders is there at all.
     pub has_renders: bool,
+    /// Keys that are absent because the file says several different things of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub disputed: Vec<String>,
 }
 
 /// A text and its line.
@@ -56,11 +62,13 @@ impl SubmittedConfig {
     /// name `config.json`, line and hint. The last answer is whether all was read: what is
     /// absent may else be in the rest.
     pub fn parse(bytes: &[u8]) -> (Self, Vec<Finding>, bool) {
-        let Read { node, stopped, text, mut findings } = parse(bytes);
+        let Read { node, stopped, rest, text, mut findings } = parse(bytes);
         let mut config = Self::default();
+        let mut said = Said::default();
+        let is_object = matches!(node, Some(Node { value: Value::Object(_) | Value::List(_), .. }));
         match node {
             Some(Node { value: Value::Object(members), .. }) => {
-                config.take_members(&members, true, &mut findings);
+                config.take_members(&members, true, &mut said, &mut findings);
             }
             Some(node) => {
                 let message = format!("expected an object {{ ... }}, found {}", node.value.kind());
@@ -70,14 +78,21 @@ impl SubmittedConfig {
                         .hint("start from the template's config.json"),
                 );
                 if let Value::List(items) = &node.value {
-                    config.take_one_of(items, true, &mut findings);
+                    config.take_one_of(items, true, &mut said, &mut findings);
                 }
             }
             None => {}
         }
-        if config.student_id.is_none() || (stopped && config.first_name.is_none()) {
-            config.salvage(&text);
+        if !findings.is_empty() {
+            said.append(salvage::beside(&text, &said));
         }
+        let (rest, line) = if is_object { rest } else { (text.clone(), 1) };
+        let rest = salvage::read(&rest, line, stopped && config.has_renders, &said);
+        said.append(rest);
+        if said.id.is_empty() {
+            said.fill_from(salvage::read(&text, 1, false, &said));
+        }
+        said.settle(&mut config, &mut findings);
         config.tidy_number(&mut findings);
         for finding in &mut findings {
             finding.path = Some(CONFIG_FILE.to_owned());
@@ -94,6 +109,7 @@ impl SubmittedConfig {
         &mut self,
         members: &[(String, u32, Node)],
         is_top: bool,
+        said: &mut Said,
         findings: &mut Vec<Finding>,
     ) {
         for (key, line, node) in members {
@@ -107,17 +123,17 @@ impl SubmittedConfig {
             // `"student": 260123456` is no name.
             let is_number = plain_text(node).is_some_and(|text| is_digits(&text));
             match known {
-                Key::First => take(&mut self.first_name, key, *line, node, findings),
-                Key::Last => take(&mut self.last_name, key, *line, node, findings),
-                Key::Full if is_number => {
-                    take_number(&mut self.student_id, key, *line, node, findings)
-                }
-                Key::Id => take_number(&mut self.student_id, key, *line, node, findings),
-                Key::Email => take(&mut self.email, key, *line, node, findings),
+                Key::First => take(&mut said.first, key, *line, node, findings),
+                Key::Last => take(&mut said.last, key, *line, node, findings),
+                Key::Full if is_number => take_number(&mut said.id, key, *line, node, findings),
+                Key::Id => take_number(&mut said.id, key, *line, node, findings),
+                Key::Email => take(&mut said.email, key, *line, node, findings),
                 Key::Full => match (&node.value, members_of(node)) {
-                    (_, Some(members)) if is_top => self.take_members(members, false, findings),
-                    (Value::List(items), _) => self.take_names(key, *line, items, findings),
-                    _ => self.take_full_name(key, *line, node, findings),
+                    (_, Some(members)) if is_top => {
+                        self.take_members(members, false, said, findings)
+                    }
+                    (Value::List(items), _) => self.take_names(key, *line, items, said, findings),
+                    _ => take(&mut said.full, key, *line, node, findings),
                 },
                 Key::Renders if is_top => {
                     self.has_renders = true;
@@ -127,45 +143,13 @@ impl SubmittedConfig {
             }
         }
         // Whatever else an object is called, it may hold what is still missing.
+        let mut inner = Said::default();
         for (key, _, node) in members.iter().filter(|_| is_top) {
             if let Some(members) = members_of(node).filter(|_| known_key(key).is_none()) {
-                let mut inner = Self::default();
-                inner.take_members(members, false, findings);
-                let fill = |own: &mut Option<Field>, inner| *own = own.take().or(inner);
-                fill(&mut self.first_name, inner.first_name);
-                fill(&mut self.last_name, inner.last_name);
-                fill(&mut self.student_id, inner.student_id);
-                fill(&mut self.email, inner.email);
+                self.take_members(members, false, &mut inner, findings);
             }
         }
-    }
-
-    /// What lines say that no reader of JSON could make out: a known key, a sign and a value.
-    fn salvage(&mut self, text: &str) {
-        for (index, line) in text.lines().enumerate() {
-            for pair in line.split([',', ';', '{', '}']) {
-                let Some((key, value)) = pair.split_once([':', '=', '\t']) else { continue };
-                let plain = |text: &str| {
-                    let sign = |c: char| !c.is_alphanumeric();
-                    text.trim_matches(sign).to_owned()
-                };
-                let (key, value) = (plain(key), plain(value));
-                let slot = match known_key(&key) {
-                    Some((Key::First, _)) => &mut self.first_name,
-                    Some((Key::Last, _)) => &mut self.last_name,
-                    Some((Key::Id, _)) => &mut self.student_id,
-                    Some((Key::Full, _)) if self.first_name.is_none() => {
-                        let line = index as u32 + 1;
-                        self.set_full_name(&Field { text: value, line });
-                        continue;
-                    }
-                    _ => continue,
-                };
-                if slot.is_none() && !value.is_empty() {
-                    *slot = Some(Field { text: value, line: index as u32 + 1 });
-                }
-            }
-        }
+        said.fill_from(inner);
     }
 
     /// A student number with other signs around or between its digits, without them.
@@ -187,11 +171,18 @@ impl SubmittedConfig {
     }
 
     /// The student of a list. Of several nobody is taken: which of them submits is not for us to guess.
-    fn take_one_of(&mut self, items: &[Node], is_top: bool, findings: &mut Vec<Finding>) {
+    fn take_one_of(
+        &mut self,
+        items: &[Node],
+        is_top: bool,
+        said: &mut Said,
+        findings: &mut Vec<Finding>,
+    ) {
         let mut students: Vec<Self> = Vec::new();
         for members in items.iter().filter_map(members_of) {
-            let mut student = Self::default();
-            student.take_members(members, is_top, findings);
+            let (mut student, mut own) = (Self::default(), Said::default());
+            student.take_members(members, is_top, &mut own, findings);
+            own.settle(&mut student, &mut Vec::new());
             let is_known = students.iter().any(|other| other.names_same(&student));
             if !is_known && student.names_somebody() {
                 students.push(student);
@@ -199,8 +190,8 @@ impl SubmittedConfig {
         }
         match &students[..] {
             [] | [_] => {
-                if let Some(members) = items.iter().filter_map(members_of).next() {
-                    self.take_members(members, is_top, &mut Vec::new());
+                for members in items.iter().filter_map(members_of) {
+                    self.take_members(members, is_top, said, &mut Vec::new());
                 }
             }
             [first, second, ..] => {
@@ -215,10 +206,14 @@ impl SubmittedConfig {
                     who(first),
                     who(second)
                 );
-                let numbers = students.iter().filter_map(|one| text(&one.student_id));
+                let mut numbers: Vec<String> =
+                    students.iter().filter_map(|one| text(&one.student_id)).collect();
+                numbers.dedup();
                 let line = first.student_id.as_ref().map_or(1, |field| field.line);
-                self.student_id =
-                    Some(Field { text: numbers.collect::<Vec<_>>().join(", "), line });
+                if !numbers.is_empty() {
+                    let key = Key::Id.written().to_owned();
+                    said.id.push(Word { key, text: numbers.join(", "), line });
+                }
                 let finding = Finding::warning("config_two_students", message).on_line(line);
                 findings.push(finding.hint("keep the one who submits"));
             }
@@ -236,43 +231,30 @@ impl SubmittedConfig {
     }
 
     /// `["Ada", "Lampglow"]`, or a list of students.
-    fn take_names(&mut self, key: &str, line: u32, items: &[Node], findings: &mut Vec<Finding>) {
+    fn take_names(
+        &mut self,
+        key: &str,
+        line: u32,
+        items: &[Node],
+        said: &mut Said,
+        findings: &mut Vec<Finding>,
+    ) {
         let message = format!("'{}': expected text, found a list", printable(key));
         let finding = Finding::warning("config_type", message).on_line(line);
         findings.push(finding.hint("write one name in double quotes"));
         if items.first().and_then(members_of).is_some() {
-            return self.take_one_of(items, false, findings);
+            return self.take_one_of(items, false, said, findings);
         }
         let names: Vec<String> = items.iter().filter_map(plain_text).collect();
         let is_word = |name: &String| !name.contains(char::is_whitespace);
-        let text = if names.iter().all(is_word) { names.join(" ") } else { names[0].clone() };
-        if !text.is_empty() {
-            self.set_full_name(&Field { text, line });
-        }
-    }
-
-    fn take_full_name(&mut self, key: &str, line: u32, node: &Node, findings: &mut Vec<Finding>) {
-        let mut full = None;
-        take(&mut full, key, line, node, findings);
-        if let Some(full) = full {
-            self.set_full_name(&full);
-        }
-    }
-
-    /// `Ada King Lampglow`: the last word is the last name; `Lampglow, Ada` says so itself. `ada_lampglow` is
-    /// how archives are named.
-    fn set_full_name(&mut self, Field { text, line }: &Field) {
-        // `Ada Lampglow <ada@example.org>`
-        let text = text.split_once('<').map_or(text.as_str(), |(name, _)| name.trim());
-        let sign = |c: char| c.is_whitespace() || (c == '_' && !text.contains(char::is_whitespace));
-        let (first, last) = match text.split_once(',') {
-            Some((last, first)) => (first, last),
-            None => text.rsplit_once(sign).unwrap_or((text, "")),
-        };
-        let field = |text: &str| Field { text: text.trim().to_owned(), line: *line };
-        self.first_name.get_or_insert(field(first));
-        if !last.is_empty() {
-            self.last_name.get_or_insert(field(last));
+        // Words are the parts of one name; of two texts, one word is a first or a last name.
+        let is_one = names.iter().all(is_word) || (names.len() == 2 && names.iter().any(is_word));
+        let mut add = |text: String| said.full.push(Word { key: key.to_owned(), text, line });
+        match (is_one, &names[..]) {
+            (_, []) => {}
+            (true, [first, last]) => add(format!("{last}, {first}")),
+            (true, words) => add(words.join(" ")),
+            (false, several) => several.iter().cloned().for_each(add),
         }
     }
 
@@ -385,48 +367,30 @@ const RENDER_HINT: &str =
 
 /// Takes a student number. Several are kept together, so that none of them counts.
 fn take_number(
-    slot: &mut Option<Field>,
+    said: &mut Vec<Word>,
     key: &str,
     line: u32,
     node: &Node,
     findings: &mut Vec<Finding>,
 ) {
-    let mut own = None;
-    take(&mut own, key, line, node, findings);
-    let several = |items: Vec<&Node>| {
-        let mut texts: Vec<String> = items.into_iter().filter_map(plain_text).collect();
-        texts.dedup();
-        (!texts.is_empty()).then(|| Field { text: texts.join(", "), line })
-    };
-    let own = own.or_else(|| match &node.value {
-        Value::List(items) => several(items.iter().collect()),
-        Value::Object(members) => several(members.iter().map(|(.., node)| node).collect()),
-        _ => None,
-    });
-    let Some(own) = own else { return };
-    match slot {
-        Some(first) if first.text.is_empty() => *slot = Some(own),
-        Some(first) if own.text.is_empty() || is_same_number(&first.text, &own.text) => {}
-        Some(first) => {
-            let message = format!(
-                "'{}' says something else than line {}: neither counts",
-                printable(key),
-                first.line
-            );
-            first.text = format!("{}, {}", first.text, own.text);
-            let finding = Finding::warning("config_twice", message).on_line(line);
-            findings.push(finding.hint("keep one of them"));
+    let before = said.len();
+    take(said, key, line, node, findings);
+    let items: Vec<&Node> = match &node.value {
+        Value::List(items) if said.len() == before => items.iter().collect(),
+        Value::Object(members) if said.len() == before => {
+            members.iter().map(|(.., node)| node).collect()
         }
-        None => *slot = Some(own),
+        _ => return,
+    };
+    let mut texts: Vec<String> = items.into_iter().filter_map(plain_text).collect();
+    texts.dedup();
+    if !texts.is_empty() {
+        said.push(Word { key: key.to_owned(), text: texts.join(", "), line });
     }
 }
 
-fn is_same_number(one: &str, other: &str) -> bool {
-    one == other || number_in(one).is_some_and(|number| number_in(other) == Some(number))
-}
-
 /// Takes a text or a number.
-fn take(slot: &mut Option<Field>, key: &str, line: u32, node: &Node, findings: &mut Vec<Finding>) {
+fn take(said: &mut Vec<Word>, key: &str, line: u32, node: &Node, findings: &mut Vec<Finding>) {
     if !matches!(node.value, Value::Text(_) | Value::Number(_) | Value::Null) {
         let message = format!("'{}': expected text, found {}", printable(key), node.value.kind());
         findings.push(
@@ -435,20 +399,9 @@ fn take(slot: &mut Option<Field>, key: &str, line: u32, node: &Node, findings: &
                 .hint("write it in double quotes"),
         );
     }
-    let Some(text) = plain_text(node) else { return };
-    if let Some(first) = slot
-        && first.text != text
-    {
-        let message = format!(
-            "'{}' says something else than line {}, which counts",
-            printable(key),
-            first.line
-        );
-        findings
-            .push(Finding::warning("config_twice", message).on_line(line).hint("keep one of them"));
-        return;
+    if let Some(text) = plain_text(node) {
+        said.push(Word { key: key.to_owned(), text, line });
     }
-    *slot = Some(Field { text, line });
 }
 
 #[cfg(test)]

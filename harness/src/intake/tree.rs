@@ -70,6 +70,7 @@ impl Default for TreeSpec {
                 "desktop.ini",
                 "Icon\r",
                 ".git",
+                "umbra-report",
                 "target/debug",
                 "target/release",
                 "target/CACHEDIR.TAG",

@@ -6,7 +6,7 @@ use super::check_config::is_template_value;
 use super::submission::{IntakeError, Submission};
 use super::submitted_config::{Field, SubmittedConfig};
 use super::tree::CONFIG_FILE;
-use super::tree_lost::{Lost, base, is_named_after};
+use super::tree_lost::{Lost, base, is_named_after, is_source};
 use crate::harmless::printable;
 
 /// Largest `config.json` that is read [bytes].
@@ -48,12 +48,14 @@ impl Person {
 /// The configuration, and other files of its name that name another person: what to say of each.
 pub(super) struct Config<'a> {
     pub(super) found: Lost<'a>,
+    /// Whether the source beside it is another than that beside another one of the same person.
+    pub(super) has_rival: bool,
     pub(super) others: Vec<(&'a str, String)>,
 }
 
 impl<'a> From<Lost<'a>> for Config<'a> {
     fn from(found: Lost<'a>) -> Self {
-        Self { found, others: Vec::new() }
+        Self { found, has_rival: false, others: Vec::new() }
     }
 }
 
@@ -85,17 +87,30 @@ pub(super) fn find_config(submission: &Submission) -> Result<Config<'_>, IntakeE
         let others = others.map(|(path, other)| {
             (*path, format!("names {}, and {own} names {}: {own} counts", other.shown, owner.shown))
         });
-        return Ok(Config { found: Lost::One(own), others: others.collect() });
+        return Ok(Config { others: others.collect(), ..Lost::One(own).into() });
     }
     let [(first, someone), others @ ..] = &named[..] else {
         return Ok(Lost::One(own.unwrap_or(found[0])).into());
     };
-    let found = if others.iter().all(|(_, other)| other.is(someone)) {
-        Lost::One(first)
-    } else {
-        Lost::Several(named.iter().map(|(path, _)| *path).collect())
+    if others.iter().all(|(_, other)| other.is(someone)) {
+        let rival = |(other, _): &(&str, Person)| is_rival(submission, first, other);
+        let has_rival = others.iter().any(rival);
+        return Ok(Config { has_rival, ..Lost::One(first).into() });
+    }
+    Ok(Lost::Several(named.iter().map(|(path, _)| *path).collect()).into())
+}
+
+/// Whether two configurations have different sources beside them, neither of which lies within the other.
+fn is_rival(submission: &Submission, first: &str, other: &str) -> bool {
+    let folder = |path: &str| path.rfind('/').map_or(String::new(), |at| path[..=at].to_owned());
+    let sources = |folder: &str| {
+        let all = submission.files.iter().filter(|file| is_source(&file.path));
+        all.filter_map(|file| Some((file.path.strip_prefix(folder)?, file.sha256.as_str())))
+            .collect::<Vec<_>>()
     };
-    Ok(found.into())
+    let (own, rival) = (folder(first), folder(other));
+    let [ours, theirs] = [sources(&own), sources(&rival)];
+    !rival.starts_with(&own) && !ours.is_empty() && !theirs.is_empty() && ours != theirs
 }
 
 /// Whom the configuration at a path names.

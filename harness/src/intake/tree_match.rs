@@ -64,10 +64,12 @@ pub(super) struct Matched {
 pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Matched, IntakeError> {
     let files = &submission.files;
     let config = find_config(submission)?;
-    // What lies beside the configuration comes before what lies elsewhere.
+    // What lies beside the configuration comes before what lies elsewhere, unless another hand-in is as good.
     let root = match config.found {
-        Lost::One(path) => path.rsplit_once('/').map_or("", |(folder, _)| folder),
-        Lost::None | Lost::Several(_) => "",
+        Lost::One(path) if !config.has_rival => {
+            path.rsplit_once('/').map_or("", |(folder, _)| folder)
+        }
+        Lost::None | Lost::One(_) | Lost::Several(_) => "",
     };
     // Files in their place first, so that no search for a lost file takes them.
     let placed: Vec<Vec<&str>> = tree.files.iter().map(|file| placed(file, submission)).collect();
@@ -255,6 +257,12 @@ const LANGUAGES: [(&str, &[&str]); 7] = [
     ("JavaScript", &["js", "ts"]),
     ("Go", &["go"]),
 ];
+
+/// Whether a file is source in whatever language.
+pub(super) fn is_source_of_any(path: &str) -> bool {
+    let end = path.rsplit_once('.').map(|(_, end)| end.to_lowercase()).unwrap_or_default();
+    is_source(path) || LANGUAGES.iter().any(|(_, ends)| ends.contains(&end.as_str()))
+}
 
 /// The finding on a missing file; for a source file, it says whether the source is in another language.
 fn missing(expected: &str, files: &[SubmittedFile]) -> Finding {

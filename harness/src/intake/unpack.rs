@@ -9,7 +9,9 @@ use super::encoding::text_of;
 use super::finding::{Finding, Severity};
 use super::limits::{Limits, mib};
 use super::submission::{Format, IntakeError, Refusal, Submission, archive_magic};
-use super::tree::TreeSpec;
+use super::tree::{TreeFile, TreeSpec};
+use super::tree_lost::base;
+use super::tree_match::is_source_of_any;
 use super::{folder, gz, tar, zip};
 use crate::harmless::printable;
 
@@ -27,8 +29,47 @@ pub fn unpack(
 ) -> Result<Submission, IntakeError> {
     match read_archive(source, limits)? {
         Some(bytes) => unpack_bytes(&bytes, &name_of(source), dest, tree, limits),
-        None => copy_working_folder(source, dest, tree, limits),
+        None => with_source(copy_working_folder(source, dest, tree, limits)?, dest, tree),
     }
+}
+
+/// What may keep the source from being seen.
+pub(super) fn is_cause(finding: &Finding) -> bool {
+    ["nested_archive", NO_END].contains(&finding.code.as_str())
+}
+
+/// The code of the warning on a tar without an end.
+const NO_END: &str = "tar_no_end";
+
+/// Refuses a submission without source where that may be in an archive that is not opened, and one that was cut off and
+/// lacks files of the tree: then nobody has seen what was submitted.
+fn with_source(
+    submission: Submission,
+    dest: &Path,
+    tree: &TreeSpec,
+) -> Result<Submission, IntakeError> {
+    let paths = || submission.files.iter().map(|file| file.path.as_str());
+    let has_source = paths().any(is_source_of_any);
+    let lacks = |file: &TreeFile| !paths().any(|path| base(path) == base(&file.path));
+    let is_whole = !tree.files.iter().filter(|file| file.required).any(lacks);
+    let hides = |finding: &Finding| match finding.code.as_str() {
+        NO_END => !is_whole,
+        _ => is_cause(finding) && !has_source,
+    };
+    if !submission.findings.iter().any(hides) {
+        return Ok(submission);
+    }
+    let what =
+        if has_source { "files of the tree are missing" } else { "no source is there besides" };
+    clear(dest)?;
+    let mut findings = submission.findings;
+    for finding in findings.iter_mut().filter(|finding| is_cause(finding)) {
+        finding.severity = Severity::Error;
+        finding.message += &format!(", and {what}");
+    }
+    findings.sort_by_key(|finding| finding.severity);
+    let Submission { name, format, .. } = submission;
+    Err(IntakeError::Refused(Box::new(Refusal { name, format: Some(format), findings })))
 }
 
 /// Copies a folder; where that is refused for what is no part of the tree, without it, as `pack` would.
@@ -169,6 +210,16 @@ pub(crate) fn name_of(source: &Path) -> String {
 /// # Errors
 /// As [`unpack`].
 pub fn unpack_bytes(
+    bytes: &[u8],
+    name: &str,
+    dest: &Path,
+    tree: &TreeSpec,
+    limits: &Limits,
+) -> Result<Submission, IntakeError> {
+    with_source(unpack_twice(bytes, name, dest, tree, limits)?, dest, tree)
+}
+
+fn unpack_twice(
     bytes: &[u8],
     name: &str,
     dest: &Path,

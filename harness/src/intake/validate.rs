@@ -8,12 +8,14 @@ use super::check_config::check_config;
 use super::encoding::text_of;
 use super::finding::{Finding, Findings, Severity};
 use super::lexer::tokens;
+use super::source_paths::misspelt;
 use super::submission::{Format, IntakeError, Refusal, Submission};
 use super::submitted_config::SubmittedConfig;
 use super::tree::{CONFIG_FILE, TreeSpec};
 use super::tree_config::MAX_CONFIG;
 use super::tree_lost::is_source;
 use super::tree_match::{Mark, Matched, TreeLine, match_tree};
+use super::unpack::is_cause;
 use crate::columns::count;
 
 /// What `validate` found.
@@ -43,6 +45,14 @@ pub fn validate_submission(
 ) -> Result<Validation, IntakeError> {
     let Matched { lines, findings: said } = match_tree(submission, tree)?;
     let mut findings = submission.findings.clone();
+    // Where something is missing, what may hide it is said first.
+    let is_missing =
+        |finding: &Finding| ["tree_missing", "tree_language"].contains(&finding.code.as_str());
+    if said.iter().any(is_missing) {
+        for finding in findings.iter_mut().filter(|finding| is_cause(finding)) {
+            finding.severity = Severity::Error;
+        }
+    }
     findings.extend(said);
     findings.extend(empty_source(submission, &lines)?);
     findings.extend(encoded_source(submission, tree)?);
@@ -112,15 +122,26 @@ fn empty_source(submission: &Submission, lines: &[TreeLine]) -> Result<Vec<Findi
     Ok(findings)
 }
 
-/// The warnings on source files that the compiler cannot read.
+/// The warnings on source files that the compiler cannot read or will not find.
 fn encoded_source(submission: &Submission, tree: &TreeSpec) -> Result<Vec<Finding>, IntakeError> {
     let mut findings = Vec::new();
+    let paths: Vec<&str> = submission.files.iter().map(|file| file.path.as_str()).collect();
     let is_text = |path: &str| is_source(path) && tree.open_folder_of(path).is_some();
     for file in submission.files.iter().filter(|file| is_text(&file.path)) {
         let path = submission.root.join(&file.path);
         let bytes = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
-        let Err(error) = std::str::from_utf8(&bytes) else { continue };
-        let line = 1 + bytes[..error.valid_up_to()].iter().filter(|b| **b == b'\n').count() as u32;
+        let end = match std::str::from_utf8(&bytes) {
+            // UTF-16 of plain text is UTF-8 with zeros.
+            Ok(_) => bytes.iter().position(|byte| *byte == 0),
+            Err(error) => Some(error.valid_up_to()),
+        };
+        let Some(end) = end else {
+            if file.path.to_lowercase().ends_with(".rs") {
+                findings.extend(misspelt(&file.path, &text_of(&bytes), &paths));
+            }
+            continue;
+        };
+        let line = 1 + bytes[..end].iter().filter(|b| **b == b'\n').count() as u32;
         let message = "expected UTF-8, found another encoding: it does not compile";
         let finding = Finding::warning("source_not_utf8", message).at(file.path.as_str());
         findings.push(finding.on_line(line).hint("save it as UTF-8"));

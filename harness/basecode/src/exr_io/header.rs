@@ -12,7 +12,7 @@ use exr::prelude::Vec2;
 use super::{ImageError, MAX_PIXELS, MAX_SIDE};
 
 /// The most channels a file may hold.
-const MAX_CHANNELS: usize = 64;
+const MAX_CHANNELS: usize = 1024;
 /// No codec that is read shrinks pixels more: deflate 1032 to 1 (zlib's technical notes), after PXR24 has made three
 /// bytes of four.
 const MAX_COMPRESSION_RATIO: usize = 1376;
@@ -30,6 +30,11 @@ pub(super) fn visible(name: &str) -> String {
         false => String::from(c),
     };
     name.chars().map(shown).collect()
+}
+
+/// The name of a channel: UTF-8, as OpenEXR writes it, or else Latin-1.
+pub(super) fn name_of(name: &Text) -> String {
+    String::from_utf8(name.bytes().to_vec()).unwrap_or_else(|_| name.to_string())
 }
 
 /// Splits `mean.R` into (`mean`, `R`) and `R` into (``, `R`): EXR's convention for layers.
@@ -141,7 +146,7 @@ impl Checks<'_> {
         }
         let mut names = header.channels.list.windows(2);
         if let Some([twice, _]) = names.find(|pair| pair[0].name == pair[1].name) {
-            let name = visible(&twice.name.to_string());
+            let name = visible(&name_of(&twice.name));
             return Err(self.malformed(format!("channel {name} is listed twice")));
         }
         use Compression::{B44, B44A, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
@@ -153,9 +158,8 @@ impl Checks<'_> {
             return Err(self.unsupported(&found, COMPRESSIONS));
         }
         if header.channels.list.len() > MAX_CHANNELS {
-            return Err(
-                self.unsupported(&format!("{} channels", header.channels.list.len()), "R, G and B")
-            );
+            let found = format!("{} channels", header.channels.list.len());
+            return Err(self.unsupported(&found, &format!("at most {MAX_CHANNELS}")));
         }
         let pixel_bytes = width * height * header.channels.bytes_per_pixel;
         let least = 8 * header.chunk_count
@@ -178,7 +182,7 @@ impl Checks<'_> {
         channels: &ChannelList,
         notes: &mut Vec<String>,
     ) -> Result<Channels, ImageError> {
-        let all: Vec<String> = channels.list.iter().map(|c| c.name.to_string()).collect();
+        let all: Vec<String> = channels.list.iter().map(|c| name_of(&c.name)).collect();
         let mut names: Vec<&str> = all.iter().map(|name| split_channel(name).0).collect();
         names.sort_unstable();
         names.dedup();
@@ -229,7 +233,7 @@ impl Checks<'_> {
         layer: &str,
         channels: &ChannelList,
     ) -> Result<[usize; 3], ImageError> {
-        let all: Vec<String> = channels.list.iter().map(|c| c.name.to_string()).collect();
+        let all: Vec<String> = channels.list.iter().map(|c| name_of(&c.name)).collect();
         let mut found = [0; 3];
         for (index, c) in found.iter_mut().zip(RGB) {
             let at = all.iter().rposition(|name| split_channel(name) == (layer, c));
@@ -309,7 +313,7 @@ pub(super) fn provenance(header: &Header) -> BTreeMap<String, String> {
 }
 
 /// The format that the first bytes of a file suggest, if it is not an EXR.
-fn kind_of(bytes: &[u8]) -> Option<&'static str> {
+pub(crate) fn kind_of(bytes: &[u8]) -> Option<&'static str> {
     const KINDS: [(&[u8], &str); 15] = [
         (b"\x89PNG", "a PNG image does"),
         (b"\xff\xd8\xff", "a JPEG image does"),

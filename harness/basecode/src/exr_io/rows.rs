@@ -17,7 +17,7 @@ use exr::meta::BlockDescription;
 use exr::meta::attribute::{IntegerBounds, SampleType};
 use exr::meta::header::Header;
 
-use super::header::{Channels, Checks, provenance, visible};
+use super::header::{Channels, Checks, name_of, provenance, visible};
 use super::{ExrLayers, ImageError, MAX_FILE_BYTES, read_file};
 use crate::Vec3;
 use crate::image::Image;
@@ -127,7 +127,7 @@ impl<'a> ExrRows<'a> {
 
     /// The names of all channels, as the file has them.
     pub fn channels(&self) -> Vec<String> {
-        self.header.channels.list.iter().map(|channel| channel.name.to_string()).collect()
+        self.header.channels.list.iter().map(|channel| name_of(&channel.name)).collect()
     }
 
     /// Whether a channel (an index of [`ExrRows::channels`]) holds integers.

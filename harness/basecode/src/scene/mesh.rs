@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::Material;
-use super::mtl::{Library, UsedFile};
+use super::mtl::{Library, UsedFile, shown};
 use super::obj::{Corner, MISSING, Obj, Part};
 use super::polygon::triangulate;
 use super::text::{decode, read, visible};
@@ -56,6 +56,9 @@ pub struct MeshFile {
     pub files: Vec<UsedFile>,
 }
 
+/// Coordinates up to this give right pictures: in 32 bits, distances in a small scene survive no larger ones.
+const LARGEST: f32 = 1e6;
+
 impl MeshFile {
     /// Loads an OBJ file, the MTL files that it names, and their textures.
     ///
@@ -98,6 +101,14 @@ impl MeshFile {
                 library.materials[first.material].name
             ));
         }
+        let coordinates = shapes.iter().flat_map(|shape| &shape.positions);
+        let largest = coordinates.fold(0.0, |most: f32, p| most.max(p.abs().max_element()));
+        if largest > LARGEST {
+            remarks.push(format!(
+                "{}: a vertex lies at {largest:e}; beyond {LARGEST:e} from the origin, pictures are wrong",
+                path.display()
+            ));
+        }
         let own = UsedFile { path: path.to_owned(), named_at: None };
         let files = std::iter::once(own).chain(files).collect();
         Ok(Self { shapes, materials: library.materials, remarks, files })
@@ -113,7 +124,7 @@ fn material_of(path: &Path, obj: &Obj, library: &Library, part: &Part) -> Result
         return Err(wrong(line, message.to_owned()));
     };
     library.find(&used.name).ok_or_else(|| {
-        wrong(used.line, format!("material \"{}\" is {}", used.name, library.lacks()))
+        wrong(used.line, format!("material \"{}\" is {}", shown(&used.name), library.lacks()))
     })
 }
 

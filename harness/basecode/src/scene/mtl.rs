@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{Vec2, Vec3};
+use unicode_normalization::UnicodeNormalization as _;
 
 use super::obj::Named;
 use super::text::{
-    Statements, decode, ignored_remarks, read, split_keyword, unquoted, without_comment,
+    SECOND_BACKSLASH, Statements, decode, ignored_remarks, read, split_keyword, unquoted,
+    without_comment,
 };
 use super::texture::Mapping;
 use super::{Material, MaterialModel, Texture};
@@ -39,6 +41,11 @@ pub(super) struct Library {
     pub remarks: Vec<String>,
 }
 
+/// A name as a message shows it.
+pub(super) fn shown(name: &str) -> String {
+    name.replace(SECOND_BACKSLASH, "\\")
+}
+
 /// Names that a message lists at most.
 const LISTED: usize = 12;
 
@@ -65,7 +72,7 @@ impl Library {
                     let why = why_missing(&statement.name, &file);
                     wrong(format!("cannot read the material file {}: {error}{why}", file.display()))
                 })?;
-                if is_absolute(&statement.name) {
+                if is_elsewhere(folder, &statement.name) {
                     library.remarks.push(taken_beside(obj, statement.line, &statement.name, &file));
                 }
                 library.read(&file, &decode(&bytes))?;
@@ -101,7 +108,13 @@ impl Library {
         let named = |which: usize, name: &str| {
             self.names.iter().position(|names| names[which] == name && !name.is_empty())
         };
-        named(0, name).or_else(|| named(0, plain)).or_else(|| named(1, plain))
+        // An accent may be a character of its own, as macOS writes names.
+        let alike = || {
+            let is_it = |own: &String| !own.is_empty() && own.nfc().eq(plain.nfc());
+            self.names.iter().position(|names| names.iter().any(is_it))
+        };
+        let found = named(0, name).or_else(|| named(0, plain)).or_else(|| named(1, plain));
+        found.or_else(|| alike().filter(|_| !plain.is_ascii()))
     }
 
     /// The message for a material name that is not found.
@@ -116,7 +129,7 @@ impl Library {
         if self.names.len() > LISTED {
             names.push("...");
         }
-        let names = if names.is_empty() { "no material".into() } else { names.join(", ") };
+        let names = if names.is_empty() { "no material".into() } else { shown(&names.join(", ")) };
         match &self.files[1..] {
             [] => format!("not in {} (it has: {names})", file(first)),
             _ => {
@@ -210,7 +223,15 @@ struct Entry {
     maps: [Option<(usize, String)>; 2],
     /// The first statement that cannot be understood.
     broken: Option<Error>,
+    /// Line and text of each statement of which the last counts, by its keyword.
+    said: BTreeMap<String, (usize, String)>,
 }
+
+/// Statements of which the last counts.
+const LAST_COUNTS: [&str; 7] = ["kd", "ks", "ke", "ns", "illum", "map_kd", "map_ks"];
+
+/// Reflectances above this are remarked on: more than rounding.
+const MAX_REFLECTANCE: f32 = 1.001;
 
 /// The last illumination model of the MTL specification.
 const LAST_MODEL: u32 = 10;
@@ -236,16 +257,45 @@ impl Entry {
             illumination: None,
             maps: [None, None],
             broken: None,
+            said: BTreeMap::new(),
         }
     }
 
-    /// Applies a statement.
+    /// Applies a statement, and says which earlier one it replaces.
     fn read(&mut self, at: &Place, keyword: &str, rest: &str) -> Result<Effect> {
+        let effect = self.apply(at, keyword, rest)?;
+        let lower = keyword.to_ascii_lowercase();
+        if !LAST_COUNTS.contains(&lower.as_str()) {
+            return Ok(effect);
+        }
+        let own = without_comment(rest).to_owned();
+        let replaced = self.said.insert(lower, (at.line, own)).filter(|(_, before)| {
+            before.split_whitespace().ne(without_comment(rest).split_whitespace())
+        });
+        Ok(match (replaced, effect) {
+            (Some((line, _)), Effect::Taken) => Effect::None(format!(
+                "material \"{}\": {keyword} replaces that of line {line}",
+                shown(&self.name)
+            )),
+            (_, effect) => effect,
+        })
+    }
+
+    fn apply(&mut self, at: &Place, keyword: &str, rest: &str) -> Result<Effect> {
         let wrong = |message: String| at.wrong(format!("material \"{}\": {message}", self.name));
         let none = || Ok(Effect::None(format!("{keyword} is ignored")));
         match keyword.to_ascii_lowercase().as_str() {
-            "kd" => self.colors[0] = Some((at.line, colour(keyword, rest).map_err(wrong)?)),
-            "ks" => self.colors[1] = Some((at.line, colour(keyword, rest).map_err(wrong)?)),
+            "kd" | "ks" => {
+                let color = colour(keyword, rest).map_err(wrong)?;
+                let which = usize::from(keyword.eq_ignore_ascii_case("ks"));
+                self.colors[which] = Some((at.line, color));
+                if color.max_element() > MAX_REFLECTANCE {
+                    return Ok(Effect::None(format!(
+                        "material \"{}\": {keyword} is {color}: a surface cannot reflect more than 1",
+                        shown(&self.name)
+                    )));
+                }
+            }
             "ke" => self.emission = colour(keyword, rest).map_err(wrong)?,
             "ns" => {
                 let word = words(rest).next().unwrap_or_default();
@@ -316,7 +366,7 @@ impl Entry {
             }
             let texture = Texture::load(&file, mapping)
                 .map_err(|error| wrong(error + &why_missing(name, &file)))?;
-            if is_absolute(name) {
+            if is_elsewhere(folder, name) {
                 remarks.push(taken_beside(path, *line, name, &file));
             }
             files.push(UsedFile { path: file, named_at: Some((path.to_owned(), *line)) });
@@ -454,14 +504,22 @@ fn is_absolute(name: &str) -> bool {
     matches!(name, [b'/' | b'\\', ..] | [b'a'..=b'z' | b'A'..=b'Z', b':', b'/' | b'\\', ..])
 }
 
+/// Whether a name leads out of the folder, where a renderer sees nothing.
+fn leaves_folder(name: &str) -> bool {
+    unquoted(name).split(['/', '\\']).any(|part| part == "..")
+}
+
+/// Whether a file is taken from elsewhere than its name says.
+fn is_elsewhere(folder: &Path, name: &str) -> bool {
+    let is_there = || spellings(folder, without_comment(name)).iter().any(|path| path.is_file());
+    is_absolute(name) || leaves_folder(name) && !is_there()
+}
+
 /// The remark on a file that is taken from beside the file that names it.
 fn taken_beside(path: &Path, line: usize, name: &str, file: &Path) -> String {
-    format!(
-        "{}:{line}: {} is absolute; taken is {}",
-        path.display(),
-        unquoted(name),
-        file.display()
-    )
+    let why = if is_absolute(name) { "is absolute" } else { "leads to no file" };
+    let (name, path) = (shown(unquoted(name)), path.display());
+    format!("{path}:{line}: {name} {why}; taken is {}", file.display())
 }
 
 /// A hint for the message about a missing file.
@@ -485,39 +543,66 @@ pub(super) fn why_missing(name: &str, file: &Path) -> String {
 
 /// The file of that name in `folder`: as it stands if there is one, else without a comment behind it. Of an
 /// absolute name the end that is there counts: the rest is another machine's, or none that a renderer
-/// sees.
+/// sees. So it does where a name leads out of the folder and no file is there.
 fn existing(folder: &Path, name: &str) -> PathBuf {
     let candidates = [name, without_comment(name)];
-    if is_absolute(name) {
+    let mut direct = candidates.iter().flat_map(|name| spellings(folder, name));
+    if !is_absolute(name)
+        && let Some(found) = direct.find(|path| path.is_file())
+    {
+        return found;
+    }
+    let plain = unquoted(without_comment(name)).replace('\\', "/");
+    let first = folder.join(shown(&plain));
+    if is_absolute(name) || leaves_folder(name) {
         let ends = candidates.iter().flat_map(|name| {
             let name = unquoted(name);
-            name.match_indices(['/', '\\']).map(move |(at, _)| &name[at + 1..])
+            let separators = ['/', '\\', SECOND_BACKSLASH];
+            let after = |(at, separator): (usize, &str)| &name[at + separator.len()..];
+            name.match_indices(separators).map(after).collect::<Vec<_>>()
         });
-        let mut ends = ends.filter(|end| !end.is_empty() && !is_absolute(end)).collect::<Vec<_>>();
+        let mut ends = ends
+            .filter(|end| !end.is_empty() && !is_absolute(end) && !leaves_folder(end))
+            .collect::<Vec<_>>();
         ends.sort_by_key(|end| std::cmp::Reverse(end.len()));
-        let mut paths = ends.iter().flat_map(|end| spellings(folder, end));
+        let found = ends.iter().flat_map(|end| spellings(folder, end)).find(|path| path.is_file());
         let last = ends.last().map(|end| folder.join(without_comment(end)));
-        return paths.find(|path| path.is_file()).or(last).unwrap_or_else(|| folder.to_owned());
+        return match (found, is_absolute(name)) {
+            (Some(found), _) => found,
+            (None, true) => last.unwrap_or_else(|| folder.to_owned()),
+            (None, false) => first,
+        };
     }
-    let mut paths = candidates.iter().flat_map(|name| spellings(folder, name));
-    let first = folder.join(unquoted(without_comment(name)).replace('\\', "/"));
-    paths.find(|path| path.is_file()).unwrap_or(first)
+    with_other_accents(&first).unwrap_or(first)
 }
 
-/// A name with either kind of slash, in UTF-8 and, where the system has bytes for names, in Latin-1.
+/// A file of that name whose accents are written in another way: as characters of their own, or not.
+fn with_other_accents(path: &Path) -> Option<PathBuf> {
+    let wanted = path.file_name()?.to_str().filter(|name| !name.is_ascii())?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let entries = folder.unwrap_or(Path::new(".")).read_dir().ok()?.flatten();
+    let mut names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    names.find(|name| name.nfc().eq(wanted.nfc())).map(|name| path.with_file_name(name))
+}
+
+/// A name with either kind of slash, and as it stands; in UTF-8 and, where the system has bytes for names, in the
+/// bytes of the file that names it.
 fn spellings(folder: &Path, name: &str) -> Vec<PathBuf> {
-    let name = unquoted(name).replace('\\', "/");
-    if name.is_empty() {
+    let own = unquoted(name);
+    if own.is_empty() {
         return Vec::new();
     }
-    let mut paths = vec![folder.join(&name)];
+    let slashes = own.replace('\\', "/");
+    let mut names = vec![slashes.replace(SECOND_BACKSLASH, "/")];
     #[cfg(unix)]
-    if !name.is_ascii()
-        && let Ok(bytes) =
-            name.chars().map(u8::try_from).collect::<std::result::Result<Vec<_>, _>>()
-    {
-        use std::os::unix::ffi::OsStrExt;
-        paths.push(folder.join(std::ffi::OsStr::from_bytes(&bytes)));
+    names.push(shown(own));
+    let mut paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
+    #[cfg(unix)]
+    if !own.is_ascii() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let bytes = [slashes.as_str(), own].map(super::text::bytes_of);
+        let bytes = bytes.into_iter().chain([super::text::bytes_of(&names[0])]).flatten();
+        paths.extend(bytes.map(|bytes| folder.join(std::ffi::OsStr::from_bytes(&bytes))));
     }
     paths
 }
@@ -526,7 +611,10 @@ fn spellings(folder: &Path, name: &str) -> Vec<PathBuf> {
 /// in quotes or each with the ending `.mtl`, or else one a word.
 fn library_files(folder: &Path, statement: &str) -> Vec<PathBuf> {
     let whole = existing(folder, statement);
-    if whole.is_file() {
+    // Of several, the end that is beside is the last alone.
+    let is_several = || statement.to_ascii_lowercase().matches(".mtl").count() > 1;
+    let is_direct = || spellings(folder, statement).contains(&whole);
+    if whole.is_file() && (is_direct() || !is_several()) {
         return vec![whole];
     }
     let mut names: Vec<String> = Vec::new();

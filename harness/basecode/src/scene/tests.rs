@@ -162,7 +162,7 @@ fn mistakes_in_mesh_and_materials_name_file_and_line() {
             MTL.to_owned(),
             "s.obj:12: material \"grey\" is in no material file",
         ),
-        ("w", OBJ.replace("v 1 1 0", "v 1 1 0 0"), MTL.to_owned(), "s.obj:4: v has the weight 0"),
+        ("w", OBJ.replace("v 1 1 0", "v 1 1 0 w"), MTL.to_owned(), "s.obj:4: v has \"w\" where"),
         ("short", OBJ.replace("v 1 1 0", "v 1 1"), MTL.to_owned(), "s.obj:4: v has 2 numbers"),
         (
             "nsneg",
@@ -277,7 +277,7 @@ fn every_form_of_a_mesh_that_exporters_write_is_read() {
         ("blank lines", OBJ.replace('\n', "\n\n  \n"), MTL.replace('\n', "\n\n")),
         ("some colours", OBJ.replace("v 1 1 0", "v 1 1 0 0.5 0.5 0.5"), MTL.to_owned()),
         ("half a colour", OBJ.replace("v 1 1 0", "v 1 1 0 0.5 0.5"), MTL.to_owned()),
-        ("weight", OBJ.replace("v 1 1 0", "v 2 2 0 2"), MTL.to_owned()),
+        ("weight", OBJ.replace("v 1 1 0", "v 1 1 0 2"), MTL.to_owned()),
         (
             "negative",
             OBJ.replace("f 1/1/1 2/2/1 3/3/1 4/4/1", "f -4/-4/-1 -3/-3/-1 -2/-2/-1 -1/-1/-1"),
@@ -318,6 +318,78 @@ fn every_form_of_a_mesh_that_exporters_write_is_read() {
         let scene = folder.load().unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(seen(&scene), seen(&plain), "{name}");
     }
+}
+
+/// Bytes of the scene's text with some in the place of `NAME`.
+fn with_name(text: &str, name: &[u8]) -> Vec<u8> {
+    let parts: Vec<&[u8]> = text.split("NAME").map(str::as_bytes).collect();
+    parts.join(name)
+}
+
+#[cfg(unix)]
+#[test]
+fn names_of_two_bytes_a_character_hold_no_backslash() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let picture = image::RgbImage::from_pixel(1, 1, image::Rgb([255, 0, 0]));
+    for name in [
+        b"\x95\x5c".as_slice(), // Shift-JIS
+        b"\xb3\x5c\xa5\x5c",    // Big5
+        b"\x81\x5c x",          // GBK
+        b"a\x83\x85\x83\x5c",   // a byte that is white space in Latin-1
+        b"a\\b",                // a file of Unix in plain ASCII
+        "\u{fc}\\b".as_bytes(),
+    ] {
+        let obj = with_name(&OBJ.replace("grey", "NAME").replace("s.mtl", "NAME.mtl"), name);
+        let mtl = with_name(&MTL.replace("grey", "NAME\nmap_Kd NAME.png"), name);
+        let folder = Folder::new("bytes", OBJ, MTL);
+        let file = |end: &[u8]| folder.0.join(std::ffi::OsStr::from_bytes(&[name, end].concat()));
+        fs::write(folder.0.join("s.obj"), obj).unwrap();
+        fs::write(file(b".mtl"), mtl).unwrap();
+        picture.save_with_format(file(b".png"), image::ImageFormat::Png).unwrap();
+        let scene = folder.load().unwrap_or_else(|error| panic!("{name:x?}: {error}"));
+        assert_eq!(scene.material_of(0).diffuse.average(), Vec3::X, "{name:x?}");
+        assert_eq!(scene.shapes().len(), 2, "{name:x?}");
+        // The name that a message shows has its backslash.
+        fs::write(
+            folder.0.join("s.obj"),
+            with_name("mtllib NAME.mtl\nv 0 0 0\nusemtl x\nf 1 1 1\n", name),
+        )
+        .unwrap();
+        assert!(!folder.error().contains('\u{f75c}'), "{}", folder.error());
+    }
+}
+
+#[test]
+fn accents_may_be_characters_of_their_own() {
+    let (whole, apart) = ("B\u{f6}den", "Bo\u{308}den");
+    for (used, there) in [(whole, apart), (apart, whole)] {
+        let obj = OBJ.replace("grey", used).replace("s.mtl", &format!("{used}.mtl"));
+        let folder = Folder::new("accents", &obj, MTL);
+        fs::write(folder.0.join(format!("{there}.mtl")), MTL.replace("grey", there)).unwrap();
+        let scene = folder.load().unwrap();
+        assert_eq!(scene.material_of(0).diffuse.average(), vec3(0.5, 0.25, 0.125));
+    }
+    // Names that differ only so are two.
+    let mtl = format!("{}newmtl {apart}\nKd 1 1 1\n", MTL.replace("grey", whole));
+    let scene = Folder::new("both", &OBJ.replace("grey", apart), &mtl).load().unwrap();
+    assert_eq!(scene.material_of(0).diffuse.average(), Vec3::ONE);
+}
+
+#[test]
+fn a_name_that_leads_out_of_the_folder_is_looked_for_beside() {
+    for name in ["../gone/s.mtl", "..\\..\\a b\\s.mtl", "../x/../y/sub/s.mtl"] {
+        let folder = Folder::new("out", &OBJ.replace("s.mtl", name), MTL);
+        let scene = folder.load().unwrap_or_else(|error| panic!("{name}: {error}"));
+        let said = scene.remarks().join("\n");
+        assert!(said.contains("leads to no file; taken is"), "{said}");
+    }
+    // What is there is taken from there.
+    let folder = Folder::new("round", OBJ, MTL);
+    let own = folder.0.file_name().unwrap().to_str().unwrap().to_owned();
+    fs::write(folder.0.join("s.obj"), OBJ.replace("s.mtl", &format!("../{own}/s.mtl"))).unwrap();
+    assert_eq!(folder.load().unwrap().remarks(), [""; 0]);
+    let error = Folder::new("nowhere", &OBJ.replace("s.mtl", "../t.mtl"), MTL).error();
+    assert!(error.contains("../t.mtl: No such file"), "{error}");
 }
 
 #[test]
@@ -375,6 +447,10 @@ fn what_has_no_area_is_left_out_and_remarked_on() {
     ] {
         assert!(said.contains(expected), "{said}");
     }
+    let far = Folder::new("far", &OBJ.replace("v 1 1 0", "v 1 -1e30 0 2"), MTL).load().unwrap();
+    let said = far.remarks().join("\n");
+    assert!(said.contains("s.obj: a vertex lies at 1e30; beyond 1e6 from the origin"), "{said}");
+    assert!(said.contains("s.obj:4: 1 weight (v x y z w) statement is ignored"), "{said}");
     let lines = OBJ.replace("f 1/1/1 2/2/1 3/3/1 4/4/1", "l 1 2 3 4").replace("f ", "l ");
     assert!(Folder::new("lines", &lines, MTL).error().contains("holds no triangle"));
 }
@@ -454,6 +530,17 @@ fn what_a_material_says_in_vain_is_remarked_on() {
         ("Ka 1 1 1\nNi 1.5\nTf 1 1 1\nsharpness 60\nd 1\nTr 0", ""),
         ("illum 99", "1: illum 99 is no model of MTL (0 to 10): Phong is taken"),
         ("illum 10", ""),
+        ("map_Kd t.png\nmap_Kd ./t.png", "2: material \"m\": map_Kd replaces that of line "),
+        ("map_Kd gone.png\nmap_Kd t.png", "2: material \"m\": map_Kd replaces that of line "),
+        ("Ns 5\nNs 6", "2: material \"m\": Ns replaces that of line "),
+        ("Ke 0 0 0\nke 1 1 1", "2: material \"m\": ke replaces that of line "),
+        ("Ns 5\nNs  5 # again", ""),
+        (
+            "Kd 255 255 255",
+            "1: material \"m\": Kd is [255, 255, 255]: a surface cannot reflect more",
+        ),
+        ("Ks 0 1.5 0", "1: material \"m\": Ks is [0, 1.5, 0]: a surface cannot reflect more"),
+        ("Kd 1 1 1\nKs 1 1 1", ""),
         ("newmtl m", "1: material \"m\" is there already: the first counts"),
     ] {
         // The first line of these statements is behind `newmtl m`.

@@ -18,7 +18,47 @@ pub(super) fn read(path: &Path) -> io::Result<Vec<u8>> {
     Err(io::Error::other(format!("expected a file, found {found}")))
 }
 
-/// The text of a file: UTF-8 or UTF-16 by its byte order mark, UTF-16 by its zeros, else UTF-8, else Latin-1.
+/// Stand for bytes of a character of two bytes that would be a backslash or white space by themselves.
+const HIDDEN: [(u8, char); 3] = [(b'\\', SECOND_BACKSLASH), (0x85, '\u{f785}'), (0xa0, '\u{f7a0}')];
+/// Stands for a second byte 0x5C, as Shift-JIS, Big5 and GBK have it; in a path it may be a backslash all the same.
+pub(super) const SECOND_BACKSLASH: char = '\u{f75c}';
+
+/// A text in no Unicode encoding: a character for each byte, so that equal names stay equal whatever encoding it is.
+/// What may be a character of two bytes (Shift-JIS, Big5, GBK, EUC) is no line continuation and no space.
+fn decode_bytes(bytes: &[u8]) -> String {
+    let hidden = |byte: u8| {
+        let found = HIDDEN.iter().find(|(own, _)| *own == byte);
+        found.map_or(char::from(byte), |(_, stands)| *stands)
+    };
+    let mut text = String::with_capacity(bytes.len() + bytes.len() / 8);
+    let mut at = 0;
+    while at < bytes.len() {
+        // Without 0xA0, which is a space of Latin-1 before any letter.
+        let is_pair =
+            matches!(bytes[at..], [0x81..=0x9f | 0xa1..=0xfe, 0x40..=0x7e | 0x80..=0xfe, ..]);
+        if is_pair {
+            text.extend([hidden(bytes[at]), hidden(bytes[at + 1])]);
+            at += 2;
+        } else {
+            text.push(char::from(bytes[at]));
+            at += 1;
+        }
+    }
+    text
+}
+
+/// The bytes of a name in a text that was read byte by byte.
+#[cfg(unix)]
+pub(super) fn bytes_of(name: &str) -> Option<Vec<u8>> {
+    let byte = |c: char| {
+        let found = HIDDEN.iter().find(|(_, stands)| *stands == c);
+        found.map(|(byte, _)| *byte).or_else(|| u8::try_from(c).ok())
+    };
+    name.chars().map(byte).collect()
+}
+
+/// The text of a file: UTF-8 or UTF-16 by its byte order mark, UTF-16 by its zeros, else UTF-8, else a character for
+/// each byte, as in Latin-1.
 pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
     if let Some(rest) = bytes.strip_prefix(b"\xef\xbb\xbf") {
         return decode(rest);
@@ -35,7 +75,7 @@ pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
         [0, 1..=127, 0, 1..=127, ..] => utf16(bytes, u16::from_be_bytes),
         _ => match std::str::from_utf8(bytes) {
             Ok(text) => Cow::Borrowed(text),
-            Err(_) => Cow::Owned(bytes.iter().map(|&byte| char::from(byte)).collect()),
+            Err(_) => Cow::Owned(decode_bytes(bytes)),
         },
     }
 }
@@ -181,6 +221,20 @@ mod tests {
     fn encodings_are_told_apart() {
         assert_eq!(decode("\u{feff}grün".as_bytes()), "grün");
         assert_eq!(decode(b"gr\xfcn"), "grün");
+        // 表 in Shift-JIS, 許 in Big5: the second byte is no continuation.
+        for name in [b"\x95\x5c", b"\xb3\x5c"] {
+            let text = [b"usemtl ".as_slice(), name, b"\nf 1 2 3\n"].concat();
+            let text = decode(&text);
+            let found = statements(&text);
+            assert_eq!(found.len(), 2, "{found:?}");
+            #[cfg(unix)]
+            assert_eq!(bytes_of(&found[0].1["usemtl ".len()..]).as_deref(), Some(&name[..]));
+        }
+        assert_eq!(
+            statements(&decode(b"usemtl gr\xfcn \\\n b")),
+            [(1, "usemtl grün b".to_owned())]
+        );
+        assert_eq!(statements(&decode(b"a \x83\x85\x83\xa0 \n"))[0].1.chars().count(), 6);
         let little: Vec<u8> = "\u{feff}ü".encode_utf16().flat_map(u16::to_le_bytes).collect();
         let big: Vec<u8> = "\u{feff}ü".encode_utf16().flat_map(u16::to_be_bytes).collect();
         assert_eq!((decode(&little), decode(&big)), ("ü".into(), "ü".into()));

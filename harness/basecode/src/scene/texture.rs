@@ -8,6 +8,7 @@ use glam::{Vec2, Vec3};
 
 use super::text::read;
 use crate::SurfaceInteraction;
+use crate::exr_io::kind_of;
 
 /// A color, constant or looked up in a bitmap.
 #[derive(Clone, Debug)]
@@ -81,36 +82,26 @@ impl Texture {
     /// Loads a bitmap (PNG, JPEG, TGA or BMP). Its 8-bit values are decoded from sRGB.
     pub(super) fn load(path: &Path, mapping: Mapping) -> Result<Self, String> {
         let file = path.display();
+        let bytes =
+            read(path).map_err(|error| format!("cannot read the texture {file}: {error}"))?;
+        let cannot = |why: String| format!("cannot decode the texture {file}: {why}");
         // The name tells a TGA file, which has no other mark.
-        let named = image::ImageFormat::from_path(path).ok();
-        let mut reader = read(path)
-            .and_then(|bytes| {
-                let mut reader = image::ImageReader::new(Cursor::new(bytes));
-                named.into_iter().for_each(|format| reader.set_format(format));
-                reader.with_guessed_format()
-            })
-            .map_err(|error| format!("cannot read the texture {file}: {error}"))?;
-        let format = reader.format();
+        let guess = image::guess_format(&bytes).ok();
+        let format = guess.or_else(|| image::ImageFormat::from_path(path).ok());
+        let Some(format) = format.filter(|format| FORMATS.contains(format)) else {
+            return Err(cannot(format!("expected {EXPECTED}, found {}", found(&bytes, guess))));
+        };
+        let is_marked = guess.is_some() || format == image::ImageFormat::Tga;
+        if !is_marked {
+            return Err(cannot(format!("expected {EXPECTED}, found {}", found(&bytes, None))));
+        }
+        let mut reader = image::ImageReader::with_format(Cursor::new(&bytes), format);
         let mut limits = image::Limits::default();
         limits.max_image_width = Some(MAX_SIDE);
         limits.max_image_height = Some(MAX_SIDE);
         reader.limits(limits);
-        let picture = reader.decode().map_err(|error| match error {
-            image::ImageError::IoError(error) if error.kind() != ErrorKind::UnexpectedEof => {
-                format!("cannot read the texture {file}: {error}")
-            }
-            image::ImageError::Unsupported(_) => {
-                let names = format.map(|format| format.extensions_str().first().copied());
-                let found = names.flatten().map_or("something else".into(), str::to_uppercase);
-                format!("cannot decode the texture {file}: expected PNG, JPEG, TGA or BMP, found {found}")
-            }
-            error => {
-                // The decoder of PNG adds its own types to what it says.
-                let error = error.to_string();
-                let said = error.split(" while decoding ").next().unwrap_or_default();
-                format!("cannot decode the texture {file}: {said}")
-            }
-        })?;
+        let picture =
+            reader.decode().map_err(|error| cannot(why_not_decoded(&error, &bytes, format)))?;
         let picture = picture.into_rgb8();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         if width == 0 || height == 0 {
@@ -123,6 +114,62 @@ impl Texture {
             .map(|p| Vec3::from(p.0.map(|level| srgb_to_linear(f32::from(level) / 255.0))))
             .collect();
         Ok(Self::Bitmap(Arc::new(Bitmap::new(width, height, texels, mapping))))
+    }
+}
+
+/// What is read.
+const FORMATS: [image::ImageFormat; 4] = [
+    image::ImageFormat::Png,
+    image::ImageFormat::Jpeg,
+    image::ImageFormat::Tga,
+    image::ImageFormat::Bmp,
+];
+const EXPECTED: &str = "PNG, JPEG, TGA or BMP";
+
+/// What a file is that is no texture: by its format, or by what it begins with.
+fn found(bytes: &[u8], format: Option<image::ImageFormat>) -> String {
+    if bytes.is_empty() {
+        return "an empty file".to_owned();
+    }
+    match (format, kind_of(bytes)) {
+        (Some(format), _) => format
+            .extensions_str()
+            .first()
+            .map_or("something else".into(), |end| end.to_uppercase()),
+        (None, Some(kind)) => format!("a file that begins as {kind}"),
+        (None, None) => "something else".to_owned(),
+    }
+}
+
+/// Why a decoder gave up, in words: the crates' own messages hold their types.
+fn why_not_decoded(error: &image::ImageError, bytes: &[u8], format: image::ImageFormat) -> String {
+    let name = found(&[0], Some(format));
+    match error {
+        image::ImageError::Limits(_) => {
+            let reader = image::ImageReader::with_format(Cursor::new(bytes), format);
+            let size = reader
+                .into_dimensions()
+                .map_or(String::new(), |(width, height)| format!("it is {width}x{height}, "));
+            format!("{size}expected at most {MAX_SIDE} texels a side")
+        }
+        image::ImageError::Unsupported(_) => format!("this kind of {name} is not supported"),
+        _ if bytes.get(12..16) == Some(b"CgBI") => {
+            "it is a PNG as Xcode rewrites it for iOS, which others cannot read; save it anew"
+                .to_owned()
+        }
+        image::ImageError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => {
+            format!("the {name} ends early; was it cut off?")
+        }
+        other => {
+            let said = other.to_string();
+            let said = said.rsplit(": ").next().unwrap_or_default().trim_end_matches('.');
+            let is_code = said.is_empty() || said.contains(['{', '}', '(', ')', '"', '`']);
+            if is_code || said.contains("::") || said.starts_with("Format error") {
+                format!("the {name} is damaged")
+            } else {
+                format!("the {name} is damaged: {said}")
+            }
+        }
     }
 }
 
@@ -190,5 +237,49 @@ mod tests {
         let texture = Texture::Bitmap(Arc::new(bitmap));
         assert_eq!(texture.average(), Vec3::splat(0.5));
         assert_eq!(texture.max(), Vec3::ONE);
+    }
+
+    #[test]
+    fn a_texture_that_is_not_read_says_why_in_words() {
+        let folder = std::env::temp_dir().join(format!("basecode-texture-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let encoded = |width, height, format| {
+            let mut bytes = Cursor::new(Vec::new());
+            image::RgbImage::new(width, height).write_to(&mut bytes, format).unwrap();
+            bytes.into_inner()
+        };
+        let png = encoded(2, 2, image::ImageFormat::Png);
+        let mut xcode = png.clone();
+        xcode.splice(8..8, *b"\0\0\0\x04CgBI\x50\0\x20\x02\x2b\xd5\xb3\x7f");
+        let mut broken = png.clone();
+        broken[29] ^= 0xff;
+        let bmp = encoded(2, 2, image::ImageFormat::Bmp);
+        let git_lfs = b"version https://git-lfs.github.com/spec/v1\n".to_vec();
+        for (name, bytes, expected) in [
+            ("t.png", xcode, "a PNG as Xcode rewrites it for iOS"),
+            ("t.png", png[..40].to_vec(), "the PNG"),
+            ("t.png", broken, "the PNG is damaged"),
+            (
+                "t.png",
+                encoded(9000, 1, image::ImageFormat::Png),
+                "it is 9000x1, expected at most 8192",
+            ),
+            ("t.png", git_lfs.clone(), "found a file that begins as the pointer does that Git LFS"),
+            ("t.jpg", git_lfs, "found a file that begins as the pointer does that Git LFS"),
+            ("t.png", b"<!DOCTYPE html>".to_vec(), "begins as a web page does"),
+            ("t.bmp", bmp[..20].to_vec(), "the BMP"),
+            ("t.tga", b"\0\0\x02".to_vec(), "the TGA ends early"),
+            ("t.png", Vec::new(), "found an empty file"),
+            ("t.png", b"abc".to_vec(), "found something else"),
+            ("t.webp", b"RIFF\0\0\0\0WEBPVP8 ".to_vec(), "found WEBP"),
+        ] {
+            let path = folder.join(name);
+            std::fs::write(&path, bytes).unwrap();
+            let said = Texture::load(&path, Mapping::default()).unwrap_err();
+            assert!(said.contains(expected), "{expected}: {said}");
+            let why = said.split_once(&format!("{}: ", path.display())).expect(&said).1;
+            assert!(!why.contains(['{', '}', '"']) && !why.contains("::"), "{said}");
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use basecode::exr_io::{ExrRows, write_exr_channels};
 
+use crate::files::is_same_file;
 use crate::harmless::harmless;
 use crate::imaging::rows::{Channels, Row, visit_rows};
 use crate::imaging::thresholds::{Limits, Tally};
@@ -147,6 +148,11 @@ impl Options {
             |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("exr"));
         if let Some(path) = output.filter(|path| !is_exr(path)) {
             bail!("{}: the difference image can only be an EXR file", path.display());
+        }
+        if let Some(path) = output
+            && options.images.iter().any(|image| is_same_file(image, path))
+        {
+            bail!("{}: this is one of the images; hint: name another file", path.display());
         }
         Ok(options)
     }

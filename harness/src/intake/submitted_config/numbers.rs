@@ -7,7 +7,7 @@ pub(super) fn is_digits(text: &str) -> bool {
 }
 
 /// Fewer digits than this are no student number by themselves: `1.5`, `+1`.
-const FEW_DIGITS: usize = 5;
+pub(super) const FEW_DIGITS: usize = 5;
 /// So many digits are a whole number, though a letter follows them at once; with fewer, the letter may stand in a
 /// digit's place.
 const MANY_DIGITS: usize = 9;
@@ -61,7 +61,7 @@ pub(super) fn number_in(text: &str) -> Option<String> {
     (is_whole && !before.ends_with(['-', '.'])).then(|| run.to_owned())
 }
 
-fn digit_runs(text: &str) -> impl Iterator<Item = &str> {
+pub(super) fn digit_runs(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !c.is_ascii_digit()).filter(|run| !run.is_empty())
 }
 

@@ -32,7 +32,6 @@ fn keys_of_other_languages_and_shapes_are_known() {
     for text in [
         r#"{"students": [{"firstName": "Ada", "lastName": "Lampglow", "id": 260123456}]}"#,
         r#"{"name": ["Ada", "Lampglow"], "id": [260123456]}"#,
-        r#"{"group": ["Ada Lampglow", "Bob Byte"], "id": 260123456}"#,
         r#"{"info": {"firstName": "Ada", "lastName": "Lampglow", "number": "260123456"}}"#,
         r#"{"author": "Ada Lampglow <ada@example.org>", "student": 260123456}"#,
         r#"{"firstName": {"value": "Ada"}, "lastName": ["Lampglow"], "id": {"is": "260123456"}}"#,
@@ -213,6 +212,138 @@ fn of_two_numbers_none_counts() {
     let said =
         crate::intake::check_config(&config, false, &[], &[], &crate::intake::TreeSpec::default());
     assert!(said[0].message.ends_with("digits are lost"), "{}", said[0]);
+}
+
+/// A `config.json` with something else in the place of the line of the name or number.
+fn file(name: &str, id: &str) -> String {
+    format!("{{\n  {name},\n  \"lastName\": \"Lampglow\",\n  {id},\n  \"renders\": []\n}}\n")
+}
+
+#[test]
+fn of_two_numbers_or_names_none_counts_in_whatever_form() {
+    let (first, id) = ("\"firstName\": \"Ada\"", "\"studentID\": \"260181512\"");
+    let both = |one: &str, other: &str| {
+        format!("<<<<<<< HEAD\n  {one},\n=======\n  {other},\n>>>>>>> main\n")
+    };
+    let other = id.replace("512", "513");
+    let whole = file(first, id);
+    for text in [
+        file(first, &both(id, &other)),
+        file(first, &both(id, &other).replace("=======", "||||||| 1a2b\n=======")),
+        both(&whole, &whole.replace("512", "513")),
+        format!("{whole}{{\"studentID\": \"260181513\"}}"),
+        format!("{whole}\n{}", whole.replace("512", "513")),
+        format!("{whole},\n{}", whole.replace("512", "513")),
+        file(first, "\"studentID\": 260181512 260181513"),
+        file(first, "\"studentID\": 260181512, 260181513"),
+        file(first, "\"studentID\": 260181512; 260181513"),
+        file(first, "\"studentID\": 260181512 / 260181513"),
+        file(first, "\"studentID\": 260181512 or 260181513"),
+        file(first, "\"studentID\": 260181512 (260181513)"),
+        file(first, "\"studentID\": 260181512 \"260181513\""),
+        file(first, "\"studentID\": \"260181512\", \"260181513\""),
+        file(first, "\"studentID\": \"260181512\" or \"260181513\""),
+        file(first, "\"studentID\": \"260181512\" / \"260181513\""),
+        file(first, "\"studentID\": \"260181512\" /* or */ \"260181513\""),
+        file(first, "\"studentID\": [\"260181512\" \"260181513\"]"),
+        file(first, &format!("{id} {other}")),
+        file(first, &format!("{id},\n  {other}")),
+        "studentID: 260181512\nstudentID: 260181513\n".into(),
+        "studentID: 260181512\nstudentID: 260181513\nfirstName: Ada\n".into(),
+        "studentID = 260181512, 260181513\n".into(),
+        r#"{"me": {"id": 260181512}, "partner": {"id": 260181513}}"#.into(),
+    ] {
+        let (config, findings, is_whole) = SubmittedConfig::parse(text.as_bytes());
+        assert_eq!(config.sampler_seed(), None, "{text}: {config:?}");
+        let tree = crate::intake::TreeSpec::default();
+        let said = crate::intake::check_config(&config, is_whole, &[], &[], &tree);
+        let said: Vec<String> = findings.iter().chain(&said).map(ToString::to_string).collect();
+        let names = |number: &str| said.iter().any(|said| said.contains(number));
+        assert!(names("260181512") && names("260181513"), "{text}: {said:?}");
+    }
+    let eve = first.replace("Ada", "Eve");
+    for text in [
+        file(&both(first, &eve), id),
+        file(&format!("{first},\n  {eve}"), id),
+        file(&format!("{first}, \"FirstName\": \"Eve\""), id),
+        file("\"firstName\": \"Ada\" or \"Eve\"", id),
+        file("\"firstName\": \"Ada\" / \"Eve\"", id),
+        format!("{whole}{{\"firstName\": \"Eve\"}}"),
+        both(&whole, &whole.replace("Ada", "Eve")),
+        r#"{"name": "Ada Lampglow", "fullName": "Eve Dimlight", "id": 260181512}"#.into(),
+        r#"{"group": ["Ada Lampglow", "Eve Dimlight"], "id": 260181512}"#.into(),
+        "name: Ada Lampglow\nname: Eve Dimlight\nid: 260181512".into(),
+    ] {
+        let (config, findings, is_whole) = SubmittedConfig::parse(text.as_bytes());
+        assert_eq!(config.first_name, None, "{text}");
+        assert_eq!(config.sampler_seed(), Some(260_181_512), "{text}");
+        let twice = findings.iter().find(|own| own.code == "config_twice").expect(&text);
+        let said = twice.to_string();
+        assert!(said.contains("Ada") && said.contains("Eve") && said.contains("neither"), "{said}");
+        let tree = crate::intake::TreeSpec::default();
+        let more = crate::intake::check_config(&config, is_whole, &[], &[], &tree);
+        let is_missing = |own: &Finding| own.message.contains("firstName");
+        assert!(!more.iter().any(is_missing), "{text}: {more:?}");
+    }
+}
+
+#[test]
+fn no_piece_of_a_number_counts() {
+    for (id, expected) in [
+        ("260,181,512", Some(260_181_512)),
+        ("260'181'512", Some(260_181_512)),
+        ("260.181.512", Some(260_181_512)),
+        ("260-181-512", Some(260_181_512)),
+        ("(260,181,512)", Some(260_181_512)),
+        ("260/181/512", None),
+        ("260;181;512", None),
+        ("260 / 181 512", None),
+        ("260|181512", None),
+        ("260 181 512 (McGill)", None),
+        ("[260/181/512]", None),
+        ("[260, 181, 512]", None),
+        ("260\n181512", None),
+        ("260 /* x */ 181512", None),
+        ("\"260\" \"181512\"", None),
+        ("\"260\" + \"181512\"", None),
+        ("260181,512", None),
+    ] {
+        for text in [
+            file("\"firstName\": \"Ada\"", &format!("\"studentID\": {id}")),
+            format!("studentID: {id}"),
+        ] {
+            let is_lines = id.contains('\n') && !text.starts_with('{');
+            let found = SubmittedConfig::parse(text.as_bytes()).0.sampler_seed();
+            let is_right = found == expected || found.is_none() || found == Some(260_181_512);
+            assert!(is_right || is_lines, "{text}: {found:?}");
+            if text.starts_with('{') && expected.is_some() {
+                assert_eq!(found, expected, "{text}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_said_twice_alike_counts() {
+    let whole = file("\"firstName\": \"Ada\"", "\"studentID\": \"260181512\"");
+    let escaped = whole.replace("Ada", "Ad\\u0061");
+    for text in [
+        format!("{whole}{whole}"),
+        format!("{whole}\n{escaped}"),
+        format!("<<<<<<< HEAD\n{whole}=======\n{whole}>>>>>>> x\n"),
+        "{\"firstName\": \"Ada\", \"lastName\": \"Lampglow\"}\n{\"studentID\": 260181512}".into(),
+        whole.replace("\"260181512\"", "\"260181512\" // not 260181513"),
+        whole.replace("\"260181512\"", "260181512 # 9 digits"),
+        whole.replace("\"260181512\",", "260181512 \"email\": \"x@260999999.ca\","),
+        whole.replace("{\n", "{\n// \"studentID\": 260181513\n"),
+        whole.replace("[]", "[{\"name\": \"Teapot\", \"id\": 26018, \"render\": \"a.exr\"} * ]"),
+        whole.replace("]\n}", "]\n}\nThanks!"),
+        whole.replace("\"firstName\"", "\"name\": \"Assignment 2\", \"firstName\""),
+        whole.replace("\"Ada\"", "\"Ada\", \"FirstName\": \"ADA\""),
+        whole.replace("\"Ada\"", "\"Ada\" \"FirstName\": \"\""),
+    ] {
+        assert_eq!(names(&text), ("Ada".into(), "Lampglow".into(), Some(260_181_512)), "{text}");
+    }
 }
 
 #[test]

@@ -101,6 +101,9 @@ const WITHOUT_EFFECT: [&str; 23] = [
     "con",
 ];
 
+/// What a remark calls the fourth number of a vertex.
+const WEIGHT: &str = "weight (v x y z w)";
+
 impl Piece {
     /// Reads a text, up to the first statement that cannot be understood.
     pub(super) fn read(text: &str) -> (Self, Option<Wrong>) {
@@ -212,15 +215,18 @@ impl Piece {
         Ok(numbers)
     }
 
-    /// `x y z`, with a weight `w` behind them or a color of any number of components.
-    fn position(&self, line: usize, rest: &str) -> Result<Vec3, Wrong> {
+    /// `x y z`, with a weight `w` behind them or a color of any number of components. A weight has a meaning for
+    /// free-form curves and surfaces only ("Advanced Visualizer Manual", appendix B1), and none for a face.
+    fn position(&mut self, line: usize, rest: &str) -> Result<Vec3, Wrong> {
         let position = Vec3::from(self.numbers::<3>(line, "v", rest, 3)?);
         let mut more = words(rest).skip(3);
-        let (Some(weight), None) = (more.next(), more.next()) else { return Ok(position) };
-        match self.number(line, "v", weight)? {
-            0.0 => Err(Wrong::at(line, "v has the weight 0".to_owned())),
-            weight => Ok(position / weight),
+        if let (Some(weight), None) = (more.next(), more.next())
+            && self.number(line, "v", weight)? != 1.0
+        {
+            let weights = self.ignored.entry(WEIGHT.to_owned()).or_insert((0, line));
+            weights.0 += 1;
         }
+        Ok(position)
     }
 
     fn face(&mut self, line: usize, rest: &str) -> Result<(), Wrong> {

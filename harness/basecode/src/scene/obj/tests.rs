@@ -11,7 +11,7 @@ const TEXTS: [&str; 4] = [
      f 1 2\nv 2 2 2 0.5 0.5 0.5\nv 1e-3 -.5 +2 # color\r\nv nan 0 0\rf 4 5 -2\n # end",
     "v 0 0 0\nv 1 0 0\nv 1 1 0\n\n\nf 1 2 3\nf -1 -2 -4\nf 1 2 x\n",
     "usemtl a\nv 0 0 0\nv 1 0 0\nv 1 inf 0\nf 1 2 3\nf 1 2 9\n",
-    "v 0 0 0\nv 1 0 0 0\n",
+    "v 0 0 0\nv 1 0 0 w\n",
 ];
 
 #[test]

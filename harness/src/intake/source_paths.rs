@@ -1,0 +1,150 @@
+//! Files that a Rust source names in another spelling: Windows and macOS find them all the same, Linux does not.
+
+use unicode_normalization::UnicodeNormalization as _;
+
+use super::finding::Finding;
+use super::lexer::{Token, TokenKind, tokens};
+
+/// Macros that read a file at compile time.
+const INCLUDES: [&str; 4] = ["include_str", "include_bytes", "include", "include_wgsl"];
+
+/// The warnings on the modules and included files that the source at `path` names and that are there in another spelling
+/// only. `files` are all paths of the submission.
+pub(super) fn misspelt(path: &str, text: &str, files: &[&str]) -> Vec<Finding> {
+    let tokens = tokens(text);
+    let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let mut findings = Vec::new();
+    for (at, token) in tokens.iter().enumerate() {
+        let (wanted, written) = match &tokens[at..] {
+            [mod_word, Token { kind: TokenKind::Word(name), .. }, semicolon, ..]
+                if is_word(mod_word, "mod") && semicolon.kind == TokenKind::Sign(';') =>
+            {
+                // A path of its own is said by an attribute before it.
+                let has_attribute = at > 0 && tokens[at - 1].kind == TokenKind::Sign(']');
+                let candidates = if has_attribute { Vec::new() } else { module_files(path, name) };
+                (candidates, name.clone())
+            }
+            [name, bang, open, Token { kind: TokenKind::Text(file), .. }, ..]
+                if INCLUDES.iter().any(|own| is_word(name, own))
+                    && bang.kind == TokenKind::Sign('!')
+                    && matches!(open.kind, TokenKind::Sign('(' | '[' | '{')) =>
+            {
+                (join(folder, file).into_iter().collect(), file.clone())
+            }
+            _ => continue,
+        };
+        let has_backslash = written.contains('\\');
+        if !has_backslash && wanted.iter().any(|own| files.contains(&own.as_str())) {
+            continue;
+        }
+        let alike = wanted.iter().find_map(|own| files.iter().find(|file| is_alike(own, file)));
+        let Some(found) = alike else {
+            // A module may be left out of some builds.
+            if let ([only], false) = (&wanted[..], is_word(token, "mod")) {
+                let message = format!("'{written}' is not there: {only}");
+                let finding = Finding::warning("source_lacks_file", message).at(path);
+                let finding = finding.on_line(token.line);
+                findings.push(finding.hint("add it; the source does not compile without it"));
+            }
+            continue;
+        };
+        let (why, hint) = if has_backslash {
+            ("a backslash between folders is one on Windows only", "write '/' between folders")
+        } else if found.to_lowercase() == wanted[0].to_lowercase() || written.is_ascii() {
+            ("upper and lower case count", "write both alike")
+        } else {
+            ("accents are written in another way", "use names without accents")
+        };
+        let message = format!("'{written}' is not there, but {found} is: {why}");
+        let finding = Finding::warning("source_spelling", message).at(path).on_line(token.line);
+        findings.push(finding.hint(format!("{hint}; it does not compile on Linux")));
+    }
+    findings
+}
+
+fn is_word(token: &Token, word: &str) -> bool {
+    matches!(&token.kind, TokenKind::Word(own) if own == word)
+}
+
+/// Where the module `name` of the file at `path` may lie.
+fn module_files(path: &str, name: &str) -> Vec<String> {
+    let (folder, file) = path.rsplit_once('/').unwrap_or(("", path));
+    let stem = file.strip_suffix(".rs").unwrap_or(file);
+    let own =
+        if ["lib", "main", "mod"].contains(&stem) { String::new() } else { format!("{stem}/") };
+    [format!("{own}{name}.rs"), format!("{own}{name}/mod.rs")]
+        .iter()
+        .filter_map(|file| join(folder, file))
+        .collect()
+}
+
+/// A path with slashes and without `..`; none where it leads out.
+fn join(folder: &str, file: &str) -> Option<String> {
+    let file = file.replace("\\\\", "/").replace('\\', "/");
+    let mut parts: Vec<&str> = folder.split('/').filter(|part| !part.is_empty()).collect();
+    for part in file.split('/') {
+        match part {
+            "" | "." => {}
+            ".." => _ = parts.pop()?,
+            part => parts.push(part),
+        }
+    }
+    Some(parts.join("/"))
+}
+
+fn is_alike(one: &str, other: &str) -> bool {
+    let plain = |text: &str| text.nfc().flat_map(char::to_lowercase).collect::<String>();
+    plain(one) == plain(other)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::misspelt;
+
+    #[test]
+    fn other_spellings_are_found_and_nothing_else() {
+        let files = ["src/lib.rs", "src/bsdfs/mod.rs", "src/bsdfs/Phong.rs", "src/shaders/a.wgsl"];
+        let said = |path: &str, text: &str| {
+            let found = misspelt(path, text, &files);
+            found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+        };
+        for (path, text, expected) in [
+            (
+                "src/bsdfs/mod.rs",
+                "\npub mod phong;",
+                "src/bsdfs/mod.rs:2: 'phong' is not there, but src/bsdfs/Phong.rs is",
+            ),
+            ("src/bsdfs.rs", "mod phong;", "upper and lower case count"),
+            ("src/lib.rs", "mod Bsdfs;", "but src/bsdfs/mod.rs is: upper"),
+            (
+                "src/bsdfs/Phong.rs",
+                "include_str!(\"../Shaders/a.wgsl\")",
+                "'../Shaders/a.wgsl' is not there",
+            ),
+            ("src/lib.rs", "wgpu::include_wgsl!(\"shaders/A.wgsl\")", "upper and lower case count"),
+        ] {
+            assert!(said(path, text).contains(expected), "{text}: {}", said(path, text));
+        }
+        for backslash in
+            ["include_str!(\"shaders\\\\a.wgsl\")", "include_str!(r\"shaders\\a.wgsl\")"]
+        {
+            let found = said("src/lib.rs", backslash);
+            assert!(found.contains("on Windows only"), "{backslash}: {found}");
+        }
+        let gone = said("src/bsdfs/mod.rs", "include_str!(\"../gone.wgsl\")");
+        assert!(gone.contains("mod.rs:1: '../gone.wgsl' is not there: src/gone.wgsl"), "{gone}");
+        for text in [
+            "mod bsdfs;",
+            "mod gone;",
+            "mod Phong { }",
+            "// mod Bsdfs;",
+            "#[path = \"x.rs\"] mod Bsdfs;",
+            "include_str!(\"shaders/a.wgsl\")",
+            "include_str!(\"shaders/./../shaders/a.wgsl\")",
+            "// include_str!(\"gone.wgsl\")",
+            "include_str!(concat!(\"a\", \"b\"))",
+        ] {
+            assert_eq!(said("src/lib.rs", text), "", "{text}");
+        }
+    }
+}
