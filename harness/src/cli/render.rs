@@ -12,6 +12,7 @@ use basecode::scene::SceneConfig;
 use basecode::{Camera, Image, Vec3};
 
 use super::context::{Context, INTERRUPTED, cores};
+use super::outputs::ensure_not_read;
 use crate::files::library_name;
 use crate::imaging::pictures::clamped;
 use crate::intake::SubmittedConfig;
@@ -164,8 +165,8 @@ fn kind_of(path: &Path) -> &'static str {
 }
 
 /// Loads what a scene consists of, so that its mistakes are told in the user's own names, with what
-/// it holds that no picture shows. The film has the size that is asked for.
-fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
+/// it holds that no picture shows. The film has the size that is asked for. `output` is none of its files.
+fn check_scene(toml: &Path, size: Option<Size>, output: &Path) -> anyhow::Result<SceneConfig> {
     let mut config = SceneConfig::load(toml)?;
     if let Some(Size(width, height)) = size {
         (config.width, config.height) = (width as usize, height as usize);
@@ -175,6 +176,8 @@ fn check_scene(toml: &Path, size: Option<Size>) -> anyhow::Result<SceneConfig> {
     let camera = Camera::new(config.camera, config.width, config.height)
         .with_context(|| toml.display().to_string())?;
     let mesh = config.load_mesh()?;
+    let read = mesh.files.iter().map(|file| file.path.as_path());
+    ensure_not_read(output, read.chain([toml, &config.mesh]))?;
     mesh.remarks.iter().for_each(warn);
     let folder = config.mesh.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
@@ -218,7 +221,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
         Ok(target) if arguments.scene.is_symlink() => target,
         _ => arguments.scene.clone(),
     };
-    let config = check_scene(&scene_file, arguments.size)?;
+    let config = check_scene(&scene_file, arguments.size, &arguments.output)?;
     let plugin = match arguments.plugin.as_str() {
         "reference" => context.reference().context(
             "there is no reference renderer here (a student's kit has none); hint: cargo build --release --workspace",
@@ -237,6 +240,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
             library_name("plugin")
         );
     }
+    ensure_not_read(&arguments.output, [plugin.as_path()])?;
     let (width, height) = (config.width as u32, config.height as u32);
     let scene = SceneRef {
         path: scene_file.canonicalize().context("scene")?,
