@@ -8,6 +8,7 @@ use crate::class::mending::Mend;
 use crate::class::{Policy, Stated, late};
 use crate::files::Scratch;
 use crate::imaging::evidence::Tolerances;
+use crate::plain_errors::plain;
 use crate::rubric::Rules;
 use crate::worker::Budget;
 use crate::{intake, process};
@@ -172,7 +173,7 @@ impl Assignment {
                 path: path.clone(),
                 line: error.line(),
                 // The place stands before the message already.
-                message: error.to_string().split(" at line ").next().unwrap_or_default().to_owned(),
+                message: plain(error.to_string().split(" at line ").next().unwrap_or_default()),
             })?;
         if let Some(message) = assignment.problem() {
             return Err(AssignmentError::Contradiction { path, message });
@@ -236,7 +237,7 @@ impl Assignment {
     /// What is wrong with the due date or the late policy, if anything.
     fn problem_of_dates(&self) -> Option<late::Problem> {
         if let Err(error) = self.due.parse::<jiff::Timestamp>() {
-            let message = format!("due: {error}");
+            let message = format!("due: {}", late::expected_date(&self.due, &error));
             return Some(late::Problem { at: vec!["due".into()], message, other: None });
         }
         self.late.as_ref().and_then(|late| late.problem(&self.due))

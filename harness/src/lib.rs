@@ -59,6 +59,7 @@ pub mod imaging;
 pub mod intake;
 #[doc(hidden)]
 pub mod panics;
+mod plain_errors;
 #[doc(hidden)]
 pub mod plugin;
 #[doc(hidden)]

@@ -181,4 +181,16 @@ fn a_grade_is_defended_mended_and_what_was_held_back_released() {
     let (code, said) = place.run(&["status"]);
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("was of another submission and does not count"), "{said}");
+
+    // What the instructor gives does not hide what was wrong.
+    let set = ["override", "260181512", "1.3", "20", "--reason", "a semicolon", "--by", "Eve"];
+    let (code, said) = place.run(&set);
+    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(place.row()["parts"][2]["points"], 20.0, "{said}");
+    for page in ["out/a2_ada/report.html", "out/instructor/a2_ada/report.html"] {
+        let page = place.read(page);
+        assert!(page.contains("id=\"part-1.3\""), "{page}");
+        let right = page.split(" right: ").nth(1).and_then(|rest| rest.split('<').next());
+        assert!(right.is_some_and(|right| !right.contains("1.3")), "{right:?}");
+    }
 }

@@ -28,6 +28,7 @@ mod labelled;
 mod likeness;
 mod metrics;
 mod original_scene;
+mod outputs;
 mod owners;
 mod program;
 mod race;

@@ -17,7 +17,7 @@ use umbra::store::Store;
 use umbra::worker::Supervisor;
 
 /// What goes into the kit as it is: files, and folders with all below.
-const CONTENT: [&str; 12] = [
+const CONTENT: [&str; 13] = [
     "config.json",
     "Cargo.lock",
     "LICENSE-APACHE",
@@ -25,6 +25,7 @@ const CONTENT: [&str; 12] = [
     "rust-toolchain.toml",
     "docs/evidence.md",
     "docs/shader_contract.md",
+    "docs/students.md",
     "expected",
     "harness/api",
     "harness/basecode",

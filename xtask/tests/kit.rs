@@ -315,3 +315,20 @@ fn verdicts(report: &Value) -> Vec<String> {
     let checks = report["submissions"][0]["checks"].as_array().unwrap().iter();
     checks.map(|check| format!("{} {} {}", check["id"], check["scene"], check["verdict"])).collect()
 }
+
+/// A slip is no success: a script that calls it goes on otherwise.
+#[cfg(unix)]
+#[test]
+fn the_kit_s_run_knows_its_commands() {
+    let run = root().join("xtask/kit/run");
+    let call = |arguments: &[&str]| {
+        let output = Command::new("bash").arg(&run).args(arguments).output().unwrap();
+        (output.status.code(), output.stdout.len(), output.stderr.len())
+    };
+    for arguments in [&[][..], &["help"], &["--help"]] {
+        let (code, out, err) = call(arguments);
+        assert!(code == Some(0) && out > 0 && err == 0, "{arguments:?}");
+    }
+    let (code, out, err) = call(&["wach"]);
+    assert!(code == Some(2) && out == 0 && err > 0);
+}

@@ -141,6 +141,7 @@ mod tests {
             env: BTreeMap::new(),
             closure: PathBuf::new(),
             key: "one".into(),
+            version: String::new(),
         };
         let calls = Cell::new(0);
         let built = |recording: &Recording| {
@@ -187,6 +188,7 @@ mod tests {
             env: BTreeMap::new(),
             closure: PathBuf::new(),
             key: String::new(),
+            version: String::new(),
         };
         let kept = Kept::within(place.path(), Isolation::Full);
         let outcome = BuildOutcome::CompileError { errors: Vec::new() };

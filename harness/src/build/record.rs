@@ -35,6 +35,9 @@ pub struct Recording {
     pub closure: PathBuf,
     /// What the recording depends on, hashed: toolchain, lock file, base code, manifests.
     pub key: String,
+    /// The compiler's name and version; asked anew each time.
+    #[serde(skip)]
+    pub version: String,
 }
 
 /// Why nothing could be recorded. The environment's matter or ours, never a submission's.
@@ -154,7 +157,7 @@ impl Recording {
         let sysroot = run(Command::new("rustc").args(["--print", "sysroot"]), workspace)?;
         let sysroot = PathBuf::from(sysroot.trim());
         let rustc = sysroot.join("bin").join(format!("rustc{}", std::env::consts::EXE_SUFFIX));
-        let key = key(workspace, &rustc)?;
+        let (key, version) = key(workspace, &rustc)?;
         let folder = workspace.join("target/umbra");
         fs::create_dir_all(&folder).map_err(at(&folder))?;
         let lock = folder.join("record.lock");
@@ -162,13 +165,14 @@ impl Recording {
         held.lock().map_err(at(&lock))?;
         let stored = folder.join(format!("record-{key}.json"));
         if let Ok(bytes) = fs::read(&stored)
-            && let Ok(recording) = serde_json::from_slice::<Self>(&bytes)
+            && let Ok(mut recording) = serde_json::from_slice::<Self>(&bytes)
             && recording.key == key
             && recording.closure.is_dir()
         {
             // It was asked for: see `forget_old`. That may fail on a disk that cannot be written, where nothing is forgotten.
             let file = File::options().append(true).open(&stored);
             let _ = file.and_then(|file| file.set_modified(SystemTime::now()));
+            recording.version = version;
             return Ok(recording);
         }
         let host = run(Command::new(&rustc).args(["--print", "host-tuple"]), workspace)?;
@@ -183,7 +187,7 @@ impl Recording {
         let libraries = libraries(&messages, &metadata.closure_of(TEMPLATE));
         let closure = stage(&folder, &key, &libraries)?;
         let Call { args, env } = call;
-        let recording = Self { rustc, sysroot, args, env, closure, key };
+        let recording = Self { rustc, sysroot, args, env, closure, key, version };
         let bytes =
             serde_json::to_vec_pretty(&recording).map_err(io::Error::from).map_err(at(&stored))?;
         fs::write(&stored, bytes).map_err(at(&stored))?;
@@ -309,10 +313,11 @@ fn stage(folder: &Path, key: &str, libraries: &[PathBuf]) -> Result<PathBuf, Rec
     Ok(closure)
 }
 
-/// The hash of everything that the recorded call and its closure depend on.
-fn key(workspace: &Path, rustc: &Path) -> Result<String, RecordError> {
+/// The hash of everything that the recorded call and its closure depend on, and the compiler's own name.
+fn key(workspace: &Path, rustc: &Path) -> Result<(String, String), RecordError> {
     let mut hash = Sha256::new();
-    hash.update(run(Command::new(rustc).arg("-vV"), workspace)?);
+    let version = run(Command::new(rustc).arg("-vV"), workspace)?;
+    hash.update(&version);
     for variable in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
         hash.update(std::env::var(variable).unwrap_or_default());
         hash.update([0]);
@@ -333,7 +338,8 @@ fn key(workspace: &Path, rustc: &Path) -> Result<String, RecordError> {
         hash.update((bytes.len() as u64).to_le_bytes());
         hash.update(bytes);
     }
-    Ok(hex(&hash.finalize()[..8]))
+    let name = version.lines().next().unwrap_or_default().to_owned();
+    Ok((hex(&hash.finalize()[..8]), name))
 }
 
 /// Runs a trusted program in the workspace and answers its standard output.

@@ -16,7 +16,7 @@ use super::layout::{
 };
 use super::slots::{content, slot};
 use crate::harmless::printable;
-use crate::intake::{Limits, TreeSpec, format_of_bytes};
+use crate::intake::{Limits, REPORT_FILES, TreeSpec, format_of_bytes};
 
 /// Depth of the search below the given folder, in folders.
 const MAX_DEPTH: usize = 8;
@@ -349,6 +349,10 @@ impl Search<'_> {
                 if self.output.as_ref().is_some_and(is_output) {
                     continue;
                 }
+                if is_report(&path) {
+                    self.found.skipped.push(format!("{name}/ (a report of Umbra's)"));
+                    continue;
+                }
                 if path.join(".git").exists() {
                     self.found.clones.push(name.clone());
                 }
@@ -418,7 +422,11 @@ impl Search<'_> {
             .output
             .as_ref()
             .is_some_and(|output| folder.canonicalize().is_ok_and(|own| own == *output));
-        if name.starts_with('.') || tree.ignored_by(&name).is_some() || is_output {
+        if name.starts_with('.')
+            || tree.ignored_by(&name).is_some()
+            || is_output
+            || is_report(folder)
+        {
             return Ok(false);
         }
         if is_submission(folder, tree)? {
@@ -544,6 +552,11 @@ fn is_submission(folder: &Path, tree: &TreeSpec) -> anyhow::Result<bool> {
         }
     }
     Ok(has_top || (is_part && !holds_archive))
+}
+
+/// Whether a folder is a report that Umbra wrote.
+fn is_report(folder: &Path) -> bool {
+    REPORT_FILES.iter().all(|name| folder.join(name).is_file())
 }
 
 /// Whether a file is an archive by its name or, when that says nothing, by its content.

@@ -118,6 +118,13 @@ pub struct Problem {
     pub other: Option<Vec<String>>,
 }
 
+/// What to say of a text that is no date; a date that does not exist is told in the words of `error`.
+pub fn expected_date(text: &str, error: &jiff::Error) -> String {
+    let is_local = text.parse::<jiff::civil::DateTime>().is_ok();
+    let said = if is_local { "without an offset from UTC".to_owned() } else { error.to_string() };
+    format!("expected a date such as \"2019-10-06T23:59:00-04:00\", found \"{text}\" ({said})")
+}
+
 impl Policy {
     /// What is wrong with the policy itself, if anything. `due` is the class's due date.
     pub fn problem(&self, due: &str) -> Option<Problem> {
@@ -146,7 +153,11 @@ impl Policy {
         }
         let due: Timestamp = due.parse().ok()?;
         match self.cut_off.as_ref().map(|text| text.parse::<Timestamp>()) {
-            Some(Err(_)) => return wrong(&["cut_off"], no_time("late.cut_off")),
+            Some(Err(error)) => {
+                let text = self.cut_off.as_deref().unwrap_or_default();
+                let message = format!("late.cut_off: {}", expected_date(text, &error));
+                return wrong(&["cut_off"], message);
+            }
             Some(Ok(cut_off)) if cut_off < due => {
                 let message = "late.cut_off lies before the due date; expected it then or later";
                 return wrong(&["cut_off"], message.into());
@@ -174,7 +185,11 @@ impl Policy {
                 });
             }
             match own.as_ref().map(|text| text.parse::<Timestamp>()) {
-                Some(Err(_)) => return wrong(&own_keys("due"), no_time(&format!("{name}.due"))),
+                Some(Err(error)) => {
+                    let text = own.as_deref().unwrap_or_default();
+                    let message = format!("{name}.due: {}", expected_date(text, &error));
+                    return wrong(&own_keys("due"), message);
+                }
                 Some(Ok(own)) if own < due => {
                     let message = format!(
                         "{name}.due lies before the due date of the class; expected it then or later"

@@ -14,6 +14,7 @@ use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::class::{self, Source, Telling};
 use super::context::{Context, INTERRUPTED, cores};
 use super::join::join;
+use super::outputs::{ensure_apart, ensure_not_read, ensure_report_outside};
 use super::render::AdapterChoice;
 use super::selection::Selection;
 use crate::assignment::Assignment;
@@ -137,8 +138,15 @@ impl<'a> Batch<'a> {
                 Collected { sources, ..Collected::default() }
             }
         };
-        for source in collected.sources.iter().filter(|source| source.path.is_dir()) {
-            ensure_beside(self.output, &source.path, &context.assignment.tree)?;
+        for source in &collected.sources {
+            ensure_report_outside(self.output, &source.path, &context.assignment.tree)?;
+        }
+        if let Some(list) = self.list {
+            // The files of a report, and the class list that it keeps of an earlier run.
+            let written = [report::HTML_FILE, report::JSON_FILE, report::CSV_FILE];
+            for name in written {
+                ensure_not_read(&self.output.join(name), [list])?;
+            }
         }
         super::writable(self.output)?;
         if self.mode == Mode::Grade && context.reference().is_none() {
@@ -176,6 +184,9 @@ impl<'a> Batch<'a> {
             Mode::Check => Found::default(),
         };
         let all = class::sources(&collected.sources, self.output, &earlier.names());
+        for source in &all {
+            ensure_apart(self.output, &source.path, &source.slug, &context.assignment.tree)?;
+        }
         if !collected.copies.is_empty() {
             eprintln!(
                 "umbra: {} in more than one download with the same content, graded once: {}",

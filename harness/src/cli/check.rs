@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::batch::{Batch, BatchOutcome, ensure_beside};
 use super::choices::Perturb;
 use super::context::Context;
+use super::outputs::{ensure_apart, words_of};
 use super::render::AdapterChoice;
 use super::selection::Selection;
 use super::{class, terminal, terminal_pictures};
@@ -86,7 +87,12 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let mut assignment = Context::assignment(root)?;
     selection.restrict(&mut assignment)?;
     ensure!(folder.exists(), "{} does not exist", folder.display());
-    if folder.is_file() {
+    if !folder.is_dir() {
+        ensure!(
+            folder.is_file(),
+            "{} is a pipe or device, expected your working folder or what umbra pack made of it",
+            folder.display()
+        );
         let bytes = read_archive(folder, &assignment.limits.archive)?.unwrap_or_default();
         ensure!(
             format_of_bytes(&bytes).is_some(),
@@ -103,6 +109,8 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let source = source.or_else(named).unwrap_or_else(|| folder.clone());
     let given = [Source::given(&source)];
     let slug = class::sources(&given, &arguments.output, &HashMap::new()).remove(0).slug;
+    ensure_apart(&arguments.output, &source, &slug, &assignment.tree)?;
+    super::writable(&arguments.output)?;
     let last_file = arguments.output.join(&slug).join(LAST);
     let last = fs::read(&last_file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
     let mut last: LastCheck = last.unwrap_or_default();
@@ -131,8 +139,9 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let page = folder_of_page.join(report::HTML_FILE);
     let program = std::env::args().next().unwrap_or_else(|| "umbra".to_owned());
     let closing = Closing {
-        folder: &folder.display().to_string(),
-        umbra: &program,
+        folder: &words_of(&folder.display().to_string()),
+        umbra: &words_of(&program),
+        is_archive: folder.is_file(),
         page: &page.display().to_string(),
         files: &task_files(root, &report.rules.parts),
         last: &last.parts,

@@ -16,6 +16,8 @@ use basecode::exr_io::{ExrRows, REC_709};
 use basecode::{Image, Vec3};
 use serde::Serialize;
 
+use super::outputs::ensure_not_read;
+use super::view;
 use crate::harmless::{harmless, harmless_json};
 use crate::imaging::difference::{Count, Differences, Different, Odd};
 use crate::imaging::metrics::{Errors, Metrics};
@@ -183,6 +185,15 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
     let [Some(actual), Some(expected)] = images else {
         bail!("expected two images");
     };
+    let read = [actual.as_path(), expected];
+    if let Some(folder) = &arguments.html {
+        ensure_not_read(&folder.join(view::PAGE), read)?;
+    }
+    if let Some(folder) = &arguments.pictures {
+        for name in pictures::NAMES {
+            ensure_not_read(&folder.join(format!("{name}.png")), read)?;
+        }
+    }
     let [actual, expected] = open([actual, expected], arguments.layer.as_deref())?;
     let mut notes = Vec::new();
     notes.extend(different_primaries(&actual.file, &expected.file));
@@ -230,7 +241,9 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
         comparison.pictures = pictures::write(folder, images)?;
     }
     if let (Some(folder), Some([actual, expected])) = (&arguments.html, images) {
-        let page = super::view::compared_page(folder, [&actual, &expected])?;
+        let names = view::names_of(&read);
+        let names = [format!("actual {}", names[0]), format!("expected {}", names[1])];
+        let page = view::compared_page(folder, names, [&actual, &expected])?;
         comparison.page = Some(page.display().to_string());
     }
     if arguments.json {

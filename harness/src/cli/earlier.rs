@@ -9,6 +9,7 @@ use serde::Deserialize;
 use super::assemble::Found;
 use crate::class::{Class, Standing};
 use crate::grading::StageCost;
+use crate::intake::Finding;
 use crate::report;
 use crate::rubric::{PartGrade, Rules};
 
@@ -46,6 +47,9 @@ pub struct Row {
     /// What the compiler of the code and that of the shaders said.
     #[serde(default)]
     pub diagnostics: String,
+    /// What intake found.
+    #[serde(default)]
+    pub findings: Vec<Finding>,
 }
 
 impl Row {

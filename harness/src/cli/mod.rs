@@ -23,6 +23,7 @@ mod likeness;
 mod lying;
 mod mend;
 mod merge;
+mod outputs;
 mod regrade;
 mod release;
 mod render;
@@ -240,19 +241,24 @@ fn told_once(error: &anyhow::Error) -> String {
 
 /// Whether an error says that the machine lacks something, as far as can be told from it.
 fn machine_lacks(error: &anyhow::Error) -> bool {
-    use std::io::{Error, ErrorKind};
+    use std::io::Error;
     error.downcast_ref::<MachineLacks>().is_some()
         || error.chain().filter_map(|cause| cause.downcast_ref::<Error>()).any(|cause| {
             let too_many_files = [Some(23), Some(24)]; // ENFILE, EMFILE
-            too_many_files.contains(&cause.raw_os_error())
-                || matches!(
-                    cause.kind(),
-                    ErrorKind::StorageFull
-                        | ErrorKind::QuotaExceeded
-                        | ErrorKind::OutOfMemory
-                        | ErrorKind::ReadOnlyFilesystem
-                )
+            too_many_files.contains(&cause.raw_os_error()) || machine_lacks_kind(cause.kind())
         })
+}
+
+/// Likewise of an error of the system by its kind.
+fn machine_lacks_kind(kind: std::io::ErrorKind) -> bool {
+    use std::io::ErrorKind;
+    matches!(
+        kind,
+        ErrorKind::StorageFull
+            | ErrorKind::QuotaExceeded
+            | ErrorKind::OutOfMemory
+            | ErrorKind::ReadOnlyFilesystem
+    )
 }
 
 /// Makes sure that reports can be written to `output` and temporary files made, before any work.
@@ -283,7 +289,7 @@ fn has_temporary_folder() -> anyhow::Result<()> {
             MachineLacks(format!("{named} is {}, which is {what}", folder.display())).into()
         );
     }
-    takes_files(&folder)
+    takes_files(&folder).map_err(|error| MachineLacks(error.to_string()).into())
 }
 
 /// Makes a folder where there is none, and a file in it that goes away again.
@@ -292,7 +298,14 @@ fn takes_files(folder: &Path) -> anyhow::Result<()> {
         .and_then(|()| tempfile::Builder::new().prefix(".umbra-").tempfile_in(folder))
         .map_err(|error| {
             // The name of the file that could not be made helps nobody.
-            MachineLacks(format!("cannot write to {}: {}", folder.display(), error.kind()))
+            let words = error.to_string();
+            let words = words.split(" at path ").next().unwrap_or_default();
+            let said = format!("cannot write to {}: {words}", folder.display());
+            if machine_lacks_kind(error.kind()) {
+                MachineLacks(said).into()
+            } else {
+                anyhow::Error::msg(said)
+            }
         })?;
     Ok(())
 }

@@ -12,7 +12,8 @@ use basecode::scene::SceneConfig;
 use basecode::{Camera, Image, Vec3};
 
 use super::context::{Context, INTERRUPTED, cores};
-use crate::files::{is_same_file, library_name};
+use super::outputs::ensure_not_read;
+use crate::files::library_name;
 use crate::imaging::pictures::clamped;
 use crate::intake::SubmittedConfig;
 use crate::process::Limits;
@@ -164,7 +165,7 @@ fn kind_of(path: &Path) -> &'static str {
 }
 
 /// Loads what a scene consists of, so that its mistakes are told in the user's own names, with what
-/// it holds that no picture shows. The film has the size that is asked for.
+/// it holds that no picture shows. The film has the size that is asked for. `output` is none of its files.
 fn check_scene(toml: &Path, size: Option<Size>, output: &Path) -> anyhow::Result<SceneConfig> {
     let mut config = SceneConfig::load(toml)?;
     if let Some(Size(width, height)) = size {
@@ -175,10 +176,8 @@ fn check_scene(toml: &Path, size: Option<Size>, output: &Path) -> anyhow::Result
     let camera = Camera::new(config.camera, config.width, config.height)
         .with_context(|| toml.display().to_string())?;
     let mesh = config.load_mesh()?;
-    let own = mesh.files.iter().map(|file| file.path.as_path());
-    if own.chain([toml, config.mesh.as_path()]).any(|file| is_same_file(file, output)) {
-        bail!("{}: this is a file of the scene; hint: name another one", output.display());
-    }
+    let read = mesh.files.iter().map(|file| file.path.as_path());
+    ensure_not_read(output, read.chain([toml, &config.mesh]))?;
     mesh.remarks.iter().for_each(warn);
     let folder = config.mesh.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
@@ -241,6 +240,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
             library_name("plugin")
         );
     }
+    ensure_not_read(&arguments.output, [plugin.as_path()])?;
     let (width, height) = (config.width as u32, config.height as u32);
     let scene = SceneRef {
         path: scene_file.canonicalize().context("scene")?,

@@ -9,12 +9,13 @@ use anyhow::{Context as _, bail, ensure};
 use unicode_width::UnicodeWidthStr as _;
 
 use super::context::{Context, INTERRUPTED};
+use super::outputs::{ensure_outside, place_inside};
 use crate::class::collect::Ambiguous;
 use crate::class::{Collected, Kind, Wanted, collect};
 use crate::columns::count;
 use crate::files::is_within;
 use crate::harmless::{harmless, harmless_json};
-use crate::intake::{self, CONFIG_FILE, IntakeError, Severity, Submission, Validation};
+use crate::intake::{self, CONFIG_FILE, IntakeError, Severity, Submission, TreeSpec, Validation};
 
 /// Files that `--fix` leaves out and names.
 const LEFT_OUT: usize = 40;
@@ -41,7 +42,8 @@ pub struct ValidateArguments {
 pub struct PackArguments {
     /// The working folder: config.json, src/, offline/, realtime/
     folder: PathBuf,
-    /// Where to write the archive: a file or a folder [default: the current folder]
+    /// Where to write the archive: a file, or a folder other than the working folder [default: the current folder, or
+    /// the one above where that is the working folder]
     #[arg(long, short, value_name = "OUT")]
     output: Option<PathBuf>,
 }
@@ -101,18 +103,10 @@ fn ensure_new_archive(out: &Path, submissions: &[PathBuf]) -> anyhow::Result<()>
     ensure!(is_zip, "{shown}: --fix writes a zip, expected a name that ends in .zip");
     let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
-    let whole = folder.canonicalize().with_context(|| {
+    folder.canonicalize().with_context(|| {
         format!("cannot write {shown}: there is no folder {}", folder.display())
     })?;
-    for submission in submissions.iter().filter(|path| path.is_dir()) {
-        let inside = submission.canonicalize().is_ok_and(|own| whole.starts_with(own));
-        ensure!(
-            !inside,
-            "{shown} lies inside {}, which is to be read; hint: write it beside that folder",
-            submission.display()
-        );
-    }
-    Ok(())
+    submissions.iter().try_for_each(|submission| ensure_outside(out, submission))
 }
 
 /// Of one submission, its tree.
@@ -237,23 +231,78 @@ fn look(
     }
 }
 
+/// Depth of the search for a working folder, in folders.
+const MAX_DEPTH: usize = 3;
+/// Number of folders that are searched for one.
+const MAX_FOLDERS: usize = 2000;
+
+/// The working folder that is meant: the one that is named, or the only one below it.
+fn working_folder(named: &Path, tree: &TreeSpec) -> anyhow::Result<PathBuf> {
+    let has_source = |folder: &Path| tree.open_folders.iter().any(|own| folder.join(own).is_dir());
+    if has_source(named) {
+        return Ok(named.to_owned());
+    }
+    let (mut found, mut seen) = (Vec::new(), 0);
+    let mut open = vec![(named.to_owned(), 0)];
+    while let Some((folder, depth)) = open.pop() {
+        seen += 1;
+        for entry in folder.read_dir().into_iter().flatten().flatten() {
+            let path = entry.path();
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let is_wanted = !name.starts_with('.') && tree.ignored_by(&name).is_none();
+            if !is_wanted || !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                continue;
+            }
+            if path.join(CONFIG_FILE).is_file() && has_source(&path) {
+                found.push(path);
+            } else if depth + 1 < MAX_DEPTH && seen + open.len() < MAX_FOLDERS {
+                open.push((path, depth + 1));
+            }
+        }
+    }
+    found.sort();
+    let has_part = named.join(CONFIG_FILE).is_file();
+    match &found[..] {
+        [only] => Ok(only.clone()),
+        // What is missing of it is told then.
+        [] if has_part => Ok(named.to_owned()),
+        [] => bail!("it holds neither {CONFIG_FILE} nor src/, expected your working folder"),
+        [first, second, ..] => {
+            let name = |path: &Path| path.strip_prefix(named).unwrap_or(path).display().to_string();
+            bail!(
+                "it holds {} working folders, {} and {} among them; hint: name one of them",
+                found.len(),
+                name(first),
+                name(second)
+            )
+        }
+    }
+}
+
 /// Writes a conforming archive; exit 1 when the folder lacks something.
 pub fn pack(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
     let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
-    let out = arguments.output.as_deref().unwrap_or(Path::new("."));
     let folder = arguments.folder.display();
     ensure!(arguments.folder.exists(), "{folder} does not exist");
     ensure!(arguments.folder.is_dir(), "{folder} is a file, expected your working folder");
     // A link of one's own may be followed.
-    let source = arguments.folder.canonicalize().with_context(|| folder.to_string())?;
-    if let Some(out) = &arguments.output {
-        ensure!(
-            !is_within(out, &source),
-            "{} lies inside {folder}, which is to be packed; hint: write it beside that folder",
-            out.display()
-        );
+    let named = arguments.folder.canonicalize().with_context(|| folder.to_string())?;
+    let source = working_folder(&named, tree).with_context(|| folder.to_string())?;
+    if let Ok(inside) = source.strip_prefix(&named)
+        && !inside.as_os_str().is_empty()
+    {
+        eprintln!("umbra: packing {}", arguments.folder.join(inside).display());
     }
+    let beside = || named.parent().unwrap_or(Path::new(".")).to_owned();
+    let out = match &arguments.output {
+        Some(out) => out.clone(),
+        // Whoever stands in the working folder has the archive beside it.
+        None if place_inside(Path::new("."), &named).is_some() => beside(),
+        None => PathBuf::from("."),
+    };
+    ensure_outside(&out, &arguments.folder)?;
+    let out = &out;
     match intake::pack(&source, out, tree, limits) {
         Ok(packed) => {
             // As whoever grades it will see it.

@@ -6,12 +6,13 @@ use anyhow::Context;
 use basecode::Image;
 use basecode::exr_io::{Band, ExrRows};
 
+use super::outputs::ensure_not_read;
 use crate::files::{private_folder, write_whole};
 use crate::report::html_viewer;
 use crate::viewer::{ImageFile, Layer, ViewedCase, write_channels, write_image};
 
 /// The page's file.
-const PAGE: &str = "view.html";
+pub(super) const PAGE: &str = "view.html";
 
 /// Options of `umbra view`.
 #[derive(clap::Args)]
@@ -34,15 +35,16 @@ struct Shown {
 
 /// Writes the page, opens it where there is a browser, and prints its path; exit 1 when a file could not be read.
 pub fn run(arguments: &ViewArguments) -> anyhow::Result<u8> {
-    let names: Vec<&Path> = arguments.images.iter().map(PathBuf::as_path).collect();
+    let paths: Vec<&Path> = arguments.images.iter().map(PathBuf::as_path).collect();
     let folder = match &arguments.output {
         Some(folder) => folder.clone(),
         None => private_folder("umbra-view-")?.keep(),
     };
+    ensure_not_read(&folder.join(PAGE), paths.iter().copied())?;
     let mut shown = Vec::new();
     let mut failed = None;
-    for path in &arguments.images {
-        match unpack(path, &short(&path.display().to_string(), &names), &folder) {
+    for (path, name) in paths.iter().zip(names_of(&paths)) {
+        match unpack(path, &name, &folder) {
             Ok(images) => shown.extend(images),
             Err(error) => {
                 if let Some(earlier) = failed.replace(error) {
@@ -56,7 +58,11 @@ pub fn run(arguments: &ViewArguments) -> anyhow::Result<u8> {
         Some(ref error) => eprintln!("umbra: {}", super::told_once(error)),
         None => {}
     }
-    let page = write_page(&folder, shown, None)?;
+    let mut title = names_of(&paths[..paths.len().min(3)]).join(", ");
+    if paths.len() > 3 {
+        title.push_str(&format!(" and {} more", paths.len() - 3));
+    }
+    let page = write_page(&folder, &title, shown, None)?;
     println!("{}", page.display());
     open_page(&page);
     Ok(if failed.is_some() { super::EXIT_NOT_IN_ORDER } else { super::EXIT_OK })
@@ -110,16 +116,16 @@ fn cannot(folder: &Path) -> impl Fn() -> String {
     move || format!("cannot write to {}", folder.display())
 }
 
-/// A name without the folder that all files share.
-fn short(name: &str, files: &[&Path]) -> String {
+/// The names of files, without the folder that all share.
+pub(super) fn names_of(files: &[&Path]) -> Vec<String> {
     let parents: Vec<_> = files.iter().map(|file| file.parent()).collect();
-    match parents.first() {
-        Some(Some(folder)) if parents.iter().all(|parent| *parent == Some(folder)) => {
-            let rest = Path::new(name).strip_prefix(folder);
-            rest.map_or_else(|_| name.to_owned(), |rest| rest.display().to_string())
-        }
-        _ => name.to_owned(),
-    }
+    let shared = parents.first().copied().flatten();
+    let shared = shared.filter(|folder| parents.iter().all(|parent| *parent == Some(folder)));
+    let name = |file: &&Path| {
+        let rest = shared.and_then(|folder| file.strip_prefix(folder).ok());
+        rest.unwrap_or(file).display().to_string()
+    };
+    files.iter().map(name).collect()
 }
 
 /// Writes the viewer's page of an image beside the expected one, and its data, into a folder; answers the page's
@@ -127,23 +133,27 @@ fn short(name: &str, files: &[&Path]) -> String {
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn compared_page(folder: &Path, images: [&Image; 2]) -> anyhow::Result<PathBuf> {
-    let names = ["actual", "expected"].into_iter();
-    let shown = names.zip(images).map(|(name, image)| {
+pub fn compared_page(
+    folder: &Path,
+    names: [String; 2],
+    images: [&Image; 2],
+) -> anyhow::Result<PathBuf> {
+    let title = format!("{} and {}", names[0], names[1]);
+    let shown = names.into_iter().zip(images).map(|(name, image)| {
         let file = write_image(folder, image).with_context(cannot(folder))?;
-        Ok(Shown { name: name.to_owned(), channel: String::new(), file })
+        Ok(Shown { name, channel: String::new(), file })
     });
-    write_page(folder, shown.collect::<anyhow::Result<_>>()?, Some(1))
+    write_page(folder, &title, shown.collect::<anyhow::Result<_>>()?, Some(1))
 }
 
 /// Writes the page of images whose data lie in a folder. Images of one size make a case, those of each channel their
 /// own, with the first of them less each other as differences.
 fn write_page(
     folder: &Path,
+    title: &str,
     mut images: Vec<Shown>,
     reference: Option<usize>,
 ) -> anyhow::Result<PathBuf> {
-    let title = images.first().map_or_else(|| "Images".to_owned(), |image| image.name.clone());
     // Colors come first.
     images.sort_by_key(|image| !image.channel.is_empty());
     let mut cases: Vec<(String, Vec<Shown>)> = Vec::new();
@@ -171,7 +181,7 @@ fn write_page(
     };
     let cases: Vec<ViewedCase> = cases.into_iter().map(case).collect();
     let page = folder.join(PAGE);
-    let html = html_viewer(&title, None, &cases);
+    let html = html_viewer(title, None, &cases);
     write_whole(&page, html.as_bytes()).with_context(cannot(folder))?;
     Ok(std::path::absolute(&page)?)
 }

@@ -94,6 +94,19 @@ pub struct Measure {
     pub passed: bool,
 }
 
+/// The measure of how many rays the shadows switch changes.
+pub(super) const SWITCHED: &str = "rays that the shadows switch changes (fraction)";
+/// How the name begins of the measure that says what a known mistake counts.
+pub(super) const PRICED: &str = "difference from what is right";
+
+impl Measure {
+    /// Whether it only informs: no rule judges it, so neither its bound nor its verdict says anything.
+    pub fn only_informs(&self) -> bool {
+        let told = [PRICED, SWITCHED];
+        self.rule.is_none() && told.iter().any(|name| self.name.starts_with(name))
+    }
+}
+
 /// A picture in a file beside the report.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Picture {

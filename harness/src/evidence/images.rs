@@ -237,7 +237,13 @@ fn describe(
 ) -> Check {
     let measures = found.checks.iter().map(|check| Measure {
         rule: format!("image.{}", check.id.split(':').next().unwrap_or_default()).parse().ok(),
-        name: format!("{}: {}", check.id, check.detail),
+        name: match check.id.split_once(": ") {
+            // The detail begins with the region that the check is about.
+            Some((kind, region)) if check.detail.starts_with(region) => {
+                format!("{kind}: {}", check.detail)
+            }
+            _ => format!("{}: {}", check.id, check.detail),
+        },
         value: check.value,
         bound: check.bound,
         passed: check.passed,

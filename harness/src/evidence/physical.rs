@@ -113,7 +113,7 @@ impl Probes {
         let possible = measures.iter().all(|measure| measure.passed);
         let verdict = if possible { Verdict::Pass } else { Verdict::Fail };
         let summary = format!(
-            "exchanging wi and wo changes f by {:.2} % at most; at most {:.1} % of the light is reflected",
+            "swapping wi and wo changes f by up to {:.2} %; up to {:.1} % of the light is reflected",
             100.0 * asymmetry,
             100.0 * albedo
         );

@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 
+use super::check::PRICED;
 use super::shading::Shading;
 use super::{Check, CheckId, Measure, Verdict};
 use crate::imaging::correlation::Moments;
@@ -116,7 +117,8 @@ impl Price {
     pub fn measure(&self) -> Option<Measure> {
         let mistake = self.mistake?;
         let name = format!(
-            "difference from what is right; counts {:.3} as one mistake: {mistake}",
+            "{PRICED}; it counts {:.3}, no more than this known mistake with the same effect: \
+             {mistake}",
             self.error
         );
         Some(Measure { passed: true, ..Measure::at_most(None, name, self.raw, 1.0) })

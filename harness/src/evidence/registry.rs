@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 
 pub use info::CheckInfo;
 
-/// From here on, of 1,000,000, two names are alike enough to be taken for a slip.
-const ALIKE: u64 = 800_000;
+/// Names less alike than this (Jaro-Winkler, 1 for the same) are no slip of each other.
+const ALIKE: f64 = 0.85;
 
 /// Defines an enum with a name in text for each variant: `ALL`, `name`, `FromStr`, `Display`, serde.
 macro_rules! named {
@@ -45,13 +45,12 @@ macro_rules! named {
             fn from_str(text: &str) -> Result<Self, String> {
                 let found = Self::ALL.iter().copied().find(|one| one.name() == text);
                 found.ok_or_else(|| {
-                    let alike = |one: &&Self| (1e6 * strsim::jaro_winkler(one.name(), text)) as u64;
-                    let nearest = Self::ALL.iter().filter(|one| alike(one) >= ALIKE).max_by_key(alike);
-                    match nearest {
-                        Some(one) => {
-                            format!("there is no {} \"{text}\"; did you mean \"{}\"?", $what, one.name())
-                        }
-                        None => format!("there is no {} \"{text}\"", $what),
+                    let alike = |one: &Self| strsim::jaro_winkler(one.name(), text);
+                    let nearest = Self::ALL.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
+                    let missing = format!("there is no {} \"{text}\"", $what);
+                    match nearest.filter(|one| alike(one) >= ALIKE) {
+                        Some(nearest) => format!("{missing}; did you mean \"{nearest}\"?"),
+                        None => missing,
                     }
                 })
             }

@@ -161,7 +161,7 @@ impl Shadows<'_> {
             }
             Some(index) => {
                 let summary = format!(
-                    "{} of {} lit pixels are not lit and {} of {} shadowed pixels are not dark; first at ({}, {})",
+                    "{} of {} pixels that see the light get none, {} of {} in shadow get light; first at ({}, {})",
                     lit[2],
                     lit[1],
                     dark[2],

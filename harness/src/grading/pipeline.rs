@@ -351,7 +351,7 @@ impl<'a> Grading<'a> {
                 Ok(adapter) => format!("{:?} {}", adapter.kind, adapter.name).trim().to_owned(),
                 Err(why) => format!("none: {why}"),
             },
-            compiler: self.recording.key.clone(),
+            compiler: format!("{}, call {}", self.recording.version, self.recording.key),
         }
     }
 }

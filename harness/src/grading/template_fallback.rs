@@ -147,7 +147,7 @@ impl Built {
                 let verdicts: Vec<Verdict> = images.map(|check| check.verdict).collect();
                 if verdicts.contains(&Verdict::Pass) && !verdicts.contains(&Verdict::Fail) {
                     let message = format!(
-                        "it does not build: part {} earns nothing by code, though the submitted images of it are right",
+                        "does not build, so part {} earns nothing by code, although its submitted images are right",
                         part.id
                     );
                     findings.push(Finding::warning("replaced_image_right", message).at(seen(file)));

@@ -49,7 +49,7 @@ pub use source_rules::{INCLUDE_INSIDE, scan_source, scan_text};
 pub use submission::{Format, IntakeError, Refusal, Submission, SubmittedFile};
 pub use submitted_config::{Field, ListedRender, SubmittedConfig};
 pub(crate) use tree::CONFIG_FILE;
-pub use tree::{TreeFile, TreeSpec};
+pub use tree::{REPORT_FILES, TreeFile, TreeSpec};
 pub use tree_match::{Mark, TreeLine};
 pub(crate) use unpack::{copy_unpacked, name_of, read_archive};
 pub use unpack::{format_of_bytes, unpack, unpack_bytes};

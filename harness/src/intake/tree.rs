@@ -14,6 +14,10 @@ pub struct TreeSpec {
     pub files: Vec<TreeFile>,
     /// Folders that may hold any further files; required files inside them are listed in `files`.
     pub open_folders: Vec<String>,
+    /// Files and folders at the root of the template that `pack` leaves out: nobody needs to take them out of a working
+    /// folder.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub kept_back: Vec<String>,
     /// What is ignored wherever it lies: one or more whole components (`target/release`), where
     /// a `*` at the end stands for anything.
     pub ignored: Vec<String>,
@@ -31,6 +35,9 @@ pub struct TreeFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aliases: Vec<String>,
 }
+
+/// The files at the top of a report that Umbra writes, by which it is known again.
+pub const REPORT_FILES: [&str; 3] = ["report.html", "report.json", "grades.csv"];
 
 /// The configuration file of a submission.
 pub(crate) const CONFIG_FILE: &str = "config.json";
@@ -62,6 +69,9 @@ impl Default for TreeSpec {
                 bonus("cbox"),
             ],
             open_folders: vec!["src".to_owned()],
+            kept_back: ["Cargo.toml", "Cargo.lock", "README.md", "tests"]
+                .map(str::to_owned)
+                .to_vec(),
             ignored: [
                 "__MACOSX",
                 ".DS_Store",
@@ -75,6 +85,7 @@ impl Default for TreeSpec {
                 "target/release",
                 "target/CACHEDIR.TAG",
                 "target/.rustc_info.json",
+                "umbra-report",
             ]
             .map(str::to_owned)
             .to_vec(),
@@ -95,6 +106,12 @@ impl TreeSpec {
                 })
             })
         })
+    }
+
+    /// Whether the template has `path` beside what is submitted.
+    pub(crate) fn is_kept_back(&self, path: &str) -> bool {
+        let top = path.split('/').next().unwrap_or_default();
+        self.kept_back.iter().any(|own| own == top)
     }
 
     /// The expected file that lies at `path`, by its own path or an alias.
@@ -167,12 +184,18 @@ mod tests {
             ".git/HEAD",
             "x/target/release/deps/a.o",
             "src/Icon\r",
+            "umbra-report/work/report.html",
         ] {
             assert!(tree.ignored_by(junk).is_some(), "{junk}");
         }
-        for wanted in
-            ["src/target/mod.rs", "src/target.rs", "src/_x.rs", "x.DS_Store", "src/.github"]
-        {
+        for wanted in [
+            "src/target/mod.rs",
+            "src/target.rs",
+            "src/_x.rs",
+            "x.DS_Store",
+            "src/.github",
+            "src/umbra-report.rs",
+        ] {
             assert_eq!(tree.ignored_by(wanted), None, "{wanted}");
         }
     }

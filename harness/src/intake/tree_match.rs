@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::finding::{Finding, Severity};
-use super::submission::{IntakeError, Submission, SubmittedFile};
-use super::tree::{CONFIG_FILE, TreeFile, TreeSpec};
+use super::submission::{Format, IntakeError, Submission, SubmittedFile};
+use super::tree::{CONFIG_FILE, REPORT_FILES, TreeFile, TreeSpec};
 use super::tree_config::find_config;
 use super::tree_lost::{Lost, MovedSource, find_lost, is_source, source_place};
 use crate::columns::count;
@@ -136,8 +136,19 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
         }
         taken.extend(further);
     }
+    let reports = reports(submission, tree);
+    for report in &reports {
+        matched.report(report);
+    }
+    let is_reported = |path: &str| {
+        reports.iter().any(|own| path.strip_prefix(own).is_some_and(|rest| rest.starts_with('/')))
+    };
     for path in files.iter().map(|file| file.path.as_str()).filter(|path| !taken.contains(path)) {
         match places.get(path) {
+            None if is_reported(path) => {}
+            None if submission.format == Format::Folder && tree.is_kept_back(path) => {
+                matched.kept_back(path);
+            }
             Some(place) => matched.wrong_place(place, path),
             None if unclear.contains(path) => matched.lines.push(TreeLine {
                 expected: None,
@@ -154,6 +165,17 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
             .hint("leave it out if it is not yours")
     }));
     Ok(matched)
+}
+
+/// The folders that are reports of Umbra's, beside what is submitted.
+fn reports<'a>(submission: &'a Submission, tree: &TreeSpec) -> Vec<&'a str> {
+    let [first, others @ ..] = REPORT_FILES;
+    let folder = |file: &'a SubmittedFile| file.path.strip_suffix(first)?.strip_suffix('/');
+    let is_one = |folder: &&str| {
+        !tree.is_top_folder(folder.split('/').next().unwrap_or_default())
+            && others.iter().all(|name| submission.file(&format!("{folder}/{name}")).is_some())
+    };
+    submission.files.iter().filter_map(folder).filter(is_one).collect()
 }
 
 /// Where an expected file lies: by its own name, or by names that are as good, where their contents differ. The
@@ -214,6 +236,31 @@ impl Matched {
             expected: Some(expected.to_owned()),
             found: Some(found.to_owned()),
             mark: Mark::WrongPlace,
+        });
+    }
+
+    /// Of a working folder, what the template has beside the submission.
+    fn kept_back(&mut self, found: &str) {
+        let advice = "of the template; umbra pack leaves it out";
+        self.findings.push(Finding::note("tree_kept_back", advice).at(found));
+        self.lines.push(TreeLine {
+            expected: None,
+            found: Some(found.to_owned()),
+            mark: Mark::Unexpected,
+            advice: advice.to_owned(),
+        });
+    }
+
+    /// A report of Umbra's, said once for all its files.
+    fn report(&mut self, folder: &str) {
+        let (message, hint) = ("a report of Umbra's, no part of the tree", "leave it out");
+        let found = format!("{folder}/");
+        self.findings.push(Finding::warning("tree_report", message).at(&*found).hint(hint));
+        self.lines.push(TreeLine {
+            expected: None,
+            found: Some(found),
+            mark: Mark::Unexpected,
+            advice: hint.to_owned(),
         });
     }
 

@@ -76,7 +76,10 @@ pub fn validate_submission(
             let bytes = fs::read(&path).map_err(|e| IntakeError::io("read", &path, e))?;
             let (parsed, said, is_whole) = SubmittedConfig::parse(&bytes);
             let (present, missing) = places(&lines);
-            let more = check_config(&parsed, is_whole, &present, &missing, tree);
+            let mut more = check_config(&parsed, is_whole, &present, &missing, tree);
+            if let Some(stop) = said.first().filter(|_| !is_whole && parsed.student_id.is_none()) {
+                more.iter_mut().for_each(|finding| blame(finding, stop));
+            }
             let text = text_of(&bytes);
             let more = more.into_iter().map(|finding| show(finding, &text));
             findings.extend(said.into_iter().chain(more).map(|finding| finding.at(name)));
@@ -97,6 +100,17 @@ pub fn validate_submission(
         config,
         findings,
     })
+}
+
+/// Of a number that is not found because reading stopped before it, says where and why that was.
+fn blame(finding: &mut Finding, stop: &Finding) {
+    if finding.severity != Severity::Error {
+        return;
+    }
+    finding.message = format!("{}; so no \"studentID\" is found", stop.message);
+    finding.line = stop.line;
+    finding.excerpt.clone_from(&stop.excerpt);
+    finding.hint.clone_from(&stop.hint);
 }
 
 /// The warning on a source file of the tree that holds no code, but comments at most.

@@ -278,6 +278,14 @@ fn slip(value: &str) -> &'static str {
     if value.contains(['\u{201c}', '\u{201d}', '\u{201e}', '\u{2018}', '\u{2019}']) {
         return "; hint: write straight quotes: \"";
     }
+    if !value.contains(['"', '\'']) {
+        if value.contains("//") {
+            return "; hint: a comment begins with #";
+        }
+        if value.trim_end().ends_with(';') {
+            return "; hint: a line ends without ;";
+        }
+    }
     match value.split_once(',') {
         Some((whole, rest))
             if !value.contains(['[', '"', '\''])
@@ -406,6 +414,8 @@ mod tests {
                 "b.toml:4: width: out of range: integer",
             ),
             (&format!("{base}[camera]\nfov = 50,0\n"), "write a point in a number"),
+            (&format!("{base}[camera]\nfov = 50.0;\n"), "a line ends without ;"),
+            (&format!("{base}[camera]\nfov = 50.0 // deg\n"), "a comment begins with #"),
             ("[input]\nobjfile = \u{201c}b.obj\u{201d}\n", "write straight quotes"),
             (&format!("{base}[camera]\nfov = 180\n"), "b.toml:4: camera.fov is 180"),
             (&format!("{base}[camera]\nfov = nan\n"), "b.toml:4: camera.fov is NaN"),

@@ -5,6 +5,7 @@
 //! - A pixel where only one image has NaN or infinity, or both have infinity of opposite signs, is
 //!   over every threshold. idiff lets it pass.
 //! - Channels are compared by name. idiff compares them by place, whatever they are called.
+//! - A difference image is not written over an image that is compared.
 //! - Images of two sizes end with 3, as its documentation says, and images at two places fail. idiff
 //!   compares them with black.
 
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use basecode::exr_io::{ExrRows, write_exr_channels};
 
-use crate::files::is_same_file;
+use crate::cli::outputs::ensure_not_read;
 use crate::harmless::harmless;
 use crate::imaging::rows::{Channels, Row, visit_rows};
 use crate::imaging::thresholds::{Limits, Tally};
@@ -164,6 +165,9 @@ fn compare(options: &Options) -> anyhow::Result<u8> {
         return Ok(MATCH);
     }
     let [a, b] = [&options.images[0], &options.images[1]];
+    if let Some(output) = &options.output {
+        ensure_not_read(output, [a.as_path(), b])?;
+    }
     if !options.quiet {
         println!("Comparing \"{}\" and \"{}\"", a.display(), b.display());
     }

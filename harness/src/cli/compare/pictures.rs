@@ -12,6 +12,9 @@ use crate::imaging::reference::RegionMask;
 /// The relative error that the difference picture shows in full color.
 const FULL_SCALE: f32 = 0.1;
 
+/// What the pictures are called.
+pub(super) const NAMES: [&str; 3] = ["actual", "expected", "difference"];
+
 /// Writes the pictures, that of the difference when the sizes are the same, and answers their files and captions.
 pub(super) fn write(
     folder: &Path,
@@ -22,11 +25,11 @@ pub(super) fn write(
     let scale = median(expected);
     let mask = RegionMask::background(actual.width, actual.height);
     let mut written = BTreeMap::new();
-    for (name, picture) in [
-        ("actual", Some(tone_mapped(actual, scale))),
-        ("expected", Some(tone_mapped(expected, scale))),
-        ("difference", signed_error(actual, expected, &mask, scale, FULL_SCALE)),
-    ] {
+    for (name, picture) in NAMES.into_iter().zip([
+        Some(tone_mapped(actual, scale)),
+        Some(tone_mapped(expected, scale)),
+        signed_error(actual, expected, &mask, scale, FULL_SCALE),
+    ]) {
         let Some(picture) = picture else { continue };
         let file = folder.join(format!("{name}.png"));
         std::fs::write(&file, picture.png()?).with_context(|| cannot(&file))?;

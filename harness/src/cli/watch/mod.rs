@@ -23,7 +23,9 @@ use self::live::LiveView;
 use self::server::{Board, Server, Stage};
 use super::context::{Context, on_interrupt};
 use super::earlier::{Report, Row};
+use super::outputs::ensure_apart;
 use crate::columns::count;
+use crate::intake::Severity;
 use crate::rubric::PartGrade;
 
 /// A save is over after this long without another change: an editor may write several files, and one file in several
@@ -61,9 +63,14 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     let name = || format!("cannot watch {}", arguments.folder.display());
     let folder = arguments.folder.canonicalize().with_context(name)?;
     anyhow::ensure!(folder.is_dir(), "{}: expected a folder", arguments.folder.display());
-    std::fs::create_dir_all(&arguments.output)?;
-    let output = arguments.output.canonicalize()?;
     let context = Context::new(root)?;
+    let given = [crate::class::Source::given(&folder)];
+    let slug = super::class::sources(&given, &arguments.output, &std::collections::HashMap::new())
+        .remove(0)
+        .slug;
+    ensure_apart(&arguments.output, &folder, &slug, &context.assignment.tree)?;
+    super::writable(&arguments.output)?;
+    let output = arguments.output.canonicalize()?;
     let live = Arc::new(LiveView::new(&context.assignment, &context.supervisor, &arguments.scene)?);
 
     let (happened, happens) = channel();
@@ -89,9 +96,6 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     let mut watched = identity(&folder);
 
     let board = Arc::new(Board::default());
-    let given = [crate::class::Source::given(&folder)];
-    let slug =
-        super::class::sources(&given, &output, &std::collections::HashMap::new()).remove(0).slug;
     let server = Server::start(output.join(slug), Arc::clone(&board), Arc::clone(&live))?;
     let door = server.door()?;
     println!("{}", door.path().display());
@@ -293,18 +297,33 @@ fn is_judged(status: ExitStatus) -> bool {
     matches!(status.code(), Some(0 | 1))
 }
 
-/// What a report comes to: in a few words, and in a sentence with what is to be mended first.
-fn verdict(row: &Row) -> (Stage, String, String) {
+/// What a report comes to: in a few words, and in a sentence with what is to be mended first. Where everything was
+/// asked (`is_whole`), that is what keeps it from being submitted, too.
+fn verdict(row: &Row, is_whole: bool) -> (Stage, String, String) {
     let points = format!("{} of {} points", row.points, row.out_of);
     if let Some(first) = row.diagnostics.lines().find(|line| !line.trim().is_empty()) {
-        return (Stage::Refused, "does not compile".to_owned(), format!("{first} ({points})"));
+        // rustc says the place on the next line.
+        let place = row.diagnostics.lines().skip_while(|line| *line != first).nth(1);
+        let place = place.and_then(|line| line.trim_start().strip_prefix("--> "));
+        let place = place.map_or(String::new(), |place| format!("{place}: "));
+        let message = format!("{place}{first} ({points})");
+        return (Stage::Refused, "does not compile".to_owned(), message);
     }
     // A bonus that nobody tried for is nothing lost.
     let is_lost =
         |part: &&PartGrade| part.points < part.out_of && !(part.bonus && part.points_max == 0.0);
+    let mut errors = row.findings.iter().filter(|found| found.severity == Severity::Error);
     let lost: Vec<&PartGrade> = row.parts.iter().filter(is_lost).collect();
     match lost.split_first() {
-        None => (Stage::Done, points.clone(), points),
+        None => match errors.next().filter(|_| is_whole) {
+            Some(error) => {
+                let error = error.to_string();
+                let error = error.trim_start_matches("error: ");
+                let short = format!("{points}, not ready to submit");
+                (Stage::Unready, short, format!("{points}. {error}"))
+            }
+            None => (Stage::Done, points.clone(), points),
+        },
         Some((first, others)) => {
             let others = match others.len() {
                 0 => String::new(),
@@ -322,7 +341,8 @@ impl Check<'_> {
         let row = is_judged(status).then(|| Report::read(self.output).ok()).flatten();
         match row.and_then(|report| report.submissions.into_iter().next()) {
             Some(row) => {
-                let (stage, verdict, message) = verdict(&row);
+                let is_whole = self.arguments.part.is_empty() && self.arguments.scene.is_empty();
+                let (stage, verdict, message) = verdict(&row, is_whole);
                 self.board.report(stage, &verdict, &message);
             }
             // The last line said why.
@@ -425,6 +445,7 @@ mod tests {
 
     #[test]
     fn a_verdict_is_green_only_where_nothing_is_wrong() {
+        use crate::intake::Finding;
         let part = |id: &str, bonus: bool, points: f64, reason: &str| PartGrade {
             id: id.into(),
             title: id.into(),
@@ -448,8 +469,9 @@ mod tests {
             parts,
             standing: crate::class::Standing::default(),
             diagnostics: diagnostics.into(),
+            findings: Vec::new(),
         };
-        let told = |parts, diagnostics| verdict(&row(parts, diagnostics));
+        let told = |parts, diagnostics| verdict(&row(parts, diagnostics), true);
         let full = || vec![part("1.1", false, 10.0, ""), part("1.2", false, 10.0, "")];
         let (stage, short, _) = told(full(), "");
         assert_eq!((stage, short.as_str()), (Stage::Done, "20 of 20 points"));
@@ -462,9 +484,24 @@ mod tests {
             (Stage::Lost, "24 of 20 points. 2.5: the map is black")
         );
         let (stage, short, words) =
-            told(full(), "\nerror[E0308]: mismatched types\n --> src/lib.rs");
+            told(full(), "\nerror[E0308]: mismatched types\n --> src/lib.rs:7:1\n  |");
         assert_eq!((stage, short.as_str()), (Stage::Refused, "does not compile"));
-        assert_eq!(words, "error[E0308]: mismatched types (20 of 20 points)");
+        assert_eq!(words, "src/lib.rs:7:1: error[E0308]: mismatched types (20 of 20 points)");
+        let (_, _, words) = told(full(), "phong.fs.wgsl:3:1: expected `;`\n3 | let x");
+        assert!(words.starts_with("phong.fs.wgsl:3:1: expected"), "{words}");
+        // What cannot be submitted is not right, whatever its points.
+        let mut broken = row(full(), "");
+        broken.findings = vec![
+            Finding::warning("w", "a slip"),
+            Finding::error("e", "the text has no closing quote").at("config.json").on_line(9),
+        ];
+        assert_eq!(verdict(&broken, false).0, Stage::Done, "of a part alone");
+        let (stage, short, words) = verdict(&broken, true);
+        assert_eq!(
+            (stage, short.as_str()),
+            (Stage::Unready, "20 of 20 points, not ready to submit")
+        );
+        assert_eq!(words, "20 of 20 points. config.json:9: the text has no closing quote");
         let lost = vec![part("1.1", false, 0.0, "it panics"), part("1.2", false, 1.0, "dark")];
         let (_, _, words) = told(lost, "");
         assert_eq!(words, "1 of 20 points. 1.1: it panics, and 1 other part lost points too");

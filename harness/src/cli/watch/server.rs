@@ -32,6 +32,8 @@ pub enum Stage {
     Running,
     /// Its report is there, and nothing is wrong.
     Done,
+    /// Its report is there, all points too, but it cannot be submitted so.
+    Unready,
     /// Its report is there, and tells of lost points.
     Lost,
     /// Its report is there; something of it does not compile.

@@ -3,16 +3,32 @@
 const report = document.getElementById("report");
 const mark = document.getElementById("mark");
 const status = document.getElementById("status");
-const NAMES = { running: "Checking", done: "Nothing is wrong", lost: "Points are missing", refused: "Does not compile", failed: "No report" };
+const NAMES = { running: "Checking", done: "Nothing is wrong", unready: "Not ready to submit", lost: "Points are missing", refused: "Does not compile", failed: "No report" };
 const EARLIER = {
   nothing: "The report below is of an earlier save.",
   offline: "The report below is of an earlier save. Shaders alone changed since: its offline results hold, and are run again.",
 };
+/** After so many seconds at one thing, how long it takes is shown; after so many, that it may be a hang. */
+const SLOW_S = 3, HANG_S = 20;
 let reports = -1;
+let begun = null;
+
+/** Says how long it is at what the status says; nobody reads it aloud every second. */
+function tellTime() {
+  const seconds = begun === null ? 0 : Math.round((performance.now() - begun) / 1000);
+  const hangs = seconds >= HANG_S ? ": an endless loop is ended when its CPU time is used up" : "";
+  if (seconds >= SLOW_S) status.dataset.time = ` (for ${seconds} s${hangs})`;
+  else delete status.dataset.time;
+}
+setInterval(tellTime, 1000);
 
 function show({ stage, message, verdict, reports: count, libraries, fresh, holds }) {
   document.body.className = stage;
-  status.textContent = `${NAMES[stage]}: ${message}`;
+  const words = `${NAMES[stage]}: ${message}`;
+  if (stage !== "running") begun = null;
+  else if (begun === null || status.textContent !== words) begun = performance.now();
+  status.textContent = words;
+  tellTime();
   document.title = `${{ running: "checking …", failed: "no report" }[stage] ?? verdict} - umbra watch`;
   tellLive({ stage, libraries, fresh });
   mark.hidden = count === 0 || holds === "all";
@@ -47,5 +63,7 @@ events.addEventListener("message", (event) => show(JSON.parse(event.data)));
 events.addEventListener("error", () => {
   document.body.className = "failed";
   document.title = "ended - umbra watch";
+  begun = null;
+  tellTime();
   status.textContent = "umbra watch has ended";
 });

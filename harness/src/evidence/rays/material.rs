@@ -60,7 +60,10 @@ pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]])
     );
     let check = match first.filter(|_| !measure.passed) {
         None => {
-            let summary = format!("the BSDF of the surface is asked along {} rays", own.len());
+            let summary = format!(
+                "radiance is the surface's BSDF times the incident light along {} rays",
+                own.len()
+            );
             Check::new(ID, &batch.scene, Verdict::Pass, summary)
         }
         Some((ray, expected)) => {

@@ -112,8 +112,8 @@ pub fn judge_shadows(
         Some((index, visibility)) => {
             let p = batch.points[index].position;
             let summary = format!(
-                "{lit_wrong} of {lit_known} lit rays are not lit and {dark_wrong} of {dark} shadowed rays are not dark; \
-                 first at ({:.3}, {:.3}, {:.3}): expected visibility {}, found {visibility:.2}",
+                "{lit_wrong} of {lit_known} rays that reach the light get none, {dark_wrong} of {dark} rays in shadow \
+                 get light; first at ({:.3}, {:.3}, {:.3}): expected visibility {}, found {visibility:.2}",
                 p.x,
                 p.y,
                 p.z,
@@ -401,7 +401,7 @@ fn same_shading(with: [f32; 3], without: [f32; 3]) -> bool {
 }
 
 /// The measure of how much of a scene the shadows switch changes.
-pub(super) const SWITCHED: &str = "rays that the shadows switch changes (fraction)";
+pub(super) use crate::evidence::check::SWITCHED;
 
 /// The least fraction of rays whose radiance is wrong where the light stands elsewhere.
 const LIGHT_ELSEWHERE: f64 = 0.9;

@@ -30,6 +30,24 @@ pub(super) fn folded(
     html.raw("</details>\n");
 }
 
+/// Failed checks in full, the worst first; of those that say the same, without pictures, the first.
+pub(super) fn articles(html: &mut Html, checks: &[Placed], places: &Places) {
+    let same = |a: &Check, b: &Check| {
+        let plain = |check: &Check| check.pictures.is_empty() && !check.summary.is_empty();
+        plain(a) && plain(b) && (&a.summary, &a.hint) == (&b.summary, &b.hint)
+    };
+    let mut rest = checks.to_vec();
+    while !rest.is_empty() {
+        let first = rest.remove(0);
+        article(html, first, places);
+        let (alike, others): (Vec<Placed>, Vec<Placed>) =
+            rest.into_iter().partition(|(_, check)| same(first.1, check));
+        let what = if alike.len() == 1 { "says the same" } else { "say the same" };
+        folded(html, ("more check", what), &alike, line);
+        rest = others;
+    }
+}
+
 /// A check in full: what was found, its measures and pictures.
 pub(super) fn article(html: &mut Html, (place, check): Placed, places: &Places) {
     html.raw("<article id=\"check-").show(place).raw("\">\n<h3>");
@@ -99,6 +117,10 @@ fn measures(html: &mut Html, measures: &[Measure]) {
         html.raw(if measure.passed { "<tr>" } else { "<tr class=\"failed\">" });
         html.raw("<th scope=\"row\">").text(&measure.name).raw("</th><td class=\"number\">");
         html.text(&value(measure.value)).raw("</td><td class=\"number\">");
+        if measure.only_informs() {
+            html.raw("</td><td class=\"told\">not judged</td></tr>\n");
+            continue;
+        }
         html.text(&value(measure.bound)).raw("</td><td>");
         html.raw(if measure.passed { "✓ pass" } else { "✗ fail" }).raw("</td></tr>\n");
     }

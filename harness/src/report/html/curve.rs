@@ -53,10 +53,11 @@ pub(super) fn curve(html: &mut Html, curve: &Curve, marks: &[(f64, &str)]) {
         "</svg>\n<figcaption>What a failed check leaves of a part's points, by its error: 0 is ",
     );
     html.raw(
-        "right, 1 as large as the answer itself. What passes is worth everything. In numbers: ",
+        "right, 1 as large as the answer itself. A check that passes leaves everything; one that fails, even by very \
+         little, at most what stands at 0. In numbers: an error of ",
     );
     for (index, [error, fraction]) in points.iter().enumerate() {
-        html.raw(if index == 0 { "" } else { ", " }).text(&value(*error)).raw(" leaves ");
+        html.raw(if index == 0 { "" } else { ", of " }).text(&value(*error)).raw(" leaves ");
         html.text(&value(100.0 * fraction)).raw(" %");
     }
     html.raw(".</figcaption>\n</figure>\n");

@@ -7,6 +7,7 @@ use super::lobe::lobe;
 use super::markup::Html;
 use super::part_class;
 use super::pictures::Places;
+use crate::class::Standing;
 use crate::columns::count;
 use crate::evidence::{Check, CheckId};
 use crate::grading::Record;
@@ -26,6 +27,13 @@ pub(super) struct Lost<'a> {
 /// Whether a part did not earn everything. A bonus that nobody tried for is nothing lost.
 pub(super) fn is_lost(part: &PartGrade) -> bool {
     part.points < part.out_of && part_class(part) != "unearned"
+}
+
+/// Whether it lost something before the instructor set its points by hand: then what was wrong still is.
+pub(super) fn was_lost(part: &PartGrade, standing: &Standing) -> bool {
+    let set = standing.decisions.iter();
+    let mut set = set.filter(|own| own.decision.part.as_deref() == Some(part.id.as_str()));
+    is_lost(part) || set.any(|own| own.before[0] < part.out_of)
 }
 
 impl<'a> Lost<'a> {
@@ -142,12 +150,11 @@ impl<'a> Lost<'a> {
         }
         html.raw("</summary>\n<p>").text(&part.reason).raw("</p>\n");
         decided_by(html, part, &self.record.evidence.checks);
-        for &check in own {
-            if !self.shown.contains(&check.0) {
-                self.shown.push(check.0);
-                checks::article(html, check, &self.places);
-            }
-        }
+        let shown = &mut self.shown;
+        let new: Vec<Placed> =
+            own.iter().filter(|check| !shown.contains(&check.0)).copied().collect();
+        shown.extend(new.iter().map(|(place, _)| *place));
+        checks::articles(html, &new, &self.places);
         html.raw("</details>\n");
     }
 }

@@ -23,6 +23,10 @@ impl Places<'_> {
     pub(super) fn of_check(&self, html: &mut Html, check: &Check) {
         let folder = if check.held_back { "" } else { self.public };
         let name = check.name();
+        if !check.pictures.is_empty() && !check.scene.is_empty() {
+            html.raw("<p class=\"of\">On the scene <b>").text(&check.scene).raw("</b>, by <code>");
+            html.text(check.id.name()).raw("</code></p>\n");
+        }
         self.show(html, &name, &name, folder, &check.pictures);
     }
 

@@ -3,7 +3,7 @@
 use super::super::number::{is_failure, is_range, looks_like, of_part, points, range, seconds};
 use super::super::{BatchReport, HTML_FILE, INSTRUCTOR, MENDED, SubmissionReport};
 use super::checks::{self, Placed};
-use super::lost::{Lost, is_lost};
+use super::lost::{Lost, is_lost, was_lost};
 use super::markup::Html;
 use super::pictures::Places;
 use super::{Reader, begin, class, end, part_class};
@@ -64,9 +64,13 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     // An error of the compiler or a shader is why the rest is as it is.
     diagnostics(&mut html, &record.diagnostics);
     let mut lost = Lost::new(&report.rules, record, places);
-    let losing: Vec<&PartGrade> = grade.parts.iter().filter(|part| is_lost(part)).collect();
+    let was_lost = |part: &PartGrade| was_lost(part, &entry.standing);
+    let losing: Vec<&PartGrade> = grade.parts.iter().filter(|part| was_lost(part)).collect();
     if !losing.is_empty() {
-        html.raw("<section>\n<h2>What was lost</h2>\n");
+        // What the instructor gave is not lost, but wrong all the same.
+        let any_lost = losing.iter().any(|part| is_lost(part));
+        html.raw("<section>\n<h2>What was ").raw(if any_lost { "lost" } else { "wrong" });
+        html.raw("</h2>\n");
         for part in losing {
             lost.part(&mut html, part);
         }
@@ -78,7 +82,7 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     mended(&mut html, entry.standing.mended.as_ref(), reader);
     findings(&mut html, &record.findings);
     html.raw("<section>\n<h2>Everything else</h2>\n");
-    right(&mut html, &grade.parts);
+    right(&mut html, &grade.parts, was_lost);
     notes(&mut html, &record.findings);
     let shown = std::mem::take(&mut lost.shown);
     rest(&mut html, &record.evidence.checks, &shown, &places);
@@ -173,9 +177,9 @@ fn released(html: &mut Html, report: &BatchReport) {
 }
 
 /// The parts that earned everything, and a bonus that nobody tried for.
-fn right(html: &mut Html, parts: &[PartGrade]) {
+fn right(html: &mut Html, parts: &[PartGrade], was_lost: impl Fn(&PartGrade) -> bool) {
     let of = |tried: bool| -> Vec<&PartGrade> {
-        let kept = parts.iter().filter(|part| !is_lost(part));
+        let kept = parts.iter().filter(|part| !was_lost(part));
         kept.filter(|part| (part_class(part) != "unearned") == tried).collect()
     };
     let (right, untried) = (of(true), of(false));
@@ -213,9 +217,12 @@ fn rest(html: &mut Html, all: &[Check], shown: &[usize], places: &Places) {
     let mut failed = pick(is_failure);
     failed.sort_by(|a, b| b.1.error.total_cmp(&a.1.error));
     let noun = if shown.is_empty() { "check" } else { "more check" };
-    checks::folded(html, (noun, "failed"), &failed, |html, check| {
-        checks::article(html, check, places)
-    });
+    if !failed.is_empty() {
+        html.raw("<details>\n<summary>").text(&count(failed.len(), noun));
+        html.raw(" failed</summary>\n");
+        checks::articles(html, &failed, places);
+        html.raw("</details>\n");
+    }
     let silent = |check: &Check| matches!(check.verdict, Verdict::NotJudged | Verdict::NotRun);
     checks::folded(html, ("check", "could not be judged"), &pick(silent), checks::line);
     let passed = |check: &Check| check.verdict == Verdict::Pass;

@@ -33,6 +33,7 @@ fn pages_say_what_matters() {
         "rel=\"prev\" href=\"./../../instructor/a2_ada/report.html\">Previous</a>",
         "rel=\"next\" href=\"./../../instructor/hand_in_3/report.html\">Next</a>",
         "<summary>4 parts right: 1.1, 1.2, 1.4, 2.4</summary>",
+        "<p class=\"of\">On the scene <b>cbox</b>, by <code>radiance.lit</code></p>",
         "<summary>1 note</summary>",
         "<summary>2 checks passed</summary>",
         "<summary>2 checks could not be judged</summary>",
@@ -43,6 +44,26 @@ fn pages_say_what_matters() {
     let page = submission(&report, &report.entries[2], Reader::Student);
     assert!(page.contains("expected `Vec3`, found `f32`"));
     assert!(!submission(&report, &report.entries[0], Reader::Student).contains("What was lost"));
+}
+
+#[test]
+fn checks_that_say_the_same_are_one() {
+    let mut report = sample::report();
+    let checks = &mut report.entries[1].record.evidence.checks;
+    let mut silent = checks[2].clone();
+    silent.summary = "not answered: phong.fs.wgsl does not compile".into();
+    silent.pictures = Vec::new();
+    checks.extend(
+        ["a", "b", "c"]
+            .map(|scene| crate::evidence::Check { scene: scene.into(), ..silent.clone() }),
+    );
+    let page = submission(&report, &report.entries[1], Reader::Instructor);
+    assert!(page.contains("<summary>2 more checks say the same</summary>"), "{page}");
+    let whole = "</h3>\n<p>not answered: phong.fs.wgsl does not compile</p>";
+    assert_eq!(page.matches(whole).count(), 1);
+    for place in 0..report.entries[1].record.evidence.checks.len() {
+        assert_eq!(page.matches(&format!("id=\"check-{place}\"")).count(), 1, "{place}");
+    }
 }
 
 #[test]

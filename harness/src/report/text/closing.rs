@@ -11,10 +11,12 @@ use crate::rubric::{BUILD, PartGrade};
 
 /// What the last lines are made from, besides the submission itself.
 pub struct Closing<'a> {
-    /// The working folder as the student calls it.
+    /// The working folder as the student calls it, as a shell takes it.
     pub folder: &'a str,
-    /// Umbra as the student calls it.
+    /// Umbra as the student calls it, likewise.
     pub umbra: &'a str,
+    /// Whether it is an archive and no folder.
+    pub is_archive: bool,
     /// Where the page with the pictures is.
     pub page: &'a str,
     /// In which files the work for a part is done: `src/bsdfs/phong.rs`.
@@ -112,6 +114,7 @@ fn next(report: &BatchReport, entry: &SubmissionReport, closing: &Closing) -> St
             format!("make it ready to submit: {}", text.trim_start_matches("error: "))
         }
         (None, Some(check)) => format!("make it ready to submit: {}", check.summary),
+        (None, None) if closing.is_archive => format!("submit {folder}"),
         (None, None) => format!("`{umbra} pack {folder}` makes the archive to submit"),
     };
     match open(true).filter(|_| report.rules.parts.iter().any(|part| part.bonus)) {
@@ -139,11 +142,22 @@ mod tests {
         asked: &str,
         last: &[(&str, f64)],
     ) -> Vec<String> {
+        closed_of(report, index, asked, last, false)
+    }
+
+    fn closed_of(
+        report: &BatchReport,
+        index: usize,
+        asked: &str,
+        last: &[(&str, f64)],
+        is_archive: bool,
+    ) -> Vec<String> {
         let files = BTreeMap::from([("1.3".to_owned(), "src/integrators/simple.rs".to_owned())]);
         let last = last.iter().map(|&(id, points)| (id.to_owned(), (points, points))).collect();
         let made_of = Closing {
             folder: "student_template",
             umbra: "./umbra",
+            is_archive,
             page: "umbra-report/a/report.html",
             files: &files,
             last: &last,
@@ -178,6 +192,8 @@ mod tests {
         let ready = closed(&report, 0, "", &[]);
         let pack = "next: `./umbra pack student_template` makes the archive to submit";
         assert_eq!(ready[3], pack);
+        // What is packed already is not packed again.
+        assert_eq!(closed_of(&report, 0, "", &[], true)[3], "next: submit student_template");
         let mistake = report.entries[2].record.findings[0].clone();
         report.entries[0].record.findings.push(mistake);
         let lines = closed(&report, 0, "", &[]);

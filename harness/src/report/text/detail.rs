@@ -205,6 +205,11 @@ fn group_of_checks(page: &mut Page, group: &[&Check]) {
     let shown = worst.measures.iter().filter(|measure| !passed || Some(*measure) == tightest);
     for measure in shown {
         let (style, word) = match (measure.passed, passed) {
+            _ if measure.only_informs() && !passed => {
+                let text = format!("{}: {}", measure.name, number::value(measure.value));
+                page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &text);
+                continue;
+            }
             (true, true) => (Style::Faint, "closest: "),
             (true, false) => (Style::Faint, "pass: "),
             (false, _) => (Style::Bad, "fail: "),
@@ -239,7 +244,11 @@ fn findings(page: &mut Page, findings: &[Finding], verbose: bool, busy: bool) {
         if errors > 0 {
             page.gap();
             let text = format!("before you submit, {} to be mended", count(errors, "thing"));
-            page.wrapped(&[], Style::Faint, &format!("{text}: `umbra validate` lists them"));
+            page.wrapped(
+                &[],
+                Style::Faint,
+                &format!("{text}: the report lists them under Findings"),
+            );
         }
         return;
     }

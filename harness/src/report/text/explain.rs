@@ -30,26 +30,29 @@ pub fn explain(rules: &Rules, name: &str, look: Look) -> Result<String, String> 
                 explain_check(&mut page, rules, check);
             }
         }
-        (Err(error), _) => {
-            let hint = "; hint: `umbra explain` lists all";
-            let hint = if error.contains("did you mean") { "" } else { hint };
-            return Err(not_found(rules, name).unwrap_or(error + hint));
-        }
+        (Err(check), Err(rule)) => return Err(not_found(rules, name, [check, rule])),
     }
     Ok(page.finish())
 }
 
 /// What to say of a name that is none: the parts where it looks like one, or the checks that it is a piece of.
-fn not_found(rules: &Rules, name: &str) -> Option<String> {
+fn not_found(rules: &Rules, name: &str, errors: [String; 2]) -> String {
     if name.starts_with(|c: char| c.is_ascii_digit()) {
         let parts: Vec<&str> = rules.parts.iter().map(|part| part.id.as_str()).collect();
-        return Some(format!("there is no part {name}; expected one of {}", parts.join(", ")));
+        return format!("there is no part {name}; expected one of {}", parts.join(", "));
     }
     let checks = CheckId::ALL.iter().map(|check| check.name());
     let pieces: Vec<&str> = checks.filter(|check| check.split('.').any(|p| p == name)).collect();
     let named = pieces.join(", ");
-    (!pieces.is_empty())
-        .then(|| format!("there is no check \"{name}\"; with it in their name: {named}"))
+    if !pieces.is_empty() {
+        return format!("there is no check \"{name}\"; with it in their name: {named}");
+    }
+    let suggests = errors.into_iter().find(|error| error.contains("did you mean"));
+    suggests.unwrap_or_else(|| {
+        format!(
+            "there is no check, rule or part \"{name}\"; hint: `umbra explain` without a name lists the checks"
+        )
+    })
 }
 
 /// All checks, a line each.
@@ -132,6 +135,12 @@ mod tests {
             of("shadow.ray").unwrap_err(),
             "there is no check \"shadow.ray\"; did you mean \"shadow.rays\"?"
         );
+        let slip = of("image.blobs").unwrap_err();
+        assert_eq!(slip, "there is no rule \"image.blobs\"; did you mean \"image.blob\"?");
+        for name in ["nonsense", "nope", "", "x"] {
+            let error = of(name).unwrap_err();
+            assert!(error.contains("hint: `umbra explain`"), "{name}: {error}");
+        }
         assert!(of(" Shadow_Rays ").is_ok());
         assert_eq!(
             of("nonsense").unwrap_err(),

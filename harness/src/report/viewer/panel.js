@@ -132,6 +132,9 @@ function showLegend(layer, settings) {
   get("unit").textContent = `${unitOf(layer)}${numberOf(layer, settings)}`;
 }
 
+/** Bars of the histogram that is drawn; the number of bins is a multiple. */
+const BARS = 48;
+
 function showHistogram(layer, settings) {
   const regions = layer.kind === "regions";
   const counts = regions ? null : kept(layer, settings, ["metric", "channel", "tone", "exposure"], histogram);
@@ -144,18 +147,29 @@ function showHistogram(layer, settings) {
   context.globalCompositeOperation = "source-over";
   context.clearRect(0, 0, width, height);
   get("facts").textContent = "";
+  for (const end of [0, 1, 2]) get(`axis-${end}`).textContent = "";
   if (regions) return;
-  // Black pixels are many: the second largest bin sets the height.
-  const highest = Math.max(...counts.map((bins) => [...bins].sort((a, b) => b - a)[1])) || 1;
+  // Few bins are wide bars that touch: narrow ones of half floats are lone strokes.
+  const bars = counts.map((bins) => Array.from({ length: BARS }, (_, bar) => {
+    const of = bins.length / BARS;
+    return bins.slice(bar * of, (bar + 1) * of).reduce((sum, n) => sum + n, 0);
+  }));
+  // Black pixels are many: the second largest bar sets the height.
+  const highest = Math.max(...bars.map((own) => [...own].sort((a, b) => b - a)[1])) || 1;
   const colors = counts.length === 3 ? ["#e0453a", "#2fa84f", "#3b7de0"] : ["#8a93a3"];
   context.globalCompositeOperation = counts.length === 3 ? "lighter" : "source-over";
-  counts.forEach((bins, c) => {
+  bars.forEach((own, c) => {
     context.fillStyle = colors[c];
-    bins.forEach((n, i) => {
-      const h = Math.min(1, n / highest) * height;
-      context.fillRect((i * width) / bins.length, height - h, width / bins.length, h);
+    own.forEach((n, i) => {
+      // What is there is seen, however little it is.
+      const h = n > 0 ? Math.max(2, Math.min(1, n / highest) * height) : 0;
+      context.fillRect((i * width) / BARS, height - h, width / BARS, h);
     });
   });
+  const limit = 2 ** -settings.exposure;
+  let ends = settings.tone === "signed" ? [-limit, 0, limit] : [0, limit / 2, limit];
+  if (layer.kind === "excess") ends = [-1, 0, 1].map((t) => limit * 2 ** ((t * LOG_RANGE) / 2));
+  ends.forEach((value, i) => { get(`axis-${i}`).textContent = digits(value, 3); });
   const { least, most, sum, count, bad } = kept(layer, settings, ["metric", "channel"], factsOf);
   const words = count ? [`least ${digits(least)}`, `mean ${digits(sum / count)}`, `most ${digits(most)}`] : [];
   if (bad) words.push(`${bad} pixel${bad > 1 ? "s" : ""} not finite`);

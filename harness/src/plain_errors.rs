@@ -1,0 +1,73 @@
+//! What serde says of a value of another kind, in the words of JSON instead of Rust's.
+
+/// The message, without the names of Rust's types: `invalid type: floating point `1.5`, expected u32` becomes
+/// `expected a whole number, 0 or more; found 1.5`. Other messages stay as they are.
+pub fn plain(message: &str) -> String {
+    let told = || {
+        let rest = message
+            .strip_prefix("invalid type: ")
+            .or_else(|| message.strip_prefix("invalid value: "))?;
+        let (found, expected) = rest.split_once(", expected ")?;
+        Some(format!("expected {}; found {}", wanted(expected), found_as(found)))
+    };
+    told().unwrap_or_else(|| message.to_owned())
+}
+
+fn wanted(expected: &str) -> &str {
+    match expected {
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
+        "f32" | "f64" => "a number",
+        "a string" | "a borrowed string" => "text in double quotes",
+        "a boolean" => "true or false",
+        "a sequence" => "a list [ ... ]",
+        "a map" => "an object { ... }",
+        other if other.starts_with("struct ") => "an object { ... }",
+        other => other,
+    }
+}
+
+fn found_as(found: &str) -> &str {
+    match found {
+        "map" => "an object { ... }",
+        "sequence" => "a list [ ... ]",
+        "null" | "unit value" => "null",
+        other => {
+            // Of text, the quotes belong to it; other values stand in `.
+            let text = other.strip_prefix("string ");
+            text.unwrap_or_else(|| other.split('`').nth(1).unwrap_or(other))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn types_are_told_in_the_words_of_the_file() {
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        #[allow(dead_code)]
+        struct All {
+            count: u32,
+            share: f64,
+            name: String,
+            list: Vec<bool>,
+        }
+        for (text, said) in [
+            (r#"{"count": -1}"#, "expected a whole number, 0 or more; found -1"),
+            (r#"{"count": 1.5}"#, "expected a whole number, 0 or more; found 1.5"),
+            (r#"{"share": "a"}"#, "expected a number; found \"a\""),
+            (r#"{"name": 3}"#, "expected text in double quotes; found 3"),
+            (r#"{"name": null}"#, "expected text in double quotes; found null"),
+            (r#"{"list": {}}"#, "expected a list [ ... ]; found an object { ... }"),
+            (r#"{"list": [1]}"#, "expected true or false; found 1"),
+            (r#"{"counts": 1}"#, "unknown field `counts`, expected one of"),
+        ] {
+            let error = serde_json::from_str::<All>(text).unwrap_err().to_string();
+            let found = plain(error.split(" at line ").next().unwrap());
+            assert!(found.starts_with(said), "{text}: {found}");
+        }
+    }
+}
