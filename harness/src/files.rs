@@ -100,37 +100,6 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether a path, which need not be there yet, lies in a folder or is the folder itself.
-pub fn is_within(path: &Path, folder: &Path) -> bool {
-    let Ok(folder) = folder.canonicalize() else { return false };
-    let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
-    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    // The part that is there, without links.
-    let there = whole.ancestors().find_map(|part| Some((part, part.canonicalize().ok()?)));
-    let whole = there.map_or(whole.clone(), |(part, real)| {
-        whole.strip_prefix(part).map_or(real.clone(), |rest| real.join(rest))
-    });
-    whole.starts_with(folder)
-}
-
-/// Whether two paths lead to one file that is there.
-pub fn is_same_file(one: &Path, other: &Path) -> bool {
-    let both = (one.canonicalize(), other.canonicalize());
-    if matches!(both, (Ok(one), Ok(other)) if one == other) {
-        return true;
-    }
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::MetadataExt as _;
-        let place = |path: &Path| path.metadata().ok().map(|meta| (meta.dev(), meta.ino()));
-        place(one).is_some() && place(one) == place(other)
-    }
-    #[cfg(not(unix))]
-    {
-        false
-    }
-}
-
 /// Removes the oldest files and folders in a folder, so that at most `most` stay.
 ///
 /// # Errors

@@ -356,11 +356,6 @@ pub fn shown(at: Timestamp, due: &str, policy: Option<&Policy>) -> String {
     in_zone(at, &zone.unwrap_or_else(|| zone_of(due)))
 }
 
-/// The message on a key that holds no time.
-fn no_time(key: &str) -> String {
-    format!("{key}: expected a time with its offset, such as \"2019-10-13T23:59:00-04:00\"")
-}
-
 /// From when on nobody submits any more: the due date, the cut-off and the last extension, with late days and grace.
 /// None where the due date says no time.
 pub fn end(due: &str, policy: Option<&Policy>) -> Option<Timestamp> {

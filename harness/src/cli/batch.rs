@@ -20,12 +20,11 @@ use super::selection::Selection;
 use crate::assignment::Assignment;
 use crate::class::{Attempt, Collected, Decisions, Kind, Label, Pins, Stated, Wanted, collect};
 use crate::columns::count;
-use crate::files::{is_within, write_whole};
+use crate::files::write_whole;
 use crate::grading::{
     Begun, Folders, Grading, Mode, Record, RecordCache, StoredRecord, Workshop, judge_shared,
 };
 use crate::held_back::recorded_seed;
-use crate::intake::TreeSpec;
 use crate::program::graded;
 use crate::report::{self, BatchReport, SubmissionReport};
 use crate::rubric;
@@ -520,26 +519,6 @@ impl<'a> Batch<'a> {
         let records = results.into_iter().map(|(_, result)| result).collect();
         (records, gone.into_inner().unwrap_or_default())
     }
-}
-
-/// Makes sure that a report does not become part of a submission: whoever packs that would submit it. A folder that
-/// intake ignores, such as `umbra-report`, may lie in it.
-///
-/// # Errors
-/// When it would; names both.
-pub fn ensure_beside(output: &Path, submission: &Path, tree: &TreeSpec) -> anyhow::Result<()> {
-    let inside = |folder: &Path| is_within(folder, submission);
-    let is_ignored = output.ancestors().take_while(|folder| inside(folder)).any(|folder| {
-        let name = folder.file_name().unwrap_or_default().to_string_lossy();
-        tree.ignored_by(&name).is_some() && !is_within(submission, folder)
-    });
-    ensure!(
-        !inside(output) || is_ignored,
-        "--report {} lies inside {}, which is to be read; hint: write it beside that folder",
-        output.display(),
-        submission.display()
-    );
-    Ok(())
 }
 
 /// Makes sure that a task of a partition uses the class list that other tasks at work use.

@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::ensure;
 use serde::{Deserialize, Serialize};
 
-use super::batch::{Batch, BatchOutcome, ensure_beside};
+use super::batch::{Batch, BatchOutcome};
 use super::choices::Perturb;
 use super::context::Context;
 use super::outputs::{ensure_apart, words_of};
@@ -99,9 +99,6 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
             "{} is no archive, expected your working folder or what umbra pack made of it",
             folder.display()
         );
-    }
-    if folder.is_dir() {
-        ensure_beside(&arguments.output, folder, &assignment.tree)?;
     }
     // `.` has no name of its own.
     let named = || folder.canonicalize().ok();

@@ -13,7 +13,6 @@ use super::outputs::{ensure_outside, place_inside};
 use crate::class::collect::Ambiguous;
 use crate::class::{Collected, Kind, Wanted, collect};
 use crate::columns::count;
-use crate::files::is_within;
 use crate::harmless::{harmless, harmless_json};
 use crate::intake::{self, CONFIG_FILE, IntakeError, Severity, Submission, TreeSpec, Validation};
 
@@ -319,39 +318,9 @@ pub fn pack(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8
             Ok(super::EXIT_OK)
         }
         Err(IntakeError::Refused(refusal)) => {
-            let is_empty = refusal.findings.iter().any(|finding| finding.code == "empty");
-            if let Some(below) = working_folder(&source, 0).filter(|_| is_empty) {
-                let below = below.strip_prefix(&source).unwrap_or(&below).to_owned();
-                let inner = arguments.folder.join(below);
-                bail!(
-                    "{folder} holds nothing of a submission itself, {} does; hint: pack that folder",
-                    inner.display()
-                );
-            }
             print!("{}", intake::validate_refusal(&refusal).to_text());
             Ok(super::EXIT_NOT_IN_ORDER)
         }
         Err(error) => bail!(error),
     }
-}
-
-/// A folder below that holds a configuration, the first by name; few levels and few entries are looked at.
-fn working_folder(folder: &Path, depth: usize) -> Option<PathBuf> {
-    const LEVELS: usize = 3;
-    if depth == LEVELS {
-        return None;
-    }
-    const ENTRIES: usize = 100;
-    let entries = folder.read_dir().ok()?.flatten().take(ENTRIES);
-    let mut inner: Vec<PathBuf> = entries
-        .filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()))
-        .map(|entry| entry.path())
-        .filter(|path| {
-            !path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
-        })
-        .collect();
-    inner.sort();
-    let own = inner.iter().find(|path| path.join(CONFIG_FILE).is_file()).cloned();
-    let deeper = || inner.iter().find_map(|path| working_folder(path, depth + 1));
-    own.or_else(deeper)
 }

@@ -108,6 +108,11 @@ impl Price {
         Self { error: raw, raw, mistake: None }
     }
 
+    /// Whether no mistake can make it smaller.
+    pub fn is_least(&self) -> bool {
+        self.error <= Class::Slip.price()
+    }
+
     /// The single mistake that explains the answers best, if there is one.
     pub fn name(&self) -> String {
         self.mistake.unwrap_or_default().to_owned()
@@ -284,6 +289,9 @@ impl Answers<'_> {
             false => price,
         };
         let price = self.changes.iter().fold(price, |price, change| {
+            if price.is_least() {
+                return price;
+            }
             let (shading, factors, class) = match (change.shading, change.fitted) {
                 (Some(shading), _) => (shading, Factors::default(), change.class),
                 (None, Some(fitted)) => match self.fit(&questions, fitted) {

@@ -150,11 +150,6 @@ impl Options {
         if let Some(path) = output.filter(|path| !is_exr(path)) {
             bail!("{}: the difference image can only be an EXR file", path.display());
         }
-        if let Some(path) = output
-            && options.images.iter().any(|image| is_same_file(image, path))
-        {
-            bail!("{}: this is one of the images; hint: name another file", path.display());
-        }
         Ok(options)
     }
 }
