@@ -309,7 +309,7 @@ fn a_class_of_brightspace_zipped_and_unpacked() {
         assert!(name.contains("Oct 8, 2019 110 AM"), "{name}");
         assert!(
             remarks.contains(
-                "1 d 1 h 11 min after it was due (2019-10-06 23:59 -04:00): 2 started days; 2 x 10 %"
+                "1 d 1 h 11 min after it was due (2019-10-06 23:59 -04:00): 2 started days; it earned nothing"
             ),
             "{remarks}"
         );

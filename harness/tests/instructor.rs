@@ -99,6 +99,23 @@ fn extensions_are_refused_or_named() {
         said.contains(&format!("config.json:{at}: late.extensions[0].due lies before")),
         "{said}"
     );
+    // In plain words.
+    for (key, value, expected) in [
+        ("late_days", serde_json::json!(-1), "number \"-1\", expected a whole number of 0 or more"),
+        (
+            "late_days",
+            serde_json::json!(1.5),
+            "number \"1.5\", expected a whole number of 0 or more",
+        ),
+        ("cut_off", "2019-10-10".into(), "late.cut_off: expected a time with its offset, such as"),
+    ] {
+        let mut slip: Value = serde_json::from_str(LATE).unwrap();
+        slip[key] = value;
+        with(slip);
+        let (code, said) = umbra(&place, &root, &["regrade"]);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains(expected), "{said}");
+    }
     // A digit is missing.
     late["extensions"] = vec![day("26000104", "09")].into();
     with(late);
