@@ -66,38 +66,38 @@ fn report(folder: &Path) {
 fn nothing_is_written_into_a_submission_that_is_read() {
     let place = tempfile::tempdir().unwrap();
     let at = |name: &str| place.path().join(name);
-    work(&at("work"));
+    work(&at("mine"));
     fs::create_dir(at("class")).unwrap();
     work(&at("class/ann"));
     let before: BTreeMap<PathBuf, _> = listing(place.path());
     for line in [
-        "check work --report work",
-        "check work --report work/src",
-        "check work --report work/new",
-        "check work --report work/src/umbra-reports",
-        // The report's folder of `work` would be `work` itself.
-        "check work --report .",
-        "watch work --report work/src",
-        "watch work --report .",
-        "grade work --report work/offline",
+        "check mine --report mine",
+        "check mine --report mine/src",
+        "check mine --report mine/new",
+        "check mine --report mine/src/umbra-reports",
+        // The report's folder of `mine` would be `mine` itself.
+        "check mine --report .",
+        "watch mine --report mine/src",
+        "watch mine --report .",
+        "grade mine --report mine/offline",
         "grade class --report class/ann/src --perturb off",
         "grade class --report class --perturb off",
-        "pack work -o work/a.zip",
-        "pack work -o work",
-        "pack work -o work/../work/src/a.zip",
-        "validate work --fix work/a.zip",
+        "pack mine -o mine/a.zip",
+        "pack mine -o mine",
+        "pack mine -o mine/../mine/src/a.zip",
+        "validate mine --fix mine/a.zip",
     ] {
         let (code, out, said) = umbra(place.path(), &line.split(' ').collect::<Vec<_>>());
         assert_eq!(code, Some(2), "{line}: {out}{said}");
         assert!(said.contains("which is to be read; hint: "), "{line}: {said}");
-        assert!(!said.contains("compil"), "{line}: it is said before any work: {said}");
+        assert!(!said.contains("compil"), "{line}: it is said before any mine: {said}");
         assert!(before == listing(place.path()), "{line} wrote something");
     }
     // Whoever stands in the folder has the archive beside it.
-    let (code, out, said) = umbra(&at("work"), &["pack", "."]);
+    let (code, out, said) = umbra(&at("mine"), &["pack", "."]);
     assert!(code == Some(0) && out.contains("a2_ada_lampglow.zip"), "{out}{said}");
     assert!(at("a2_ada_lampglow.zip").is_file());
-    assert!(!at("work/a2_ada_lampglow.zip").exists());
+    assert!(!at("mine/a2_ada_lampglow.zip").exists());
 }
 
 #[test]

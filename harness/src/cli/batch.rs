@@ -1,6 +1,6 @@
 //! Takes submissions through all stages and writes their report: the code that `umbra check` and `umbra grade` share.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,7 +14,7 @@ use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::class::{self, Source, Telling};
 use super::context::{Context, INTERRUPTED, cores};
 use super::join::join;
-use super::outputs::{ensure_apart, ensure_not_read, ensure_report_outside};
+use super::outputs::{ensure_apart, ensure_not_read};
 use super::render::AdapterChoice;
 use super::selection::Selection;
 use crate::assignment::Assignment;
@@ -72,6 +72,8 @@ pub struct Batch<'a> {
     pub keeps_plugin: Option<&'a Path>,
     /// Whether to print what each stage cost.
     pub timings: bool,
+    /// Whether the submission is a copy that Umbra put into the report's folder itself.
+    pub is_own: bool,
 }
 
 /// How a batch ended.
@@ -109,6 +111,7 @@ impl<'a> Batch<'a> {
             force: false,
             keeps_plugin: None,
             timings: false,
+            is_own: false,
         }
     }
 
@@ -137,8 +140,11 @@ impl<'a> Batch<'a> {
                 Collected { sources, ..Collected::default() }
             }
         };
-        for source in &collected.sources {
-            ensure_report_outside(self.output, &source.path, &context.assignment.tree)?;
+        if !self.is_own {
+            // Before anything is written, pins included.
+            for source in class::sources(&collected.sources, self.output, &HashMap::new()) {
+                ensure_apart(self.output, &source.path, &source.slug, &context.assignment.tree)?;
+            }
         }
         if let Some(list) = self.list {
             // The files of a report, and the class list that it keeps of an earlier run.
@@ -183,9 +189,6 @@ impl<'a> Batch<'a> {
             Mode::Check => Found::default(),
         };
         let all = class::sources(&collected.sources, self.output, &earlier.names());
-        for source in &all {
-            ensure_apart(self.output, &source.path, &source.slug, &context.assignment.tree)?;
-        }
         if !collected.copies.is_empty() {
             eprintln!(
                 "umbra: {} in more than one download with the same content, graded once: {}",

@@ -103,6 +103,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         force: arguments.force,
         keeps_plugin: None,
         timings: arguments.timings,
+        is_own: false,
     };
     let (report, collected) = match batch.run(root)? {
         BatchOutcome::Interrupted => return Ok(super::EXIT_INTERRUPTED),

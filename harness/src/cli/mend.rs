@@ -71,6 +71,7 @@ pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8>
         adapter: arguments.adapter,
         isolation: arguments.isolation,
         perturb: Some(Perturb(seed)),
+        is_own: true,
         ..Batch::of(vec![source], &folder, Mode::Grade)
     };
     let BatchOutcome::Report(..) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };

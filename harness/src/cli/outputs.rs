@@ -41,7 +41,7 @@ pub fn ensure_outside(out: &Path, submission: &Path) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// When the report would be part of the submission.
-pub fn ensure_report_outside(out: &Path, submission: &Path, tree: &TreeSpec) -> anyhow::Result<()> {
+fn ensure_report_outside(out: &Path, submission: &Path, tree: &TreeSpec) -> anyhow::Result<()> {
     let is_ignored =
         |inside: &Path| tree.ignored_by(&inside.to_string_lossy().replace('\\', "/")).is_some();
     match place_inside(out, submission) {

@@ -144,7 +144,6 @@ function showHistogram(layer, settings) {
   const canvas = get("histogram");
   const context = canvas.getContext("2d");
   const { width, height } = canvas;
-  context.globalCompositeOperation = "source-over";
   context.clearRect(0, 0, width, height);
   get("facts").textContent = "";
   for (const end of [0, 1, 2]) get(`axis-${end}`).textContent = "";
@@ -157,7 +156,8 @@ function showHistogram(layer, settings) {
   // Black pixels are many: the second largest bar sets the height.
   const highest = Math.max(...bars.map((own) => [...own].sort((a, b) => b - a)[1])) || 1;
   const colors = counts.length === 3 ? ["#e0453a", "#2fa84f", "#3b7de0"] : ["#8a93a3"];
-  context.globalCompositeOperation = counts.length === 3 ? "lighter" : "source-over";
+  // Added up, three colors would be white, which a light page does not show.
+  context.globalAlpha = counts.length === 3 ? 0.6 : 1;
   bars.forEach((own, c) => {
     context.fillStyle = colors[c];
     own.forEach((n, i) => {
