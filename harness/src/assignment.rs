@@ -158,19 +158,6 @@ pub enum AssignmentError {
     },
 }
 
-/// A message of the JSON reader without Rust's names of types.
-fn in_plain_words(message: &str) -> String {
-    const WHOLE: &str = "expected a whole number of 0 or more";
-    let types = ["u8", "u16", "u32", "u64", "usize"].map(|name| format!("expected {name}"));
-    let known = types.iter().find(|name| message.ends_with(name.as_str()));
-    let message = match known {
-        Some(name) => format!("{}{WHOLE}", &message[..message.len() - name.len()]),
-        None => message.replace("expected f64", "expected a number"),
-    };
-    let message = message.replace("floating point `", "number `").replace("integer `", "number `");
-    message.replace('`', "\"")
-}
-
 impl Assignment {
     /// Loads `config.json` in the folder `root`.
     ///
@@ -186,9 +173,7 @@ impl Assignment {
                 path: path.clone(),
                 line: error.line(),
                 // The place stands before the message already.
-                message: in_plain_words(
-                    error.to_string().split(" at line ").next().unwrap_or_default(),
-                ),
+                message: plain(error.to_string().split(" at line ").next().unwrap_or_default()),
             })?;
         if let Some(message) = assignment.problem() {
             return Err(AssignmentError::Contradiction { path, message });

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::batch::{Batch, BatchOutcome};
 use super::choices::Perturb;
 use super::context::Context;
-use super::outputs::{ensure_apart, words_of};
+use super::outputs::{ensure_apart, shell_word};
 use super::render::AdapterChoice;
 use super::selection::Selection;
 use super::{class, terminal, terminal_pictures};
@@ -136,8 +136,8 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let page = folder_of_page.join(report::HTML_FILE);
     let program = std::env::args().next().unwrap_or_else(|| "umbra".to_owned());
     let closing = Closing {
-        folder: &words_of(&folder.display().to_string()),
-        umbra: &words_of(&program),
+        folder: &shell_word(&folder.display().to_string()),
+        umbra: &shell_word(&program),
         is_archive: folder.is_file(),
         page: &page.display().to_string(),
         files: &task_files(root, &report.rules.parts),

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use super::assemble::Kept;
 use super::chosen::one;
 use super::context::Context;
-use super::lying::{Lying, quoted};
+use super::location::{Location, quoted};
 use super::report_folder::ReportFolder;
 use super::{EXIT_OK, class, terminal};
 use crate::class::overrides::Subject;
@@ -56,17 +56,17 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
     println!("\nTo reproduce it");
     println!("  the student, on public scenes:  umbra check DIR --part {part}");
     let source = class::mended(output, &slug).join(report::MENDED_SOURCE);
-    let lying = match &mended {
-        Some(_) => Lying::Here(source.canonicalize().unwrap_or(source)),
-        None => Lying::of(output, &slug),
+    let location = match &mended {
+        Some(_) => Location::Here(source.canonicalize().unwrap_or(source)),
+        None => Location::of(output, &slug),
     };
     let seed = report.held_back.as_ref().map_or("off".to_owned(), |own| own.seed.to_string());
     let at_root = root.map_or(String::new(), |root| format!(" --root {}", quoted(root)));
     println!(
         "  the instructor, on all:  umbra grade {} --perturb {seed} --report ANOTHER{at_root}",
-        lying.arguments()
+        location.arguments()
     );
-    if let Lying::Gone(place) = &lying {
+    if let Location::Gone(place) = &location {
         println!("  (SUBMISSION: it was graded from {}, where it is no more)", place.display());
     }
     match (report.held_back.is_some(), report.released) {

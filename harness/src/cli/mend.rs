@@ -12,7 +12,7 @@ use super::chosen::one;
 use super::class;
 use super::context::Context;
 use super::decide::{DecisionArguments, said};
-use super::lying::{Lying, fetch};
+use super::location::{Location, fetch};
 use super::render::AdapterChoice;
 use crate::class::mending;
 use crate::files::files_below;
@@ -96,16 +96,16 @@ fn mended_source(
 ) -> anyhow::Result<PathBuf> {
     let output = &arguments.decision.report.path;
     let Record { slug, digest, .. } = record;
-    let lying = match &arguments.submission {
-        Some(path) if path.exists() => Lying::Here(path.clone()),
-        Some(path) => Lying::Gone(path.clone()),
-        None => Lying::of(output, slug),
+    let location = match &arguments.submission {
+        Some(path) if path.exists() => Location::Here(path.clone()),
+        Some(path) => Location::Gone(path.clone()),
+        None => Location::of(output, slug),
     };
     let context = Context::new(root)?;
     let scratch = tempfile::tempdir_in(&context.supervisor.scratch)?;
     let unpacked = scratch.path().join("download");
     fs::create_dir(&unpacked)?;
-    let given = fetch(&lying, kept.kind(), &context, &unpacked).with_context(|| {
+    let given = fetch(&location, kept.kind(), &context, &unpacked).with_context(|| {
         format!(
             "the submission {slug} cannot be read; hint: --submission PATH, the archive or folder"
         )

@@ -20,7 +20,7 @@ mod grade;
 mod gradescope_pack;
 mod join;
 mod likeness;
-mod lying;
+mod location;
 mod mend;
 mod merge;
 mod outputs;

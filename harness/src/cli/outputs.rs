@@ -74,7 +74,7 @@ pub fn ensure_apart(
 }
 
 /// A word of a command line as a shell takes it: quoted where it must be.
-pub fn words_of(text: &str) -> String {
+pub fn shell_word(text: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./:,+@%=\\".contains(c);
     // `cmd` and PowerShell take double quotes.
     if cfg!(windows) {
@@ -164,7 +164,7 @@ mod tests {
             ("$HOME", "'$HOME'"),
             ("", "''"),
         ] {
-            assert_eq!(words_of(text), quoted);
+            assert_eq!(shell_word(text), quoted);
         }
     }
 

@@ -228,6 +228,9 @@ pub fn film_price(
     let mut changes = film.changes(factor);
     changes.extend(film.missing(image));
     changes.iter().fold(start, |price, change| {
+        if price.is_least() {
+            return price;
+        }
         let (mut apart, mut total) = (0.0, 0.0);
         let (mut all, mut known) = (0usize, 0usize);
         let mut pairs = Moments::default();

@@ -64,6 +64,9 @@ pub fn price(
     }
     let price = answers.price(Some(raw));
     inputs(scene, &camera).iter().fold(price, |price, (name, class, shaded)| {
+        if price.is_least() {
+            return price;
+        }
         let points: Vec<ShadedPoint> = surfaces.iter().map(shaded).collect();
         let of = |index: usize, shading: &Shading| shading.radiance(&points[index]);
         let answers = Answers { of: &of, changes: &[], ..answers };

@@ -6,10 +6,11 @@ use anyhow::Context as _;
 
 use super::class;
 use super::context::Context;
+use super::outputs::shell_word;
 use crate::class::{Kind, Wanted, collect};
 
 /// Where a submission lies.
-pub enum Lying {
+pub enum Location {
     /// At this path.
     Here(PathBuf),
     /// In this download, which is a file, below this path in it.
@@ -23,7 +24,7 @@ pub enum Lying {
     Gone(PathBuf),
 }
 
-impl Lying {
+impl Location {
     /// Where the submission in a folder of a report lies.
     pub fn of(output: &Path, slug: &str) -> Self {
         let place = class::place_of(output, slug).map(PathBuf::from).unwrap_or_default();
@@ -43,9 +44,13 @@ impl Lying {
     /// The arguments of `umbra grade` that grade this submission alone, for a shell.
     pub fn arguments(&self) -> String {
         match self {
-            Self::Here(path) => quoted(path),
+            Self::Here(path) => shell_word(&path.to_string_lossy()),
             Self::Packed { download, inside } => {
-                format!("{} --only {}", quoted(download), quoted(inside))
+                format!(
+                    "{} --only {}",
+                    shell_word(&download.to_string_lossy()),
+                    shell_word(&inside.to_string_lossy())
+                )
             }
             Self::Gone(_) => "SUBMISSION".to_owned(),
         }
@@ -57,14 +62,14 @@ impl Lying {
 /// # Errors
 /// When it does not lie any more where it was graded from.
 pub fn fetch(
-    lying: &Lying,
+    location: &Location,
     kind: Kind,
     context: &Context,
     scratch: &Path,
 ) -> anyhow::Result<PathBuf> {
-    match lying {
-        Lying::Here(path) => Ok(path.clone()),
-        Lying::Packed { download, inside } => {
+    match location {
+        Location::Here(path) => Ok(path.clone()),
+        Location::Packed { download, inside } => {
             let wanted = Wanted {
                 tree: &context.assignment.tree,
                 limits: &context.assignment.limits.archive,
@@ -79,36 +84,8 @@ pub fn fetch(
                 format!("{} is not in {} any more", inside.display(), download.display())
             })
         }
-        Lying::Gone(place) => {
+        Location::Gone(place) => {
             anyhow::bail!("{} is not there any more", place.display())
-        }
-    }
-}
-
-/// A path as a word of a shell's command line.
-pub fn quoted(path: &Path) -> String {
-    let text = path.to_string_lossy();
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./+,=:@%".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        return text.into_owned();
-    }
-    format!("'{}'", text.replace('\'', "'\\''"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_shell_reads_a_path_as_one_word() {
-        for (path, expected) in [
-            ("/tmp/a2_ada.zip", "/tmp/a2_ada.zip"),
-            ("A2 Download.zip", "'A2 Download.zip'"),
-            ("Zo\u{eb} O'Neil/a2.zip", "'Zo\u{eb} O'\\''Neil/a2.zip'"),
-            ("$(x)", "'$(x)'"),
-            ("", "''"),
-        ] {
-            assert_eq!(quoted(Path::new(path)), expected);
         }
     }
 }
