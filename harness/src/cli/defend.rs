@@ -7,7 +7,8 @@ use anyhow::Context as _;
 use super::assemble::Kept;
 use super::chosen::one;
 use super::context::Context;
-use super::location::{Location, quoted};
+use super::location::Location;
+use super::outputs::shell_word;
 use super::report_folder::ReportFolder;
 use super::{EXIT_OK, class, terminal};
 use crate::class::overrides::Subject;
@@ -61,7 +62,8 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
         None => Location::of(output, &slug),
     };
     let seed = report.held_back.as_ref().map_or("off".to_owned(), |own| own.seed.to_string());
-    let at_root = root.map_or(String::new(), |root| format!(" --root {}", quoted(root)));
+    let at_root = root
+        .map_or(String::new(), |root| format!(" --root {}", shell_word(&root.to_string_lossy())));
     println!(
         "  the instructor, on all:  umbra grade {} --perturb {seed} --report ANOTHER{at_root}",
         location.arguments()
