@@ -282,46 +282,6 @@ fn what_cannot_be_packed_or_written_is_named_with_its_reason() {
     assert!(code == Some(2) && said.starts_with("umbra: there is no part 2.6"), "{said}");
 }
 
-/// A folder that is packed or checked next must not hold what the last command wrote.
-#[test]
-fn nothing_is_written_into_a_submission() {
-    let place = tempfile::tempdir().unwrap();
-    let at = |name: &str| place.path().join(name);
-    let config = config("Ada", "Lampglow", "260123456");
-    for (path, text) in submission(&config, "src/lib.rs", "x") {
-        put(at("up/work").join(path), text.as_bytes());
-    }
-    let count = || walk(&at("up"));
-    let before = count();
-    for report in ["up/work/src", "up/work", "up/work/offline/new/deep", "up/../up/work/r"] {
-        for command in ["check", "grade"] {
-            let (code, _, said) = umbra(&[command, "--report"], &[&at(report), &at("up/work")]);
-            assert!(code == Some(2) && said.contains("which is to be read; hint"), "{said}");
-            assert!(!said.contains("compil"), "it is said before any work: {said}");
-        }
-    }
-    for out in ["up/work/x.zip", "up/work/src", "up/work"] {
-        let (code, _, said) = umbra(&["pack", "-o"], &[&at(out), &at("up/work")]);
-        assert!(code == Some(2) && said.contains("which is to be packed; hint"), "{said}");
-    }
-    assert_eq!(count(), before);
-    // A folder too high is told where the hand-in lies.
-    for folder in ["up", "."] {
-        let (code, _, said) = umbra(&["pack"], &[&at(folder)]);
-        assert!(code == Some(2) && said.contains("work does; hint: pack that folder"), "{said}");
-    }
-    // The report's own name is known.
-    put(at("up/work/umbra-report/work/a.png"), b"x");
-    let (code, said, _) = umbra(&["validate"], &[&at("up/work")]);
-    assert!(code == Some(0) && !said.contains("a.png"), "{said}");
-}
-
-/// Files and folders below a folder.
-fn walk(folder: &Path) -> usize {
-    let entries = folder.read_dir().unwrap().map(|entry| entry.unwrap().path());
-    entries.map(|path| 1 + if path.is_dir() { walk(&path) } else { 0 }).sum()
-}
-
 #[test]
 fn fix_writes_a_new_zip_and_nothing_else() {
     let place = tempfile::tempdir().unwrap();

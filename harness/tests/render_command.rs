@@ -96,19 +96,6 @@ fn differing(a: &Image, b: &Image) -> usize {
 }
 
 #[test]
-fn no_file_of_the_scene_is_written_over() {
-    let scene = Scene::new(&plain(), TEXTURED);
-    let before = fs::read(scene.path("t.png")).unwrap();
-    fs::hard_link(scene.path("t.png"), scene.path("link.png")).unwrap();
-    for output in ["t.png", "./t.png", "link.png"] {
-        let (code, said) = scene.run(&["s.toml", "--output", output]);
-        assert_eq!(code, 2, "{said}");
-        assert!(said.contains(&format!("{output}: this is a file of the scene; hint: ")), "{said}");
-    }
-    assert_eq!(fs::read(scene.path("t.png")).unwrap(), before);
-}
-
-#[test]
 fn lines_and_points_are_not_drawn() {
     let right = Scene::new(&plain(), MTL).image();
     assert_mean(&right, 0.12981);
