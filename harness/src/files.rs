@@ -100,19 +100,25 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// Removes the oldest files and folders in a folder, so that at most `most` stay.
+/// Removes the oldest files and folders in a folder, so that at most `most` stay. Others may use and remove them
+/// meanwhile.
 ///
 /// # Errors
 /// When the folder cannot be read, or an entry cannot be removed.
 pub fn keep_newest(folder: &Path, most: usize) -> io::Result<()> {
     let age = |path: &PathBuf| path.metadata().and_then(|meta| meta.modified()).ok();
     let mut all: Vec<_> = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
-    all.sort_by_key(age);
+    // Each age is asked once: it may change while they are sorted.
+    all.sort_by_cached_key(age);
     for old in all.iter().take(all.len().saturating_sub(most)) {
-        match old.is_dir() {
-            true => std::fs::remove_dir_all(old)?,
-            false => std::fs::remove_file(old)?,
-        }
+        let removed = match old.is_dir() {
+            true => std::fs::remove_dir_all(old),
+            false => std::fs::remove_file(old),
+        };
+        removed.or_else(|error| match error.kind() {
+            io::ErrorKind::NotFound => Ok(()),
+            _ => Err(error),
+        })?;
     }
     Ok(())
 }
@@ -282,6 +288,30 @@ pub mod path_json {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_newest_stay_while_others_use_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let files: Vec<_> = (0..200).map(|i| folder.path().join(i.to_string())).collect();
+        files.iter().for_each(|file| std::fs::write(file, "").unwrap());
+        let stop = std::sync::atomic::AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for i in (0..files.len()).cycle() {
+                    let file = std::fs::File::options().append(true).open(&files[i * 7 % 200]);
+                    let _ = file.and_then(|file| file.set_modified(std::time::SystemTime::now()));
+                    if stop.load(std::sync::atomic::Ordering::Relaxed) {
+                        break;
+                    }
+                }
+            });
+            for most in (50..200).rev() {
+                keep_newest(folder.path(), most).unwrap();
+                assert_eq!(folder.path().read_dir().unwrap().count(), most);
+            }
+            stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        });
+    }
 
     #[test]
     fn the_next_scratch_removes_what_a_killed_process_left_and_nothing_else() {

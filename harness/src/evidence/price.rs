@@ -305,14 +305,22 @@ impl Answers<'_> {
                 false => price,
             }
         });
-        // A concept that explains them is one: without falloff is no r in place of r^2, made twice.
+        if price.error <= TWO_SLIPS {
+            return price;
+        }
+        // A concept that explains them is one, also where it is far from the right answers by little: without falloff
+        // is no r in place of r^2, made twice.
         let is_concept = self.changes.iter().any(|change| {
             let left = price.error - Class::Concept.price();
-            price.mistake == Some(change.name)
+            let is_named = price.mistake == Some(change.name)
                 && left <= LEFT_BY_TWO
-                && (change.class == Class::Concept || left >= 0.0)
+                && (change.class == Class::Concept || left >= 0.0);
+            let explains = |shading: Shading| {
+                self.residual(&questions, &shading, &Factors::default()) <= LEFT_BY_TWO
+            };
+            is_named || (change.class == Class::Concept && change.shading.is_some_and(explains))
         });
-        match price.error > TWO_SLIPS && !is_concept && self.are_of_two_slips(&questions) {
+        match !is_concept && self.are_of_two_slips(&questions) {
             true => Price { error: TWO_SLIPS, mistake: Some("two slips"), ..price },
             false => price,
         }

@@ -26,7 +26,7 @@ pub fn render(
         let row_seed = if has(M::SameSeed) { 0 } else { y as u64 };
         let own = Sampler::new(seed.wrapping_add(row_seed));
         let sampler = if has(M::SharedSampler) { &shared } else { &own };
-        let whole = |size: usize| size / 16 * 16;
+        let whole = |size: usize| size / 20 * 20;
         let mut before = Vec3::ZERO;
         for (x, pixel) in row.iter_mut().enumerate() {
             if has(M::WholeTilesOnly) && (x >= whole(job.width) || y >= whole(job.height)) {
