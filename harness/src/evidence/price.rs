@@ -372,7 +372,7 @@ impl Answers<'_> {
             residual <= LEFT_BY_TWO
         };
         let pairs = (0..slips.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
-        let two = pairs
+        let mut two = pairs
             .filter(|&(a, b)| explains(&|at, c| both(plain[at][c], all[a][at][c], all[b][at][c])));
         let is_untested = |shading: &&Shading| {
             !(shading.tests_wi && shading.tests_wo) || shading.tests_both_at_once
@@ -393,7 +393,7 @@ impl Answers<'_> {
         if untested.any(|shading| surely(&|index| (self.of)(index, &shading))) {
             return true;
         }
-        let one_and_factor = (0..slips.len()).filter_map(|a| {
+        let mut one_and_factor = (0..slips.len()).filter_map(|a| {
             let mut ratios: Vec<f64> = Vec::new();
             for (at, &index) in few.iter().enumerate() {
                 let tells = |c: &usize| all[a][at][*c].abs() > 0.01 * (self.unit)(index);
@@ -415,7 +415,7 @@ impl Answers<'_> {
         let of_factor = |(a, factor): (usize, f64)| {
             surely(&|index| (self.of)(index, &slips[a]).map(|value| factor * value))
         };
-        two.map(of_two).any(|told| told) || one_and_factor.map(of_factor).any(|told| told)
+        two.any(of_two) || one_and_factor.any(of_factor)
     }
 
     /// Whether the answers follow those of a changed renderer.
@@ -474,8 +474,8 @@ impl Answers<'_> {
             let changed = of(index);
             let group = (self.group)(index);
             let (apart, total) = groups.entry(group).or_default();
-            for c in 0..3 {
-                let (a, b) = (f64::from(self.found[index][c]), changed[c]);
+            for (c, b) in changed.into_iter().enumerate() {
+                let a = f64::from(self.found[index][c]);
                 let difference = match (a.is_finite(), b.is_finite()) {
                     (true, true) => (a - b).abs(),
                     (false, false) => 0.0,
