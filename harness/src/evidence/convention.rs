@@ -150,8 +150,8 @@ pub fn judge(questions: &[Conventional], together: &dyn Fn() -> Vec<(Party, Chec
     checks
 }
 
-/// The checks under a convention of the renderer's own, if it has one: integrator and one BSDF are wrong each alone, and
-/// right together on every scene, or so but for a slip that does not explain the BSDF alone. Then the integrator is
+/// The checks under a convention of the renderer's own, if it has one: integrator and one BSDF are wrong each alone,
+/// and right together on every scene, or so but for a slip that does not explain the BSDF alone. Then the integrator is
 /// right, and what it makes of the other BSDF is that one's matter. A BSDF that is right alone mends nothing: what an
 /// integrator does wrong may not show on its surfaces.
 fn judge_together(

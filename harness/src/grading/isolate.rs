@@ -51,8 +51,8 @@ struct PassFrames {
 
 /// Judges the student's pass with Umbra's stages (2.1) and the student's stages in Umbra's pass (2.2 to 2.4) on scenes.
 /// One worker draws all frames of the former; another, without any of the student's Rust code, draws those of the
-/// latter. `own_frames` is what the student's own frames show. The flag says whether one of some scene got no answer: then a
-/// stage that does not compile is to blame, otherwise no frame needs it.
+/// latter. `own_frames` is what the student's own frames show. The flag says whether one of some scene got no answer:
+/// then a stage that does not compile is to blame, otherwise no frame needs it.
 pub fn isolate(
     session: &Session,
     plugin: &Path,
