@@ -8,8 +8,8 @@ use super::lexer::{Token, TokenKind, tokens};
 /// Macros that read a file at compile time.
 const INCLUDES: [&str; 4] = ["include_str", "include_bytes", "include", "include_wgsl"];
 
-/// The warnings on the modules and included files that the source at `path` names and that are there in another spelling
-/// only. `files` are all paths of the submission.
+/// The warnings on the modules and included files that the source at `path` names and that are there in another
+/// spelling only. `files` are all paths of the submission.
 pub(super) fn misspelt(path: &str, text: &str, files: &[&str]) -> Vec<Finding> {
     let tokens = tokens(text);
     let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);

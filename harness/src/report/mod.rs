@@ -292,8 +292,8 @@ impl BatchReport {
     }
 }
 
-/// Writes `report.json`, `grades.csv`, `report.html`, and `<slug>/report.html` with `<slug>/view.html` for each submission,
-/// into the folder `out`, which is made when missing, and `instructor/<slug>/report.html` where
+/// Writes `report.json`, `grades.csv`, `report.html`, and `<slug>/report.html` with `<slug>/view.html` for each
+/// submission, into the folder `out`, which is made when missing, and `instructor/<slug>/report.html` where
 /// there is more to know than the student may. The pictures are expected to lie in `<slug>/`, those of held-back scenes
 /// in `instructor/<slug>/` already.
 ///

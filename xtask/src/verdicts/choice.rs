@@ -24,8 +24,8 @@ pub const TRIPLES: usize = 500;
 /// The seed of what stands for the other path.
 pub const PLAIN_SEED: u64 = SEEDS[0];
 
-/// Pairs of mistakes that a student may well make together, and mistakes of renderers that do something otherwise. Not among them: one that hides the
-/// other, such as an intensity that was never set.
+/// Pairs of mistakes that a student may well make together, and mistakes of renderers that do something otherwise.
+/// Not among them: one that hides the other, such as an intensity that was never set.
 const PAIRS: [[&str; 2]; 30] = [
     ["diffuse-no-pi", "phong-n-plus-1"],
     ["diffuse-no-pi", "light-two-cosines"],
