@@ -245,7 +245,7 @@ fn mend_with(changes: &[Change]) -> template_fallback::Built {
 fn what_the_compiler_refuses_is_the_templates_and_the_rest_is_built() {
     let new =
         ("bsdfs/phong.rs", "pub fn new(material: &Material)", "pub fn new(m: &Material, n: f32)");
-    let kinds: [(&[Change], &[&str]); 12] = [
+    let kinds: [(&[Change], &[&str]); 13] = [
         // A type error, a file that is missing, one that does not parse.
         (&[("bsdfs/phong.rs", "f * cos_i", "f + 1")], &["bsdfs/phong.rs"]),
         (&[("bsdfs/phong.rs", "", "")], &["bsdfs/phong.rs"]),
@@ -269,6 +269,8 @@ fn what_the_compiler_refuses_is_the_templates_and_the_rest_is_built() {
             )],
             &["integrators/simple.rs"],
         ),
+        // A name that the template's own line does not find either.
+        (&[("bsdfs/mod.rs", "phong::PhongBsdf", "phong::PhongBSDF")], &["bsdfs/mod.rs"]),
         // Two at once.
         (
             &[("bsdfs/diffuse.rs", "impl Bsdf", "imp Bsdf"), ("renderer.rs", "use", "us")],
@@ -285,4 +287,60 @@ fn what_the_compiler_refuses_is_the_templates_and_the_rest_is_built() {
         assert!(rendered.contains("--> src/") && rendered.contains('^'), "{rendered}");
         assert!(!rendered.contains(workspace().to_str().unwrap()), "{rendered}");
     }
+}
+
+/// Ends the next `count` compilers below this process, as a scheduler or a machine out of memory would.
+#[cfg(target_os = "linux")]
+fn end_compilers(count: usize) -> std::thread::JoinHandle<()> {
+    use nix::sys::signal::{Signal, kill};
+    use nix::unistd::Pid;
+    // The name and the parent of a process.
+    let stat = |pid: i32| {
+        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+        let (name, rest) = stat.split_once('(')?.1.rsplit_once(')')?;
+        Some((name.to_owned(), rest.split_whitespace().nth(1)?.parse::<i32>().ok()?))
+    };
+    let is_below = move |pid: i32| {
+        let mut above =
+            std::iter::successors(Some(pid), |&pid| stat(pid).map(|(_, parent)| parent));
+        above.any(|pid| pid == std::process::id() as i32)
+    };
+    std::thread::spawn(move || {
+        let mut ended = Vec::new();
+        while ended.len() < count {
+            for entry in std::fs::read_dir("/proc").unwrap() {
+                let Ok(pid) = entry.unwrap().file_name().to_str().unwrap_or("").parse() else {
+                    continue;
+                };
+                let is_compiler = stat(pid).is_some_and(|(name, _)| name == "rustc");
+                if ended.len() < count && !ended.contains(&pid) && is_compiler && is_below(pid) {
+                    kill(Pid::from_raw(pid), Signal::SIGKILL).unwrap();
+                    ended.push(pid);
+                }
+            }
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+    })
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_compiler_that_is_ended_from_outside_is_nobodys_fault() {
+    let src = workspace().join("student_template/src");
+    let dir = tempfile::tempdir().unwrap();
+    recording();
+    let compile = || {
+        let supervisor = Supervisor::new(umbra().to_owned(), dir.path().to_owned());
+        let cancel = AtomicBool::new(false);
+        compile(recording(), &supervisor, &src, dir.path(), &default_limits(), &cancel)
+    };
+    let killer = end_compilers(1);
+    let again = compile().unwrap().outcome;
+    killer.join().unwrap();
+    assert!(matches!(again, BuildOutcome::Built { .. }), "{again:?}");
+
+    let killer = end_compilers(2);
+    let error = compile().unwrap_err().to_string();
+    killer.join().unwrap();
+    assert_eq!(error, "the compiler was ended by SIGKILL");
 }

@@ -67,7 +67,7 @@ pub fn default_limits() -> Limits {
 
 /// Compiles the submission whose `src` folder is `src` into a plugin in `out`, an existing folder.
 /// `supervisor` says which program is Umbra and what isolates the compiler. Nothing of the submission besides `src` is named to the compiler.
-/// A timeout counts when it comes again, alone on the machine.
+/// A timeout counts when it comes again, alone on the machine. Nobody is to blame for an end from outside.
 ///
 /// # Errors
 /// When the compiler cannot be started or isolated, or `out` cannot be used.
@@ -161,7 +161,9 @@ fn compile_once(
             }
             BuildOutcome::CompileError { errors }
         }
-        Exit::Starved => return Err(process::starved("the compiler")),
+        exit if exit == Exit::Starved || exit.is_from_outside() => {
+            return Err(process::nobodys_fault("the compiler", exit));
+        }
         exit => BuildOutcome::Ended(exit),
     };
     let (wall_s, cpu_s) = (ended.wall_s, ended.cpu_s);

@@ -336,7 +336,9 @@ fn death(ended: &ChildOutcome) -> Result<(), NoAnswer> {
     let how = match ended.exit {
         Exit::Code(0) => return Ok(()),
         Exit::Cancelled => return Err(io::Error::from(io::ErrorKind::Interrupted).into()),
-        Exit::Starved => return Err(process::starved("a decoder").into()),
+        exit if exit == Exit::Starved || exit.is_from_outside() => {
+            return Err(process::nobodys_fault("a decoder", exit).into());
+        }
         // The child itself reports that it could not work: no disk space, no memory, no lock. Hostile bytes cannot
         // cause this exit.
         Exit::Code(code) if code == i32::from(process::EXIT_NOT_LOCKED) => {

@@ -373,7 +373,10 @@ fn triple(v: [f32; 3]) -> String {
 
 /// What a constant ratio, or the place of the wrong answers, gives away.
 fn hint(mut ratios: Vec<f64>, probes: &[BsdfProbe], values: &[[f32; 3]]) -> String {
-    if values.iter().flatten().any(|v| !v.is_finite()) {
+    if values.iter().flatten().any(|v| v.is_infinite()) {
+        return "a value is infinite: is the mirror direction of length 1, and is nothing divided by 0?".into();
+    }
+    if values.iter().flatten().any(|v| v.is_nan()) {
         return "pow of a negative base is not a number: clamp cos alpha to 0 first".into();
     }
     let nonzero_where_black = |wanted: fn(&api::BsdfQuery) -> bool| {

@@ -1,7 +1,7 @@
 //! The known single mistakes that answers are compared with, each with what a teacher takes it for.
 
 use super::price::{Change, Class, Fitted};
-use super::shading::{Angle, Clamp, Directions, Shading};
+use super::shading::{Angle, Clamp, Directions, Shading, Tests};
 use crate::imaging::srgb;
 
 /// What can be wrong in a diffuse BSDF.
@@ -29,14 +29,18 @@ pub fn diffuse_changes() -> Vec<Change> {
         ),
         slip("cos theta_o beside cos theta_i", Shading { cos_o: [1.0; 2], ..right }),
         slip("divided by cos theta_o", Shading { cos_o: [-1.0; 2], ..right }),
-        slip("wo is not tested", Shading { tests_wo: false, ..right }),
-        slip("wi is not tested", Shading { tests_wi: false, ..right }),
-        slip("neither wo nor wi is tested", Shading { tests_wo: false, tests_wi: false, ..right }),
+        slip("wo is not tested", Shading { tests: Tests::Wi, ..right }),
+        slip("wi is not tested", Shading { tests: Tests::Wo, ..right }),
+        slip("neither wo nor wi is tested", Shading { tests: Tests::Neither, ..right }),
         slip("abs() around cos theta_i", Shading { absolute: true, ..right }),
-        slip("abs() around both cosines", Shading { absolute: true, tests_wo: false, ..right }),
+        slip("abs() around both cosines", Shading { absolute: true, tests: Tests::Wi, ..right }),
         slip(
             "black only where both wo and wi lie below",
-            Shading { tests_both_at_once: true, ..right },
+            Shading { tests: Tests::AtOnce, ..right },
+        ),
+        slip(
+            "not black where both wo and wi lie below",
+            Shading { tests: Tests::SameSide, ..right },
         ),
         slip("sin theta_i in place of cos theta_i", Shading { sine: true, ..right }),
         slip("x of wi in place of its cosine", Shading { axis: 0, ..right }),
@@ -101,9 +105,12 @@ pub fn phong_changes() -> Vec<Change> {
         slip("no power of a negative cos alpha", Shading { clamp: Clamp::NotANumber, ..right }),
         slip(
             "the mirror direction lacks its factor 2",
-            Shading { angle: Angle::WithoutTwo, ..right },
+            Shading { angle: Angle::Sum(1.0, -1.0), ..right },
         ),
-        slip("the mirror direction is the negated wo", Shading { angle: Angle::Negated, ..right }),
+        slip(
+            "the mirror direction is the negated wo",
+            Shading { angle: Angle::Sum(0.0, -1.0), ..right },
+        ),
         concept("the lobe is not normalized", lobe(|_| 1.0)),
         concept("the lobe is divided by pi alone", lobe(|_| std::f64::consts::FRAC_1_PI)),
         concept("the lobe is divided by 2 pi alone", lobe(|_| 1.0 / std::f64::consts::TAU)),
@@ -118,10 +125,11 @@ pub fn phong_changes() -> Vec<Change> {
         slip("exponent rounded up", Shading { round: f64::ceil, ..right }),
         slip("cos alpha is not clamped", Shading { clamp: Clamp::Nothing, ..right }),
         slip("cos alpha is raised before it is clamped", Shading { clamp: Clamp::Power, ..right }),
-        slip("the mirror direction is negated", Shading { angle: Angle::Reversed, ..right }),
+        slip("the mirror direction is negated", Shading { angle: Angle::Sum(-2.0, 1.0), ..right }),
+        slip("the mirror direction adds wo", Shading { angle: Angle::Sum(2.0, 1.0), ..right }),
         slip("wo is mirrored on x alone", Shading { angle: Angle::OneAxis(0), ..right }),
         slip("wo is mirrored on y alone", Shading { angle: Angle::OneAxis(1), ..right }),
-        concept("wo is not mirrored", Shading { angle: Angle::Unmirrored, ..right }),
+        concept("wo is not mirrored", Shading { angle: Angle::Sum(0.0, 1.0), ..right }),
         concept("alpha is taken from the normal", Shading { angle: Angle::Normal, ..right }),
         slip("Ks is grey", Shading { specular_channels: [0; 3], ..right }),
         slip("red and blue of Ks exchanged", Shading { specular_channels: [2, 1, 0], ..right }),

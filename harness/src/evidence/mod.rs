@@ -8,6 +8,7 @@ mod check;
 pub mod convention;
 mod film_slips;
 pub mod images;
+mod light_levels;
 mod lobe;
 pub mod loops;
 pub mod physical;

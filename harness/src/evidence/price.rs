@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use super::check::PRICED;
-use super::shading::Shading;
+use super::shading::{Shading, Tests};
 use super::{Check, CheckId, Measure, Verdict};
 use crate::imaging::correlation::Moments;
 
@@ -374,17 +374,10 @@ impl Answers<'_> {
         let pairs = (0..slips.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
         let mut two = pairs
             .filter(|&(a, b)| explains(&|at, c| both(plain[at][c], all[a][at][c], all[b][at][c])));
-        let is_untested = |shading: &&Shading| {
-            !(shading.tests_wi && shading.tests_wo) || shading.tests_both_at_once
-        };
+        let is_untested = |shading: &&Shading| shading.tests != Tests::Each;
         let untested = slips.iter().filter(is_untested).flat_map(|a| {
             let tested = slips.iter().filter(|b| !is_untested(b));
-            tested.map(|b| Shading {
-                tests_wi: a.tests_wi,
-                tests_wo: a.tests_wo,
-                tests_both_at_once: a.tests_both_at_once,
-                ..*b
-            })
+            tested.map(|b| Shading { tests: a.tests, ..*b })
         });
         let mut untested = untested.filter(|shading| {
             let values = values(shading);
@@ -680,7 +673,7 @@ mod tests {
         for (made, factor) in [
             (two_cosines, 3.0),
             (Shading { normalization: lobe, ..two_cosines }, 1.0),
-            (Shading { normalization: lobe, tests_wi: false, ..right }, 1.0),
+            (Shading { normalization: lobe, tests: Tests::Wo, ..right }, 1.0),
             (Shading { falloff: 1.0, ..two_cosines }, 1.0),
         ] {
             assert_eq!(price(&made, factor).error, TWO_SLIPS, "{made:?}");

@@ -39,12 +39,8 @@ pub struct Shading {
     pub specular_times_diffuse: Option<i32>,
     /// Whether the diffuse term is multiplied by the lobe's normalization too.
     pub diffuse_normalized: bool,
-    /// Whether a surface is black only where it is both seen and lit from behind.
-    pub tests_both_at_once: bool,
-    /// Whether a surface seen from behind is black.
-    pub tests_wo: bool,
-    /// Whether a surface lit from behind is black.
-    pub tests_wi: bool,
+    /// Where a surface is black.
+    pub tests: Tests,
     /// The component of wi that stands for cos theta_i: 2 is right.
     pub axis: usize,
     /// Whether cos theta_i is replaced by its magnitude.
@@ -112,6 +108,23 @@ pub enum Directions {
     LightPlusPoint,
 }
 
+/// What is tested before anything is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tests {
+    /// wo and wi: black where either lies below the surface. Right.
+    Each,
+    /// wo alone.
+    Wo,
+    /// wi alone.
+    Wi,
+    /// Nothing.
+    Neither,
+    /// Both at once: black only where both lie below.
+    AtOnce,
+    /// Their product: not black where both lie below.
+    SameSide,
+}
+
 /// What is clamped to 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clamp {
@@ -128,18 +141,10 @@ pub enum Clamp {
 }
 
 /// The angle that a lobe depends on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Angle {
-    /// Between wi and the mirror direction of wo: right.
-    Mirror,
-    /// Between wi and the negated mirror direction of wo.
-    Reversed,
-    /// Between wi and wo.
-    Unmirrored,
-    /// Between wi and the negated wo.
-    Negated,
-    /// Between wi and n cos theta_o - wo: the mirror direction without its factor 2.
-    WithoutTwo,
+    /// Between wi and this multiple of n cos theta_o plus this multiple of wo: 2 and -1 give the mirror direction.
+    Sum(f64, f64),
     /// Between the normal and the half vector (Blinn).
     Half,
     /// Between wi and wo mirrored on this axis of the tangents alone, 0 or 1.
@@ -159,15 +164,13 @@ impl Default for Shading {
             exponent: [1.0, 0.0],
             round: |n| n,
             normalization: |n| (n + 2.0) / std::f64::consts::TAU,
-            angle: Angle::Mirror,
+            angle: Angle::Sum(2.0, -1.0),
             clamp: Clamp::Base,
             swapped_power: false,
             raised_ks: false,
             specular_times_diffuse: None,
             diffuse_normalized: false,
-            tests_both_at_once: false,
-            tests_wo: true,
-            tests_wi: true,
+            tests: Tests::Each,
             axis: 2,
             absolute: false,
             sine: false,
@@ -221,8 +224,16 @@ impl Shading {
         let cos_o = wo[2];
         let length = if self.long_wi { *distance } else { 1.0 };
         let cos_i = length * if self.absolute { wi[self.axis].abs() } else { wi[self.axis] };
-        let (behind, below) = (self.tests_wo && cos_o <= 0.0, self.tests_wi && cos_i <= 0.0);
-        if if self.tests_both_at_once { behind && below } else { behind || below } {
+        let (behind, below) = (cos_o <= 0.0, cos_i <= 0.0);
+        let black = match self.tests {
+            Tests::Each => behind || below,
+            Tests::Wo => behind,
+            Tests::Wi => below,
+            Tests::Neither => false,
+            Tests::AtOnce => behind && below,
+            Tests::SameSide => behind != below,
+        };
+        if black {
             return [0.0; 3];
         }
         let cos_i = if self.sine { (1.0 - cos_i * cos_i).max(0.0).sqrt() } else { cos_i };
@@ -281,15 +292,12 @@ impl Shading {
     fn lobe(&self, point: &ShadedPoint, length: f64) -> f64 {
         let ShadedPoint { material, wo, wi, .. } = point;
         let n = f64::from(material.exponent);
-        // The mirror image of wo about the normal is (-x, -y, z).
-        let mirror = wi[2] * wo[2] - wi[0] * wo[0] - wi[1] * wo[1];
         let cos_alpha = length
             * match self.angle {
-                Angle::Mirror => mirror,
-                Angle::Reversed => -mirror,
-                Angle::Unmirrored => wi[0] * wo[0] + wi[1] * wo[1] + wi[2] * wo[2],
-                Angle::Negated => -wi[0] * wo[0] - wi[1] * wo[1] - wi[2] * wo[2],
-                Angle::WithoutTwo => -wi[0] * wo[0] - wi[1] * wo[1],
+                Angle::Sum(normal, toward_viewer) => {
+                    let tangential = toward_viewer * (wi[0] * wo[0] + wi[1] * wo[1]);
+                    (normal + toward_viewer) * wi[2] * wo[2] + tangential
+                }
                 Angle::OneAxis(axis) => {
                     let signs = [[-1.0, 1.0], [1.0, -1.0]][axis];
                     signs[0] * wi[0] * wo[0] + signs[1] * wi[1] * wo[1] + wi[2] * wo[2]
@@ -310,6 +318,8 @@ impl Shading {
         let exponent = (self.round)(self.exponent[0] * n + self.exponent[1]);
         let power = if self.swapped_power { exponent.powf(base) } else { base.powf(exponent) };
         let power = if self.clamp == Clamp::Power { power.max(0.0) } else { power };
+        // As in a renderer's single precision.
+        let power = if power.abs() > f64::from(f32::MAX) { f64::INFINITY } else { power };
         (self.normalization)((self.round)(n)) * power
     }
 }
@@ -369,7 +379,7 @@ mod tests {
         let slanted = ShadedPoint { wi: [0.6, 0.0, 0.8], ..point() };
         let twice = Shading { cos_i: [2.0; 2], ..right };
         assert!((twice.radiance(&slanted)[0] / right.radiance(&slanted)[0] - 0.8).abs() < 1e-12);
-        let unclamped = Shading { clamp: Clamp::Nothing, tests_wi: false, ..right };
+        let unclamped = Shading { clamp: Clamp::Nothing, tests: Tests::Wo, ..right };
         let odd = ShadedPoint {
             material: api::MaterialValue { exponent: 2.5, ..point().material },
             wi: [0.0, 0.0, -1.0],

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use basecode::Image;
 
+use super::light_levels::{Levels, what_lit_get};
 use super::price::{self, Class, Price};
 use super::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::imaging::evidence::Tolerances;
@@ -160,8 +161,11 @@ impl Shadows<'_> {
                 Check::new(id, scene, Verdict::Pass, summary)
             }
             Some(index) => {
+                let lit_ones = known_pixels.iter().filter(|pixel| pixel.lit);
+                let off = |light: &f64| (light - 1.0).abs() > f64::from(HALF_LIGHT);
+                let get = what_lit_get(lit_ones.map(|pixel| pixel.visibility).filter(off));
                 let summary = format!(
-                    "{} of {} pixels that see the light get none, {} of {} in shadow get light; first at ({}, {})",
+                    "{} of {} pixels that see the light get {get}, {} of {} in shadow get light; first at ({}, {})",
                     lit[2],
                     lit[1],
                     dark[2],
@@ -174,7 +178,7 @@ impl Shadows<'_> {
                     (true, _) => {
                         "shadows are missing or come loose from what casts them: too much bias?"
                     }
-                    (_, true) => {
+                    (_, true) if get == "none" => {
                         "lit points are in shadow: too little bias, or the light's frustum is too small"
                     }
                     _ => "",
@@ -285,20 +289,9 @@ fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64) -> Price {
         }
         _ => price,
     };
-    let mut dark: Vec<f64> = pixels.iter().filter(|p| !p.lit).map(|p| p.visibility).collect();
-    dark.retain(|visibility| visibility.is_finite());
-    dark.sort_by(f64::total_cmp);
-    match dark.get(dark.len() / 2) {
-        Some(&left) if left > 0.0 && left < 1.0 => {
-            let light = |pixel: &Known| if pixel.lit { 1.0 } else { left };
-            price.or(
-                "shadows leave some light",
-                Class::Slip,
-                price::fading(left) + residual(&light),
-            )
-        }
-        _ => price,
-    }
+    let seen = pixels.iter().map(|pixel| (pixel.lit, pixel.visibility));
+    Levels::of(seen)
+        .priced(price, |lit, dark| residual(&|pixel: &Known| if pixel.lit { lit } else { dark }))
 }
 
 #[cfg(test)]

@@ -19,6 +19,9 @@ const ROUNDS: usize = 3;
 /// The check that says which files were replaced; it costs nothing by itself.
 const REPLACED: CheckId = CheckId::SubmissionReplaced;
 
+/// Remarks on the render loop, which is the template's where a file of its part was replaced.
+const SAMPLER: [CheckId; 3] = [CheckId::SamplerThreads, CheckId::SamplerRows, CheckId::SamplerSeed];
+
 /// A source as it was built.
 pub struct Built {
     /// The last compiler call.
@@ -63,9 +66,15 @@ pub fn build(
     let mut replaced = BTreeMap::new();
     for _ in 0..ROUNDS {
         let known = replaced.len();
-        for error in &errors {
-            for file in to_replace(error, template, copy) {
-                replaced.entry(file).or_insert_with(|| error.headline());
+        // What is wrong in a file of the template's may only follow from what is wrong elsewhere.
+        for of_error in [to_replace, culprits] {
+            for error in &errors {
+                for file in of_error(error, template, copy) {
+                    replaced.entry(file).or_insert_with(|| error.headline());
+                }
+            }
+            if replaced.len() > known {
+                break;
             }
         }
         if replaced.len() == known {
@@ -139,10 +148,15 @@ impl Built {
             let of = |part: &&crate::rubric::Part| part.files.contains(file);
             let parts: Vec<_> = rules.parts.iter().filter(of).collect();
             for part in &parts {
-                let own = |check: &&mut Check| {
-                    part.evidence.contains(&check.id) && check.verdict == Verdict::NotImplemented
-                };
-                checks.iter_mut().filter(own).for_each(|check| check.summary.clone_from(why));
+                // What the template does there is no work of the student's, be it right or wrong.
+                for check in checks.iter_mut().filter(|check| part.evidence.contains(&check.id)) {
+                    let (held_back, weight) = (check.held_back, check.weight);
+                    let own = Check::new(check.id, &check.scene, Verdict::NotImplemented, why);
+                    *check = Check { held_back, weight, ..own };
+                }
+                if part.evidence.contains(&CheckId::LoopAgreement) {
+                    checks.retain(|check| !SAMPLER.contains(&check.id));
+                }
                 let images = checks.iter().filter(|check| part.images_only.contains(&check.id));
                 let verdicts: Vec<Verdict> = images.map(|check| check.verdict).collect();
                 if verdicts.contains(&Verdict::Pass) && !verdicts.contains(&Verdict::Fail) {
@@ -175,7 +189,7 @@ fn seen(file: &str) -> String {
     format!("src/{file}")
 }
 
-/// The files below `src` that an error is about, as far as the template has them too. What is wrong
+/// The files below `src` that an error is about, as far as the template has them too and they differ. What is wrong
 /// with a file of the student's own is the matter of those that use it.
 fn to_replace(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
     let known =
@@ -188,10 +202,10 @@ fn to_replace(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
         return Vec::new();
     };
     if template.join(&file).is_file() {
-        return match differs(&file, template, copy) && known(&file) {
-            true => vec![file],
-            // The template's own line is right as long as what it uses is.
-            false => culprits(error, template, copy).into_iter().filter(known).collect(),
+        return if differs(&file, template, copy) && known(&file) {
+            vec![file]
+        } else {
+            Vec::new()
         };
     }
     let users = users(&file, copy);
@@ -223,16 +237,22 @@ fn differs(file: &str, template: &Path, copy: &Path) -> bool {
     fs::read(copy.join(file)).ok() != fs::read(template.join(file)).ok()
 }
 
-/// The files other than the template's that an error in one of the template's lines comes from: those
-/// that it points at too, or else those that define, or are called, what it names.
+/// The files other than the template's that an error in one of the template's lines comes from, since that line is
+/// right as long as what it uses is: those that it points at too, or else those that define, or are called, what it
+/// names.
 fn culprits(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
+    let at = error.place.as_ref().and_then(|place| below_src(&place.file));
+    if !at.is_some_and(|file| template.join(file).is_file()) {
+        return Vec::new();
+    }
+    let may = |file: &String| may_be_replaced(file, template, copy);
     let lines = error.rendered.lines().map(str::trim_start);
     let places = lines.filter_map(|line| {
         let place = line.strip_prefix("--> ").or_else(|| line.strip_prefix("::: "))?;
         below_src(place.split(':').next()?)
     });
     let mut pointed: Vec<String> = places.filter(|file| template.join(file).is_file()).collect();
-    pointed.retain(|file| differs(file, template, copy));
+    pointed.retain(|file| differs(file, template, copy) && may(file));
     if !pointed.is_empty() {
         return pointed;
     }
@@ -249,7 +269,7 @@ fn culprits(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
     };
     let files = files_below(template).unwrap_or_default();
     let files = files.iter().filter_map(|path| below(path.strip_prefix(template).ok()?));
-    files.filter(|file| differs(file, template, copy)).filter(is_named).collect()
+    files.filter(|file| differs(file, template, copy) && may(file)).filter(is_named).collect()
 }
 
 /// What stands before a name that is defined.
@@ -452,8 +472,11 @@ mod tests {
         let copy = copy.path();
         write(copy, &TEMPLATE);
         write(copy, &[("bsdfs/phong.rs", "pub struct Phong { n: f32 }")]);
-        let of =
-            |rendered: &str| to_replace(&error("wrong", "src/lib.rs", rendered), template, copy);
+        let of = |rendered: &str| {
+            let error = error("wrong", "src/lib.rs", rendered);
+            assert_eq!(to_replace(&error, template, copy), [""; 0]);
+            culprits(&error, template, copy)
+        };
         assert_eq!(
             of("error: wrong\n --> src/lib.rs:7:1\nnote: here\n ::: src/bsdfs/phong.rs:1:2\n"),
             ["bsdfs/phong.rs"]
@@ -466,5 +489,30 @@ mod tests {
         assert_eq!(of(error("wrong", "src/bsdfs/phong/lobe.rs", "")), [""; 0]);
         write(template, &[("bsdfs/phong.rs", "use lobe::peak;")]);
         assert_eq!(of(error("wrong", "src/bsdfs/lobe.rs", "")), ["bsdfs/phong.rs"]);
+    }
+
+    #[test]
+    fn what_the_template_does_in_place_of_a_broken_file_earns_nothing() {
+        let config: serde_json::Value =
+            serde_json::from_str(include_str!("../../../config.json")).expect("JSON");
+        let rules: Rules = serde_json::from_value(config["rules"].clone()).expect("rules");
+        let (broken, _) = built(&[("renderer.rs", "!")]);
+        let (id, shadows) = (CheckId::LoopAgreement, CheckId::ShadowRays);
+        let mut checks = vec![
+            Check { held_back: true, ..Check::new(id, "cbox", Verdict::Pass, "the loop is right") },
+            Check::new(shadows, "cbox", Verdict::Pass, "shadows are right"),
+            Check::new(CheckId::SamplerThreads, "", Verdict::Fail, "threads share a sampler"),
+        ];
+        broken.explain(&rules, &mut checks, &mut Vec::new());
+        let found: Vec<_> = checks.iter().map(|c| (c.id, c.verdict, c.held_back)).collect();
+        assert_eq!(
+            found,
+            [
+                (id, Verdict::NotImplemented, true),
+                (shadows, Verdict::Pass, false),
+                (CheckId::SubmissionReplaced, Verdict::Fail, false),
+            ]
+        );
+        assert_eq!(checks[0].summary, "src/renderer.rs:7: unexpected `!`");
     }
 }

@@ -63,6 +63,18 @@ impl Exit {
         }
     }
 
+    /// Whether it got a signal that ends processes from outside: an operator's, a scheduler's, or that of a machine
+    /// out of memory. A program that fails gets others.
+    pub fn is_from_outside(self) -> bool {
+        #[cfg(unix)]
+        {
+            use nix::libc::{SIGHUP, SIGINT, SIGKILL, SIGQUIT, SIGTERM};
+            matches!(self, Self::Signal(SIGHUP | SIGINT | SIGQUIT | SIGTERM | SIGKILL))
+        }
+        #[cfg(not(unix))]
+        false
+    }
+
     /// Whether it ran out of time, its own or the machine's.
     pub fn is_out_of_time(self) -> bool {
         matches!(self, Self::OutOfCpu | Self::TimedOut | Self::Starved)
@@ -120,9 +132,10 @@ impl ChildOutcome {
     }
 }
 
-/// The error for a child that was [`Exit::Starved`].
-pub fn starved(what: &str) -> std::io::Error {
-    std::io::Error::new(std::io::ErrorKind::TimedOut, format!("{what} {}", Exit::Starved))
+/// The error for a child whose end is nobody's fault: it was [`Exit::Starved`], or ended from outside. Its kind is
+/// `TimedOut`: doing it again may help.
+pub fn nobodys_fault(what: &str, exit: Exit) -> std::io::Error {
+    std::io::Error::new(std::io::ErrorKind::TimedOut, format!("{what} {exit}"))
 }
 
 /// The usual name of a signal.

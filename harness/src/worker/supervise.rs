@@ -139,8 +139,11 @@ impl Supervisor {
         let mut report = JobReport { outcomes: Vec::new(), renderer: None, runs: Vec::new() };
         let mut pending: Vec<usize> = (0..count).collect();
         let used_up = || job.plugin.is_some() && retries.used_up().is_some();
+        // Whether the first of those pending was asked again because its worker was ended from outside. A renderer can
+        // do that to itself: then it ends so again.
+        let mut ended_before = vec![false; count];
         loop {
-            // Each worker settles one request at least, so this ends.
+            // Each worker settles one request, or is the second to be ended from outside at it, so this ends.
             pending.retain(|&index| outcomes[index].is_none());
             for &index in &pending {
                 outcomes[index] = retries.given_up(job, &job.requests[index]);
@@ -171,6 +174,14 @@ impl Supervisor {
             report.renderer = report.renderer.or(run.renderer);
             let exit = run.ended.exit;
             report.runs.push(WorkerRun { requests: pending.clone(), ended: run.ended });
+            if exit.is_from_outside() {
+                for &index in &pending {
+                    let blamed = matches!(outcomes[index], Some(Outcome::CrashedBySignal(_)));
+                    if blamed && !std::mem::replace(&mut ended_before[index], true) {
+                        outcomes[index] = None;
+                    }
+                }
+            }
             if !exit.is_out_of_time() {
                 continue;
             }
@@ -498,7 +509,7 @@ pub(super) fn not_started(ended: &ChildOutcome) -> Outcome {
 }
 
 fn starved() -> Outcome {
-    let reason = process::starved("the worker").to_string();
+    let reason = process::nobodys_fault("the worker", Exit::Starved).to_string();
     Outcome::NotRun { reason, fault: Fault::Environment }
 }
 

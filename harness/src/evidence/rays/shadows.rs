@@ -3,6 +3,7 @@
 use basecode::{Ray, Vec3};
 
 use super::{RELATIVE, RayBatch, STRAY_FRACTION};
+use crate::evidence::light_levels::{GAINS_LIGHT, LEAVES_LIGHT, LOSES_LIGHT, Levels, what_lit_get};
 use crate::evidence::price::{self, Class, Price};
 use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::expected::SurfacePoint;
@@ -10,10 +11,6 @@ use crate::imaging::correlation::Moments;
 
 /// Nothing is in shadow, or nothing lit, where more of the rays than this are wrong.
 const NEARLY_ALL: f64 = 0.99;
-/// The mistake of shadows that are not black.
-const LEAVES_LIGHT: &str = "shadows leave some light";
-/// The mistake of lit points that are darker with shadows on.
-const LOSES_LIGHT: &str = "lit points lose some light";
 /// The mistake of shadows that are all of one color.
 const ONE_COLOR: &str = "shadows have a color of their own";
 /// The mistake of a switch that does the opposite.
@@ -111,9 +108,11 @@ pub fn judge_shadows(
         }
         Some((index, visibility)) => {
             let p = batch.points[index].position;
+            let wrong = lit_seen.iter().copied().filter(|seen| (seen - 1.0).abs() >= HALF_LIGHT);
+            let get = what_lit_get(wrong);
             let summary = format!(
-                "{lit_wrong} of {lit_known} rays that reach the light get none, {dark_wrong} of {dark} rays in shadow \
-                 get light; first at ({:.3}, {:.3}, {:.3}): expected visibility {}, found {visibility:.2}",
+                "{lit_wrong} of {lit_known} rays that reach the light get {get}, {dark_wrong} of {dark} rays in \
+                 shadow get light; first at ({:.3}, {:.3}, {:.3}): expected visibility {}, found {visibility:.2}",
                 p.x,
                 p.y,
                 p.z,
@@ -362,33 +361,9 @@ fn price(batch: &RayBatch, known: &[(usize, f64)], raw: f64, occluders: &Occlude
         of(lit).filter(|(_, visibility)| !right(*visibility)).count() as f64
     });
     let price = price::partly(price, lit_wrong / counts[0], dark_wrong / counts[1]);
-    // What nearly all dark rays, or lit ones, have of the light.
-    let level = |wanted: bool| {
-        let mut seen: Vec<f64> = of(wanted).map(|(_, visibility)| *visibility).collect();
-        seen.retain(|visibility| visibility.is_finite());
-        seen.sort_by(f64::total_cmp);
-        seen.get(seen.len() / 2).copied().unwrap_or_default()
-    };
-    let (lit, dark) = (level(true), level(false));
-    let price = match dark > 0.0 && dark < 1.0 {
-        true => price.or(
-            LEAVES_LIGHT,
-            Class::Slip,
-            price::fading(dark)
-                + residual(&|index| {
-                    if index < batch.lit { 1.0 } else { dark }
-                }),
-        ),
-        false => price,
-    };
-    match lit > 0.0 && lit < 1.0 {
-        true => price.or(
-            LOSES_LIGHT,
-            Class::Slip,
-            price::fading(1.0 - lit) + residual(&|index| if index < batch.lit { lit } else { 0.0 }),
-        ),
-        false => price,
-    }
+    let seen = known.iter().map(|(index, visibility)| (*index < batch.lit, *visibility));
+    Levels::of(seen)
+        .priced(price, |lit, dark| residual(&|index| if index < batch.lit { lit } else { dark }))
 }
 
 /// Whether radiance is the same except for rounding. NaN in both does not concern shadows.
@@ -473,8 +448,8 @@ fn charge_what_is_never_tested(checks: &mut [Check]) {
         return;
     }
     for check in checks.iter_mut().filter(|check| check.verdict == Verdict::Fail) {
-        let left =
-            [LEAVES_LIGHT, LOSES_LIGHT, ONE_COLOR, INVERTED].contains(&check.mistake.as_str());
+        let left = [LEAVES_LIGHT, LOSES_LIGHT, GAINS_LIGHT, ONE_COLOR, INVERTED]
+            .contains(&check.mistake.as_str());
         if let Some((lit, dark)) = fractions(check).filter(|_| !left) {
             check.error = Price::of_raw(lit + dark).error;
         }
