@@ -245,7 +245,7 @@ fn mend_with(changes: &[Change]) -> template_fallback::Built {
 fn what_the_compiler_refuses_is_the_templates_and_the_rest_is_built() {
     let new =
         ("bsdfs/phong.rs", "pub fn new(material: &Material)", "pub fn new(m: &Material, n: f32)");
-    let kinds: [(&[Change], &[&str]); 13] = [
+    let kinds: [(&[Change], &[&str]); 14] = [
         // A type error, a file that is missing, one that does not parse.
         (&[("bsdfs/phong.rs", "f * cos_i", "f + 1")], &["bsdfs/phong.rs"]),
         (&[("bsdfs/phong.rs", "", "")], &["bsdfs/phong.rs"]),
@@ -271,6 +271,7 @@ fn what_the_compiler_refuses_is_the_templates_and_the_rest_is_built() {
         ),
         // A name that the template's own line does not find either.
         (&[("bsdfs/mod.rs", "phong::PhongBsdf", "phong::PhongBSDF")], &["bsdfs/mod.rs"]),
+        (&[("bsdfs/mod.rs", "pub use diffuse::DiffuseBsdf;\n", "")], &["bsdfs/mod.rs"]),
         // Two at once.
         (
             &[("bsdfs/diffuse.rs", "impl Bsdf", "imp Bsdf"), ("renderer.rs", "use", "us")],

@@ -239,13 +239,22 @@ fn record(
     metadata: &Metadata,
     progress: &dyn Fn(Compiling),
 ) -> Result<(Call, String), RecordError> {
-    // Cargo's freshness is a file for each crate; without it this one crate is built again.
-    let fingerprints = workspace.join("target/release/.fingerprint");
+    // Cargo's freshness is a file for each crate; without it this one crate is built again. A cargo that builds here
+    // holds its lock, and does not expect that.
+    let release = workspace.join("target/release");
+    let lock = fs::File::open(release.join(".cargo-lock")).ok();
+    if let Some(lock) = lock.as_ref().filter(|lock| lock.try_lock().is_err()) {
+        eprintln!("umbra: waiting for the cargo that builds in {}", release.display());
+        // Where there are no locks, cargo has none either.
+        let _ = lock.lock();
+    }
+    let fingerprints = release.join(".fingerprint");
     for entry in fs::read_dir(&fingerprints).into_iter().flatten().flatten() {
         if entry.file_name().to_string_lossy().starts_with(&format!("{TEMPLATE}-")) {
             fs::remove_dir_all(entry.path()).map_err(at(&entry.path()))?;
         }
     }
+    drop(lock);
     let file = folder.join("call.json");
     let _ = fs::remove_file(&file);
     let mut built = vec![TEMPLATE];

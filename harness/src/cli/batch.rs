@@ -325,7 +325,7 @@ impl<'a> Batch<'a> {
                 let entry = |record| {
                     let mut entry = graded(record, rules);
                     if let Some(selection) = self.selection {
-                        selection.only_of(&mut entry.grade);
+                        selection.only_of(&mut entry.grade, rules, &entry.record.evidence);
                     }
                     entry
                 };

@@ -20,7 +20,7 @@ use crate::files::{files_below, write_whole};
 use crate::grading::Mode;
 use crate::intake::{format_of_bytes, read_archive};
 use crate::report::{self, Closing, Look};
-use crate::rubric::Part;
+use crate::rubric::{Part, PartGrade};
 
 /// What the last check found, in the submission's folder in the report.
 const LAST: &str = "last-check.json";
@@ -152,7 +152,9 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     if arguments.open {
         super::view::open_page(&page);
     }
-    let whole = entry.grade.points >= entry.grade.out_of;
+    // A bonus makes up for no part.
+    let grade = &entry.grade;
+    let whole = grade.points >= grade.out_of && !grade.parts.iter().any(PartGrade::is_lost);
     Ok(if whole { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
 }
 

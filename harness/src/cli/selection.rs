@@ -4,8 +4,9 @@ use anyhow::ensure;
 
 use super::context::Context;
 use crate::assignment::Assignment;
+use crate::evidence::{CheckId, Evidence, Verdict};
 use crate::grading::RenderPath;
-use crate::rubric::{Grade, Part};
+use crate::rubric::{Grade, Part, PartGrade, Rules};
 
 /// What of an assignment is asked.
 pub struct Selection {
@@ -44,6 +45,13 @@ impl Selection {
         }
         if !self.scenes.is_empty() {
             assignment.scenes.retain(|scene| self.scenes.contains(&scene.name));
+            // Images of a few scenes stand for no part: what is wrong may not show on them.
+            let rules = &mut assignment.rules;
+            for (name, path) in &mut rules.paths {
+                let own = rules.parts.iter().filter(|part| part.path == *name);
+                path.unseen = own.flat_map(|part| part.evidence.clone()).collect();
+            }
+            rules.parts.iter_mut().for_each(|part| part.proof = None);
         }
         let bonus = assignment.rules.parts.iter().any(|part| part.bonus && self.asks(&part.id));
         if !bonus {
@@ -64,12 +72,29 @@ impl Selection {
         RenderPath::ALL.into_iter().filter(|&path| asked(path)).collect()
     }
 
-    /// Takes out of a grade what was not asked.
-    pub fn only_of(&self, grade: &mut Grade) {
+    /// Takes out of a grade what was not asked, and what the chosen scenes say nothing of.
+    pub fn only_of(&self, grade: &mut Grade, rules: &Rules, evidence: &Evidence) {
         if self.is_all() {
             return;
         }
         grade.parts.retain(|part| self.asks(&part.id));
+        if !self.scenes.is_empty() {
+            let told =
+                |id: &CheckId| evidence.named(*id).any(|check| check.verdict != Verdict::NotJudged);
+            let silent = |part: &&Part| !part.evidence.iter().chain(&part.fallback).any(told);
+            let silent: Vec<&str> =
+                rules.parts.iter().filter(silent).map(|part| part.id.as_str()).collect();
+            let is_silent = |part: &PartGrade| silent.contains(&part.id.as_str());
+            // What was asked for by its number is not passed over.
+            grade.parts.retain(|part| !self.parts.is_empty() || !is_silent(part));
+            for part in grade.parts.iter_mut().filter(|part| is_silent(part)) {
+                (part.points, part.points_max) = (0.0, part.out_of);
+                part.reason = "could not be judged: the chosen scenes say nothing of it".into();
+            }
+            if self.parts.is_empty() && !silent.is_empty() {
+                grade.remarks.push(format!("nothing of {} shows there", silent.join(", ")));
+            }
+        }
         grade.points = grade.parts.iter().map(|part| part.points).sum();
         grade.points_max = grade.parts.iter().map(|part| part.points_max).sum();
         grade.out_of = grade.parts.iter().map(|part| part.out_of).sum();

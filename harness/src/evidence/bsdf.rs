@@ -413,6 +413,7 @@ fn hint(mut ratios: Vec<f64>, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Stri
 
 #[cfg(test)]
 mod tests {
+    use super::super::price::Class;
     use super::*;
 
     fn judge_plain(kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Check {
@@ -484,6 +485,51 @@ mod tests {
             assert_eq!(passes(&probes, &values, &convention), same, "{convention:?}");
             let judged = judge(BsdfKind::Phong, &probes, &values, &convention).verdict;
             assert_eq!(judged == Verdict::Pass, same, "{convention:?}");
+        }
+    }
+
+    /// cos alpha of a renderer, from wo, wi and the cosine between them.
+    type CosAlpha = fn([f32; 3], [f32; 3], f32) -> f32;
+
+    #[test]
+    fn one_wrong_sign_power_or_cosine_of_the_mirror_direction_is_a_slip() {
+        let probes = probes(BsdfKind::Phong);
+        // In single precision, as a student's code: a direction that is too long overflows.
+        let error = |cos_alpha: CosAlpha| {
+            let values: Vec<[f32; 3]> = probes
+                .iter()
+                .map(|probe| {
+                    let (wo, wi) = (probe.query.wo, probe.query.wi);
+                    if wo[2] <= 0.0 || wi[2] <= 0.0 {
+                        return [0.0; 3];
+                    }
+                    let (m, scale) = (&probe.point.material, probe.point.scale as f32);
+                    let between = wo[0] * wi[0] + wo[1] * wi[1] + wo[2] * wi[2];
+                    let base = cos_alpha(wo, wi, between).max(0.0);
+                    let lobe = (m.exponent + 2.0) / std::f32::consts::TAU * base.powf(m.exponent);
+                    let term =
+                        |c: usize| m.diffuse[c] / std::f32::consts::PI + m.specular[c] * lobe;
+                    [0, 1, 2].map(|c| scale * term(c) * wi[2])
+                })
+                .collect();
+            judge_plain(BsdfKind::Phong, &probes, &values)
+        };
+        let right = error(|wo, wi, between| 2.0 * wo[2] * wi[2] - between);
+        assert_eq!(right.verdict, Verdict::Pass, "{}", right.summary);
+        let slips: [CosAlpha; 7] = [
+            |wo, wi, between| 2.0 * wo[2] * wi[2] + between,
+            |wo, wi, between| wo[2] * wi[2] - between,
+            |wo, wi, between| between - 2.0 * wo[2] * wi[2],
+            |_, wi, between| 2.0 * wi[2] * wi[2] - between,
+            |wo, _, between| 2.0 * wo[2] * wo[2] - between,
+            |_, wi, between| 2.0 * wi[2] - between,
+            |wo, _, between| 2.0 * wo[2] - between,
+        ];
+        for (index, slip) in slips.into_iter().enumerate() {
+            let check = error(slip);
+            let off = check.error / Class::Slip.price();
+            assert!((0.9..1.2).contains(&off), "{index}: {} {}", check.error, check.mistake);
+            assert!(!check.hint.contains("negative base"), "{index}: {}", check.hint);
         }
     }
 

@@ -127,6 +127,16 @@ pub fn phong_changes() -> Vec<Change> {
         slip("cos alpha is raised before it is clamped", Shading { clamp: Clamp::Power, ..right }),
         slip("the mirror direction is negated", Shading { angle: Angle::Sum(-2.0, 1.0), ..right }),
         slip("the mirror direction adds wo", Shading { angle: Angle::Sum(2.0, 1.0), ..right }),
+        slip(
+            "wo is mirrored with the cosine of wi",
+            Shading { angle: Angle::Cosines(2, 0), ..right },
+        ),
+        slip(
+            "wi is mirrored with the cosine of wo",
+            Shading { angle: Angle::Cosines(0, 2), ..right },
+        ),
+        slip("wo is mirrored without its cosine", Shading { angle: Angle::Cosines(1, 0), ..right }),
+        slip("wi is mirrored without its cosine", Shading { angle: Angle::Cosines(0, 1), ..right }),
         slip("wo is mirrored on x alone", Shading { angle: Angle::OneAxis(0), ..right }),
         slip("wo is mirrored on y alone", Shading { angle: Angle::OneAxis(1), ..right }),
         concept("wo is not mirrored", Shading { angle: Angle::Sum(0.0, 1.0), ..right }),

@@ -314,7 +314,7 @@ impl Answers<'_> {
             let left = price.error - Class::Concept.price();
             let is_named = price.mistake == Some(change.name)
                 && left <= LEFT_BY_TWO
-                && (change.class == Class::Concept || left >= 0.0);
+                && (change.class == Class::Concept || (change.fitted.is_some() && left >= 0.0));
             let explains = |shading: Shading| {
                 self.residual(&questions, &shading, &Factors::default()) <= LEFT_BY_TWO
             };
@@ -437,12 +437,15 @@ impl Answers<'_> {
         (0..self.found.len()).step_by(step).collect()
     }
 
-    /// The answers beside those of `shading`, of every channel, in units.
+    /// The answers beside those of `shading`, of every channel, in units. Where neither is finite, they agree, and
+    /// nothing is to be compared.
     fn pairs(&self, questions: &[usize], shading: &Shading, factors: &Factors) -> Moments {
         Moments::of(questions.iter().flat_map(|&index| {
             let (expected, unit) = ((self.of)(index, shading), (self.unit)(index));
             let (found, factors) = (self.found[index], self.factors(factors, index));
-            (0..3).map(move |c| (f64::from(found[c]) / unit, factors[c] * expected[c] / unit))
+            let pair = move |c: usize| (f64::from(found[c]), factors[c] * expected[c]);
+            let told = |(a, b): &(f64, f64)| a.is_finite() || b.is_finite();
+            (0..3).map(pair).filter(told).map(move |(a, b)| (a / unit, b / unit))
         }))
     }
 

@@ -145,6 +145,9 @@ pub enum Clamp {
 pub enum Angle {
     /// Between wi and this multiple of n cos theta_o plus this multiple of wo: 2 and -1 give the mirror direction.
     Sum(f64, f64),
+    /// Between one direction and twice the normal minus the other, where the normal has these powers of cos theta_i
+    /// and cos theta_o, instead of one of each.
+    Cosines(i32, i32),
     /// Between the normal and the half vector (Blinn).
     Half,
     /// Between wi and wo mirrored on this axis of the tangents alone, 0 or 1.
@@ -292,12 +295,13 @@ impl Shading {
     fn lobe(&self, point: &ShadedPoint, length: f64) -> f64 {
         let ShadedPoint { material, wo, wi, .. } = point;
         let n = f64::from(material.exponent);
+        let between = wi[0] * wo[0] + wi[1] * wo[1] + wi[2] * wo[2];
         let cos_alpha = length
             * match self.angle {
                 Angle::Sum(normal, toward_viewer) => {
-                    let tangential = toward_viewer * (wi[0] * wo[0] + wi[1] * wo[1]);
-                    (normal + toward_viewer) * wi[2] * wo[2] + tangential
+                    normal * wi[2] * wo[2] + toward_viewer * between
                 }
+                Angle::Cosines(i, o) => 2.0 * wi[2].powi(i) * wo[2].powi(o) - between,
                 Angle::OneAxis(axis) => {
                     let signs = [[-1.0, 1.0], [1.0, -1.0]][axis];
                     signs[0] * wi[0] * wo[0] + signs[1] * wi[1] * wo[1] + wi[2] * wo[2]
@@ -318,9 +322,9 @@ impl Shading {
         let exponent = (self.round)(self.exponent[0] * n + self.exponent[1]);
         let power = if self.swapped_power { exponent.powf(base) } else { base.powf(exponent) };
         let power = if self.clamp == Clamp::Power { power.max(0.0) } else { power };
+        let lobe = (self.normalization)((self.round)(n)) * power;
         // As in a renderer's single precision.
-        let power = if power.abs() > f64::from(f32::MAX) { f64::INFINITY } else { power };
-        (self.normalization)((self.round)(n)) * power
+        if lobe.abs() > f64::from(f32::MAX) { f64::INFINITY } else { lobe }
     }
 }
 

@@ -128,7 +128,8 @@ impl Workshop<'_> {
         say("compiling the source");
         let src = submission.root.join("src");
         if !src.join("lib.rs").is_file() {
-            begun.checks.push(Check::new(BUILD, "", Verdict::Fail, "there is no src/lib.rs"));
+            let summary = no_source(&submission.root);
+            begun.checks.push(Check::new(BUILD, "", Verdict::Fail, summary));
             return Ok(());
         }
         let scratch = begun.scratch.path();
@@ -170,5 +171,15 @@ impl Workshop<'_> {
         }
         begun.built = plugin.map(|library| (library, built));
         Ok(())
+    }
+}
+
+/// Why there is no source, where it may lie under a name that only some systems take for the right one.
+fn no_source(root: &Path) -> String {
+    let entries = std::fs::read_dir(root).into_iter().flatten().flatten();
+    let mut names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    match names.find(|name| name != "src" && name.eq_ignore_ascii_case("src")) {
+        Some(name) => format!("there is no src/lib.rs: the folder is called {name}, expected src"),
+        None => "there is no src/lib.rs".to_owned(),
     }
 }

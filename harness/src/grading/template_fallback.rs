@@ -223,9 +223,7 @@ fn users(file: &str, copy: &Path) -> Vec<String> {
         .map(|name| name.unwrap_or_default().to_string_lossy().into_owned());
     let uses = |other: &String| {
         let text = fs::read_to_string(copy.join(other)).unwrap_or_default();
-        other != file
-            && (text.contains(&name)
-                || text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == stem))
+        other != file && (text.contains(&name) || words(&text).any(|word| word == stem))
     };
     let files = files_below(copy).unwrap_or_default();
     let files = files.iter().filter_map(|path| below(path.strip_prefix(copy).ok()?));
@@ -238,38 +236,60 @@ fn differs(file: &str, template: &Path, copy: &Path) -> bool {
 }
 
 /// The files other than the template's that an error in one of the template's lines comes from, since that line is
-/// right as long as what it uses is: those that it points at too, or else those that define, or are called, what it
-/// names.
+/// right as long as what it uses is: modules that no longer pass on what it names, or else files that it points at too,
+/// or else those that define, or are called, what it names.
 fn culprits(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
     let at = error.place.as_ref().and_then(|place| below_src(&place.file));
     if !at.is_some_and(|file| template.join(file).is_file()) {
         return Vec::new();
     }
-    let may = |file: &String| may_be_replaced(file, template, copy);
+    let is_other = |file: &String| {
+        template.join(file).is_file()
+            && differs(file, template, copy)
+            && may_be_replaced(file, template, copy)
+    };
+    let files = files_below(template).unwrap_or_default();
+    let files = files.iter().filter_map(|path| below(path.strip_prefix(template).ok()?));
+    let others: Vec<String> = files.filter(is_other).collect();
+    let quoted = error.rendered.split('`').skip(1).step_by(2);
+    let named: BTreeSet<&str> = quoted.flat_map(words).collect();
+    let text = |at: &Path, file: &str| fs::read_to_string(at.join(file)).unwrap_or_default();
+    let passes_on = |at: &Path, file: &str, name: &str| words(&text(at, file)).any(|w| w == name);
+    let lacks_a_name = |file: &&String| {
+        let lost = |name: &&str| passes_on(template, file, name) && !passes_on(copy, file, name);
+        is_module(file) && named.iter().any(lost)
+    };
+    let modules: Vec<String> = others.iter().filter(lacks_a_name).cloned().collect();
+    if !modules.is_empty() {
+        return modules;
+    }
     let lines = error.rendered.lines().map(str::trim_start);
     let places = lines.filter_map(|line| {
         let place = line.strip_prefix("--> ").or_else(|| line.strip_prefix("::: "))?;
         below_src(place.split(':').next()?)
     });
-    let mut pointed: Vec<String> = places.filter(|file| template.join(file).is_file()).collect();
-    pointed.retain(|file| differs(file, template, copy) && may(file));
+    let pointed: Vec<String> = places.filter(is_other).collect();
     if !pointed.is_empty() {
         return pointed;
     }
-    let is_word = |c: char| c.is_alphanumeric() || c == '_';
-    let quoted = error.rendered.split('`').skip(1).step_by(2);
-    let named: BTreeSet<&str> = quoted.flat_map(|name| name.split(|c: char| !is_word(c))).collect();
     let is_named = |file: &String| {
         let stem = Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
-        let text = fs::read_to_string(copy.join(file)).unwrap_or_default();
-        let words: Vec<&str> =
-            text.split(|c: char| !is_word(c)).filter(|w| !w.is_empty()).collect();
+        let text = text(copy, file);
+        let words: Vec<&str> = words(&text).collect();
         let defines = |pair: &[&str]| DEFINING.contains(&pair[0]) && named.contains(pair[1]);
         named.contains(&*stem) || words.windows(2).any(defines)
     };
-    let files = files_below(template).unwrap_or_default();
-    let files = files.iter().filter_map(|path| below(path.strip_prefix(template).ok()?));
-    files.filter(|file| differs(file, template, copy) && may(file)).filter(is_named).collect()
+    others.into_iter().filter(is_named).collect()
+}
+
+/// The identifiers, keywords and numbers in a text.
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|word| !word.is_empty())
+}
+
+/// Whether a file says what is in a folder's module.
+fn is_module(file: &str) -> bool {
+    Path::new(file).file_name().is_some_and(|name| name == "mod.rs")
 }
 
 /// What stands before a name that is defined.

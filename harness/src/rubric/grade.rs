@@ -62,6 +62,18 @@ pub struct PartGrade {
     pub evidence: Vec<String>,
 }
 
+impl PartGrade {
+    /// Whether nobody tried for it: a bonus that earned nothing.
+    pub fn is_unearned(&self) -> bool {
+        self.bonus && self.points_max == 0.0
+    }
+
+    /// Whether it did not earn everything. A bonus that nobody tried for is nothing lost.
+    pub fn is_lost(&self) -> bool {
+        self.points < self.out_of && !self.is_unearned()
+    }
+}
+
 /// What one part is worth, as fractions of its points.
 struct PartScore {
     least: f64,

@@ -22,6 +22,10 @@ const TIMES_REFERENCE: f64 = 10.0;
 const TIMES_REFERENCE_SHORT: f64 = 3.0;
 /// They may then stand still for this fraction of the usual limit.
 const SHORT: f64 = 0.2;
+/// One worker may stand still for this fraction of the seconds that its submission has left for that, or for so many
+/// seconds if that is more.
+const SHARE: f64 = 0.25;
+const SHARE_S: f64 = 2.0;
 
 /// How the reason begins when this process could not run a worker, for want of disk space, memory, files.
 pub(super) const CANNOT_RUN: &str = "cannot run a worker";
@@ -211,7 +215,9 @@ impl<'a> RetryBudget<'a> {
         if job.plugin.is_none() {
             return;
         }
-        limits.wall_s = limits.wall_s.min((budget.still_s - still_s).max(0.0) + 0.1);
+        // One question that stands still leaves time to ask others.
+        let left_s = (budget.still_s - still_s).max(0.0);
+        limits.wall_s = limits.wall_s.min((SHARE * left_s).max(SHARE_S)).min(left_s + 0.1);
         // Before, it is not worth measuring the reference.
         if cpu_s >= budget.cpu_s {
             let left = self.cpu_budget(budget, &job.requests[first]) - cpu_s;

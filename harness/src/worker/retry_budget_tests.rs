@@ -161,8 +161,13 @@ fn a_budget_ends_a_path_by_cpu_time_of_the_reference_or_by_standing_still() {
     retries.renew();
     assert_eq!(over(), None);
 
-    retries.spent(&job, &ended(1.0, 19.5));
-    assert!((retries.allowed(&job, &[0], &limits()).limits.wall_s - 0.6).abs() < 1e-9);
+    // What stands still, and does so again alone, leaves half of the time for other questions.
+    let still_s = || retries.allowed(&job, &[0], &limits()).limits.wall_s;
+    assert_eq!(still_s(), 5.0);
+    retries.spent(&job, &ended(1.0, 5.0));
+    assert_eq!(still_s(), 3.75);
+    retries.spent(&job, &ended(1.0, 14.5));
+    assert!((still_s() - 0.6).abs() < 1e-9);
     retries.spent(&job, &ended(1.0, 0.6));
     assert!(retries.used_up().unwrap().starts_with("20 s of doing nothing"));
     // Nobody has less than the seconds that everybody has, and without a budget nothing ends.

@@ -24,6 +24,7 @@ use self::server::{Board, Server, Stage};
 use super::context::{Context, on_interrupt};
 use super::earlier::{Report, Row};
 use super::outputs::ensure_apart;
+use super::selection::Selection;
 use crate::columns::count;
 use crate::intake::Severity;
 use crate::rubric::PartGrade;
@@ -68,6 +69,9 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     let slug = super::class::sources(&given, &arguments.output, &std::collections::HashMap::new())
         .remove(0)
         .slug;
+    // Errors come before anything opens.
+    Selection { parts: arguments.part.clone(), scenes: arguments.scene.clone() }
+        .restrict(&mut Context::assignment(root)?)?;
     ensure_apart(&arguments.output, &folder, &slug, &context.assignment.tree)?;
     super::writable(&arguments.output)?;
     let output = arguments.output.canonicalize()?;
@@ -309,11 +313,8 @@ fn verdict(row: &Row, is_whole: bool) -> (Stage, String, String) {
         let message = format!("{place}{first} ({points})");
         return (Stage::Refused, "does not compile".to_owned(), message);
     }
-    // A bonus that nobody tried for is nothing lost.
-    let is_lost =
-        |part: &&PartGrade| part.points < part.out_of && !(part.bonus && part.points_max == 0.0);
     let mut errors = row.findings.iter().filter(|found| found.severity == Severity::Error);
-    let lost: Vec<&PartGrade> = row.parts.iter().filter(is_lost).collect();
+    let lost: Vec<&PartGrade> = row.parts.iter().filter(|part| part.is_lost()).collect();
     match lost.split_first() {
         None => match errors.next().filter(|_| is_whole) {
             Some(error) => {

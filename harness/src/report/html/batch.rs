@@ -2,9 +2,8 @@
 
 use super::super::number::{due, is_range, of_part, points, range};
 use super::super::{BatchReport, ErrorPicture, INSTRUCTOR, ReportError, SubmissionReport};
-use super::lost::is_lost;
 use super::markup::Html;
-use super::{CLASS, begin, class, end, overview, part_class};
+use super::{CLASS, begin, end, overview, part_class, total_class};
 use crate::class::Class;
 use crate::columns::count;
 use crate::evidence::CheckId;
@@ -81,7 +80,7 @@ fn row(html: &mut Html, report: &BatchReport, entry: &SubmissionReport) {
     html.text(shown);
     html.raw("</a><small>").text(&record.name).raw("</small></th>");
     html.raw("<td class=\"number total ");
-    html.raw(class(grade.points, grade.points_max, grade.out_of)).raw("\" data-sort=\"");
+    html.raw(total_class(grade)).raw("\" data-sort=\"");
     html.show(grade.points).raw("\">").text(&range(grade.points, grade.points_max));
     html.raw("</td><td>").text(&student.id).raw("</td>");
     for part in &report.rules.parts {
@@ -90,7 +89,7 @@ fn row(html: &mut Html, report: &BatchReport, entry: &SubmissionReport) {
                 html.raw("<td class=\"number ").raw(part_class(own)).raw("\" data-sort=\"");
                 html.show(own.points).raw("\">");
                 // The page of a part that lost points, one click away.
-                if is_lost(own) {
+                if own.is_lost() {
                     overview::link(html, report, entry, &own.id);
                     html.text(&of_part(own)).raw("</a></td>");
                 } else {

@@ -24,16 +24,11 @@ pub(super) struct Lost<'a> {
     pictured: Vec<(usize, &'a str)>,
 }
 
-/// Whether a part did not earn everything. A bonus that nobody tried for is nothing lost.
-pub(super) fn is_lost(part: &PartGrade) -> bool {
-    part.points < part.out_of && part_class(part) != "unearned"
-}
-
 /// Whether it lost something before the instructor set its points by hand: then what was wrong still is.
 pub(super) fn was_lost(part: &PartGrade, standing: &Standing) -> bool {
     let set = standing.decisions.iter();
     let mut set = set.filter(|own| own.decision.part.as_deref() == Some(part.id.as_str()));
-    is_lost(part) || set.any(|own| own.before[0] < part.out_of)
+    part.is_lost() || set.any(|own| own.before[0] < part.out_of)
 }
 
 impl<'a> Lost<'a> {

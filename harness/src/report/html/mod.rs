@@ -28,7 +28,7 @@ pub use viewer::viewer;
 
 use self::markup::Html;
 use super::BatchReport;
-use crate::rubric::PartGrade;
+use crate::rubric::{Grade, PartGrade};
 
 const STYLE: &str = include_str!("style.css");
 /// Sorts, searches and filters the batch's table; the page is whole without it.
@@ -97,11 +97,15 @@ fn class(least: f64, most: f64, out_of: f64) -> &'static str {
     }
 }
 
+/// [`class`] of a whole grade: what is lost in a part is lost, also where a bonus makes up for it.
+fn total_class(grade: &Grade) -> &'static str {
+    match class(grade.points, grade.points_max, grade.out_of) {
+        "full" if grade.parts.iter().any(PartGrade::is_lost) => "some",
+        class => class,
+    }
+}
+
 /// [`class`] of a part; a bonus that was not earned is nothing lost.
 fn part_class(part: &PartGrade) -> &'static str {
-    if part.bonus && part.points_max == 0.0 {
-        "unearned"
-    } else {
-        class(part.points, part.points_max, part.out_of)
-    }
+    if part.is_unearned() { "unearned" } else { class(part.points, part.points_max, part.out_of) }
 }

@@ -8,7 +8,6 @@ use super::super::{
     BatchReport, ERRORS, ErrorPicture, HTML_FILE, INSTRUCTOR, SubmissionReport, is_private,
 };
 use super::likeness::LIKENESS;
-use super::lost::is_lost;
 use super::markup::Html;
 use crate::class::Class;
 use crate::columns::count;
@@ -237,7 +236,7 @@ pub(super) fn mistakes(html: &mut Html, report: &BatchReport) {
                 check.id == CheckId::SubmissionBuild && check.verdict == Verdict::Fail
             });
         let judged = |own: &&PartGrade| !is_range(own.points, own.points_max);
-        for own in entry.grade.parts.iter().filter(|own| is_lost(own)).filter(judged) {
+        for own in entry.grade.parts.iter().filter(|own| own.is_lost()).filter(judged) {
             if entry.record.diagnoses.iter().any(|found| found.part == own.id) {
                 continue;
             }

@@ -3,10 +3,10 @@
 use super::super::number::{is_failure, is_range, looks_like, of_part, points, range, seconds};
 use super::super::{BatchReport, HTML_FILE, INSTRUCTOR, MENDED, SubmissionReport};
 use super::checks::{self, Placed};
-use super::lost::{Lost, is_lost, was_lost};
+use super::lost::{Lost, was_lost};
 use super::markup::Html;
 use super::pictures::Places;
-use super::{Reader, begin, class, end, part_class};
+use super::{Reader, begin, end, part_class, total_class};
 use crate::class::mending::Mended;
 use crate::columns::count;
 use crate::evidence::{Check, Verdict};
@@ -49,7 +49,7 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
         html.raw(" · <span title=\"SHA-256 over its paths and contents, first 12 digits\">");
         html.text(digest).raw("</span>");
     }
-    html.raw("</p>\n<p class=\"sum ").raw(class(grade.points, grade.points_max, grade.out_of));
+    html.raw("</p>\n<p class=\"sum ").raw(total_class(grade));
     html.raw("\"><strong>").text(&range(grade.points, grade.points_max)).raw("</strong> of ");
     html.text(&points(grade.out_of)).raw(" points");
     html.bar(grade.points, grade.points_max, grade.out_of).raw("</p>\n");
@@ -68,7 +68,7 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     let losing: Vec<&PartGrade> = grade.parts.iter().filter(|part| was_lost(part)).collect();
     if !losing.is_empty() {
         // What the instructor gave is not lost, but wrong all the same.
-        let any_lost = losing.iter().any(|part| is_lost(part));
+        let any_lost = losing.iter().any(|part| part.is_lost());
         html.raw("<section>\n<h2>What was ").raw(if any_lost { "lost" } else { "wrong" });
         html.raw("</h2>\n");
         for part in losing {
@@ -180,7 +180,7 @@ fn released(html: &mut Html, report: &BatchReport) {
 fn right(html: &mut Html, parts: &[PartGrade], was_lost: impl Fn(&PartGrade) -> bool) {
     let of = |tried: bool| -> Vec<&PartGrade> {
         let kept = parts.iter().filter(|part| !was_lost(part));
-        kept.filter(|part| (part_class(part) != "unearned") == tried).collect()
+        kept.filter(|part| part.is_unearned() != tried).collect()
     };
     let (right, untried) = (of(true), of(false));
     if right.is_empty() && untried.is_empty() {
