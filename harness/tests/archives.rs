@@ -971,7 +971,8 @@ fn gz_data_after_zeros() {
 #[test]
 fn gz_truncated() {
     let bytes = gz(&tar(&[Tar::file("config.json", b"{}")]));
-    assert_refused(&bytes[..bytes.len() / 2], "a.tar.gz", "gz_corrupt", "");
+    let found = assert_refused(&bytes[..bytes.len() / 2], "a.tar.gz", "gz_corrupt", "");
+    assert!(found.hint.as_ref().is_some_and(|hint| hint.contains("cut off")), "{found}");
 }
 
 #[test]
@@ -979,7 +980,8 @@ fn gz_wrong_checksum() {
     let mut bytes = gz(&tar(&[Tar::file("config.json", b"{}")]));
     let at = bytes.len() - 8;
     bytes[at] ^= 1;
-    assert_refused(&bytes, "a.tar.gz", "gz_corrupt", "");
+    let found = assert_refused(&bytes, "a.tar.gz", "gz_corrupt", "");
+    assert!(found.hint.as_ref().is_some_and(|hint| hint.contains("damaged")), "{found}");
 }
 
 #[test]

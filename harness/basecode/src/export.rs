@@ -11,7 +11,7 @@ use std::sync::{Mutex, Once};
 use glam::{Vec2, Vec3};
 pub use renderer_api as api;
 
-use crate::gpu::{AdapterKind, Footprint, Gpu, RenderPass, Target};
+use crate::gpu::{AdapterKind, Footprint, Gpu, NEGATED_NORMALS, RenderPass, Target};
 use crate::realtime::{RayRefused, Realtime};
 use crate::{
     Bsdf, Camera, CameraConfig, Error, Film, Frame, Material, Ray, RenderJob, Renderer, Result,
@@ -266,14 +266,17 @@ unsafe extern "C" fn open_realtime(
             let (name, source) = unsafe { (text(&stage.name)?, text(&stage.source)?) };
             replaced.push((name.to_owned(), source.to_owned()));
         }
+        let negated = replaced.iter().any(|(name, _)| name == NEGATED_NORMALS);
+        let negated = negated.then(|| loaded.scene.with_negated_normals());
+        let scene = negated.as_ref().unwrap_or(&loaded.scene);
         gpu.replace_stages(replaced);
         let target = Target::new(&gpu, settings.width as usize, settings.height as usize)?;
         let shadow_map = settings.shadow_map != 0;
         let _ = gpu.take_footprint();
         let mut opened = None;
         gpu.checked(&mut || {
-            let kind = loaded.scene.config().kind;
-            opened = Some(loaded.renderer.render_pass(kind, &gpu, &loaded.scene, shadow_map)?);
+            let kind = scene.config().kind;
+            opened = Some(loaded.renderer.render_pass(kind, &gpu, scene, shadow_map)?);
             Ok(())
         })?;
         realtime.without_rays()?;

@@ -199,6 +199,50 @@ fn the_host_sees_how_a_picture_comes_about() {
     assert_eq!(looked_at(&mut gpu, &[EMPTY_MAPS]), (vec3(8.5, 8.5, 1e6), 10));
 }
 
+/// A pipeline that takes vertices and draws into these targets.
+fn beside_the_picture(
+    gpu: &Gpu,
+    targets: &[Option<wgpu::ColorTargetState>],
+) -> wgpu::RenderPipeline {
+    let module = |stage: Stage| {
+        let source = wgpu::ShaderSource::Wgsl(stage.text.into());
+        gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source })
+    };
+    let (vertex, fragment) = (module(VS), module(POSITION_FS));
+    let compilation_options = wgpu::PipelineCompilationOptions::default();
+    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: None,
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &vertex,
+            entry_point: Some("vs_main"),
+            compilation_options: compilation_options.clone(),
+            buffers: &[Some(wgpu::VertexBufferLayout {
+                array_stride: 24,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes: &wgpu::vertex_attr_array![0 => Float32x3],
+            })],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Less),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState::default(),
+        fragment: (!targets.is_empty()).then_some(wgpu::FragmentState {
+            module: &fragment,
+            entry_point: Some("fs_main"),
+            compilation_options,
+            targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
 #[test]
 fn what_a_pass_hands_to_the_device_is_counted() {
     let gpu = gpu();
@@ -213,6 +257,22 @@ fn what_a_pass_hands_to_the_device_is_counted() {
     );
     assert_eq!(found.to_string().parse(), Ok(found));
     assert!("1 2 3 4".parse::<Footprint>().is_err());
+
+    // Surfaces that are drawn into other colors, to be shaded later, are drawn by vertices all the same.
+    gpu.checked(&mut || {
+        drop(beside_the_picture(&gpu, &[]));
+        Ok(())
+    })
+    .unwrap();
+    let map = gpu.take_footprint();
+    assert_eq!((map.vertex_pipelines, map.maps), (0, 1), "depths alone are no surfaces");
+    gpu.checked(&mut || {
+        drop(beside_the_picture(&gpu, &[Some(wgpu::TextureFormat::Rgba16Float.into())]));
+        Ok(())
+    })
+    .unwrap();
+    let colors = gpu.take_footprint();
+    assert_eq!((colors.vertex_pipelines, colors.maps), (1, 1));
 
     // Functions that take wgpu's own types are watched as well: these are what stands for them.
     fn uploads(device: &wgpu::Device, queue: &wgpu::Queue) -> wgpu::Device {

@@ -309,6 +309,20 @@ pub fn image_finding(root: &Path, path: &str, image: &Result<Image, String>) -> 
     })
 }
 
+/// Radiance below this is negative: what rounding leaves is far above.
+const LEAST: f32 = -1e-6;
+
+/// How many pixels of an image are wrong, if any is.
+fn wrong_pixels(image: &Image, how: &str, is: fn(&basecode::Vec3) -> bool) -> Option<String> {
+    let mut wrong = image.pixels.iter().enumerate().filter(|(_, pixel)| is(pixel));
+    let (first, _) = wrong.next()?;
+    let (x, y) = (first % image.width, first / image.width);
+    Some(match wrong.count() {
+        0 => format!("a pixel of the image is {how}: that at ({x}, {y})"),
+        more => format!("{} pixels of the image are {how}; first at ({x}, {y})", more + 1),
+    })
+}
+
 /// The warning on an image that cannot be its scene's.
 fn impossible(path: &str, image: &Image, film: Option<[usize; 2]>) -> Option<Finding> {
     let found = [image.width, image.height];
@@ -321,6 +335,10 @@ fn impossible(path: &str, image: &Image, film: Option<[usize; 2]>) -> Option<Fin
         ("image_not_finite", "no pixel of the image is finite".to_owned())
     } else if all(|pixel| *pixel == basecode::Vec3::ZERO) {
         ("image_black", "every pixel of the image is black".to_owned())
+    } else if let Some(found) = wrong_pixels(image, "not finite", |pixel| !pixel.is_finite()) {
+        ("image_not_finite", found)
+    } else if let Some(found) = wrong_pixels(image, "negative", |p| p.min_element() < LEAST) {
+        ("image_negative", found)
     } else {
         return None;
     };
@@ -374,4 +392,26 @@ fn image(width: usize, height: usize, content: &[u8]) -> Option<Image> {
 
 fn write_json(folder: &Folder, value: &impl Serialize) -> io::Result<()> {
     fs::write(folder.question(), serde_json::to_vec(value)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use basecode::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn pixels_that_no_scene_has_are_warned_of() {
+        let said = |pixels: [f32; 4]| {
+            let pixels = pixels.map(Vec3::splat).to_vec();
+            let image = Image { width: 2, height: 2, pixels };
+            impossible("a.exr", &image, Some([2, 2])).map(|finding| finding.message)
+        };
+        assert_eq!(said([0.5, 0.0, 1e9, -1e-7]), None);
+        let one = said([0.5, 0.5, f32::INFINITY, 0.5]);
+        assert_eq!(one.as_deref(), Some("a pixel of the image is not finite: that at (0, 1)"));
+        let all = said([-1.0; 4]);
+        assert_eq!(all.as_deref(), Some("4 pixels of the image are negative; first at (0, 0)"));
+        assert_eq!(said([f32::NAN; 4]).as_deref(), Some("no pixel of the image is finite"));
+    }
 }

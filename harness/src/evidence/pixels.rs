@@ -24,24 +24,8 @@ pub fn price(
     raw: f64,
 ) -> Price {
     let Ok(camera) = scene.camera(image.width, image.height) else { return Price::of_raw(raw) };
-    let clear = |value: &u16| {
-        value & (RegionMask::EDGE | RegionMask::EMITTER) == 0
-            && value & RegionMask::INDEX != 0
-            && wanted(mask.region(*value))
-    };
-    let pixels: Vec<usize> =
-        mask.pixels.iter().enumerate().filter(|(_, value)| clear(value)).map(|(i, _)| i).collect();
-    let step = pixels.len().div_ceil(PIXELS).max(1);
+    let Looked { surfaces, found } = Looked::at(scene, &camera, image, mask, wanted);
     let places = Places { light: scene.first_light_position(), eye: camera.eye() };
-    let mut surfaces = Vec::new();
-    let mut found = Vec::new();
-    for index in pixels.into_iter().step_by(step) {
-        let (x, y) = (index % image.width, index / image.width);
-        let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
-        let Some(point) = SurfacePoint::cast(scene, ray) else { continue };
-        surfaces.push(point);
-        found.push(image.pixels[index].into());
-    }
     let shaded = |point: &SurfacePoint| places.shaded_point(scene, point);
     let points: Vec<ShadedPoint> = surfaces.iter().map(shaded).collect();
     let of = |index: usize, shading: &Shading| shading.radiance(&points[index]);
@@ -78,6 +62,114 @@ pub fn price(
     })
 }
 
+/// Surfaces of a scene, and what an image shows of them.
+struct Looked {
+    surfaces: Vec<SurfacePoint>,
+    found: Vec<[f32; 3]>,
+}
+
+impl Looked {
+    /// Some pixels away from edges, spread over the regions that are wanted.
+    fn at(
+        scene: &Scene,
+        camera: &Camera,
+        image: &Image,
+        mask: &RegionMask,
+        wanted: &dyn Fn(&Region) -> bool,
+    ) -> Self {
+        let clear = |value: &u16| {
+            value & (RegionMask::EDGE | RegionMask::EMITTER) == 0
+                && value & RegionMask::INDEX != 0
+                && wanted(mask.region(*value))
+        };
+        let pixels = mask.pixels.iter().enumerate().filter(|(_, value)| clear(value));
+        let pixels: Vec<usize> = pixels.map(|(index, _)| index).collect();
+        let step = pixels.len().div_ceil(PIXELS).max(1);
+        let mut looked = Self { surfaces: Vec::new(), found: Vec::new() };
+        for index in pixels.into_iter().step_by(step) {
+            let (x, y) = (index % image.width, index / image.width);
+            let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
+            let Some(point) = SurfacePoint::cast(scene, ray) else { continue };
+            looked.surfaces.push(point);
+            looked.found.push(image.pixels[index].into());
+        }
+        looked
+    }
+}
+
+/// What a mistake in the values of a render pass leaves of an image unexplained.
+pub struct LeftByPass {
+    /// The mistake.
+    pub name: &'static str,
+    /// Sum of differences from what it draws over the sum of that, at most 1.
+    pub left: f64,
+    /// Whether it draws any light: one black image is as good as another.
+    pub lights: bool,
+}
+
+/// How far single mistakes in the values that a pass binds explain an unshadowed realtime image: those that are no
+/// mistake of a shader as well, such as a missing term.
+pub fn left_by_pass(scene: &Scene, image: &Image, mask: &RegionMask) -> Vec<LeftByPass> {
+    let Ok(camera) = scene.camera(image.width, image.height) else { return Vec::new() };
+    let Looked { surfaces, found } = Looked::at(scene, &camera, image, mask, &|_| true);
+    let places = Places { light: scene.first_light_position(), eye: camera.eye() };
+    let radiances = |shaded: &dyn Fn(&SurfacePoint) -> ShadedPoint| -> Vec<[f64; 3]> {
+        surfaces.iter().map(|point| Shading::default().radiance(&shaded(point))).collect()
+    };
+    let right = radiances(&|point| places.shaded_point(scene, point));
+    let sum: f64 = right.iter().flatten().sum();
+    let mean = (sum / (3 * right.len()).max(1) as f64).max(f64::MIN_POSITIVE);
+    let left = |(name, shaded): &PassMistake| {
+        let changed = radiances(shaded);
+        let answers = Answers {
+            found: &found,
+            of: &|index, _| changed[index],
+            unit: &|_| mean,
+            group: &|_| 0,
+            relative: RELATIVE,
+            changes: &[],
+        };
+        let lights = answers.total() >= LEAST_LEFT * surfaces.len() as f64;
+        LeftByPass { name: *name, left: answers.residual_of_right().min(1.0), lights }
+    };
+    pass_mistakes(scene, places).iter().map(left).collect()
+}
+
+/// A mistake in the values of a pass: its name, and what a right shader makes of a point under it.
+type PassMistake<'a> = (&'static str, Box<dyn Fn(&SurfacePoint) -> ShadedPoint + 'a>);
+
+fn pass_mistakes(scene: &Scene, right: Places) -> Vec<PassMistake<'_>> {
+    let at = |name, places: Places| -> PassMistake {
+        (name, Box::new(move |point| places.shaded_point(scene, point)))
+    };
+    let changed = |name, change: fn(&mut ShadedPoint)| -> PassMistake {
+        let shaded = move |point: &SurfacePoint| {
+            let mut shaded = right.shaded_point(scene, point);
+            change(&mut shaded);
+            shaded
+        };
+        (name, Box::new(shaded))
+    };
+    vec![
+        at(price::VIEWER_AT_ORIGIN, Places { eye: Vec3::ZERO, ..right }),
+        at(price::LIGHT_AT_ORIGIN, Places { light: Vec3::ZERO, ..right }),
+        at("the light stands where the viewer does", Places { light: right.eye, ..right }),
+        changed("the intensity is grey", |p| p.intensity = [p.intensity[0]; 3]),
+        changed("the intensity is divided by 4 pi", |p| {
+            p.intensity = p.intensity.map(|v| v / (2.0 * std::f64::consts::TAU));
+        }),
+        changed("rho_d and rho_s are exchanged", |p| {
+            std::mem::swap(&mut p.material.diffuse, &mut p.material.specular);
+        }),
+        changed("albedos are grey", |p| {
+            p.material.diffuse = [p.material.diffuse[0]; 3];
+            p.material.specular = [p.material.specular[0]; 3];
+        }),
+        changed("albedos without the energy scale", |p| p.scale = 1.0),
+        changed("the energy scale twice", |p| p.scale *= p.scale),
+    ]
+}
+
 /// Fraction of the mean radiance that a mistake must leave to explain an image.
 const LEAST_LEFT: f64 = 1e-4;
 
@@ -94,7 +186,8 @@ type Input<'a> = (&'static str, Class, Box<dyn Fn(&SurfacePoint) -> ShadedPoint 
 /// The mistakes that are looked for.
 fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
     let right = Places { light: scene.first_light_position(), eye: camera.eye() };
-    let seen = camera.view().transform_point3(right.light);
+    let view = camera.view();
+    let seen = view.transform_point3(right.light);
     let at = |name, class, places: Places| -> Input<'a> {
         (name, class, Box::new(move |point| places.shaded_point(scene, point)))
     };
@@ -108,6 +201,16 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
     };
     let mut inputs = vec![
         at(price::LIGHT_IN_VIEW_SPACE, Class::Slip, Places { light: seen, ..right }),
+        at(
+            price::LIGHT_IN_WORLD_SPACE,
+            Class::Slip,
+            Places { light: view.inverse().transform_point3(right.light), ..right },
+        ),
+        at(
+            price::VIEWER_NOT_TURNED,
+            Class::Slip,
+            Places { eye: -view.transform_vector3(view.w_axis.truncate()), ..right },
+        ),
         at(price::VIEWER_AT_ORIGIN, Class::Slip, Places { eye: Vec3::ZERO, ..right }),
         at(price::LIGHT_AT_ORIGIN, Class::Concept, Places { light: Vec3::ZERO, ..right }),
         at(
@@ -216,5 +319,51 @@ impl Places {
             intensity: scene.first_light_intensity().to_array().map(f64::from),
             distance: f64::from(to_light.length()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::expected::{load_scene, regions};
+
+    /// The names that explain what a right stage draws of the Cornell box with its points changed so.
+    fn explained(change: &dyn Fn(&mut ShadedPoint), at: &dyn Fn(&mut Places)) -> Vec<&'static str> {
+        let (width, height) = (64, 48);
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let scene = root.join("scenes/a2/probes/exponents/tinyrender/exponents_realtime.toml");
+        let scene = load_scene(&scene).unwrap();
+        let [_, mask] = regions(&scene, width, height).unwrap();
+        let camera = scene.camera(width, height).unwrap();
+        let mut places = Places { light: scene.first_light_position(), eye: camera.eye() };
+        at(&mut places);
+        let pixel = |index: usize| {
+            let ray = camera.ray((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
+            let Some(point) = SurfacePoint::cast(&scene, ray) else { return Vec3::ZERO };
+            let mut shaded = places.shaded_point(&scene, &point);
+            change(&mut shaded);
+            Vec3::from(Shading::default().radiance(&shaded).map(|value| value as f32))
+        };
+        let pixels = (0..width * height).map(pixel).collect();
+        let left = left_by_pass(&scene, &Image { width, height, pixels }, &mask);
+        let explains = left.iter().filter(|left| left.left < 1e-3 && left.lights);
+        explains.map(|left| left.name).collect()
+    }
+
+    #[test]
+    fn a_slip_in_the_values_of_a_pass_is_told_by_its_pictures() {
+        let exchanged = |point: &mut ShadedPoint| {
+            std::mem::swap(&mut point.material.diffuse, &mut point.material.specular);
+        };
+        assert_eq!(explained(&exchanged, &|_| ()), ["rho_d and rho_s are exchanged"]);
+        let light = |places: &mut Places| places.light = places.eye;
+        let at_viewer = "the light stands where the viewer does";
+        assert_eq!(explained(&|_| (), &light), [at_viewer]);
+        // What is right, black or a shader's own needs no pass.
+        let none: [&str; 0] = [];
+        assert_eq!(explained(&|point| point.intensity = [0.0; 3], &|_| ()), none);
+        assert_eq!(explained(&|point| point.material.specular = [0.0; 3], &|_| ()), none);
     }
 }

@@ -178,8 +178,8 @@ pub fn are_mostly_explained<'a>(checks: impl IntoIterator<Item = &'a Check>) -> 
 
 /// If one mistake explains a check on most scenes, and nothing known explains it on the others, the others cost no
 /// more: on one scene a seam or an edge may leave more unexplained. A scene that the mistake leaves without light
-/// (`DARKENING`) is no worse either. And if the answers on most scenes are explained, or follow the right ones, the
-/// others do not count as empty.
+/// (`DARKENING`) is no worse either. And if the answers on most scenes are explained, or follow the right ones, or are
+/// right BSDF values, the others do not count as empty.
 pub fn settle_by_common_mistake(checks: &mut [Check]) {
     let mut of_id: BTreeMap<(CheckId, String), Vec<usize>> = BTreeMap::new();
     for (index, check) in checks.iter().enumerate() {
@@ -188,7 +188,17 @@ pub fn settle_by_common_mistake(checks: &mut [Check]) {
             of_id.entry(key).or_default().push(index);
         }
     }
-    for own in of_id.into_values() {
+    // Every other question is passed by answers that show nothing as well, where nothing is to be seen.
+    let is_told_by_right = |id: CheckId| [CheckId::BsdfDiffuse, CheckId::BsdfPhong].contains(&id);
+    let right_of = |(id, convention): &(CheckId, String)| {
+        let right = |check: &&Check| {
+            let same = check.id == *id && check.convention == *convention;
+            same && is_told_by_right(*id) && check.verdict == Verdict::Pass
+        };
+        checks.iter().filter(right).count()
+    };
+    let right: Vec<usize> = of_id.keys().map(right_of).collect();
+    for (own, right) in of_id.into_values().zip(right) {
         // A mistake that leaves most unexplained is no explanation.
         let unexplained = |check: &Check| {
             let barely = check.error > Class::Unknown.price() && check.mistake != BLACK;
@@ -196,7 +206,8 @@ pub fn settle_by_common_mistake(checks: &mut [Check]) {
         };
         let (nothing, others): (Vec<usize>, Vec<usize>) =
             own.iter().partition(|&&index| unexplained(&checks[index]));
-        if others.iter().filter(|&&index| checks[index].mistake != BLACK).count() >= nothing.len() {
+        let told = others.iter().filter(|&&index| checks[index].mistake != BLACK).count();
+        if told + right >= nothing.len() {
             for index in nothing {
                 checks[index].error = checks[index].error.min(Class::Unknown.price());
             }
@@ -221,8 +232,15 @@ pub fn settle_by_common_mistake(checks: &mut [Check]) {
 /// The mistake's name for a check whose answers are all black.
 pub const BLACK: &str = "nothing is lit";
 /// The mistakes that can leave nothing lit on a scene.
-const DARKENING: [&str; 5] =
-    [LIGHT_NEGATED, VIEWER_NEGATED, VIEWER_AT_ORIGIN, LIGHT_IN_VIEW_SPACE, LIGHT_AT_ORIGIN];
+const DARKENING: [&str; 7] = [
+    LIGHT_NEGATED,
+    VIEWER_NEGATED,
+    VIEWER_AT_ORIGIN,
+    VIEWER_NOT_TURNED,
+    LIGHT_IN_VIEW_SPACE,
+    LIGHT_IN_WORLD_SPACE,
+    LIGHT_AT_ORIGIN,
+];
 /// wi is negated.
 pub const LIGHT_NEGATED: &str = "the direction to the light is negated";
 /// wo is negated.
@@ -231,6 +249,10 @@ pub const VIEWER_NEGATED: &str = "the direction to the viewer is negated";
 pub const VIEWER_AT_ORIGIN: &str = "the viewer stands at the origin";
 /// The light's position is multiplied by the view matrix.
 pub const LIGHT_IN_VIEW_SPACE: &str = "the light is in view space";
+/// The light's position is not multiplied by the view matrix, positions are.
+pub const LIGHT_IN_WORLD_SPACE: &str = "the light is in world space, surfaces in view space";
+/// The viewer's position is the view matrix' translation, turned the wrong way round.
+pub const VIEWER_NOT_TURNED: &str = "the viewer comes from the view matrix without its transpose";
 /// wi leads to the origin.
 pub const LIGHT_AT_ORIGIN: &str = "the light stands at the origin";
 
@@ -636,6 +658,22 @@ mod tests {
         assert_eq!(agreed(&[(UNKNOWN, 0.4), (UNKNOWN, 0.4), (slip, 0.8)]), [0.4, 0.4, 0.4]);
         assert_eq!(agreed(&[(UNKNOWN, 0.4), ("", 0.3), ("", 1.0)]), [0.4, 0.3, 1.0]);
         assert_eq!(agreed(&[(UNKNOWN, 0.4), (BLACK, 1.0)]), [0.4, 1.0]);
+    }
+
+    #[test]
+    fn a_bsdf_that_is_right_elsewhere_is_not_empty() {
+        let settled = |id: CheckId, passes: usize| {
+            let right = |_| Check::new(id, "", Verdict::Pass, "");
+            let mut checks: Vec<Check> = (0..passes).map(right).collect();
+            checks.push(Check { id, ..failed("textured", "", 1.0) });
+            settle_by_common_mistake(&mut checks);
+            checks[passes].error
+        };
+        // As with another mistake beside it, which explains what is right here.
+        assert_eq!(settled(CheckId::BsdfDiffuse, 1), Class::Unknown.price());
+        assert_eq!(settled(CheckId::BsdfDiffuse, 0), 1.0);
+        // Scenes without a shadow are passed without any.
+        assert_eq!(settled(CheckId::ShadowRays, 1), 1.0);
     }
 
     #[test]

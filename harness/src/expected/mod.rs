@@ -9,8 +9,8 @@ use basecode::{Image, Scene};
 
 use crate::imaging::reference::{ReferenceImage, RegionMask};
 
-pub use regions::regions;
 pub(crate) use regions::table as region_table;
+pub use regions::{regions, regions_seen_by};
 pub use scene_file::load_scene;
 pub(crate) use scene_file::scene_digest;
 pub use surface::{FARTHEST_START, SurfaceBuffer, SurfacePoint, Visibility};

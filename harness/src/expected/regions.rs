@@ -1,6 +1,6 @@
 //! Labels the pixels of a scene: their material, whether they are lit, and whether they can be trusted.
 
-use basecode::{Frame, MaterialModel, Result, Scene, Vec3};
+use basecode::{Camera, Frame, MaterialModel, Result, Scene, Vec3};
 
 use super::surface::{Lattice, SurfacePoint, Visibility};
 use crate::imaging::reference::{Region, RegionMask};
@@ -18,9 +18,18 @@ const GRAZING: f32 = 1e-3;
 /// # Errors
 /// When the film is empty or the scene's camera has no frame.
 pub fn regions(scene: &Scene, width: usize, height: usize) -> Result<[RegionMask; 2]> {
-    let camera = scene.camera(width, height)?;
-    let lattice = Lattice::new(scene, &camera, width, height);
-    Ok([true, false].map(|shadows| mask(scene, &lattice, width, height, shadows)))
+    Ok(regions_seen_by(scene, &scene.camera(width, height)?, width, height))
+}
+
+/// The same for another camera than the scene's own.
+pub fn regions_seen_by(
+    scene: &Scene,
+    camera: &Camera,
+    width: usize,
+    height: usize,
+) -> [RegionMask; 2] {
+    let lattice = Lattice::new(scene, camera, width, height);
+    [true, false].map(|shadows| mask(scene, &lattice, width, height, shadows))
 }
 
 fn mask(

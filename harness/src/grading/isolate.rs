@@ -6,7 +6,7 @@ use std::path::Path;
 
 use basecode::{Image, MaterialModel, Vec3};
 
-use super::draw::{Frame, draw_scenes};
+use super::draw::{Frame, draw, draw_scenes};
 use super::kept_frames::draw_sets;
 use super::observe;
 use super::own_frames;
@@ -14,6 +14,7 @@ use super::prepared_scene::PreparedScene;
 use super::session::{self, Session, headline};
 use super::stages::Stages;
 use super::stages::named;
+use super::uploads::{drawn_parts, every_fragment};
 use crate::diagnosis::{Kind, Thumbnail, View};
 use crate::evidence::premultiplied::Premultiplied;
 use crate::evidence::stage_film::StageFilm;
@@ -49,6 +50,23 @@ struct PassFrames {
     positions: Image,
 }
 
+impl PassFrames {
+    /// Whether nothing shows under any stage.
+    fn are_black(&self) -> bool {
+        let frames = self.bound.iter().map(|(_, frame)| frame).chain([&self.positions]);
+        frames.flat_map(|frame| &frame.pixels).all(|pixel| *pixel == Vec3::ZERO)
+    }
+}
+
+/// Whether a pass draws any fragment of a scene, by whatever stages.
+fn draws_surfaces(session: &Session, plugin: &Path, case: &PreparedScene) -> bool {
+    let frame = Frame::probe(case, vec![every_fragment()]);
+    let outcome = draw(session, Some(plugin), &frame);
+    let (width, height) = frame.size;
+    let image = outcome.answer().map(|answer| session::image(&answer.values, width, height));
+    image.is_some_and(|image| drawn_parts(&image).pixels.iter().any(|pixel| *pixel != Vec3::ZERO))
+}
+
 /// Judges the student's pass with Umbra's stages (2.1) and the student's stages in Umbra's pass (2.2 to 2.4) on scenes.
 /// One worker draws all frames of the former; another, without any of the student's Rust code, draws those of the
 /// latter. `own_frames` is what the student's own frames show. The flag says whether one of some scene got no answer:
@@ -79,6 +97,10 @@ pub fn isolate(
     for (case, pass) in cases.iter().zip(passes) {
         let swapped: Vec<Outcome> = swapped.iter_mut().filter_map(Iterator::next).collect();
         let pass = match pass_frames(case, &pass) {
+            Ok(frames) if frames.are_black() && draws_surfaces(session, plugin, case) => {
+                let summary = "swap not possible: no stage of Umbra's draws what the pass draws";
+                Check::new(CheckId::PassUniforms, &case.entry.name, Verdict::NotJudged, summary)
+            }
             Ok(frames) => {
                 observe::pass(session, case, &frames.bound);
                 let check = judge_pass_frames(case, &frames);
@@ -211,6 +233,12 @@ fn under<'a>(cases: &'a [PreparedScene], sets: &[Vec<Stage>]) -> Vec<Vec<Frame<'
     cases.iter().map(frames).collect()
 }
 
+/// A vertex stage with stages of ours that show the positions, and the normals, that it forwards.
+pub fn positions_and_normals(vertex: &str) -> [Vec<Stage>; 2] {
+    let under = |show: &str| named([vertex.to_owned(), show.to_owned(), show.to_owned()]);
+    [SHOW_POSITION, SHOW_NORMAL].map(under)
+}
+
 /// What can be asked of a stage.
 enum Swap {
     /// Nothing: it is the template's.
@@ -231,8 +259,7 @@ fn swaps(stages: &Stages) -> ([Swap; 3], Vec<Vec<Stage>>) {
         let Some(own) = &stages.own[index] else { return Swap::Absent };
         let begin = sets.len();
         if index == 0 {
-            let under = |show: &str| named([own.clone(), show.to_owned(), show.to_owned()]);
-            sets.extend([SHOW_POSITION, SHOW_NORMAL].map(under));
+            sets.extend(positions_and_normals(own));
         } else {
             let mut texts = [vertex_for(own), BLACK.to_owned(), BLACK.to_owned()];
             texts[index].clone_from(own);
@@ -301,7 +328,7 @@ fn judge_pass_by(
 }
 
 /// Judges on the small film of a scene.
-fn on_film(
+pub fn on_film(
     id: CheckId,
     case: &PreparedScene,
     judge: impl FnOnce(&StageFilm, &str) -> Check,

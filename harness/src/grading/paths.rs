@@ -10,7 +10,7 @@ use super::pipeline::Grading;
 use super::prepared_scene::PreparedScene;
 use super::session::Session;
 use super::stages::Stages;
-use super::{isolate, realtime, sampler, uploads};
+use super::{isolate, one_slip, realtime, sampler, uploads};
 use crate::evidence::{Check, CheckId, Verdict, loops, price, rays, shadow_map};
 
 /// By how much the standard error of a region's mean grows when its rows share their noise: the
@@ -120,6 +120,11 @@ impl Grading<'_> {
                 let own = (&checks[begin..], fails);
                 let found = isolate::isolate(session, plugin, cases, stages, own, tolerances);
                 checks.extend(found);
+                if nothing_draws.is_none() {
+                    let own = (&checks[begin..], &drawn[..]);
+                    let slip = one_slip::judge(session, plugin, cases, stages, own, tolerances);
+                    checks.extend(slip);
+                }
             }
             price::settle_by_common_mistake(&mut checks[begin..]);
             mark(&mut checks[begin..], cases);

@@ -5,11 +5,13 @@ use std::path::Path;
 use basecode::Image;
 use basecode::gpu::{EMPTY_MAPS, Footprint};
 
+use super::coverage;
 use super::draw::{Frame, draw, draw_one_each};
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
-use super::stages::Stages;
+use super::stages::{Stages, negated_normals};
+use super::zoomed;
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels;
 use crate::evidence::price::{Class, Price};
@@ -41,14 +43,8 @@ pub struct Judged {
     /// What that frame took, where it was drawn and the plugin says so.
     pub footprint: Option<Footprint>,
     /// How its brightness follows the light within a surface, where that shows.
-    shading: Option<f64>,
+    pub shading: Option<f64>,
 }
-
-/// Whether surfaces lie where they should, for what cannot be judged alone.
-const COVERAGE: CheckId = CheckId::ImageRealtimeCoverage;
-
-/// Silhouettes correlate by 0, in one color or one for each surface; what follows the light does by more.
-const LEAST_SHADING: f64 = 0.2;
 
 /// Draws every scene with the plugin and judges the images, those of the bonus too.
 pub fn judge_images(
@@ -117,31 +113,9 @@ pub fn judge_images(
         Judged { checks, drawn, fails, footprint, shading }
     });
     let mut judged: Vec<Judged> = judged.collect();
-    refuse_silhouettes(&mut judged);
+    coverage::look_at_black_surfaces(session, plugin, cases, &mut judged);
+    coverage::refuse_silhouettes(&mut judged);
     judged
-}
-
-/// Surfaces that lie where they should earn nothing when no light falls on them on most scenes: one scene may show
-/// little but what another mistake spoils.
-fn refuse_silhouettes(judged: &mut [Judged]) {
-    let mut shading: Vec<f64> = judged.iter().filter_map(|judged| judged.shading).collect();
-    shading.sort_by(f64::total_cmp);
-    if shading.get(shading.len() / 2).is_none_or(|median| *median >= LEAST_SHADING) {
-        return;
-    }
-    for judged in judged {
-        let Some(shading) = judged.shading.filter(|shading| *shading < LEAST_SHADING) else {
-            continue;
-        };
-        let covered = |check: &&mut Check| check.id == COVERAGE && check.verdict == Verdict::Pass;
-        for check in judged.checks.iter_mut().filter(covered) {
-            let summary = format!(
-                "surfaces lie where they should, but no light falls on them: within a surface, brightness \
-                 correlates by {shading:.2} with what is expected, and must by {LEAST_SHADING} on most scenes"
-            );
-            *check = Check::new(COVERAGE, &check.scene, Verdict::Fail, summary);
-        }
-    }
 }
 
 /// A picture that no shader of the submission can have drawn earns nothing, however right it is;
@@ -197,7 +171,7 @@ fn judge_plain(
         // Where a part cannot be judged alone either, a frame that is not there decides.
         Err(check) => {
             let same = |id: CheckId| Check { id, ..(*check).clone() };
-            let ids = VIEWS.iter().map(|(id, _)| *id).chain([COVERAGE]);
+            let ids = VIEWS.iter().map(|(id, _)| *id).chain([coverage::COVERAGE]);
             return (ids.map(same).collect(), None);
         }
     };
@@ -216,7 +190,7 @@ fn judge_plain(
         _ => None,
     };
     let mut checks = without_shadows.unwrap_or(views.to_vec());
-    checks.push(judge_coverage(case, &drawn.image));
+    checks.push(coverage::judge(case, &drawn.image));
     (checks, Some(drawn))
 }
 
@@ -381,8 +355,8 @@ fn plain_but_for_shadows(
 }
 
 /// Judges shadows that are wrong as an image by visibility alone: against the student's own image
-/// without shadows, or else against that drawn under a vertex stage of ours, or as the second of two
-/// frames: what the first lacks is the render pass' matter. `check` is the verdict on the image, which
+/// without shadows, or else against that drawn under a vertex stage of ours, or of the scene with its normals negated
+/// or of another field of view, or as the second of two frames: what these mend is no matter of shadows. `check` is the verdict on the image, which
 /// stands when none tells.
 fn judge_visibility(
     session: &Session,
@@ -415,32 +389,12 @@ fn judge_visibility(
     if let Some(swapped) = swapped.as_ref().filter(|swapped| passes(swapped)) {
         return swapped.clone();
     }
-    let second = again(2, &[]).filter(passes);
-    second.or(own).or(swapped).unwrap_or(check)
-}
-
-/// Where the image shows a surface and where not.
-fn judge_coverage(case: &PreparedScene, image: &Image) -> Check {
-    let mask = &case.expected.unshadowed_mask;
-    let (mut counted, mut wrong) = (0usize, 0usize);
-    for (pixel, &value) in image.pixels.iter().zip(&mask.pixels) {
-        let background = value & RegionMask::INDEX == 0;
-        if value & (RegionMask::EDGE | RegionMask::EMITTER) != 0
-            || !(background || mask.region(value).lit)
-        {
-            continue;
-        }
-        counted += 1;
-        let covered = *pixel != basecode::Vec3::ZERO;
-        wrong += usize::from(covered == background || !pixel.is_finite());
-    }
-    let name = &case.entry.name;
-    let error = wrong as f64 / counted.max(1) as f64;
-    if error > 5e-3 {
-        let summary = format!(
-            "{wrong} of {counted} pixels show a surface where none is, or none where one is"
-        );
-        return Check { error, ..Check::new(COVERAGE, name, Verdict::Fail, summary) };
-    }
-    Check::new(COVERAGE, name, Verdict::Pass, "surfaces lie where they should")
+    let negated = again(1, &[negated_normals()]).filter(passes);
+    let mended = negated.or_else(|| {
+        let masks = zoomed::masks(session, plugin, case)?;
+        let shadows = masks.shadows(shadows.median_lit);
+        shadows.judge(name, with, without?, tolerances).filter(passes)
+    });
+    let mended = mended.or_else(|| again(2, &[]).filter(passes));
+    mended.or(own).or(swapped).unwrap_or(check)
 }

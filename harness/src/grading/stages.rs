@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use basecode::gpu::NEGATED_NORMALS;
+
 use crate::evidence::stages::{bare, is_template};
 use crate::files::files_below;
 use crate::intake::Finding;
@@ -131,6 +133,11 @@ fn written(texts: &BTreeMap<PathBuf, String>, template: &BTreeMap<PathBuf, Strin
         found.fragment |= made_by_code || holds("@fragment");
     }
     found
+}
+
+/// What the host replaces to have a pass draw a scene whose normals are negated.
+pub fn negated_normals() -> Stage {
+    Stage { name: NEGATED_NORMALS.to_owned(), text: NEGATED_NORMALS.to_owned() }
 }
 
 /// Texts under the names of the stages.

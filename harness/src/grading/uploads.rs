@@ -103,7 +103,7 @@ fn nothing_draws(
     cases: &[PreparedScene],
 ) -> Option<&'static str> {
     let drawn = |case: &PreparedScene, outlines: bool| {
-        let mut stages = vec![Stage { name: EVERY_FRAGMENT.to_owned(), text: SHOW.to_owned() }];
+        let mut stages = vec![every_fragment()];
         stages.extend(
             outlines.then(|| Stage { name: OUTLINES.to_owned(), text: "outlines".to_owned() }),
         );
@@ -123,6 +123,17 @@ fn nothing_draws(
         return Some("the pixels are uploaded, and drawn one by one");
     }
     None
+}
+
+/// What the host replaces to see every fragment in one color.
+pub fn every_fragment() -> Stage {
+    Stage { name: EVERY_FRAGMENT.to_owned(), text: SHOW.to_owned() }
+}
+
+/// An image under [`every_fragment`] without what no such fragment drew.
+pub fn drawn_parts(image: &Image) -> Image {
+    let shown = |pixel: &Vec3| if *pixel == SHOWN { SHOWN } else { Vec3::ZERO };
+    Image { pixels: image.pixels.iter().map(shown).collect(), ..*image }
 }
 
 /// Pixels away from edges in which the scene shows nothing, or surfaces that are no light.

@@ -480,5 +480,10 @@ fn unreadable(error: &io::Error) -> Finding {
         return finding.clone();
     }
     let message = format!("the compressed data cannot be read: {}", printable(&error.to_string()));
-    Finding::error("gz_corrupt", message).hint("the upload may have been cut off; submit it again")
+    // What ends too early was cut off; what has another checksum or code was changed on its way.
+    let hint = match error.kind() {
+        io::ErrorKind::UnexpectedEof => "the upload may have been cut off; submit it again",
+        _ => "the file is damaged; make the archive again and submit it",
+    };
+    Finding::error("gz_corrupt", message).hint(hint)
 }

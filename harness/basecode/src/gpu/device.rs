@@ -21,6 +21,9 @@ pub const OUTLINES: &str = "outlines";
 /// Not the name of a stage. If the host replaces it, pipelines that do not draw the picture, such as those of a shadow
 /// map, write nothing.
 pub const EMPTY_MAPS: &str = "empty.maps";
+/// Not the name of a stage. If the host replaces it, the pass is made for a scene whose normals are all negated: what
+/// it draws rightly then, it draws by a normal that is negated once more.
+pub const NEGATED_NORMALS: &str = "negated.normals";
 
 /// Name of the entry point in the text of [`EVERY_FRAGMENT`].
 const SHOWN: &str = "umbra_shown";
@@ -38,7 +41,7 @@ pub struct Footprint {
     pub uploaded: u64,
     /// Textures to draw into, of a picture's format, 32 texels wide or more.
     pub picture_targets: u32,
-    /// Pipelines for pictures that take vertices.
+    /// Pipelines that take vertices, for pictures or for colors that a picture is made of, as a deferred renderer does.
     pub vertex_pipelines: u32,
     /// Pipelines for pictures that take none.
     pub vertexless_pipelines: u32,
@@ -219,8 +222,13 @@ impl Device {
         let overrides = self.watch.overrides();
         let targets: Vec<Option<wgpu::ColorTargetState>>;
         let mut desc = desc.clone();
+        let takes_vertices = desc.vertex.buffers.iter().any(Option::is_some);
         if !draws_picture(&desc) {
             self.watch.maps.fetch_add(1, Relaxed);
+            // A shadow map has depths alone; colors are read where surfaces are shaded later.
+            if takes_vertices && desc.fragment.as_ref().is_some_and(|f| !f.targets.is_empty()) {
+                self.watch.vertex_pipelines.fetch_add(1, Relaxed);
+            }
             if overrides.empty_maps {
                 if let Some(depth) = &mut desc.depth_stencil {
                     depth.depth_write_enabled = Some(false);
@@ -237,11 +245,9 @@ impl Device {
             }
             return self.device.create_render_pipeline(&desc);
         }
-        let vertex_pipelines = desc.vertex.buffers.iter().any(Option::is_some);
-        let pipelines = if vertex_pipelines {
-            &self.watch.vertex_pipelines
-        } else {
-            &self.watch.vertexless_pipelines
+        let pipelines = match takes_vertices {
+            true => &self.watch.vertex_pipelines,
+            false => &self.watch.vertexless_pipelines,
         };
         pipelines.fetch_add(1, Relaxed);
         let outlined = self.device.features().contains(wgpu::Features::POLYGON_MODE_LINE);

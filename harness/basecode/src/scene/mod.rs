@@ -212,6 +212,25 @@ impl Scene {
         self.witness = witness;
     }
 
+    /// A copy for render passes, with all normals negated. It has no BSDFs.
+    pub(crate) fn with_negated_normals(&self) -> Self {
+        let negated = |shape: &Shape| Shape {
+            normals: shape.normals.iter().map(|normal| -*normal).collect(),
+            ..shape.clone()
+        };
+        Self {
+            config: self.config.clone(),
+            shapes: self.shapes.iter().map(negated).collect(),
+            materials: self.materials.clone(),
+            remarks: self.remarks.clone(),
+            bvh: OnceLock::new(),
+            triangles: self.triangles.clone(),
+            bsdfs: Vec::new(),
+            witness: None,
+            ..*self
+        }
+    }
+
     /// A surface point on triangle `primitive` of `shape`, with texture coordinates given; the
     /// position is the triangle's first corner. For looking up a BSDF without a ray.
     pub(crate) fn point_on(

@@ -1,6 +1,6 @@
 //! Right variants of the stages.
 
-use super::{COSINE, DIFFUSE, FACING, NORMAL, PHONG, SQUARED, VS, mistakes};
+use super::{COSINE, DIFFUSE, FACING, NORMAL, PHONG, SQUARED, VISIBLE, VS, mistakes};
 
 const CLIP: &str = "frame.projection * frame.view * world;";
 const VS_NORMAL: &str = "(object.normal_matrix * vec4f(normal, 0.0)).xyz;";
@@ -8,8 +8,24 @@ const WI: &str = "let wi = to_light * inverseSqrt(r2);";
 const COS_ALPHA: &str = "let cos_alpha = max(dot(reflect(-wo, n), wi), 0.0);";
 const LENGTH: &str = "let r2 = length(to_light) * length(to_light);";
 const CLAMPED: &str = "let cos_i = max(dot(n, wi), 0.0);";
+// A third varying: the way from the light, by which the shadow map is looked up.
+const VARYING: &str = "@location(1) world_normal: vec3f,";
+const AND_THIRD: &str = "@location(1) world_normal: vec3f,\n    @location(2) from_light: vec3f,";
+const VS_RETURN: &str = "return out;";
+const FORWARDED: &str = "out.from_light = world.xyz - frame.light_position.xyz;\n    return out;";
+const BY_THIRD: &str = "visibility(from_light, n, wi) *";
+const LIGHT: &str = "let light = frame.light_position.xyz;";
+const AT_LIGHT: &str = "let light = vec3f(0.0);";
+const LOOKED_UP: &str = "vec4f(moved, 1.0);";
+const FROM_LIGHT: &str = "vec4f(moved + frame.light_position.xyz, 1.0);";
 
 mistakes! {
+    "third-varying":
+        (VS, VARYING, AND_THIRD), (VS, VS_RETURN, FORWARDED),
+        (DIFFUSE, VARYING, AND_THIRD), (DIFFUSE, VISIBLE, BY_THIRD), (DIFFUSE, LIGHT, AT_LIGHT),
+        (DIFFUSE, LOOKED_UP, FROM_LIGHT),
+        (PHONG, VARYING, AND_THIRD), (PHONG, VISIBLE, BY_THIRD), (PHONG, LIGHT, AT_LIGHT),
+        (PHONG, LOOKED_UP, FROM_LIGHT);
     "normals-raw": (DIFFUSE, NORMAL, "let n = world_normal;"), (PHONG, NORMAL, "let n = world_normal;");
     "normals-doubled": (VS, VS_NORMAL, "2.0 * (object.normal_matrix * vec4f(normal, 0.0)).xyz;");
     "normals-negated-twice":
