@@ -11,6 +11,7 @@ use super::layout::{Kind, Label};
 use super::roster::{Roster, Student};
 use super::{names, stamps};
 use crate::harmless::printable;
+use crate::plain_errors::plain;
 
 /// The file of the instructor's decisions on whose submissions are, in the report's folder.
 pub const MATCHES: &str = "matches.toml";
@@ -100,7 +101,7 @@ impl Matches {
             anyhow::anyhow!(
                 "{}: {}",
                 place(error.span().map_or(0, |span| span.start)),
-                error.message()
+                plain(error.message())
             )
         })?;
         let mut decisions: Vec<Decision> = Vec::new();
