@@ -38,6 +38,15 @@ const LOOPED: [&str; 3] = ["perfect", "no-falloff", "does-not-compile"];
 const LATE: usize = 10;
 const TWICE: usize = 15;
 
+/// Times classes of several sizes, beside a loop of build, render and compare.
+#[derive(clap::Parser)]
+#[command(name = "class_of_300")]
+struct Arguments {
+    /// Number of students of each class
+    #[arg(default_values_t = [30, 300], value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    sizes: Vec<u32>,
+}
+
 #[cfg(not(unix))]
 fn main() {
     println!("this example needs unzip, tar and /proc: it runs on Linux");
@@ -45,12 +54,11 @@ fn main() {
 
 #[cfg(unix)]
 fn main() -> anyhow::Result<()> {
+    let Arguments { sizes } = clap::Parser::parse();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize()?;
-    let sizes: Vec<usize> =
-        std::env::args().skip(1).map(|size| size.parse()).collect::<Result<_, _>>()?;
-    let sizes = if sizes.is_empty() { vec![30, 300] } else { sizes };
     let place = tempfile::tempdir()?;
     for size in sizes {
+        let size = size as usize;
         let download =
             place.path().join(format!("Assignment 2 Download Oct 9, 2019 {size} AM.zip"));
         make(&root, &download, size)?;

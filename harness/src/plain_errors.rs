@@ -1,8 +1,12 @@
-//! What serde says of a value of another kind, in the words of JSON instead of Rust's.
+//! What serde says of a value of another kind, in the words of JSON and TOML instead of Rust's.
 
 /// The message, without the names of Rust's types: `invalid type: floating point `1.5`, expected u32` becomes
 /// `expected a whole number, 0 or more; found 1.5`. Other messages stay as they are.
 pub fn plain(message: &str) -> String {
+    // Of a number in a TOML file: `student = 0260000001`.
+    if message.starts_with("unexpected leading zero") {
+        return "a number begins with no 0; a student number is text in double quotes".to_owned();
+    }
     let told = || {
         let rest = message
             .strip_prefix("invalid type: ")
@@ -68,6 +72,14 @@ mod tests {
             let error = serde_json::from_str::<All>(text).unwrap_err().to_string();
             let found = plain(error.split(" at line ").next().unwrap());
             assert!(found.starts_with(said), "{text}: {found}");
+        }
+        for (text, said) in [
+            ("name = 026", "a number begins with no 0; a student number is text in double quotes"),
+            ("name = 26", "expected text in double quotes; found 26"),
+            ("share = \"10\"", "expected a number; found \"10\""),
+        ] {
+            let error = toml::from_str::<All>(text).unwrap_err();
+            assert_eq!(plain(error.message()), said);
         }
     }
 }

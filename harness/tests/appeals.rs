@@ -157,6 +157,14 @@ fn a_grade_is_defended_mended_and_what_was_held_back_released() {
     assert!(page.contains("href=\"mended/report.html\""), "{page}");
     assert!(place.read("out/instructor/a2_ada/mended/report.html").contains("Lampglow"));
     assert!(!place.read("out/a2_ada/report.html").contains("mended/report.html"));
+    // A part set by hand takes the place of what the fix shows.
+    let (code, said) = place.run(&["override", "260181512", "1.3", "12", "--reason", "half"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("has 12 points from now on, the evidence says 20"), "{said}");
+    let decided = &place.row()["standing"]["decisions"][0];
+    assert_eq!(decided["before"], serde_json::json!([20.0, 20.0]));
+    let (code, said) = place.run(&["regrade", "--undo"]);
+    assert_eq!(code, Some(0), "{said}");
     // Graded again the fix is there; another submission makes it stale.
     let (code, said) = place.run(&["grade", "class", "--isolation", "reduced"]);
     assert_eq!((code, &place.row()), (Some(3), &after), "{said}");

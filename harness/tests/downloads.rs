@@ -354,7 +354,8 @@ fn a_class_of_brightspace_zipped_and_unpacked() {
     place
         .put("out/matches.toml", format!("[[match]]\n{own}\nstudent = \"260000007\"\n").as_bytes());
     let (said, report) = place.grade(&root, &[name]);
-    assert!(said.contains("5 of 6 submissions keep their earlier grades"), "{said}"); // An empty archive costs nothing to look at again.
+    // An empty archive costs nothing to look at again. Beside a late attempt the one in time is graded, too.
+    assert!(said.contains("6 of 7 submissions keep their earlier grades"), "{said}");
     assert_eq!(report["class"]["undecided"].as_array().unwrap().len(), 0);
     assert!(
         rows(&report)
@@ -731,6 +732,81 @@ fn what_the_instructor_decides_survives_and_is_flagged_when_the_evidence_changes
     let (code, said) = set("260000002", "1.3", "10");
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("overrides.toml:4: expected points of 0 or more"), "{said}");
+}
+
+#[test]
+fn decisions_at_the_same_time_are_all_kept() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    place.put("class/a2_bo.zip", &submission(&config("Bo", "Ode", "260000002")));
+    place.grade(&root, &["class"]);
+    let parts = ["1.1", "1.2", "1.3", "1.4"];
+    std::thread::scope(|scope| {
+        let place = &place;
+        let decide = |part| {
+            let own = ["override", "260000002", part, "1", "--reason", part, "--output", "out"];
+            scope.spawn(move || place.run(&own))
+        };
+        for one in parts.map(decide) {
+            let (code, said, errors) = one.join().unwrap();
+            assert_eq!(code, Some(0), "{said}{errors}");
+        }
+    });
+    let kept = fs::read_to_string(place.at("out/overrides.toml")).unwrap();
+    for part in parts {
+        assert_eq!(kept.matches(&format!("reason = \"{part}\"")).count(), 1, "{kept}");
+    }
+    let (_, report) = place.grade(&root, &["class"]);
+    assert_eq!(report["submissions"][0]["points"], 4.0);
+}
+
+#[test]
+fn a_grade_waits_where_another_submission_may_be_the_students() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    let of = |id: u32| format!("class/{id}-5150 - Ann Lee - Oct 6, 2019 1000 PM/a2.zip");
+    place.put(&of(1), &submission(&config("Ann", "Lee", "0260000003")));
+    // One of two who are called so.
+    place.put(&of(2), &submission(&config("Ann", "Lee", "")));
+    place.put("list.csv", LIST.as_bytes());
+    place.grade(&root, &["class", "--class", "list.csv"]);
+    let export = ["export", "book.csv", "--format", "brightspace", "--output", "out"];
+    let (code, said, errors) = place.run(&export);
+    assert_eq!(code, Some(2), "{said}{errors}");
+    assert!(errors.contains("another submission may be theirs"), "{errors}");
+    let decided = format!(
+        "[[match]]\nsubmission = \"{}\"\nstudent = \"260000004\"\n",
+        of(2).trim_start_matches("class/")
+    );
+    place.put("out/matches.toml", decided.as_bytes());
+    // It is a student's who had none.
+    let regrade = ["regrade", "--output", "out", "--root", root.to_str().unwrap()];
+    let (code, said, errors) = place.run(&regrade);
+    assert_eq!(code, Some(0), "{said}{errors}");
+    assert!(said.contains("0 fall, 1 stay, 1 more now count"), "{said}");
+    place.grade(&root, &["class"]);
+    let (code, said, errors) = place.run(&export);
+    assert_eq!(code, Some(0), "{said}{errors}");
+    assert!(said.contains("book.csv: 2 grades for Brightspace"), "{said}");
+}
+
+#[test]
+fn an_export_among_the_submissions_is_none() {
+    let place = Place::new();
+    let root = place.assignment(LATE);
+    place.put("class/a2_ann.zip", &submission(&config("Ann", "Lee", "0260000003")));
+    let (_, report) = place.grade(&root, &["class"]);
+    assert_eq!(report["submissions"].as_array().unwrap().len(), 1);
+    let export = ["export", "class/fb.zip", "--format", "feedback", "--output", "out"];
+    let (code, said, errors) = place.run(&export);
+    assert_eq!(code, Some(0), "{said}{errors}");
+    let (said, report) = place.grade(&root, &["class"]);
+    assert_eq!(report["submissions"].as_array().unwrap().len(), 1, "{said}");
+    assert!(said.contains("fb.zip (an export of this report)"), "{said}");
+    // Another file of that name is somebody's.
+    place.put("class/fb.zip", &submission(&config("Bo", "Ode", "260000002")));
+    let (said, report) = place.grade(&root, &["class"]);
+    assert_eq!(report["submissions"].as_array().unwrap().len(), 2, "{said}");
 }
 
 #[test]

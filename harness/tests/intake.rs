@@ -797,6 +797,23 @@ fn no_hand_in_is_taken_where_one_person_has_two() {
     let digest = fix_files(&perfect()).unwrap().digest;
     assert_eq!(fix_files(&two(["v1/", "v2/"], &same)).unwrap().digest, digest);
     assert_eq!(fix_files(&two(["x/", "x/old/"], &newer)).unwrap().digest, digest);
+    // Hand-ins that differ in an image alone: that one is open, the others are not.
+    let image = |path: &str, content: &mut Vec<u8>| {
+        if path == "realtime/teapot_simple_realtime.exr" {
+            content.push(0);
+        }
+    };
+    let files = two(["v1/", "v2/"], &image);
+    let found = validate_files(&files);
+    let open: Vec<&Finding> =
+        found.findings.iter().filter(|found| found.code == "tree_ambiguous").collect();
+    let [only] = open[..] else { panic!("{}", found.to_text()) };
+    for place in ["v1/", "v2/"] {
+        let path = format!("{place}realtime/teapot_simple_realtime.exr");
+        assert!(only.message.contains(&path), "{only}");
+    }
+    assert!(fix_files(&files).is_err());
+    assert_eq!(fix_files(&two(["x/", "x/old/"], &image)).unwrap().digest, digest);
 }
 
 /// Where files are missing, the cause comes before what it causes.

@@ -96,7 +96,8 @@ fn a_changed_policy_waits_until_it_is_applied_and_every_change_can_be_undone() {
     place.put(cy, &submission(&config("Cy", "Poe", "260000005")));
     let (said, report) = place.grade(&root, &["class"]);
     assert!(said.contains("config.json has other late than this report"), "{said}");
-    assert!(said.contains("`umbra regrade --report out` shows what would change"), "{said}");
+    let command = format!("`umbra regrade --report out --root {}` shows", root.display());
+    assert!(said.contains(&command), "{said}");
     assert_eq!(points(&place), [of("Ann", 0.0), of("Bo", 5.0), of("Cy", 0.0)]);
     assert!(!report["submissions"].to_string().contains(" 5 % of the maximum"));
 
@@ -127,6 +128,16 @@ fn a_changed_policy_waits_until_it_is_applied_and_every_change_can_be_undone() {
     assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("what differs: overrides.toml\n"), "{said}");
     assert_eq!(points(&place)[1], of("Bo", 0.0));
+
+    // What a file says by now and nobody applied is not lost.
+    place.put(
+        "out/overrides.toml",
+        b"[[override]]\nstudent = \"260000002\"\npart = \"1.1\"\npoints = 1\nreason = \"r\"\n",
+    );
+    let (code, said) = regrade(&["--undo"]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("out: --undo would lose what overrides.toml says by now"), "{said}");
+    place.put("out/overrides.toml", b"");
 
     // Back, change by change, with the files of decisions.
     for (bo, matches, overrides) in

@@ -366,10 +366,17 @@ fn slips_in_a_scene_file_are_told_in_plain_words() {
     let (code, said) =
         Scene::new(&plain(), MTL).run(&["s.toml", "--output", "o.exr", "--spp", "0"]);
     assert!(code == 2 && said.contains("0 is not in 1..="), "{said}");
-    let (code, said) =
-        Scene::new(&plain(), MTL).run(&["s.toml", "--output", "o.exr", "--size", "16384x4097"]);
-    let expected = "expected at most 67108864 pixels, found 67125248";
-    assert!(code == 2 && said.contains(expected), "{said}");
+    for (size, expected) in [
+        ("16384x4097", "expected at most 67108864 pixels, found 67125248"),
+        ("16385x1", "expected at most 16384 pixels a side, found 16385"),
+        ("1x5000000000", "expected at most 16384 pixels a side, found 5000000000"),
+        ("0x1", "expected WIDTHxHEIGHT such as 640x480, found 0x1"),
+        ("640", "expected WIDTHxHEIGHT such as 640x480, found 640"),
+    ] {
+        let (code, said) =
+            Scene::new(&plain(), MTL).run(&["s.toml", "--output", "o.exr", "--size", size]);
+        assert!(code == 2 && said.contains(expected), "{said}");
+    }
 }
 
 /// The scene `scale` times as large, its light as bright.

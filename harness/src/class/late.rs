@@ -214,7 +214,8 @@ impl Policy {
         let own = all.filter(|(_, own)| !numbers.contains(&names::number(&own.student)));
         own.map(|(at, own)| {
             format!(
-                "config.json: late.extensions[{at}]: nobody on the class list has the student number \"{}\"",
+                "config.json, as this report pins it: late.extensions[{at}]: nobody on the class list has the student \
+                 number \"{}\"",
                 own.student
             )
         })

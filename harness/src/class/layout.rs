@@ -141,18 +141,17 @@ pub fn clone(component: &str, prefix: &str) -> Label {
     }
 }
 
-/// What the names of clones begin with: the longest common beginning that ends with `-`; of one alone, all
-/// before its last `-`.
+/// What the names of clones begin with: of the beginnings that end with `-`, the one that most names have, if that is
+/// more than half of them; of several such, the longest. Other clones lie among students' ones, such as a solution.
 pub fn prefix_of_clones(names: &[&str]) -> String {
-    let Some(first) = names.first() else { return String::new() };
-    let common = match names {
-        [only] => only.len().saturating_sub(1),
-        _ => first
-            .char_indices()
-            .find(|(at, c)| names.iter().any(|name| !name[*at..].starts_with(*c)))
-            .map_or(first.len(), |(at, _)| at),
-    };
-    first[..common].rfind('-').map_or(String::new(), |at| first[..=at].to_owned())
+    let shared = |prefix: &str| names.iter().filter(|name| name.starts_with(prefix)).count();
+    let ends = |name: &str| name.match_indices('-').map(|(at, _)| at + 1).collect::<Vec<_>>();
+    let all = names.iter().flat_map(|name| ends(name).into_iter().map(move |end| &name[..end]));
+    // What ends with it is no account.
+    let all = all.filter(|prefix| !names.contains(prefix));
+    let best = all.map(|prefix| (shared(prefix), prefix.len(), prefix)).max();
+    let best = best.filter(|(number, ..)| 2 * number > names.len());
+    best.map_or(String::new(), |(.., prefix)| prefix.to_owned())
 }
 
 /// `12345-67890 - First Last - Oct 5, 2019 1159 PM`, and more after it where files lie flat.
@@ -428,7 +427,11 @@ mod tests {
             prefix_of_clones(&["a2-lights-ada", "a2-lights-ann", "a2-lights-bob-x"]),
             "a2-lights-"
         );
+        let with_others = ["a2-ada", "a2-ann", "solution", "a2-bob-x", "a-submodule"];
+        assert_eq!(prefix_of_clones(&with_others), "a2-");
         assert_eq!(prefix_of_clones(&["a2-ada"]), "a2-");
+        assert_eq!(prefix_of_clones(&["a2-ada", "solution"]), "");
+        assert_eq!(prefix_of_clones(&[]), "");
         assert_eq!(prefix_of_clones(&["ada", "bob"]), "");
         assert_eq!(clone("a2-ada-l", "a2-").username, "ada-l");
     }

@@ -11,6 +11,7 @@ use super::layout::{Kind, Label};
 use super::roster::{Roster, Student};
 use super::{names, stamps};
 use crate::harmless::printable;
+use crate::plain_errors::plain;
 
 /// The file of the instructor's decisions on whose submissions are, in the report's folder.
 pub const MATCHES: &str = "matches.toml";
@@ -100,7 +101,7 @@ impl Matches {
             anyhow::anyhow!(
                 "{}: {}",
                 place(error.span().map_or(0, |span| span.start)),
-                error.message()
+                plain(error.message())
             )
         })?;
         let mut decisions: Vec<Decision> = Vec::new();
@@ -240,13 +241,25 @@ impl Matches {
         lines
     }
 
-    /// Decisions on nothing that is there, with their lines; `is_seen` says what is there, graded or not.
-    pub fn lost(&self, is_seen: impl Fn(&str) -> bool) -> Vec<String> {
-        let lost = self.0.iter().filter_map(|Decision { submission, place, on, .. }| match on {
-            On::Any if !is_seen(submission) => {
+    /// Decisions on nothing that is graded, with their lines; `is_seen` says what is there, graded or not, and
+    /// `is_aside` which of that was not graded as another attempt counts.
+    pub fn lost(
+        &self,
+        is_seen: impl Fn(&str) -> bool,
+        is_aside: impl Fn(&str) -> bool,
+    ) -> Vec<String> {
+        let lost = self.0.iter().filter_map(|own| match (&own.on, &own.submission, &own.place) {
+            (On::Any, submission, place) if !is_seen(submission) => {
                 Some(format!("{place}: there is no submission \"{submission}\""))
             }
-            On::Unclear(slugs) => Some(format!(
+            (On::Any, submission, place)
+                if own.student.as_deref() != Some(NOBODY) && is_aside(submission) =>
+            {
+                Some(format!(
+                    "{place}: \"{submission}\" is not graded yet; the same `umbra grade` as before does that"
+                ))
+            }
+            (On::Unclear(slugs), submission, place) => Some(format!(
                 "{place}: \"{submission}\" may be more than one submission, so it is on none; name a folder: {}",
                 slugs.join(", ")
             )),

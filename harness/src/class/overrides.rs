@@ -13,6 +13,7 @@ use super::matching::line_of;
 use super::owners::Owners;
 use crate::evidence::Evidence;
 use crate::files::hex;
+use crate::plain_errors::plain;
 use crate::rubric::{Grade, IMAGES_EARN, ONCE_CONFIRMED, PartGrade, Rules};
 
 /// What takes the place of [`ONCE_CONFIRMED`] in the reason of a part whose images are confirmed.
@@ -110,7 +111,7 @@ impl Overrides {
         let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
         let file: File = toml::from_str(text).map_err(|error| {
             let place = place(error.span().map_or(0, |span| span.start));
-            anyhow::anyhow!("{place}: {}", error.message())
+            anyhow::anyhow!("{place}: {}", plain(error.message()))
         })?;
         let mut decisions = Vec::new();
         let of = |kind: &'static str, entries: Vec<Spanned<Decision>>| {

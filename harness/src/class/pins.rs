@@ -1,6 +1,7 @@
 //! The rules and decisions that settle the grades of a report, pinned in it. Every applied change is one more numbered
 //! file, and the last one counts.
 
+use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -189,6 +190,23 @@ impl Pins {
         Ok(Self { folder, all })
     }
 
+    /// Waits until nobody else changes what a report is settled by; nobody does as long as the answer lives.
+    ///
+    /// # Errors
+    /// When the file of the lock cannot be made.
+    pub fn lock(instructor: &Path) -> anyhow::Result<File> {
+        let path = instructor.join(FOLDER).join("lock");
+        let file =
+            File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
+        // A file system that locks nothing is used by one process at a time, as before there were locks.
+        match file.lock() {
+            Err(error) if error.kind() != ErrorKind::Unsupported => {
+                Err(error).with_context(|| format!("cannot lock {}", path.display()))
+            }
+            _ => Ok(file),
+        }
+    }
+
     /// The one that counts.
     pub fn current(&self) -> Option<&Pin> {
         self.all.last()
@@ -202,6 +220,13 @@ impl Pins {
         let before = self.current().and_then(|pin| pin.before);
         let before = before.and_then(|number| self.all.iter().find(|pin| pin.number == number));
         before.context("there is nothing to undo: the report is settled as it was at first")
+    }
+
+    /// The change that `--undo` takes back: the first one that followed what it returns to. Later ones that did are
+    /// returns to it.
+    pub fn undone(&self) -> Option<&Pin> {
+        let before = self.current()?.before;
+        self.all.iter().find(|pin| before.is_some() && pin.before == before)
     }
 
     /// Applies a change; an undo follows what its source follows.
@@ -301,17 +326,20 @@ mod tests {
         let mut pins = Pins::begin(place.path(), &decided("")).unwrap();
         pins.before().unwrap_err();
         for text in ["# one", "# two"] {
-            pins.apply(decided(text), "why", Vec::new(), false).unwrap();
+            pins.apply(decided(text), text, Vec::new(), false).unwrap();
         }
-        for text in ["# one", ""] {
+        for (text, undone) in [("# one", "# two"), ("", "# one")] {
             let before = pins.before().unwrap().decided.clone();
             assert_eq!(before.overrides, text);
+            assert_eq!(pins.undone().unwrap().reason, undone);
             pins.apply(before, "undone", Vec::new(), true).unwrap();
         }
         assert!(pins.before().unwrap_err().to_string().contains("nothing to undo"));
+        assert_eq!(pins.undone(), None);
         // A change after an undo follows it.
         pins.apply(decided("# three"), "why", Vec::new(), false).unwrap();
         assert_eq!(pins.before().unwrap().decided.overrides, "");
+        assert_eq!(pins.undone().unwrap().reason, "why");
         let read = Pins::read(place.path()).unwrap();
         assert_eq!((read.all.len(), &read.all), (6, &pins.all));
         // What is pinned wins over what begins later.

@@ -120,8 +120,13 @@ pub struct Undecided {
 }
 
 /// Which attempts of a student need not be graded, by index: those that the platform's names alone tell do not
-/// count. The best attempt is known only when all are graded.
-pub fn set_aside(labels: &[Option<&Label>], attempt: Attempt) -> BTreeSet<usize> {
+/// count. The best attempt is known only when all are graded; so is whether a late one costs points that another has,
+/// as `is_late` says of a time stamp.
+pub fn set_aside(
+    labels: &[Option<&Label>],
+    attempt: Attempt,
+    is_late: impl Fn(&str) -> bool,
+) -> BTreeSet<usize> {
     let mut people: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (index, label) in labels.iter().enumerate() {
         if let Some(label) = label {
@@ -134,7 +139,8 @@ pub fn set_aside(labels: &[Option<&Label>], attempt: Attempt) -> BTreeSet<usize>
             .iter()
             .map(|&at| labels[at].map_or("", |label| label.submitted.as_str()))
             .collect();
-        if let (false, Some(counts)) = (attempt == Attempt::Best, by_time(&stamps, attempt)) {
+        let counts = by_time(&stamps, attempt).filter(|_| attempt != Attempt::Best);
+        if let Some(counts) = counts.filter(|at| !is_late(stamps[*at])) {
             aside.extend(
                 attempts.iter().enumerate().filter(|(at, _)| *at != counts).map(|(_, own)| *own),
             );
@@ -250,8 +256,14 @@ pub fn settle(
                 let worth = |at: usize| grades[at].points_max;
                 let better = attempts.iter().max_by(|a, b| worth(**a).total_cmp(&worth(**b)));
                 if let Some(better) = better.filter(|at| worth(**at) > worth(own)) {
+                    let why = match matches.word(&claims[own]) {
+                        Some(_) if deciding.attempt == Attempt::Best => {
+                            "matches.toml names the first"
+                        }
+                        _ => "`umbra grade --attempt best` counts the better one",
+                    };
                     class.worse.push(format!(
-                        "{}: {} points, {} would have {}; `umbra grade --attempt best` counts the better one",
+                        "{}: {} points, {} would have {}; {why}",
                         called(own),
                         worth(own),
                         called(*better),
@@ -351,6 +363,13 @@ fn choose(
     if let [only] = attempts {
         return Some(*only);
     }
+    // The one that the instructor names as the student's.
+    let mut named =
+        attempts.iter().copied().filter(|at| deciding.matches.word(&claims[*at]).is_some());
+    let (named, is_alone) = (named.next(), named.next().is_none());
+    if named.is_some() && is_alone {
+        return named;
+    }
     if deciding.attempt == Attempt::Best {
         let most = |at: &&usize| grades[**at].points_max;
         return attempts.iter().rev().max_by(|a, b| most(a).total_cmp(&most(b))).copied();
@@ -377,10 +396,8 @@ fn choose(
         if alike {
             return uploads.as_deref().and_then(by_upload).or(Some(*first));
         }
-        // The one that the instructor names as the student's.
-        let mut named = attempts.iter().filter(|at| deciding.matches.word(&claims[**at]).is_some());
-        if let Some(only) = named.next() {
-            return named.next().is_none().then_some(*only);
+        if named.is_some() {
+            return None;
         }
         // One file of Canvas, submitted again: its numbers there tell. Others may be files of one attempt.
         let uploads = uploads?;
@@ -578,10 +595,18 @@ mod tests {
         let several = [claim(FIRST, ""), claims[1].clone(), third];
         assert_eq!(run(&several, &[1.0; 3], false, Attempt::Latest, "").names, [SECOND]);
         let labels: Vec<Option<&Label>> = claims.iter().map(|claim| claim.label.as_ref()).collect();
-        let aside = |attempt| set_aside(&labels, attempt).into_iter().collect::<Vec<_>>();
-        assert_eq!(aside(Attempt::Latest), [0]);
-        assert_eq!(aside(Attempt::First), [1]);
-        assert_eq!(aside(Attempt::Best), [0usize; 0]);
+        let aside = |attempt, late: &str| {
+            let late = late.to_owned();
+            let aside = set_aside(&labels, attempt, |stamp| !late.is_empty() && stamp >= &late[..]);
+            aside.into_iter().collect::<Vec<_>>()
+        };
+        assert_eq!(aside(Attempt::Latest, ""), [0]);
+        assert_eq!(aside(Attempt::First, ""), [1]);
+        assert_eq!(aside(Attempt::Best, ""), [0usize; 0]);
+        // The last one is late: the other may be worth more, which is said.
+        assert_eq!(aside(Attempt::Latest, "2019-10-06"), [0usize; 0]);
+        assert_eq!(aside(Attempt::First, "2019-10-06"), [1]);
+        assert_eq!(aside(Attempt::Latest, "2019-10-07"), [0]);
     }
 
     #[test]
@@ -684,10 +709,19 @@ mod tests {
                 assert!(settled.class.undecided.iter().all(asks));
             }
         }
-        // Times go before it: the later one counts, whoever is named.
+        // It goes before times and points; what is worth more is told.
         let timed = [claim(FIRST, "3"), claim(SECOND, "3")];
-        let first = format!("[[match]]\nsubmission = \"{FIRST}\"\nstudent = \"3\"\n");
-        assert_eq!(run(&timed, &[1.0, 2.0], true, Attempt::Latest, &first).names, [SECOND]);
+        let is = |name: &str| format!("[[match]]\nsubmission = \"{name}\"\nstudent = \"3\"\n");
+        for attempt in [Attempt::Latest, Attempt::First, Attempt::Best] {
+            for (named, points) in [(FIRST, [1.0, 90.0]), (SECOND, [2.0, 1.0])] {
+                let settled = run(&timed, &points, true, attempt, &is(named));
+                assert_eq!((settled.names, settled.class.worse.len()), (vec![named.into()], 1));
+            }
+            // Of several that are named, and of none, the policy tells.
+            let both = run(&timed, &[1.0, 90.0], true, attempt, &(is(FIRST) + &is(SECOND)));
+            let policy = if attempt == Attempt::First { FIRST } else { SECOND };
+            assert_eq!(both.names, [policy]);
+        }
         // The same content twice is no question.
         let same = claims.clone().map(|own| Claim { digest: "d".into(), ..own });
         let settled = run(&same, &[1.0, 1.0], true, Attempt::Latest, "");

@@ -3,6 +3,7 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -11,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::class::{self, WORK};
+use super::outputs::shell_path;
 use crate::class::jplag;
 use crate::class::mending;
 use crate::class::overrides::{Applied, Subject};
@@ -219,13 +221,18 @@ impl Kept {
     /// When the folder holds no report, or one of another version.
     pub fn read(output: &Path) -> anyhow::Result<Self> {
         let instructor = output.join(report::INSTRUCTOR);
+        ensure!(
+            instructor.is_dir(),
+            "{} holds no report; expected the --report of an earlier `umbra grade`",
+            output.display()
+        );
         let pins = Pins::read(&instructor)?;
         let Some(found) = Found::read(output)?.filter(|_| pins.current().is_some()) else {
             ensure!(
                 Found::begun(output)?.is_empty(),
                 "{}: the tasks of a partition are not merged yet; hint: umbra merge --report {}",
                 output.display(),
-                output.display()
+                shell_path(output)
             );
             bail!(
                 "{}: expected the --report of an earlier `umbra grade` of this version; hint: grade once more",
@@ -241,6 +248,19 @@ impl Kept {
         found.name(&mut records);
         let roster = class::roster(None, output)?;
         Ok(Self { pins, found, roster, records })
+    }
+
+    /// This, read again where another process changed meanwhile what it is settled by. Nobody else changes that as long
+    /// as the lock is there.
+    ///
+    /// # Errors
+    /// When it cannot be locked or read.
+    pub fn locked(self, output: &Path) -> anyhow::Result<(File, Self)> {
+        let lock = Pins::lock(&output.join(report::INSTRUCTOR))?;
+        let now = Pins::read(&output.join(report::INSTRUCTOR))?;
+        let is_same =
+            now.current().map(|pin| pin.number) == self.pins.current().map(|pin| pin.number);
+        Ok((lock, if is_same { self } else { Self::read(output)? }))
     }
 
     /// What is held back, if anything.
@@ -527,8 +547,16 @@ pub fn settled(
                 let private = original.remarks.iter();
                 let private = private.filter(|own| report::is_private(own, &stated.rules));
                 mended.remarks.extend(private.cloned());
-                overrides.apply(&subject, &mut mended);
-                mending::choose(decision, &mut grade, mended).map(Ok)
+                let on_mended = overrides.apply(&subject, &mut mended);
+                let made = mending::choose(decision, &mut grade, mended);
+                if made.as_ref().is_some_and(|made| made.counts) {
+                    // They were made on the submission's own evidence, and change points of the mended one.
+                    let own = decisions.iter_mut().last().into_iter().flatten();
+                    for (own, mended) in own.zip(on_mended) {
+                        (own.before, own.after) = (mended.before, mended.after);
+                    }
+                }
+                made.map(Ok)
             }
             (Some(decision), _) => Some(Err(mending::stale(decision))),
             (None, _) => None,
@@ -548,11 +576,14 @@ pub fn settled(
     let parts: Vec<&str> = stated.rules.parts.iter().map(|part| part.id.as_str()).collect();
     let counts = |slug: &str| standings.iter().any(|(at, _)| claims[*at].slug == slug);
     class.unused.extend(overrides.unused(counts, &parts));
-    let is_seen = |word: &str| {
-        let label = |seen: &Seen| seen.label.as_ref().is_some_and(|own| own.submission == word);
-        found.seen.iter().any(|seen| seen.slug == word || seen.name == word || label(seen))
+    let is_called = |seen: &Seen, word: &str| {
+        let label = seen.label.as_ref().is_some_and(|own| own.submission == word);
+        seen.slug == word || seen.name == word || label
     };
-    class.unused.extend(matches.lost(is_seen));
+    class.unused.extend(matches.lost(
+        |word| found.seen.iter().any(|seen| is_called(seen, word)),
+        |word| found.seen.iter().any(|seen| seen.aside && is_called(seen, word)),
+    ));
     class.unopened.clone_from(&found.unopened);
     class.stale.extend(outdated);
     if let (Some(roster), Some(policy)) = (roster, &stated.late) {
@@ -592,6 +623,11 @@ pub fn settled(
     Ok(Settled { report: BatchReport { released, has_alike, ..settled }, records, shared })
 }
 
+/// Whether a submission of two reports is one student's in both.
+pub fn is_same(own: &SubmissionReport, other: &SubmissionReport) -> bool {
+    own.record.slug == other.record.slug && own.standing.student == other.standing.student
+}
+
 /// The attempt in `of` of the student whose attempt `own` is in `with` alone; that one is not in `with`.
 pub fn other_attempt<'a>(
     own: &SubmissionReport,
@@ -604,9 +640,8 @@ pub fn other_attempt<'a>(
         Some(student) => other.standing.student.as_ref() == Some(student),
         None => label.is_some() && other.standing.label.as_ref().map(Label::person) == label,
     };
-    let gone = |other: &&SubmissionReport| {
-        !with.entries.iter().any(|own| own.record.slug == other.record.slug)
-    };
+    // One that was nobody's, or another's, is not theirs in `with`.
+    let gone = |other: &&SubmissionReport| !with.entries.iter().any(|own| is_same(own, other));
     of.entries.iter().filter(gone).find(is_theirs)
 }
 
@@ -628,6 +663,9 @@ pub fn changes(before: &BatchReport, after: &BatchReport) -> Vec<Change> {
         };
         let (old, new) = match (old, new) {
             (None, Some(new)) => (other(&new, before, after), Some(new)),
+            (Some(old), Some(new)) if !is_same(&old, &new) => {
+                (other(&new, before, after), Some(new))
+            }
             (Some(old), None) if other(&old, after, before).is_some() => continue,
             both => both,
         };

@@ -13,8 +13,9 @@ use super::assemble::{self, Found};
 use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::class::{self, Source, Telling};
 use super::context::{Context, INTERRUPTED, cores};
+use super::export;
 use super::join::join;
-use super::outputs::{ensure_apart, ensure_not_read};
+use super::outputs::{at_root, ensure_apart, ensure_not_read, shell_path};
 use super::render::AdapterChoice;
 use super::selection::Selection;
 use crate::assignment::Assignment;
@@ -123,7 +124,7 @@ impl<'a> Batch<'a> {
         let mut context = Context::new(root)?;
         // What a zip of many holds, until the end of the batch.
         let scratch = tempfile::tempdir_in(&context.supervisor.scratch)?;
-        let collected = match self.mode {
+        let mut collected = match self.mode {
             Mode::Grade => {
                 let wanted = Wanted {
                     tree: &context.assignment.tree,
@@ -140,6 +141,14 @@ impl<'a> Batch<'a> {
                 Collected { sources, ..Collected::default() }
             }
         };
+        // What an earlier run wrote beside the submissions is none.
+        let sources = std::mem::take(&mut collected.sources);
+        let is_own = |source: &crate::class::Source| export::is_export(&source.path, self.output);
+        let (own, sources): (Vec<_>, Vec<_>) = sources.into_iter().partition(is_own);
+        collected.sources = sources;
+        let own =
+            own.into_iter().map(|source| format!("{} (an export of this report)", source.name));
+        collected.skipped.extend(own);
         if !self.is_own {
             // Before anything is written, pins included.
             for source in class::sources(&collected.sources, self.output, &HashMap::new()) {
@@ -176,7 +185,7 @@ impl<'a> Batch<'a> {
         }
         let instructor = self.output.join(report::INSTRUCTOR);
         let mut pins = match self.mode {
-            Mode::Grade => Some(self.pin(&mut context.assignment)?),
+            Mode::Grade => Some(self.pin(&mut context.assignment, root)?),
             Mode::Check => None,
         };
         let context = &context;
@@ -355,7 +364,11 @@ impl<'a> Batch<'a> {
 
     /// What the report is settled by: what is pinned there, which takes the place of what `config.json` says by now,
     /// with the instructor's decisions as they are now.
-    fn pin(&self, assignment: &mut Assignment) -> anyhow::Result<(Pins, Decisions)> {
+    fn pin(
+        &self,
+        assignment: &mut Assignment,
+        root: Option<&Path>,
+    ) -> anyhow::Result<(Pins, Decisions)> {
         let stated = Stated::from(&*assignment);
         let attempt = self.attempt.unwrap_or_default();
         let mut decided = Decisions::read(self.output, stated, attempt)?;
@@ -368,10 +381,11 @@ impl<'a> Batch<'a> {
             if !differs.is_empty() {
                 eprintln!(
                     "umbra: config.json has other {} than this report, which keeps what it was settled by on {} for \
-                     all submissions; `umbra regrade --report {}` shows what would change",
+                     all submissions; `umbra regrade --report {}{}` shows what would change",
                     differs.join(", "),
                     pin.when,
-                    self.output.display()
+                    shell_path(self.output),
+                    at_root(root)
                 );
                 assignment.pin(pinned);
                 decided.assignment = pinned.clone();
@@ -393,7 +407,11 @@ impl<'a> Batch<'a> {
         let told = |source: &Source| !matches.mention(&source.claim());
         let labels: Vec<Option<&Label>> =
             all.iter().map(|source| source.label.as_ref().filter(|_| told(source))).collect();
-        let aside = crate::class::set_aside(&labels, decided.attempt);
+        let (policy, due) = (&decided.assignment.late, &decided.assignment.due);
+        let aside = crate::class::set_aside(&labels, decided.attempt, |stamp| {
+            let late = policy.as_ref().and_then(|policy| policy.judge(due, stamp, |_| false));
+            late.is_some_and(|late| late.late_s > 0)
+        });
         Ok(aside.into_iter().map(|at| all[at].slug.clone()).collect())
     }
 

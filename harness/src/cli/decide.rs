@@ -7,9 +7,10 @@ use anyhow::{Context as _, ensure};
 use super::assemble::Kept;
 use super::chosen::{Graded, one};
 use super::earlier::{Report, Row};
+use super::outputs::shell_path;
 use super::report_folder::ReportFolder;
 use crate::class::Decisions;
-use crate::class::overrides::{Decision, OVERRIDES, entry, fingerprint};
+use crate::class::overrides::{Applied, Decision, OVERRIDES, entry, fingerprint};
 use crate::files::write_whole;
 use crate::report::{self, harmless};
 
@@ -79,13 +80,18 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
     let own = graded.entry.grade.parts.iter().position(|own| own.id == *part);
     let own = own.map(|at| &graded.entry.grade.parts[at..=at]).unwrap_or_default();
     let evidence = fingerprint(&graded.subject(), own);
-    let before = own.first().map(|own| own.points).unwrap_or_default();
+    let before = own.first().map(|own| [own.points, own.points_max]).unwrap_or_default();
     let made = decision.of(&graded, evidence)?;
-    decision.add(kept, &Decision { part: Some(part.clone()), points: Some(*points), ..made })?;
+    let made = Decision { part: Some(part.clone()), points: Some(*points), ..made };
+    let kept = decision.add(kept, &made)?;
+    // What a fix of the instructor shows is the evidence, where that counts.
+    let applied = applied(&graded, &kept, decision, Some(part))?;
+    let [least, most] = applied.map_or(before, |own| own.before);
     println!(
-        "{}: part {part} has {points} {} from now on, the evidence says {before}",
+        "{}: part {part} has {points} {} from now on, the evidence says {}",
         harmless(&graded.entry.who()),
-        if *points == 1.0 { "point" } else { "points" }
+        if *points == 1.0 { "point" } else { "points" },
+        if least == most { least.to_string() } else { format!("{least}..{most}") }
     );
     said(&decision.report.path, &graded)
 }
@@ -101,14 +107,24 @@ pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     said(&decision.report.path, &graded)
 }
 
-/// What a confirmation is worth, beside all other decisions on the submission.
-fn confirmed(graded: &Graded, kept: &Kept, decision: &DecisionArguments) -> anyhow::Result<String> {
+/// The last decision on a part, or on the whole, as the report applies it beside all others; none where the submission
+/// does not count.
+fn applied(
+    graded: &Graded,
+    kept: &Kept,
+    decision: &DecisionArguments,
+    part: Option<&str>,
+) -> anyhow::Result<Option<Applied>> {
     let report = kept.report(&decision.report.path, kept.decided()?)?.report;
     let slug = &graded.entry.record.slug;
-    let entry = report.entries.iter().find(|own| own.record.slug == *slug);
-    let decisions = entry.map(|own| own.standing.decisions.as_slice()).unwrap_or_default();
-    let own = decisions.iter().rfind(|own| own.decision.part.is_none());
-    let (from, to) = match own {
+    let entry = report.entries.into_iter().find(|own| own.record.slug == *slug);
+    let decisions = entry.map(|own| own.standing.decisions).unwrap_or_default();
+    Ok(decisions.into_iter().rfind(|own| own.decision.part.as_deref() == part))
+}
+
+/// What a confirmation is worth, beside all other decisions on the submission.
+fn confirmed(graded: &Graded, kept: &Kept, decision: &DecisionArguments) -> anyhow::Result<String> {
+    let (from, to) = match applied(graded, kept, decision, None)? {
         Some(own) => (own.before[0], own.after[0]),
         None => (0.0, graded.entry.grade.unconfirmed),
     };
@@ -121,18 +137,17 @@ fn confirmed(graded: &Graded, kept: &Kept, decision: &DecisionArguments) -> anyh
 
 /// Says where a decision is kept, and whether it shows.
 pub fn said(output: &Path, graded: &Graded) -> anyhow::Result<u8> {
-    let file = output.join(OVERRIDES);
-    match &graded.instead {
-        None => println!(
-            "kept in {}; the reports show it; `umbra regrade --undo` takes it back",
-            file.display()
-        ),
-        Some(instead) => println!(
-            "kept in {}, but no report shows it: this submission does not count{}; `umbra regrade --undo` takes it back",
-            file.display(),
-            harmless(instead)
-        ),
-    }
+    let shown = match &graded.instead {
+        None => "; the reports show it".to_owned(),
+        Some(instead) => {
+            format!(", but no report shows it: this submission does not count{}", harmless(instead))
+        }
+    };
+    println!(
+        "kept in {}{shown}; `umbra regrade --undo --report {}` takes it back",
+        output.join(OVERRIDES).display(),
+        shell_path(output)
+    );
     Ok(super::EXIT_OK)
 }
 
@@ -175,8 +190,10 @@ impl DecisionArguments {
     ///
     /// # Errors
     /// When the file says what means nothing, or something cannot be written.
-    pub fn add(&self, mut kept: Kept, decision: &Decision) -> anyhow::Result<Kept> {
+    pub fn add(&self, kept: Kept, decision: &Decision) -> anyhow::Result<Kept> {
         let file = self.report.path.join(OVERRIDES);
+        // Two decisions at the same time follow each other, each on what is settled by then.
+        let (_lock, mut kept) = kept.locked(&self.report.path)?;
         // What is there must be right before anything is added to it.
         let current = kept.decided()?.clone();
         let mut decided =

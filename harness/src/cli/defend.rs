@@ -8,7 +8,7 @@ use super::assemble::Kept;
 use super::chosen::one;
 use super::context::Context;
 use super::location::Location;
-use super::outputs::shell_word;
+use super::outputs::at_root;
 use super::report_folder::ReportFolder;
 use super::{EXIT_OK, class, terminal};
 use crate::class::overrides::Subject;
@@ -62,11 +62,10 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
         None => Location::of(output, &slug),
     };
     let seed = report.held_back.as_ref().map_or("off".to_owned(), |own| own.seed.to_string());
-    let at_root = root
-        .map_or(String::new(), |root| format!(" --root {}", shell_word(&root.to_string_lossy())));
     println!(
-        "  the instructor, on all:  umbra grade {} --perturb {seed} --report ANOTHER{at_root}",
-        location.arguments()
+        "  the instructor, on all:  umbra grade {} --perturb {seed} --report ANOTHER{}",
+        location.arguments(),
+        at_root(root)
     );
     if let Location::Gone(place) = &location {
         println!("  (SUBMISSION: it was graded from {}, where it is no more)", place.display());

@@ -7,6 +7,7 @@ use anyhow::{Context as _, ensure};
 use serde::Deserialize;
 
 use super::assemble::Found;
+use super::outputs::shell_path;
 use crate::class::{Class, Standing};
 use crate::grading::StageCost;
 use crate::intake::Finding;
@@ -55,9 +56,7 @@ pub struct Row {
 impl Row {
     /// Whether the archive could not be opened, and the instructor has not decided on it.
     pub fn is_unread(&self) -> bool {
-        self.digest.is_empty()
-            && self.points == self.points_max
-            && self.standing.decisions.iter().all(|own| own.stale)
+        report::is_unread(&self.digest, [self.points, self.points_max], &self.standing)
     }
 }
 
@@ -95,7 +94,7 @@ impl Report {
             file.exists() || !is_begun(output),
             "{}: the tasks of a partition are not merged yet; hint: umbra merge --report {}",
             output.display(),
-            output.display()
+            shell_path(output)
         );
         let opened = std::fs::File::open(&file).with_context(|| {
             format!(

@@ -13,11 +13,12 @@ use super::assemble::Kept;
 use super::chosen::one;
 use super::class;
 use super::earlier::{Report, Row};
+use super::outputs::shell_path;
 use super::report_folder::ReportFolder;
 use crate::class::export::{Points, grade_book};
 use crate::class::feedback::{self, Feedback};
 use crate::class::overrides::OVERRIDES;
-use crate::class::{Kind, MATCHES, Roster};
+use crate::class::{Kind, MATCHES, Roster, Student};
 use crate::columns::count;
 use crate::files::{hex, write_whole};
 use crate::report::{self, harmless};
@@ -175,7 +176,7 @@ fn write(
             ));
             match format {
                 Format::Junit => junit::junit(report, output).into_bytes(),
-                _ => gradescope(report)?.into_bytes(),
+                _ => gradescope(report, output)?.into_bytes(),
             }
         }
         Format::Csv | Format::Json => {
@@ -238,18 +239,25 @@ fn may_replace(file: &Path, format: Format, output: &Path) -> anyhow::Result<()>
             output.display()
         );
     }
-    let Ok(meta) = file.symlink_metadata() else { return Ok(()) };
-    let is_export = meta.is_file()
-        && exports(output).get(&whole).is_some_and(|noted| {
-            std::fs::read(file).is_ok_and(|bytes| *noted == hex(&Sha256::digest(bytes)))
-        });
+    if file.symlink_metadata().is_err() {
+        return Ok(());
+    }
     ensure!(
-        is_export,
+        is_export(file, output),
         "{} is there already, and is no export from this report, or was changed since; nothing is written; hint: \
          name another file, or remove that one",
         file.display()
     );
     Ok(())
+}
+
+/// Whether a file is an export from a report, which nobody changed since.
+pub fn is_export(file: &Path, output: &Path) -> bool {
+    let is_file = file.symlink_metadata().is_ok_and(|meta| meta.is_file());
+    is_file
+        && exports(output).get(&whole_path(file)).is_some_and(|noted| {
+            std::fs::read(file).is_ok_and(|bytes| *noted == hex(&Sha256::digest(bytes)))
+        })
 }
 
 /// Notes what was exported, so that a later export may replace it.
@@ -312,6 +320,12 @@ fn waits(row: &Row, report: &Report) -> Option<&'static str> {
     (row.points < row.points_max).then_some("not wholly judged")
 }
 
+/// Whether a submission that is not decided yet may be a student's, beside their own.
+fn may_have_another(student: &Student, report: &Report) -> bool {
+    let undecided = report.class.iter().flat_map(|class| &class.undecided);
+    undecided.flat_map(|own| &own.candidates).any(|candidate| candidate == student)
+}
+
 /// What each student may read.
 fn feedback_archive(
     file: &Path,
@@ -364,6 +378,9 @@ fn book(
             (None, _) => "nobody of the class list",
             (Some(_), None) if row.is_unread() => {
                 "nobody could open it; hint: ask for another archive, or `umbra confirm` its points"
+            }
+            (Some(student), None) if may_have_another(student, report) => {
+                "another submission may be theirs, which is not decided yet"
             }
             (Some(student), None) => {
                 graded.push(Points { student, points: row.points });
@@ -447,15 +464,18 @@ fn remarks(row: &Row, rules: &Rules) -> String {
 }
 
 /// `results.json` of Gradescope's autograders: a test for each part.
-fn gradescope(report: &Report) -> anyhow::Result<String> {
+fn gradescope(report: &Report, output: &Path) -> anyhow::Result<String> {
     let [row] = report.submissions.as_slice() else {
         bail!(
-            "Gradescope takes one submission at a time, and there are {}; hint: --only NAME",
-            report.submissions.len()
+            "Gradescope takes one submission at a time, and there are {}; hint: umbra export FILE --format gradescope \
+             --only STUDENT --report {}",
+            report.submissions.len(),
+            shell_path(output)
         );
     };
     let tests = row.parts.iter().map(|part| {
-        let bonus = if part.bonus { " (bonus)" } else { "" };
+        let is_said = part.title.contains("(bonus)");
+        let bonus = if part.bonus && !is_said { " (bonus)" } else { "" };
         let reason = harmless(&part.reason);
         json!({
             "number": part.id,

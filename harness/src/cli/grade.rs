@@ -6,6 +6,7 @@ use super::batch::{Batch, BatchOutcome};
 use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::context::cores;
 use super::export::{self, Format, Item};
+use super::outputs::{at_root, shell_path};
 use super::render::AdapterChoice;
 use super::terminal;
 use crate::class::{Attempt, Kind, MATCHES};
@@ -110,9 +111,10 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         BatchOutcome::Report(report, collected) => (report, collected),
         BatchOutcome::Slice(entries, all) => {
             println!(
-                "{} of {all} graded; `umbra merge --report {}` makes the reports when all tasks are done",
+                "{} of {all} graded; `umbra merge --report {}{}` makes the reports when all tasks are done",
                 count(entries.len(), "submission"),
-                arguments.output.display()
+                shell_path(&arguments.output),
+                at_root(root)
             );
             return Ok(exit_code(&entries));
         }

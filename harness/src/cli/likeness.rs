@@ -10,6 +10,7 @@ use anyhow::{Context as _, ensure};
 use super::assemble::{self, Kept};
 use super::class;
 use super::context::{Context, INTERRUPTED};
+use super::outputs::shell_path;
 use super::report_folder::ReportFolder;
 use crate::class::jplag::{self, Match, Pair, Place};
 use crate::class::{Wanted, collect};
@@ -147,11 +148,11 @@ fn write_sources(
          umbra likeness {} --report {}\n(JPlag before version 6 writes a .zip)",
         folder.display(),
         count(submissions(folder)?.len(), "submission"),
-        folder.join(TEMPLATE).display(),
-        folder.join("result").display(),
-        folder.join(SUBMISSIONS).display(),
-        folder.join("result.jplag").display(),
-        output.display()
+        shell_path(&folder.join(TEMPLATE)),
+        shell_path(&folder.join("result")),
+        shell_path(&folder.join(SUBMISSIONS)),
+        shell_path(&folder.join("result.jplag")),
+        shell_path(output)
     );
     Ok(())
 }

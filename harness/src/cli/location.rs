@@ -6,7 +6,7 @@ use anyhow::Context as _;
 
 use super::class;
 use super::context::Context;
-use super::outputs::shell_word;
+use super::outputs::shell_path;
 use crate::class::{Kind, Wanted, collect};
 
 /// Where a submission lies.
@@ -44,13 +44,9 @@ impl Location {
     /// The arguments of `umbra grade` that grade this submission alone, for a shell.
     pub fn arguments(&self) -> String {
         match self {
-            Self::Here(path) => shell_word(&path.to_string_lossy()),
+            Self::Here(path) => shell_path(path),
             Self::Packed { download, inside } => {
-                format!(
-                    "{} --only {}",
-                    shell_word(&download.to_string_lossy()),
-                    shell_word(&inside.to_string_lossy())
-                )
+                format!("{} --only {}", shell_path(download), shell_path(inside))
             }
             Self::Gone(_) => "SUBMISSION".to_owned(),
         }

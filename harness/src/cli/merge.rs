@@ -13,6 +13,7 @@ use super::class::{self, some};
 use super::context::Context;
 use super::grade;
 use super::join::join;
+use super::outputs::{at_root, shell_path};
 use crate::class::{Decisions, Pins, Stated};
 use crate::columns::count;
 use crate::evidence::{Check, Evidence};
@@ -83,8 +84,11 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
         let differs = Stated::from(&assignment).differs(&stated);
         if !differs.is_empty() {
             eprintln!(
-                "umbra: config.json has other {} than the tasks pinned; `umbra regrade` shows what would change",
-                differs.join(", ")
+                "umbra: config.json has other {} than the tasks pinned; `umbra regrade --report {}{}` shows what would \
+                 change",
+                differs.join(", "),
+                shell_path(output),
+                at_root(root)
             );
         }
     }
@@ -111,7 +115,7 @@ fn one(output: &Path, begun: Vec<(PathBuf, Found)>) -> anyhow::Result<Found> {
         !begun.is_empty(),
         "{}: nothing to merge; expected tasks that ran `umbra grade --partition slice:K/N --report {}`",
         output.display(),
-        output.display()
+        shell_path(output)
     );
     let mut judged: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for slug in class::folders(output) {

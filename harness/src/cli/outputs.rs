@@ -85,6 +85,16 @@ pub fn shell_word(text: &str) -> String {
     if plain { text.to_owned() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }
 
+/// A path as a word of a command line.
+pub fn shell_path(path: &Path) -> String {
+    shell_word(&path.to_string_lossy())
+}
+
+/// The option ` --root DIR` for a command line, where one was given.
+pub fn at_root(root: Option<&Path>) -> String {
+    root.map_or(String::new(), |root| format!(" --root {}", shell_path(root)))
+}
+
 /// Whether two paths lead to one file that exists.
 fn is_same_file(one: &Path, other: &Path) -> bool {
     let (Ok(one), Ok(other)) = (one.canonicalize(), other.canonicalize()) else { return false };

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Context as _;
 
-use super::assemble::{self, Kept, changes, other_attempt};
+use super::assemble::{self, Kept, changes, is_same, other_attempt};
 use super::context::Context;
 use super::report_folder::ReportFolder;
 use crate::class::overrides::OVERRIDES;
@@ -35,7 +35,11 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
     let RegradeArguments { apply, undo, reason, report: ReportFolder { path: output } } = arguments;
     let reason = reason.as_deref().map(str::trim);
     anyhow::ensure!(reason != Some(""), "--reason: expected a reason, found nothing");
-    let mut kept = Kept::read(output)?;
+    let kept = Kept::read(output)?;
+    let (_lock, mut kept) = match *apply || *undo {
+        true => kept.locked(output).map(|(lock, kept)| (Some(lock), kept))?,
+        false => (None, kept),
+    };
     let current = kept.pins.current().context("nothing is pinned")?.clone();
     println!(
         "settled by change {} of {}: {}",
@@ -44,6 +48,15 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
         harmless(&current.reason)
     );
     let decided = if *undo {
+        let read =
+            Decisions::read(output, current.decided.assignment.clone(), current.decided.attempt)?;
+        let edited = read.differs(&current.decided, output)?;
+        anyhow::ensure!(
+            edited.is_empty(),
+            "{}: --undo would lose what {} says by now and no report shows; hint: --apply it, or take it out of the file",
+            output.display(),
+            edited.join(" and ")
+        );
         kept.pins.before()?.decided.clone()
     } else {
         let stated = Stated::from(&Context::assignment(root)?);
@@ -75,6 +88,7 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
         println!("warning: on nothing that is there: {}", harmless(line));
     }
     if *undo {
+        let undone = kept.pins.undone().map(|pin| pin.reason.clone()).unwrap_or_default();
         // The files first: a change that is applied without them would come back with the next run.
         for (name, text, old) in [
             (MATCHES, &decided.matches, &current.decided.matches),
@@ -86,7 +100,7 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
                     .with_context(|| format!("cannot write {}", file.display()))?;
             }
         }
-        let reason = reason.map_or_else(|| format!("undone: {}", current.reason), str::to_owned);
+        let reason = reason.map_or_else(|| format!("undone: {undone}"), str::to_owned);
         kept.apply(output, decided, &reason, true)?;
         println!("undone; the reports are written");
     } else if *apply {
@@ -133,15 +147,13 @@ fn table(changes: &[Change]) -> String {
 /// How many rise and fall.
 fn summary(before: &BatchReport, after: &BatchReport) -> String {
     let total = |own: &SubmissionReport| own.grade.points + own.grade.points_max;
-    let find = |of: &'_ BatchReport, slug: &str| {
-        of.entries.iter().find(|own| own.record.slug == slug).map(total)
-    };
     let (mut rise, mut fall, mut stay, mut new) = (0, 0, 0, 0);
     for entry in &after.entries {
         let now = total(entry);
         // Of a student whose other attempt counts now, that one.
         let other = || other_attempt(entry, before, after).map(total);
-        match find(before, &entry.record.slug).or_else(other) {
+        let same = before.entries.iter().find(|own| is_same(own, entry)).map(total);
+        match same.or_else(other) {
             None => new += 1,
             Some(old) if now > old => rise += 1,
             Some(old) if now < old => fall += 1,
@@ -149,7 +161,8 @@ fn summary(before: &BatchReport, after: &BatchReport) -> String {
         }
     }
     let is_gone = |own: &&SubmissionReport| {
-        find(after, &own.record.slug).is_none() && other_attempt(own, after, before).is_none()
+        let is_there = after.entries.iter().any(|now| now.record.slug == own.record.slug);
+        !is_there && other_attempt(own, after, before).is_none()
     };
     let gone = before.entries.iter().filter(is_gone).count();
     let mut words = format!(

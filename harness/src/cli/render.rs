@@ -111,9 +111,14 @@ impl FromStr for Size {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || format!("expected WIDTHxHEIGHT such as 640x480, found {text}");
         let (width, height) = text.split_once('x').ok_or_else(wrong)?;
-        let side =
-            |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE as u32).contains(side));
-        let (width, height) = (side(width).ok_or_else(wrong)?, side(height).ok_or_else(wrong)?);
+        let side = |text: &str| match text.parse::<u64>() {
+            Ok(side) if side > MAX_SIDE as u64 => {
+                Err(format!("expected at most {MAX_SIDE} pixels a side, found {text}"))
+            }
+            Ok(side @ 1..) => u32::try_from(side).map_err(|_| wrong()),
+            _ => Err(wrong()),
+        };
+        let (width, height) = (side(width)?, side(height)?);
         let pixels = width as usize * height as usize;
         if pixels > MAX_PIXELS {
             return Err(format!("expected at most {MAX_PIXELS} pixels, found {pixels}"));

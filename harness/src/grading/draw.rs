@@ -149,6 +149,7 @@ pub fn probe_adapter(session: &Session, case: &PreparedScene) -> Result<String, 
     match draw(session, None, &Frame { size: (16, 16), ..Frame::probe(case, stages) }) {
         Outcome::Done(answer) => Ok(answer.adapter),
         Outcome::NoAdapter(message) | Outcome::Failed(message) => Err(message),
+        Outcome::NotRun { reason, .. } => Err(reason),
         other => Err(other.to_string()),
     }
 }

@@ -50,12 +50,14 @@ pub(super) struct Config<'a> {
     pub(super) found: Lost<'a>,
     /// Whether the source beside it is another than that beside another one of the same person.
     pub(super) has_rival: bool,
+    /// The folders of other ones of the same person that do not lie within its own; they end with `/`.
+    pub(super) beside: Vec<&'a str>,
     pub(super) others: Vec<(&'a str, String)>,
 }
 
 impl<'a> From<Lost<'a>> for Config<'a> {
     fn from(found: Lost<'a>) -> Self {
-        Self { found, has_rival: false, others: Vec::new() }
+        Self { found, has_rival: false, beside: Vec::new(), others: Vec::new() }
     }
 }
 
@@ -93,24 +95,29 @@ pub(super) fn find_config(submission: &Submission) -> Result<Config<'_>, IntakeE
         return Ok(Lost::One(own.unwrap_or(found[0])).into());
     };
     if others.iter().all(|(_, other)| other.is(someone)) {
-        let rival = |(other, _): &(&str, Person)| is_rival(submission, first, other);
-        let has_rival = others.iter().any(rival);
-        return Ok(Config { has_rival, ..Lost::One(first).into() });
+        let own = folder(first);
+        let beside = others.iter().map(|(other, _)| folder(other));
+        let beside: Vec<&str> = beside.filter(|other| !other.starts_with(own)).collect();
+        let has_rival = beside.iter().any(|other| is_rival(submission, own, other));
+        return Ok(Config { has_rival, beside, ..Lost::One(first).into() });
     }
     Ok(Lost::Several(named.iter().map(|(path, _)| *path).collect()).into())
 }
 
-/// Whether two configurations have different sources beside them, neither of which lies within the other.
-fn is_rival(submission: &Submission, first: &str, other: &str) -> bool {
-    let folder = |path: &str| path.rfind('/').map_or(String::new(), |at| path[..=at].to_owned());
+/// The folder of a file, with `/` at its end.
+fn folder(path: &str) -> &str {
+    path.rfind('/').map_or("", |at| &path[..=at])
+}
+
+/// Whether two folders have different sources.
+fn is_rival(submission: &Submission, own: &str, other: &str) -> bool {
     let sources = |folder: &str| {
         let all = submission.files.iter().filter(|file| is_source(&file.path));
         all.filter_map(|file| Some((file.path.strip_prefix(folder)?, file.sha256.as_str())))
             .collect::<Vec<_>>()
     };
-    let (own, rival) = (folder(first), folder(other));
-    let [ours, theirs] = [sources(&own), sources(&rival)];
-    !rival.starts_with(&own) && !ours.is_empty() && !theirs.is_empty() && ours != theirs
+    let [ours, theirs] = [sources(own), sources(other)];
+    !ours.is_empty() && !theirs.is_empty() && ours != theirs
 }
 
 /// Whom the configuration at a path names.

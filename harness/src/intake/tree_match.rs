@@ -95,7 +95,10 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
             [] => {
                 let free: Vec<&SubmittedFile> =
                     files.iter().filter(|file| !taken.contains(file.path.as_str())).collect();
-                find_lost(file, &free, tree, root)
+                match find_lost(file, &free, tree, root) {
+                    Lost::One(path) => with_others(path, root, &config.beside, submission),
+                    found => found,
+                }
             }
         };
         matched.take(file, &found, files);
@@ -165,6 +168,26 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
             .hint("leave it out if it is not yours")
     }));
     Ok(matched)
+}
+
+/// A file that was found below the root, or several: an image may differ from that in the same place of another hand-in
+/// of the same person. Whether their sources differ is known by then.
+fn with_others<'a>(
+    path: &'a str,
+    root: &str,
+    beside: &[&str],
+    submission: &'a Submission,
+) -> Lost<'a> {
+    let own = submission.file(path).filter(|_| !is_source(path));
+    let place = path.strip_prefix(root).map(|rest| rest.trim_start_matches('/'));
+    let (Some(own), Some(place)) = (own, place.filter(|_| !root.is_empty())) else {
+        return Lost::One(path);
+    };
+    let others = beside.iter().filter_map(|folder| submission.file(&format!("{folder}{place}")));
+    let others = others.filter(|other| other.sha256 != own.sha256);
+    let mut all = vec![path];
+    all.extend(others.map(|other| other.path.as_str()));
+    if all.len() == 1 { Lost::One(path) } else { Lost::Several(all) }
 }
 
 /// The folders that are reports of Umbra's, beside what is submitted.

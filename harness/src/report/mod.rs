@@ -90,13 +90,24 @@ impl SubmissionReport {
         let own = &self.record.student;
         self.standing.student.as_ref().map_or_else(
             || own.clone(),
-            |listed| Student {
-                first_name: listed.first_name.clone(),
-                last_name: listed.last_name.clone(),
-                id: if listed.number.is_empty() { &own.id } else { &listed.number }.clone(),
+            |listed| {
+                // A list may hold accounts or numbers alone.
+                let is_named = !(listed.first_name.is_empty() && listed.last_name.is_empty());
+                let names = match is_named {
+                    true => [&listed.first_name, &listed.last_name],
+                    false => [&own.first_name, &own.last_name],
+                };
+                let [first_name, last_name] = names.map(String::clone);
+                let id = if listed.number.is_empty() { &own.id } else { &listed.number }.clone();
+                Student { first_name, last_name, id }
             },
         )
     }
+}
+
+/// Whether an archive could not be opened, and the instructor has not decided on it. Its digest is empty.
+pub fn is_unread(digest: &str, [least, most]: [f64; 2], standing: &Standing) -> bool {
+    digest.is_empty() && least == most && standing.decisions.iter().all(|own| own.stale)
 }
 
 /// Everything that a report of a batch is made from.

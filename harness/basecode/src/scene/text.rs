@@ -57,8 +57,8 @@ pub(super) fn bytes_of(name: &str) -> Option<Vec<u8>> {
     name.chars().map(byte).collect()
 }
 
-/// The text of a file: UTF-8 or UTF-16 by its byte order mark, UTF-16 by its zeros, else UTF-8, else a character for
-/// each byte, as in Latin-1.
+/// The text of a file: UTF-8 or UTF-16 by its byte order mark, UTF-16 by its zeros, else each line by itself: UTF-8, else
+/// a character for each byte, as in Latin-1. A comment in another encoding so changes no name.
 pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
     if let Some(rest) = bytes.strip_prefix(b"\xef\xbb\xbf") {
         return decode(rest);
@@ -75,7 +75,14 @@ pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
         [0, 1..=127, 0, 1..=127, ..] => utf16(bytes, u16::from_be_bytes),
         _ => match std::str::from_utf8(bytes) {
             Ok(text) => Cow::Borrowed(text),
-            Err(_) => Cow::Owned(decode_bytes(bytes)),
+            Err(_) => {
+                let lines = bytes.split_inclusive(|byte| matches!(byte, b'\n' | b'\r'));
+                let texts = lines.map(|line| match std::str::from_utf8(line) {
+                    Ok(text) => Cow::Borrowed(text),
+                    Err(_) => Cow::Owned(decode_bytes(line)),
+                });
+                Cow::Owned(texts.collect())
+            }
         },
     }
 }
@@ -221,6 +228,12 @@ mod tests {
     fn encodings_are_told_apart() {
         assert_eq!(decode("\u{feff}grün".as_bytes()), "grün");
         assert_eq!(decode(b"gr\xfcn"), "grün");
+        // A name is the same in two files, whatever a comment in one of them holds.
+        for end in ["\n", "\r\n", "\r"] {
+            let mixed =
+                [b"# k\xfcche".as_slice(), end.as_bytes(), "usemtl Böden".as_bytes()].concat();
+            assert_eq!(decode(&mixed), format!("# küche{end}usemtl Böden"));
+        }
         // 表 in Shift-JIS, 許 in Big5: the second byte is no continuation.
         for name in [b"\x95\x5c", b"\xb3\x5c"] {
             let text = [b"usemtl ".as_slice(), name, b"\nf 1 2 3\n"].concat();

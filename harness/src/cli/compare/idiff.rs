@@ -266,7 +266,7 @@ fn report(
         (Some(largest), Some(values)) => {
             let [x, y] = largest.at;
             let [a, b] = values.map(|values| {
-                values.iter().map(f32::to_string).collect::<Vec<_>>().join(", ").to_lowercase()
+                values.iter().map(|value| shortest(*value)).collect::<Vec<_>>().join(", ")
             });
             println!(
                 "  Max error  = {} @ ({x}, {y}, {})  values are {a} vs {b}",
@@ -369,16 +369,55 @@ fn general(value: f64, digits: usize) -> String {
         false => text.to_owned(),
     };
     if exponent < -4 || exponent >= digits as i32 {
-        let sign = if exponent < 0 { '-' } else { '+' };
-        return format!("{}e{sign}{:02}", trimmed(mantissa), exponent.abs());
+        return with_exponent(trimmed(mantissa), exponent);
     }
     let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
     trimmed(&format!("{value:.decimals$}"))
 }
 
+/// A number with as few digits as tell it from others, as C++'s `{fmt}` writes it.
+fn shortest(value: f32) -> String {
+    let scientific = format!("{value:e}");
+    let parts = scientific.split_once('e');
+    let parts = parts.and_then(|(mantissa, exponent)| Some((mantissa, exponent.parse().ok()?)));
+    match parts {
+        Some((mantissa, exponent)) if !(-4..16).contains(&exponent) => {
+            with_exponent(mantissa.to_owned(), exponent)
+        }
+        _ => value.to_string().to_lowercase(),
+    }
+}
+
+/// `1.5e-07`, as C writes it.
+fn with_exponent(mantissa: String, exponent: i32) -> String {
+    let sign = if exponent < 0 { '-' } else { '+' };
+    format!("{mantissa}e{sign}{:02}", exponent.abs())
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{general, hexadecimal};
+    use super::{general, hexadecimal, shortest};
+
+    #[test]
+    fn values_are_written_as_idiff_writes_them() {
+        // The first four by idiff of OpenImageIO 2.4.
+        for (value, text) in [
+            (4.326_4e-41, "4.3264e-41"),
+            (2.999_373_5e38, "2.9993735e+38"),
+            (1e-8, "1e-08"),
+            (9.604_056e-5, "9.604056e-05"),
+            (1e-4, "0.0001"),
+            (0.5, "0.5"),
+            (-1.0, "-1"),
+            (0.0, "0"),
+            (1e15, "1000000000000000"),
+            (1e16, "1e+16"),
+            (f32::INFINITY, "inf"),
+            (f32::NAN, "nan"),
+        ] {
+            assert_eq!(shortest(value), text);
+        }
+    }
 
     #[test]
     fn hexadecimal_numbers_are_read_as_c_reads_them() {

@@ -8,6 +8,7 @@ use super::markup::Html;
 use super::part_class;
 use super::pictures::Places;
 use crate::class::Standing;
+use crate::class::overrides::Applied;
 use crate::columns::count;
 use crate::evidence::{Check, CheckId};
 use crate::grading::Record;
@@ -29,6 +30,13 @@ pub(super) fn was_lost(part: &PartGrade, standing: &Standing) -> bool {
     let set = standing.decisions.iter();
     let mut set = set.filter(|own| own.decision.part.as_deref() == Some(part.id.as_str()));
     part.is_lost() || set.any(|own| own.before[0] < part.out_of)
+}
+
+/// Whether it lost what the evidence took, not the instructor alone.
+pub(super) fn is_lost_by_evidence(part: &PartGrade, standing: &Standing) -> bool {
+    let is_own = |own: &&Applied| own.decision.part.as_deref() == Some(part.id.as_str());
+    let set = standing.decisions.iter().rfind(is_own);
+    is_lost(part) && set.is_none_or(|own| own.before[0] < part.out_of)
 }
 
 impl<'a> Lost<'a> {

@@ -6,8 +6,10 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use super::super::number::{is_failure, is_range, percent, points, range, value};
 use super::super::{
     BatchReport, ERRORS, ErrorPicture, HTML_FILE, INSTRUCTOR, SubmissionReport, is_private,
+    is_unread,
 };
 use super::likeness::LIKENESS;
+use super::lost::is_lost_by_evidence;
 use super::markup::Html;
 use crate::class::Class;
 use crate::columns::count;
@@ -85,6 +87,11 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
     add("not wholly judged: grade again, or decide", &|entry| {
         let (least, most) = (entry.grade.points, entry.grade.points_max);
         is_range(least, most).then(|| format!("{} points", range(least, most)))
+    });
+    add("nobody could open them: ask for other archives, or confirm", &|entry| {
+        let (record, grade) = (&entry.record, &entry.grade);
+        let unread = is_unread(&record.digest, [grade.points, grade.points_max], &entry.standing);
+        unread.then(|| grade.remarks.first().cloned().unwrap_or_default())
     });
     add("images without code: confirm or refuse", &|entry| {
         let own = entry.grade.unconfirmed;
@@ -236,7 +243,8 @@ pub(super) fn mistakes(html: &mut Html, report: &BatchReport) {
                 check.id == CheckId::SubmissionBuild && check.verdict == Verdict::Fail
             });
         let judged = |own: &&PartGrade| !is_range(own.points, own.points_max);
-        for own in entry.grade.parts.iter().filter(|own| own.is_lost()).filter(judged) {
+        let lost = |own: &&PartGrade| is_lost_by_evidence(own, &entry.standing);
+        for own in entry.grade.parts.iter().filter(lost).filter(judged) {
             if entry.record.diagnoses.iter().any(|found| found.part == own.id) {
                 continue;
             }
