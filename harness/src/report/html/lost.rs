@@ -36,7 +36,7 @@ pub(super) fn was_lost(part: &PartGrade, standing: &Standing) -> bool {
 pub(super) fn is_lost_by_evidence(part: &PartGrade, standing: &Standing) -> bool {
     let is_own = |own: &&Applied| own.decision.part.as_deref() == Some(part.id.as_str());
     let set = standing.decisions.iter().rfind(is_own);
-    is_lost(part) && set.is_none_or(|own| own.before[0] < part.out_of)
+    part.is_lost() && set.is_none_or(|own| own.before[0] < part.out_of)
 }
 
 impl<'a> Lost<'a> {
