@@ -130,7 +130,7 @@ pub fn left_by_pass(scene: &Scene, image: &Image, mask: &RegionMask) -> Vec<Left
             changes: &[],
         };
         let lights = answers.total() >= LEAST_LEFT * surfaces.len() as f64;
-        LeftByPass { name: *name, left: answers.residual_of_right().min(1.0), lights }
+        LeftByPass { name, left: answers.residual_of_right().min(1.0), lights }
     };
     pass_mistakes(scene, places).iter().map(left).collect()
 }
