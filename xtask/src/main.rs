@@ -42,8 +42,11 @@ enum Command {
     },
     /// Write the list of checks into docs/evidence.md.
     Checks,
-    /// Pack the sample submissions into target/umbra/samples, with the images that their code draws.
-    Samples,
+    /// Pack the sample submissions into target/umbra/samples, with the images that their code draws; print their paths.
+    Samples {
+        /// Folders of samples/; all without any.
+        names: Vec<String>,
+    },
     /// Make the student's kit.
     Dist(dist::Arguments),
     /// Grade the reference with known mistakes, and without; print the matrix part x mistake.
@@ -65,7 +68,7 @@ fn main() -> ExitCode {
         #[cfg(unix)]
         Command::BenchChild { command } => bench::child::run(&command),
         Command::Checks => checks::run(root(), false),
-        Command::Samples => samples::pack(root(), &|_, _| true).map(|samples| {
+        Command::Samples { names } => samples::pack_named(root(), &names).map(|samples| {
             let paths = samples.iter().map(|sample| sample.archive.display().to_string());
             paths.collect::<Vec<_>>().join("\n")
         }),

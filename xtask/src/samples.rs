@@ -123,6 +123,18 @@ pub fn pack(root: &Path, wanted: Wanted) -> Result<Vec<Sample>> {
     Ok(samples)
 }
 
+/// Packs the samples of these names, or all.
+///
+/// # Errors
+/// When there is no sample of a name; as [`pack`] otherwise.
+pub fn pack_named(root: &Path, names: &[String]) -> Result<Vec<Sample>> {
+    for name in names {
+        let recipe = root.join("samples").join(name).join("recipe.toml");
+        ensure!(recipe.is_file(), "there is no sample {name}");
+    }
+    pack(root, &|name, _| names.is_empty() || names.iter().any(|wanted| wanted == name))
+}
+
 /// The files below `src/`.
 type Source = BTreeMap<PathBuf, Vec<u8>>;
 
