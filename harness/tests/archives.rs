@@ -1043,16 +1043,21 @@ fn a_source_that_may_be_in_an_archive_which_is_not_opened_is_not_missing() {
         ("a2/i.rar", b"Rar!\x1a\x07\0xxxx"),
         ("i.tar.xz", b"\xfd7zXZ\0xxxx"),
         ("src.zip", &zip),
+        // What its bytes do not tell, its name does.
+        ("a2.iso", b"\0\0\0\0"),
+        ("a2.7z.002", b"xxxx"),
+        ("a2.Z01", b"xxxx"),
     ] {
         let archive = Entry::stored(inner, archive);
-        let text = Entry::stored("readme.txt", b"x");
-        for entries in [vec![good(), archive.clone()], vec![archive.clone(), text]] {
+        let others = ["readme.txt", "notes.rs", "main.cpp", "old/phong.fs.wgsl"];
+        let beside = others.map(|name| vec![archive.clone(), Entry::stored(name, b"x")]);
+        for entries in beside.into_iter().chain([vec![good(), archive.clone()]]) {
             let bytes = Zip::of(entries).bytes();
             let first = assert_refused(&bytes, "a.zip", "nested_archive", inner).to_string();
             assert!(first.contains("no source is there besides"), "{first}");
         }
     }
-    for entry in ["main.cpp", "src/main.rs", "src/shaders/phong.wgsl"] {
+    for entry in ["src/lib.rs", "a2/lib.rs"] {
         let bytes = Zip::of([Entry::stored(entry, b"x"), Entry::stored("x.zip", &zip)]).bytes();
         assert_accepted(&bytes, "a.zip", "nested_archive");
     }
@@ -1392,6 +1397,18 @@ fn tar_without_an_end_is_reported() {
     // What is missing may have been behind the cut.
     for number in 1..files.len() {
         assert_refused(&tar_bytes::open(&files[..number]), "a.tar", "tar_no_end", "");
+    }
+    // So may a file that the source names.
+    for (text, named) in [
+        ("mod renderer;", "src/renderer.rs"),
+        ("pub mod bsdfs;", "src/bsdfs/mod.rs"),
+        ("const A: &str = include_str!(\"a.wgsl\");", "src/a.wgsl"),
+    ] {
+        files[1] = Tar::file("src/lib.rs", text.as_bytes());
+        assert_refused(&tar_bytes::open(&files), "a.tar", "tar_no_end", "");
+        let mut whole = files.clone();
+        whole.push(Tar::file(named, b"x"));
+        assert_accepted(&tar_bytes::open(&whole), "a.tar", "tar_no_end");
     }
 }
 

@@ -14,7 +14,9 @@ use unicode_normalization::UnicodeNormalization as _;
 use super::finding::{Finding, Findings};
 use super::limits::{Limits, mib};
 use super::name::{Backslashes, safe_path};
-use super::submission::{Format, IntakeError, Refusal, Submission, SubmittedFile, archive_magic};
+use super::submission::{
+    Format, IntakeError, Refusal, Submission, SubmittedFile, archive_by_name, archive_magic,
+};
 use super::tree::{CONFIG_FILE, TreeSpec};
 use crate::files::hex;
 use crate::harmless::printable;
@@ -289,7 +291,7 @@ impl<'a> PrivateCopy<'a> {
             };
             let chunk = &buffer[..n];
             if bytes == 0
-                && let Some(kind) = archive_magic(chunk)
+                && let Some(kind) = archive_magic(chunk).or_else(|| archive_by_name(path))
             {
                 self.findings.push(
                     Finding::warning(

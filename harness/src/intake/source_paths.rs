@@ -8,12 +8,20 @@ use super::lexer::{Token, TokenKind, tokens};
 /// Macros that read a file at compile time.
 const INCLUDES: [&str; 4] = ["include_str", "include_bytes", "include", "include_wgsl"];
 
-/// The warnings on the modules and included files that the source at `path` names and that are there in another
-/// spelling only. `files` are all paths of the submission.
-pub(super) fn misspelt(path: &str, text: &str, files: &[&str]) -> Vec<Finding> {
-    let tokens = tokens(text);
+/// A file that a source names.
+struct Named<'a> {
+    /// Where it may lie.
+    wanted: Vec<String>,
+    /// As it is written.
+    written: String,
+    /// The first token of the module or macro.
+    token: &'a Token,
+}
+
+/// The modules and included files that the source at `path` names.
+fn named_files<'a>(path: &str, tokens: &'a [Token]) -> Vec<Named<'a>> {
     let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
-    let mut findings = Vec::new();
+    let mut named = Vec::new();
     for (at, token) in tokens.iter().enumerate() {
         let (wanted, written) = match &tokens[at..] {
             [mod_word, Token { kind: TokenKind::Word(name), .. }, semicolon, ..]
@@ -33,6 +41,24 @@ pub(super) fn misspelt(path: &str, text: &str, files: &[&str]) -> Vec<Finding> {
             }
             _ => continue,
         };
+        named.push(Named { wanted, written, token });
+    }
+    named
+}
+
+/// Whether the source at `path` names a file that is not there; `files` are all paths of the submission.
+pub(super) fn lacks_files(path: &str, text: &str, files: &[&str]) -> bool {
+    let is_there = |own: &String| files.contains(&own.as_str());
+    let lacks = |own: &Named| !own.wanted.is_empty() && !own.wanted.iter().any(is_there);
+    named_files(path, &tokens(text)).iter().any(lacks)
+}
+
+/// The warnings on the modules and included files that the source at `path` names and that are there in another
+/// spelling only. `files` are all paths of the submission.
+pub(super) fn misspelt(path: &str, text: &str, files: &[&str]) -> Vec<Finding> {
+    let tokens = tokens(text);
+    let mut findings = Vec::new();
+    for Named { wanted, written, token } in named_files(path, &tokens) {
         let has_backslash = written.contains('\\');
         if !has_backslash && wanted.iter().any(|own| files.contains(&own.as_str())) {
             continue;

@@ -119,3 +119,18 @@ pub(super) fn archive_magic(bytes: &[u8]) -> Option<&'static str> {
     ];
     MAGIC.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, kind)| *kind)
 }
+
+/// The kind of archive that a file is by its name alone: one without magic bytes at its begin, or a part of a split one.
+pub(super) fn archive_by_name(path: &str) -> Option<&'static str> {
+    const ENDS: [&str; 12] =
+        ["iso", "dmg", "egg", "alz", "lzh", "lha", "arj", "wim", "xar", "lzma", "sit", "sitx"];
+    let end = path.rsplit_once('.')?.1.to_lowercase();
+    // `a2.7z.002`, `a2.z01`, `a2.r00`
+    let digits = end.trim_start_matches(['z', 'r']);
+    let is_part = (end.len() == 3 && digits.len() >= 2 && end.len() - digits.len() <= 1)
+        && digits.bytes().all(|byte| byte.is_ascii_digit());
+    if is_part {
+        return Some("a part of one");
+    }
+    ENDS.into_iter().find(|own| *own == end)
+}

@@ -8,6 +8,7 @@ use super::copy::{EntryAction, Kind, PrivateCopy, Stop, clear};
 use super::encoding::text_of;
 use super::finding::{Finding, Severity};
 use super::limits::{Limits, mib};
+use super::source_paths::lacks_files;
 use super::submission::{Format, IntakeError, Refusal, Submission, archive_magic};
 use super::tree::{TreeFile, TreeSpec};
 use super::tree_lost::base;
@@ -49,9 +50,15 @@ fn with_source(
     tree: &TreeSpec,
 ) -> Result<Submission, IntakeError> {
     let paths = || submission.files.iter().map(|file| file.path.as_str());
-    let has_source = paths().any(is_source_of_any);
     let lacks = |file: &TreeFile| !paths().any(|path| base(path) == base(&file.path));
-    let is_whole = !tree.files.iter().filter(|file| file.required).any(lacks);
+    let required = || tree.files.iter().filter(|file| file.required);
+    let mut sources = required().filter(|file| is_source_of_any(&file.path)).peekable();
+    // A file or two of source beside an archive are not what was submitted.
+    let has_source = match sources.peek() {
+        Some(_) => !sources.any(lacks),
+        None => paths().any(is_source_of_any),
+    };
+    let is_whole = !required().any(lacks) && !names_what_is_lost(&submission, dest);
     let hides = |finding: &Finding| match finding.code.as_str() {
         NO_END => !is_whole,
         _ => is_cause(finding) && !has_source,
@@ -70,6 +77,16 @@ fn with_source(
     findings.sort_by_key(|finding| finding.severity);
     let Submission { name, format, .. } = submission;
     Err(IntakeError::Refused(Box::new(Refusal { name, format: Some(format), findings })))
+}
+
+/// Whether the source names files that are not there.
+fn names_what_is_lost(submission: &Submission, dest: &Path) -> bool {
+    let paths: Vec<&str> = submission.files.iter().map(|file| file.path.as_str()).collect();
+    let lacks = |path: &&str| {
+        let text = fs::read(dest.join(path)).unwrap_or_default();
+        path.ends_with(".rs") && lacks_files(path, &text_of(&text), &paths)
+    };
+    paths.iter().any(lacks)
 }
 
 /// Copies a folder; where that is refused for what is no part of the tree, without it, as `pack` would.
