@@ -18,6 +18,7 @@ mod shadow;
 pub mod stages;
 
 use std::borrow::Cow;
+use std::sync::OnceLock;
 
 use basecode::gpu::Stage;
 use basecode::{Bsdf, Error, Film, Integrator, Material, MaterialModel, RenderJob, Result, Scene};
@@ -79,7 +80,8 @@ impl Mistakes {
 
     /// The integrator that replaces the right one, if any.
     pub fn integrator(&self, shadows: bool) -> Option<Box<dyn Integrator>> {
-        let mistaken = || integrator::Mistaken { mistakes: self.clone(), shadows };
+        let mistaken =
+            || integrator::Mistaken { mistakes: self.clone(), shadows, own_bsdfs: OnceLock::new() };
         (!self.none()).then(|| Box::new(mistaken()) as Box<dyn Integrator>)
     }
 

@@ -16,7 +16,7 @@ use crate::evidence::loops::Edges;
 use crate::evidence::physical::Probes;
 use crate::evidence::rays::{self, RayBatch, Unshadowed};
 use crate::evidence::shading::{ShadedPoint, Shading};
-use crate::evidence::{Check, CheckId};
+use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict, price};
 use crate::expected::SurfacePoint;
 use crate::plugin::{Witness, WitnessQuery};
 use crate::worker::{Outcome, Request};
@@ -220,14 +220,36 @@ impl<'a> Answers<'a> {
         }
     }
 
+    /// What the BSDFs do wrong alone, where an integrator may hold the same ones without asking for them.
+    fn known_mistakes(&self) -> Vec<KnownMistake> {
+        if self.lights.iter().all(|light| light.own.is_empty()) {
+            return Vec::new();
+        }
+        let known = |own: &BsdfAnswer| {
+            let values = own.values.as_ref().ok()?;
+            let check = bsdf::judge(own.kind, &own.probes, values, &Convention::default());
+            let model = match own.kind {
+                BsdfKind::Diffuse => MaterialModel::Diffuse,
+                BsdfKind::Phong => MaterialModel::Phong,
+            };
+            let is_known = check.verdict == Verdict::Fail && price::is_explained(&check);
+            is_known.then_some((model, check.mistake))
+        };
+        self.bsdfs.iter().filter_map(known).collect()
+    }
+
     /// The checks under the handout's convention, and under others that the plugin keeps.
     pub fn judge(&self) -> Vec<Check> {
         let bsdfs = self.bsdfs.iter().map(BsdfAnswer::question);
-        let lights = self.lights.iter().map(LightAnswer::question);
+        let known = self.known_mistakes();
+        let lights = self.lights.iter().map(|light| light.question(&known));
         let together = || self.together.iter().map(TogetherAnswer::judge).collect();
         convention::judge(&bsdfs.chain(lights).collect::<Vec<_>>(), &together)
     }
 }
+
+/// What a BSDF is known to do wrong by itself.
+type KnownMistake = (MaterialModel, String);
 
 impl TogetherAnswer {
     fn judge(&self) -> (Party, Check) {
@@ -305,7 +327,49 @@ impl LightAnswer<'_> {
         then(&answers)
     }
 
-    fn question(&self) -> Conventional<'_> {
+    /// The check of an integrator that asks the scene for no BSDF. Its BSDFs are its own: a mistake may be in one of
+    /// them alone, and then costs no more than on surfaces of that kind. One that is `known` of the BSDF itself is paid
+    /// there.
+    fn judge_own(&self, answers: &[Unshadowed], known: &[KnownMistake]) -> Check {
+        let (case, handout) = (self.case, Convention::default());
+        let batch = &case.probe_film.batch;
+        let changes = changes::shader_changes(true);
+        let whole = rays::judge_unshadowed(batch, answers, &handout, &changes);
+        let of_kind = |model: MaterialModel| {
+            let is_own =
+                |point: &SurfacePoint| case.expected.scene.material_of(point.shape).model == model;
+            let (part, chosen) =
+                batch.without_shadows(&|index| batch.points.get(index).is_some_and(is_own));
+            let points: Vec<ShadedPoint> =
+                part.points.iter().map(|point| shaded_point(case, point)).collect();
+            let of = |index: usize, shading: &Shading| shading.radiance(&points[index]);
+            let chosen = |answer: &Unshadowed| -> Vec<[f32; 3]> {
+                chosen.iter().map(|index| answer.values[*index]).collect()
+            };
+            let values: Vec<_> = answers.iter().map(chosen).collect();
+            let answers = answers.iter().zip(&values);
+            let answers = answers.map(|(answer, values)| Unshadowed { of: &of, values, ..*answer });
+            let answers: Vec<Unshadowed> = answers.collect();
+            (model, rays::judge_unshadowed(&part, &answers, &handout, &changes))
+        };
+        let kinds = [MaterialModel::Diffuse, MaterialModel::Phong].map(of_kind);
+        let failed = kinds.into_iter().filter(|(_, check)| check.verdict == Verdict::Fail);
+        let is_known = |(model, check): &(MaterialModel, Check)| {
+            let same = |(of, mistake): &KnownMistake| of == model && *mistake == check.mistake;
+            price::is_explained(check) && known.iter().any(same)
+        };
+        let (of_bsdfs, own): (Vec<_>, Vec<_>) = failed.partition(is_known);
+        let black = |measure: &Measure| measure.rule == Some(RuleId::RaysBlack) && !measure.passed;
+        if own.is_empty() && !of_bsdfs.is_empty() && !whole.measures.iter().any(black) {
+            let summary = "right but for its BSDFs, which are judged alone";
+            return Check::new(CheckId::RadianceLit, &batch.scene, Verdict::Pass, summary);
+        }
+        let own = own.into_iter().map(|(_, check)| check);
+        let worst = own.max_by(|a, b| a.error.total_cmp(&b.error));
+        worst.filter(|worst| worst.error < whole.error).unwrap_or(whole)
+    }
+
+    fn question<'b>(&'b self, known: &'b [KnownMistake]) -> Conventional<'b> {
         let batch = &self.case.probe_film.batch;
         Conventional {
             party: Party::Integrator,
@@ -324,8 +388,7 @@ impl LightAnswer<'_> {
                         let changes = changes::integrator_changes();
                         return rays::judge_unshadowed(batch, answers, convention, &changes);
                     }
-                    let (handout, changes) = (Convention::default(), changes::shader_changes(true));
-                    rays::judge_unshadowed(batch, answers, &handout, &changes)
+                    self.judge_own(answers, known)
                 }),
                 Err(unanswered) => (**unanswered).clone(),
             }),

@@ -5,8 +5,8 @@ use std::path::Path;
 use basecode::{Image, Vec3};
 
 use super::draw::{Frame, draw_each};
+use super::judged::Judged;
 use super::prepared_scene::PreparedScene;
-use super::realtime::Judged;
 use super::session::{self, Session};
 use super::uploads::{drawn_parts, every_fragment};
 use crate::evidence::{Check, CheckId, Verdict, price};

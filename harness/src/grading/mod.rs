@@ -11,6 +11,7 @@ mod diagnose;
 mod draw;
 mod image_digest;
 mod isolate;
+mod judged;
 mod kept_frames;
 mod likeness;
 mod measure_reference;

@@ -1,5 +1,5 @@
-//! A wrong picture of a renderer whose pass and stages are right alone, or cannot be exchanged: one slip may explain its
-//! frames on all scenes, and is charged to the part that it belongs to.
+//! A wrong picture of a renderer whose pass and stages are right alone, or cannot all be exchanged: one slip may explain
+//! its frames on all scenes, and is charged to the part that it belongs to.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use super::session::{self, Session};
 use super::stages::{Stages, negated_normals};
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels::{self, LeftByPass};
-use crate::evidence::price::Class;
+use crate::evidence::price::{Class, Price};
 use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::imaging::evidence::Tolerances;
@@ -25,8 +25,8 @@ const ALONE: [CheckId; 4] =
 /// What the slip may leave of a scene's picture unexplained.
 const LEFT: f64 = 0.01;
 
-/// The checks under which one slip pays for all wrong frames, if one explains them and nothing is known to be wrong
-/// alone. `found` are the checks of pass, stages and frames, and `drawn` the frames.
+/// The checks under which one slip pays for all wrong frames, if one explains them and nothing but its part is known to
+/// be wrong alone. `found` are the checks of pass, stages and frames, and `drawn` the frames.
 pub fn judge(
     session: &Session,
     plugin: &Path,
@@ -36,10 +36,8 @@ pub fn judge(
     tolerances: &Tolerances,
 ) -> Vec<Check> {
     let is_open = |check: &Check| matches!(check.verdict, Verdict::Pass | Verdict::NotJudged);
-    let mut alone = found.iter().filter(|check| ALONE.contains(&check.id));
-    if !alone.all(is_open) {
-        return Vec::new();
-    }
+    let fails = |id: CheckId| found.iter().any(|check| check.id == id && !is_open(check));
+    let others_are_open = |id: CheckId| ALONE.into_iter().all(|of| of == id || !fails(of));
     let frame = |case: &PreparedScene| {
         let own = |drawn: &&Drawn| drawn.scene == case.entry.name && drawn.kind == Kind::Realtime;
         drawn.iter().find(own).map(|drawn| &drawn.image)
@@ -47,22 +45,29 @@ pub fn judge(
     let Some(frames) = cases.iter().map(frame).collect::<Option<Vec<&Image>>>() else {
         return Vec::new();
     };
-    let slip = |id, name: &str| {
-        let scene = |case: &PreparedScene| {
-            let wrong = |check: &&Check| {
-                let own = check.scene == case.entry.name && check.id == CheckId::ImageRealtime;
-                own && check.verdict == Verdict::Fail
-            };
-            let is_wrong = found.iter().any(|check| wrong(&check));
-            ALONE.map(|other| explained(other, case, (other == id && is_wrong).then_some(name)))
-        };
-        cases.iter().flat_map(scene).collect()
+    let is_wrong = |case: &PreparedScene| {
+        let own =
+            |check: &Check| check.scene == case.entry.name && check.id == CheckId::ImageRealtime;
+        found.iter().any(|check| own(check) && check.verdict == Verdict::Fail)
     };
-    if let Some(name) = slip_of_pass(cases, &frames) {
-        return slip(CheckId::PassUniforms, name);
+    let wrong: Vec<bool> = cases.iter().map(is_wrong).collect();
+    let slip = |id, name: &str| {
+        let scene = |(case, wrong): (&PreparedScene, &bool)| {
+            ALONE.map(|other| explained(other, case, (other == id && *wrong).then_some(name)))
+        };
+        cases.iter().zip(&wrong).flat_map(scene).collect()
+    };
+    let (pass, vertex) = (CheckId::PassUniforms, CheckId::StageVertex);
+    if others_are_open(pass)
+        && let Some(name) = slip_of_pass(cases, &frames, &wrong)
+    {
+        return slip(pass, name);
     }
-    if mended_by_normals(session, plugin, cases, tolerances) {
-        return slip(CheckId::StageVertex, "the normal is negated");
+    if others_are_open(vertex) && mended_by_normals(session, plugin, cases, tolerances) {
+        return slip(vertex, "the normal is negated");
+    }
+    if ALONE.into_iter().any(fails) {
+        return Vec::new();
     }
     vertex_under_own_pass(session, plugin, cases, stages)
 }
@@ -80,8 +85,13 @@ fn explained(id: CheckId, case: &PreparedScene, name: Option<&str>) -> Check {
     Check { error, mistake, convention, ..Check::new(id, scene, Verdict::Fail, summary) }
 }
 
-/// The one mistake in the values of a pass that explains the frames of all scenes, some of them by light.
-fn slip_of_pass(cases: &[PreparedScene], frames: &[&Image]) -> Option<&'static str> {
+/// The one mistake in the values of a pass that explains the frames of all scenes, some of them by light: those that are
+/// right, and most of those that are `wrong`, because on one scene noise may decide what a surface shows.
+fn slip_of_pass(
+    cases: &[PreparedScene],
+    frames: &[&Image],
+    wrong: &[bool],
+) -> Option<&'static str> {
     let of_scenes: Vec<Vec<LeftByPass>> = cases
         .iter()
         .zip(frames)
@@ -92,8 +102,18 @@ fn slip_of_pass(cases: &[PreparedScene], frames: &[&Image]) -> Option<&'static s
         .collect();
     let names = of_scenes.first()?.iter().map(|left| left.name);
     let explains = |index: &usize| {
-        let own = || of_scenes.iter().filter_map(|scene| scene.get(*index));
-        own().all(|left| left.left <= LEFT) && own().any(|left| left.lights)
+        let of = |is_wrong: bool| {
+            let scenes = of_scenes.iter().zip(wrong).filter(move |(_, wrong)| **wrong == is_wrong);
+            scenes.filter_map(|(scene, _)| scene.get(*index))
+        };
+        let most = |lights: bool| {
+            let (mut all, mut explained) = (0usize, 0usize);
+            for left in of(true).filter(|left| left.lights || !lights) {
+                (all, explained) = (all + 1, explained + usize::from(left.left <= LEFT));
+            }
+            2 * explained > all
+        };
+        of(false).all(|left| left.left <= LEFT) && most(false) && most(true)
     };
     names.enumerate().find(|(index, _)| explains(index)).map(|(_, name)| name)
 }
@@ -149,7 +169,9 @@ fn vertex_under_own_pass(
         });
         let convention = "the vertex stage under the submission's own pass".to_owned();
         let summary = format!("{} (judged so: {convention})", check.summary);
-        checks.push(Check { convention, summary, ..check });
+        let check = Check { convention, summary, ..check };
+        // Identities show nothing wrong, so a matrix stands where another belongs.
+        checks.push(check.priced(|raw| Price::of_raw(raw).or("another matrix", Class::Slip, 0.0)));
     }
     // Right there as well: nothing is explained.
     if checks.iter().any(|check| check.verdict == Verdict::Fail) { checks } else { Vec::new() }

@@ -7,6 +7,7 @@ use basecode::gpu::{EMPTY_MAPS, Footprint};
 
 use super::coverage;
 use super::draw::{Frame, draw, draw_one_each};
+use super::judged::Judged;
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
@@ -31,20 +32,6 @@ const VIEWS: [View; 3] = [
     (CheckId::ImageRealtimeDiffuse, &|region| region.exponent == 0.0),
     (CheckId::ImageRealtimePhong, &|region| region.exponent > 0.0),
 ];
-
-/// What the frames of a scene show.
-pub struct Judged {
-    /// What was found.
-    pub checks: Vec<Check>,
-    /// What was drawn.
-    pub drawn: Vec<Drawn>,
-    /// Whether the frame without shadows got no answer, by the submission's own fault.
-    pub fails: bool,
-    /// What that frame took, where it was drawn and the plugin says so.
-    pub footprint: Option<Footprint>,
-    /// How its brightness follows the light within a surface, where that shows.
-    pub shading: Option<f64>,
-}
 
 /// Draws every scene with the plugin and judges the images, those of the bonus too.
 pub fn judge_images(

@@ -62,8 +62,10 @@ pub fn judge(
 ) -> Uploaded {
     let mut found = Uploaded::default();
     let known = || cases.iter().zip(footprints).filter_map(|(case, of)| Some((case, (*of)?)));
+    // A vertex shader that fetches its vertices from a buffer of its own draws the scene's surfaces all the same.
     if known().next().is_some()
         && known().all(|(_, of)| of.vertex_pipelines == 0 && of.vertexless_pipelines > 0)
+        && fills_the_film(session, plugin, cases).unwrap_or(true)
     {
         let summary =
             "no pipeline that draws a picture takes vertices: it is made in one piece, or computed";
@@ -96,29 +98,36 @@ fn triangles(case: &PreparedScene) -> usize {
     case.expected.scene.shapes().iter().map(|shape| shape.triangles.len()).sum()
 }
 
+/// A scene's small film with every fragment in one color, or the outlines of triangles alone.
+fn drawn(session: &Session, plugin: &Path, case: &PreparedScene, outlines: bool) -> Option<Image> {
+    let mut stages = vec![every_fragment()];
+    stages
+        .extend(outlines.then(|| Stage { name: OUTLINES.to_owned(), text: "outlines".to_owned() }));
+    let frame = Frame::probe(case, stages);
+    let outcome = draw(session, Some(plugin), &frame);
+    outcome.answer().map(|answer| session::image(&answer.values, frame.size.0, frame.size.1))
+}
+
+/// Whether a pass covers the background as well, on the scene that has most of it.
+fn fills_the_film(session: &Session, plugin: &Path, cases: &[PreparedScene]) -> Option<bool> {
+    let mask = |case: &&PreparedScene| clear(&case.probe_film.unshadowed_mask, true).count();
+    let case = cases.iter().max_by_key(mask)?;
+    let image = drawn(session, plugin, case, false)?;
+    Some(covers_background(&image, &case.probe_film.unshadowed_mask))
+}
+
 /// Why what is drawn with uploaded pixels is not the scene, if it is not.
 fn nothing_draws(
     session: &Session,
     plugin: &Path,
     cases: &[PreparedScene],
 ) -> Option<&'static str> {
-    let drawn = |case: &PreparedScene, outlines: bool| {
-        let mut stages = vec![every_fragment()];
-        stages.extend(
-            outlines.then(|| Stage { name: OUTLINES.to_owned(), text: "outlines".to_owned() }),
-        );
-        let frame = Frame::probe(case, stages);
-        let outcome = draw(session, Some(plugin), &frame);
-        outcome.answer().map(|answer| session::image(&answer.values, frame.size.0, frame.size.1))
-    };
-    let mask = |case: &&PreparedScene| clear(&case.probe_film.unshadowed_mask, true).count();
-    let case = cases.iter().max_by_key(mask)?;
-    if covers_background(&drawn(case, false)?, &case.probe_film.unshadowed_mask) {
+    if fills_the_film(session, plugin, cases)? {
         return Some("the pixels are uploaded, and what is drawn with them is not the scene");
     }
     let case = cases.iter().min_by_key(|case| triangles(case))?;
     if triangles(case) <= FEW_TRIANGLES
-        && covers_surfaces(&drawn(case, true)?, &case.probe_film.unshadowed_mask)
+        && covers_surfaces(&drawn(session, plugin, case, true)?, &case.probe_film.unshadowed_mask)
     {
         return Some("the pixels are uploaded, and drawn one by one");
     }

@@ -98,7 +98,9 @@ fn find_directory(bytes: &[u8], limits: &Limits) -> Result<Directory, Finding> {
             "zip_truncated",
             "expected a zip directory at the end, found none",
         )
-        .hint("the upload may have been cut off; submit it again"));
+        .hint(
+            "the upload may have been cut off, or this is one volume of several; submit all of it",
+        ));
     };
     let comment = usize::from(u16_at(bytes, at + 20).unwrap_or(0));
     let (end, records) = end_record(bytes, at)?;

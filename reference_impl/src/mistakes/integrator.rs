@@ -1,8 +1,12 @@
 //! Mistakes in direct illumination: the steps of `crate::integrators::simple`, with switches.
 
 use std::f32::consts::PI;
+use std::sync::OnceLock;
 
-use basecode::{Frame, INV_PI, Integrator, Ray, Sampler, Scene, Shape, SurfaceInteraction, Vec3};
+use basecode::{
+    Bsdf, Frame, INV_PI, Integrator, MaterialModel, Ray, Sampler, Scene, Shape, SurfaceInteraction,
+    Vec3,
+};
 
 use super::shadow::visibility;
 use super::{Mistake as M, Mistakes};
@@ -10,6 +14,8 @@ use super::{Mistake as M, Mistakes};
 pub struct Mistaken {
     pub mistakes: Mistakes,
     pub shadows: bool,
+    /// Made for the first surface, if it makes them itself.
+    pub own_bsdfs: OnceLock<Vec<Option<Box<dyn Bsdf>>>>,
 }
 
 impl Integrator for Mistaken {
@@ -121,6 +127,12 @@ impl Mistaken {
         if has(M::NoBsdf) {
             return Vec3::ONE;
         }
+        if has(M::OwnBsdfs) {
+            return match scene.material_of(i.shape).model {
+                MaterialModel::Mirror => Vec3::ZERO,
+                _ => self.own_bsdf(scene, i).map_or(Vec3::ZERO, |bsdf| bsdf.eval(i)),
+            };
+        }
         let mut asked = *i;
         if has(M::FirstMaterial) {
             asked.shape = 0;
@@ -133,6 +145,13 @@ impl Mistaken {
             asked.shape = of_index.unwrap_or(i.shape);
         }
         scene.bsdf(&asked).eval(i)
+    }
+
+    /// A BSDF of its own making.
+    fn own_bsdf(&self, scene: &Scene, i: &SurfaceInteraction) -> Option<&dyn Bsdf> {
+        let make =
+            || scene.materials().iter().map(|material| self.mistakes.bsdf(material)).collect();
+        self.own_bsdfs.get_or_init(make)[scene.shapes()[i.shape].material].as_deref()
     }
 
     fn light_position(&self, scene: &Scene) -> Vec3 {

@@ -261,6 +261,7 @@ right {
     TestsInIntegrator = "tests-in-integrator",
     DirectionsInWorld = "directions-in-world",
     WiFromLight = "wi-from-light",
+    OwnBsdfs = "own-bsdfs",
     OtherTangents = "other-tangents",
     AlphaByDots = "alpha-by-dots",
     ReflectWi = "reflect-wi",

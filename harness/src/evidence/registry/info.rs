@@ -179,7 +179,8 @@ impl CheckId {
                     all? Asked where a part's own evidence does not apply.",
                 "The fraction of wrong pixels.",
                 "0.5 % may differ. Within a surface, on most scenes, brightness (cube root) must \
-                    correlate with what is expected by 0.2. Silhouettes do not.",
+                    correlate with what is expected by 0.2. Silhouettes do not. Black surfaces are seen with \
+                    every fragment in one color, and count if a known mistake explains some scene.",
                 &[],
             ),
             Self::ImageRealtimeDiffuse => info(
@@ -266,8 +267,8 @@ impl CheckId {
                 &[],
             ),
             Self::SubmissionNoVertices => info(
-                "Appears only where no pipeline that draws a picture takes vertices: says so to the \
-                    instructor.",
+                "Appears only where no pipeline that draws a picture takes vertices, and fragments cover the \
+                    background as well: says so to the instructor.",
                 "",
                 "",
                 &[],
