@@ -120,7 +120,17 @@ pub fn left_by_pass(scene: &Scene, image: &Image, mask: &RegionMask) -> Vec<Left
     let sum: f64 = right.iter().flatten().sum();
     let mean = (sum / (3 * right.len()).max(1) as f64).max(f64::MIN_POSITIVE);
     let left = |(name, shaded): &PassMistake| {
+        let grazes = |point: &SurfacePoint| {
+            let point = shaded(point);
+            point.wo[2].abs() < GRAZING || point.wi[2].abs() < GRAZING
+        };
         let changed = radiances(shaded);
+        let changed: Vec<[f64; 3]> = (0..surfaces.len())
+            .map(|index| match grazes(&surfaces[index]) {
+                true => found[index].map(f64::from),
+                false => changed[index],
+            })
+            .collect();
         let answers = Answers {
             found: &found,
             of: &|index, _| changed[index],
@@ -134,6 +144,9 @@ pub fn left_by_pass(scene: &Scene, image: &Image, mask: &RegionMask) -> Vec<Left
     };
     pass_mistakes(scene, places).iter().map(left).collect()
 }
+
+/// Where a direction lies in the surface, as from the origin on a floor through it, rounding decides what is black.
+const GRAZING: f64 = 1e-3;
 
 /// A mistake in the values of a pass: its name, and what a right shader makes of a point under it.
 type PassMistake<'a> = (&'static str, Box<dyn Fn(&SurfacePoint) -> ShadedPoint + 'a>);

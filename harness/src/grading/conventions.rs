@@ -354,9 +354,14 @@ impl LightAnswer<'_> {
         };
         let kinds = [MaterialModel::Diffuse, MaterialModel::Phong].map(of_kind);
         let failed = kinds.into_iter().filter(|(_, check)| check.verdict == Verdict::Fail);
+        // Where little shows of a mistake, no name explains it.
         let is_known = |(model, check): &(MaterialModel, Check)| {
-            let same = |(of, mistake): &KnownMistake| of == model && *mistake == check.mistake;
-            price::is_explained(check) && known.iter().any(same)
+            let little = check.mistake.is_empty() && price::are_slight([check]);
+            let same = |(of, mistake): &KnownMistake| {
+                let named = *mistake == check.mistake && price::is_explained(check);
+                of == model && (named || little)
+            };
+            known.iter().any(same)
         };
         let (of_bsdfs, own): (Vec<_>, Vec<_>) = failed.partition(is_known);
         let black = |measure: &Measure| measure.rule == Some(RuleId::RaysBlack) && !measure.passed;

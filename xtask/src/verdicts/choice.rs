@@ -26,7 +26,7 @@ pub const PLAIN_SEED: u64 = SEEDS[0];
 
 /// Pairs of mistakes that a student may well make together, and mistakes of renderers that do something otherwise.
 /// Not among them: one that hides the other, such as an intensity that was never set.
-const PAIRS: [[&str; 2]; 35] = [
+const PAIRS: [[&str; 2]; 36] = [
     ["diffuse-no-pi", "phong-n-plus-1"],
     ["diffuse-no-pi", "light-two-cosines"],
     ["diffuse-no-wi-test", "shadow-none"],
@@ -55,6 +55,7 @@ const PAIRS: [[&str; 2]; 35] = [
     [ELSEWHERE, "phong-fs-n-plus-1"],
     [ELSEWHERE, "vertex-normal-negated"],
     [ELSEWHERE, "pass-rho-swapped"],
+    [ELSEWHERE, "pass-camera-unset"],
     ["third-varying", "vertex-normal-negated"],
     ["directions-in-world", "shadow-none"],
     ["directions-in-world", "phong-no-scale"],
