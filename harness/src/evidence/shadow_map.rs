@@ -233,6 +233,14 @@ fn ambient(pixels: &[Known]) -> (f64, f64) {
 /// shadow has about the same radiance everywhere too.
 const AMBIENT: f64 = 0.5;
 
+/// The fraction of lit pixels that are lit, if most are dark: they may lie outside of the shadow map.
+fn outside(pixels: &[Known]) -> f64 {
+    let lit = || pixels.iter().filter(|pixel| pixel.lit);
+    let right = lit().filter(|p| (p.visibility - 1.0).abs() <= f64::from(HALF_LIGHT)).count();
+    let fraction = right as f64 / lit().count().max(1) as f64;
+    if fraction < 0.5 { fraction } else { 0.0 }
+}
+
 /// The mistake of shadows where light belongs, and the reverse.
 const EXCHANGED: &str = "lit and dark are exchanged";
 
@@ -277,8 +285,10 @@ fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64) -> Price {
             f64::from(u8::from(p.lit || !p.phong))
         }),
     ] {
+        // Outside of the map all is lit, either way.
+        let outside = if name == EXCHANGED { outside(pixels) } else { 0.0 };
         if name == EXCHANGED || some_dark(&light) {
-            price = price.or(name, class, residual(&light));
+            price = price.or(name, class, residual(&light) - outside);
         }
     }
     let price = price::partly(price, lit_wrong, dark_wrong);
@@ -338,6 +348,25 @@ mod tests {
         assert_eq!(judge(&not_a_number, &without), Some(Verdict::Fail));
         // A black renderer shows nothing and earns nothing.
         assert_eq!(judge(&right, &image(|_| 0.0)), None);
+    }
+
+    #[test]
+    fn a_comparison_that_is_reversed_is_a_slip_whatever_lies_outside_of_the_map() {
+        let (mask, unshadowed) = masks();
+        let shadows = Shadows { mask: &mask, unshadowed: &unshadowed, median_lit: 1.0 };
+        let tolerances = Tolerances { spare_pixels: 0, ..Tolerances::default() };
+        let error = |dark: &[usize]| {
+            let without = image(|i| 2.0 + i as f32);
+            let with = image(|i| if dark.contains(&i) { 0.0 } else { 2.0 + i as f32 });
+            let check = shadows.judge("s", &with, &without, &tolerances).unwrap();
+            (check.error, check.mistake)
+        };
+        let slip = (Class::Slip.price(), EXCHANGED.to_owned());
+        let within: Vec<usize> = (0..7).collect();
+        assert_eq!(error(&within), slip);
+        assert_eq!(error(&(0..10).collect::<Vec<_>>()), slip);
+        // No shadow where one belongs, and some where none does.
+        assert!(error(&[0, 1, 2]).0 > 0.5);
     }
 
     #[test]

@@ -4,7 +4,11 @@ for (const table of document.querySelectorAll("table.sortable")) {
   const heads = [...table.tHead.rows[0].cells];
   const body = table.tBodies[0];
   const rows = [...body.rows];
-  const texts = new Map(rows.map((row) => [row, row.textContent.toLowerCase()]));
+  // Without case and accents; some letters have none to take off.
+  const letters = { "ł": "l", "ø": "o", "đ": "d", "ß": "ss", "æ": "ae", "œ": "oe", "ı": "i", "’": "'", "‘": "'" };
+  const plain = (text) => text.toLowerCase().normalize("NFD").replace(/\p{M}/gu, "")
+    .replace(/[łøđßæœı’‘]/gu, (letter) => letters[letter]);
+  const texts = new Map(rows.map((row) => [row, plain(row.textContent)]));
 
   heads.forEach((head, column) => {
     const button = document.createElement("button");
@@ -55,7 +59,7 @@ for (const table of document.querySelectorAll("table.sortable")) {
   table.parentElement.before(bar);
 
   const show = () => {
-    const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const words = plain(search.value).split(/\s+/).filter(Boolean);
     let shown = 0;
     for (const row of rows) {
       const wanted = words.every((word) => texts.get(row).includes(word))
