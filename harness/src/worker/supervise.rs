@@ -139,8 +139,8 @@ impl Supervisor {
         let mut report = JobReport { outcomes: Vec::new(), renderer: None, runs: Vec::new() };
         let mut pending: Vec<usize> = (0..count).collect();
         let used_up = || job.plugin.is_some() && retries.used_up().is_some();
-        // Whether the first of those pending was asked again because its worker was ended from outside. A renderer can
-        // do that to itself: then it ends so again.
+        // Which requests were asked again because their worker was ended from outside. A renderer can do that to itself:
+        // then it ends so again, and is to blame.
         let mut ended_before = vec![false; count];
         loop {
             // Each worker settles one request, or is the second to be ended from outside at it, so this ends.
