@@ -13,7 +13,7 @@ pub const THREADS: [u32; 3] = [1, 2, 4];
 const SEEDS: [u64; 4] = [260_000_001, 260_712_345, 261_999_999, 7];
 
 /// `--quick` takes every n-th of the mistakes, and this many pairs and triples of them.
-pub const QUICK_STEP: usize = 12;
+pub const QUICK_STEP: usize = 8;
 pub const QUICK_PAIRS: usize = 60;
 pub const QUICK_TRIPLES: usize = 20;
 /// The samples per pixel of all these.
