@@ -343,8 +343,8 @@ fn plain_but_for_shadows(
 
 /// Judges shadows that are wrong as an image by visibility alone: against the student's own image
 /// without shadows, or else against that drawn under a vertex stage of ours, or of the scene with its normals negated
-/// or of another field of view, or as the second of two frames: what these mend is no matter of shadows. `check` is the verdict on the image, which
-/// stands when none tells.
+/// or of another field of view, or as the second of two frames: what these mend is no matter of shadows. `check` is the
+/// verdict on the image, which stands when none tells.
 fn judge_visibility(
     session: &Session,
     plugin: &Path,
