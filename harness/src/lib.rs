@@ -30,6 +30,9 @@
 mod output;
 
 #[doc(hidden)]
+pub use imaging;
+
+#[doc(hidden)]
 pub mod assignment;
 #[doc(hidden)]
 pub mod build;
@@ -53,8 +56,6 @@ pub mod grading;
 mod harmless;
 #[doc(hidden)]
 pub mod held_back;
-#[doc(hidden)]
-pub mod imaging;
 #[doc(hidden)]
 pub mod intake;
 #[doc(hidden)]

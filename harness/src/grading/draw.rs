@@ -67,9 +67,8 @@ impl<'a> Frame<'a> {
 
 /// Draws one frame in a worker of its own.
 pub fn draw(session: &Session, plugin: Option<&Path>, frame: &Frame) -> Outcome {
-    draw_each(session, plugin, std::slice::from_ref(frame)).pop().unwrap_or_else(|| {
-        Outcome::NoAdapter("the worker gave no outcome: a bug of Umbra's".into())
-    })
+    let mut outcomes = draw_each(session, plugin, std::slice::from_ref(frame));
+    outcomes.pop().unwrap_or_else(|| unreachable!("each frame has an outcome"))
 }
 
 /// Draws frames, all in one worker while it lives.

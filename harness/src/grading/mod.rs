@@ -24,6 +24,7 @@ mod paths;
 mod pictures;
 mod pipeline;
 mod prepared_scene;
+mod questions;
 mod realtime;
 mod record;
 mod sampler;

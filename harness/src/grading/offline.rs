@@ -6,7 +6,8 @@ use basecode::{Image, MaterialModel, Ray, Scene, Texture};
 
 use super::conventions::{Answers, shaded_point, value};
 use super::observe;
-use super::prepared_scene::PreparedScene;
+use super::prepared_scene::{PreparedScene, Sampled};
+use super::questions::{Outcomes, Question, Questions};
 use super::session::{self, Session};
 use crate::diagnosis::{self, LoopSeen, Thumbnail, View};
 use crate::evidence::images::{self, Kind};
@@ -17,7 +18,7 @@ use crate::evidence::{loops, rays};
 use crate::expected::{Expected, SurfacePoint};
 use crate::imaging::evidence::Tolerances;
 use crate::plugin::Witness;
-use crate::worker::{BsdfQuery, BsdfSource, Outcome, Request};
+use crate::worker::{BsdfQuery, BsdfSource, Outcome, RayQuery, Request, SceneRef};
 
 /// The witnesses that an integrator is judged under, with their names for reports.
 const WITNESSES: [(Witness, &str); 4] = [
@@ -51,7 +52,44 @@ pub struct Run {
     pub whole: bool,
 }
 
-/// Judges integrator, shadows, loop and image on one scene. Answers no image where only a small film was
+/// What is asked about the offline path of one scene.
+struct Asked<'s, 'a> {
+    session: &'s Session<'s>,
+    plugin: &'s Path,
+    case: &'a PreparedScene,
+    run: Run,
+    scene: SceneRef,
+}
+
+/// A question without shadows, and with them.
+#[derive(Clone, Copy)]
+struct BothWays {
+    without: Question,
+    with: Question,
+}
+
+/// Radiance along rays, and a render whose samples follow the same rays.
+#[derive(Clone, Copy)]
+struct LoopQuestions {
+    along: Question,
+    image: Question,
+}
+
+/// What the light and the shadows are judged by.
+struct RayQuestions {
+    /// Under each of [`WITNESSES`], without shadows.
+    witnessed: [Question; WITNESSES.len()],
+    /// Under [`FLAT`].
+    flat: BothWays,
+    /// With the renderer's own BSDFs.
+    own: BothWays,
+    /// Its own BSDFs at the surfaces of `plain`.
+    bsdfs: Question,
+    /// Rays, by position, that end on plain surfaces.
+    plain: Vec<usize>,
+}
+
+/// Judges integrator, shadows, loop and image on one scene. Returns no image where only a small film was
 /// drawn: it is right.
 pub fn judge_scene<'a>(
     session: &Session,
@@ -61,203 +99,269 @@ pub fn judge_scene<'a>(
     tolerances: &Tolerances,
     answers: &mut Answers<'a>,
 ) -> (Vec<Check>, Option<Drawn>) {
-    let name = &case.entry.name;
+    let asked = Asked { session, plugin, case, run, scene: session.scene(&case.offline) };
     let small = &case.probe_film;
-    let scene = session.scene(&case.offline);
-    let chosen: Vec<_> = small.batch.rays.iter().map(session::ray).collect();
-    let radiance = |rays: &[_], witness, shadows| Request::Radiance {
-        scene: scene.clone(),
-        rays: rays.to_vec(),
-        shadows,
-        witness,
-        seed: 1,
-    };
-    let render = |(width, height), spp, seed, threads, shadows| Request::RenderOffline {
-        scene: scene.clone(),
-        width,
-        height,
-        spp,
-        seed,
-        threads,
-        shadows,
-    };
-    let centres: Vec<_> =
-        small.surface.pixels.iter().map(|(centre, _)| session::ray(centre)).collect();
-    let mut requests: Vec<Request> =
-        WITNESSES.iter().map(|(witness, _)| radiance(&chosen, *witness, false)).collect();
-    requests.push(radiance(&chosen, FLAT, false));
-    requests.push(radiance(&chosen, FLAT, true));
-    requests.push(radiance(&chosen, Witness::True, false));
-    requests.push(radiance(&chosen, Witness::True, true));
-    // What the loop is asked: a render, and radiance along its rays.
-    let size = (small.width, small.height);
-    let at_centres =
-        |shadows| [radiance(&centres, Witness::True, shadows), render(size, 1, 1, 1, shadows)];
-    let at_samples = small.sampled.iter().flat_map(|sampled| {
+    let mut questions = Questions::default();
+    let rays = asked.rays(&mut questions);
+    let at_centers = asked.at_centers(&mut questions, true);
+    let image = questions.ask(asked.film(asked.first_film()));
+    let at_samples = small.sampled.as_ref().map(|sampled| {
+        let along = questions.ask(asked.radiance(&sampled.rays, Witness::True, false));
         let size = (sampled.film.width, sampled.film.height);
-        let along = radiance(&sampled.rays, Witness::True, false);
-        [along, render(size, loops::SAMPLES, run.seed, 1, false)]
+        let image = questions.ask(asked.render(size, loops::SAMPLES, run.seed, 1, false));
+        (sampled, LoopQuestions { along, image })
     });
-    requests.extend(at_centres(true));
-    let plain = plain_surfaces(case);
-    let queries = plain.iter().map(|(_, query)| *query).collect();
-    requests.push(Request::EvalBsdf { scene: scene.clone(), queries });
-    let first = case.first.as_ref().filter(|_| !run.whole);
-    let film =
-        |expected: &Expected| (expected.unshadowed.width as u32, expected.unshadowed.height as u32);
-    let size = film(first.unwrap_or(&case.expected));
-    requests.push(render(size, case.spp, run.seed, run.threads, true));
-    requests.extend(at_samples);
-    let outcomes = session.run(Some(plugin), requests);
-    let [
-        w0,
-        w1,
-        w2,
-        w3,
-        flat_off,
-        flat_on,
-        true_off,
-        true_on,
-        along_centres,
-        one_spp,
-        own,
-        full,
-        sampled @ ..,
-    ] = outcomes.as_slice()
-    else {
-        let summary = "the worker gave no outcomes: a bug of Umbra's";
-        return (vec![Check::new(CheckId::ImageOffline, name, Verdict::NotRun, summary)], None);
-    };
-    let witnessed = [w0, w1, w2, w3];
-    let bypassed = witnessed.iter().all(|outcome| {
-        matches!(outcome, Outcome::Done(answer) if answer.witness.is_some_and(|seen| seen.calls == 0))
-    });
-    let mut checks = Vec::new();
-    if bypassed {
-        let own = "the scene's own: the integrator asks for none";
-        answers.push_light(case, &[(true_off, Witness::True, own)]);
-        let own = |point: &SurfacePoint| {
-            let point =
-                ShadedPoint { intensity: [1.0; 3], distance: 1.0, ..shaded_point(case, point) };
-            Shading::default().radiance(&point)
-        };
-        checks.push(judge_shadows(case, &own, (true_on, true_off), (true_on, true_off)));
-    } else {
-        let asked = witnessed.iter().zip(WITNESSES);
-        let mut asked: Vec<_> =
-            asked.map(|(outcome, (witness, name))| (*outcome, witness, name)).collect();
-        asked.push((flat_off, FLAT, "constant, below the surface too"));
-        answers.push_light(case, &asked);
-        answers.push_together(case, true_off);
-        let flat = |point: &SurfacePoint| value(FLAT, point.wi, point.wo);
-        let shadows = judge_shadows(case, &flat, (flat_on, flat_off), (true_on, true_off));
-        for ((witness, _), outcome) in WITNESSES.iter().zip(witnessed) {
-            if let Some(values) = observe::colours(outcome) {
-                observe::radiance(session, case, *witness, values);
-            }
+    let outcomes = questions.run(session, plugin);
+
+    let mut checks = asked.judge_rays(&rays, &outcomes, answers);
+    checks.push(asked.judge_agreement(at_centers, &outcomes));
+    checks.extend(at_samples.map(|(sampled, samples)| {
+        judge_samples(
+            case,
+            sampled,
+            [samples.along, samples.image].map(|of| &outcomes[of]),
+            answers,
+        )
+    }));
+    let small = at_samples.iter().flat_map(|(_, asked)| [asked.along, asked.image]);
+    let draws_small = small.chain([at_centers.image]).all(|of| outcomes[of].answer().is_some());
+    let (check, drawn) = asked.judge_image(&outcomes[image], draws_small, tolerances);
+    checks.push(check);
+    (checks, drawn)
+}
+
+impl<'a> Asked<'_, 'a> {
+    fn radiance(&self, rays: &[RayQuery], witness: Witness, shadows: bool) -> Request {
+        Request::Radiance {
+            scene: self.scene.clone(),
+            rays: rays.to_vec(),
+            shadows,
+            witness,
+            seed: 1,
         }
-        let both = observe::colours(flat_on).zip(observe::colours(flat_off));
+    }
+
+    fn render(
+        &self,
+        (width, height): (u32, u32),
+        spp: u32,
+        seed: u64,
+        threads: u32,
+        shadows: bool,
+    ) -> Request {
+        let scene = self.scene.clone();
+        Request::RenderOffline { scene, width, height, spp, seed, threads, shadows }
+    }
+
+    /// The whole render, on the film of what is expected.
+    fn film(&self, expected: &Expected) -> Request {
+        let run = self.run;
+        self.render(size_of(expected), self.case.spp, run.seed, run.threads, true)
+    }
+
+    /// The small film that is drawn first, if there is one.
+    fn first_film(&self) -> &'a Expected {
+        let first = self.case.first.as_ref().filter(|_| !self.run.whole);
+        first.unwrap_or(&self.case.expected)
+    }
+
+    fn rays(&self, questions: &mut Questions) -> RayQuestions {
+        let chosen: Vec<_> = self.case.probe_film.batch.rays.iter().map(session::ray).collect();
+        let mut ask = |witness, shadows| questions.ask(self.radiance(&chosen, witness, shadows));
+        let witnessed = WITNESSES.map(|(witness, _)| ask(witness, false));
+        let flat = BothWays { without: ask(FLAT, false), with: ask(FLAT, true) };
+        let own = BothWays { without: ask(Witness::True, false), with: ask(Witness::True, true) };
+        let (plain, queries) = plain_surfaces(self.case).into_iter().unzip();
+        let bsdfs = questions.ask(Request::EvalBsdf { scene: self.scene.clone(), queries });
+        RayQuestions { witnessed, flat, own, bsdfs, plain }
+    }
+
+    /// One sample in the center of each pixel of the small film.
+    fn at_centers(&self, questions: &mut Questions, shadows: bool) -> LoopQuestions {
+        let small = &self.case.probe_film;
+        let centers = small.surface.pixels.iter().map(|(center, _)| session::ray(center));
+        let centers: Vec<_> = centers.collect();
+        LoopQuestions {
+            along: questions.ask(self.radiance(&centers, Witness::True, shadows)),
+            image: questions.ask(self.render((small.width, small.height), 1, 1, 1, shadows)),
+        }
+    }
+
+    /// Judges light and shadows along the chosen rays. An integrator that asks the scene for no BSDF is judged with
+    /// its own.
+    fn judge_rays(
+        &self,
+        asked: &RayQuestions,
+        outcomes: &Outcomes,
+        answers: &mut Answers<'a>,
+    ) -> Vec<Check> {
+        let case = self.case;
+        let witnessed = asked.witnessed.map(|of| &outcomes[of]);
+        let both = |of: BothWays| (&outcomes[of.with], &outcomes[of.without]);
+        let own = both(asked.own);
+        let asks_none = |outcome: &&Outcome| {
+            let witness = outcome.answer().and_then(|answer| answer.witness);
+            witness.is_some_and(|seen| seen.calls == 0)
+        };
+        if witnessed.iter().all(asks_none) {
+            let name = "the scene's own: the integrator asks for none";
+            answers.push_light(case, &[(own.1, Witness::True, name)]);
+            let bsdf = |point: &SurfacePoint| {
+                let point =
+                    ShadedPoint { intensity: [1.0; 3], distance: 1.0, ..shaded_point(case, point) };
+                Shading::default().radiance(&point)
+            };
+            return vec![judge_shadows(case, &bsdf, own, own)];
+        }
+        let flat = both(asked.flat);
+        let under = witnessed.into_iter().zip(WITNESSES);
+        let mut under: Vec<_> =
+            under.map(|(outcome, (witness, name))| (outcome, witness, name)).collect();
+        under.push((flat.1, FLAT, "constant, below the surface too"));
+        answers.push_light(case, &under);
+        answers.push_together(case, own.1);
+        let bsdf = |point: &SurfacePoint| value(FLAT, point.wi, point.wo);
+        let shadows = judge_shadows(case, &bsdf, flat, own);
         // Of a switch that does the opposite, visibility by its position says something else.
         let is_inverted = shadows.mistake == rays::INVERTED;
-        if let (Verdict::Fail, Some((with, without)), false) = (shadows.verdict, both, is_inverted)
-        {
-            observe::shadows(session, case, with, without);
-        }
-        checks.push(shadows);
-        if let (Outcome::Done(own), Outcome::Done(radiance)) = (own, true_off) {
-            let rays = plain.iter().map(|(ray, _)| *ray);
-            let own: Vec<_> = rays.zip(session::colours(&own.values).iter().copied()).collect();
+        self.observe_rays(witnessed, flat, shadows.verdict == Verdict::Fail && !is_inverted);
+        record_rays(
+            self.session,
+            case,
+            witnessed[1],
+            if is_inverted { (flat.1, flat.0) } else { flat },
+        );
+        let mut checks = vec![shadows];
+        if let (Outcome::Done(bsdfs), Outcome::Done(radiance)) = (&outcomes[asked.bsdfs], own.1) {
+            let values = session::colours(&bsdfs.values).iter().copied();
+            let values: Vec<_> = asked.plain.iter().copied().zip(values).collect();
             let radiance = session::colours(&radiance.values);
-            checks.push(rays::judge_material(&small.batch, &own, radiance));
+            checks.push(rays::judge_material(&case.probe_film.batch, &values, radiance));
         }
-        let flat = if is_inverted { (flat_off, flat_on) } else { (flat_on, flat_off) };
-        record_rays(session, case, w1, flat);
+        checks
     }
-    if let (Outcome::Done(image), Outcome::Done(along)) = (one_spp, along_centres) {
-        record_loop(session, case, (&image.values, &along.values));
+
+    /// Keeps what the diagnosis of light and, if `shadows`, of visibility fits to.
+    fn observe_rays(
+        &self,
+        witnessed: [&Outcome; WITNESSES.len()],
+        (with, without): (&Outcome, &Outcome),
+        shadows: bool,
+    ) {
+        for ((witness, _), outcome) in WITNESSES.iter().zip(witnessed) {
+            if let Some(values) = observe::colours(outcome) {
+                observe::radiance(self.session, self.case, *witness, values);
+            }
+        }
+        if let (true, Some(with), Some(without)) =
+            (shadows, observe::colours(with), observe::colours(without))
+        {
+            observe::shadows(self.session, self.case, with, without);
+        }
     }
-    // Where shadows leave nothing to see, the loop shows without them.
-    let unshadowed =
-        is_black(along_centres).then(|| session.run(Some(plugin), at_centres(false).into()));
-    let (along_centres, one_spp) = match unshadowed.as_deref() {
-        Some([along, image]) => (along, image),
-        _ => (along_centres, one_spp),
-    };
-    checks.push(match (one_spp, along_centres) {
+
+    /// Judges whether a render is what the integrator answers along the rays through the pixels' centers.
+    fn judge_agreement(&self, asked: LoopQuestions, outcomes: &Outcomes) -> Check {
+        let (session, case) = (self.session, self.case);
+        let (along, image) = (&outcomes[asked.along], &outcomes[asked.image]);
+        if let (Outcome::Done(image), Outcome::Done(along)) = (image, along) {
+            record_loop(session, case, (&image.values, &along.values));
+        }
+        if !is_black(along) {
+            return judge_centers(case, along, image);
+        }
+        // Where shadows leave nothing to see, the loop shows without them.
+        let mut questions = Questions::default();
+        let asked = self.at_centers(&mut questions, false);
+        let outcomes = questions.run(session, self.plugin);
+        judge_centers(case, &outcomes[asked.along], &outcomes[asked.image])
+    }
+
+    /// Judges the image: on a small film first, and on the scene's own where that one is wrong. `draws_small` tells
+    /// whether the renderer drew every small film in time.
+    fn judge_image(
+        &self,
+        outcome: &Outcome,
+        draws_small: bool,
+        tolerances: &Tolerances,
+    ) -> (Check, Option<Drawn>) {
+        let (case, name) = (self.case, &self.case.entry.name);
+        let kind = Kind::Offline { spp: case.spp };
+        let judge = |outcome: &Outcome, expected: &Expected| {
+            let id = CheckId::ImageOffline;
+            let Outcome::Done(answer) = outcome else {
+                let parts = ["1.1", "1.2", "1.3", "1.4"];
+                return (session::unanswered(id, name, &parts, outcome), None);
+            };
+            let (width, height) = size_of(expected);
+            let image = session::image(&answer.values, width, height);
+            let check = images::judge(id, name, kind, &image, expected, &|_| true, tolerances);
+            (check, Some(Drawn { scene: name.clone(), kind, image }))
+        };
+        let first = self.first_film();
+        let (mut check, drawn) = judge(outcome, first);
+        if std::ptr::eq(first, &case.expected) {
+            if case.first.is_some() && draws_small {
+                settle_slow(&mut check, outcome);
+            }
+            return (check, drawn);
+        }
+        if check.verdict != Verdict::Fail {
+            return (check, None);
+        }
+        let mut questions = Questions::default();
+        let whole = questions.ask(self.film(&case.expected));
+        let outcomes = questions.run(self.session, self.plugin);
+        let (whole, drawn) = judge(&outcomes[whole], &case.expected);
+        // An image that is wrong on any film is wrong; the larger one is shown.
+        (if whole.verdict == Verdict::Fail { whole } else { check }, drawn)
+    }
+}
+
+/// Columns and rows of what is expected.
+fn size_of(expected: &Expected) -> (u32, u32) {
+    (expected.unshadowed.width as u32, expected.unshadowed.height as u32)
+}
+
+fn judge_centers(case: &PreparedScene, along: &Outcome, image: &Outcome) -> Check {
+    let (id, name) = (CheckId::LoopAgreement, &case.entry.name);
+    match (image, along) {
         (Outcome::Done(image), Outcome::Done(along)) => {
             let (image, along) = (session::colours(&image.values), session::colours(&along.values));
-            loops::judge_agreement(name, &small.mask, image, along)
+            loops::judge_agreement(name, &case.probe_film.mask, image, along)
         }
-        (Outcome::Done(_), missing) => Check {
-            verdict: Verdict::NotJudged,
-            ..session::unanswered(CheckId::LoopAgreement, name, &[], missing)
-        },
         // Where the rays fail in the same way, it is not the loop's fault.
-        (missing, Outcome::Done(_)) => {
-            session::unanswered(CheckId::LoopAgreement, name, &[], missing)
+        (missing, Outcome::Done(_)) => session::unanswered(id, name, &[], missing),
+        (Outcome::Done(_), missing) | (missing, _) => {
+            Check { verdict: Verdict::NotJudged, ..session::unanswered(id, name, &[], missing) }
         }
-        (missing, _) => Check {
-            verdict: Verdict::NotJudged,
-            ..session::unanswered(CheckId::LoopAgreement, name, &[], missing)
-        },
-    });
-    if let ([along, image], Some(sampled)) = (sampled, &small.sampled) {
-        checks.push(match (along, image) {
-            (Outcome::Done(along), Outcome::Done(image)) => {
-                let (image, along) =
-                    (session::colours(&image.values), session::colours(&along.values));
-                let (check, edges) = loops::judge_samples(name, &sampled.film, image, along);
-                // Where the samples are wrong already, edges are too.
-                if check.verdict == Verdict::Pass {
-                    answers.edges.add(&edges);
-                }
-                check
-            }
-            (Outcome::Done(_), missing) => {
-                session::unanswered(CheckId::LoopSamples, name, &[], missing)
-            }
-            // Where the rays fail in the same way, it is not the loop's fault.
-            (missing, _) => Check {
-                verdict: Verdict::NotJudged,
-                ..session::unanswered(CheckId::LoopSamples, name, &[], missing)
-            },
-        });
     }
-    let kind = Kind::Offline { spp: case.spp };
-    let judge = |outcome: &Outcome, expected: &Expected| {
-        let Outcome::Done(answer) = outcome else {
-            let parts = ["1.1", "1.2", "1.3", "1.4"];
-            return (session::unanswered(CheckId::ImageOffline, name, &parts, outcome), None);
-        };
-        let (width, height) = film(expected);
-        let image = session::image(&answer.values, width, height);
-        let id = CheckId::ImageOffline;
-        let check = images::judge(id, name, kind, &image, expected, &|_| true, tolerances);
-        (check, Some(Drawn { scene: name.clone(), kind, image }))
-    };
-    let Some(first) = first else {
-        let (mut check, drawn) = judge(full, &case.expected);
-        let mut small = sampled.iter().chain([one_spp]);
-        if case.first.is_some() && small.all(|outcome| outcome.answer().is_some()) {
-            settle_slow(&mut check, full);
+}
+
+/// Judges a render of several samples per pixel by the integrator's radiance along their rays.
+fn judge_samples(
+    case: &PreparedScene,
+    sampled: &Sampled,
+    [along, image]: [&Outcome; 2],
+    answers: &mut Answers,
+) -> Check {
+    let (id, name) = (CheckId::LoopSamples, &case.entry.name);
+    match (along, image) {
+        (Outcome::Done(along), Outcome::Done(image)) => {
+            let (image, along) = (session::colours(&image.values), session::colours(&along.values));
+            let (check, edges) = loops::judge_samples(name, &sampled.film, image, along);
+            // Where the samples are wrong already, edges are too.
+            if check.verdict == Verdict::Pass {
+                answers.edges.add(&edges);
+            }
+            check
         }
-        checks.push(check);
-        return (checks, drawn);
-    };
-    let (check, _) = judge(full, first);
-    if check.verdict != Verdict::Fail {
-        checks.push(check);
-        return (checks, None);
+        (Outcome::Done(_), missing) => session::unanswered(id, name, &[], missing),
+        // Where the rays fail in the same way, it is not the loop's fault.
+        (missing, _) => {
+            Check { verdict: Verdict::NotJudged, ..session::unanswered(id, name, &[], missing) }
+        }
     }
-    let whole = render(film(&case.expected), case.spp, run.seed, run.threads, true);
-    let outcomes = session.run(Some(plugin), vec![whole]);
-    let (whole, drawn) = match outcomes.first() {
-        Some(outcome) => judge(outcome, &case.expected),
-        None => (check.clone(), None),
-    };
-    // An image that is wrong on any film is wrong; the larger one is shown.
-    checks.push(if whole.verdict == Verdict::Fail { whole } else { check });
-    (checks, drawn)
 }
 
 /// A renderer that draws the small films in time is slow on a large one, no endless loop: a slip. Whether the loop is

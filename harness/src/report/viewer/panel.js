@@ -208,7 +208,7 @@ function showProbe() {
   get("probe").replaceChildren(...rows);
 }
 
-/** Mask flags, as harness/src/imaging/reference.rs has them. */
+/** Mask flags, as harness/imaging/src/reference.rs has them. */
 const EDGE = 0x8000, EMITTER = 0x4000, HIGHLIGHT = 0x2000, REGION = 0x1fff;
 
 /** What a pixel counts for, in words. */

@@ -8,7 +8,6 @@ use super::evidence::{
     Check, ComparedWith, FailingArea, ImageEvidence, RegionBias, Tolerances, WorstPixel,
 };
 use super::reference::RegionMask;
-use crate::columns::count;
 
 /// A dim lit region's bias is relative to this fraction of the median lit value at least.
 const DIM: f64 = 0.01;
@@ -263,9 +262,9 @@ impl ComparisonStats {
             passed: blocks == 0,
             detail: match largest {
                 Some(a) if blocks > 0 => format!(
-                    "{} of 2x2 differing pixels; the largest area has {}, in columns {} to {} and rows {} to {}",
-                    count(blocks, "block"),
-                    count(a.pixels, "pixel"),
+                    "{} of 2x2 differing pixels; the largest area has {} pixels, in columns {} to {} and rows {} to {}",
+                    if blocks == 1 { "1 block".into() } else { format!("{blocks} blocks") },
+                    a.pixels,
                     a.x,
                     a.x + a.width - 1,
                     a.y,

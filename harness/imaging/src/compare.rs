@@ -31,7 +31,7 @@ pub fn compare_offline(
 }
 
 /// [`compare_offline`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
-pub(crate) fn offline(
+pub fn offline(
     actual: &Image,
     reference: &ReferenceImage,
     spp: u32,
@@ -93,7 +93,7 @@ pub fn compare_realtime_linear(
 }
 
 /// [`compare_realtime_linear`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
-pub(crate) fn realtime_linear(
+pub fn realtime_linear(
     actual: &Image,
     centre: &Image,
     mask: &RegionMask,
@@ -145,7 +145,7 @@ pub fn compare_srgb8(
 }
 
 /// [`compare_srgb8`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
-pub(crate) fn srgb8(
+pub fn srgb8(
     actual: &Image,
     centre: &Image,
     mask: &RegionMask,
