@@ -240,7 +240,8 @@ pub fn judge_samples(
     let mut edges = Edges::default();
     let (mut bias, mut edge_count) = (0.0, 0usize);
     for (index, pixel) in own.iter().enumerate() {
-        let Some(pixel) = pixel else { continue };
+        // Beside rays that are not a number, a sample may be none either.
+        let Some(pixel) = pixel.filter(|_| near(index).all(|i| own[i].is_some())) else { continue };
         let found = sum(&image[index]);
         counted += 1;
         let difference = if found.is_finite() { found - pixel.mean } else { typical };
@@ -264,6 +265,11 @@ pub fn judge_samples(
             (*count, *squares) = (*count + 1, *squares + z * z);
             (bias, edge_count) = (bias + z, edge_count + 1);
         }
+    }
+    if counted == 0 {
+        let summary =
+            "radiance along rays is not a number nearly everywhere: there is nothing to agree with";
+        return (Check::new(id, scene, Verdict::NotJudged, summary), Edges::default());
     }
     let off_fraction = off as f64 / counted as f64;
     let worst = edges.worst();

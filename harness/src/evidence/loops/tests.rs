@@ -136,6 +136,26 @@ fn samples_that_do_not_cover_their_pixels_are_found() {
     }
 }
 
+/// A BSDF that is not a number is paid in its own part.
+#[test]
+fn a_sample_that_is_not_a_number_beside_rays_that_are_none_is_not_the_loops() {
+    let film = SampledFilm::new(WIDTH, HEIGHT);
+    let mut rays = own(&film);
+    let mut image = render(independent, mean);
+    let pixel = |x: usize, y: usize| y * WIDTH as usize + x;
+    rays[pixel(2, 23) * RAYS as usize] = [f32::NAN; 3];
+    image[pixel(2, 23)] = [f32::NAN; 3];
+    image[pixel(3, 24)] = [f32::NAN; 3];
+    assert_eq!(judge_samples("s", &film, &image, &rays).0.verdict, Verdict::Pass);
+    image[pixel(2, 26)] = [f32::NAN; 3];
+    assert_eq!(judge_samples("s", &film, &image, &rays).0.verdict, Verdict::Fail);
+    // In every other column, no pixel is left that tells anything.
+    for pixel in rays.chunks_mut(RAYS as usize).step_by(2) {
+        pixel[0] = [f32::INFINITY; 3];
+    }
+    assert_eq!(judge_samples("s", &film, &image, &rays).0.verdict, Verdict::NotJudged);
+}
+
 #[test]
 fn single_pixels_that_are_never_written_or_written_over_are_a_slip() {
     let right = render(independent, mean);
