@@ -1,4 +1,4 @@
-//! What isolation costs, start to exit: a plain start, one locked by all layers and by all but one, and a whole
+//! What isolation costs, start to exit: a plain start, one confined by all layers and by all but one, and a whole
 //! worker under supervision. `cargo bench --workspace --bench sandbox`, after a build.
 
 use std::path::{Path, PathBuf};
@@ -36,7 +36,7 @@ fn locked_by_all_but(bencher: Bencher, layer: &str) {
     let program = policy.seen(&umbra);
     bencher.bench(|| {
         let started = command(&umbra, &policy, &program, [doctor::PROBE_COMMAND]);
-        let status = started.and_then(|mut locked| locked.status());
+        let status = started.and_then(|mut confined| confined.status());
         assert!(status.expect("umbra starts").success());
     });
 }

@@ -1,6 +1,5 @@
-//! `umbra check` and `umbra watch` by the clock: a check of which nothing is kept, and one after an edit; from a save to
-//! the first image and to the whole judgement; frames per second of the live view, and from a key to the picture; the
-//! size of what a student gets.
+//! Times `umbra check` and `umbra watch`: a first check, one after an edit, from a save to the first image and to the
+//! report, frames per second of the live view, and from a key to its picture. Also prints the size of the kit.
 //!
 //! ```sh
 //! cargo build --release --workspace && cargo run --release --example watching    # minutes; it needs Chromium

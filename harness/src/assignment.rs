@@ -81,9 +81,9 @@ pub struct SceneEntry {
     /// of the others is `bonus.image`; this one is a check of its own, `bonus.probe`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub bonus_required: bool,
-    /// The largest share of a part's points, in (0, 1], that a mistake can cost which shows on this
-    /// scene alone. 1 for the assignment's scenes and for probes of what these demand too; less for
-    /// probes of what no image of the assignment shows.
+    /// The largest share of a part, in (0, 1], that a mistake can cost if only this scene shows it. It is 1 for the
+    /// assignment's scenes and for probes of what these demand. It is less for probes of what no image of the
+    /// assignment shows.
     #[serde(default = "full_weight", skip_serializing_if = "is_full_weight")]
     pub weight: f64,
     /// Film to judge it on, width and height in pixels; the scene's own when absent.

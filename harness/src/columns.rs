@@ -8,6 +8,22 @@ pub fn count(number: usize, noun: &str) -> String {
     if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
 }
 
+/// `1 point`, `0.5 points`.
+pub fn points(number: f64) -> String {
+    point_range([number; 2])
+}
+
+/// `1 point`, `3..5 points`.
+pub fn point_range(ends: [f64; 2]) -> String {
+    let text = range(ends);
+    if text == "1" { "1 point".to_owned() } else { format!("{text} points") }
+}
+
+/// `3`, `3..5`.
+pub fn range([least, most]: [f64; 2]) -> String {
+    if least == most { least.to_string() } else { format!("{least}..{most}") }
+}
+
 /// The text in exactly `width` columns, cut or filled at its end.
 pub fn left(text: &str, width: usize) -> String {
     let mut shown = cut(text, width);
@@ -52,6 +68,15 @@ pub fn wrap(text: &str, width: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_is_singular() {
+        assert_eq!(count(1, "day"), "1 day");
+        assert_eq!(count(0, "day"), "0 days");
+        let texts = [1.0, 0.5, 0.0, 15.0].map(points);
+        assert_eq!(texts, ["1 point", "0.5 points", "0 points", "15 points"]);
+        assert_eq!(point_range([0.0, 1.0]), "0..1 points");
+    }
 
     #[test]
     fn cuts_and_fills_by_display_width() {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{NamedTempFile, TempDir};
 
-/// What the folders of processes are called.
+/// Prefix of process folders.
 const RUN: &str = "run-";
 /// The file in such a folder that its process holds locked.
 const LOCK: &str = "lock";
@@ -197,7 +197,7 @@ pub fn copy_tree(from: &Path, to: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// What this system calls the dynamic library of a crate, such as `libplugin.so`.
+/// The file name of a crate's dynamic library on this system, such as `libplugin.so`.
 pub fn library_name(crate_name: &str) -> String {
     format!("{}{crate_name}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX)
 }

@@ -2,8 +2,8 @@
 //! all other work goes on, so that no report is lost. [`end_of_closed_pipe`] then ends the program like any other that
 //! writes into a closed pipe.
 //!
-//! The macros take the place of the standard library's, which panic. What they print is harmless to a terminal, whatever
-//! names it holds; only `print_as_is!` prints sequences that mean something to one.
+//! The macros take the place of the standard library's, which panic. What they print is harmless to a terminal,
+//! whatever names it holds; only `print_as_is!` prints sequences that mean something to one.
 
 use std::fmt;
 use std::io::{ErrorKind, Write as _};

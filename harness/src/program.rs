@@ -52,7 +52,8 @@ pub fn grade_submission(
     let isolation = supervisor.isolation.isolation();
     ensure!(
         options.reduced_isolation || isolation == Isolation::Full,
-        "the submission is not run here, isolation would be {isolation}; hint: `umbra doctor` says what to do"
+        "full isolation is not available here ({isolation}), so the submission is not run; hint: `umbra doctor` says \
+         what to do"
     );
     let store = Store {
         assignment: &assignment,

@@ -400,7 +400,7 @@ impl Store<'_> {
                 Ok(answer.values)
             }
             Outcome::Done(_) => bail!("the reference renderer drew a value that is not finite"),
-            other => bail!("the reference renderer failed: {other:?}"),
+            other => bail!("the reference renderer failed: {other}"),
         });
         answers.collect()
     }

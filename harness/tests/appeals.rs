@@ -160,7 +160,7 @@ fn a_grade_is_defended_mended_and_what_was_held_back_released() {
     // A part set by hand takes the place of what the fix shows.
     let (code, said) = place.run(&["override", "260181512", "1.3", "12", "--reason", "half"]);
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("has 12 points from now on, the evidence says 20"), "{said}");
+    assert!(said.contains("now has 12 points; the evidence gives 20"), "{said}");
     let decided = &place.row()["standing"]["decisions"][0];
     assert_eq!(decided["before"], serde_json::json!([20.0, 20.0]));
     let (code, said) = place.run(&["regrade", "--undo"]);

@@ -1034,7 +1034,7 @@ fn nested_archive_is_reported() {
     assert_eq!(submission.findings[0].path.as_deref(), Some("src.zip"));
 }
 
-/// Nobody has seen what was submitted: it is no hand-in without a source.
+/// Nobody has seen what was submitted: it is no submission without a source.
 #[test]
 fn a_source_that_may_be_in_an_archive_which_is_not_opened_is_not_missing() {
     let zip = Zip::of([Entry::stored("lib.rs", b"x")]).bytes();

@@ -62,7 +62,10 @@ fn a_number_or_name_means_the_attempt_that_counts() {
         let set = ["override", word, "1.4", points, "--reason", "x"];
         let (code, said) = umbra(&place, &root, &set);
         assert_eq!(code, Some(0), "{word}: {said}");
-        assert!(said.contains(&format!("({SECOND_SLUG}): part 1.4 has {points} points")), "{said}");
+        assert!(
+            said.contains(&format!("({SECOND_SLUG}): part 1.4 now has {points} points")),
+            "{said}"
+        );
         assert!(said.contains("the reports show it"), "{said}");
         assert_eq!(report(&place)["submissions"][0]["points"].to_string(), format!("{points}.0"));
     }
@@ -78,7 +81,7 @@ fn a_number_or_name_means_the_attempt_that_counts() {
     assert_eq!(report(&place)["submissions"][0]["points"], 5.0);
     // One that counts for less is named.
     let (_, said) = umbra(&place, &root, &["status"]);
-    assert!(said.contains("attempts that count for less than another: 1"), "{said}");
+    assert!(said.contains("counting attempts that earn less than another attempt: 1"), "{said}");
     assert!(said.contains(&format!("{SECOND}: 5 points, {FIRST} would have 15")), "{said}");
     let (code, said) = umbra(&place, &root, &["defend", FIRST_SLUG, "1.4"]);
     assert_eq!(code, Some(2), "{said}");
@@ -225,7 +228,7 @@ fn each_download_of_several_is_of_its_own_platform() {
     place.put("mail/a2_cy.zip", &submission(&own("Cy", "260000107")));
     place.put("mail/a2_di.zip", &submission(&own("Di", "260000108")));
     let (said, report) = place.grade(&root, &["b.zip", "c.zip", "mail"]);
-    assert!(said.contains("recognised as downloads of Brightspace and Canvas"), "{said}");
+    assert!(said.contains("recognized as downloads of Brightspace and Canvas"), "{said}");
     let late = report["submissions"].as_array().unwrap().iter();
     let late: Vec<(&str, &Value)> =
         late.map(|row| (text(&row["name"]), &row["standing"]["late"]["charged"])).collect();

@@ -1,4 +1,4 @@
-//! Hostile files are decoded in locked children: the answer is what this process would have found,
+//! Hostile files are decoded in confined children: the answer is what this process would have found,
 //! and a child that dies takes nothing with it.
 
 use std::fs;

@@ -294,7 +294,7 @@ fn a_forged_download_is_not_opened_beside_folders_and_deeper_archives() {
         assert_eq!(code, Some(1), "{said}");
         assert!(said.contains("neither opened nor graded"), "{given} {said}");
         assert!(
-            !said.contains("recognised as") && said.contains("1 submission: "),
+            !said.contains("recognized as") && said.contains("1 submission: "),
             "{given} {said}"
         );
         assert!(!said.contains("nothing in it"), "{given} {said}");

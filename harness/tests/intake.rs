@@ -792,7 +792,7 @@ fn no_hand_in_is_taken_where_one_person_has_two() {
             assert!(found.config.is_some(), "who it is is known: {text}");
         }
     }
-    // Copies of one hand-in are one, and so is a folder with an older one in it.
+    // Copies of one submission are one, and so is a folder with an older one in it.
     let same = |_: &str, _: &mut Vec<u8>| {};
     let digest = fix_files(&perfect()).unwrap().digest;
     assert_eq!(fix_files(&two(["v1/", "v2/"], &same)).unwrap().digest, digest);

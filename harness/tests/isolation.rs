@@ -293,7 +293,7 @@ fn nothing_is_left_of_a_worker_that_is_ended() {
 fn a_layer_that_cannot_be_had_is_the_machines_matter() {
     let house = TestEnv::new();
     let plugin = house.plugin("attack.so", &[]);
-    // Not this program: it ends well and has locked nothing.
+    // Not this program: it ends well and has confined nothing.
     let liar = Supervisor { umbra: "/bin/true".into(), ..house.supervisor.clone() };
     let job = Job { plugin: Some(plugin), requests: vec![house.offline("")] };
     let never = AtomicBool::new(false);

@@ -1,5 +1,5 @@
-//! Sources that are alike, through the real binary: equal files found by Umbra, near ones read from a result of JPlag's,
-//! both side by side for the instructor and unseen by students.
+//! Sources that are alike, through the real binary: equal files found by Umbra, near ones read from a result of
+//! JPlag's, both side by side for the instructor and unseen by students.
 
 #![cfg(unix)]
 

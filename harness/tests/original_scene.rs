@@ -1,7 +1,7 @@
-//! A scene folder in the manner of the original course, dropped anywhere: `umbra render` must draw
-//! it, offline and realtime. Its files are as modelers and hands left them there: CRLF line ends, groups,
-//! faces counted from the end, a triangle without area, materials without `Ks` or `Ns`, `illum` 5 and
-//! 8, keys that nobody knows, and a light 2e-6 wide.
+//! A scene folder in the manner of the original course, dropped anywhere: `umbra render` must draw it, offline and
+//! realtime. Its files are as modelers and hands left them there. They have CRLF line ends, groups, faces counted from
+//! the end, a triangle without area, materials without `Ks` or `Ns`, `illum` 5 and 8, unknown keys, and a light 2e-6
+//! wide.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -233,7 +233,7 @@ fn a_path_that_cannot_be_used_is_the_command_line_s_matter() {
     work(&place.path().join("work"));
     let (code, out, said) = umbra(place.path(), &["check", "work", "--report", "/proc/x"]);
     assert!(code == Some(2) && out.is_empty(), "{said}");
-    assert!(said.starts_with("umbra: cannot write to /proc/x: No such file"), "{said}");
+    assert!(said.starts_with("umbra: cannot write to /proc/x: there is no such file"), "{said}");
     assert_eq!(said.lines().count(), 1, "it is said before any work: {said}");
     let (code, _, said) = umbra(place.path(), &["check", "/dev/null"]);
     assert!(code == Some(2) && said.contains("/dev/null is a pipe or device"), "{said}");

@@ -49,7 +49,7 @@ fn a_decision_is_never_on_another_who_typed_the_same_number() {
     assert_eq!(points(&place), of(&[("a2_ann", 0.0), ("a2_mal", 3.0)]));
     let (code, said) = set("260000104", "1.1", "1");
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("Ann Lee (a2_ann): part 1.1 has 1 point from now on"), "{said}");
+    assert!(said.contains("Ann Lee (a2_ann): part 1.1 now has 1 point;"), "{said}");
     assert_eq!(points(&place), of(&[("a2_ann", 1.0), ("a2_mal", 3.0)]));
     let (code, said) = set("260000106", "1.1", "2");
     assert_eq!(code, Some(2), "{said}");
@@ -63,7 +63,7 @@ fn a_decision_is_never_on_another_who_typed_the_same_number() {
     assert_eq!(code, Some(0), "{said}");
     let (code, said) = set("260000106", "1.4", "13");
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("Mallory Malone (a2_mal): part 1.4 has 13 points"), "{said}");
+    assert!(said.contains("Mallory Malone (a2_mal): part 1.4 now has 13 points"), "{said}");
     assert_eq!(points(&place), of(&[("a2_ann", 1.0), ("a2_mal", 13.0)]));
     let (code, said) = umbra(&place, &root, &["confirm", "Malone, Mallory", "--reason", "x"]);
     assert_eq!(code, Some(0), "{said}");

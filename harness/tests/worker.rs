@@ -627,13 +627,13 @@ fn scenes_and_passes_that_fail_say_why() {
 }
 
 #[test]
-fn the_hidden_commands_refuse_to_run_unlocked() {
+fn the_hidden_commands_refuse_to_run_unconfined() {
     let (umbra, worker) = (env!("CARGO_BIN_EXE_umbra"), env!("CARGO_BIN_EXE_umbra-worker"));
     for (program, args) in
         [(worker, &["/tmp"][..]), (umbra, &["__decode", "/tmp"]), (umbra, &["__exec", "/bin/true"])]
     {
         let output = Command::new(program).args(args).output().unwrap();
-        assert_eq!(output.status.code(), Some(70), "{args:?}");
+        assert_eq!(output.status.code(), Some(71), "{args:?}");
         assert!(String::from_utf8_lossy(&output.stderr).contains("own use"), "{output:?}");
     }
 }

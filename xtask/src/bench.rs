@@ -50,7 +50,7 @@ impl Bench {
     }
 }
 
-/// Runs it, and answers the table.
+/// Runs it, and returns the table.
 pub fn run(root: &Path, arguments: &Arguments) -> anyhow::Result<String> {
     let folder = root.join("target/umbra/bench");
     std::fs::create_dir_all(&folder)?;

@@ -1,41 +1,77 @@
-//! The list of checks in `docs/evidence.md`, made from their registry.
+//! The list of checks in `docs/evidence.md` and the table of their code in `ARCHITECTURE.md`, made from the registry.
 
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use umbra::assignment::Assignment;
-use umbra::evidence::CheckId;
+use umbra::evidence::{CheckId, IMAGE_RULES};
 use umbra::rubric::Rules;
 
-/// The page, in the repository.
-const PAGE: &str = "docs/evidence.md";
-const BEGIN: &str =
-    "<!-- Made by `xtask checks`; the words stand in harness/src/evidence/registry/info.rs -->\n";
+/// What begins a part of a page that is made here.
+const BEGIN: &str = "<!-- Made by `xtask checks` from harness/src/evidence/registry/ -->\n";
 const END: &str = "<!-- end of what `xtask checks` made -->\n";
 /// Columns of a line.
 const COLUMNS: usize = 120;
 
-/// Writes the list into the page, or with `check` compares it with what the page holds.
+/// Writes list and table into their pages, or with `check` compares them with what the pages hold.
 ///
 /// # Errors
-/// When the page cannot be used, or differs.
+/// When a page cannot be used, or differs.
 pub fn run(root: &Path, check: bool) -> Result<String> {
-    let path = root.join(PAGE);
-    let page = std::fs::read_to_string(&path).context(PAGE)?;
-    let parts = page.split_once(BEGIN).zip(page.split_once(END));
-    let Some(((before, _), (_, after))) = parts else {
-        bail!("{PAGE}: the marks of the list are gone")
-    };
-    let made = format!("{before}{BEGIN}{}{END}{after}", list(&Assignment::load(root)?.rules));
-    if check {
-        ensure!(
-            made == page,
-            "{PAGE}: the list of checks is not the registry's; `xtask checks` writes it"
-        );
-    } else {
-        std::fs::write(&path, made).context(PAGE)?;
+    let list = list(&Assignment::load(root)?.rules);
+    for (name, made) in [("docs/evidence.md", list), ("ARCHITECTURE.md", sources())] {
+        let path = root.join(name);
+        let page = std::fs::read_to_string(&path).context(name)?;
+        let parts = page.split_once(BEGIN).zip(page.split_once(END));
+        let Some(((before, _), (_, after))) = parts else {
+            bail!("{name}: the marks of what `xtask checks` makes are gone")
+        };
+        let made = format!("{before}{BEGIN}{made}{END}{after}");
+        if check {
+            ensure!(made == page, "{name} differs from the registry; `xtask checks` writes it");
+        } else {
+            std::fs::write(&path, made).context(name)?;
+        }
     }
-    Ok(format!("{PAGE}: {} checks", CheckId::ALL.len()))
+    Ok(format!("{} checks written", CheckId::ALL.len()))
+}
+
+/// A table of the files that ask and judge the checks of each family, the first word of their names.
+fn sources() -> String {
+    let family = |check: &CheckId| check.name().split('.').next().unwrap_or_default();
+    let mut table =
+        "| checks | asked in `grading/` | judged in `evidence/`, or there |\n|---|---|---|\n"
+            .to_owned();
+    for name in unique(CheckId::ALL.iter().map(family)) {
+        let sources: Vec<_> = CheckId::ALL
+            .iter()
+            .filter(|check| family(check) == name)
+            .map(|check| check.sources())
+            .collect();
+        let asked = sources.iter().map(|files| module(files.asked));
+        let judged = sources
+            .iter()
+            .map(|files| if files.judged == files.asked { "there" } else { module(files.judged) });
+        let [asked, judged] = [unique(asked), unique(judged)].map(|files| files.join(", "));
+        table.push_str(&format!("| `{name}.*` | {asked} | {judged} |\n"));
+    }
+    table
+}
+
+/// The path of a file without its first folder and extension.
+fn module(file: &str) -> &str {
+    file.split_once('/').map_or(file, |(_, rest)| rest).trim_end_matches(".rs")
+}
+
+/// Each item once, in the order in which they first appear.
+fn unique<'a>(items: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut seen = Vec::new();
+    for item in items {
+        if !seen.contains(&item) {
+            seen.push(item);
+        }
+    }
+    seen
 }
 
 /// Every check as an item of a list.
@@ -46,7 +82,12 @@ fn list(rules: &Rules) -> String {
         let role = Some(rules.role(check)).filter(|role| !role.is_empty());
         let role = role.map_or_else(String::new, |role| format!(" ({role})"));
         wrap(&mut list, "- ", &format!("**`{check}`**{role}: {}", info.question));
-        let rules: Vec<String> = info.rules.iter().map(|rule| format!("`{rule}`")).collect();
+        let (images, rest) = match info.rules.strip_prefix(IMAGE_RULES) {
+            Some(rest) => (Some("those of *Images*".to_owned()), rest),
+            None => (None, info.rules),
+        };
+        let rest = rest.iter().map(|rule| format!("`{rule}`"));
+        let rules: Vec<String> = images.into_iter().chain(rest).collect();
         let rules = if rules.is_empty() { String::new() } else { rules.join(", ") + "." };
         for (title, text) in [("Error", info.error), ("Bound", info.bound), ("Rules", &rules)] {
             if !text.is_empty() {
@@ -76,7 +117,7 @@ fn wrap(list: &mut String, lead: &str, text: &str) {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn the_page_holds_what_the_registry_says() {
+    fn the_pages_hold_what_the_registry_says() {
         super::run(crate::root(), true).unwrap();
     }
 }

@@ -38,7 +38,7 @@ const TEMPLATE: &str = "student_template";
 const MEMBERS: &str = r#"members = ["harness/api", "harness/basecode", "student_template"]"#;
 const DEFAULT_MEMBERS: &str = r#"default-members = ["student_template"]"#;
 
-/// What `xtask dist` is told.
+/// Options of `xtask dist`.
 #[derive(clap::Args)]
 pub struct Arguments {
     #[command(subcommand)]

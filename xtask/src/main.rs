@@ -40,7 +40,7 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         command: Vec<String>,
     },
-    /// Write the list of checks into docs/evidence.md.
+    /// Write the list of checks into docs/evidence.md and ARCHITECTURE.md.
     Checks,
     /// Pack the sample submissions into target/umbra/samples, with the images that their code draws; print their paths.
     Samples {

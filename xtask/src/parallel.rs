@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::Result;
 
-/// Does `work` on every item and its index, `jobs` at a time, and answers the results in the items' order.
+/// Does `work` on every item and its index, `jobs` at a time, and returns the results in the items' order.
 ///
 /// # Errors
 /// The first error that came; nothing is begun after it.

@@ -36,7 +36,7 @@ use crate::parallel;
 /// The film of the scenes that a submission holds images of, unless `--full`.
 const SMALL_FILM: [u32; 2] = [128, 96];
 
-/// What `xtask verdicts` is told.
+/// Options of `xtask verdicts`.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Grade only mistakes, pairs, variants and samples whose name holds this (repeatable); `plain` for the
@@ -46,10 +46,8 @@ pub struct Arguments {
     /// Scenes on their own films; without it the large ones are drawn at 128x96
     #[arg(long)]
     full: bool,
-    /// What CI runs: of right renderers one for each number of samples and half of the other ways to
-    /// be right; at 4 spp an eighth of the mistakes, 60 pairs and 20 triples of these; of each the path,
-    /// offline or realtime, that it can show on; half of the unseen scenes; and the samples that are no
-    /// known mistake
+    /// A fast selection, as CI runs it: some right renderers, an eighth of the mistakes at 4 spp, 60 pairs, 20 triples
+    /// and half of the held-back seeds. Each mistake runs only on the path that shows it
     #[arg(long, conflicts_with = "full")]
     quick: bool,
     /// Grade mistakes alone and write what they cost to this file, nothing else
@@ -61,7 +59,7 @@ pub struct Arguments {
     /// Seed of held-back scenes to grade on as well [default: none are made]
     #[arg(long, value_name = "SEED")]
     perturb: Option<u64>,
-    /// Which adapter draws the realtime scenes
+    /// Graphics adapter for realtime scenes
     #[arg(long, value_enum, default_value_t = AdapterChoice::Software)]
     adapter: AdapterChoice,
     /// Renderers graded at the same time [default: one more than there are cores]
@@ -69,7 +67,7 @@ pub struct Arguments {
     jobs: Option<usize>,
 }
 
-/// Grades everything, prints the matrix and answers the line of figures.
+/// Grades everything, prints the matrix and returns the line of figures.
 ///
 /// # Errors
 /// When a verdict is not what the catalogue says, with the figures, or nothing can be graded here.

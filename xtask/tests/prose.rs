@@ -1,7 +1,7 @@
-//! Every Markdown file keeps to what CONTRIBUTING.md says of prose: lines of at most 120 columns,
-//! sentences of at most 40 words, and on average at most 20 words in a sentence.
+//! All prose keeps to what CONTRIBUTING.md says: lines of at most 120 columns, sentences of at most 40 words, and on
+//! average at most 20 words in a sentence. Prose is in Markdown files, comments, the help and texts in the code.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -10,13 +10,14 @@ use serde_json::Value;
 const LINE: usize = 120;
 /// Words of a sentence, in a paragraph, a list or the cell of a table.
 const SENTENCE: usize = 40;
-/// Words of a file's sentences on average. Cells of tables are left out: most are no sentences.
+/// Words of the sentences of a page, or of a crate's comments, on average. Cells of tables are left out: most are no
+/// sentences.
 const AVERAGE: f64 = 20.0;
 
 #[test]
 fn documents_are_short_of_breath() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the repository");
-    let mut files = markdown_below(root);
+    let root = root();
+    let mut files = files_below(root, "md");
     // A table that `xtask verdicts --table` writes.
     files.retain(|file| !file.ends_with("docs/points.md"));
     assert!(files.len() > 20, "only {} files", files.len());
@@ -25,18 +26,54 @@ fn documents_are_short_of_breath() {
         .flat_map(|file| {
             let text = std::fs::read_to_string(file).expect("UTF-8");
             let name = file.strip_prefix(root).unwrap_or(file).display().to_string();
-            faults(&text).into_iter().map(move |fault| format!("{name}: {fault}"))
+            faults(&text).into_iter().map(move |fault| format!("{name}:{fault}"))
         })
         .collect();
     assert!(faults.is_empty(), "{} faults\n{}", faults.len(), faults.join("\n"));
 }
 
 #[test]
+fn comments_messages_and_help_are_short_of_breath() {
+    let root = root();
+    let mut faults = Vec::new();
+    let mut crates: BTreeMap<PathBuf, Average> = BTreeMap::new();
+    for file in files_below(root, "rs") {
+        let text = std::fs::read_to_string(&file).expect("UTF-8");
+        let path = file.strip_prefix(root).unwrap_or(&file);
+        if path.starts_with("samples") || path.starts_with("expected") {
+            continue; // Students' code, and a copy of the template.
+        }
+        let comments = comments(&text);
+        let mut of_file = wide_lines(&text, |line| {
+            line.trim_start().starts_with("//") && !line.contains("//! # ")
+        });
+        of_file.extend(long_sentences(&blocks(&comments)));
+        let roots = ["src", "tests", "examples", "benches", "build.rs"];
+        let is_crate =
+            |at: &&Path| at.components().all(|part| !roots.iter().any(|r| part.as_os_str() == *r));
+        let of_crate = path.ancestors().find(is_crate).unwrap_or(path);
+        crates.entry(of_crate.to_owned()).or_default().add(&blocks(&comments));
+        if path.components().any(|part| part.as_os_str() == "src") {
+            of_file.extend(long_sentences(&texts(&text)));
+        }
+        faults.extend(of_file.into_iter().map(|fault| format!("{}:{fault}", path.display())));
+    }
+    assert!(crates.len() > 5, "{:?}", crates.keys());
+    for (of_crate, average) in crates {
+        faults.extend(average.fault().map(|fault| format!("{}: {fault}", of_crate.display())));
+    }
+    let help = "harness/src/cli/snapshots/umbra__cli__tests__help.snap";
+    let lines = std::fs::read_to_string(root.join(help)).expect("UTF-8").replace('\n', "\n\n");
+    faults
+        .extend(long_sentences(&blocks(&lines)).into_iter().map(|fault| format!("{help}:{fault}")));
+    assert!(faults.is_empty(), "{} faults\n{}", faults.len(), faults.join("\n"));
+}
+
+#[test]
 fn every_page_is_in_the_book() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the repository");
-    let docs = root.join("docs");
+    let docs = root().join("docs");
     let summary = std::fs::read_to_string(docs.join("SUMMARY.md")).expect("UTF-8");
-    for page in markdown_below(&docs) {
+    for page in files_below(&docs, "md") {
         let path = page.strip_prefix(&docs).unwrap_or(&page).display().to_string();
         let is_named = path == "SUMMARY.md" || summary.contains(&format!("]({path})"));
         assert!(is_named, "docs/SUMMARY.md lacks a line for {path}");
@@ -49,8 +86,7 @@ fn every_page_is_in_the_book() {
 
 #[test]
 fn every_key_of_config_json_is_in_its_reference() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the repository");
-    let read = |path: &str| std::fs::read_to_string(root.join(path)).expect("UTF-8");
+    let read = |path: &str| std::fs::read_to_string(root().join(path)).expect("UTF-8");
     let config: Value = serde_json::from_str(&read("config.json")).expect("JSON");
     let page = read("docs/reference/config.md");
     let code = page.lines().flat_map(|line| line.split('`').skip(1).step_by(2));
@@ -74,47 +110,123 @@ fn keys(value: &Value) -> BTreeSet<&str> {
     }
 }
 
-/// The Markdown files of the tree, without what is built or hidden.
-fn markdown_below(folder: &Path) -> Vec<PathBuf> {
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the repository")
+}
+
+/// The files of the tree with this extension, without what is built or hidden.
+fn files_below(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in folder.read_dir().expect("a folder") {
         let path = entry.expect("an entry").path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         if path.is_dir() && name != "target" && (!name.starts_with('.') || name == ".github") {
-            found.extend(markdown_below(&path));
-        } else if path.extension().is_some_and(|extension| extension == "md") {
+            found.extend(files_below(&path, extension));
+        } else if path.extension().is_some_and(|own| own == extension) {
             found.push(path);
         }
     }
     found
 }
 
-/// What is too long in a text.
+/// What is too long in a page.
 fn faults(text: &str) -> Vec<String> {
-    let wide = text.lines().enumerate().filter_map(|(index, line)| {
+    let blocks = blocks(text);
+    let mut faults = wide_lines(text, |_| true);
+    faults.extend(long_sentences(&blocks));
+    let mut average = Average::default();
+    average.add(&blocks);
+    faults.extend(average.fault());
+    faults
+}
+
+fn wide_lines(text: &str, counts: impl Fn(&str) -> bool) -> Vec<String> {
+    let lines = text.lines().enumerate().filter(|(_, line)| counts(line));
+    let wide = lines.filter_map(|(index, line)| {
         let width = line.chars().count();
         (width > LINE).then(|| format!("{}: {width} columns", index + 1))
     });
-    let mut faults: Vec<String> = wide.collect();
-    let (mut words, mut sentences) = (0, 0);
-    for block in blocks(text) {
+    wide.collect()
+}
+
+fn long_sentences(blocks: &[Block]) -> Vec<String> {
+    let mut faults = Vec::new();
+    for block in blocks {
         for sentence in sentences_of(&block.text) {
             let count = words_of(sentence);
             if count > SENTENCE {
                 let begin: String = sentence.chars().take(60).collect();
                 faults.push(format!("{}: {count} words: {begin}...", block.line));
             }
-            if !block.is_cell && count > 0 {
-                words += count;
-                sentences += 1;
+        }
+    }
+    faults
+}
+
+#[derive(Default)]
+struct Average {
+    words: usize,
+    sentences: usize,
+}
+
+impl Average {
+    fn add(&mut self, blocks: &[Block]) {
+        for block in blocks.iter().filter(|block| !block.is_cell) {
+            let counts = sentences_of(&block.text).into_iter().map(words_of);
+            for count in counts.filter(|count| *count > 0) {
+                self.words += count;
+                self.sentences += 1;
             }
         }
     }
-    let average = words as f64 / f64::from(sentences.max(1));
-    if average > AVERAGE {
-        faults.push(format!("{average:.1} words in a sentence on average"));
+
+    fn fault(&self) -> Option<String> {
+        let average = self.words as f64 / self.sentences.max(1) as f64;
+        (average > AVERAGE).then(|| format!("{average:.1} words in a sentence on average"))
     }
-    faults
+}
+
+/// The comments of Rust code as Markdown; every line stays in its place.
+fn comments(code: &str) -> String {
+    let comment = |line: &str| {
+        let text = line.trim_start().strip_prefix("//")?;
+        Some(text.trim_start_matches(['/', '!']).trim_start().to_owned())
+    };
+    code.lines().map(|line| comment(line).unwrap_or_default() + "\n").collect()
+}
+
+/// The texts between quotes in Rust code before its tests, a block for each line of them.
+fn texts(code: &str) -> Vec<Block> {
+    let code = code.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+    let mut blocks = Vec::new();
+    let (mut line, mut text) = (1, None::<Block>);
+    let mut rest = code.chars().peekable();
+    while let Some(c) = rest.next() {
+        line += usize::from(c == '\n');
+        match (&mut text, c) {
+            (None, '"') => text = Some(Block { line, text: String::new(), is_cell: false }),
+            (None, '/') if rest.peek() == Some(&'/') => {
+                while rest.next_if(|c| *c != '\n').is_some() {}
+            }
+            // A character: '"' begins no text.
+            (None, '\'') if rest.peek() == Some(&'"') => drop(rest.next()),
+            (None, _) => {}
+            (Some(_), '"') => blocks.extend(text.take()),
+            (Some(open), '\\') => match rest.next() {
+                // The text goes on in the next line.
+                Some('\n') => {
+                    line += 1;
+                    while rest.next_if(|c| c.is_whitespace() && *c != '\n').is_some() {}
+                }
+                Some('n') => open.text.push_str(". "),
+                Some(escaped) => open.text.push(escaped),
+                None => {}
+            },
+            (Some(open), '\n') => open.text.push_str(". "),
+            (Some(open), c) => open.text.push(c),
+        }
+    }
+    blocks
 }
 
 /// A paragraph, an item of a list or a cell of a table.
@@ -217,4 +329,20 @@ fn what_is_too_long_is_found() {
     assert_eq!(faults(&wrapped).len(), 2, "a long sentence is also the average");
     assert_eq!(words_of("see [the `a b c` page](https://example.org/x y), and so on"), 7);
     assert_eq!(sentences_of("One. Two `a. b` is. 3.5 is (no end.) Four? ").len(), 5);
+    // Comments keep their lines and lose their code; texts are what stands between quotes.
+    let code = format!(
+        "//! {}\n//! ```\n//! {}\n//! ```\nlet a = '\"';\nbail!(\"{}\\\n {}\\n{}\"); // \"{}\"\n",
+        many(41),
+        many(41),
+        "w ".repeat(20),
+        "w ".repeat(21),
+        "w ".repeat(40),
+        "w ".repeat(41)
+    );
+    let of = |blocks: &[Block]| -> Vec<usize> {
+        let faults = long_sentences(blocks).into_iter();
+        faults.map(|fault| fault.split(':').next().unwrap().parse().unwrap()).collect()
+    };
+    assert_eq!(of(&blocks(&comments(&code))), [1]);
+    assert_eq!(of(&texts(&code)), [6]);
 }

@@ -288,7 +288,7 @@ typedef struct {
      */
     void (*progress)(void *user, uint32_t done, uint32_t total);
     /*
-     Answers non-zero when the plugin should stop early; may be null.
+     Returns non-zero when the plugin should stop early; may be null.
      */
     uint32_t (*cancelled)(void *user);
 } UmbraOfflineSettings;
@@ -444,10 +444,10 @@ typedef struct {
                                  UmbraPass *pass,
                                  UmbraMessage *message);
     /*
-     Draws one frame for a camera. With [`STATUS_OK`] the message may tell what the pass handed to the
-     device from its opening to this frame, as five numbers in decimal digits with spaces between:
-     bytes uploaded, textures to draw into, pipelines for pictures that take vertices, pipelines for
-     pictures that take none, and other pipelines.
+     Draws one frame for a camera. With [`STATUS_OK`] the message may hold five decimal numbers
+     separated by spaces. They count what the pass did from its opening to this frame: bytes
+     uploaded, textures to draw into, picture pipelines with vertices, picture pipelines without,
+     and other pipelines.
      */
     UmbraStatus (*draw_frame)(UmbraPass pass, const UmbraCameraValue *camera, UmbraMessage *message);
     /*

@@ -201,7 +201,7 @@ pub struct OfflineSettings {
     pub user: *mut c_void,
     /// Called now and then with finished and total rows; may be null.
     pub progress: Option<unsafe extern "C" fn(user: *mut c_void, done: u32, total: u32)>,
-    /// Answers non-zero when the plugin should stop early; may be null.
+    /// Returns non-zero when the plugin should stop early; may be null.
     pub cancelled: Option<unsafe extern "C" fn(user: *mut c_void) -> u32>,
 }
 
@@ -334,10 +334,10 @@ pub struct Plugin {
             message: *mut Message,
         ) -> Status,
     >,
-    /// Draws one frame for a camera. With [`STATUS_OK`] the message may tell what the pass handed to the
-    /// device from its opening to this frame, as five numbers in decimal digits with spaces between:
-    /// bytes uploaded, textures to draw into, pipelines for pictures that take vertices, pipelines for
-    /// pictures that take none, and other pipelines.
+    /// Draws one frame for a camera. With [`STATUS_OK`] the message may hold five decimal numbers
+    /// separated by spaces. They count what the pass did from its opening to this frame: bytes
+    /// uploaded, textures to draw into, picture pipelines with vertices, picture pipelines without,
+    /// and other pipelines.
     pub draw_frame: Option<
         unsafe extern "C" fn(
             pass: Pass,

@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-/// The pixels of an image while it is rendered; row-major, row 0 on top, linear radiance.
+/// The pixels of an image while it is rendered: linear radiance [W m^-2 sr^-1], row-major, row 0 on
+/// top.
 #[derive(Debug)]
 pub struct Film<'a> {
     width: usize,

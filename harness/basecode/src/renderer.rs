@@ -80,13 +80,13 @@ pub struct RenderJob<'a> {
     pub height: usize,
     /// Samples per pixel. At 1, the sample is the pixel's center.
     pub spp: usize,
-    /// Seed of the samplers: the student id in a submission's own images.
+    /// Seed of the samplers: the student number in a submission's own images.
     pub seed: u64,
     /// Number of threads to render with, at least 1.
     pub threads: usize,
     /// Told finished and total rows now and then, from any thread.
     pub progress: &'a (dyn Fn(usize, usize) + Sync),
-    /// Answers true when rendering should stop early; asked from any thread.
+    /// Returns true when rendering should stop early; asked from any thread.
     pub cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 

@@ -4,10 +4,10 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// A stream of uniform random numbers that its seed determines.
 ///
-/// A sampler is meant for one thread at a time. Threads that share one draw from the same state
-/// in an order that changes from run to run, and some draw the same number twice: the image is
-/// then noisy in a way that no seed reproduces. (Rust rules out a data race here, so the state is
-/// an atomic; that makes sharing *safe*, not *right*.)
+/// Use a sampler in one thread at a time. Threads that share one draw from the same state in an
+/// order that changes from run to run, and some draw the same number twice. No seed then reproduces
+/// the noise. Rust rules out a data race because the state is atomic. That makes sharing *safe*,
+/// not *right*.
 ///
 /// The generator is PCG-RXS-M-XS-64 (O'Neill, "PCG: A Family of Simple Fast Space-Efficient
 /// Statistically Good Algorithms for Random Number Generation", 2014); seeds are scrambled with

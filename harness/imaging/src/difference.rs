@@ -66,7 +66,7 @@ pub struct Sums {
 }
 
 impl Odd {
-    /// Takes the row `y` of an image in; answers whether all its values are finite.
+    /// Takes the row `y` of an image in; returns whether all its values are finite.
     pub fn add(&mut self, y: usize, row: [&[f32]; 3]) -> bool {
         let not_finite = |value: f32| value.to_bits() as i32 & INFINITE == INFINITE;
         let finite = !self.not_finite.add(y, row, not_finite);

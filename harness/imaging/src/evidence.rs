@@ -172,7 +172,8 @@ pub struct ImageEvidence {
     /// The pixel furthest off, if any differs at all.
     pub worst: Option<WorstPixel>,
     /// Root of (squared difference over the difference that noise predicts), over all compared pixels: about 1 for an
-    /// independent image of the spp it claims, 0 for a copy. `None` where no noise is expected. It decides nothing here.
+    /// independent image of the spp it claims, 0 for a copy. `None` where no noise is expected. It decides nothing
+    /// here.
     pub noise_ratio: Option<f64>,
 }
 

@@ -1,9 +1,9 @@
 //! FLIP, the perceived difference of two images that are flipped between, 0 (none) to 1.
 //!
 //! LDR-FLIP: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference Evaluator for
-//! Alternating Images", HPG 2020. HDR-FLIP: Andersson, Nilsson, Shirley, Akenine-Moller, "Visualizing Errors in Rendered
-//! High Dynamic Range Images", EG 2021: the largest LDR-FLIP over a range of exposures. Constants are the papers'.
-//! FLIP informs readers of a report and decides nothing.
+//! Alternating Images", HPG 2020. HDR-FLIP: Andersson, Nilsson, Shirley, Akenine-Moller, "Visualizing Errors in
+//! Rendered High Dynamic Range Images", EG 2021: the largest LDR-FLIP over a range of exposures. Constants are the
+//! papers'. FLIP informs readers of a report and decides nothing.
 
 use basecode::image::Image;
 use glam::{Mat3, Vec3, vec3};

@@ -13,9 +13,9 @@ const DRAWS_APART: f64 = 1e-3;
 
 /// Whether two offline images of `spp` samples a pixel are draws of one renderer.
 ///
-/// It may be a wrong one, so that the reference's variance does not hold: a sample lies within
-/// the range R of the 3x3 pixels around, and the difference of two means of n such samples has a
-/// standard deviation of at most R / 2 sqrt(2 / n).
+/// The renderer may be a wrong one, so the reference's variance does not hold. A sample lies within the range R of the
+/// 3x3 pixels around. The difference of two means of n samples then has a standard deviation of at most R / 2 sqrt(2 /
+/// n).
 pub fn same_draws(a: &Image, b: &Image, spp: u32, scale: f32, tolerances: &Tolerances) -> bool {
     if (a.width, a.height) != (b.width, b.height) {
         return false;

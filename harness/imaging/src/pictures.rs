@@ -229,8 +229,8 @@ const RAY_SIDE: usize = 6;
 /// Lit, though it should be in shadow; and the other way round (Okabe and Ito 2008: told apart by the color-blind).
 const RAY_COLOURS: [[u8; 3]; 2] = [[230, 159, 0], [86, 180, 233]];
 
-/// A film without shadows in gray, and on it the rays that were judged wrongly: the pixel of each, and whether it should
-/// be lit.
+/// A film without shadows in gray, and on it the rays that were judged wrongly: the pixel of each, and whether it
+/// should be lit.
 pub fn ray_map(film: &Image, rays: &[(usize, bool)], median_lit: f32) -> Picture {
     let mut small = tone_mapped(film, median_lit);
     for pixel in &mut small.pixels {

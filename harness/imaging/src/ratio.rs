@@ -102,6 +102,11 @@ pub fn region_ratios(actual: &Image, expected: &Image, mask: &RegionMask) -> Vec
     found
 }
 
+/// Three channels as `(0.1000, 0.2000, 0.3000)`.
+pub fn triple(v: [f32; 3]) -> String {
+    format!("({:.4}, {:.4}, {:.4})", v[0], v[1], v[2])
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::reference::Region;

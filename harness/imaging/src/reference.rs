@@ -78,7 +78,7 @@ pub struct ReferenceImage {
 #[derive(Debug, Error, PartialEq)]
 pub enum ReferenceError {
     /// The parts do not fit together.
-    #[error("reference: {part} is {found:?}, expected {expected:?} as the mean")]
+    #[error("reference: {part} is {}x{}, expected {}x{} as the mean", found.0, found.1, expected.0, expected.1)]
     Size {
         /// Which part.
         part: &'static str,

@@ -7,6 +7,7 @@ use super::blob;
 use super::evidence::{
     Check, ComparedWith, FailingArea, ImageEvidence, RegionBias, Tolerances, WorstPixel,
 };
+use super::ratio::triple;
 use super::reference::RegionMask;
 
 /// A dim lit region's bias is relative to this fraction of the median lit value at least.
@@ -238,8 +239,11 @@ impl ComparisonStats {
         let bound = scale.interior_fraction + few;
         let worst = match &self.worst {
             Some(w) if failing > 0 => format!(
-                "; worst at ({}, {}): {:.4?}, expected {:.4?}",
-                w.x, w.y, w.actual, w.expected
+                "; worst at ({}, {}): {}, expected {}",
+                w.x,
+                w.y,
+                triple(w.actual),
+                triple(w.expected)
             ),
             _ => String::new(),
         };

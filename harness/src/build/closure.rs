@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
-/// What `cargo metadata` says, as far as it matters here.
+/// The part of `cargo metadata` that matters here.
 #[derive(Deserialize)]
 pub struct Metadata {
     resolve: Resolve,

@@ -98,8 +98,8 @@ struct Call {
     env: BTreeMap<String, String>,
 }
 
-/// When cargo runs this program as its compiler wrapper, plays that part and answers the exit code.
-/// `main` asks first of all.
+/// When cargo runs this program as its compiler wrapper, plays that part and returns the exit code. `main` asks first
+/// of all.
 pub fn wrapper_main() -> Option<ExitCode> {
     let file = PathBuf::from(std::env::var_os(RECORD_VARIABLE)?);
     let mut args = std::env::args_os().skip(1);
@@ -169,7 +169,8 @@ impl Recording {
             && recording.key == key
             && recording.closure.is_dir()
         {
-            // It was asked for: see `forget_old`. That may fail on a disk that cannot be written, where nothing is forgotten.
+            // It was asked for: see `forget_old`. That may fail on a disk that cannot be written, where nothing is
+            // forgotten.
             let file = File::options().append(true).open(&stored);
             let _ = file.and_then(|file| file.set_modified(SystemTime::now()));
             recording.version = version;

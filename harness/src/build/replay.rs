@@ -65,9 +65,9 @@ pub fn default_limits() -> Limits {
     }
 }
 
-/// Compiles the submission whose `src` folder is `src` into a plugin in `out`, an existing folder.
-/// `supervisor` says which program is Umbra and what isolates the compiler. Nothing of the submission besides `src` is named to the compiler.
-/// A timeout counts when it comes again, alone on the machine. Nobody is to blame for an end from outside.
+/// Compiles the submission whose `src` folder is `src` into a plugin in `out`, an existing folder. `supervisor` says
+/// which program is Umbra and what isolates the compiler. Nothing of the submission besides `src` is named to the
+/// compiler. A timeout counts when it comes again, alone on the machine. Nobody is to blame for an end from outside.
 ///
 /// # Errors
 /// When the compiler cannot be started or isolated, or `out` cannot be used.
@@ -108,15 +108,16 @@ fn compile_once(
     policy.collect.push(Bind::new(&library, Path::new(SCRATCH).join(&file)));
     policy.scratch.without_mount = Some(scratch.path().to_owned());
     policy.report = Some(report.path().to_owned());
-    let lock = Confinement::new(limits, policy.clone());
-    let sandboxed = lock.sandbox.is_some();
+    let confinement = Confinement::new(limits, policy.clone());
+    let sandboxed = confinement.sandbox.is_some();
     // What the compiler is told: where it sees things, and where it may write.
     let (seen_src, temporary) = (policy.seen(&src), policy.scratch_path());
     let into = if sandboxed { &temporary } else { &out };
     if sandboxed {
         make_empty(&library)?;
     }
-    let mut command = process::command(&supervisor.umbra, &lock, &policy.seen(&recording.rustc));
+    let mut command =
+        process::command(&supervisor.umbra, &confinement, &policy.seen(&recording.rustc));
     command.args(replayed(recording, &policy.seen(&recording.closure), &seen_src, into));
     command.current_dir(scratch.path());
     // The linker is found through PATH.
@@ -128,7 +129,8 @@ fn compile_once(
         command.env("CARGO_MANIFEST_DIR", root);
     }
     let keep = (limits.output_kib as usize) << 10;
-    let ended = process::run(command, &lock, keep, cancel, &mut |_| ControlFlow::Continue(()))?;
+    let ended =
+        process::run(command, &confinement, keep, cancel, &mut |_| ControlFlow::Continue(()))?;
     // What lies between was cut: a source may be warned of more than is kept.
     let said = parse(&[&*ended.stderr.head, &*ended.stderr.tail].join("\n"));
     let outcome = match ended.exit {
@@ -138,7 +140,7 @@ fn compile_once(
             BuildOutcome::Built { library }
         }
         // In a sandbox foreign code could end with this code; there the report tells.
-        Exit::Code(code) if !sandboxed && code == i32::from(process::EXIT_NOT_LOCKED) => {
+        Exit::Code(code) if !sandboxed && code == i32::from(process::EXIT_NOT_CONFINED) => {
             return Err(io::Error::other(ended.stderr.head));
         }
         // The compiler succeeded but left no library: the library could not be stored.

@@ -141,8 +141,8 @@ pub fn recognised<'a>(kind: Kind, labels: impl Iterator<Item = &'a Label>) -> Op
     let titles = Kind::PLATFORMS.into_iter().filter(|kind| kinds.contains(kind)).map(Kind::title);
     match &titles.collect::<Vec<_>>()[..] {
         [] => None,
-        [only] => Some(format!("recognised as a download of {only}")),
-        several => Some(format!("recognised as downloads of {}", several.join(" and "))),
+        [only] => Some(format!("recognized as a download of {only}")),
+        several => Some(format!("recognized as downloads of {}", several.join(" and "))),
     }
 }
 

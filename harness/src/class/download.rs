@@ -1,7 +1,7 @@
 //! The zip that a learning platform gave, with many submissions in it.
 //!
 //! The platform made the zip, but students named what is in it. Names are checked before anything is written, and
-//! what students uploaded is only copied: archives among it are opened later, in locked children.
+//! what students uploaded is only copied: archives among it are opened later, in confined children.
 
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
@@ -92,7 +92,7 @@ pub fn only_archive(names: &[String], tree: &TreeSpec) -> Option<String> {
     }
 }
 
-/// The names in a zip; none where it is no zip that can be read.
+/// The names in a zip; `None` if it cannot be read.
 pub fn names(path: &Path) -> Option<Vec<String>> {
     let mut zip = open(path)?;
     let mut names: Vec<String> = (0..zip.len())
@@ -157,7 +157,7 @@ pub fn is_download(names: &[String], tree: &TreeSpec, from: Option<Kind>) -> boo
     canvas == archives.len() || archives.len() > 1 || from.is_some()
 }
 
-/// Unpacks a download into the empty folder `into`. Answers the names that were left out, with the reason.
+/// Unpacks a download into the empty folder `into`. Returns the names that were left out, with the reason.
 ///
 /// # Errors
 /// When the zip cannot be read, or a file not be written.

@@ -32,8 +32,8 @@ enum Place {
 }
 
 impl Feedback<'_> {
-    /// As the platform names what it takes back. Those that take files of one student at a time get one zip for each, since
-    /// a page needs its pictures beside it.
+    /// As the platform names what it takes back. Those that take files of one student at a time get one zip for each,
+    /// since a page needs its pictures beside it.
     fn place(&self) -> Place {
         const FILE: &str = "feedback.zip";
         let Some(label) = self.label else { return Place::Folder(self.slug.to_owned()) };

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{names, stamps};
+use crate::columns::{count, point_range, range};
 use crate::rubric::Grade;
 
 /// The policy.
@@ -230,7 +231,7 @@ impl Policy {
     }
 
     /// How late a submission of the stamp `submitted` is, for a student whom the numbers `own` name. The time zone is
-    /// the policy's, else the offset of `due`. None where the stamp or the due date says nothing.
+    /// the policy's, else the offset of `due`. Returns `None` if the stamp or the due date says nothing.
     pub fn judge(&self, due: &str, submitted: &str, own: impl Fn(&str) -> bool) -> Option<Late> {
         let zone = self.zone(due)?;
         let extension = self.extensions.iter().find(|extension| own(&extension.student));
@@ -273,8 +274,8 @@ impl Policy {
                 shown(due)
             );
             if covered > 0 {
-                let plural = if late_days == 1 { "day" } else { "days" };
-                words += &format!(", {covered} of them covered by {late_days} late {plural}");
+                let days = count(late_days as usize, "late day");
+                words += &format!(", {covered} of them covered by {days}");
             }
             if let Some(cut_off) = cut_off {
                 words += &format!("; after the cut-off ({}) it is worth nothing", shown(cut_off));
@@ -306,9 +307,6 @@ impl Policy {
         if late.late_s == 0 {
             return;
         }
-        let range = |[least, most]: [f64; 2]| {
-            if least == most { format!("{least}") } else { format!("{least}..{most}") }
-        };
         let why = if late.cut_off {
             String::new()
         } else if late.charged == 0 {
@@ -326,7 +324,7 @@ impl Policy {
         late.words += &if late.after == late.before {
             "; it earned nothing, so that costs nothing".to_owned()
         } else {
-            format!("{why}: {} instead of {} points", range(late.after), range(late.before))
+            format!("{why}: {} instead of {}", range(late.after), point_range(late.before))
         };
         grade.remarks.push(late.words.clone());
     }
@@ -358,7 +356,7 @@ pub fn shown(at: Timestamp, due: &str, policy: Option<&Policy>) -> String {
 }
 
 /// From when on nobody submits any more: the due date, the cut-off and the last extension, with late days and grace.
-/// None where the due date says no time.
+/// Returns `None` if the due date says no time.
 pub fn end(due: &str, policy: Option<&Policy>) -> Option<Timestamp> {
     let class_due: Timestamp = due.parse().ok()?;
     let Some(policy) = policy else { return Some(class_due) };

@@ -41,7 +41,7 @@ impl Kind {
     pub const PLATFORMS: [Self; 5] =
         [Self::Brightspace, Self::Canvas, Self::Moodle, Self::Gradescope, Self::Github];
 
-    /// What it is called in a sentence.
+    /// Its name in a sentence.
     pub fn title(self) -> &'static str {
         match self {
             Self::Brightspace => "Brightspace",
@@ -53,7 +53,7 @@ impl Kind {
         }
     }
 
-    /// What submissions of it are called, for a message.
+    /// Names of its submissions, for a message.
     pub fn pattern(self) -> &'static str {
         match self {
             Self::Brightspace => "\"12345-67890 - First Last - Oct 5, 2019 1159 PM/\"",

@@ -321,7 +321,7 @@ impl Matches {
 }
 
 impl Decision {
-    /// The student that it names, by index; none where it names nobody.
+    /// The student that it names, by index; `None` if it names nobody.
     fn student_of(&self, roster: &Roster) -> anyhow::Result<Option<usize>> {
         let Some(word) = self.student.as_ref().filter(|word| *word != NOBODY) else {
             return Ok(None);
@@ -357,7 +357,7 @@ impl Decision {
         format!("{place}: submission \"{submission}\" has {what} already, on line {line}{hint}")
     }
 
-    /// The time with the submission that it is said of; nothing where it says no time.
+    /// The time with the submission that it is said of; `None` if it says no time.
     fn time(&self) -> Option<String> {
         Some(format!("{} {}", self.submission, self.submitted.as_ref()?))
     }

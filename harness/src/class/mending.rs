@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::overrides::Decision;
+use crate::columns::{count, point_range, points, range};
 use crate::rubric::Grade;
 
 /// What a mend may be, as `config.json` says.
@@ -53,7 +54,7 @@ impl Mend {
 }
 
 /// Puts a mended submission's grade, less what the fix costs, in the place of the unmended one's, unless that is worth
-/// more. None where the decision holds no fix.
+/// more. Returns `None` if the decision holds no fix.
 pub fn choose(decision: &Decision, grade: &mut Grade, mended: Grade) -> Option<Mended> {
     let (patch, penalty) = (decision.patch.clone()?, decision.penalty?);
     let less = |points: f64| ((points - penalty).max(0.0) * 100.0).round() / 100.0;
@@ -61,22 +62,18 @@ pub fn choose(decision: &Decision, grade: &mut Grade, mended: Grade) -> Option<M
     let after = [mended.points, mended.points_max].map(less);
     let counts = after[0] >= before[0] && after[1] > before[1];
     let lines = lines_of(&patch).unwrap_or_default();
-    let plural = if lines == 1 { "line" } else { "lines" };
-    let range = |[least, most]: [f64; 2]| {
-        if least == most { format!("{least}") } else { format!("{least}..{most}") }
-    };
+    let (fix, less) = (count(lines, "line"), points(penalty));
     let what = if counts {
         format!(
-            "mended by the instructor, {lines} {plural}, less {penalty} points: {} instead of {} points",
+            "mended by the instructor, {fix}, less {less}: {} instead of {}",
             range(after),
-            range(before)
+            point_range(before)
         )
     } else {
         format!(
-            "mended by the instructor, {lines} {plural}; less {penalty} points that would be {}, no more than the {} \
-             points without it, which count",
+            "mended by the instructor, {fix}; less {less} that would be {}, no more than the {} without it, which count",
             range(after),
-            range(before)
+            point_range(before)
         )
     };
     let words = format!("{what}: {}{}", decision.reason, decision.who());

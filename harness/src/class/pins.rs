@@ -167,7 +167,7 @@ pub struct Pins {
 }
 
 impl Pins {
-    /// Reads those in an instructor's folder; none where there are none.
+    /// Reads those in an instructor's folder.
     ///
     /// # Errors
     /// When a file cannot be read, or is not one of this version.

@@ -13,6 +13,7 @@ use super::mending::Mended;
 use super::overrides::Applied;
 use super::roster::{Roster, Student};
 use super::{names, owners, stamps};
+use crate::columns;
 use crate::rubric::Grade;
 
 /// What is added where the instructor names several attempts as one student's.
@@ -64,7 +65,7 @@ pub struct Standing {
     pub mended: Option<Mended>,
     /// Whether there is a policy on lateness, and no time stamp to judge by.
     pub time_unknown: bool,
-    /// How late it is; nothing where there is no policy, or no time stamp.
+    /// How late it is; absent without a policy or a time stamp.
     pub late: Option<Late>,
 }
 
@@ -93,9 +94,9 @@ pub struct Class {
     pub unopened: Vec<String>,
     /// Decisions on points whose evidence has changed since.
     pub stale: Vec<String>,
-    /// Decisions on points that are on nothing that is there.
+    /// Decisions on submissions that are not in this report.
     pub unused: Vec<String>,
-    /// Attempts that count for less than another attempt of the student, such as one after the cut-off.
+    /// Counting attempts that earn less than another attempt of the student, such as one after the cut-off.
     pub worse: Vec<String>,
 }
 
@@ -149,7 +150,7 @@ pub fn set_aside(
     aside
 }
 
-/// The first or last of some time stamps; nothing where that is not certain.
+/// The first or last of some time stamps; `None` if that is not certain.
 fn by_time(stamps: &[&str], attempt: Attempt) -> Option<usize> {
     let zone = jiff::tz::TimeZone::UTC;
     let mut times = stamps
@@ -263,9 +264,9 @@ pub fn settle(
                         _ => "`umbra grade --attempt best` counts the better one",
                     };
                     class.worse.push(format!(
-                        "{}: {} points, {} would have {}; {why}",
+                        "{}: {}, {} would have {}; {why}",
                         called(own),
-                        worth(own),
+                        columns::points(worth(own)),
                         called(*better),
                         worth(*better)
                     ));
@@ -352,7 +353,7 @@ fn doubles(claims: &[Claim], persons: &[(usize, String)], matches: &Matches) -> 
     found
 }
 
-/// The attempt that counts; nothing where that is not certain.
+/// The attempt that counts; `None` if that is not certain.
 fn choose(
     attempts: &[usize],
     claims: &[Claim],

@@ -480,7 +480,7 @@ impl Settled {
     }
 }
 
-/// What submissions have in common, also as JPlag says.
+/// What submissions share, also according to JPlag.
 fn shared(output: &Path, records: &[StoredRecord]) -> anyhow::Result<Shared> {
     let near = jplag::kept(&output.join(report::INSTRUCTOR).join(report::LIKENESS))?;
     let near = near.iter().map(|pair| (&pair.who, pair.similarity));

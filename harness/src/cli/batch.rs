@@ -165,9 +165,9 @@ impl<'a> Batch<'a> {
         super::writable(self.output)?;
         if self.mode == Mode::Grade && context.reference().is_none() {
             return Err(MachineLacks(
-                "grades are made with the reference renderer and with scenes that are held back, which \
-                 are not here: a student's kit has neither; hint: `umbra check DIR` judges your work \
-                 on the public scenes, as the grader does (instructors: cargo build --release --workspace)"
+                "this is a student's kit: it holds neither the reference renderer nor held-back scenes, which \
+                 `umbra grade` needs; hint: `umbra check DIR` judges your work on the public scenes. \
+                 Instructors: cargo build --release --workspace"
                     .into(),
             )
             .into());
@@ -175,8 +175,8 @@ impl<'a> Batch<'a> {
         let isolation = context.supervisor.isolation.isolation();
         if self.isolation == IsolationChoice::Full && isolation != Isolation::Full {
             return Err(MachineLacks(format!(
-                "submissions are not run here, isolation would be {isolation}; hint: `umbra doctor` says \
-                 what to do, `--isolation reduced` grades all the same"
+                "full isolation is not available here ({isolation}), so no submission is run; hint: `umbra doctor` \
+                 says what to do, `--isolation reduced` grades without it"
             ))
             .into());
         }

@@ -62,7 +62,9 @@ fn mistakes(context: &mut Context) -> anyhow::Result<u8> {
         scene.film = Some(SMALL_FILM);
     }
     let context = &*context;
-    let reference = context.reference().context("there is no reference renderer here")?;
+    let reference = context
+        .reference()
+        .context("there is no reference renderer here; hint: cargo build --release --workspace")?;
     let catalogue = Catalogue::known()?;
     let mistakes: Vec<_> = catalogue.mistakes.iter().filter(|m| m.is_stored()).collect();
     let (folder, stored) = context.with_store(|store| {

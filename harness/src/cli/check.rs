@@ -52,10 +52,10 @@ pub struct CheckArguments {
         default_value = "umbra-report"
     )]
     output: PathBuf,
-    /// Which adapter draws realtime scenes
+    /// Graphics adapter for realtime scenes
     #[arg(long, value_enum, default_value_t = AdapterChoice::Auto)]
     adapter: AdapterChoice,
-    /// Print what each stage cost
+    /// Print what each step cost
     #[arg(long)]
     timings: bool,
     /// Open the report in the browser

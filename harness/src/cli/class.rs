@@ -35,7 +35,7 @@ pub struct Source {
     pub path: PathBuf,
     /// What reports call it.
     pub name: String,
-    /// What its folders in the report are called.
+    /// Names of its folders in the report.
     pub slug: String,
     /// Where it was found, the same from run to run.
     pub place: PathBuf,

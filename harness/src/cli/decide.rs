@@ -11,17 +11,18 @@ use super::outputs::shell_path;
 use super::report_folder::ReportFolder;
 use crate::class::Decisions;
 use crate::class::overrides::{Applied, Decision, OVERRIDES, entry, fingerprint};
+use crate::columns;
 use crate::files::write_whole;
 use crate::report::{self, harmless};
 
 /// Options of `umbra override`.
 #[derive(clap::Args)]
 pub struct OverrideArguments {
-    /// Whose: a student number, a name, or the submission's folder in the report
+    /// Student number, name, or the submission's folder in the report
     student: String,
     /// The part, such as 1.3
     part: String,
-    /// Its points from now on
+    /// The new points
     #[arg(value_parser = points)]
     points: f64,
     #[command(flatten)]
@@ -31,7 +32,7 @@ pub struct OverrideArguments {
 /// Options of `umbra confirm`.
 #[derive(clap::Args)]
 pub struct ConfirmArguments {
-    /// Whose: a student number, a name, or the submission's folder in the report
+    /// Student number, name, or the submission's folder in the report
     student: String,
     #[command(flatten)]
     decision: DecisionArguments,
@@ -40,10 +41,10 @@ pub struct ConfirmArguments {
 /// What every decision says.
 #[derive(clap::Args)]
 pub struct DecisionArguments {
-    /// Why; both reports show it
+    /// The reason, shown to student and instructor
     #[arg(long, value_name = "TEXT")]
     reason: String,
-    /// Who decides [default: the name of this account]
+    /// Who decided [default: your account name]
     #[arg(long, value_name = "NAME")]
     by: Option<String>,
     #[command(flatten)]
@@ -88,10 +89,10 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
     let applied = applied(&graded, &kept, decision, Some(part))?;
     let [least, most] = applied.map_or(before, |own| own.before);
     println!(
-        "{}: part {part} has {points} {} from now on, the evidence says {}",
+        "{}: part {part} now has {}; the evidence gives {}",
         harmless(&graded.entry.who()),
-        if *points == 1.0 { "point" } else { "points" },
-        if least == most { least.to_string() } else { format!("{least}..{most}") }
+        columns::points(*points),
+        columns::range([least, most])
     );
     said(&decision.report.path, &graded)
 }
@@ -130,8 +131,8 @@ fn confirmed(graded: &Graded, kept: &Kept, decision: &DecisionArguments) -> anyh
     };
     let points = ((to - from) * 100.0).round() / 100.0;
     Ok(match points {
-        0.0 => "confirmed, no points hang on it".to_owned(),
-        points => format!("{points} points for the images are confirmed"),
+        0.0 => "confirmed; it changes no points".to_owned(),
+        earned => format!("confirmed: {} for the images", columns::points(earned)),
     })
 }
 
@@ -235,8 +236,9 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
     let row = |row: &Row, what: &str| format!("{} ({}): {what}", row.name, row.slug);
     let open = || report.submissions.iter().filter(|row| !row.standing.is_confirmed());
     let images = open().filter(|own| own.unconfirmed > 0.0);
-    let images: Vec<String> =
-        images.map(|own| row(own, &format!("{} points for its images", own.unconfirmed))).collect();
+    let images: Vec<String> = images
+        .map(|own| row(own, &format!("{} for its images", columns::points(own.unconfirmed))))
+        .collect();
     let remarks = open().filter_map(|own| {
         let private = own.remarks.iter().filter(|remark| report::is_private(remark, rules));
         let private: Vec<&str> = private.map(String::as_str).collect();
@@ -265,14 +267,14 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
             "decisions whose evidence has changed: make them again or delete them",
             class.stale.clone(),
         ),
-        ("decisions that name nothing", class.unused.clone()),
+        ("decisions on submissions that are not in this report", class.unused.clone()),
         ("lateness unknown: `submitted` in matches.toml says it", late.collect()),
         ("not wholly judged: grade again", ranges.collect()),
     ] {
         waits |= !lines.is_empty();
         list(title, &lines);
     }
-    list("attempts that count for less than another", &class.worse);
+    list("counting attempts that earn less than another attempt", &class.worse);
     list("without a submission", &missing.collect::<Vec<_>>());
     if !waits {
         println!("nothing waits for a decision");

@@ -19,7 +19,7 @@ use crate::rubric::{self, Rules};
 /// Options of `umbra defend`.
 #[derive(clap::Args)]
 pub struct DefendArguments {
-    /// Whose: a student number, a name, or the submission's folder in the report
+    /// Student number, name, or the submission's folder in the report
     student: String,
     /// The part, such as 1.3
     part: String,

@@ -9,6 +9,7 @@ use serde::Deserialize;
 use super::assemble::Found;
 use super::outputs::shell_path;
 use crate::class::{Class, Standing};
+use crate::columns;
 use crate::grading::StageCost;
 use crate::intake::Finding;
 use crate::report;
@@ -66,7 +67,10 @@ impl Row {
         let mut open = Vec::new();
         if !self.standing.is_confirmed() {
             if self.unconfirmed > 0.0 {
-                open.push(format!("{} points for its images are not confirmed", self.unconfirmed));
+                open.push(format!(
+                    "not confirmed: {} for its images",
+                    columns::points(self.unconfirmed)
+                ));
             }
             let private = self.remarks.iter().filter(|remark| report::is_private(remark, rules));
             open.extend(private.cloned());

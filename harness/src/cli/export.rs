@@ -280,9 +280,8 @@ fn of_platform(roster: Option<Roster>, kind: Kind, output: &Path) -> anyhow::Res
     };
     ensure!(
         roster.kind != Kind::Plain,
-        "{}: expected the export of {}, found a list of no platform that Umbra knows; hint: grade with --class and the \
-         file that {} exports, with its headings as they are; if they are not in English, switch {} to English and \
-         download it again",
+        "{}: not an export of {}: no platform that Umbra knows has these columns; hint: grade with --class and the file \
+         that {} exports, unchanged. If its headings are not in English, switch {} to English first",
         roster.path.display(),
         kind.title(),
         kind.title(),

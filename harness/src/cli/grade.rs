@@ -18,23 +18,24 @@ use crate::report::{self, BatchReport, SubmissionReport};
 /// Options of `umbra grade`.
 #[derive(clap::Args)]
 pub struct GradeArguments {
-    /// Archives, submission folders, or what holds many: a folder at any depth, or the zip that Brightspace, Canvas,
-    /// Moodle or Gradescope gave
+    /// Archives, submission folders, a folder of them, or a download from Brightspace, Canvas, Moodle or Gradescope
     #[arg(required = true)]
     submissions: Vec<PathBuf>,
-    /// Where the submissions come from [default: recognised by their names]
+    /// Where the submissions come from [default: recognized by their names]
     #[arg(long, value_enum, value_name = "KIND")]
     from: Option<Kind>,
-    /// The class list: a CSV file as a learning platform exports it. Tells whose each submission is, and who is
-    /// missing; kept in --report for later runs
+    /// The class list: a CSV file as a learning platform exports it
+    ///
+    /// Umbra matches submissions to its students and lists who is missing. The report keeps a copy for later runs.
     #[arg(long, value_name = "LIST.csv")]
     class: Option<PathBuf>,
     /// Which of a student's attempts counts [default: as in earlier runs into --report, else latest]
     #[arg(long, value_enum)]
     attempt: Option<Attempt>,
-    /// Where to write report.html, report.json, grades.csv and each submission's own report. Results
-    /// are kept there too: the same command resumes an interrupted batch and grades what is new or has
-    /// changed; other submissions join the class that is there
+    /// Folder for the reports and results
+    ///
+    /// The same command resumes an interrupted batch and grades only what is new or has changed. Other submissions join
+    /// the class that is there.
     #[arg(
         long = "report",
         alias = "output",
@@ -43,36 +44,35 @@ pub struct GradeArguments {
         default_value = "umbra-report"
     )]
     output: PathBuf,
-    /// Which adapter draws realtime scenes; software gives every machine the same pixels
+    /// Graphics adapter for realtime scenes; software gives every machine the same pixels
     #[arg(long, value_enum, default_value_t = AdapterChoice::Software)]
     adapter: AdapterChoice,
     /// Submissions to grade at the same time [default: one for each core]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
-    /// The isolation to demand: full refuses a machine without it, reduced uses what there is and says
-    /// so in the report (see `umbra doctor`)
+    /// Required isolation; `reduced` runs with what this machine has, and the report says so (see `umbra doctor`)
     #[arg(long, value_enum, default_value_t = IsolationChoice::Full)]
     isolation: IsolationChoice,
-    /// Seed of the held-back scenes, to reproduce a batch; off uses the public scenes alone [default:
-    /// the secret seed in --report, made when there is none]
+    /// Seed of the held-back scenes, to reproduce a batch; `off` uses public scenes alone [default: the secret seed of
+    /// the report]
     #[arg(long, value_name = "SEED|off", overrides_with = "perturb")]
     perturb: Option<Perturb>,
     /// Grade only this student's submission, by number, name or file name; the others keep their grades
     #[arg(long, value_name = "STUDENT")]
     only: Vec<String>,
-    /// Grade only this share of the submissions, such as slice:2/4, and write no report: tasks on several machines
-    /// share
-    /// --report, and `umbra merge` makes the reports
+    /// Grade only this share, such as slice:2/4, and write no report; `umbra merge` writes it
     #[arg(long, value_name = "slice:K/N", conflicts_with = "only")]
     partition: Option<Slice>,
-    /// Grade again what has not changed since it was graded
+    /// Grade unchanged submissions again too
     #[arg(long)]
     force: bool,
-    /// Total time of each submission: as config.json says (ten times the reference renderer's CPU time),
-    /// or none, which fully grades a submission that used up its time before
+    /// CPU time limit of each submission
+    ///
+    /// By default config.json sets it, as a multiple of the reference renderer's CPU time. `none` finishes a submission
+    /// that used up its time.
     #[arg(long, value_enum, default_value_t = BudgetChoice::Config)]
     budget: BudgetChoice,
-    /// Print what each stage cost
+    /// Print what each step cost
     #[arg(long)]
     timings: bool,
     /// Also write the grades as `umbra export` does, into --report; may be repeated

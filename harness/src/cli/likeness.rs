@@ -30,7 +30,7 @@ const SHOWN: usize = 100;
 /// Options of `umbra likeness`.
 #[derive(clap::Args)]
 pub struct LikenessArguments {
-    /// The result of JPlag; without one, sources are written for JPlag and pairs of equal files shown
+    /// The result of JPlag; without one, sources are written for JPlag and pairs of equal files are shown
     result: Option<PathBuf>,
     #[command(flatten)]
     report: ReportFolder,
@@ -42,7 +42,7 @@ pub fn run(arguments: &LikenessArguments, root: Option<&Path>) -> anyhow::Result
     let kept = Kept::read(output)?;
     let folder = output.join(report::INSTRUCTOR).join(report::LIKENESS);
     match &arguments.result {
-        Some(result) => take(result, &folder)?,
+        Some(result) => take(result, output, &folder)?,
         None => write_sources(&kept, output, root, &folder)?,
     }
     let settled = kept.report(output, kept.decided()?)?;
@@ -53,13 +53,14 @@ pub fn run(arguments: &LikenessArguments, root: Option<&Path>) -> anyhow::Result
 }
 
 /// Reads a result and keeps its pairs.
-fn take(result: &Path, folder: &Path) -> anyhow::Result<()> {
+fn take(result: &Path, output: &Path, folder: &Path) -> anyhow::Result<()> {
     let bytes = fs::read(result).with_context(|| format!("cannot read {}", result.display()))?;
     let pairs = jplag::read(&bytes).with_context(|| result.display().to_string())?;
     let known = submissions(folder)?;
     ensure!(
         !known.is_empty(),
-        "no sources were written for JPlag yet; hint: run this without a result first"
+        "no sources were written for JPlag yet; hint: run `umbra likeness --report {}` first",
+        shell_path(output)
     );
     let whose = pairs.iter().flat_map(|pair| &pair.who);
     let unknown: BTreeSet<&String> = whose.filter(|who| !known.contains(*who)).collect();

@@ -23,17 +23,17 @@ use crate::report;
 /// Options of `umbra mend`.
 #[derive(clap::Args)]
 pub struct MendArguments {
-    /// Whose: a student number, a name, or the submission's folder in the report
+    /// Student number, name, or the submission's folder in the report
     student: String,
     /// The fix: a unified diff of files in src/, of at most `mend.lines` lines
     patch: PathBuf,
-    /// The submission, where it does not lie any more where it was graded from
+    /// Where the submission is now, if it was moved since grading
     #[arg(long, value_name = "PATH")]
     submission: Option<PathBuf>,
-    /// Which adapter draws realtime scenes
+    /// Graphics adapter for realtime scenes
     #[arg(long, value_enum, default_value_t = AdapterChoice::Software)]
     adapter: AdapterChoice,
-    /// The isolation to demand
+    /// Required isolation
     #[arg(long, value_enum, default_value_t = IsolationChoice::Full)]
     isolation: IsolationChoice,
     #[command(flatten)]

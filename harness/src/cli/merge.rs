@@ -33,8 +33,9 @@ pub struct MergeArguments {
         default_value = "umbra-report"
     )]
     output: PathBuf,
-    /// Merge records of machines that differ in isolation, graphics adapter or compiler: one submission of each other
-    /// kind of machine is graded again on this one, and verdicts that differ are printed
+    /// Merge records of machines that differ in isolation, graphics adapter or compiler
+    ///
+    /// One submission of each other kind of machine is graded again on this one. Verdicts that differ are printed.
     #[arg(long)]
     allow_mixed: bool,
 }
@@ -236,9 +237,9 @@ fn differing(there: &Evidence, here: &Evidence) -> Vec<String> {
         let held_back = if check.held_back { ", held back" } else { "" };
         format!("{}{held_back}", check.name())
     };
-    let verdicts = |evidence: &Evidence| -> BTreeMap<String, String> {
+    let verdicts = |evidence: &Evidence| -> BTreeMap<String, &'static str> {
         let own = evidence.checks.iter();
-        own.map(|check| (named(check), format!("{:?}", check.verdict).to_lowercase())).collect()
+        own.map(|check| (named(check), check.verdict.name())).collect()
     };
     let (there, here) = (verdicts(there), verdicts(here));
     // Findings that compare submissions of a class do not depend on the machine.

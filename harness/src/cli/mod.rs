@@ -58,63 +58,77 @@ pub const EXIT_BUG: u8 = 70;
 /// Ended by Ctrl-C.
 pub const EXIT_INTERRUPTED: u8 = 130;
 
-/// Umbra grades renderers: it builds students' renderer plugins, runs them in isolation on every
-/// scene, offline and realtime, and explains every lost point with numbers and pictures.
 #[derive(Parser)]
-#[command(version, about, long_about = None, after_help = EXIT_CODES)]
+#[command(version, about, after_help = EXIT_CODES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// The folder that holds the assignment: config.json, scenes/, expected/ [default: the nearest
-    /// one at or above the current folder, or the program's]
+    /// Folder of the assignment: config.json, scenes/, expected/ [default: found upward from the
+    /// current folder, then from the program]
     #[arg(long, global = true, value_name = "DIR")]
     root: Option<PathBuf>,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 success; 1 the answer is no (points were lost in a check, the tree \
-does not conform, images differ); 2 the command line or an input cannot be used; 3 the machine lacks \
-something; 70 an internal error of Umbra; 130 interrupted.";
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    success
+  1    the answer is no: points lost, the tree does not conform, images differ
+  2    bad command line or input
+  3    the machine lacks something
+  70   bug in Umbra
+  130  interrupted";
 
 /// The text that follows a panic's message.
 const BUG: &str = concat!(
-    "this is an internal error of Umbra, nobody else's fault. Please report it to its maintainers with \
-     the line above, the command line, the file involved and the version, ",
+    "this is a bug in Umbra, not in the submission. Please report it with the line above, the command \
+     line, the file involved and the version, ",
     env!("CARGO_PKG_VERSION"),
     "; RUST_BACKTRACE=1 prints more"
 );
 
 #[derive(Subcommand)]
 enum Command {
-    /// Check your own working folder before you submit: builds src/, renders every public scene and
-    /// says what is wrong, where, and what it looks like
+    /// Check your working folder on the public scenes before you submit
+    ///
+    /// Builds src/, renders every public scene, and says what is wrong, where, and what it looks like.
     Check(check::CheckArguments),
-    /// Grade submissions: archives (.zip, .tar, .tar.gz), folders, or what holds many of them
+    /// Grade submissions: archives, folders, or a download from a learning platform
     Grade(grade::GradeArguments),
-    /// Make the reports of a class that several tasks graded into one folder with `umbra grade --partition`
+    /// Merge what the tasks of `umbra grade --partition` graded, and write the reports
     Merge(merge::MergeArguments),
     /// Set the points of a part by hand, with a reason that both reports show
     Override(decide::OverrideArguments),
     /// Confirm what a report leaves to the instructor, such as images without code
     Confirm(decide::ConfirmArguments),
-    /// Grade a submission with a fix of a few lines by the instructor, for a penalty; never less than without it
+    /// Regrade a submission with a small fix, for a penalty
+    ///
+    /// The grade is never lower than without the fix.
     Mend(mend::MendArguments),
-    /// Print why a part has its points: evidence, bounds, how to reproduce it, what a fix would earn
+    /// Print why a part has its points: evidence, bounds and how to reproduce them
     Defend(defend::DefendArguments),
-    /// Give students the held-back scenes and what went wrong on them, when nobody can submit any more
+    /// Show students the held-back scenes, once nobody can submit any more
     Release(release::ReleaseArguments),
-    /// Show what other rules, policies, matches or overrides make of a graded class; --apply writes it. Nothing is
-    /// rendered
+    /// Show how other rules, policies or decisions change the grades
+    ///
+    /// Renders nothing. --apply writes the change, --undo takes it back.
     Regrade(regrade::RegradeArguments),
-    /// List what a report still leaves to the instructor; exits with 0 when nothing waits, 1 when something does
+    /// List what waits for the instructor
+    ///
+    /// Exits with 0 if nothing waits, with 1 if something does.
     Status(decide::StatusArguments),
-    /// Write the grades of a report as another program takes them: a learning platform's grade book, feedback for each
-    /// student, Gradescope's results, JUnit
+    /// Export grades: grade books, feedback archives, Gradescope, JUnit, CSV, JSON
     Export(export::ExportArguments),
-    /// Show submissions whose sources are alike side by side; takes what JPlag found. Costs nobody points
+    /// Show submissions with similar sources side by side
+    ///
+    /// Reads results of JPlag. Costs no points.
     Likeness(likeness::LikenessArguments),
-    /// Write an autograder for Gradescope: a zip that installs and builds Umbra there and grades each submission
+    /// Write an autograder for Gradescope
+    ///
+    /// The zip installs and builds Umbra there, and grades each submission.
     GradescopePack(gradescope_pack::PackArguments),
-    /// Check the tree of submissions against the handout's; exits with 0 when all conform, 1 when not
+    /// Check the tree of submissions against the handout's
+    ///
+    /// Exits with 0 if all conform, with 1 if one does not.
     Validate(tree::ValidateArguments),
     /// Pack a working folder into an archive that conforms to the handout
     Pack(tree::PackArguments),
@@ -124,19 +138,23 @@ enum Command {
     Compare(compare::CompareArguments),
     /// Check a working folder on every save, with its report in the browser
     Watch(watch::WatchArguments),
-    /// Look at EXR images in the browser: values, differences, exposure, wipe
+    /// View EXR images in the browser: values, differences, exposure
     View(view::ViewArguments),
-    /// Explain a check, a rule or a part: what is asked, what its error means, where its bound lies
+    /// Explain a check, a rule or a part
+    ///
+    /// Prints what it asks, what its error means, where its bound lies, and which code judges it.
     Explain(explain::ExplainArguments),
-    /// Show what this machine has: isolation, graphics adapters, compiler; exits with 0 when it can grade
+    /// Show what this machine has: isolation, graphics adapters, compiler
+    ///
+    /// Exits with 0 if it can grade.
     #[cfg(target_os = "linux")]
     Doctor,
-    /// Print a script that completes umbra's commands and options in a shell
+    /// Print shell completions
     Completions {
         /// The shell
         shell: clap_complete::Shell,
     },
-    /// Render the stored expected images again with the reference renderer, and replace them
+    /// Render the stored expected images again and replace them
     Bless(bless::BlessArguments),
 }
 
@@ -230,13 +248,45 @@ fn wrapped(text: &str, width: usize) -> String {
     out
 }
 
-/// An error and its causes, without causes that its message already contains.
+/// An error and its causes, without causes that its message already contains and without numbers of the system's.
 fn told_once(error: &anyhow::Error) -> String {
-    error.chain().map(ToString::to_string).fold(String::new(), |told, cause| match told.as_str() {
+    let words = |cause: &(dyn std::error::Error + 'static)| match cause.downcast_ref() {
+        Some(error) => io_words(error),
+        None => without_codes(&cause.to_string()),
+    };
+    error.chain().map(words).fold(String::new(), |told, cause| match told.as_str() {
         "" => cause,
         told if told.contains(&cause) => told.to_owned(),
         told => format!("{told}: {cause}"),
     })
+}
+
+/// What an error of the system says, in plain words.
+fn io_words(error: &std::io::Error) -> String {
+    use std::io::ErrorKind;
+    let plain = match error.kind() {
+        ErrorKind::NotFound => "there is no such file or folder",
+        ErrorKind::PermissionDenied => "permission denied",
+        ErrorKind::IsADirectory => "it is a folder",
+        ErrorKind::NotADirectory => "not a folder",
+        _ => return without_codes(&error.to_string()),
+    };
+    // One that names a path has words of its own.
+    if error.raw_os_error().is_some() {
+        plain.to_owned()
+    } else {
+        without_codes(&error.to_string())
+    }
+}
+
+/// The text without ` (os error 2)` and the like.
+fn without_codes(text: &str) -> String {
+    let mut parts = text.split(" (os error ");
+    let mut plain = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        plain += part.split_once(')').map_or(part, |(_, rest)| rest);
+    }
+    plain
 }
 
 /// Whether an error says that the machine lacks something, as far as can be told from it.
@@ -298,7 +348,7 @@ fn takes_files(folder: &Path) -> anyhow::Result<()> {
         .and_then(|()| tempfile::Builder::new().prefix(".umbra-").tempfile_in(folder))
         .map_err(|error| {
             // The name of the file that could not be made helps nobody.
-            let words = error.to_string();
+            let words = io_words(&error);
             let words = words.split(" at path ").next().unwrap_or_default();
             let said = format!("cannot write to {}: {words}", folder.display());
             if machine_lacks_kind(error.kind()) {
@@ -384,6 +434,17 @@ mod tests {
             let widest = help.lines().map(|line| line.chars().count()).max();
             assert!(widest <= Some(width), "{help}");
         }
+    }
+
+    #[test]
+    fn errors_are_told_once_and_without_numbers() {
+        use anyhow::Context as _;
+        let missing = || io::Error::from_raw_os_error(2);
+        let error = Err::<(), _>(missing()).context("cannot read a").unwrap_err();
+        assert_eq!(told_once(&error), "cannot read a: there is no such file or folder");
+        let error = anyhow::anyhow!("a.toml:2: x (os error 2)").context("b (os error 13) c");
+        assert_eq!(told_once(&error), "b c: a.toml:2: x");
+        assert_eq!(io_words(&io::Error::other("disk (os error 5)")), "disk");
     }
 
     #[test]

@@ -20,10 +20,10 @@ pub struct RegradeArguments {
     /// Write the new points into the reports, and keep the change with its time and reason
     #[arg(long, requires = "reason")]
     apply: bool,
-    /// Return to what held before the last applied change; `matches.toml` and `overrides.toml` are again what they were
+    /// Undo the last applied change and restore `matches.toml` and `overrides.toml`
     #[arg(long, conflicts_with = "apply")]
     undo: bool,
-    /// Why; kept with the change
+    /// The reason, kept with the change
     #[arg(long, value_name = "TEXT")]
     reason: Option<String>,
     #[command(flatten)]
@@ -85,7 +85,10 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
     print!("{}", table(&changes(&before.report, &after.report)));
     println!("{}", summary(&before.report, &after.report));
     for line in after.report.class.iter().flat_map(|class| &class.unused) {
-        println!("warning: on nothing that is there: {}", harmless(line));
+        println!(
+            "warning: decision on a submission that is not in this report: {}",
+            harmless(line)
+        );
     }
     if *undo {
         let undone = kept.pins.undone().map(|pin| pin.reason.clone()).unwrap_or_default();

@@ -50,7 +50,7 @@ pub struct RenderArguments {
     /// Film size in pixels, at most 16384 a side and 67108864 in all [default: the scene's]
     #[arg(long, value_name = "WxH")]
     size: Option<Size>,
-    /// Which adapter draws realtime scenes
+    /// Graphics adapter for realtime scenes
     #[arg(long, value_enum, default_value_t = AdapterChoice::Auto)]
     adapter: AdapterChoice,
     /// Load the plugin into this process, without isolation, so that a debugger and prints work; only
@@ -65,7 +65,7 @@ pub struct RenderArguments {
 /// Which adapter to draw with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum AdapterChoice {
-    /// Hardware when there is some, software otherwise
+    /// Hardware if available, otherwise software
     Auto,
     /// Hardware only
     Gpu,

@@ -98,7 +98,7 @@ impl Selection {
         grade.points = grade.parts.iter().map(|part| part.points).sum();
         grade.points_max = grade.parts.iter().map(|part| part.points_max).sum();
         grade.out_of = grade.parts.iter().map(|part| part.out_of).sum();
-        grade.remarks.push(format!("only {} was checked, not the rest", self.in_words()));
+        grade.remarks.push(format!("only {} was checked", self.in_words()));
     }
 
     pub fn asks(&self, part: &str) -> bool {

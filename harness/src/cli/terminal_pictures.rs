@@ -32,7 +32,8 @@ const GAP: u32 = 8;
 /// Bytes of one command, as kitty wants it.
 const CHUNK: usize = 4096;
 
-/// The pictures of what was lost, for standard output; or why there are none. `folder` is the report's of the submission.
+/// The pictures of what was lost, for standard output; or why there are none. `folder` is the report's of the
+/// submission.
 pub fn pictures(entry: &SubmissionReport, rules: &Rules, folder: &Path) -> String {
     let env = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     let protocol = protocol_of(env).filter(|_| std::io::stdout().is_terminal());

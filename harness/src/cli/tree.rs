@@ -22,13 +22,13 @@ const LEFT_OUT: usize = 40;
 /// Options of `umbra validate`.
 #[derive(clap::Args)]
 pub struct ValidateArguments {
-    /// Archives or folders of submissions, or what holds many, as `umbra grade` takes it
+    /// Archives, folders or downloads, as for `umbra grade`
     #[arg(required = true)]
     submissions: Vec<PathBuf>,
-    /// Where the submissions come from [default: recognised by their names]
+    /// Where the submissions come from [default: recognized by their names]
     #[arg(long, value_enum, value_name = "KIND")]
     from: Option<Kind>,
-    /// Print what was found as JSON: a list with one entry for each submission
+    /// Print the findings as JSON: a list with one entry for each submission
     #[arg(long, conflicts_with = "fix")]
     json: bool,
     /// Repack a nearly conforming submission (wrong level, other names, junk) into a new archive

@@ -17,7 +17,8 @@ pub(super) const PAGE: &str = "view.html";
 /// Options of `umbra view`.
 #[derive(clap::Args)]
 pub struct ViewArguments {
-    /// The images; all layers and channels of each are shown, and the first of a size less each other
+    /// The images; all layers and channels of each are shown, and the difference of the first to each other image of
+    /// its size
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
     /// The folder for the page and its data [default: a new one in the system's temporary folder]
@@ -128,7 +129,7 @@ pub(super) fn names_of(files: &[&Path]) -> Vec<String> {
     files.iter().map(name).collect()
 }
 
-/// Writes the viewer's page of an image beside the expected one, and its data, into a folder; answers the page's
+/// Writes the viewer's page of an image beside the expected one, and its data, into a folder; returns the page's
 /// absolute path.
 ///
 /// # Errors

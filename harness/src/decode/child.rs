@@ -11,11 +11,11 @@ use super::wire::{Answer, Folder, Question, write_answer};
 use crate::intake::{self, IntakeError, Submission};
 use crate::process::{self, exit_now};
 
-/// Locks this process, then answers the question in `dir`. Does not return when it could.
+/// Confines this process, then answers the question in `dir`. Does not return when it could.
 pub fn child_main(dir: &Path) -> ExitCode {
     if let Err(error) = process::confine_self().and_then(|()| answer(dir)) {
         eprintln!("umbra: the decoder cannot work: {error}");
-        return ExitCode::from(process::EXIT_NOT_LOCKED);
+        return ExitCode::from(process::EXIT_NOT_CONFINED);
     }
     exit_now(0)
 }

@@ -1,5 +1,5 @@
 //! Decodes untrusted bytes: archives, texts and images of a submission. Each request runs in its own child process,
-//! which is Umbra itself and is locked before it touches a byte. The child sees only the one file or folder in
+//! which is Umbra itself and is confined before it touches a byte. The child sees only the one file or folder in
 //! question, and can write only its answer.
 //!
 //! The parent reads an answer after the child has ended, and trusts no name or size in it. A child that dies is the
@@ -271,8 +271,8 @@ impl<'a> Decoder<'a> {
         if cfg!(windows) {
             command.envs(std::env::var_os("SystemRoot").map(|root| ("SystemRoot", root)));
         }
-        let lock = Confinement::new(self.limits, policy);
-        let ended = process::run(command, &lock, KEEP_OUTPUT, self.cancel, &mut |_| {
+        let confinement = Confinement::new(self.limits, policy);
+        let ended = process::run(command, &confinement, KEEP_OUTPUT, self.cancel, &mut |_| {
             ControlFlow::Continue(())
         })?;
         if let Ok(mut cpu_s) = self.cpu_s.lock() {
@@ -357,9 +357,9 @@ fn death(ended: &ChildOutcome) -> Result<(), NoAnswer> {
         exit if exit == Exit::Starved || exit.is_from_outside() => {
             return Err(process::nobodys_fault("a decoder", exit).into());
         }
-        // The child itself reports that it could not work: no disk space, no memory, no lock. Hostile bytes cannot
+        // The child itself reports that it could not work: no disk space, no memory, no isolation. Hostile bytes cannot
         // cause this exit.
-        Exit::Code(code) if code == i32::from(process::EXIT_NOT_LOCKED) => {
+        Exit::Code(code) if code == i32::from(process::EXIT_NOT_CONFINED) => {
             return Err(io::Error::other(ended.stderr.head.trim().to_owned()).into());
         }
         exit @ Exit::Code(_) => format!("its decoder {exit}: {}", ended.stderr.head),

@@ -28,7 +28,7 @@ pub struct Diagnosis {
     pub words: String,
     /// The fraction of the difference from what is right that this leaves unexplained.
     pub unexplained: f64,
-    /// The same of the next best guess; 1 is what is right.
+    /// The same of the next best hypothesis; 1 is what is right.
     pub runner_up: f64,
     /// Small pictures: what was drawn, what is right, what the known mistake draws.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

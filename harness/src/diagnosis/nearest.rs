@@ -1,5 +1,5 @@
 //! Finds the known mistake nearest to some answers, if it is clearly nearer than any other and than the right answers.
-//! A pure function from tiles to a guess.
+//! A pure function from thumbnails to a hypothesis.
 
 use std::collections::BTreeMap;
 
@@ -53,14 +53,14 @@ pub enum Hypothesis {
     Two(String, String),
 }
 
-/// A guess with its distance.
+/// A hypothesis with its distance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nearest {
     /// What it is.
     pub guess: Hypothesis,
     /// Its distance, as a fraction of the distance from what is right.
     pub distance: f64,
-    /// The distance of the next best guess of the same sort; 1 is that of what is right.
+    /// The distance of the next best hypothesis of the same sort; 1 is that of what is right.
     pub runner_up: f64,
 }
 
@@ -150,7 +150,7 @@ impl Comparison<'_> {
     }
 }
 
-/// The nearest guess, if it leaves less than `limit` and clearly less than the next one.
+/// The nearest hypothesis, if it leaves less than `limit` and clearly less than the next one.
 fn clearest(mut guesses: Vec<(f64, Hypothesis)>, limit: f64) -> Option<Nearest> {
     guesses.sort_by(|a, b| a.0.total_cmp(&b.0));
     let runner_up = guesses.get(1).map_or(1.0, |(distance, _)| distance.min(1.0));
@@ -175,7 +175,7 @@ impl Total {
     }
 }
 
-/// How far the answers are from a guess, over all views.
+/// How far the answers are from a hypothesis, over all views.
 fn total(shown: &[(&Comparison, f32)], guess: impl Fn(&Comparison) -> Thumbnail) -> Total {
     let mut total = Total::default();
     for (exhibit, scale) in shown {

@@ -1,7 +1,7 @@
 //! The stored answers of known mistakes: `expected/<assignment>/mistakes/<view>.exr`.
 //!
-//! A file is a column of tiles, named in order by its attribute `tiles`. The first tile holds the right answers, the
-//! second the material behind each value, the others the answers of mistakes that differ here.
+//! A file is a column of thumbnails, named in order by its attribute `tiles`. The first one holds the right answers,
+//! the second the material behind each value, the others the answers of mistakes that differ here.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use super::thumbnail::{COLUMNS, LENGTH, Thumbnail};
 use super::view::View;
 use crate::imaging::reference::RegionMask;
 
-/// The first two tiles of every file.
+/// The first two thumbnails of every file.
 const HEAD: [&str; 2] = ["right", "material"];
 /// The digest of the scene that a file was made from.
 const DIGEST: &str = "scene_sha256";
@@ -35,7 +35,7 @@ pub enum Material {
 }
 
 impl Material {
-    /// What the values of a tile show, whose image has this mask.
+    /// What the values of a thumbnail show, whose image has this mask.
     pub fn of_mask(mask: &RegionMask) -> Vec<Self> {
         let code = |(index, &value): (usize, &u16)| {
             let material = match mask.region(value) {
@@ -193,12 +193,16 @@ impl StoredView {
         let digest = attribute(DIGEST).unwrap_or_default();
         let image = content.layers.remove("tiles").ok_or("no layer \"tiles\"")?;
         if names.get(..2) != Some(&HEAD) {
-            return Err(format!("the first tiles are {names:?}, expected {HEAD:?}"));
+            return Err(format!(
+                "the first thumbnails are {}, expected {}",
+                names.join(" "),
+                HEAD.join(" ")
+            ));
         }
         let expected = (COLUMNS, LENGTH / COLUMNS * names.len());
         if (image.width, image.height) != expected {
             return Err(format!(
-                "{}x{} pixels, expected {}x{} for {} tiles",
+                "{}x{} pixels, expected {}x{} for {} thumbnails",
                 image.width,
                 image.height,
                 expected.0,
@@ -208,7 +212,7 @@ impl StoredView {
         }
         let mut tiles =
             image.pixels.chunks_exact(LENGTH).map(|values| Thumbnail::of_stored(values.to_vec()));
-        let mut next = || tiles.next().flatten().ok_or("a tile is missing");
+        let mut next = || tiles.next().flatten().ok_or("a thumbnail is missing");
         let right = next()?;
         let materials = next()?;
         let materials = materials.values().iter().map(|value| Material::ALL.get(value.x as usize));
@@ -217,7 +221,7 @@ impl StoredView {
         let mut mistakes = BTreeMap::new();
         for name in &names[2..] {
             if mistakes.insert((*name).to_owned(), next()?).is_some() {
-                return Err(format!("the tile \"{name}\" is there twice"));
+                return Err(format!("the thumbnail \"{name}\" is there twice"));
             }
         }
         Ok(Self { right, materials, mistakes, digest })
@@ -288,8 +292,8 @@ mod tests {
         });
         assert!(renamed.contains("found \"light-cbox\""), "{renamed}");
         for (change, expected) in [
-            ("right material dark", "32x96 pixels, expected 32x72 for 3 tiles"),
-            ("material right dark broken", "expected [\"right\", \"material\"]"),
+            ("right material dark", "32x96 pixels, expected 32x72 for 3 thumbnails"),
+            ("material right dark broken", "expected right material"),
             ("right material dark dark", "\"dark\" is there twice"),
         ] {
             let text = said(&|file| {

@@ -1,8 +1,8 @@
-//! Tiles: a renderer's answer to one question, reduced to 32x24 values.
+//! Thumbnails: a renderer's answer to one question, reduced to 32x24 values.
 
 use basecode::{Image, Vec3};
 
-/// Values in a row of a tile.
+/// Values in a row of a thumbnail.
 pub const COLUMNS: usize = 32;
 /// Rows of a tile.
 pub const ROWS: usize = 24;

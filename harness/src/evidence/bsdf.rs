@@ -9,7 +9,7 @@ use super::lobe::{self, Answer};
 use super::price::Answers;
 use super::shading::{ShadedPoint, Shading, energy_scale};
 use super::{Check, CheckId, Lobe, Measure, RuleId, Verdict};
-use crate::imaging::ratio::ratio_name;
+use crate::imaging::ratio::{ratio_name, triple};
 
 /// Which BSDF is probed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,8 +63,8 @@ pub fn probes(kind: BsdfKind) -> Vec<BsdfProbe> {
     probes
 }
 
-/// Probes with a `wi` that is not of unit length: some integrators leave that to the BSDF. No
-/// renderer must answer them rightly; see [`Convention`].
+/// Probes with a `wi` that is not of unit length: some integrators leave that to the BSDF. A renderer need not answer
+/// them correctly; see [`Convention`].
 pub fn long_probes(kind: BsdfKind) -> Vec<BsdfProbe> {
     let lengths = [0.5f32, 2.0, 5.0];
     let some = probes(kind).into_iter().step_by(7).enumerate();
@@ -351,10 +351,12 @@ fn describe(
     let degrees = |w: [f32; 3]| w[2].clamp(-1.0, 1.0).acos().to_degrees();
     let material = match query.material.model {
         api::MATERIAL_PHONG => format!(
-            "kd {:?}, ks {:?}, n {}",
-            query.material.diffuse, query.material.specular, query.material.exponent
+            "kd {}, ks {}, n {}",
+            triple(query.material.diffuse),
+            triple(query.material.specular),
+            query.material.exponent
         ),
-        _ => format!("kd {:?}", query.material.diffuse),
+        _ => format!("kd {}", triple(query.material.diffuse)),
     };
     format!(
         "the {name} BSDF is wrong at {wrong} of {} directions; worst with {material}, wo {:.0} and wi {:.0} \
@@ -365,10 +367,6 @@ fn describe(
         triple(expected.map(|v| v as f32)),
         triple(found),
     )
-}
-
-fn triple(v: [f32; 3]) -> String {
-    format!("({:.4}, {:.4}, {:.4})", v[0], v[1], v[2])
 }
 
 /// What a constant ratio, or the place of the wrong answers, gives away.

@@ -76,6 +76,19 @@ pub enum Verdict {
     NotRun,
 }
 
+impl Verdict {
+    /// The verdict in words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Fail => "fail",
+            Self::NotImplemented => "not implemented",
+            Self::NotJudged => "not judged",
+            Self::NotRun => "not run",
+        }
+    }
+}
+
 /// One value against its bound.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Measure {

@@ -137,7 +137,7 @@ pub fn judge(questions: &[Conventional], together: &dyn Fn() -> Vec<(Party, Chec
             }
             let name = convention.name();
             checks.extend(own.into_iter().map(|check| {
-                let summary = format!("{} (judged so: {name})", check.summary);
+                let summary = format!("{} (convention: {name})", check.summary);
                 Check { convention: name.clone(), summary, ..check }
             }));
         }
@@ -202,7 +202,7 @@ fn judge_together(
     });
     let all = alone.chain(together.iter().map(|(_, check)| check.clone()));
     let named = all.map(|check| {
-        let summary = format!("{} (judged so: {OF_ITS_OWN})", check.summary);
+        let summary = format!("{} (convention: {OF_ITS_OWN})", check.summary);
         Check { convention: OF_ITS_OWN.to_owned(), summary, ..check }
     });
     named.collect()

@@ -185,7 +185,7 @@ pub fn judge_shaded(
         let accepted = judge_realtime(id, scene, actual, &mixed, mask, tolerances);
         if accepted.verdict == Verdict::Pass {
             let summary =
-                "the image is what is expected of a normal that is not renormalised (accepted)";
+                "the image is what is expected of a normal that is not renormalized (accepted)";
             return Check { summary: summary.into(), ..accepted };
         }
     }

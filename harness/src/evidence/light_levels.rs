@@ -29,7 +29,7 @@ impl Levels {
     }
 
     /// The price, if one constant changes all lit points, or all dark ones. `residual` is asked with what lit and what
-    /// dark points have, and answers the fractions of both that have not, added up.
+    /// dark points have, and returns the fractions of both that have not, added up.
     pub fn priced(self, price: Price, residual: impl Fn(f64, f64) -> f64) -> Price {
         let price = match self.dark > 0.0 && self.dark < 1.0 {
             true => {

@@ -3,6 +3,7 @@
 use renderer_api as api;
 
 use super::Lobe;
+use crate::imaging::ratio::triple;
 
 /// A direction of the local frame.
 type Direction = [f32; 3];
@@ -84,9 +85,9 @@ fn fields(m: &api::MaterialValue) -> (u32, [f32; 3], [f32; 3], f32) {
 
 fn describe(m: &api::MaterialValue) -> String {
     if m.model == api::MATERIAL_PHONG {
-        format!("kd {:?}, ks {:?}, n {}", m.diffuse, m.specular, m.exponent)
+        format!("kd {}, ks {}, n {}", triple(m.diffuse), triple(m.specular), m.exponent)
     } else {
-        format!("kd {:?}", m.diffuse)
+        format!("kd {}", triple(m.diffuse))
     }
 }
 

@@ -60,13 +60,13 @@ pub fn judge_agreement(
     let mut check = match first.filter(|_| failed) {
         None => {
             let summary =
-                format!("the image is what the integrator answers at {counted} pixel centres");
+                format!("the image is what the integrator answers at {counted} pixel centers");
             Check::new(id, scene, Verdict::Pass, summary)
         }
         Some(index) => {
             let summary = format!(
                 "{wrong} of {counted} pixels of a 1 spp render are not what the integrator answers along their \
-                 centre rays; first at ({}, {})",
+                 center rays; first at ({}, {})",
                 index % mask.width,
                 index / mask.width
             );

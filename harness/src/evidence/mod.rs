@@ -26,4 +26,4 @@ pub mod varyings;
 pub mod vertex;
 
 pub use check::{Check, Evidence, Lobe, Measure, Picture, Verdict};
-pub use registry::{CheckId, CheckInfo, RuleId};
+pub use registry::{CheckId, CheckInfo, CheckSources, IMAGE_RULES, RuleId};

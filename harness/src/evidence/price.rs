@@ -608,9 +608,8 @@ const LIT: f64 = 0.05;
 /// And where at least so much of what should be dark is.
 const DARK: f64 = 0.4;
 
-/// The same price, for shadows that are wrong on these fractions of what is lit and what is dark, if
-/// nearly all of one is right: acne darkens some of what is lit, too large a bias lights some of what
-/// is dark.
+/// The price of shadows that are wrong on these fractions of the lit and the dark pixels, if nearly all of one kind is
+/// right. Acne darkens some lit pixels; too large a bias lights some dark ones.
 pub fn partly(price: Price, lit_wrong: f64, dark_wrong: f64) -> Price {
     let few = 0.02;
     let price = match dark_wrong <= few && lit_wrong <= 1.0 - LIT {

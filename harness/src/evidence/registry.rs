@@ -1,10 +1,11 @@
 //! Every check and every rule by name. `info.rs` says what each check asks, what its error means and where its bound
-//! lies. To find the code that judges a check, search `evidence/` and `grading/` for its variant of `CheckId`.
+//! lies. `sources.rs` names the files that ask and judge it.
 //!
 //! `umbra explain`, the list in `docs/evidence.md` and the reports read these entries. ARCHITECTURE.md says what a new
 //! check needs.
 
 mod info;
+mod sources;
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,7 +13,8 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use info::CheckInfo;
+pub use info::{CheckInfo, IMAGE_RULES};
+pub use sources::CheckSources;
 
 /// Names less alike than this (Jaro-Winkler, 1 for the same) are no slip of each other.
 const ALIKE: f64 = 0.85;
@@ -83,7 +85,7 @@ named! {
     RuleId, "rule",
     /// BSDF values at directions over both hemispheres.
     BsdfValue = "bsdf.value",
-    /// The same, for the BSDF that a textured scene hands out.
+    /// The same, for the BSDF of a textured surface.
     BsdfTextured = "bsdf.textured",
     /// Radiance along lit rays.
     RaysLit = "rays.lit",

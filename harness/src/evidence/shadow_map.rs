@@ -209,8 +209,8 @@ struct Known {
     left: f64,
 }
 
-/// The shadowed pixels, if every pixel of a region has the same radiance, as an ambient term leaves it: the largest
-/// fraction of the light that is left to half of a region, and the fraction of dark pixels that have another radiance.
+/// Judges shadowed pixels that have one radiance in each region, as an ambient term leaves them. Returns the largest
+/// fraction of light left to half of a region, and the fraction of dark pixels with another radiance.
 fn ambient(pixels: &[Known]) -> (f64, f64) {
     let mut of_region: BTreeMap<u16, Vec<&Known>> = BTreeMap::new();
     for pixel in pixels.iter().filter(|pixel| !pixel.lit) {

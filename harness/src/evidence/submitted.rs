@@ -17,9 +17,9 @@ const STANDARD_ERRORS: f64 = 5.0;
 const CONVERGED: f64 = 8.0;
 /// What looks like noise may be wrong edges where more than this fraction of all other pixels is wrong.
 const RIGHT: f64 = 5e-4;
-/// An image that looks like fewer samples than this is without noise of its own: right renderers
-/// draw one sample in the middle of each pixel alike, and what is rounded to an edge's nearer side
-/// has half of the variance of chance, so that it looks like two.
+/// An image that looks like fewer samples than this has no noise of its own. Right renderers agree where they draw one
+/// sample in the middle of each pixel. An image rounded to the nearer side of each edge has half the variance of
+/// chance, so it looks like two samples.
 const OWN_NOISE: f64 = 3.0;
 /// From this correlation on two images have one noise. Other seeds stay below 0.3 on a film a tenth as large
 /// as the assignment's; rounding to 8 bits leaves more than 0.9.
@@ -144,7 +144,7 @@ pub fn judge_scene(
     let judged = if like {
         check(Verdict::Pass, format!("{path} shows the scene"))
     } else if image.pixels.iter().all(|p| *p == image.pixels[0]) {
-        check(Verdict::Fail, format!("{path} has one colour all over"))
+        check(Verdict::Fail, format!("{path} has one color all over"))
     } else {
         check(Verdict::Fail, format!("{path} shows something else than the scene"))
     };

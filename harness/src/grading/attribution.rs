@@ -57,7 +57,7 @@ fn attribute_failures(session: &Session, job: &Job, outcomes: &mut [Outcome]) {
     }
 }
 
-/// What an outcome says in words.
+/// An outcome in words.
 fn said(outcome: &Outcome) -> &str {
     match outcome {
         Outcome::NoAdapter(said) | Outcome::Failed(said) | Outcome::Panicked(said) => said,

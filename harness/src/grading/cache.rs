@@ -20,7 +20,7 @@ use crate::panics::Bug;
 const FILE: &str = "record.json";
 /// The file of a bug of Umbra's that a submission met.
 const BUG: &str = "internal-error.json";
-/// What a record's file is called once a newer submission has replaced it.
+/// Name of a record's file once a newer submission has replaced it.
 const REPLACED: &str = "record.replaced.json";
 
 /// Keeps records and finds them again.
@@ -241,7 +241,7 @@ impl RecordCache {
         fs::read(instructor.join(FILE)).ok()
     }
 
-    /// Sets an older record aside, unless `record` is of the same submission; answers whether it did.
+    /// Sets an older record aside, unless `record` is of the same submission; returns whether it did.
     ///
     /// # Errors
     /// When it cannot be written.

@@ -139,7 +139,7 @@ fn same(a: &Outcome, b: &Outcome) -> bool {
     }
 }
 
-/// Whether this machine can draw at all: asks Umbra's own pass for one small frame, and answers the adapter.
+/// Whether this machine can draw at all: asks Umbra's own pass for one small frame, and returns the adapter.
 ///
 /// # Errors
 /// Why not, in words.

@@ -98,7 +98,8 @@ pub fn isolate(
         let swapped: Vec<Outcome> = swapped.iter_mut().filter_map(Iterator::next).collect();
         let pass = match pass_frames(case, &pass) {
             Ok(frames) if frames.are_black() && draws_surfaces(session, plugin, case) => {
-                let summary = "swap not possible: no stage of Umbra's draws what the pass draws";
+                let summary =
+                    "cannot be judged alone: no stage of Umbra's draws what the pass draws";
                 Check::new(CheckId::PassUniforms, &case.entry.name, Verdict::NotJudged, summary)
             }
             Ok(frames) => {
@@ -125,8 +126,9 @@ pub fn isolate(
                 }
                 Swap::Untouched | Swap::Absent => {
                     let name = STAGES[index];
-                    let summary =
-                        format!("swap not possible: what draws is not in src/shaders/{name}.wgsl");
+                    let summary = format!(
+                        "cannot be judged alone: what draws is not in src/shaders/{name}.wgsl"
+                    );
                     return Check::new(id, &case.entry.name, Verdict::NotJudged, summary);
                 }
                 Swap::Drawn(range) => &swapped[range.clone()],
@@ -215,7 +217,7 @@ impl Shown<'_> {
                 let name = convention.name();
                 let judged = kept.into_iter().chain(fragments.into_iter().map(|(_, check)| check));
                 checks.extend(judged.map(|check| {
-                    let summary = format!("{} (judged so: {name})", check.summary);
+                    let summary = format!("{} (convention: {name})", check.summary);
                     Check { convention: name.clone(), summary, ..check }
                 }));
             }
@@ -306,7 +308,7 @@ fn pass_frames(case: &PreparedScene, outcomes: &[Outcome]) -> Result<PassFrames,
     let is_same = |image: &Image| bits(image) == first;
     let shows = |image: &Image| image.pixels.iter().any(|pixel| *pixel != Vec3::ZERO);
     if images.iter().all(is_same) && images.iter().any(shows) {
-        let summary = "swap not possible: the pass draws the same under all stages";
+        let summary = "cannot be judged alone: the pass draws the same under all stages";
         return Err(Box::new(Check::new(id, name, Verdict::NotJudged, summary)));
     }
     let Some(positions) = images.pop() else { unreachable!("each value has a frame") };
@@ -396,6 +398,6 @@ fn swap_failed(
 
 /// A swap that the graphics library refuses is no fault.
 fn not_possible(id: CheckId, case: &PreparedScene, message: &str) -> Check {
-    let summary = format!("swap not possible: {}", headline(message));
+    let summary = format!("cannot be judged alone: {}", headline(message));
     Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
 }

@@ -28,7 +28,7 @@ impl Grading<'_> {
     ) -> anyhow::Result<Record> {
         let grade = || self.submission(source, slug, out, Mode::Grade, say);
         contained(self.cache.as_ref(), source, out, grade).unwrap_or_else(|bug| {
-            let summary = "Umbra itself failed, and nothing was found out";
+            let summary = "an internal error of Umbra stopped the grading of this submission";
             let check = Check::new(INTERNAL_ERROR, "", Verdict::Fail, summary);
             // Its text may hold anything.
             let check = Check { private: bug.to_string(), ..check };

@@ -1,5 +1,5 @@
-//! A wrong picture of a renderer whose pass and stages are right alone, or cannot all be exchanged: one slip may explain
-//! its frames on all scenes, and is charged to the part that it belongs to.
+//! A wrong picture of a renderer whose pass and stages are right alone, or cannot all be exchanged: one slip may
+//! explain its frames on all scenes, and is charged to the part that it belongs to.
 
 use std::path::Path;
 
@@ -85,8 +85,8 @@ fn explained(id: CheckId, case: &PreparedScene, name: Option<&str>) -> Check {
     Check { error, mistake, convention, ..Check::new(id, scene, Verdict::Fail, summary) }
 }
 
-/// The one mistake in the values of a pass that explains the frames of all scenes, some of them by light: those that are
-/// right, and most of those that are `wrong`, because on one scene noise may decide what a surface shows.
+/// The one mistake in the pass's values that explains the frames of all scenes, some of them by light. It must explain
+/// every right frame and most of the `wrong` ones, because on one scene noise may decide what a surface shows.
 fn slip_of_pass(
     cases: &[PreparedScene],
     frames: &[&Image],
@@ -168,7 +168,7 @@ fn vertex_under_own_pass(
             judge_vertex(name, film, [[positions, normals]; 3])
         });
         let convention = "the vertex stage under the submission's own pass".to_owned();
-        let summary = format!("{} (judged so: {convention})", check.summary);
+        let summary = format!("{} (convention: {convention})", check.summary);
         let check = Check { convention, summary, ..check };
         // Identities show nothing wrong, so a matrix stands where another belongs.
         checks.push(check.priced(|raw| Price::of_raw(raw).or("another matrix", Class::Slip, 0.0)));

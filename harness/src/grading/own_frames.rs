@@ -36,10 +36,10 @@ impl Surfaces {
     }
 }
 
-/// The checks under a convention of the submission's own, if it has one: on the surfaces of one fragment stage the own
-/// frames are right on every scene, or so but for a slip that does not explain the stage alone, while two of pass,
-/// vertex stage and fragment stage are wrong alone. `alone` are the checks of these, `own` those of the frames, and
-/// `pass_of` judges the pass by some of its values.
+/// The checks under a convention of the submission's own, if it has one. It has one if two of pass, vertex stage and
+/// fragment stage are wrong alone, but the own frames are right on all surfaces of one fragment stage on every scene. A
+/// slip in the frames is no obstacle if it does not explain the stage alone. `alone` are the checks of the three, `own`
+/// those of the frames, and `pass_of` judges the pass by some of its values.
 pub fn judge(alone: &[Check], own: &[Check], pass_of: &dyn Fn(Wanted) -> Vec<Check>) -> Vec<Check> {
     let failed = |id: CheckId| {
         let is_own = move |check: &&Check| check.id == id && check.convention.is_empty();
@@ -103,7 +103,7 @@ pub fn judge(alone: &[Check], own: &[Check], pass_of: &dyn Fn(Wanted) -> Vec<Che
         }
     }
     let named = checks.into_iter().map(|check| {
-        let summary = format!("{} (judged so: {OF_THEIR_OWN})", check.summary);
+        let summary = format!("{} (convention: {OF_THEIR_OWN})", check.summary);
         Check { convention: OF_THEIR_OWN.to_owned(), summary, ..check }
     });
     named.collect()

@@ -304,7 +304,7 @@ impl<'a> Grading<'a> {
 
     /// The record of a submission that the machine failed on: nothing is found out, no point lost.
     pub fn unjudged(&self, source: &Path, slug: &str) -> Record {
-        let summary = "the machine failed, and nothing was found out";
+        let summary = "the machine failed before this submission could be judged";
         let checks = vec![Check::new(JUDGED, "", Verdict::NotRun, summary)];
         Record { evidence: Evidence { checks }, ..self.begin(source, slug) }
     }

@@ -345,10 +345,9 @@ fn plain_but_for_shadows(
     Some(checks)
 }
 
-/// Judges shadows that are wrong as an image by visibility alone: against the student's own image
-/// without shadows, or else against that drawn under a vertex stage of ours, or of the scene with its normals negated
-/// or of another field of view, or as the second of two frames: what these mend is no matter of shadows. `check` is the
-/// verdict on the image, which stands when none tells.
+/// Judges wrong shadows by visibility alone. The image without shadows is the student's own. If that fails, it is drawn
+/// with a vertex stage of ours, with negated normals, with another field of view, or as the second of two frames. What
+/// these repair is no fault of the shadows. `check` is the verdict on the image; it stands if none of them decides.
 fn judge_visibility(
     session: &Session,
     plugin: &Path,

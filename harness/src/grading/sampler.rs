@@ -67,7 +67,7 @@ pub fn judge(session: &Session, plugin: &Path, scene: &Path) -> anyhow::Result<V
             } else {
                 "two seeds give two images"
             },
-            "seed the samplers with the job's seed, the student id",
+            "seed the samplers with the job's seed, the student number",
         ),
     ];
     checks.retain(|check| {

@@ -162,7 +162,7 @@ pub fn judge(
     let reference = &expected.offline;
     let published = [
         ("the published mean of many samples", &reference.mean),
-        ("the published image at pixel centres", &reference.centre),
+        ("the published image at pixel centers", &reference.centre),
         ("the published image without shadows", &expected.unshadowed),
     ];
     let noisy = NoisyPixels::new(reference);

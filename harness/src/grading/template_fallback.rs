@@ -235,9 +235,9 @@ fn differs(file: &str, template: &Path, copy: &Path) -> bool {
     fs::read(copy.join(file)).ok() != fs::read(template.join(file)).ok()
 }
 
-/// The files other than the template's that an error in one of the template's lines comes from, since that line is
-/// right as long as what it uses is: modules that no longer pass on what it names, or else files that it points at too,
-/// or else those that define, or are called, what it names.
+/// The submission's files that cause an error in one of the template's lines. Such a line is right as long as what it
+/// uses is. The first of these that yields any file counts: modules that no longer re-export the name, other files that
+/// the error points at, files that define the name or are called so.
 fn culprits(error: &Diagnostic, template: &Path, copy: &Path) -> Vec<String> {
     let at = error.place.as_ref().and_then(|place| below_src(&place.file));
     if !at.is_some_and(|file| template.join(file).is_file()) {

@@ -67,7 +67,11 @@ pub fn recorded_seed(file: &Path) -> anyhow::Result<u64> {
     let text =
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
     text.trim().parse().with_context(|| {
-        format!("{}: expected the seed of held-back scenes, found {text:?}", file.display())
+        format!(
+            "{}: expected the seed of held-back scenes, found \"{}\"",
+            file.display(),
+            text.trim()
+        )
     })
 }
 

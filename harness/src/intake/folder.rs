@@ -1,6 +1,5 @@
-//! A folder as a submission. It may change while it is read, so that no path is looked up twice: each folder
-//! and file is opened by its name in the open folder above it, no link is followed, and what is read is what
-//! was opened.
+//! A folder as a submission. It may change while it is read, so no path is looked up twice. Each folder and file is
+//! opened by its name in the open folder above it. No link is followed, and what is read is what was opened.
 
 #[cfg_attr(unix, path = "folder/unix.rs")]
 #[cfg_attr(not(unix), path = "folder/other.rs")]

@@ -8,7 +8,7 @@
 //!
 //! Everything here is library code without processes. [`unpack_bytes`] is the one function that
 //! decodes an archive: it writes below an empty destination folder that the caller made, and touches
-//! nothing else. Submissions come in by [`crate::decode`], which calls it in a locked child.
+//! nothing else. Submissions come in by [`crate::decode`], which calls it in a confined child.
 //!
 //! Conventions: paths of a submission are relative, UTF-8, with `/` between components and neither
 //! `.` nor `..`; sizes are bytes; hashes are lower-case hexadecimal SHA-256.

@@ -120,7 +120,8 @@ pub(super) fn archive_magic(bytes: &[u8]) -> Option<&'static str> {
     MAGIC.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, kind)| *kind)
 }
 
-/// The kind of archive that a file is by its name alone: one without magic bytes at its begin, or a part of a split one.
+/// The kind of archive that a file is by its name alone: one without magic bytes at its begin, or a part of a split
+/// one.
 pub(super) fn archive_by_name(path: &str) -> Option<&'static str> {
     const ENDS: [&str; 12] =
         ["iso", "dmg", "egg", "alz", "lzh", "lha", "arj", "wim", "xar", "lzma", "sit", "sitx"];

@@ -60,7 +60,7 @@ pub(super) struct Records {
 }
 
 impl Records {
-    /// Takes a record; answers whether it makes sense.
+    /// Takes a record; returns whether it makes sense.
     pub(super) fn take(&mut self, key: &str, value: &[u8]) -> bool {
         let number = || std::str::from_utf8(value).ok()?.parse::<u64>().ok();
         match key {

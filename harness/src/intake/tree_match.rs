@@ -64,7 +64,7 @@ pub(super) struct Matched {
 pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Matched, IntakeError> {
     let files = &submission.files;
     let config = find_config(submission)?;
-    // What lies beside the configuration comes before what lies elsewhere, unless another hand-in is as good.
+    // What lies beside the configuration comes before what lies elsewhere, unless another submission is as good.
     let root = match config.found {
         Lost::One(path) if !config.has_rival => {
             path.rsplit_once('/').map_or("", |(folder, _)| folder)
@@ -170,8 +170,8 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
     Ok(matched)
 }
 
-/// A file that was found below the root, or several: an image may differ from that in the same place of another hand-in
-/// of the same person. Whether their sources differ is known by then.
+/// A file that was found below the root, or several: an image may differ from that in the same place of another
+/// submission of the same person. Whether their sources differ is known by then.
 fn with_others<'a>(
     path: &'a str,
     root: &str,

@@ -78,7 +78,7 @@ pub fn validate_submission(
             let (present, missing) = places(&lines);
             let mut more = check_config(&parsed, is_whole, &present, &missing, tree);
             if let Some(stop) = said.first().filter(|_| !is_whole && parsed.student_id.is_none()) {
-                more.iter_mut().for_each(|finding| blame(finding, stop));
+                more.iter_mut().for_each(|finding| name_cause(finding, stop));
             }
             let text = text_of(&bytes);
             let more = more.into_iter().map(|finding| show(finding, &text));
@@ -103,7 +103,7 @@ pub fn validate_submission(
 }
 
 /// Of a number that is not found because reading stopped before it, says where and why that was.
-fn blame(finding: &mut Finding, stop: &Finding) {
+fn name_cause(finding: &mut Finding, stop: &Finding) {
     if finding.severity != Severity::Error {
         return;
     }

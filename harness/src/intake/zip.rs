@@ -1,6 +1,6 @@
-//! Zip archives. The central directory and every local header are read and compared here, and the
-//! data is inflated from exactly the bytes that both agree on: one reading of the archive, so
-//! that no second parser can see another tree in it.
+//! Zip archives. The central directory and every local header are read and compared here. The data is inflated from
+//! exactly the bytes that both agree on. So there is one reading of the archive, and no second parser can see another
+//! tree in it.
 //!
 //! Bytes before, between and after the parts (a self-extracting program, an archiver's zeros, a line that a mailer
 //! added) are skipped with a warning, unless another parser could take them for parts.

@@ -32,7 +32,7 @@ pub enum PluginError {
     Load {
         /// The library.
         path: PathBuf,
-        /// What the loader says.
+        /// Message of the loader.
         message: String,
     },
     /// The symbol [`api::ENTRY_SYMBOL`] is missing.

@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use renderer_api as api;
 use serde::{Deserialize, Serialize};
 
-/// Which BSDF an integrator meets. All values include the cosine [sr^-1] and, but for
-/// `Flat`, are zero unless `wi` and `wo` both lie above the surface; there they are smooth, and positive if the constant is.
+/// Which BSDF an integrator meets. All values include the cosine [sr^-1] and, but for `Flat`, are zero unless `wi` and
+/// `wo` both lie above the surface; there they are smooth, and positive if the constant is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Witness {
     /// The renderer's own.

@@ -53,13 +53,13 @@ impl Default for Limits {
 pub struct Confinement {
     /// What it may use.
     pub limits: Limits,
-    /// What it may see: the sandbox locks it. None where there is no isolation at all: then it gets
+    /// What it may see: the sandbox confines it. None where there is no isolation at all: then it gets
     /// a session and limits only, by [`crate::process::confine_self`].
     pub sandbox: Option<Policy>,
 }
 
 impl Confinement {
-    /// A lock that isolates by `policy`, or by limits alone when the policy has no layer.
+    /// A confinement that isolates by `policy`, or by limits alone when the policy has no layer.
     /// The policy's limits and quota are replaced by these.
     pub fn new(limits: &Limits, mut policy: Policy) -> Self {
         let none = policy.layers.isolation() == Isolation::None;

@@ -1,5 +1,5 @@
-//! Child processes. Each locks itself before it touches anything hostile, is watched while it runs, and is ended with
-//! all reachable descendants and reaped on every path.
+//! Child processes. Each confines itself before it touches anything hostile, is watched while it runs, and is ended
+//! with all reachable descendants and reaped on every path.
 //!
 //! Everything of Umbra that runs foreign code (the compiler, the worker) goes through [`run`].
 //! `start` is the one place where a process is made; what the child does to itself first is
@@ -16,9 +16,10 @@ mod watch;
 #[path = "watch_fallback.rs"]
 mod watch;
 
+pub use crate::sandbox::EXIT_NOT_CONFINED;
 pub use capture::Captured;
 pub use limits::{Confinement, Limits};
-pub use start::{EXIT_NOT_LOCKED, command, confine_self, exec_main, exit_now, start};
+pub use start::{command, confine_self, exec_main, exit_now, start};
 pub use watch::run;
 
 use serde::{Deserialize, Serialize};
@@ -119,7 +120,7 @@ pub struct ChildOutcome {
     pub peak_resident_mib: u64,
     /// Largest address space that was seen in MiB, by sampling; 0 when unknown.
     pub peak_address_mib: u64,
-    /// The isolation that was in force; none without any, and when it ended before it was locked.
+    /// The isolation that was in force; none without any, and when it ended before it was confined.
     pub in_force: Option<InForce>,
     /// Whether some process outside the child's group still held its output open in the end.
     pub left_process: bool,

@@ -7,20 +7,17 @@ use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
 
 use super::{Confinement, Limits};
-use crate::sandbox;
+use crate::sandbox::{self, EXIT_NOT_CONFINED};
 
 /// Carries the [`Confinement`] to the child, which removes it.
-const LOCK_VARIABLE: &str = "UMBRA_LOCK";
+const CONFINEMENT_VARIABLE: &str = "UMBRA_CONFINEMENT";
 /// Carries the parent's process id to the child.
 const PARENT_VARIABLE: &str = "UMBRA_PARENT";
 
-/// The exit code of a child that could not lock itself or could not execute its program.
-pub const EXIT_NOT_LOCKED: u8 = 70;
-
-/// A command that locks itself by `lock`, then executes `program`, a path as the child sees it.
+/// A command that confines itself by `confinement`, then executes `program`, a path as the child sees it.
 /// `umbra` is this program. The environment is empty but for what the caller adds.
-pub fn command(umbra: &Path, lock: &Confinement, program: &Path) -> Command {
-    let hidden = if lock.sandbox.is_some() { sandbox::LAUNCH_COMMAND } else { "__exec" };
+pub fn command(umbra: &Path, confinement: &Confinement, program: &Path) -> Command {
+    let hidden = if confinement.sandbox.is_some() { sandbox::LAUNCH_COMMAND } else { "__exec" };
     let mut command = Command::new(umbra);
     command.arg(hidden).arg(program).env_clear();
     command
@@ -32,59 +29,59 @@ pub fn command(umbra: &Path, lock: &Confinement, program: &Path) -> Command {
 ///
 /// # Errors
 /// When the process cannot be made.
-pub fn start(mut command: Command, lock: &Confinement) -> io::Result<Child> {
+pub fn start(mut command: Command, confinement: &Confinement) -> io::Result<Child> {
     command.stdin(Stdio::null());
     #[cfg(target_os = "linux")]
-    if let Some(policy) = &lock.sandbox {
+    if let Some(policy) = &confinement.sandbox {
         use std::os::unix::process::CommandExt;
         // A group of its own: the terminal's Ctrl-C is for Umbra, which ends its children itself.
         return command.stdin(sandbox::orders(policy)?).process_group(0).spawn();
     }
-    if lock.sandbox.is_some() {
+    if confinement.sandbox.is_some() {
         return Err(io::Error::other("there is no isolation on this system"));
     }
-    command.env(LOCK_VARIABLE, serde_json::to_string(lock)?);
+    command.env(CONFINEMENT_VARIABLE, serde_json::to_string(confinement)?);
     command.env(PARENT_VARIABLE, std::process::id().to_string());
     command.spawn()
 }
 
-/// Locks this process by what [`start`] was given: in a sandbox or, where there is no isolation at
+/// Confines this process by what [`start`] was given: in a sandbox or, where there is no isolation at
 /// all, by a session and process group of its own, death with its parent, and its limits.
 ///
 /// Call it first thing in `main`, while there is one thread.
 ///
 /// # Errors
-/// When there is no lock, or any part of it cannot be applied: then nothing hostile may be touched.
+/// When there is no confinement, or any part of it cannot be applied: then nothing hostile may be touched.
 pub fn confine_self() -> io::Result<()> {
     #[cfg(target_os = "linux")]
-    if std::env::var_os(LOCK_VARIABLE).is_none() {
+    if std::env::var_os(CONFINEMENT_VARIABLE).is_none() {
         return sandbox::confine_self().map(drop).map_err(io::Error::other);
     }
-    lock_plainly()
+    confine_plainly()
 }
 
-fn lock_plainly() -> io::Result<()> {
-    let lock = std::env::var(LOCK_VARIABLE)
+fn confine_plainly() -> io::Result<()> {
+    let text = std::env::var(CONFINEMENT_VARIABLE)
         .map_err(|_| io::Error::other("this command is for Umbra's own use"))?;
-    let lock: Confinement = serde_json::from_str(&lock)?;
+    let confinement: Confinement = serde_json::from_str(&text)?;
     let parent = std::env::var(PARENT_VARIABLE).ok().and_then(|id| id.parse::<i32>().ok());
     // SAFETY: the caller promises that this process has no other thread yet.
     unsafe {
-        std::env::remove_var(LOCK_VARIABLE);
+        std::env::remove_var(CONFINEMENT_VARIABLE);
         std::env::remove_var(PARENT_VARIABLE);
     }
     detach(parent)?;
-    limit(&lock.limits)
+    limit(&confinement.limits)
 }
 
-/// Locks this process, then turns it into `program`: the hidden command `__exec`.
+/// Confines this process, then turns it into `program`: the hidden command `__exec`.
 pub fn exec_main(program: &OsStr, args: &[OsString]) -> ExitCode {
-    let failure = match lock_plainly() {
+    let failure = match confine_plainly() {
         Ok(()) => exec(Command::new(program).args(args)),
         Err(error) => error,
     };
     eprintln!("umbra: cannot execute {}: {failure}", program.display());
-    ExitCode::from(EXIT_NOT_LOCKED)
+    ExitCode::from(EXIT_NOT_CONFINED)
 }
 
 #[cfg(unix)]

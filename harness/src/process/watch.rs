@@ -38,26 +38,27 @@ const DRAIN: Duration = Duration::from_millis(200);
 /// However it ends, its process group is killed and it is reaped before this returns.
 ///
 /// # Errors
-/// When the child cannot be started, locked or watched.
+/// When the child cannot be started, confined or watched.
 pub fn run(
     mut command: Command,
-    lock: &Confinement,
+    confinement: &Confinement,
     keep: usize,
     cancel: &AtomicBool,
     watcher: &mut Watcher,
 ) -> io::Result<ChildOutcome> {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let begin = Instant::now();
-    let mut child = start(command, lock)?;
+    let mut child = start(command, confinement)?;
     let pid = Pid::from_raw(child.id() as i32);
     let mut group = Group { pid, reaped: false };
     let mut pipes = Vec::new();
     for end in [child.stdout.take().map(OwnedFd::from), child.stderr.take().map(OwnedFd::from)] {
         pipes.push(Pipe::new(end, keep)?);
     }
-    let may_stand_still = Duration::from_secs_f64(lock.limits.wall_s);
+    let may_stand_still = Duration::from_secs_f64(confinement.limits.wall_s);
     let mut peak_address_mib = 0;
-    let mut running = Running { child: pid, sandboxed: lock.sandbox.is_some(), locked: None };
+    let mut running =
+        Running { child: pid, sandboxed: confinement.sandbox.is_some(), payload: None };
     let (mut still, mut looked, mut printed) = (Standstill::new(begin), begin, false);
     let ended_by_us = loop {
         wait_readable(&pipes, TICK);
@@ -106,7 +107,7 @@ pub fn run(
     }
     let left_process = pipes.iter().any(Pipe::is_open);
     let cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
-    let out_of_cpu = cpu_s >= lock.limits.cpu_s as f64;
+    let out_of_cpu = cpu_s >= confinement.limits.cpu_s as f64;
     let exit = match (ended_by_us, libc::WIFSIGNALED(status).then(|| libc::WTERMSIG(status))) {
         (Some(exit), _) => exit,
         (None, Some(libc::SIGXCPU)) => Exit::OutOfCpu,
@@ -115,8 +116,8 @@ pub fn run(
         (None, Some(signal)) => Exit::Signal(signal),
         (None, None) => Exit::Code(libc::WEXITSTATUS(status)),
     };
-    let in_force = match lock.sandbox.as_ref().map(in_force) {
-        // It was not locked, and nothing foreign ran: only the machine can be at fault.
+    let in_force = match confinement.sandbox.as_ref().map(in_force) {
+        // It was not confined, and nothing foreign ran: only the machine can be at fault.
         Some(Err(error)) if ended_by_us.is_none() => return Err(io::Error::other(error)),
         Some(in_force) => in_force.ok(),
         None => None,
@@ -128,7 +129,7 @@ pub fn run(
     let peak_resident_mib = usage.ru_maxrss as u64 >> 10;
     let peak_mib = peak_resident_mib.max(peak_address_mib);
     Ok(ChildOutcome {
-        exit: exit.with_memory(&stderr, peak_mib, lock.limits.memory_mib),
+        exit: exit.with_memory(&stderr, peak_mib, confinement.limits.memory_mib),
         pid: pid.as_raw() as u32,
         stdout,
         stderr,
@@ -157,37 +158,37 @@ fn in_force(policy: &Policy) -> Result<InForce, SandboxError> {
 struct Running {
     child: Pid,
     sandboxed: bool,
-    /// The locked process, once it is known.
-    locked: Option<Pid>,
+    /// The payload, once it is known.
+    payload: Option<Pid>,
 }
 
 impl Running {
     /// Looks who runs foreign code now, as long as that is not known.
     fn find(&mut self) {
         if !self.sandboxed {
-            self.locked = Some(self.child);
+            self.payload = Some(self.child);
         }
         #[cfg(target_os = "linux")]
-        if self.locked.is_none() {
-            let locked = crate::sandbox::locked_pid(self.child.as_raw() as u32);
-            self.locked = locked.map(|pid| Pid::from_raw(pid as i32));
+        if self.payload.is_none() {
+            let payload = crate::sandbox::payload_pid(self.child.as_raw() as u32);
+            self.payload = payload.map(|pid| Pid::from_raw(pid as i32));
         }
     }
 
     /// Its address space; 0 when it is not known.
     fn address_space_mib(&self) -> u64 {
-        self.locked.map_or(0, address_space_mib)
+        self.payload.map_or(0, address_space_mib)
     }
 
     /// CPU seconds of its threads; 0 when it is not known.
     fn cpu_s(&self) -> f64 {
-        self.locked.map_or(0.0, standstill::cpu_s)
+        self.payload.map_or(0.0, standstill::cpu_s)
     }
 
-    /// Whether it and all that it started stand still; nothing when it is not known.
+    /// Whether it and all that it started stand still; `None` if that is not known.
     fn stands_still(&self) -> Option<bool> {
-        match self.locked {
-            Some(locked) => standstill::stands_still(locked),
+        match self.payload {
+            Some(payload) => standstill::stands_still(payload),
             // The launcher at work.
             None => standstill::stands_still(self.child).filter(|still| !still),
         }

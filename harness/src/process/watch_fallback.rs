@@ -15,14 +15,14 @@ use super::{Captured, ChildOutcome, Confinement, Exit, Watcher, start};
 /// When the child cannot be started or watched.
 pub fn run(
     mut command: Command,
-    lock: &Confinement,
+    confinement: &Confinement,
     keep: usize,
     cancel: &AtomicBool,
     watcher: &mut Watcher,
 ) -> io::Result<ChildOutcome> {
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let begin = Instant::now();
-    let mut child = start(command, lock)?;
+    let mut child = start(command, confinement)?;
     let stdout = child.stdout.take().map(|pipe| collect(pipe, keep));
     let stderr = child.stderr.take().map(|pipe| collect(pipe, keep));
     let exit = loop {
@@ -33,7 +33,7 @@ pub fn run(
             Exit::OutOfCpu
         } else if cancel.load(Ordering::Relaxed) {
             Exit::Cancelled
-        } else if begin.elapsed().as_secs_f64() >= lock.limits.wall_s {
+        } else if begin.elapsed().as_secs_f64() >= confinement.limits.wall_s {
             Exit::TimedOut
         } else {
             std::thread::sleep(Duration::from_millis(5));

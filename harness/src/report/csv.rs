@@ -4,8 +4,8 @@ use super::number::{is_range, of_part, points, range};
 use super::{BatchReport, ReportError, SubmissionReport};
 use crate::harmless::csv_cell;
 
-/// The grades as CSV (UTF-8, comma, `\n`). The columns are student id, last and first name, name of
-/// the submission, the parts, total, what it is out of, lowest and highest, unconfirmed, time, total before lateness, remarks.
+/// The grades as CSV (UTF-8, comma, `\n`). The columns are student number, last and first name, name of the submission,
+/// the parts, total, what it is out of, lowest and highest, unconfirmed, time, total before lateness, remarks.
 ///
 /// `total` is empty if part of the submission could not be judged, so that nobody imports an undecided number; `lowest`
 /// and `highest` are filled only then. `submitted` and `before_late` say when a submission came and what it earned

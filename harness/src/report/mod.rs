@@ -203,7 +203,7 @@ pub enum ReportError {
     Empty,
     /// The folder of a submission's page has no usable name.
     #[error(
-        "submission {name:?}: expected a plain and unique folder name for its report, found {slug:?}"
+        "submission \"{name}\": expected a plain and unique folder name for its report, found \"{slug}\""
     )]
     Slug {
         /// The submission.

@@ -74,17 +74,6 @@ pub(super) fn seconds(value: f64) -> String {
     if value.abs() < 9.995 { format!("{value:.2} s") } else { format!("{value:.1} s") }
 }
 
-/// A verdict in words.
-pub(super) fn verdict(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Pass => "pass",
-        Verdict::Fail => "fail",
-        Verdict::NotImplemented => "not implemented",
-        Verdict::NotJudged => "not judged",
-        Verdict::NotRun => "not run",
-    }
-}
-
 /// `0.53, at most 0.002`
 pub(super) fn measure(measure: &Measure) -> String {
     format!("{}, at most {}", value(measure.value), value(measure.bound))
@@ -121,9 +110,8 @@ pub(super) fn looks_like(part: &str, diagnoses: &[Diagnosis]) -> Vec<String> {
 }
 
 /// Words of Umbra's own, and what they are called where only the handout's are known.
-const PLAIN: [(&str, &str); 3] = [
+const PLAIN: [(&str, &str); 2] = [
     ("under the witness BSDF", "with a test BSDF in place of yours,"),
-    ("swap not possible", "cannot be judged alone"),
     (" directions probed", " directions"),
 ];
 

@@ -43,14 +43,14 @@ impl TryFrom<Vec<[f64; 2]>> for Curve {
         for pair in points.windows(2) {
             if !(pair[0][0] < pair[1][0] && pair[0][1] >= pair[1][1]) {
                 return Err(format!(
-                    "a curve's errors must rise and its fractions must not: {:?} is followed by {:?}",
-                    pair[0], pair[1]
+                    "a curve's errors must rise and its fractions must not: [{}, {}] is followed by [{}, {}]",
+                    pair[0][0], pair[0][1], pair[1][0], pair[1][1]
                 ));
             }
         }
         match points.iter().find(|p| !(p[0] >= 0.0 && (0.0..=1.0).contains(&p[1]))) {
-            Some(point) => Err(format!(
-                "curve point {point:?}: expected an error of at least 0 and a fraction in [0, 1]"
+            Some([error, fraction]) => Err(format!(
+                "curve point [{error}, {fraction}]: expected an error of at least 0 and a fraction in [0, 1]"
             )),
             None => Ok(Self(points)),
         }

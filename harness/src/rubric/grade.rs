@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::rules::{Part, Rules};
+use crate::columns;
 use crate::evidence::{Check, CheckId, Evidence, Verdict};
 
 /// The check that says whether the source was built; images alone count when it failed.
@@ -14,10 +15,10 @@ pub const BUILD: CheckId = CheckId::SubmissionBuild;
 /// The reason of a part that a private check decides.
 const FOR_THE_INSTRUCTOR: &str = "what its images are worth is for the instructor to decide";
 
-/// What follows in a remark where images alone are worth something.
+/// The part of a remark that says what images alone earn.
 pub const IMAGES_EARN: &str = "; the images alone earn ";
 
-/// What says in remarks and reasons that images count only by the instructor's word.
+/// The part of remarks and reasons that says that images wait for the instructor.
 pub const ONCE_CONFIRMED: &str = " once the instructor confirms";
 
 /// The points of one submission.
@@ -83,7 +84,7 @@ struct PartScore {
     evidence: Vec<String>,
 }
 
-/// Grades a submission. Depends on nothing but its arguments, nor on the order of the checks.
+/// Grades a submission. Pure: depends only on its arguments, not on the order of the checks.
 ///
 /// A part is worth the lower of what it is worth on public and on held-back scenes; checks without a
 /// scene count in both.
@@ -376,7 +377,7 @@ fn without_code(
     Some(if unconfirmed == 0.0 {
         why.clone()
     } else {
-        format!("{why}{IMAGES_EARN}{unconfirmed} points{ONCE_CONFIRMED}")
+        format!("{why}{IMAGES_EARN}{}{ONCE_CONFIRMED}", columns::points(unconfirmed))
     })
 }
 

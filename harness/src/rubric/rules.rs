@@ -129,7 +129,7 @@ impl Rules {
         for (name, path) in &self.paths {
             if !self.parts.iter().any(|part| part.id == path.residual_part && part.path == *name) {
                 return Some(format!(
-                    "path \"{name}\": its residual_part part {} is not its own",
+                    "path \"{name}\": residual_part is \"{}\", which is no part of this path",
                     path.residual_part
                 ));
             }

@@ -1,4 +1,4 @@
-//! The steps by which the locked process confines itself, in an order in which each is still allowed.
+//! The steps by which the payload confines itself, in an order in which each is still allowed.
 
 use std::path::PathBuf;
 
@@ -12,8 +12,8 @@ use nix::unistd::{AccessFlags, access, chdir, setsid};
 use super::privileges::{self, Identity};
 use super::{InForce, Limits, Policy, SandboxError, filter, landlock};
 
-/// Locks this process, a child of init. The last step but the report: the system call filter.
-pub fn lock(policy: &Policy, identity: &Identity) -> Result<InForce, SandboxError> {
+/// Confines this process, a child of init. The last step but the report: the system call filter.
+pub fn confine(policy: &Policy, identity: &Identity) -> Result<InForce, SandboxError> {
     let error = |step: &str, cause: Errno| SandboxError::new("launcher", step, cause);
     // Without a process namespace nothing else ends it with init.
     prctl::set_pdeathsig(Signal::SIGKILL).map_err(|cause| error("follow process 1", cause))?;

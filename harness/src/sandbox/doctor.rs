@@ -18,7 +18,7 @@ const UMBRA: &str = "/umbra";
 pub struct Finding {
     /// Its name in [`Layers`].
     pub layer: String,
-    /// Whether a child was locked with it.
+    /// Whether a child was confined with it.
     pub available: bool,
     /// What it is and in which version, or why it failed.
     pub detail: String,
@@ -80,7 +80,7 @@ fn alone(name: &str) -> Layers {
     layers
 }
 
-/// Locks a child with these layers and executes [`PROBE_COMMAND`] in it.
+/// Confines a child with these layers and executes [`PROBE_COMMAND`] in it.
 fn probe(umbra: &Path, layers: &Layers) -> Result<InForce, SandboxError> {
     let error = |step: &str, cause: &dyn ToString| {
         SandboxError::new("launcher", step.to_owned(), cause.to_string())
@@ -104,9 +104,9 @@ fn probe(umbra: &Path, layers: &Layers) -> Result<InForce, SandboxError> {
         .as_deref()
         .map_or_else(|| Err(error("find the report", &"there is none")), read_report);
     match report {
-        // Without a root of its own the program may be out of reach: then the lock is all.
+        // Without a root of its own the program may be out of reach: then being confined is all.
         Ok(in_force) if status.success() || !layers.mount_ns => Ok(in_force),
-        Ok(_) => Err(error("execute a program in a locked child", &status)),
+        Ok(_) => Err(error("execute a program in a confined child", &status)),
         Err(cause) => Err(cause),
     }
 }

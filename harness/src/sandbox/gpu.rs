@@ -38,7 +38,7 @@ const MANIFESTS: [&str; 5] = [
 ];
 
 impl Gpu {
-    /// What this machine has of the usual drivers', but for what a worker sees anyway; none when there is no device.
+    /// What this machine has of the usual drivers', but for what a worker sees anyway; `None` without a device.
     pub fn of_this_machine(is_seen: &dyn Fn(&Path) -> bool) -> Option<Self> {
         static FOUND: OnceLock<Option<Gpu>> = OnceLock::new();
         FOUND.get_or_init(|| Self::find(is_seen)).clone()

@@ -69,7 +69,7 @@ impl Right {
     }
 }
 
-/// What may be done beneath which path, as the locked process sees it.
+/// What may be done beneath which path, as the payload sees it.
 fn rules(policy: &Policy) -> Vec<(PathBuf, Right)> {
     let read = if policy.kind.may_execute() { Right::ReadAndExecute } else { Right::Read };
     let mut rules = Vec::new();

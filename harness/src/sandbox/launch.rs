@@ -13,7 +13,7 @@ use nix::sys::memfd::{MFdFlags, memfd_create};
 use serde::{Deserialize, Serialize};
 
 use super::process_tree::{self, Ready};
-use super::{EXIT_NOT_LOCKED, InForce, LAUNCH_COMMAND, Policy, SandboxError};
+use super::{EXIT_NOT_CONFINED, InForce, LAUNCH_COMMAND, Policy, SandboxError};
 
 /// What the child reads from its standard input.
 #[derive(Serialize, Deserialize)]
@@ -55,10 +55,10 @@ where
     Ok(command)
 }
 
-/// The hidden command `__launch PROGRAM ARGS...`: locks this process, then becomes the program.
+/// The hidden command `__launch PROGRAM ARGS...`: confines this process, then becomes the program.
 /// Returns only when that failed.
 pub fn launch_main(program: &OsStr, args: &[OsString]) -> ExitCode {
-    let error = match receive().and_then(|policy| process_tree::lock(&policy)) {
+    let error = match receive().and_then(|policy| process_tree::confine(&policy)) {
         Ok(ready) => {
             // The standard library's `exec` also undoes what the Rust runtime did to SIGPIPE.
             let cause = Command::new(program).args(args).exec();
@@ -68,10 +68,10 @@ pub fn launch_main(program: &OsStr, args: &[OsString]) -> ExitCode {
         Err(error) => error,
     };
     eprintln!("umbra: {error}");
-    ExitCode::from(EXIT_NOT_LOCKED)
+    ExitCode::from(EXIT_NOT_CONFINED)
 }
 
-/// Locks this process by the orders on its standard input, which is empty afterwards; every other
+/// Confines this process by the orders on its standard input, which is empty afterwards; every other
 /// file descriptor but standard output and error is closed. Call it first thing in `main`.
 ///
 /// It returns in a grandchild of the process that called it; the other two never return.
@@ -80,7 +80,7 @@ pub fn launch_main(program: &OsStr, args: &[OsString]) -> ExitCode {
 /// When there are no orders, this process has threads, or any layer that was asked for cannot be
 /// had. Then nothing foreign may be touched.
 pub fn confine_self() -> Result<InForce, SandboxError> {
-    receive().and_then(|policy| process_tree::lock(&policy)).map(Ready::go)
+    receive().and_then(|policy| process_tree::confine(&policy)).map(Ready::go)
 }
 
 /// Reads the orders and puts `/dev/null` in their place.
@@ -98,13 +98,13 @@ fn receive() -> Result<Policy, SandboxError> {
     Ok(orders.policy)
 }
 
-/// The host's process id of the locked process behind a launcher, once there is one: its
+/// The host's process id of the payload behind a launcher, once there is one: its
 /// `/proc/PID` shows the memory in use.
-pub fn locked_pid(launcher: u32) -> Option<u32> {
+pub fn payload_pid(launcher: u32) -> Option<u32> {
     child_of(child_of(launcher)?)
 }
 
-/// Ends everything inside by killing the locked process: process 1 then ends and reaps the others,
+/// Ends everything inside by killing the payload: process 1 then ends and reaps the others,
 /// so that the launcher's usage counts all. With `at_once`, or before there is one, process 1 itself is
 /// killed. False when there is nothing to kill (any more).
 pub fn kill_inside(launcher: u32, at_once: bool) -> bool {

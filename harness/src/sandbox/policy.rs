@@ -217,7 +217,7 @@ pub struct Policy {
     /// the links to be read (a program finds its own path by `/proc/self/exe`, as rustc's linker
     /// does) and no other file: `mountinfo` would name the binds' host paths.
     pub proc: bool,
-    /// Which layers lock it.
+    /// Which layers confine it.
     pub layers: Layers,
     /// A file that the launcher writes and the child cannot reach: see [`read_report`].
     #[serde(with = "crate::files::path_json::optional")]
@@ -313,7 +313,7 @@ pub struct InForce {
     pub landlock_abi: u32,
 }
 
-/// Why a child could not be locked: the machine's or Umbra's matter, never the submission's.
+/// Why a child could not be confined: the machine's or Umbra's matter, never the submission's.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("sandbox, {layer}: cannot {step}: {cause}{}", hint_text(.hint))]
 pub struct SandboxError {
@@ -350,12 +350,12 @@ impl SandboxError {
 /// ran. It is written before foreign code runs, by a process that foreign code cannot reach.
 ///
 /// # Errors
-/// When the child was not locked, or ended before it was.
+/// When the child was not confined, or ended before it was.
 pub fn read_report(path: &Path) -> Result<InForce, SandboxError> {
     let error = |cause: String| SandboxError::new("launcher", "read the sandbox's report", cause);
     let text = std::fs::read_to_string(path).map_err(|cause| error(cause.to_string()))?;
     if text.trim().is_empty() {
-        return Err(error("the child ended before it was locked".to_owned()));
+        return Err(error("the child ended before it was confined".to_owned()));
     }
     serde_json::from_str::<Result<InForce, SandboxError>>(&text)
         .map_err(|cause| error(cause.to_string()))?
@@ -407,7 +407,7 @@ mod tests {
         assert!(read_report(&path).is_err());
         std::fs::write(&path, "").expect("a file");
         let silence = read_report(&path).expect_err("nothing was reported").to_string();
-        assert!(silence.ends_with("the child ended before it was locked"), "{silence}");
+        assert!(silence.ends_with("the child ended before it was confined"), "{silence}");
         let failed = SandboxError::new("net_ns", "enter it", "EPERM").hint("be root");
         let text = serde_json::to_string(&Err::<InForce, _>(&failed)).expect("plain data");
         std::fs::write(&path, text).expect("a file");

@@ -21,7 +21,7 @@ pub const NOBODY: u32 = 65534;
 pub struct Identity {
     /// Whether Umbra is root.
     pub root: bool,
-    /// The host's user id of the locked process.
+    /// The host's user id of the payload.
     pub host_uid: u32,
     host_gid: u32,
     /// Its user id as it sees it itself.

@@ -1,4 +1,4 @@
-//! The three processes: launcher, init, locked.
+//! The three processes: launcher, init, payload.
 
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -20,7 +20,7 @@ use nix::unistd::{ForkResult, Pid, fork, getppid, pipe2};
 use super::cgroup::Group;
 use super::policy::SCRATCH;
 use super::privileges::{self, Identity};
-use super::{Bind, EXIT_NOT_LOCKED, InForce, Policy, SandboxError, confine, root};
+use super::{Bind, EXIT_NOT_CONFINED, InForce, Policy, SandboxError, confine, root};
 
 /// Ends this process with the thread that started it.
 ///
@@ -36,7 +36,7 @@ pub fn follow(parent: u32) -> Result<(), SandboxError> {
     }
 }
 
-/// The locked process, ready to run foreign code, and its pipe to the launcher.
+/// The payload, ready to run foreign code, and its pipe to the launcher.
 pub struct Ready {
     in_force: InForce,
     report: Report,
@@ -56,7 +56,7 @@ impl Ready {
     }
 }
 
-/// The pipe through which init and the locked process tell the launcher how far they got.
+/// The pipe through which init and the payload tell the launcher how far they got.
 struct Report(File);
 
 impl Report {
@@ -69,9 +69,9 @@ impl Report {
     }
 }
 
-/// Locks this process by `policy`: returns in the locked process. An error is returned in the
+/// Confines this process by `policy`: returns in the payload. An error is returned in the
 /// launcher; of the other two, the one that failed has ended.
-pub fn lock(policy: &Policy) -> Result<Ready, SandboxError> {
+pub fn confine(policy: &Policy) -> Result<Ready, SandboxError> {
     let error = |step: &str, cause: Errno| SandboxError::new("launcher", step, cause);
     single_threaded()?;
     close_from_3().map_err(|cause| error("close inherited files", cause))?;
@@ -107,7 +107,7 @@ fn begin(policy: &Policy) -> Result<Side, SandboxError> {
     let (status_out, status_in) = pipe()?;
     // Held by the launcher alone: init waits for a byte from it, and hangs up with it.
     let (life_out, life_in) = pipe()?;
-    // SAFETY: this process has one thread (checked in `lock`).
+    // SAFETY: this process has one thread (checked in `confine`).
     match unsafe { fork() }.map_err(|cause| error("make process 1", cause))? {
         ForkResult::Parent { child } => {
             let mut life = File::from(life_in);
@@ -126,13 +126,13 @@ fn begin(policy: &Policy) -> Result<Side, SandboxError> {
             std::mem::forget(group);
             let mut report = Report(File::from(report_in));
             match init(policy, &identity, File::from(life_out)) {
-                Ok(Some((locked, copies))) => {
+                Ok(Some((payload, copies))) => {
                     drop(report);
-                    watch(locked, copies, policy, File::from(status_in))
+                    watch(payload, copies, policy, File::from(status_in))
                 }
                 Ok(None) => {
                     drop(status_in);
-                    match confine::lock(policy, &identity) {
+                    match confine::confine(policy, &identity) {
                         Ok(in_force) => {
                             report.send(&Ok(in_force.clone()));
                             Ok(Side::Locked(Ready { in_force, report }))
@@ -148,7 +148,7 @@ fn begin(policy: &Policy) -> Result<Side, SandboxError> {
 
 fn give_up(report: &mut Report, error: SandboxError) -> ! {
     report.send(&Err(error));
-    exit(EXIT_NOT_LOCKED.into())
+    exit(EXIT_NOT_CONFINED.into())
 }
 
 /// What to copy when all is over.
@@ -201,7 +201,7 @@ fn copy(scratch: &OwnedFd, beneath: &Path, host: &mut File, limit: u64) -> io::R
     Ok(())
 }
 
-/// Becomes process 1 and makes the process that will be locked: that one gets nothing back.
+/// Becomes process 1 and makes the payload: that one gets nothing back.
 fn init(
     policy: &Policy,
     identity: &Identity,
@@ -230,21 +230,23 @@ fn init(
         _ => return Err(error("follow the launcher", &"it is gone")),
     }
     // SAFETY: this process has one thread: it is a fork of one that had one.
-    match unsafe { fork() }.map_err(|cause| error("make the locked process", &cause))? {
+    match unsafe { fork() }.map_err(|cause| error("make the payload", &cause))? {
         ForkResult::Parent { child } => Ok(Some((child, copies))),
         ForkResult::Child => Ok(None),
     }
 }
 
-/// Process 1: reaps children until the locked process ends, kills all others, collects files, reports the exit code,
+/// Process 1: reaps children until the payload ends, kills all others, collects files, reports the exit code,
 /// exits.
-fn watch(locked: Pid, copies: Copies, policy: &Policy, mut status: File) -> ! {
+fn watch(payload: Pid, copies: Copies, policy: &Policy, mut status: File) -> ! {
     let code = loop {
         match waitpid(None, None) {
-            Ok(WaitStatus::Exited(pid, code)) if pid == locked => break code & 0xff,
-            Ok(WaitStatus::Signaled(pid, signal, _)) if pid == locked => break 256 + signal as i32,
+            Ok(WaitStatus::Exited(pid, code)) if pid == payload => break code & 0xff,
+            Ok(WaitStatus::Signaled(pid, signal, _)) if pid == payload => {
+                break 256 + signal as i32;
+            }
             Ok(_) | Err(Errno::EINTR) => {}
-            Err(_) => exit(EXIT_NOT_LOCKED.into()),
+            Err(_) => exit(EXIT_NOT_CONFINED.into()),
         }
     };
     if policy.layers.pid_ns {
@@ -269,13 +271,13 @@ struct Launcher {
 }
 
 impl Launcher {
-    /// Waits for the locked process and ends in the same way. Returns only if the child was not locked.
+    /// Waits for the payload and ends in the same way. Returns only if the child was not confined.
     fn attend(mut self, report_file: Option<File>) -> Result<Ready, SandboxError> {
-        // Ends when the locked process closes its end, or is gone.
+        // Ends when the payload closes its end, or is gone.
         let mut text = String::new();
         let _ = self.report.read_to_string(&mut text);
         let report = text.lines().next_back().map_or_else(
-            || Err(SandboxError::new("launcher", "lock its child", "it ended early")),
+            || Err(SandboxError::new("launcher", "confine its child", "it ended early")),
             |line| {
                 serde_json::from_str::<Result<InForce, SandboxError>>(line)
                     .unwrap_or_else(|e| Err(SandboxError::new("launcher", "read its child", e)))
@@ -331,7 +333,7 @@ fn exit(code: i32) -> ! {
 }
 
 fn single_threaded() -> Result<(), SandboxError> {
-    let error = |cause: &str| SandboxError::new("launcher", "lock itself", cause);
+    let error = |cause: &str| SandboxError::new("launcher", "confine itself", cause);
     let tasks = std::fs::read_dir("/proc/self/task").map_err(|e| error(&e.to_string()))?.count();
     if tasks == 1 { Ok(()) } else { Err(error(&format!("it has {tasks} threads, expected 1"))) }
 }

@@ -52,7 +52,7 @@ pub struct ViewedCase {
 /// One image of a case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// What its values are.
     pub kind: LayerKind,

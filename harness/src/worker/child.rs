@@ -21,11 +21,11 @@ use crate::plugin::{
 };
 use crate::process::{self, exit_now};
 
-/// Locks this process, then answers the job in `dir`. Does not return when it worked.
+/// Confines this process, then answers the job in `dir`. Does not return when it worked.
 pub fn child_main(dir: &Path) -> ExitCode {
     if let Err(error) = process::confine_self().and_then(|()| work(dir)) {
         eprintln!("umbra: the worker cannot work: {error}");
-        return ExitCode::from(process::EXIT_NOT_LOCKED);
+        return ExitCode::from(process::EXIT_NOT_CONFINED);
     }
     // The answers are in place; what a plugin wants to do at exit concerns nobody.
     exit_now(0)
@@ -196,7 +196,7 @@ fn no_image() -> CallError {
     CallError { kind: CallErrorKind::Ours, message: "not a request for such an image".to_owned() }
 }
 
-/// Answers a request for an image in this very process, without a lock: for authors who debug their own
+/// Answers a request for an image in this very process, without isolation: for authors who debug their own
 /// plugin, whose prints and breakpoints then work. Never for foreign code.
 ///
 /// # Errors

@@ -90,14 +90,14 @@ impl LiveWorker {
         };
         let (cameras, frames) = (pipe(&cameras, 0o644)?, pipe(&frames, 0o600)?);
         let job = Job { plugin: Some(plugin), requests: vec![request.clone()] };
-        let Ready { files, command, lock, _program: program } =
+        let Ready { files, command, confinement, _program: program } =
             supervisor.ready(private.path(), &job, &[&request], &limits, true)?;
         let (asked, cancel) = (Arc::<FrameCounts>::default(), Arc::<AtomicBool>::default());
         let (seen, ends) = (Arc::clone(&asked), Arc::clone(&cancel));
         let thread = std::thread::spawn(move || {
             let _program = program;
             let mut watch = Watch::new(&seen, &ends);
-            process::run(command, &lock, KEEP_OUTPUT, &ends, &mut |cpu_s| watch.look(cpu_s))
+            process::run(command, &confinement, KEEP_OUTPUT, &ends, &mut |cpu_s| watch.look(cpu_s))
         });
         let thread = Some(thread);
         Ok(Self { request, files, cameras, frames, asked, cancel, thread, _private: private })

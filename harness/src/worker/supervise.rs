@@ -88,13 +88,13 @@ impl Supervisor {
         [self.umbra.clone(), program_beside(&self.umbra)]
     }
 
-    /// To be held by what runs beside others; waits while someone has the machine for itself.
+    /// Returns a guard for work that may run in parallel. Blocks while a confirmation has the machine to itself.
     pub fn beside_others(&self) -> RwLockReadGuard<'_, ()> {
         self.machine.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Does something beside others, and where it ran out of time once more, alone on the machine:
-    /// a busy machine is nobody's fault. For work that is done only once; jobs have a [`RetryBudget`].
+    /// Runs `once` in parallel with other work. If it timed out, runs it again alone on the machine, since a busy
+    /// machine is nobody's fault. For work that is done only once; jobs have a [`RetryBudget`].
     pub fn confirming_timeouts<T>(
         &self,
         once: impl Fn() -> T,
@@ -139,8 +139,8 @@ impl Supervisor {
         let mut report = JobReport { outcomes: Vec::new(), renderer: None, runs: Vec::new() };
         let mut pending: Vec<usize> = (0..count).collect();
         let used_up = || job.plugin.is_some() && retries.used_up().is_some();
-        // Which requests were asked again because their worker was ended from outside. A renderer can do that to itself:
-        // then it ends so again, and is to blame.
+        // Which requests were asked again because their worker was ended from outside. A renderer can do that to
+        // itself: then it ends so again, and is to blame.
         let mut ended_before = vec![false; count];
         loop {
             // Each worker settles one request, or is the second to be ended from outside at it, so this ends.
@@ -176,8 +176,8 @@ impl Supervisor {
             report.runs.push(WorkerRun { requests: pending.clone(), ended: run.ended });
             if exit.is_from_outside() {
                 for &index in &pending {
-                    let blamed = matches!(outcomes[index], Some(Outcome::CrashedBySignal(_)));
-                    if blamed && !std::mem::replace(&mut ended_before[index], true) {
+                    let ended_it = matches!(outcomes[index], Some(Outcome::CrashedBySignal(_)));
+                    if ended_it && !std::mem::replace(&mut ended_before[index], true) {
                         outcomes[index] = None;
                     }
                 }
@@ -260,8 +260,8 @@ impl Supervisor {
         let command = command(&program, private, &own, requests, limits, driver.as_deref());
         let mut policy = own.policy;
         policy.read_only.extend(driver.filter(elsewhere).map(Bind::same));
-        let lock = Confinement::new(limits, policy);
-        Ok(Ready { files, command, lock, _program: program })
+        let confinement = Confinement::new(limits, policy);
+        Ok(Ready { files, command, confinement, _program: program })
     }
 
     fn run_worker(
@@ -275,12 +275,12 @@ impl Supervisor {
         let private = self.private_folder()?;
         let requests: Vec<_> = pending.iter().map(|&index| &job.requests[index]).collect();
         let ready = self.ready(private.path(), job, &requests, &allowed.limits, false)?;
-        let Ready { mut files, command, lock, .. } = ready;
+        let Ready { mut files, command, confinement, .. } = ready;
         let mut last = Instant::now();
         // The question that is being worked at, and the CPU time at its beginning. Both are the worker's
         // word; the kernel limits them all together.
         let (mut current, mut since_cpu_s) = (0, 0.0);
-        let ended = process::run(command, &lock, KEEP_OUTPUT, cancel, &mut |cpu_s| {
+        let ended = process::run(command, &confinement, KEEP_OUTPUT, cancel, &mut |cpu_s| {
             if last.elapsed() >= PROGRESS_INTERVAL {
                 last = Instant::now();
                 if let Ok(records) = files.records() {
@@ -349,7 +349,7 @@ struct Run {
 pub(super) struct Ready {
     pub files: Files,
     pub command: Command,
-    pub lock: Confinement,
+    pub confinement: Confinement,
     /// To be held until it has started.
     pub _program: Program,
 }

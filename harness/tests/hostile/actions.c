@@ -431,7 +431,7 @@ int action(const char *what, float *values, size_t count, UmbraMessage *message,
     DEED("close_all", (closefrom(0), UMBRA_STATUS_OK))
     DEED("forge_answers", forge_answers())
     DEED("forge_no_start", forge_word(0, 0, 0, 0))
-    DEED("forge_not_locked", forge_word(0, 0, 0, 70))
+    DEED("forge_not_confined", forge_word(0, 0, 0, 71))
     DEED("forge_bug", forge_bug())
     DEED("lost_device", (say(message, "the graphics device was lost"), UMBRA_STATUS_NO_ADAPTER))
     DEED("lost_in_words", say(message, "the graphics device \"llvmpipe\" was lost: device lost"))

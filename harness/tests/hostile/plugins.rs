@@ -212,7 +212,7 @@ pub fn all() -> Vec<Plugin> {
         c("cuts_the_result_channel", "truncate", Rejected("cut the file short")).alone(),
         c("forges_answers", "forge_answers", Anything).alone(),
         c("forges_that_it_never_began", "forge_no_start", Ours).alone(),
-        c("forges_that_it_was_not_locked", "forge_not_locked", Ours).alone(),
+        c("forges_that_it_was_not_confined", "forge_not_confined", Ours).alone(),
         c("forges_a_bug_of_ours", "forge_bug", Ours).alone(),
         c("unknown_status", "status", Failed("the plugin answered with the unknown status 77")),
         c("endless_message", "long_message", Failed("\0\0")),

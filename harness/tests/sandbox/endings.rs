@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use umbra::sandbox::{Bind, EXIT_NOT_LOCKED, Kind, Layers, locked_pid};
+use umbra::sandbox::{Bind, EXIT_NOT_CONFINED, Kind, Layers, payload_pid};
 
 use super::fixture::{Fixture, Who, everyone, open_to_all, piped, survivors, wait};
 
@@ -28,9 +28,9 @@ fn endings_are_mirrored() {
             assert_eq!(status(&["exit", "3"]).code(), Some(3));
             assert_eq!(status(&["abort"]).signal(), Some(6));
             assert_eq!(status(&["segv"]).signal(), Some(11));
-            // The code of a failed lock is no proof of one.
-            let forged = fixture.attack(&policy, &["exit", &EXIT_NOT_LOCKED.to_string()]);
-            assert_eq!(forged.status.code(), Some(EXIT_NOT_LOCKED.into()));
+            // The code of a failed confinement is no proof of one.
+            let forged = fixture.attack(&policy, &["exit", &EXIT_NOT_CONFINED.to_string()]);
+            assert_eq!(forged.status.code(), Some(EXIT_NOT_CONFINED.into()));
             assert!(forged.report.is_ok());
         }
     }
@@ -86,13 +86,13 @@ fn killing_the_launcher_ends_everything() {
         for kind in [Kind::Worker, Kind::Build] {
             let policy = fixture.policy(kind, Layers::full());
             let mut child = piped(&mut fixture.command(&policy, &["sleep", "60"]));
-            let locked = until(|| locked_pid(child.id())).expect("a locked process");
-            assert!(Path::new(&format!("/proc/{locked}")).exists());
+            let payload = until(|| payload_pid(child.id())).expect("a payload");
+            assert!(Path::new(&format!("/proc/{payload}")).exists());
             child.kill().expect("our child");
             child.wait().expect("our child");
             assert_eq!(survivors(&fixture.path("")), Vec::<String>::new());
-            until(|| (!Path::new(&format!("/proc/{locked}")).exists()).then_some(()))
-                .expect("the locked process is gone");
+            until(|| (!Path::new(&format!("/proc/{payload}")).exists()).then_some(()))
+                .expect("the payload is gone");
         }
     }
 }
@@ -104,7 +104,7 @@ fn a_child_dies_with_the_thread_that_started_it() {
     let mut child = std::thread::scope(|scope| {
         let start = || {
             let child = piped(&mut fixture.command(&policy, &["sleep", "60"]));
-            until(|| locked_pid(child.id())).expect("a locked process");
+            until(|| payload_pid(child.id())).expect("a payload");
             child
         };
         scope.spawn(start).join().expect("no panic")
@@ -209,9 +209,9 @@ fn what_cannot_be_had_is_an_error() {
         }
         for (layer, policy) in broken {
             let outcome = fixture.attack(&policy, &["write", "/scratch/mine"]);
-            assert_eq!(outcome.status.code(), Some(EXIT_NOT_LOCKED.into()), "{outcome:?}");
+            assert_eq!(outcome.status.code(), Some(EXIT_NOT_CONFINED.into()), "{outcome:?}");
             assert_eq!(outcome.word, "", "nothing ran");
-            let error = outcome.report.expect_err("it was not locked");
+            let error = outcome.report.expect_err("it was not confined");
             assert_eq!(error.layer, layer, "{error}");
             assert_eq!(outcome.stderr.trim_end(), format!("umbra: {error}"));
         }

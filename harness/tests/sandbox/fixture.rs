@@ -13,7 +13,7 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use umbra::sandbox::{
-    Bind, EXIT_NOT_LOCKED, InForce, Kind, Layers, Policy, SandboxError, confine_self, orders,
+    Bind, EXIT_NOT_CONFINED, InForce, Kind, Layers, Policy, SandboxError, confine_self, orders,
     read_report,
 };
 
@@ -249,8 +249,8 @@ pub fn open_to_all(path: &Path, mode: u32) {
     fs::set_permissions(path, fs::Permissions::from_mode(mode)).expect("our own file");
 }
 
-/// Makes this test program a locked child of kind `Worker` when a test started it as one. A
-/// constructor, because a process must lock itself before it has threads, and the test library
+/// Makes this test program a confined child of kind `Worker` when a test started it as one. A
+/// constructor, because a process must confine itself before it has threads, and the test library
 /// always makes one.
 extern "C" fn worker_child() {
     let Ok(words) = std::env::var(ATTACK) else { return };
@@ -258,7 +258,7 @@ extern "C" fn worker_child() {
         words.lines().map(|word| std::ffi::CString::new(word).expect("no zero byte")).collect();
     if let Err(error) = confine_self() {
         eprintln!("umbra: {error}");
-        std::process::exit(EXIT_NOT_LOCKED.into());
+        std::process::exit(EXIT_NOT_CONFINED.into());
     }
     let mut pointers: Vec<_> = words[1..].iter().map(|word| word.as_ptr()).collect();
     let count = pointers.len() as i32;

@@ -26,9 +26,9 @@ fn expect(layer: &str, who: Who, kind: Kind, attacks: &[(Vec<String>, &str)], fi
         let args = &args.iter().map(String::as_str).collect::<Vec<_>>()[..];
         let free = fixture.attack(&fixture.policy(kind, Layers::NONE), args);
         assert_eq!(free.verdict(), "ok", "{who:?}, no layer, {args:?}: {free:?}");
-        let locked = fixture.attack(&fixture.policy(kind, only(layer, who)), args);
-        assert_eq!(locked.verdict(), *errno, "{who:?}, {layer}, {args:?}: {locked:?}");
-        let in_force = locked.report.as_ref().expect("a report");
+        let confined = fixture.attack(&fixture.policy(kind, only(layer, who)), args);
+        assert_eq!(confined.verdict(), *errno, "{who:?}, {layer}, {args:?}: {confined:?}");
+        let in_force = confined.report.as_ref().expect("a report");
         assert_eq!(in_force.layers, only(layer, who));
     }
 }

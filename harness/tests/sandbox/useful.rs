@@ -13,7 +13,7 @@ fn sysroot() -> String {
     String::from_utf8(output.stdout).expect("a path").trim().to_owned()
 }
 
-/// Compiles a library in a locked child, as root: its toolchain may lie in a home of mode 0700.
+/// Compiles a library in a confined child, as root: its toolchain may lie in a home of mode 0700.
 fn compile(fixture: &Fixture, source: &str) -> (Output, Vec<u8>) {
     let at = |name: &str| fixture.path(name);
     std::fs::create_dir_all(at("src")).expect("a folder");
@@ -24,7 +24,7 @@ fn compile(fixture: &Fixture, source: &str) -> (Output, Vec<u8>) {
     policy.read_only.push(Bind::new(at("src"), SRC));
     policy.collect.push(Bind::new(at("lib.so"), "/scratch/lib.so"));
     policy.scratch.quota_mib = 64;
-    let output = locked(
+    let output = confined(
         fixture,
         &policy,
         "/toolchain/bin/rustc",
@@ -40,7 +40,7 @@ fn compile(fixture: &Fixture, source: &str) -> (Output, Vec<u8>) {
     (output, std::fs::read(at("lib.so")).expect("a file"))
 }
 
-fn locked(fixture: &Fixture, policy: &Policy, program: &str, args: &[&str]) -> Output {
+fn confined(fixture: &Fixture, policy: &Policy, program: &str, args: &[&str]) -> Output {
     let mut command = command(Path::new(UMBRA), policy, Path::new(program), args).expect("orders");
     as_user(&mut command, fixture.who);
     command.env("PATH", "/usr/bin:/bin").env("TMPDIR", "/scratch").env("HOME", "/scratch");
@@ -103,7 +103,7 @@ fn the_linker_works_for_everyone() {
         open_to_all(Path::new(&fixture.path("lib.so")), 0o666);
         policy.collect.push(Bind::new(fixture.path("lib.so"), "/scratch/lib.so"));
         let args = ["-shared", "-fPIC", "-o", "/scratch/lib.so", "/src/a.c"];
-        let output = locked(&fixture, &policy, "/usr/bin/cc", &args);
+        let output = confined(&fixture, &policy, "/usr/bin/cc", &args);
         assert!(output.status.success(), "{who:?}: {output:?}");
         assert!(std::fs::read(fixture.path("lib.so")).expect("a file").starts_with(b"\x7fELF"));
     }

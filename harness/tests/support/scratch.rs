@@ -34,7 +34,7 @@ impl Scratch {
         all
     }
 
-    /// In a locked child, as submissions are; in this process the same must come out.
+    /// In a confined child, as submissions are; in this process the same must come out.
     pub fn unpack(
         &self,
         bytes: &[u8],

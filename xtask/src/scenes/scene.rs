@@ -55,9 +55,9 @@ pub struct Shape {
 pub struct Scene {
     /// The folder below `scenes/a2`.
     pub folder: String,
-    /// What the TOML files are called before `_offline`, `_realtime` and `_realtime_bonus`.
+    /// Name of the TOML files before `_offline`, `_realtime` and `_realtime_bonus`.
     pub name: &'static str,
-    /// What the OBJ and MTL files are called.
+    /// Name of the OBJ and MTL files.
     pub mesh_name: &'static str,
     /// Whether there is a `_realtime_bonus` variant.
     pub bonus: bool,

@@ -25,7 +25,8 @@ pub fn ball(centre: DVec3, radius: f64) -> Mesh {
     sphere_band(centre, radius, 32, 16, 1.0)
 }
 
-/// The part of a sphere from its upper pole down to the fraction `part` of the way to the lower pole, seen from outside.
+/// The part of a sphere from its upper pole down to the fraction `part` of the way to the lower pole, seen from
+/// outside.
 pub fn sphere_band(centre: DVec3, radius: f64, segments: usize, rings: usize, part: f64) -> Mesh {
     Mesh::grid(segments, rings, |u, v| {
         // Exact values at the seam and at the poles keep the mesh watertight.

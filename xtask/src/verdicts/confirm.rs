@@ -14,7 +14,7 @@ use super::figures::Figure;
 use super::row::Row;
 use crate::parallel;
 
-/// What this is called in `--only`.
+/// Its name in `--only`.
 pub const NAME: &str = "unseen scenes";
 
 /// Primes after a million. A seed is spent once a threshold was changed by what it showed: then

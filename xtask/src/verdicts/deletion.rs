@@ -47,7 +47,7 @@ enum EvidenceRule {
     /// What judges inside checks.
     Measure(RuleId),
     /// The path's `residual_part` pays for unexplained errors.
-    Blame(String),
+    Residual(String),
 }
 
 impl EvidenceRule {
@@ -57,9 +57,9 @@ impl EvidenceRule {
         let named = parts.flat_map(|part| [&part.evidence, &part.fallback, &part.images_only]);
         let checks = named.flatten().chain(rules.gates.iter().map(|gate| &gate.check));
         let checks = checks.chain(rules.paths.values().map(|path| &path.proof));
-        let blames = rules.paths.keys().map(|path| Self::Blame(path.clone()));
+        let residuals = rules.paths.keys().map(|path| Self::Residual(path.clone()));
         let measures = RuleId::ALL.iter().map(|rule| Self::Measure(*rule));
-        checks.map(|id| Self::Check(*id)).chain(blames).chain(measures).collect()
+        checks.map(|id| Self::Check(*id)).chain(residuals).chain(measures).collect()
     }
 
     /// Whether only a submission can break it: by its tree or its images.
@@ -69,7 +69,7 @@ impl EvidenceRule {
                 id.name().starts_with("submission.") || id.name().starts_with("submitted.")
             }
             Self::Measure(rule) => *rule == RuleId::ImageSize,
-            Self::Blame(_) => false,
+            Self::Residual(_) => false,
         }
     }
 
@@ -90,7 +90,7 @@ impl EvidenceRule {
                     }
                 }
             }
-            Self::Blame(path) => {
+            Self::Residual(path) => {
                 if let Some(path) = rules.paths.get_mut(path) {
                     path.residual_part.clear();
                 }
@@ -105,7 +105,7 @@ impl fmt::Display for EvidenceRule {
         match self {
             Self::Check(id) => write!(f, "the check {id}"),
             Self::Measure(rule) => write!(f, "the rule {rule}"),
-            Self::Blame(path) => write!(f, "the blame of the path {path}"),
+            Self::Residual(path) => write!(f, "the residual part of path {path}"),
         }
     }
 }

@@ -79,7 +79,7 @@ impl Row {
         self.diagnoses.iter().all(said) && mentioned
     }
 
-    /// What the diagnosis says, in one line.
+    /// The diagnosis in one line.
     pub fn said(&self) -> String {
         let each = self.diagnoses.iter().map(|found| format!("{} {}", found.part, found.words));
         let said = each.collect::<Vec<_>>().join(" | ");

@@ -13,9 +13,9 @@ const SHADOW_VS: Stage =
 
 /// Draws what blocks the scene's light.
 pub fn draw_shadow_map(gpu: &Gpu, scene: &Scene) -> Result<ShadowMap> {
-    // TODO(A2) 2.5 (bonus): rasterize the scene from the point of view of the light source and store
-    // its depth: a `ShadowMap` has one layer for each view of the light (one that covers the scene,
-    // or six that look in all directions), drawn with `ShadowMap::begin` and `Gpu::depth_pipeline`.
-    // Leave emitters out. Then look the map up in the fragment shaders.
+    // TODO(A2) 2.5 (bonus): draw the scene's depth from the light into a `ShadowMap`. Use one layer
+    // for each view of the light: one that covers the scene, or six in all directions.
+    // `ShadowMap::begin` and `Gpu::depth_pipeline` draw a layer. Leave emitters out. Then look the
+    // map up in the fragment shaders.
     Err(Error::NotImplemented("2.5 shadow mapping (bonus)".into()))
 }

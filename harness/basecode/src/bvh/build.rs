@@ -1,6 +1,6 @@
-//! A binary tree by the surface area heuristic, in bins (Wald, "On fast Construction of SAH-based Bounding Volume
-//! Hierarchies", 2007), and what each of its subtrees would cost as part of a tree of eight children (Ylitie, Karras
-//! and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", 2017).
+//! Builds a binary tree by the binned surface area heuristic (Wald, "On fast Construction of SAH-based Bounding Volume
+//! Hierarchies", 2007). It also computes the cost of each subtree as part of an eight-wide tree (Ylitie, Karras and
+//! Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", 2017).
 //!
 //! The tree does not depend on the number of threads: each task's part of it has its own place from the beginning.
 
@@ -218,7 +218,7 @@ fn shared(left: &[f32; 7], right: &[f32; 7], slots: usize) -> (usize, f32) {
 }
 
 /// Grows the tree: the upper levels one after the other, each level's parts at once, and then all parts that are left.
-/// Answers the nodes of the upper levels, whose costs are still to be set.
+/// Returns the nodes of the upper levels, whose costs are still to be set.
 fn grow(whole: Part, threads: usize) -> Vec<usize> {
     let (mut upper, mut level, mut parts) = (Vec::new(), vec![whole], Vec::new());
     while threads > 1 && !level.is_empty() {

@@ -102,7 +102,7 @@ impl Gpu {
             memory_hints: wgpu::MemoryHints::MemoryUsage,
             ..wgpu::DeviceDescriptor::default()
         }))
-        .map_err(|error| Error::NoAdapter(format!("cannot open {:?}: {error}", info.name)))?;
+        .map_err(|error| Error::NoAdapter(format!("cannot open \"{}\": {error}", info.name)))?;
         let trouble = Arc::new(Mutex::new(Trouble::default()));
         let shared = Arc::clone(&trouble);
         device.set_device_lost_callback(move |_, why| {
@@ -227,7 +227,7 @@ impl Gpu {
                 value
             }
             Some(wgpu::Error::OutOfMemory { .. }) => Err(Error::Gpu(format!(
-                "the graphics device {:?} is out of memory",
+                "the graphics device \"{}\" is out of memory",
                 self.adapter.name
             ))),
             Some(error) => Err(Error::Gpu(readable(&error.to_string()))),
@@ -236,7 +236,7 @@ impl Gpu {
 
     /// The error for a device that was lost.
     pub(super) fn lost(&self, why: &str) -> Error {
-        Error::NoAdapter(format!("the graphics device {:?} was lost: {why}", self.adapter.name))
+        Error::NoAdapter(format!("the graphics device \"{}\" was lost: {why}", self.adapter.name))
     }
 }
 
@@ -256,15 +256,27 @@ fn rank(kind: wgpu::DeviceType) -> u32 {
     }
 }
 
+fn words(kind: wgpu::DeviceType) -> &'static str {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+        wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+        wgpu::DeviceType::VirtualGpu => "virtual GPU",
+        wgpu::DeviceType::Other => "other",
+        wgpu::DeviceType::Cpu => "CPU",
+    }
+}
+
 fn no_adapter(kind: AdapterKind, name: &str, found: &[wgpu::AdapterInfo]) -> Error {
     let wanted = match kind {
         AdapterKind::Any => "graphics adapter",
         AdapterKind::Software => "software graphics adapter",
         AdapterKind::Hardware => "hardware graphics adapter",
     };
-    let named = if name.is_empty() { String::new() } else { format!(" named like {name:?}") };
-    let found: Vec<_> =
-        found.iter().map(|info| format!("{:?} ({:?})", info.name, info.device_type)).collect();
+    let named = if name.is_empty() { String::new() } else { format!(" named like \"{name}\"") };
+    let found: Vec<_> = found
+        .iter()
+        .map(|info| format!("\"{}\" ({})", info.name, words(info.device_type)))
+        .collect();
     let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
     Error::NoAdapter(format!("no {wanted}{named} on this machine; found {found}; {HINT}"))
 }

@@ -12,17 +12,17 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 
 use super::COLOR_FORMAT;
 
-/// Not the name of a stage. If the host replaces it, the text holds a fragment entry point `umbra_shown`, which then
-/// draws all fragments of the picture.
+/// A host switch in the form of a stage name. When the host sets it, its text holds a fragment entry point
+/// `umbra_shown`, which draws all fragments of the picture.
 pub const EVERY_FRAGMENT: &str = "every.fs";
-/// Not the name of a stage. If the host replaces it, only the outlines of triangles are drawn. On a device that cannot
-/// draw outlines nothing changes, not even the fragments.
+/// A host switch in the form of a stage name. When the host sets it, only the outlines of triangles are drawn. On a
+/// device that cannot draw outlines nothing changes, not even the fragments.
 pub const OUTLINES: &str = "outlines";
-/// Not the name of a stage. If the host replaces it, pipelines that do not draw the picture, such as those of a shadow
-/// map, write nothing.
+/// A host switch in the form of a stage name. When the host sets it, pipelines that do not draw the picture, such as
+/// those of a shadow map, write nothing.
 pub const EMPTY_MAPS: &str = "empty.maps";
-/// Not the name of a stage. If the host replaces it, the pass is made for a scene whose normals are all negated: what
-/// it draws rightly then, it draws by a normal that is negated once more.
+/// A host switch in the form of a stage name. When the host sets it, the pass is made for a scene whose normals are all
+/// negated: what it draws rightly then, it draws by a normal that is negated once more.
 pub const NEGATED_NORMALS: &str = "negated.normals";
 
 /// Name of the entry point in the text of [`EVERY_FRAGMENT`].

@@ -49,7 +49,9 @@ use crate::{Camera, Result};
 
 /// A realtime renderer of one scene, made by [`crate::Renderer::render_pass`].
 pub trait RenderPass {
-    /// Draws one frame of the scene as `camera` sees it, over whatever `target` held.
+    /// Draws one frame of the scene as `camera` sees it, over whatever `target` held: linear
+    /// radiance [W m^-2 sr^-1]. `camera` is that of the frame, whatever the scene's own is; its
+    /// position and matrices belong in the uniforms.
     ///
     /// # Errors
     /// When the graphics library refuses a command.

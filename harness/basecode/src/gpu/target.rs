@@ -33,7 +33,7 @@ impl Target {
             || bytes > limits.max_buffer_size
         {
             return Err(Error::Argument(format!(
-                "target is {width}x{height} but {:?} can draw 1 to {side} pixels in each \
+                "target is {width}x{height} but \"{}\" can draw 1 to {side} pixels in each \
                  direction and {} MiB in all",
                 gpu.adapter.name,
                 limits.max_buffer_size >> 20
@@ -80,7 +80,7 @@ impl Target {
         })
     }
 
-    /// Reads the colors back.
+    /// Reads the colors back: linear radiance [W m^-2 sr^-1], row-major, row 0 on top.
     ///
     /// # Errors
     /// When the device was lost.

@@ -57,8 +57,8 @@ pub(super) fn bytes_of(name: &str) -> Option<Vec<u8>> {
     name.chars().map(byte).collect()
 }
 
-/// The text of a file: UTF-8 or UTF-16 by its byte order mark, UTF-16 by its zeros, else each line by itself: UTF-8, else
-/// a character for each byte, as in Latin-1. A comment in another encoding so changes no name.
+/// The text of a file: UTF-8 or UTF-16 by its byte order mark, UTF-16 by its zeros, else each line by itself: UTF-8,
+/// else a character for each byte, as in Latin-1. A comment in another encoding so changes no name.
 pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
     if let Some(rest) = bytes.strip_prefix(b"\xef\xbb\xbf") {
         return decode(rest);

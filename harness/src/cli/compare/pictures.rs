@@ -12,7 +12,7 @@ use crate::imaging::reference::RegionMask;
 /// The relative error that the difference picture shows in full color.
 const FULL_SCALE: f32 = 0.1;
 
-/// What the pictures are called.
+/// Names of the pictures.
 pub(super) const NAMES: [&str; 3] = ["actual", "expected", "difference"];
 
 /// Writes the pictures, that of the difference when the sizes are the same, and answers their files and captions.

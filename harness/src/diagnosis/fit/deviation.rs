@@ -233,7 +233,7 @@ fn of_lobe(formula: &Formula, say: Say) {
     if let Some((form, words)) = form {
         say(of, "exponent_form", Value::Form(form), words.to_owned());
     }
-    let also = if formula.follows { ", in the normalisation too" } else { "" };
+    let also = if formula.follows { ", in the normalization too" } else { "" };
     let (a, b) = (formula.times, formula.plus);
     if a != 1.0 {
         let words = format!("the exponent of the specular lobe is {a} n where n belongs{also}");

@@ -217,7 +217,7 @@ fn clip(pixels: &[&VertexSeen]) -> Option<Deviation> {
             "shift",
             Value::Three([dx, dy, 0.0]),
             format!(
-                "everything is drawn ({dx:.4}, {dy:.4}) off its place, in normalised device coordinates"
+                "everything is drawn ({dx:.4}, {dy:.4}) off its place, in normalized device coordinates"
             ),
         ),
         (false, true) => say(

@@ -6,6 +6,7 @@ use super::{RayBatch, STRAY_FRACTION};
 use crate::evidence::convention::Convention;
 use crate::evidence::price::Class;
 use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict};
+use crate::imaging::ratio::triple;
 
 /// The check.
 pub const ID: CheckId = CheckId::RadianceMaterial;
@@ -23,7 +24,7 @@ pub type OwnValue = (usize, [f32; 3]);
 pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]]) -> Check {
     let not_judged = |summary: &str| Check::new(ID, &batch.scene, Verdict::NotJudged, summary);
     if own.is_empty() {
-        return not_judged("no lit ray ends on a surface of one colour");
+        return not_judged("no lit ray ends on a surface of one color");
     }
     let sum: f64 = own.iter().flat_map(|(ray, _)| radiance[*ray]).map(f64::from).sum();
     if sum.is_nan() || sum <= 0.0 {
@@ -68,7 +69,6 @@ pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]])
         }
         Some((ray, expected)) => {
             let p = batch.points[ray].position;
-            let triple = |v: [f64; 3]| format!("({:.4}, {:.4}, {:.4})", v[0], v[1], v[2]);
             let summary = format!(
                 "{wrong} of {} rays are not what the BSDF of their surface makes of the light; first at ({:.3}, \
                  {:.3}, {:.3}): expected {}, found {}",
@@ -76,8 +76,8 @@ pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]])
                 p.x,
                 p.y,
                 p.z,
-                triple(expected),
-                triple(radiance[ray].map(f64::from)),
+                triple(expected.map(|v| v as f32)),
+                triple(radiance[ray]),
             );
             let check = Check::new(ID, &batch.scene, Verdict::Fail, summary);
             Check { error: Class::Slip.price(), ..check }

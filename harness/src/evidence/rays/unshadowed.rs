@@ -5,7 +5,7 @@ use crate::evidence::convention::Convention;
 use crate::evidence::price::{self, Answers, Change, Class};
 use crate::evidence::shading::Shading;
 use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict};
-use crate::imaging::ratio::ratio_name;
+use crate::imaging::ratio::{ratio_name, triple};
 
 /// The answers to a batch under one witness, shadows off.
 pub struct Unshadowed<'a> {
@@ -170,18 +170,14 @@ impl Difference {
             error: apart / total,
             summary: format!(
                 "unshadowed radiance is wrong along {wrong} of {} rays under the witness BSDF \"{}\"; worst at \
-                 ({:.3}, {:.3}, {:.3}): expected ({:.4}, {:.4}, {:.4}), found ({:.4}, {:.4}, {:.4})",
+                 ({:.3}, {:.3}, {:.3}): expected {}, found {}",
                 batch.lit,
                 answer.witness,
                 p.x,
                 p.y,
                 p.z,
-                expected[0],
-                expected[1],
-                expected[2],
-                found[0],
-                found[1],
-                found[2]
+                triple(expected.map(|v| v as f32)),
+                triple(found)
             ),
             hint: factor_hint(&mut ratios),
         }

@@ -142,7 +142,7 @@ fn about(html: &mut Html, report: &BatchReport, class: &Class) {
         html.raw("</ul>\n");
     }
     if !class.worse.is_empty() {
-        html.raw("<p>Attempts that count for less than another:</p>\n<ul>\n");
+        html.raw("<p>Counting attempts that earn less than another attempt:</p>\n<ul>\n");
         for line in &class.worse {
             html.raw("<li>").text(line).raw("</li>\n");
         }

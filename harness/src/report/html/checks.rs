@@ -96,7 +96,7 @@ fn title(html: &mut Html, check: &Check) {
         Verdict::Fail | Verdict::NotImplemented => "<span class=\"badge bad\">✗ ",
         Verdict::NotJudged | Verdict::NotRun => "<span class=\"badge unsure\">? ",
     });
-    html.text(number::verdict(check.verdict)).raw("</span> <code>").text(check.id.name());
+    html.text(check.verdict.name()).raw("</span> <code>").text(check.id.name());
     html.raw("</code>");
     if !check.scene.is_empty() {
         html.raw(" <span class=\"scene\">on ").text(&check.scene).raw("</span>");

@@ -12,7 +12,7 @@ use super::likeness::LIKENESS;
 use super::lost::is_lost_by_evidence;
 use super::markup::Html;
 use crate::class::Class;
-use crate::columns::count;
+use crate::columns::{self, count};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::grading::{Shared, SharedFiles};
 use crate::rubric::{Part, PartGrade};
@@ -95,7 +95,7 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
     });
     add("images without code: confirm or refuse", &|entry| {
         let own = entry.grade.unconfirmed;
-        (own > 0.0).then(|| format!("{} points for images", points(own)))
+        (own > 0.0).then(|| format!("{} for images", columns::points(own)))
     });
     add("to be looked at, then confirmed", &|entry| {
         // What the instructor confirmed, they have looked at.

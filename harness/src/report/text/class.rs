@@ -24,11 +24,19 @@ pub(super) fn class(page: &mut Page, report: &BatchReport, class: &Class) {
     let list = if class.list.is_empty() { String::new() } else { format!(", by {}", class.list) };
     for (title, style, lines) in [
         ("attempts that count".to_owned(), Style::Plain, aside.collect::<Vec<_>>()),
-        ("attempts that count for less than another".to_owned(), Style::Open, class.worse.clone()),
+        (
+            "counting attempts that earn less than another attempt".to_owned(),
+            Style::Open,
+            class.worse.clone(),
+        ),
         ("not counted, as matches.toml says".to_owned(), Style::Plain, class.not_counted.clone()),
         (format!("without a submission{list}"), Style::Open, missing.collect()),
         ("decisions whose evidence has changed".to_owned(), Style::Bad, class.stale.clone()),
-        ("decisions on nothing that is there".to_owned(), Style::Bad, class.unused.clone()),
+        (
+            "decisions on submissions that are not in this report".to_owned(),
+            Style::Bad,
+            class.unused.clone(),
+        ),
         ("neither opened nor graded".to_owned(), Style::Bad, class.unopened.clone()),
         ("to be decided in matches.toml".to_owned(), Style::Bad, undecided.collect()),
     ] {

@@ -56,7 +56,7 @@ pub fn closing(
     let mut verdict = verdict.join(", ");
     verdict.push_str(" on the public scenes");
     if !closing.asked.is_empty() {
-        verdict.push_str(&format!("; only {} was checked, not the rest", closing.asked));
+        verdict.push_str(&format!("; only {} was checked", closing.asked));
     }
     let whole = plain.iter().all(|part| is_whole(part)) && !grade.parts.is_empty();
     let style = if whole { Style::Good } else { Style::Bad };
@@ -101,7 +101,7 @@ fn next(report: &BatchReport, entry: &SubmissionReport, closing: &Closing) -> St
     if !closing.asked.is_empty() {
         return match open(true) {
             Some(part) => work_on(part, closing),
-            None => format!("that is right; `{umbra} check {folder}` checks the rest too"),
+            None => format!("this part is right; `{umbra} check {folder}` checks everything"),
         };
     }
     // Images that are not what the code draws.
@@ -210,12 +210,12 @@ mod tests {
         let lines = closed(&report, 1, "part 2.4 on scene cbox", &[]);
         assert_eq!(
             lines[2],
-            "verdict: 25 of 25 points on the public scenes; only part 2.4 on scene cbox was checked, not \
-             the rest"
+            "verdict: 25 of 25 points on the public scenes; only part 2.4 on scene cbox was \
+             checked"
         );
         assert_eq!(
             lines[3],
-            "next: that is right; `./umbra check student_template` checks the rest too"
+            "next: this part is right; `./umbra check student_template` checks everything"
         );
     }
 }

@@ -1,6 +1,6 @@
 //! `umbra defend`: the evidence for the points of one part, with its bounds.
 
-use super::super::number::{measure as in_words, of_part, range, verdict};
+use super::super::number::{measure as in_words, of_part, range};
 use super::super::{BatchReport, SubmissionReport};
 use super::page::{Look, Page, Style};
 use crate::evidence::{Check, Verdict};
@@ -62,7 +62,7 @@ pub fn defend(
     page.line(&[(Style::Heading, "All that was asked about it")]);
     for own in checks.iter().filter(asked) {
         let held_back = if own.held_back { ", held back" } else { "" };
-        let line = format!("{} ({}{held_back}): {}", own.name(), verdict(own.verdict), own.summary);
+        let line = format!("{} ({}{held_back}): {}", own.name(), own.verdict.name(), own.summary);
         page.wrapped(&[(Style::Plain, "  ")], style(own), &line);
     }
     Ok(page.finish())

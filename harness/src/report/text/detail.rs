@@ -195,7 +195,7 @@ fn group_of_checks(page: &mut Page, group: &[&Check]) {
         Verdict::NotJudged | Verdict::NotRun => Style::Open,
         Verdict::Fail | Verdict::NotImplemented => Style::Bad,
     };
-    let verdict = format!("  {}", left(number::verdict(worst.verdict), VERDICT_WIDTH));
+    let verdict = format!("  {}", left(worst.verdict.name(), VERDICT_WIDTH));
     let indent = " ".repeat(columns(&verdict));
     let held_back = if worst.held_back { " (held back)" } else { "" };
     let text = format!("{}{held_back}: {}", worst.name(), worst.summary);

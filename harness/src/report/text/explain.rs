@@ -24,7 +24,11 @@ pub fn explain(rules: &Rules, name: &str, look: Look) -> Result<String, String> 
         (Ok(check), _) => explain_check(&mut page, rules, check),
         (Err(_), Ok(rule)) => {
             page.line(&[(Style::Heading, rule.name())]);
-            page.wrapped(&[], Style::Plain, "A rule: a bound on one measured value. It can fail:");
+            page.wrapped(
+                &[],
+                Style::Plain,
+                "A rule bounds one measured value. It can fail these checks:",
+            );
             for &check in CheckId::ALL.iter().filter(|check| check.info().rules.contains(&rule)) {
                 page.gap();
                 explain_check(&mut page, rules, check);
@@ -45,7 +49,7 @@ fn not_found(rules: &Rules, name: &str, errors: [String; 2]) -> String {
     let pieces: Vec<&str> = checks.filter(|check| check.split('.').any(|p| p == name)).collect();
     let named = pieces.join(", ");
     if !pieces.is_empty() {
-        return format!("there is no check \"{name}\"; with it in their name: {named}");
+        return format!("there is no check \"{name}\"; names that contain it: {named}");
     }
     let suggests = errors.into_iter().find(|error| error.contains("did you mean"));
     suggests.unwrap_or_else(|| {
@@ -58,7 +62,11 @@ fn not_found(rules: &Rules, name: &str, errors: [String; 2]) -> String {
 /// All checks, a line each.
 pub fn explain_all(rules: &Rules, look: Look) -> String {
     let mut page = Page::new(look.width, look.colours);
-    page.wrapped(&[], Style::Plain, "`umbra explain NAME` says more of a check, a rule or a part.");
+    page.wrapped(
+        &[],
+        Style::Plain,
+        "`umbra explain NAME` says more about a check, a rule or a part.",
+    );
     page.gap();
     for &check in CheckId::ALL {
         let name = format!("{:<28}", check.name());
@@ -77,7 +85,10 @@ fn explain_part(page: &mut Page, rules: &Rules, part: &Part) {
     page.line(&[(Style::Heading, &format!("{} {}", part.id, part.title))]);
     page.wrapped(&[], Style::Plain, &format!("{} {worth}.", part.points));
     if let Some(path) = rules.paths.get(&part.path) {
-        let text = format!("All of them where `{}` passes on every scene. Else:", path.proof);
+        let text = format!(
+            "Earned in full when `{}` passes on every scene. Otherwise these checks decide:",
+            path.proof
+        );
         page.wrapped(&[], Style::Plain, &text);
     }
     for &check in part.evidence.iter().chain(&part.fallback) {
@@ -87,7 +98,7 @@ fn explain_part(page: &mut Page, rules: &Rules, part: &Part) {
     if !part.images_only.is_empty() {
         let names: Vec<_> = part.images_only.iter().map(|check| check.name()).collect();
         page.gap();
-        let text = format!("Where there is no code to judge: {}.", names.join(", "));
+        let text = format!("For a submission without code: {}.", names.join(", "));
         page.wrapped(&[], Style::Plain, &text);
     }
 }
@@ -101,7 +112,14 @@ fn explain_check(page: &mut Page, rules: &Rules, check: CheckId) {
     page.wrapped(&[(Style::Plain, "  ")], Style::Plain, &plain(info.question));
     let names: Vec<_> = info.rules.iter().map(|rule| rule.name()).collect();
     let rules = names.join(", ");
-    for (title, text) in [("error", info.error), ("bound", info.bound), ("rules", &rules)] {
+    let sources = check.sources();
+    let mut code = format!("harness/src/{}", sources.judged);
+    if sources.asked != sources.judged {
+        code += &format!("; asked in harness/src/{}", sources.asked);
+    }
+    let texts =
+        [("error", info.error), ("bound", info.bound), ("rules", &rules), ("judged in", &code)];
+    for (title, text) in texts {
         if !text.is_empty() {
             page.wrapped(&[(Style::Open, &format!("  {title}  "))], Style::Plain, &plain(text));
         }
@@ -126,6 +144,10 @@ mod tests {
         let check = of("shadow.rays").unwrap();
         assert!(check.starts_with("shadow.rays (1.4)\n  Asks for radiance"), "{check}");
         assert!(check.contains("  rules  shadow.lit, shadow.dark"), "{check}");
+        assert!(
+            check.contains("  judged in  harness/src/evidence/rays/shadows.rs; asked in"),
+            "{check}"
+        );
         // Every check that the rule can fail.
         let rule = of("image.blob").unwrap();
         assert!(rule.contains("image.offline (") && rule.contains("stage.phong (2.4)"), "{rule}");
@@ -145,7 +167,10 @@ mod tests {
         let error = of("9.9").unwrap_err();
         assert!(error.starts_with("there is no part 9.9; expected one of 1.1, 1.2"), "{error}");
         let error = of("phong").unwrap_err();
-        assert!(error.contains("in their name: ") && error.contains("bsdf.phong"), "{error}");
+        assert!(
+            error.contains("names that contain it: ") && error.contains("bsdf.phong"),
+            "{error}"
+        );
     }
 
     #[test]

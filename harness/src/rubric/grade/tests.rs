@@ -123,7 +123,7 @@ fn one_right_scene_is_enough_where_the_student_may_choose() {
 }
 
 #[test]
-fn an_unexplained_wrong_image_is_paid_by_the_blamed_part() {
+fn an_unexplained_wrong_image_is_paid_by_the_residual_part() {
     let checks = [check(IMAGE, Fail, 0.1), check(BSDF, Pass, 0.0), check(RAYS, Pass, 0.0)];
     let grade = grade(&rules(), &Evidence { checks: checks.to_vec() });
     assert_eq!(grade.parts[0].points, 10.0);
@@ -255,8 +255,8 @@ fn reasons_tell_nothing_of_held_back_scenes() {
         grade(&rules(), &evidence).parts[1].reason.clone()
     };
     assert_eq!(reason(&[image(Fail), secret.clone()]), "wrong on a held-back scene (error 0.12)");
-    let blamed = reason(&[image(Fail), hidden(check(RAYS, Pass, 0.0))]);
-    assert_eq!(blamed, "every part alone is right, but wrong on a held-back scene (error 0.5)");
+    let residual = reason(&[image(Fail), hidden(check(RAYS, Pass, 0.0))]);
+    assert_eq!(residual, "every part alone is right, but wrong on a held-back scene (error 0.5)");
     let silent = Check { verdict: NotRun, ..secret };
     assert_eq!(
         reason(&[image(Fail), silent]),
@@ -419,8 +419,8 @@ proptest! {
             // paid only because no other explained the image, it gets back when one does.
             let failed = grade(&rules(), &Evidence { checks });
             for (failed, after) in failed.parts.iter().zip(&after.parts) {
-                let blamed = after.reason.starts_with("every part alone is right");
-                prop_assert!(blamed || failed.points <= after.points, "{failed:?} {after:?}");
+                let residual = after.reason.starts_with("every part alone is right");
+                prop_assert!(residual || failed.points <= after.points, "{failed:?} {after:?}");
             }
         }
     }

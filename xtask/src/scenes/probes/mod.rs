@@ -32,7 +32,7 @@ const PROBES: [Probe; 14] = [
     ),
     (
         materials::coloured,
-        "A dim, coloured light on coloured Kd and Ks, with no value above 1. It shows swapped \
+        "A dim, colored light on colored Kd and Ks, with no value above 1. It shows swapped \
          channels, and a light or material taken as grey. The MTL file lists the materials in another order \
          than the shapes, and one has its largest Kd and its largest Ks in different channels.",
     ),
