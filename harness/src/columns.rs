@@ -8,6 +8,11 @@ pub fn count(number: usize, noun: &str) -> String {
     if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
 }
 
+/// `1 point`, `2.5 points`, `0..3 points`: with a number that is written already.
+pub fn of_points(number: &str) -> String {
+    format!("{number} point{}", if number == "1" { "" } else { "s" })
+}
+
 /// The text in exactly `width` columns, cut or filled at its end.
 pub fn left(text: &str, width: usize) -> String {
     let mut shown = cut(text, width);

@@ -11,6 +11,7 @@ use toml::Spanned;
 
 use super::matching::line_of;
 use super::owners::Owners;
+use crate::columns::of_points;
 use crate::evidence::Evidence;
 use crate::files::hex;
 use crate::plain_errors::plain;
@@ -320,16 +321,16 @@ impl Applied {
         };
         match part {
             Some(part) => format!(
-                "part {part} was set by the instructor to {} points instead of {}: {reason}{who}",
-                range(self.after),
+                "part {part} was set by the instructor to {} instead of {}: {reason}{who}",
+                of_points(&range(self.after)),
                 range(self.before)
             ),
             None if self.after == self.before => {
                 format!("the instructor looked at it and confirms the points: {reason}{who}")
             }
             None => format!(
-                "the instructor confirms what the images show, {} points instead of {}: {reason}{who}",
-                range(self.after),
+                "the instructor confirms what the images show, {} instead of {}: {reason}{who}",
+                of_points(&range(self.after)),
                 range(self.before)
             ),
         }

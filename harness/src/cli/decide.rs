@@ -131,6 +131,7 @@ fn confirmed(graded: &Graded, kept: &Kept, decision: &DecisionArguments) -> anyh
     let points = ((to - from) * 100.0).round() / 100.0;
     Ok(match points {
         0.0 => "confirmed, no points hang on it".to_owned(),
+        1.0 => "1 point for the images is confirmed".to_owned(),
         points => format!("{points} points for the images are confirmed"),
     })
 }
