@@ -15,8 +15,12 @@ pub fn points(number: f64) -> String {
 
 /// `1 point`, `3..5 points`.
 pub fn point_range(ends: [f64; 2]) -> String {
-    let text = range(ends);
-    if text == "1" { "1 point".to_owned() } else { format!("{text} points") }
+    of_points(&range(ends))
+}
+
+/// The same for a number or range that is written already.
+pub fn of_points(number: &str) -> String {
+    if number == "1" { "1 point".to_owned() } else { format!("{number} points") }
 }
 
 /// `3`, `3..5`.

@@ -106,8 +106,21 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// # Errors
 /// When the folder cannot be read, or an entry cannot be removed.
 pub fn keep_newest(folder: &Path, most: usize) -> io::Result<()> {
+    keep_newest_of(folder, most, |_| true)
+}
+
+/// The same among those that are `wanted`.
+///
+/// # Errors
+/// As [`keep_newest`].
+pub fn keep_newest_of(
+    folder: &Path,
+    most: usize,
+    wanted: impl Fn(&Path) -> bool,
+) -> io::Result<()> {
     let age = |path: &PathBuf| path.metadata().and_then(|meta| meta.modified()).ok();
     let mut all: Vec<_> = std::fs::read_dir(folder)?.flatten().map(|entry| entry.path()).collect();
+    all.retain(|path| wanted(path));
     // Each age is asked once: it may change while they are sorted.
     all.sort_by_cached_key(age);
     for old in all.iter().take(all.len().saturating_sub(most)) {

@@ -64,14 +64,14 @@ fn many_channels_and_names_in_utf_8_are_read() {
     let channels: Vec<(&str, Vec<f32>)> =
         names.iter().map(|name| (name.as_str(), vec![0.5; 4])).collect();
     let many = folder.path().join("many.exr");
-    write_exr_channels(&many, 2, &channels).unwrap();
+    write_exr_channels(&many, [0, 0], 2, &channels).unwrap();
     let (code, said, _) = compare(&[Path::new("--no-metrics"), &many, &plain]);
     assert!(code == 0 && said.contains("0 of 4 pixels differ"), "{said}");
     // Two characters of Latin-1 are one of UTF-8.
     let named = folder.path().join("named.exr");
     let layer = ["R", "G", "B"].map(|c| format!("\u{c3}\u{a9}.{c}"));
     let channels = layer.each_ref().map(|name| (name.as_str(), vec![0.5; 4]));
-    write_exr_channels(&named, 2, &channels).unwrap();
+    write_exr_channels(&named, [0, 0], 2, &channels).unwrap();
     let arguments = ["--no-metrics", "--layer", "\u{e9}"].map(Path::new);
     let (code, said, errors) = compare(&[&arguments[..], &[&named, &plain]].concat());
     assert!(code == 0 && said.contains("0 of 4 pixels differ"), "{said}{errors}");
@@ -212,7 +212,7 @@ fn layers_are_chosen_by_name() {
     let other = write("other.exr", &[("", 0.5), ("spec", 0.5)]);
     let torn = folder.path().join("torn.exr");
     let channels = ["R", "G", "B", "left.R"].map(|name| (name, vec![0.5]));
-    write_exr_channels(&torn, 1, &channels).unwrap();
+    write_exr_channels(&torn, [0, 0], 1, &channels).unwrap();
     for (lacking, has) in
         [(&other, "plain R, G, B, spec"), (&single, "raw"), (&torn, "plain R, G, B")]
     {
@@ -228,7 +228,7 @@ fn layers_are_chosen_by_name() {
     // Plain channels beside R, G and B make no layer.
     let depth = folder.path().join("depth.exr");
     let channels = ["R", "G", "B", "Z"].map(|name| (name, vec![0.75]));
-    write_exr_channels(&depth, 1, &channels).unwrap();
+    write_exr_channels(&depth, [0, 0], 1, &channels).unwrap();
     assert_eq!(layer(&stereo, &depth, "left").0, 0);
 }
 
@@ -510,7 +510,7 @@ fn idiff_s_arguments_have_idiff_s_answers() {
     file(&folder, "inf.exr", &[(0, Vec3::INFINITY)]);
     file(&folder, "minus.exr", &[(0, Vec3::NEG_INFINITY)]);
     write_exr(folder.path().join("small.exr"), &Image::new(2, 1), Precision::Float, &[]).unwrap();
-    write_exr_channels(folder.path().join("xyz.exr"), 2, &[("X", vec![0.5; 4])]).unwrap();
+    write_exr_channels(folder.path().join("xyz.exr"), [0, 0], 2, &[("X", vec![0.5; 4])]).unwrap();
     moved(&folder.path().join("a.exr"), &folder.path().join("right.exr"));
     let run = |line: &str| {
         let run = Command::new(env!("CARGO_BIN_EXE_umbra"))
@@ -587,6 +587,10 @@ fn idiff_s_arguments_have_idiff_s_answers() {
     assert_eq!(difference.pixels[2..], [Vec3::new(0.0, 10.0, 0.0), Vec3::splat(2.5)]);
     assert_eq!(run("-q -o D.EXR a.exr c.exr").0, 2);
     assert_eq!(read_exr(folder.path().join("D.EXR")).unwrap().pixels[2].y, -1.0);
+    moved(&folder.path().join("c.exr"), &folder.path().join("right_c.exr"));
+    let (_, out, _) = run("-o moved.exr right.exr right_c.exr");
+    assert!(out.contains("Max error  = 1 @ (1, 1, G)"), "{out}");
+    assert_eq!(ExrRows::open(folder.path().join("moved.exr")).unwrap().origin(), [1, 0]);
     run("-q -od -o none.exr a.exr a.exr");
     assert!(!folder.path().join("none.exr").exists());
 }
@@ -624,7 +628,7 @@ fn names_from_files_do_nothing_to_a_terminal() {
     };
     let write = |file: &str, names: &[&str]| {
         let channels: Vec<_> = names.iter().map(|name| (*name, vec![0.5; 4])).collect();
-        write_exr_channels(folder.path().join(file), 2, &channels).unwrap();
+        write_exr_channels(folder.path().join(file), [0, 0], 2, &channels).unwrap();
     };
     let (evil, shown) = ("x\u{1b}[2J\u{9b}31m\nPASS\r", "x\\u{1b}[2J\\u{9b}31m\\nPASS\\r");
     let layer = ["R", "G", "B"].map(|c| format!("{evil}.{c}"));

@@ -10,6 +10,7 @@ mod attempts;
 mod batch;
 mod brute_force;
 mod build;
+mod check;
 mod compare;
 mod compare_command;
 mod decode;

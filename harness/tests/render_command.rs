@@ -303,8 +303,9 @@ fn what_is_no_mesh_is_told_from_one_without_faces() {
     for (obj, expected) in [
         (
             "<!doctype html>\n",
-            "it has no vertex (v) and no face (f), and begins with \"<!doctype html>\"",
+            "it has no vertex (v) and no face (f), and begins as a web page does: is it an OBJ file?",
         ),
+        ("solid cube\n", "begins with \"solid cube\""),
         ("\u{1f}\u{8b}\u{8}", "begins with \"???\""),
         (
             "v 0 0 0\nv 0 0 1\n",
@@ -624,7 +625,10 @@ fn a_realtime_frame_is_drawn_without_a_word_and_what_lies_out_of_range_is_said()
         TOML.replace("spp = 4", "realtime = true").replace("0.0, 3.0, 4.0", "0.0, 0.5, 0.0");
     for (at, expected) in [
         ("0.0, 0.5, -1.0", ""),
-        ("0.0, 9.0, -9.0", "umbra: warning: s.obj: nothing of it is in view\n"),
+        (
+            "0.0, 9.0, -9.0",
+            "umbra: warning: s.obj: nothing of it is in view\numbra: warning: o.exr: the image is black all over\n",
+        ),
     ] {
         let scene = Scene::new(&plain(), MTL);
         fs::write(

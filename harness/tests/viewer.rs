@@ -105,14 +105,14 @@ fn pixels_modes_keys_and_addresses() {
     let mut seen = Vec::new();
     for key in ["1", "2", "3"] {
         browser.key(key, 0);
-        for _ in 0..4 {
+        for _ in 0..5 {
             browser.key("ArrowRight", SHIFT);
             seen.push(browser.value("lookNow().tone"));
             let apart = browser.value(SCREEN_IS_WRONG_BY).as_f64().unwrap();
             assert!(apart <= 2.0, "layer {key}, {:?}: {apart} levels", seen.last());
         }
     }
-    assert_eq!(seen[..4], ["gamma", "false", "signed", "srgb"].map(Value::from));
+    assert_eq!(seen[..5], ["gamma", "false", "signed", "reinhard", "srgb"].map(Value::from));
 
     // Flicker: the other image while the key is held.
     browser.key("1", 0);
@@ -451,11 +451,11 @@ fn every_channel_is_shown_and_a_file_that_cannot_be_read_ends_nothing() {
     let [gray, deep, other, broken] =
         ["gray.exr", "deep.exr", "other.exr", "broken.exr"].map(|name| folder.path().join(name));
     let plane = |scale: f32| (0..12).map(|index| scale * index as f32).collect::<Vec<f32>>();
-    write_exr_channels(&gray, 4, &[("Y", plane(1.0))]).unwrap();
+    write_exr_channels(&gray, [0, 0], 4, &[("Y", plane(1.0))]).unwrap();
     for (file, scale) in [(&deep, 10.0), (&other, 20.0)] {
         let colors = ["B", "G", "R"].map(|name| (name, plane(1.0)));
         let all: Vec<_> = colors.into_iter().chain([("depth.Z", plane(scale))]).collect();
-        write_exr_channels(file, 4, &all).unwrap();
+        write_exr_channels(file, [0, 0], 4, &all).unwrap();
     }
     std::fs::write(&broken, "no image").unwrap();
     let files = [gray, broken.clone(), deep, other];

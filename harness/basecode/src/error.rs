@@ -40,4 +40,14 @@ impl Error {
     pub fn file(path: impl Into<PathBuf>, message: impl Into<String>) -> Self {
         Self::File { path: path.into(), line: None, message: message.into() }
     }
+
+    /// The same error in a file, and the first of the remarks that may tell its cause.
+    pub(crate) fn also(mut self, remarks: &[String]) -> Self {
+        if let Self::File { message, .. } = &mut self {
+            for remark in remarks.iter().take(3) {
+                *message += &format!("; {remark}");
+            }
+        }
+        self
+    }
 }

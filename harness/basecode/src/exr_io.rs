@@ -197,17 +197,19 @@ pub fn write_exr_layers(
     write_file(path, &bytes)
 }
 
-/// Writes channels of 32-bit floats, uncompressed: their names, and `width` values for each row.
+/// Writes channels of 32-bit floats, uncompressed: their names, and `width` values for each row. `origin` is the pixel
+/// where both windows begin, as [`ExrRows::origin`] answers it.
 ///
 /// # Errors
 /// When there is none, they are not of one size, or the file system refuses.
 pub fn write_exr_channels(
     path: impl AsRef<Path>,
+    origin: [i32; 2],
     width: usize,
     channels: &[(&str, Vec<f32>)],
 ) -> Result<(), ImageError> {
     let path = path.as_ref();
-    write_file(path, &encode::encode_channels(width, channels, path)?)
+    write_file(path, &encode::encode_channels(origin, width, channels, path)?)
 }
 
 /// Decodes a whole EXR file held in memory; `path` only names it in messages.

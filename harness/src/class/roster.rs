@@ -26,6 +26,9 @@ pub struct Roster {
     /// Rows that are no student, with their lines.
     #[serde(default)]
     pub left_out: Vec<String>,
+    /// Times of submission that cannot be read, with their lines.
+    #[serde(default)]
+    pub unread_times: Vec<String>,
 }
 
 /// A student of a class list. A text is empty where the list does not say it.
@@ -340,6 +343,7 @@ impl Roster {
             rows: Vec::new(),
             students: Vec::new(),
             left_out: Vec::new(),
+            unread_times: Vec::new(),
         };
         for (line, cells) in records {
             let cell = |column: Column| {
@@ -357,6 +361,7 @@ impl Roster {
                     path.display()
                 );
             }
+            let submitted = cell(Column::Submitted);
             let mut student = Student {
                 line,
                 row,
@@ -366,8 +371,11 @@ impl Roster {
                 first_name: cell(Column::First),
                 last_name: cell(Column::Last),
                 email: cell(Column::Email),
-                submitted: stamps::parse(&cell(Column::Submitted)).unwrap_or_default(),
+                submitted: stamps::parse(&submitted).unwrap_or_default(),
             };
+            if student.submitted.is_empty() && submitted.contains(|c: char| c.is_ascii_digit()) {
+                roster.unread_times.push(format!("line {line}, \"{}\"", printable(&submitted)));
+            }
             let full = cell(Column::Full);
             // Canvas's rows of points and its made-up student.
             if kind == Kind::Canvas && (student.id.is_empty() || full == "Student, Test") {
@@ -460,6 +468,12 @@ impl Roster {
         if !self.left_out.is_empty() {
             said += &format!("; no student: {}", self.left_out.join(", "));
         }
+        if !self.unread_times.is_empty() {
+            said += &format!(
+                "; a time that cannot be read, so nothing is known of lateness: {}",
+                self.unread_times.join("; ")
+            );
+        }
         said
     }
 
@@ -529,6 +543,15 @@ fn columns(header: &[String], kind: Kind) -> Vec<Option<Column>> {
 
 /// Whether a header has a column that tells students apart.
 fn tells_students(header: &[String]) -> bool {
+    // A student called "No", say, has a number or an address beside the name.
+    let is_datum = |cell: &String| {
+        let digits = unwrapped(cell.trim()).trim_start_matches('#');
+        let is_number = digits.len() >= 5 && digits.bytes().all(|byte| byte.is_ascii_digit());
+        is_number || cell.contains('@')
+    };
+    if header.iter().any(is_datum) {
+        return false;
+    }
     let columns = columns(header, kind(header));
     let telling =
         [Column::Number, Column::Username, Column::Email, Column::Full, Column::Last].map(Some);
@@ -770,6 +793,22 @@ mod tests {
         let list = read("SID,Name\n\"=\"\"0260\"\"\",A\n26.0,B\n27.50,C\n12E5,D\n");
         let numbers: Vec<&str> = list.students.iter().map(|own| own.number.as_str()).collect();
         assert_eq!(numbers, ["0260", "26", "27.50", "12E5"]);
+        let moodle = "Full name,ID number,Last modified (submission)\nAnn Lee,17,\"4/11/2019, 09:00\"\n\
+                      Bo Ode,18,-\nCy Ash,19,\"Montag, 4. November 2019, 09:00\"\n";
+        let list = read(moodle);
+        let times: Vec<&str> = list.students.iter().map(|own| own.submitted.as_str()).collect();
+        assert_eq!(times, ["", "", "2019-11-04T09:00:00"]);
+        let said = list.reading();
+        assert!(said.ends_with("of lateness: line 2, \"4/11/2019, 09:00\""), "{said}");
+        // A list without a header is told as such, whoever is on it.
+        for headless in
+            ["Ash,Ann,260000001\nNo,On,260000002\n", "No,On,on@x.ca\nAsh,Ann,ann@x.ca\n"]
+        {
+            let error = Roster::parse(headless.as_bytes(), Path::new("list.csv")).unwrap_err();
+            let error = error.to_string();
+            assert!(error.starts_with("list.csv:1: expected a header"), "{error}");
+            assert!(!error.contains("looks like the header"), "{error}");
+        }
         let titled = "ECSE 446,,\nFall 2019,,\nName,ID,x\nAnn Ash,1,\n";
         let error =
             Roster::parse(titled.as_bytes(), Path::new("list.csv")).unwrap_err().to_string();

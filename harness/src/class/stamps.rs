@@ -46,7 +46,11 @@ pub fn leading(text: &str) -> Option<(DateTime, &str)> {
     for _ in 0..5 {
         scan.skip(" ,\u{a0}\u{202f}");
         match (scan.number(2), month, day) {
-            (Some(number), _, None) => day = Some(number),
+            (Some(number), _, None) => {
+                day = Some(number);
+                // As German has it.
+                scan.skip(".");
+            }
             (Some(_), _, Some(_)) => return None,
             (None, ..) => {
                 let word = scan.word()?;
@@ -63,32 +67,35 @@ pub fn leading(text: &str) -> Option<(DateTime, &str)> {
         scan.skip(" ");
     }
     let year = scan.number(4).filter(|year| *year >= 1970)?;
-    scan.skip(" ,\u{a0}\u{202f}");
-    let (hour, minute, second) = scan.clock()?;
-    let before_half = scan;
-    scan.skip(" \u{a0}\u{202f}");
-    let hour = match scan.half_of_day() {
-        Some(afternoon) if (1..=12).contains(&hour) => hour % 12 + if afternoon { 12 } else { 0 },
-        Some(_) => return None,
-        None => {
-            scan = before_half;
-            hour
-        }
+    scan.time_of(year, u32::try_from(month?).ok()?, day?)
+}
+
+/// A time stamp of numbers at the beginning of a text, and what follows it: `04.11.2019, 09:00`, `25/11/2019 9:00 AM`.
+/// None where day and month cannot be told apart: `4/11/2019` is in November or in April.
+fn in_numbers(text: &str) -> Option<(DateTime, &str)> {
+    let mut scan = Scan(text);
+    let first = scan.number(2)?;
+    let separator = scan.0.chars().next().filter(|c| ['.', '/', '-'].contains(c))?;
+    scan.0 = &scan.0[1..];
+    let second = scan.number(2)?;
+    scan.0 = scan.0.strip_prefix(separator)?;
+    let year = scan.number(4).filter(|year| *year >= 1970)?;
+    let [day, month] = match separator {
+        '.' => [first, second],
+        _ if first > 12 || first == second => [first, second],
+        _ if second > 12 => [second, first],
+        _ => return None,
     };
-    let parts = [month?, i8::try_from(day?).ok()?];
-    let time = [hour, minute, second].map(|value| i8::try_from(value).ok());
-    let [Some(hour), Some(minute), Some(second)] = time else { return None };
-    let when =
-        DateTime::new(i16::try_from(year).ok()?, parts[0], parts[1], hour, minute, second, 0);
-    Some((when.ok()?, scan.0))
+    scan.time_of(year, month, day)
 }
 
 /// A time stamp as text that [`instant`] reads: with its offset where it has one, else local. None where the text
 /// is no time stamp.
 pub fn parse(text: &str) -> Option<String> {
     let text = text.trim();
-    if let Some((when, rest)) = leading(text)
-        && rest.trim().is_empty()
+    let in_words = leading(text).or_else(|| in_numbers(text));
+    if let Some((when, rest)) = in_words
+        && (rest.trim().is_empty() || rest.trim().eq_ignore_ascii_case("uhr"))
     {
         return Some(when.to_string());
     }
@@ -192,6 +199,31 @@ impl<'a> Scan<'a> {
         Some((hour, minute, second))
     }
 
+    /// The moment on a day whose time follows, and the rest.
+    fn time_of(mut self, year: u32, month: u32, day: u32) -> Option<(DateTime, &'a str)> {
+        self.skip(" ,\u{a0}\u{202f}");
+        let (hour, minute, second) = self.clock()?;
+        let before_half = self;
+        self.skip(" \u{a0}\u{202f}");
+        let hour = match self.half_of_day() {
+            Some(afternoon) if (1..=12).contains(&hour) => {
+                hour % 12 + if afternoon { 12 } else { 0 }
+            }
+            Some(_) => return None,
+            None => {
+                self = before_half;
+                hour
+            }
+        };
+        let parts = [month, day, hour, minute, second].map(|value| i8::try_from(value).ok());
+        let [Some(month), Some(day), Some(hour), Some(minute), Some(second)] = parts else {
+            return None;
+        };
+        let year = i16::try_from(year).ok()?;
+        let when = DateTime::new(year, month, day, hour, minute, second, 0);
+        Some((when.ok()?, self.0))
+    }
+
     /// Whether `PM` follows, or `AM`.
     fn half_of_day(&mut self) -> Option<bool> {
         for (sign, afternoon) in [("a.m.", false), ("p.m.", true), ("am", false), ("pm", true)] {
@@ -234,12 +266,23 @@ mod tests {
             ("Sunday, 6 October 2019, 11:59 PM", "2019-10-06T23:59:00"),
             ("Monday, December 2, 2019, 12:00 PM", "2019-12-02T12:00:00"),
             ("6 de octubre de 2019, 23:59", "2019-10-06T23:59:00"),
+            ("Montag, 4. November 2019, 09:00", "2019-11-04T09:00:00"),
+            ("Dienstag, 3. M\u{e4}rz 2020, 23:59 Uhr", "2020-03-03T23:59:00"),
+            ("Monday, 4 November 2019, 9:05 PM", "2019-11-04T21:05:00"),
+            ("04.11.2019 09:00", "2019-11-04T09:00:00"),
+            ("4.11.2019, 09:00:30", "2019-11-04T09:00:30"),
+            ("25/11/2019, 09:00", "2019-11-25T09:00:00"),
+            ("11/25/2019 9:00 AM", "2019-11-25T09:00:00"),
+            ("5/5/2019, 09:00", "2019-05-05T09:00:00"),
             ("2019-02-15 17:33:57.5 Z", "2019-02-15T17:33:57.5Z"),
             ("2019-02-15 17:33:57 -0500", "2019-02-15T22:33:57Z"),
             ("2019-02-15T17:33:57-05:00", "2019-02-15T22:33:57Z"),
             ("2019-02-15 17:33:57", "2019-02-15T17:33:57"),
         ] {
             assert_eq!(parse(text).as_deref(), Some(expected), "{text}");
+        }
+        for text in ["4/11/2019, 09:00", "04-11-2019 09:00", "43773.375", "31.02.2019 09:00"] {
+            assert_eq!(parse(text), None, "{text}");
         }
         for text in ["", "-", "a2.zip", "Oct 35, 2019 1159 PM", "Oct 5, 2019 1359 PM", "Oct 5", "5"]
         {

@@ -404,6 +404,11 @@ pub fn finish(
     mut found: Found,
     records: Vec<StoredRecord>,
 ) -> anyhow::Result<BatchReport> {
+    let instructor = output.join(report::INSTRUCTOR);
+    let _lock = Pins::lock(&instructor)?;
+    // Something may have been decided while this was graded.
+    *pins = Pins::read(&instructor)?;
+    let decided = &Decisions::read(output, decided.assignment.clone(), decided.attempt)?;
     found.join(Found::read(output)?.unwrap_or_default(), output);
     found.keep(output)?;
     let roster = class::roster(None, output)?;

@@ -275,6 +275,8 @@ impl<'a> Batch<'a> {
             }
             grading.paths =
                 self.selection.map_or(grading.paths, |selection| selection.paths(context));
+            grading.asked =
+                self.selection.map_or(Vec::new(), |selection| selection.checks(context));
             grading.compares_submitted = self.selection.is_none_or(Selection::is_all);
             let jobs = self.jobs.min(chosen.len()).max(1);
             grading.threads = (cores() / jobs as u32).max(1);

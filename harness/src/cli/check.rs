@@ -14,6 +14,7 @@ use super::context::Context;
 use super::outputs::{ensure_apart, shell_word};
 use super::render::AdapterChoice;
 use super::selection::Selection;
+use super::tree::ensure_working_folder;
 use super::{class, terminal, terminal_pictures};
 use crate::class::Source;
 use crate::files::{files_below, write_whole};
@@ -87,7 +88,9 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let mut assignment = Context::assignment(root)?;
     selection.restrict(&mut assignment)?;
     ensure!(folder.exists(), "{} does not exist", folder.display());
-    if !folder.is_dir() {
+    if folder.is_dir() {
+        ensure_working_folder(folder, &assignment.tree)?;
+    } else {
         ensure!(
             folder.is_file(),
             "{} is a pipe or device, expected your working folder or what umbra pack made of it",

@@ -229,6 +229,9 @@ fn show(kept: &Kept, settled: &BatchReport, folder: &Path) -> anyhow::Result<()>
         }
     }
     let mut all: Vec<Alike> = all.into_values().collect();
+    let submitted =
+        kept.records().map(|record| (record.slug.clone(), record.name.clone())).collect();
+    tell_attempts_apart(&mut all, &submitted);
     for pair in &mut all {
         let texts = |who: &String| sources_of(&folder.join(SUBMISSIONS).join(who));
         let [first, second] = pair.who.each_ref().map(texts);
@@ -256,6 +259,23 @@ fn show(kept: &Kept, settled: &BatchReport, folder: &Path) -> anyhow::Result<()>
     Ok(())
 }
 
+/// Adds to names that several submissions have, such as attempts of one student, what each was submitted as.
+fn tell_attempts_apart(pairs: &mut [Alike], submitted: &BTreeMap<String, String>) {
+    let mut slugs: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for pair in pairs.iter() {
+        for (name, slug) in pair.names.iter().zip(&pair.who) {
+            slugs.entry(name.clone()).or_default().insert(slug.clone());
+        }
+    }
+    for pair in pairs {
+        for (name, slug) in pair.names.iter_mut().zip(&pair.who) {
+            if slugs[name].len() > 1 && !name.is_empty() {
+                *name += &format!(" ({})", submitted.get(slug).unwrap_or(slug));
+            }
+        }
+    }
+}
+
 /// The sources of a submission, by path.
 fn sources_of(folder: &Path) -> anyhow::Result<BTreeMap<String, String>> {
     let mut texts = BTreeMap::new();
@@ -265,4 +285,28 @@ fn sources_of(folder: &Path) -> anyhow::Result<BTreeMap<String, String>> {
         texts.insert(below.join("/"), String::from_utf8_lossy(&fs::read(&file)?).into_owned());
     }
     Ok(texts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attempts_of_one_student_are_told_apart() {
+        let pair = |who: [&str; 2], names: [&str; 2]| Alike {
+            who: who.map(str::to_owned),
+            names: names.map(str::to_owned),
+            ..Alike::default()
+        };
+        let mut pairs = [
+            pair(["a1", "b"], ["Ann Lee", "Bo Ode"]),
+            pair(["a2", "b"], ["Ann Lee", "Bo Ode"]),
+            pair(["c", "d"], ["", ""]),
+        ];
+        let submitted = [("a1", "a2.zip"), ("a2", "a2_v2.zip"), ("b", "b.zip")];
+        let submitted = submitted.map(|(slug, name)| (slug.to_owned(), name.to_owned()));
+        tell_attempts_apart(&mut pairs, &submitted.into());
+        let names = pairs.map(|pair| pair.names.join(", "));
+        assert_eq!(names, ["Ann Lee (a2.zip), Bo Ode", "Ann Lee (a2_v2.zip), Bo Ode", ", "]);
+    }
 }

@@ -111,11 +111,12 @@ impl FromStr for Size {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || format!("expected WIDTHxHEIGHT such as 640x480, found {text}");
         let (width, height) = text.split_once('x').ok_or_else(wrong)?;
-        let side = |text: &str| match text.parse::<u64>() {
-            Ok(side) if side > MAX_SIDE as u64 => {
+        let side = |text: &str| match text.parse::<u32>() {
+            Ok(0) => Err(wrong()),
+            Ok(side) if side as usize <= MAX_SIDE => Ok(side),
+            _ if !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit()) => {
                 Err(format!("expected at most {MAX_SIDE} pixels a side, found {text}"))
             }
-            Ok(side @ 1..) => u32::try_from(side).map_err(|_| wrong()),
             _ => Err(wrong()),
         };
         let (width, height) = (side(width)?, side(height)?);
@@ -126,6 +127,9 @@ impl FromStr for Size {
         Ok(Self(width, height))
     }
 }
+
+/// Below this, a value is more than rounding.
+const NEGATIVE: f32 = -1e-6;
 
 /// What a file's name asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -281,6 +285,9 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     let save = |values: &[f32]| -> anyhow::Result<()> {
         let pixels = values.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v)).collect();
         let image = Image { width: width as usize, height: height as usize, pixels };
+        for said in looks_broken(&image) {
+            eprintln!("umbra: warning: {}: {said}", arguments.output.display());
+        }
         let precision = if config.realtime { Precision::Half } else { Precision::Float };
         match format {
             Format::Exr => write_exr(&arguments.output, &image, precision, &[])?,
@@ -354,6 +361,25 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     }
 }
 
+/// What a viewer may not show of an image that no right renderer draws.
+fn looks_broken(image: &Image) -> Vec<String> {
+    let mut said = Vec::new();
+    let kinds: [(&str, fn(&Vec3) -> bool); 2] =
+        [("not finite", |p| !p.is_finite()), ("negative", |p| p.min_element() < NEGATIVE)];
+    for (what, is_it) in kinds {
+        let count = image.pixels.iter().filter(|p| is_it(p)).count();
+        if let Some(first) = image.pixels.iter().position(is_it) {
+            let (x, y) = (first % image.width, first / image.width);
+            let pixels = if count == 1 { "pixel is" } else { "pixels are" };
+            said.push(format!("{count} {pixels} {what}; first at ({x}, {y})"));
+        }
+    }
+    if image.pixels.iter().all(|p| *p == Vec3::ZERO) {
+        said.push("the image is black all over".to_owned());
+    }
+    said
+}
+
 /// The student number of the submission that a file lies in, at its root or one folder deeper.
 fn own_seed(file: &Path) -> Option<u64> {
     let file = std::path::absolute(file).ok()?;
@@ -366,6 +392,44 @@ fn own_seed(file: &Path) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_image_that_no_viewer_shows_is_warned_of() {
+        let said = |pixels: [[f32; 3]; 4]| {
+            let pixels = pixels.map(Vec3::from).to_vec();
+            looks_broken(&Image { width: 2, height: 2, pixels }).join("; ")
+        };
+        let (grey, black) = ([0.5; 3], [0.0; 3]);
+        assert_eq!(said([grey, black, black, black]), "");
+        assert_eq!(said([[-1e-7; 3], grey, grey, grey]), "");
+        assert_eq!(said([black; 4]), "the image is black all over");
+        let (nan, negative) = ([f32::NAN, 0.5, 0.5], [-0.5, 0.5, 0.5]);
+        assert_eq!(said([grey, black, nan, grey]), "1 pixel is not finite; first at (0, 1)");
+        let infinite = [f32::INFINITY; 3];
+        assert_eq!(said([infinite; 4]), "4 pixels are not finite; first at (0, 0)");
+        assert_eq!(
+            said([grey, negative, grey, negative]),
+            "2 pixels are negative; first at (1, 0)"
+        );
+        assert_eq!(
+            said([grey, negative, grey, nan]),
+            "1 pixel is not finite; first at (1, 1); 1 pixel is negative; first at (1, 0)"
+        );
+    }
+
+    #[test]
+    fn a_size_says_which_limit_it_breaks() {
+        let said = |text: &str| text.parse::<Size>().map(|_| ()).unwrap_err();
+        assert_eq!(said("16385x1"), "expected at most 16384 pixels a side, found 16385");
+        assert_eq!(
+            said("1x99999999999"),
+            "expected at most 16384 pixels a side, found 99999999999"
+        );
+        assert_eq!(said("16384x4097"), "expected at most 67108864 pixels, found 67125248");
+        for text in ["0x1", "1", "-1x1", "1x", "1x1x1", "+1x"] {
+            assert_eq!(said(text), format!("expected WIDTHxHEIGHT such as 640x480, found {text}"));
+        }
+    }
 
     #[test]
     fn a_submission_s_images_have_the_seed_of_its_student() {

@@ -72,6 +72,13 @@ impl Selection {
         RenderPath::ALL.into_iter().filter(|&path| asked(path)).collect()
     }
 
+    /// The checks that the parts hang on.
+    pub fn checks(&self, context: &Context) -> Vec<CheckId> {
+        let parts = context.assignment.rules.parts.iter();
+        let asked = parts.filter(|part| self.asks(&part.id));
+        asked.flat_map(|part| part.evidence.iter().chain(&part.fallback).copied()).collect()
+    }
+
     /// Takes out of a grade what was not asked, and what the chosen scenes say nothing of.
     pub fn only_of(&self, grade: &mut Grade, rules: &Rules, evidence: &Evidence) {
         if self.is_all() {

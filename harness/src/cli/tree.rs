@@ -237,9 +237,53 @@ const MAX_FOLDERS: usize = 2000;
 
 /// The working folder that is meant: the one that is named, or the only one below it.
 fn working_folder(named: &Path, tree: &TreeSpec) -> anyhow::Result<PathBuf> {
+    let has_part = named.join(CONFIG_FILE).is_file();
+    match &working_folders_in(named, tree)[..] {
+        [only] => Ok(only.clone()),
+        // What is missing of it is told then.
+        [] if has_part => Ok(named.to_owned()),
+        [] => bail!("it holds neither {CONFIG_FILE} nor src/, expected your working folder"),
+        several => bail!(several_folders(named, several)),
+    }
+}
+
+/// That a folder is none to check, if working folders lie in it instead.
+///
+/// # Errors
+/// Then; names them.
+pub(super) fn ensure_working_folder(named: &Path, tree: &TreeSpec) -> anyhow::Result<()> {
+    if named.join(CONFIG_FILE).is_file() {
+        return Ok(());
+    }
+    let folder = named.display();
+    match &working_folders_in(named, tree)[..] {
+        [only] if only != named => {
+            let inside = named.join(only.strip_prefix(named).unwrap_or(only));
+            bail!(
+                "{folder}: it holds neither {CONFIG_FILE} nor src/; did you mean {}?",
+                inside.display()
+            )
+        }
+        [] | [_] => Ok(()),
+        several => bail!("{folder}: {}", several_folders(named, several)),
+    }
+}
+
+fn several_folders(named: &Path, found: &[PathBuf]) -> String {
+    let name = |path: &Path| path.strip_prefix(named).unwrap_or(path).display().to_string();
+    format!(
+        "it holds {} working folders, {} and {} among them; hint: name one of them",
+        found.len(),
+        name(&found[0]),
+        name(&found[1])
+    )
+}
+
+/// The folder itself if it has source, else the folders below it that have, and a configuration.
+fn working_folders_in(named: &Path, tree: &TreeSpec) -> Vec<PathBuf> {
     let has_source = |folder: &Path| tree.open_folders.iter().any(|own| folder.join(own).is_dir());
     if has_source(named) {
-        return Ok(named.to_owned());
+        return vec![named.to_owned()];
     }
     let (mut found, mut seen) = (Vec::new(), 0);
     let mut open = vec![(named.to_owned(), 0)];
@@ -260,22 +304,7 @@ fn working_folder(named: &Path, tree: &TreeSpec) -> anyhow::Result<PathBuf> {
         }
     }
     found.sort();
-    let has_part = named.join(CONFIG_FILE).is_file();
-    match &found[..] {
-        [only] => Ok(only.clone()),
-        // What is missing of it is told then.
-        [] if has_part => Ok(named.to_owned()),
-        [] => bail!("it holds neither {CONFIG_FILE} nor src/, expected your working folder"),
-        [first, second, ..] => {
-            let name = |path: &Path| path.strip_prefix(named).unwrap_or(path).display().to_string();
-            bail!(
-                "it holds {} working folders, {} and {} among them; hint: name one of them",
-                found.len(),
-                name(first),
-                name(second)
-            )
-        }
-    }
+    found
 }
 
 /// Writes a conforming archive; exit 1 when the folder lacks something.

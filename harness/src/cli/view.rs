@@ -7,7 +7,7 @@ use basecode::Image;
 use basecode::exr_io::{Band, ExrRows};
 
 use super::outputs::ensure_not_read;
-use crate::files::{private_folder, write_whole};
+use crate::files::{keep_newest_of, private_folder, write_whole};
 use crate::report::html_viewer;
 use crate::viewer::{ImageFile, Layer, ViewedCase, write_channels, write_image};
 
@@ -39,7 +39,7 @@ pub fn run(arguments: &ViewArguments) -> anyhow::Result<u8> {
     let paths: Vec<&Path> = arguments.images.iter().map(PathBuf::as_path).collect();
     let folder = match &arguments.output {
         Some(folder) => folder.clone(),
-        None => private_folder("umbra-view-")?.keep(),
+        None => own_folder()?,
     };
     ensure_not_read(&folder.join(PAGE), paths.iter().copied())?;
     let mut shown = Vec::new();
@@ -67,6 +67,40 @@ pub fn run(arguments: &ViewArguments) -> anyhow::Result<u8> {
     println!("{}", page.display());
     open_page(&page);
     Ok(if failed.is_some() { super::EXIT_NOT_IN_ORDER } else { super::EXIT_OK })
+}
+
+/// What the folders of pages begin with that were given none.
+const PREFIX: &str = "umbra-view-";
+/// So many of them are kept: a page may be open still.
+const KEPT: usize = 3;
+
+/// A new folder of one's own in the system's temporary one; of earlier ones the oldest go.
+fn own_folder() -> anyhow::Result<PathBuf> {
+    let folder = private_folder(PREFIX)?.keep();
+    let all = folder.parent().unwrap_or(Path::new("."));
+    let is_own = |path: &Path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with(PREFIX) && same_owner(path, &folder)
+    };
+    // What cannot be removed is left.
+    let _ = keep_newest_of(all, KEPT, is_own);
+    Ok(folder)
+}
+
+/// Whether two folders, neither of them a link, belong to one user.
+fn same_owner(one: &Path, other: &Path) -> bool {
+    let folder = |path: &Path| path.symlink_metadata().ok().filter(std::fs::Metadata::is_dir);
+    let (Some(one), Some(other)) = (folder(one), folder(other)) else { return false };
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt as _;
+        one.uid() == other.uid()
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = (one, other);
+        true
+    }
 }
 
 /// Writes the images of a file into the page's folder: each layer of colors, and every other channel by itself.

@@ -155,11 +155,32 @@ pub fn isolate(
         checks.push(pass);
         checks.extend((0..STAGES.len()).map(&mut stage));
     }
+    refuse_inputs(&mut checks, own_frames, stages);
     checks.extend(shown.judge_premultiplied(tolerances));
     let pass_of = |wanted: own_frames::Wanted| shown.judge_passes(wanted);
     let together = own_frames::judge(&checks, own_frames, &pass_of);
     checks.extend(together);
     checks
+}
+
+/// A fragment stage that takes more than the contract forwards gets zeros from Umbra's vertex stage. Where it is wrong
+/// with them, and its own pipeline is refused, the cause is what the graphics library says.
+fn refuse_inputs(checks: &mut [Check], own_frames: &[Check], stages: &Stages) {
+    for index in [1, 2] {
+        let takes_more = stages.own[index].as_ref().is_some_and(|own| vertex_for(own) != VERTEX);
+        let label = format!("label = '{}'", STAGES[index]);
+        for check in checks.iter_mut().filter(|check| check.id == CHECKS[index].0) {
+            let refused = own_frames.iter().find(|own| {
+                own.id == CheckId::ImageRealtime
+                    && own.scene == check.scene
+                    && own.summary.contains(&label)
+            });
+            if let (true, Verdict::Fail, Some(refused)) = (takes_more, check.verdict, refused) {
+                check.summary.clone_from(&refused.summary);
+                check.hint.clear();
+            }
+        }
+    }
 }
 
 /// What pass and fragment stages show of scenes.
@@ -400,4 +421,32 @@ fn swap_failed(
 fn not_possible(id: CheckId, case: &PreparedScene, message: &str) -> Check {
     let summary = format!("cannot be judged alone: {}", headline(message));
     Check::new(id, &case.entry.name, Verdict::NotJudged, summary)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_input_that_nobody_writes_is_the_cause_and_not_what_comes_of_it() {
+        let stages = |phong: &str| {
+            let mut stages = Stages::default();
+            stages.own =
+                [None, Some("fn fs_main(@location(1) n: vec3f)".into()), Some(phong.into())];
+            stages
+        };
+        let said = |phong: &str, verdict, own: &str| {
+            let mut checks = [Check::new(CheckId::StagePhong, "s", verdict, "not finite")];
+            let own = Check::new(CheckId::ImageRealtime, "s", Verdict::Fail, own);
+            refuse_inputs(&mut checks, &[own], &stages(phong));
+            let [check] = checks;
+            check.summary
+        };
+        let (takes, refused) =
+            ("fn fs_main(@location(5) n: vec3f)", "label = 'phong.fs': it takes");
+        assert_eq!(said(takes, Verdict::Fail, refused), refused);
+        assert_eq!(said(takes, Verdict::Pass, refused), "not finite");
+        assert_eq!(said(takes, Verdict::Fail, "label = 'diffuse.fs': it takes"), "not finite");
+        assert_eq!(said("fn fs_main(@location(1) n: vec3f)", Verdict::Fail, refused), "not finite");
+    }
 }

@@ -36,6 +36,20 @@ impl Grading<'_> {
             }
             (answers, checks)
         });
+        if self.is_told_by_bsdfs() {
+            let mut told: Vec<Check> =
+                probed.iter().flat_map(|(answers, _)| answers.judge()).collect();
+            mark(&mut told, &self.cases);
+            let is_right = |id: &CheckId| {
+                let own = || told.iter().filter(|check| check.id == *id);
+                own().count() > 0 && own().all(|check| check.verdict != Verdict::Fail)
+            };
+            // Where one is not, integrator and images may still show that it is right together with them.
+            if self.asked.iter().all(is_right) {
+                checks.extend(told);
+                return Ok(());
+            }
+        }
         let scene = std::path::absolute(self.assignment.root.join(&self.assignment.sampler_scene))?;
         let findings = sampler::judge(session, plugin, &scene)?;
         let mut tolerances = self.assignment.tolerances.clone();
@@ -71,6 +85,12 @@ impl Grading<'_> {
             mark(&mut checks[begin..], cases);
         }
         Ok(())
+    }
+
+    /// Whether BSDFs by themselves tell all that is asked.
+    fn is_told_by_bsdfs(&self) -> bool {
+        let of_bsdf = |id: &CheckId| [CheckId::BsdfDiffuse, CheckId::BsdfPhong].contains(id);
+        !self.asked.is_empty() && self.asked.iter().all(of_bsdf)
     }
 
     /// The public scenes and the held-back ones. No worker is asked about both, and neither's

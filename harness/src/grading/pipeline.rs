@@ -59,6 +59,8 @@ pub struct Grading<'a> {
     pub cancel: &'a AtomicBool,
     /// What is asked about: both halves of the assignment, or one.
     pub paths: Vec<RenderPath>,
+    /// The checks whose verdicts are asked for; all, if none is named.
+    pub asked: Vec<CheckId>,
     /// Whether submitted images are compared with what the code draws.
     pub compares_submitted: bool,
     /// Records made before and to be made, if they are kept.
@@ -157,6 +159,7 @@ impl<'a> Grading<'a> {
             threads: store.threads,
             cancel,
             paths: RenderPath::ALL.to_vec(),
+            asked: Vec::new(),
             compares_submitted: true,
             cache: None,
             budget: Some(assignment.limits.budget.clone()),

@@ -202,9 +202,10 @@ fn judge_bonus(
     (check, Some(drawn))
 }
 
-/// Judges the bonus of a submission that draws no frame with it, where that is the fault of a fragment stage:
-/// with the template's stage in its place, as with a Rust file that does not build. None when no frame comes
-/// of it either.
+/// Judges the bonus of a submission that draws no frame with it, where that is the fault of a stage: with Umbra's vertex
+/// stage or the template's fragment stage in its place, as with a Rust file that does not build. On what a fragment stage
+/// should draw, nothing is in shadow: one that draws nothing earns no more than one without shadows. None when no frame
+/// comes of it either.
 fn judge_bonus_without(
     session: &Session,
     plugin: &Path,
@@ -213,11 +214,13 @@ fn judge_bonus_without(
     tolerances: &Tolerances,
 ) -> Option<Check> {
     let bonus = case.bonus.as_deref()?;
-    let of_template = |index: &usize| Stage {
+    // The template's vertex stage draws nothing.
+    let another = |index: &usize| Stage {
         name: STAGES[*index].to_owned(),
-        text: stages.template[*index].clone(),
+        text: if *index == 0 { VERTEX.to_owned() } else { stages.template[*index].clone() },
     };
-    let own: Vec<usize> = (1..STAGES.len())
+    let own: Vec<usize> = [1, 2, 0]
+        .into_iter()
         .filter(|&index| stages.own[index].is_some() && !stages.is_template(index))
         .collect();
     let each = own.iter().map(|index| vec![*index]);
@@ -229,14 +232,18 @@ fn judge_bonus_without(
         outcome.answer().map(|answer| session::image(&answer.values, width, height))
     };
     for set in sets {
-        let replaced: Vec<Stage> = set.iter().map(of_template).collect();
-        let Some(with) = drawn(bonus, true, &replaced) else { continue };
-        let without = drawn(&case.realtime, false, &replaced)?;
-        let told = shadows(case).judge(&case.entry.name, &with, &without, tolerances);
-        // A scene of that stage's materials alone tells nothing: it is too dark, and no frame that fails.
-        let view: View = (CheckId::BonusImage, &|_| true);
-        let dark = || judge(case, Kind::RealtimeShadows, &with, view, tolerances);
-        return Some(told.unwrap_or_else(dark));
+        let replaced: Vec<Stage> = set.iter().map(another).collect();
+        let Some(mut with) = drawn(bonus, true, &replaced) else { continue };
+        let mut without = drawn(&case.realtime, false, &replaced)?;
+        let Expected { unshadowed, unshadowed_mask: mask, .. } = &case.expected;
+        for (index, value) in mask.pixels.iter().enumerate() {
+            let stage = if mask.region(*value).exponent > 0.0 { 2 } else { 1 };
+            if set.contains(&stage) {
+                with.pixels[index] = unshadowed.pixels[index];
+                without.pixels[index] = unshadowed.pixels[index];
+            }
+        }
+        return shadows(case).judge(&case.entry.name, &with, &without, tolerances);
     }
     None
 }

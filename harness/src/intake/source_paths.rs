@@ -18,11 +18,12 @@ struct Named<'a> {
     token: &'a Token,
 }
 
-/// The modules and included files that the source at `path` names.
+/// The modules and included files that the source at `path` names, whatever the build.
 fn named_files<'a>(path: &str, tokens: &'a [Token]) -> Vec<Named<'a>> {
     let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
     let mut named = Vec::new();
-    for (at, token) in tokens.iter().enumerate() {
+    let optional = optional(tokens);
+    for (at, token) in tokens.iter().enumerate().filter(|(at, _)| !optional[*at]) {
         let (wanted, written) = match &tokens[at..] {
             [mod_word, Token { kind: TokenKind::Word(name), .. }, semicolon, ..]
                 if is_word(mod_word, "mod") && semicolon.kind == TokenKind::Sign(';') =>
@@ -46,6 +47,56 @@ fn named_files<'a>(path: &str, tokens: &'a [Token]) -> Vec<Named<'a>> {
     named
 }
 
+/// Whether a build may leave each token out: what a `cfg` attribute stands before, and the rules of a macro.
+fn optional(tokens: &[Token]) -> Vec<bool> {
+    let mut optional = vec![false; tokens.len()];
+    for (at, token) in tokens.iter().enumerate() {
+        let kinds: Vec<&TokenKind> = tokens[at..].iter().take(4).map(|token| &token.kind).collect();
+        let end = match kinds[..] {
+            [TokenKind::Sign('#'), TokenKind::Sign('['), TokenKind::Word(name), ..]
+                if name == "cfg" =>
+            {
+                item_end(tokens, at)
+            }
+            [TokenKind::Sign('#'), TokenKind::Sign('!'), _, TokenKind::Word(name)]
+                if name == "cfg" =>
+            {
+                tokens.len()
+            }
+            _ if is_word(token, "macro_rules") => item_end(tokens, at),
+            _ => continue,
+        };
+        optional[at..end].fill(true);
+    }
+    optional
+}
+
+/// Where the item, statement or element that begins at a token ends.
+fn item_end(tokens: &[Token], start: usize) -> usize {
+    let (mut depth, mut has_generics) = (0, false);
+    for (at, token) in tokens.iter().enumerate().skip(start) {
+        match &token.kind {
+            TokenKind::Word(word) => {
+                has_generics |=
+                    ["fn", "impl", "struct", "enum", "trait", "type"].contains(&word.as_str());
+            }
+            TokenKind::Sign('(' | '[' | '{') => depth += 1,
+            TokenKind::Sign(')' | ']' | '}') if depth == 0 => return at,
+            TokenKind::Sign(')' | ']') => depth -= 1,
+            TokenKind::Sign('}') => {
+                depth -= 1;
+                if depth == 0 {
+                    return at + 1;
+                }
+            }
+            TokenKind::Sign(';') if depth == 0 => return at + 1,
+            TokenKind::Sign(',') if depth == 0 && !has_generics => return at + 1,
+            _ => {}
+        }
+    }
+    tokens.len()
+}
+
 /// Whether the source at `path` names a file that is not there; `files` are all paths of the submission.
 pub(super) fn lacks_files(path: &str, text: &str, files: &[&str]) -> bool {
     let is_there = |own: &String| files.contains(&own.as_str());
@@ -53,12 +104,36 @@ pub(super) fn lacks_files(path: &str, text: &str, files: &[&str]) -> bool {
     named_files(path, &tokens(text)).iter().any(lacks)
 }
 
-/// The warnings on the modules and included files that the source at `path` names and that are there in another
-/// spelling only. `files` are all paths of the submission.
-pub(super) fn misspelt(path: &str, text: &str, files: &[&str]) -> Vec<Finding> {
-    let tokens = tokens(text);
+/// The warnings on the modules and included files that sources name and that are there in another spelling only.
+/// A source that every build holds counts, as far as that can be seen. `sources` are paths and texts, `files` all paths
+/// of the submission.
+pub(super) fn misspelt(sources: &[(&str, String)], files: &[&str]) -> Vec<Finding> {
+    let lexed: Vec<_> = sources.iter().map(|(path, text)| (*path, tokens(text))).collect();
+    let named: Vec<_> =
+        lexed.iter().map(|(path, tokens)| (*path, named_files(path, tokens))).collect();
+    let is_root = |path: &str| path.rsplit('/').next().is_some_and(|name| is_alike(name, "lib.rs"));
+    let mut open: Vec<&str> =
+        named.iter().map(|(path, _)| *path).filter(|path| is_root(path)).collect();
+    let mut built = open.clone();
+    while let Some(source) = open.pop() {
+        let names = named.iter().find(|(path, _)| *path == source).into_iter();
+        let wanted: Vec<&String> =
+            names.flat_map(|(_, names)| names).flat_map(|own| &own.wanted).collect();
+        for (path, _) in &named {
+            if !built.contains(path) && wanted.iter().any(|own| is_alike(own, path)) {
+                built.push(path);
+                open.push(path);
+            }
+        }
+    }
+    let built = named.into_iter().filter(|(path, _)| built.contains(path));
+    built.flat_map(|(path, named)| misspelt_in(path, named, files)).collect()
+}
+
+/// The warnings on what the source at `path` names.
+fn misspelt_in(path: &str, named: Vec<Named>, files: &[&str]) -> Vec<Finding> {
     let mut findings = Vec::new();
-    for Named { wanted, written, token } in named_files(path, &tokens) {
+    for Named { wanted, written, token } in named {
         let has_backslash = written.contains('\\');
         if !has_backslash && wanted.iter().any(|own| files.contains(&own.as_str())) {
             continue;
@@ -131,8 +206,17 @@ mod tests {
     fn other_spellings_are_found_and_nothing_else() {
         let files = ["src/lib.rs", "src/bsdfs/mod.rs", "src/bsdfs/Phong.rs", "src/shaders/a.wgsl"];
         let said = |path: &str, text: &str| {
-            let found = misspelt(path, text, &files);
-            found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+            let others = [
+                ("src/lib.rs", "mod bsdfs; #[cfg(test)] mod tests;"),
+                ("src/bsdfs/mod.rs", "mod phong;"),
+            ];
+            let others = others.iter().filter(|(other, _)| *other != path);
+            let sources: Vec<_> = others
+                .chain([&(path, text)])
+                .map(|(path, text)| (*path, (*text).to_owned()))
+                .collect();
+            let found = misspelt(&sources, &files).into_iter().map(|finding| finding.to_string());
+            found.filter(|found| found.contains(&format!("{path}:"))).collect::<Vec<_>>().join("\n")
         };
         for (path, text, expected) in [
             (
@@ -169,8 +253,25 @@ mod tests {
             "include_str!(\"shaders/./../shaders/a.wgsl\")",
             "// include_str!(\"gone.wgsl\")",
             "include_str!(concat!(\"a\", \"b\"))",
+            "#[cfg(test)] mod tests { #[test] fn t() { g(); include_str!(\"gone.txt\"); } }",
+            "#[cfg(feature = \"extra\")] const LUT: &[u8; 4] = include_bytes!(\"gone.bin\");",
+            "#[cfg(test)] fn f<A, B>() -> [u8; 2] { include!(\"gone.rs\") }",
+            "f(#[cfg(windows)] include_str!(\"gone\"), 1)",
+            "macro_rules! m { () => { include_str!(\"gone\") }; }",
+            "#![cfg(test)] fn f() {} const A: &str = include_str!(\"gone\");",
         ] {
             assert_eq!(said("src/lib.rs", text), "", "{text}");
+        }
+        for text in [
+            "#[cfg(test)] mod tests { } const A: &str = include_str!(\"gone\");",
+            "#[cfg(test)] use a::b; const A: &str = include_str!(\"gone\");",
+            "S { #[cfg(test)] a: 1, b: include_str!(\"gone\") }",
+        ] {
+            assert!(said("src/lib.rs", text).contains("'gone' is not there"), "{text}");
+        }
+        // Files that no build reaches, or tests alone.
+        for path in ["src/old.rs", "src/tests.rs", "src/tests/a.rs"] {
+            assert_eq!(said(path, "include_str!(\"gone\")"), "", "{path}");
         }
     }
 }

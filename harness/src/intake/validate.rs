@@ -138,7 +138,7 @@ fn empty_source(submission: &Submission, lines: &[TreeLine]) -> Result<Vec<Findi
 
 /// The warnings on source files that the compiler cannot read or will not find.
 fn encoded_source(submission: &Submission, tree: &TreeSpec) -> Result<Vec<Finding>, IntakeError> {
-    let mut findings = Vec::new();
+    let (mut findings, mut sources) = (Vec::new(), Vec::new());
     let paths: Vec<&str> = submission.files.iter().map(|file| file.path.as_str()).collect();
     let is_text = |path: &str| is_source(path) && tree.open_folder_of(path).is_some();
     for file in submission.files.iter().filter(|file| is_text(&file.path)) {
@@ -151,7 +151,7 @@ fn encoded_source(submission: &Submission, tree: &TreeSpec) -> Result<Vec<Findin
         };
         let Some(end) = end else {
             if file.path.to_lowercase().ends_with(".rs") {
-                findings.extend(misspelt(&file.path, &text_of(&bytes), &paths));
+                sources.push((file.path.as_str(), text_of(&bytes)));
             }
             continue;
         };
@@ -160,6 +160,7 @@ fn encoded_source(submission: &Submission, tree: &TreeSpec) -> Result<Vec<Findin
         let finding = Finding::warning("source_not_utf8", message).at(file.path.as_str());
         findings.push(finding.on_line(line).hint("save it as UTF-8"));
     }
+    findings.extend(misspelt(&sources, &paths));
     Ok(findings)
 }
 

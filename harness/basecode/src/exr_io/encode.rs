@@ -49,11 +49,12 @@ pub(super) fn encode(
             channels.push((name, Box::new(put)));
         }
     }
-    write(channels, (width, height), attributes, precision, compression, path)
+    write(channels, ([0, 0], width, height), attributes, precision, compression, path)
 }
 
-/// One part, uncompressed, with these channels of 32-bit floats, each as long as the others.
+/// One part, uncompressed, with these channels of 32-bit floats, each as long as the others, from this pixel on.
 pub(super) fn encode_channels(
+    origin: [i32; 2],
     width: usize,
     planes: &[(&str, Vec<f32>)],
     path: &Path,
@@ -71,13 +72,13 @@ pub(super) fn encode_channels(
         };
         channels.push(((*name).to_owned(), Box::new(put)));
     }
-    let (size, attributes) = ((width, height), BTreeMap::new());
-    write(channels, size, &attributes, Precision::Float, Compression::Uncompressed, path)
+    let (place, attributes) = ((origin, width, height), BTreeMap::new());
+    write(channels, place, &attributes, Precision::Float, Compression::Uncompressed, path)
 }
 
 fn write(
     mut channels: Vec<Channel>,
-    (width, height): (usize, usize),
+    ([left, top], width, height): ([i32; 2], usize, usize),
     attributes: &BTreeMap<String, String>,
     precision: Precision,
     compression: Compression,
@@ -104,7 +105,9 @@ fn write(
     });
     let mut header =
         Header::new(Text::default(), (width, height), described.collect::<SmallVec<[_; 5]>>())
-            .with_encoding(compression, BlockDescription::ScanLines, LineOrder::Increasing);
+            .with_encoding(compression, BlockDescription::ScanLines, LineOrder::Increasing)
+            .with_position(Vec2(left, top));
+    header.shared_attributes.display_window.position = Vec2(left, top);
     header.own_attributes.layer_name = None;
     header.own_attributes.software_name = Text::new_or_none("umbra");
     if !attributes.is_empty() {

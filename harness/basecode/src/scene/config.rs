@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::de::DeTable;
 
 use super::mesh::MeshFile;
-use super::mtl::why_missing;
+use super::named_file::{file_of, is_elsewhere, taken_beside, why_missing};
 use super::text::{decode, read};
 use crate::exr_io::{MAX_PIXELS, MAX_SIDE};
 use crate::{Camera, CameraConfig, Error, Result, ShadingKind};
@@ -156,11 +156,16 @@ impl SceneConfig {
             }
             let statement =
                 line.and_then(|line: usize| text.lines().nth(line - 1)).unwrap_or_default();
-            if let Some((key, value)) = statement.split_once('=') {
-                if !message.contains(&format!("`{}`", key.trim())) {
-                    message = format!("{}: {message}", key.trim());
+            match statement.split_once('=') {
+                Some((key, value)) => {
+                    if !message.contains(&format!("`{}`", key.trim())) {
+                        message = format!("{}: {message}", key.trim());
+                    }
+                    message += slip(value);
                 }
-                message += slip(value);
+                // A value of several lines goes on here.
+                None if statement.contains(',') => message += slip(statement),
+                None => {}
             }
             if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("toml")) {
                 message = format!("expected a scene's TOML file: {message}");
@@ -221,17 +226,32 @@ impl SceneConfig {
         }
         let renderer = file.renderer;
         // Written on Windows, perhaps.
-        let mesh = file.input.objfile.trim().replace('\\', "/");
-        if mesh.is_empty() {
-            let message = "input.objfile names no file".to_owned();
-            return Err(wrong(line_of_key("input", "objfile"), message));
+        let name = file.input.objfile.trim().replace('\\', "/");
+        let wrong_mesh = |message| wrong(line_of_key("input", "objfile"), message);
+        if name.is_empty() {
+            return Err(wrong_mesh("input.objfile names no file".to_owned()));
+        }
+        if name.contains(|c: char| c.is_ascii_control()) {
+            let message =
+                "input.objfile holds a control character, which a \\ and a letter stand for";
+            return Err(wrong_mesh(format!("{message}{SLASH}")));
         }
         // A worker sees the files under other names; so does whoever moves the folder.
-        let on_drive = matches!(mesh.as_bytes(), [b'a'..=b'z' | b'A'..=b'Z', b':', ..]);
-        if on_drive || mesh.starts_with('/') || Path::new(&mesh).is_absolute() {
+        let on_drive = matches!(name.as_bytes(), [b'a'..=b'z' | b'A'..=b'Z', b':', ..]);
+        if on_drive || name.starts_with('/') || Path::new(&name).is_absolute() {
             let message =
-                format!("input.objfile is {mesh} but must be relative to the folder of this file");
-            return Err(wrong(line_of_key("input", "objfile"), message));
+                format!("input.objfile is {name} but must be relative to the folder of this file");
+            return Err(wrong_mesh(message));
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mesh = file_of(folder, &[file.input.objfile.trim()]);
+        let unknown = unknown_keys(&table).into_iter().map(|(name, at)| {
+            format!("{}:{}: unknown key {name}", path.display(), line_at(text, at))
+        });
+        let mut remarks: Vec<String> = unknown.collect();
+        if is_elsewhere(folder, &name) && mesh.is_file() {
+            let line = line_of_key("input", "objfile").unwrap_or_default();
+            remarks.push(taken_beside(path, line, &name, &mesh));
         }
         let kind = match renderer.kind.as_deref() {
             None | Some("simple" | "direct") => ShadingKind::Simple,
@@ -253,7 +273,7 @@ impl SceneConfig {
         }
         Ok(Self {
             path: path.to_owned(),
-            mesh: path.parent().unwrap_or(Path::new("")).join(mesh),
+            mesh,
             camera,
             width,
             height,
@@ -261,46 +281,67 @@ impl SceneConfig {
             kind,
             spp: in_range("renderer", "spp", renderer.spp, 1 << 20)?,
             bonus: renderer.bonus,
-            remarks: unknown_keys(&table)
-                .into_iter()
-                .map(|(name, at)| {
-                    format!("{}:{}: unknown key {name}", path.display(), line_at(text, at))
-                })
-                .collect(),
+            remarks,
         })
     }
 }
 
-/// The hint on a value that was written as text is, or as a calculator shows it.
+const SLASH: &str = "; hint: write / in a path";
+const POINT: &str = "; hint: write a point in square brackets: [x, y, z]";
+
+/// The hint on a value that was written as other languages, a calculator or a word processor have it.
 fn slip(value: &str) -> &'static str {
-    let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
-    let value = value.split('#').next().unwrap_or_default();
+    let value = value.split('#').next().unwrap_or_default().trim();
     if value.contains(['\u{201c}', '\u{201d}', '\u{201e}', '\u{2018}', '\u{2019}']) {
         return "; hint: write straight quotes: \"";
     }
-    if !value.contains(['"', '\'']) {
-        if value.contains("//") {
-            return "; hint: a comment begins with #";
-        }
-        if value.trim_end().ends_with(';') {
-            return "; hint: a line ends without ;";
-        }
+    if value.contains(['"', '\'']) {
+        return if value.contains('"') && value.contains('\\') { SLASH } else { "" };
     }
-    match value.split_once(',') {
-        Some((whole, rest))
-            if !value.contains(['[', '"', '\''])
-                && is_digit(whole.trim().chars().last())
-                && is_digit(rest.trim().chars().next()) =>
-        {
-            "; hint: write a point in a number, as in 50.0"
-        }
+    if value.contains("//") {
+        return "; hint: a comment begins with #";
+    }
+    if value.ends_with(';') {
+        return "; hint: a line ends without ;";
+    }
+    if value.contains(['\u{2212}', '\u{2010}', '\u{2011}', '\u{2013}', '\u{2014}']) {
+        return "; hint: write a minus sign as -";
+    }
+    match value.to_ascii_lowercase().as_str() {
+        "true" | "on" | "yes" => return "; hint: write true",
+        "false" | "off" | "no" => return "; hint: write false",
+        _ => {}
+    }
+    if value.contains(['(', '<']) || value.contains('{') && !value.contains('=') {
+        return POINT;
+    }
+    let words = || value.split([',', '[', ']', ' ', '\t']).filter(|word| !word.is_empty());
+    let is_number = |word: &str| {
+        word.trim_start_matches(['+', '-', '.']).starts_with(|c: char| c.is_ascii_digit())
+    };
+    if !words().all(is_number) {
+        return "";
+    }
+    if words().any(|word| word.ends_with(|c: char| !c.is_ascii_digit() && c != '.')) {
+        return "; hint: write a number without letters or signs behind it";
+    }
+    let has_bare_point = |word: &str| word.trim_start_matches(['+', '-']).starts_with('.');
+    if words().any(|word| has_bare_point(word) || word.ends_with('.')) {
+        return "; hint: write digits on both sides of a point, as in 0.5";
+    }
+    match (words().count(), value.matches(',').count(), value.contains('[')) {
+        (3.., commas, true) if commas < 2 => "; hint: write commas between numbers: [x, y, z]",
+        (3.., _, false) => POINT,
+        (2, 1, false) => "; hint: write a point in a number, as in 50.0",
         _ => "",
     }
 }
 
 /// A text whose lines end with LF: TOML knows none that ends with CR alone.
 fn plain_lines(bytes: &[u8]) -> String {
-    decode(bytes).replace("\r\n", "\n").replace('\r', "\n")
+    let text = decode(bytes).replace("\r\n", "\n").replace('\r', "\n");
+    // Joined files hold a byte order mark inside.
+    text.replace("\n\u{feff}", "\n")
 }
 
 /// Keys that nobody knows, as `section.key`, and the byte that each stands at.
@@ -414,6 +455,21 @@ mod tests {
                 "b.toml:4: width: out of range: integer",
             ),
             (&format!("{base}[camera]\nfov = 50,0\n"), "write a point in a number"),
+            (&format!("{base}[camera]\neye = (0, 3, 4)\n"), "in square brackets: [x, y, z]"),
+            (&format!("{base}[camera]\neye = [(0, 3, 4)]\n"), "in square brackets: [x, y, z]"),
+            (&format!("{base}[camera]\neye = 0, 3.5, -4 # m\n"), "in square brackets: [x, y, z]"),
+            (&format!("{base}[camera]\neye = 0 3 4\n"), "in square brackets: [x, y, z]"),
+            (&format!("{base}[camera]\neye = [0 3 4]\n"), "commas between numbers: [x, y, z]"),
+            (&format!("{base}[camera]\neye = [0, \u{2212}3, 4]\n"), "write a minus sign as -"),
+            (&format!("{base}[camera]\neye = [0,\n \u{2013}3, 4]\n"), "write a minus sign as -"),
+            (&format!("{base}[camera]\neye = [0.0f, 3, 4]\n"), "without letters or signs behind"),
+            (&format!("{base}[camera]\nfov = 30deg\n"), "without letters or signs behind"),
+            (&format!("{base}[camera]\neye = [.5, 3, 4]\n"), "on both sides of a point"),
+            (&format!("{base}[camera]\neye = [0, 3., 4]\n"), "on both sides of a point"),
+            (&format!("{base}[renderer]\nbonus = True\n"), "hint: write true"),
+            ("[input]\nobjfile = \"..\\s.obj\"\n", "hint: write / in a path"),
+            ("[input]\nobjfile = \"..\\bunny.obj\"\n", "hint: write / in a path"),
+            ("[input]\nobjfile = \"C:\\Users\\a.obj\"\n", "hint: write / in a path"),
             (&format!("{base}[camera]\nfov = 50.0;\n"), "a line ends without ;"),
             (&format!("{base}[camera]\nfov = 50.0 // deg\n"), "a comment begins with #"),
             ("[input]\nobjfile = \u{201c}b.obj\u{201d}\n", "write straight quotes"),
@@ -427,6 +483,10 @@ mod tests {
         ] {
             let message = parse(text).unwrap_err().to_string();
             assert!(message.contains(expected), "{text:?} gave {message:?}");
+        }
+        for text in ["[film]\nsize = {{ width = 9, }, }\n", "[film\nwidth = 9\n", "fov = -\n"] {
+            let message = parse(&format!("{base}{text}")).unwrap_err().to_string();
+            assert!(!message.contains("hint"), "{text:?} gave {message:?}");
         }
     }
 

@@ -5,10 +5,11 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::Material;
-use super::mtl::{Library, UsedFile, shown};
+use super::mtl::{Library, UsedFile};
+use super::named_file::shown;
 use super::obj::{Corner, MISSING, Obj, Part};
 use super::polygon::triangulate;
-use super::text::{decode, read, visible};
+use super::text::{begins_as, decode, read};
 use crate::{Error, Result};
 
 /// A triangle mesh with one material.
@@ -70,8 +71,11 @@ impl MeshFile {
         let text = decode(&bytes);
         let obj = Obj::parse(path, &text)?;
         let mut library = Library::load(path, &obj.libraries)?;
+        // A statement that is not understood may be what is missing.
+        let ignored = [&obj.ignored[..], &library.ignored[..]].concat();
         let material = |part| material_of(path, &obj, &library, part);
-        let used = obj.parts.iter().map(material).collect::<Result<Vec<_>>>()?;
+        let used = obj.parts.iter().map(material).collect::<Result<Vec<_>>>();
+        let used = used.map_err(|error| error.also(&ignored))?;
         let files = library.settle(&used)?;
         let mut builder = Builder { obj: &obj, newest: vec![MISSING; obj.positions.len()] };
         let parts = obj.parts.iter().zip(used);
@@ -79,10 +83,9 @@ impl MeshFile {
         if shapes.is_empty() {
             let what = match (obj.positions.len(), obj.faces.len()) {
                 (0, _) => {
-                    let first = text.lines().next().unwrap_or_default().trim();
-                    let first: String = first.chars().take(40).map(visible).collect();
+                    let begins = begins_as(&bytes, &text);
                     format!(
-                        "it has no vertex (v) and no face (f), and begins with \"{first}\": is it an OBJ file?"
+                        "it has no vertex (v) and no face (f), and {begins}: is it an OBJ file?"
                     )
                 }
                 (vertices, _) => format!("it has {vertices} vertices (v) and no face (f)"),
@@ -91,7 +94,14 @@ impl MeshFile {
         }
         let emits = |shape: &&Shape| library.materials[shape.material].is_emitter();
         let mut lights = shapes.iter().filter(emits);
-        let mut remarks = [&obj.remarks[..], &library.remarks[..]].concat();
+        let mut remarks = [&obj.remarks[..], &library.remarks[..], &ignored[..]].concat();
+        let is_used = |index: usize| obj.parts.iter().any(|part| part.material == Some(index));
+        for (index, nameless) in obj.uses.iter().enumerate() {
+            if nameless.name.is_empty() && !is_used(index) {
+                let (path, line) = (path.display(), nameless.line);
+                remarks.push(format!("{path}:{line}: {NAMELESS}; no face uses it"));
+            }
+        }
         if let (Some(first), more @ 1..) = (lights.next(), lights.count()) {
             remarks.push(format!(
                 "{}: {} shapes emit light; the light is the first, \"{}\", of material \"{}\"",
@@ -115,6 +125,8 @@ impl MeshFile {
     }
 }
 
+const NAMELESS: &str = "usemtl names no material";
+
 /// Index of the material of a part.
 fn material_of(path: &Path, obj: &Obj, library: &Library, part: &Part) -> Result<usize> {
     let wrong = |line, message| Error::File { path: path.to_owned(), line: Some(line), message };
@@ -123,6 +135,9 @@ fn material_of(path: &Path, obj: &Obj, library: &Library, part: &Part) -> Result
         let message = "face has no material; expected a usemtl statement before it";
         return Err(wrong(line, message.to_owned()));
     };
+    if used.name.is_empty() {
+        return Err(wrong(used.line, NAMELESS.to_owned()));
+    }
     library.find(&used.name).ok_or_else(|| {
         wrong(used.line, format!("material \"{}\" is {}", shown(&used.name), library.lacks()))
     })

@@ -4,6 +4,7 @@ mod config;
 mod material;
 mod mesh;
 mod mtl;
+mod named_file;
 mod obj;
 mod polygon;
 mod text;

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use glam::{Vec2, Vec3};
 use unicode_normalization::UnicodeNormalization as _;
 
+use super::named_file::{existing, is_elsewhere, library_files, shown, taken_beside, why_missing};
 use super::obj::Named;
 use super::text::{
-    SECOND_BACKSLASH, Statements, decode, ignored_remarks, read, split_keyword, unquoted,
-    without_comment,
+    Statements, begins_as, decode, ignored_remarks, read, split_keyword, unquoted, without_comment,
 };
 use super::texture::Mapping;
 use super::{Material, MaterialModel, Texture};
@@ -39,11 +39,8 @@ pub(super) struct Library {
     textures: Vec<(usize, UsedFile)>,
     /// What was left out.
     pub remarks: Vec<String>,
-}
-
-/// A name as a message shows it.
-pub(super) fn shown(name: &str) -> String {
-    name.replace(SECOND_BACKSLASH, "\\")
+    /// The remarks on statements that are not supported, and on files without a material.
+    pub ignored: Vec<String>,
 }
 
 /// Names that a message lists at most.
@@ -75,7 +72,7 @@ impl Library {
                 if is_elsewhere(folder, &statement.name) {
                     library.remarks.push(taken_beside(obj, statement.line, &statement.name, &file));
                 }
-                library.read(&file, &decode(&bytes))?;
+                library.read(&file, &bytes);
                 let named_at = Some((obj.to_owned(), statement.line));
                 library.files.push(UsedFile { path: file, named_at });
             }
@@ -124,9 +121,10 @@ impl Library {
                 .into();
         };
         let file = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
-        let mut names: Vec<&str> =
-            self.names.iter().take(LISTED).map(|[name, _]| name.as_str()).collect();
-        if self.names.len() > LISTED {
+        let named = self.names.iter().map(|[name, _]| name.as_str());
+        let mut names: Vec<&str> = named.filter(|name| !name.is_empty()).collect();
+        if names.len() > LISTED {
+            names.truncate(LISTED);
             names.push("...");
         }
         let names = if names.is_empty() { "no material".into() } else { shown(&names.join(", ")) };
@@ -140,7 +138,9 @@ impl Library {
     }
 
     /// Adds the materials of one file.
-    fn read(&mut self, path: &Path, text: &str) -> Result<()> {
+    fn read(&mut self, path: &Path, bytes: &[u8]) {
+        let text = &decode(bytes);
+        let before = self.materials.len();
         let mut current: Option<Entry> = None;
         let mut ignored: BTreeMap<String, (usize, usize)> = BTreeMap::new();
         for (line, statement) in Statements::new(text) {
@@ -150,15 +150,16 @@ impl Library {
             if keyword.eq_ignore_ascii_case("newmtl") {
                 self.add(path, current.take());
                 let plain = unquoted(without_comment(rest)).to_owned();
-                if plain.is_empty() {
-                    return Err(at.wrong("newmtl names no material".to_owned()));
-                }
                 if self.find(&plain).is_some() {
                     let message =
                         format!("material \"{plain}\" is there already: the first counts");
                     self.remarks.push(format!("{}:{line}: {message}", path.display()));
                 }
-                current = Some(Entry::new(unquoted(rest).to_owned(), plain));
+                let mut entry = Entry::new(unquoted(rest).to_owned(), plain);
+                if entry.name.is_empty() {
+                    entry.broken = Some(at.wrong("newmtl names no material".to_owned()));
+                }
+                current = Some(entry);
             } else if let Some(entry) = &mut current {
                 match entry.read(&at, keyword, rest) {
                     Ok(Effect::Taken) => {}
@@ -174,8 +175,13 @@ impl Library {
             }
         }
         self.add(path, current);
-        self.remarks.extend(ignored_remarks(path, &ignored));
-        Ok(())
+        if self.materials.len() > before || ignored.is_empty() {
+            self.ignored.extend(ignored_remarks(path, &ignored));
+        } else {
+            let begins = begins_as(bytes, text);
+            let file = path.display();
+            self.ignored.push(format!("{file} has no newmtl and {begins}: is it an MTL file?"));
+        }
     }
 
     fn add(&mut self, path: &Path, entry: Option<Entry>) {
@@ -496,147 +502,6 @@ fn leading_numbers(text: &str, most: usize) -> (Vec<f32>, &str) {
         rest = after;
     }
     (values, rest)
-}
-
-/// Whether a name is a place on the machine of whoever exported it.
-fn is_absolute(name: &str) -> bool {
-    let name = unquoted(name).as_bytes();
-    matches!(name, [b'/' | b'\\', ..] | [b'a'..=b'z' | b'A'..=b'Z', b':', b'/' | b'\\', ..])
-}
-
-/// Whether a name leads out of the folder, where a renderer sees nothing.
-fn leaves_folder(name: &str) -> bool {
-    unquoted(name).split(['/', '\\']).any(|part| part == "..")
-}
-
-/// Whether a file is taken from elsewhere than its name says.
-fn is_elsewhere(folder: &Path, name: &str) -> bool {
-    let is_there = || spellings(folder, without_comment(name)).iter().any(|path| path.is_file());
-    is_absolute(name) || leaves_folder(name) && !is_there()
-}
-
-/// The remark on a file that is taken from beside the file that names it.
-fn taken_beside(path: &Path, line: usize, name: &str, file: &Path) -> String {
-    let why = if is_absolute(name) { "is absolute" } else { "leads to no file" };
-    let (name, path) = (shown(unquoted(name)), path.display());
-    format!("{path}:{line}: {name} {why}; taken is {}", file.display())
-}
-
-/// A hint for the message about a missing file.
-pub(super) fn why_missing(name: &str, file: &Path) -> String {
-    // The first of its folders that is not there, or the file itself.
-    let missing =
-        file.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists());
-    let Some(missing) = missing.last() else { return String::new() };
-    let wanted = missing.file_name().unwrap_or_default();
-    let folder = missing.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let entries = folder.unwrap_or(Path::new(".")).read_dir().into_iter().flatten().flatten();
-    let mut alike = entries.map(|entry| entry.file_name());
-    if let Some(other) = alike.find(|other| other.eq_ignore_ascii_case(wanted)) {
-        return format!("; there is {}: upper and lower case count", other.display());
-    }
-    if is_absolute(name) {
-        return format!("; {} is absolute, so it was looked for here", unquoted(name));
-    }
-    String::new()
-}
-
-/// The file of that name in `folder`: as it stands if there is one, else without a comment behind it. Of an
-/// absolute name the end that is there counts: the rest is another machine's, or none that a renderer
-/// sees. So it does where a name leads out of the folder and no file is there.
-fn existing(folder: &Path, name: &str) -> PathBuf {
-    let candidates = [name, without_comment(name)];
-    let mut direct = candidates.iter().flat_map(|name| spellings(folder, name));
-    if !is_absolute(name)
-        && let Some(found) = direct.find(|path| path.is_file())
-    {
-        return found;
-    }
-    let plain = unquoted(without_comment(name)).replace('\\', "/");
-    let first = folder.join(shown(&plain));
-    if is_absolute(name) || leaves_folder(name) {
-        let ends = candidates.iter().flat_map(|name| {
-            let name = unquoted(name);
-            let separators = ['/', '\\', SECOND_BACKSLASH];
-            let after = |(at, separator): (usize, &str)| &name[at + separator.len()..];
-            name.match_indices(separators).map(after).collect::<Vec<_>>()
-        });
-        let mut ends = ends
-            .filter(|end| !end.is_empty() && !is_absolute(end) && !leaves_folder(end))
-            .collect::<Vec<_>>();
-        ends.sort_by_key(|end| std::cmp::Reverse(end.len()));
-        let found = ends.iter().flat_map(|end| spellings(folder, end)).find(|path| path.is_file());
-        let last = ends.last().map(|end| folder.join(without_comment(end)));
-        return match (found, is_absolute(name)) {
-            (Some(found), _) => found,
-            (None, true) => last.unwrap_or_else(|| folder.to_owned()),
-            (None, false) => first,
-        };
-    }
-    with_other_accents(&first).unwrap_or(first)
-}
-
-/// A file of that name whose accents are written in another way: as characters of their own, or not.
-fn with_other_accents(path: &Path) -> Option<PathBuf> {
-    let wanted = path.file_name()?.to_str().filter(|name| !name.is_ascii())?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let entries = folder.unwrap_or(Path::new(".")).read_dir().ok()?.flatten();
-    let mut names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-    names.find(|name| name.nfc().eq(wanted.nfc())).map(|name| path.with_file_name(name))
-}
-
-/// A name with either kind of slash, and as it stands; in UTF-8 and, where the system has bytes for names, in the
-/// bytes of the file that names it.
-fn spellings(folder: &Path, name: &str) -> Vec<PathBuf> {
-    let own = unquoted(name);
-    if own.is_empty() {
-        return Vec::new();
-    }
-    let slashes = own.replace('\\', "/");
-    let mut names = vec![slashes.replace(SECOND_BACKSLASH, "/")];
-    #[cfg(unix)]
-    names.push(shown(own));
-    let mut paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
-    #[cfg(unix)]
-    if !own.is_ascii() {
-        use std::os::unix::ffi::OsStrExt as _;
-        let bytes = [slashes.as_str(), own].map(super::text::bytes_of);
-        let bytes = bytes.into_iter().chain([super::text::bytes_of(&names[0])]).flatten();
-        paths.extend(bytes.map(|bytes| folder.join(std::ffi::OsStr::from_bytes(&bytes))));
-    }
-    paths
-}
-
-/// The files of an `mtllib` statement: one whose name may hold spaces, if it is there; else several,
-/// in quotes or each with the ending `.mtl`, or else one a word.
-fn library_files(folder: &Path, statement: &str) -> Vec<PathBuf> {
-    let whole = existing(folder, statement);
-    // Of several, the end that is beside is the last alone.
-    let is_several = || statement.to_ascii_lowercase().matches(".mtl").count() > 1;
-    let is_direct = || spellings(folder, statement).contains(&whole);
-    if whole.is_file() && (is_direct() || !is_several()) {
-        return vec![whole];
-    }
-    let mut names: Vec<String> = Vec::new();
-    let mut rest = without_comment(statement).trim();
-    while !rest.is_empty() {
-        let quoted = rest.strip_prefix('"').and_then(|rest| rest.split_once('"'));
-        let (name, after) = match quoted {
-            Some((name, after)) => (name, after),
-            None => {
-                let lower = rest.to_ascii_lowercase();
-                let mut ends = lower.match_indices(".mtl").map(|(at, ending)| at + ending.len());
-                let is_end =
-                    |end: &usize| rest[*end..].chars().next().is_none_or(char::is_whitespace);
-                let word = rest.find(char::is_whitespace).unwrap_or(rest.len());
-                let end = ends.find(is_end).unwrap_or(word);
-                rest.split_at(end)
-            }
-        };
-        names.push(name.trim().to_owned());
-        rest = after.trim();
-    }
-    names.iter().filter(|name| !name.is_empty()).map(|name| existing(folder, name)).collect()
 }
 
 #[cfg(test)]

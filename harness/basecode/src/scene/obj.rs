@@ -86,6 +86,8 @@ pub(super) struct Obj {
     pub libraries: Vec<Named>,
     /// What was left out.
     pub remarks: Vec<String>,
+    /// The remarks on statements that are not supported.
+    pub ignored: Vec<String>,
 }
 
 impl Obj {
@@ -104,10 +106,14 @@ impl Obj {
             texts => texts.par_iter().map(|text| Piece::read(text)).collect(),
         };
         let mut whole = Assembly { path, ..Assembly::default() };
-        for (piece, wrong) in pieces {
-            whole.append(piece, wrong)?;
+        let mut pieces = pieces.into_iter();
+        let read = pieces.try_for_each(|(piece, wrong)| whole.append(piece, wrong));
+        let read = read.and_then(|()| whole.finish());
+        let ignored = ignored_remarks(path, &whole.ignored);
+        match read {
+            Ok(()) => Ok(Obj { ignored, ..whole.obj }),
+            Err(error) => Err(error.also(&ignored)),
         }
-        whole.finish()
     }
 }
 
@@ -184,6 +190,9 @@ impl Assembly<'_> {
     fn append(&mut self, mut piece: Piece, wrong: Option<Wrong>) -> Result<()> {
         let obj = &mut self.obj;
         let before = [obj.positions.len(), obj.uvs.len(), obj.normals.len()];
+        for (keyword, (more, line)) in piece.ignored {
+            self.ignored.entry(keyword).or_insert((0, self.lines + line)).0 += more;
+        }
         for relative in piece.relative {
             let index = before[relative.which] as i64 + relative.index;
             let Some(index) = u32::try_from(index).ok().filter(|&index| index != MISSING) else {
@@ -231,9 +240,6 @@ impl Assembly<'_> {
         }
         let line = |beyond: Beyond| Beyond { line: self.lines + beyond.line, ..beyond };
         self.beyond.extend(piece.beyond.into_iter().map(line));
-        for (keyword, (more, line)) in piece.ignored {
-            self.ignored.entry(keyword).or_insert((0, self.lines + line)).0 += more;
-        }
         self.lines += piece.lines;
         Ok(())
     }
@@ -264,7 +270,7 @@ impl Assembly<'_> {
         }
     }
 
-    fn finish(mut self) -> Result<Obj> {
+    fn finish(&mut self) -> Result<()> {
         self.end_part(self.obj.faces.len());
         // Exporters write indices of what they leave out.
         let (no_uvs, no_normals) = (self.obj.uvs.is_empty(), self.obj.normals.is_empty());
@@ -281,17 +287,16 @@ impl Assembly<'_> {
                 self.check(face.line as usize, corner)?;
             }
         }
-        for (what, count, line) in self.without_area {
-            let words = if count == 1 { what.0 } else { what.1 };
-            if count > 0 {
+        for (what, count, line) in &self.without_area {
+            let words = if *count == 1 { what.0 } else { what.1 };
+            if *count > 0 {
                 let path = self.path.display();
                 self.obj
                     .remarks
                     .push(format!("{path}:{line}: {count} {words} no area and will not be seen"));
             }
         }
-        self.obj.remarks.extend(ignored_remarks(self.path, &self.ignored));
-        Ok(self.obj)
+        Ok(())
     }
 
     /// Whether what a corner names is there, and finite.

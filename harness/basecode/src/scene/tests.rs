@@ -189,6 +189,38 @@ fn mistakes_in_mesh_and_materials_name_file_and_line() {
             "s.mtl:3: material \"grey\": illum is",
         ),
         ("word", OBJ.replace("v 1 1 0", "v 1 one 0"), MTL.to_owned(), "s.obj:4"),
+        (
+            "nameless",
+            OBJ.replace("usemtl grey", "usemtl \"\""),
+            MTL.to_owned(),
+            "s.obj:12: usemtl names no material",
+        ),
+        (
+            "typo",
+            OBJ.to_owned(),
+            MTL.replace("newmtl grey", "newmlt grey"),
+            "s.mtl:1: 1 newmlt statement is ignored",
+        ),
+        (
+            "vertex",
+            OBJ.replace("v -3 0 4", "vertex -3 0 4"),
+            MTL.to_owned(),
+            "s.obj:17: 1 vertex statement is ignored",
+        ),
+        (
+            "web page",
+            OBJ.to_owned(),
+            "<html>\n".into(),
+            "s.mtl has no newmtl and begins as a web page does: is it an MTL file?",
+        ),
+        ("zeros", OBJ.to_owned(), "\0".repeat(9), "s.mtl has no newmtl and begins with zeros"),
+        (
+            "mesh",
+            OBJ.to_owned(),
+            "\n v 0 0 0".into(),
+            "s.mtl has no newmtl and begins with \"v 0 0 0\": is it an MTL file?",
+        ),
+        ("no material", OBJ.to_owned(), "# none\n".into(), "is not in s.mtl (it has: no material)"),
         ("empty", String::new(), MTL.to_owned(), "holds no triangle"),
         (
             "nomtl",
@@ -299,6 +331,13 @@ fn every_form_of_a_mesh_that_exporters_write_is_read() {
         ("mtllib last", OBJ.replace("mtllib s.mtl\n", "") + "mtllib s.mtl", MTL.to_owned()),
         ("unused", OBJ.to_owned() + "v nan 0 0\nvn nan 0 0\nvt nan 0\n", MTL.to_owned()),
         ("lower case", OBJ.to_owned(), MTL.replace("Kd", "kd").replace("Ke", "KE")),
+        (
+            "joined",
+            OBJ.replace("v 1 1 0", "\u{feff}v 1 1 0"),
+            MTL.replace("newmtl lamp", "\u{feff}newmtl lamp"),
+        ),
+        ("nameless", OBJ.replace("usemtl grey", "usemtl\nusemtl grey"), format!("{MTL}newmtl\n")),
+        ("sign", OBJ.replace("usemtl grey", "usemtl #1"), MTL.replace("grey", "#1")),
     ]
     .into_iter()
     .map(|(name, obj, mtl)| (name, obj.into_bytes(), mtl.into_bytes()))
@@ -346,15 +385,15 @@ fn names_of_two_bytes_a_character_hold_no_backslash() {
         fs::write(folder.0.join("s.obj"), obj).unwrap();
         fs::write(file(b".mtl"), mtl).unwrap();
         picture.save_with_format(file(b".png"), image::ImageFormat::Png).unwrap();
+        fs::rename(folder.0.join("s.obj"), file(b".obj")).unwrap();
+        fs::write(folder.0.join("s.toml"), with_name("[input]\nobjfile = 'NAME.obj'\n", name))
+            .unwrap();
         let scene = folder.load().unwrap_or_else(|error| panic!("{name:x?}: {error}"));
         assert_eq!(scene.material_of(0).diffuse.average(), Vec3::X, "{name:x?}");
         assert_eq!(scene.shapes().len(), 2, "{name:x?}");
         // The name that a message shows has its backslash.
-        fs::write(
-            folder.0.join("s.obj"),
-            with_name("mtllib NAME.mtl\nv 0 0 0\nusemtl x\nf 1 1 1\n", name),
-        )
-        .unwrap();
+        fs::write(file(b".obj"), with_name("mtllib NAME.mtl\nv 0 0 0\nusemtl x\nf 1 1 1\n", name))
+            .unwrap();
         assert!(!folder.error().contains('\u{f75c}'), "{}", folder.error());
     }
 }
@@ -373,6 +412,39 @@ fn accents_may_be_characters_of_their_own() {
     let mtl = format!("{}newmtl {apart}\nKd 1 1 1\n", MTL.replace("grey", whole));
     let scene = Folder::new("both", &OBJ.replace("grey", apart), &mtl).load().unwrap();
     assert_eq!(scene.material_of(0).diffuse.average(), Vec3::ONE);
+}
+
+#[test]
+fn a_mesh_is_found_as_other_files_are() {
+    let load = |there: &str, written: &[u8]| {
+        let folder = Folder::new("mesh-name", OBJ, MTL);
+        fs::create_dir_all(folder.0.join(there).parent().unwrap()).unwrap();
+        fs::rename(folder.0.join("s.obj"), folder.0.join(there)).unwrap();
+        fs::rename(folder.0.join("s.mtl"), folder.0.join(there).with_file_name("s.mtl")).unwrap();
+        let toml = [b"[input]\nobjfile = '", written, b"'\n"].concat();
+        fs::write(folder.0.join("s.toml"), toml).unwrap();
+        folder.load().map(|scene| scene.remarks().join("\n"))
+    };
+    let (whole, apart) = ("B\u{f6}den", "Bo\u{308}den");
+    for (there, written) in [
+        (format!("{whole}.obj"), format!("{apart}.obj")),
+        (format!("{apart}.obj"), format!("{whole}.obj")),
+        (format!("{apart}/{whole}.obj"), format!("{whole}\\{apart}.obj")),
+        ("a #1.obj".into(), "a #1.obj".into()),
+    ] {
+        assert_eq!(load(&there, written.as_bytes()).unwrap(), "", "{there}");
+    }
+    let error = load("s.obj", b"a #1.obj").unwrap_err().to_string();
+    assert!(error.contains("s.toml:2: cannot read the mesh ") && error.contains("a #1.obj: No"));
+}
+
+#[test]
+fn nameless_materials_that_nothing_uses_are_remarked_on() {
+    let obj = OBJ.replace("usemtl grey", "usemtl\nusemtl grey");
+    let scene = Folder::new("nameless", &obj, &format!("newmtl\n{MTL}")).load().unwrap();
+    let said = scene.remarks().join("\n");
+    assert!(said.contains("s.obj:12: usemtl names no material; no face uses it"), "{said}");
+    assert!(said.contains("s.mtl:1: newmtl names no material; no face uses this"), "{said}");
 }
 
 #[test]

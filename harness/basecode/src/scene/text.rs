@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
+use crate::exr_io::kind_of;
+
 /// The bytes of a file. To read a pipe would be to wait for its writer.
 ///
 /// # Errors
@@ -87,6 +89,11 @@ pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
+/// A line without the white space around it and the byte order mark before it, which joined files leave inside.
+fn trimmed(line: &str) -> &str {
+    line.trim_start_matches(|c: char| c.is_whitespace() || c == '\u{feff}').trim_end()
+}
+
 /// The statements of an OBJ or MTL text: non-empty lines, each with the number (from 1) of the line
 /// it begins on. Lines end with LF, CR or CRLF; one that ends with a backslash goes on in the next.
 pub(super) struct Statements<'a> {
@@ -136,7 +143,7 @@ impl<'a> Iterator for Statements<'a> {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            let mut line = Cow::Borrowed(self.physical_line()?.trim());
+            let mut line = Cow::Borrowed(trimmed(self.physical_line()?));
             let number = self.line;
             // A comment that happens to end with a backslash (a Windows path) does not go on.
             while line.ends_with('\\') && without_comment(&line).ends_with('\\') {
@@ -199,8 +206,21 @@ pub(super) fn ignored_remarks(
     remarks
 }
 
+/// What a file begins as that is none of those expected.
+pub(super) fn begins_as(bytes: &[u8], text: &str) -> String {
+    if let Some(kind) = kind_of(bytes) {
+        return format!("begins as {kind}");
+    }
+    if bytes.starts_with(&[0; 4]) {
+        return "begins with zeros".to_owned();
+    }
+    let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default().trim();
+    let first: String = first.chars().take(40).map(visible).collect();
+    format!("begins with \"{first}\"")
+}
+
 /// A character as a message shows it.
-pub(super) fn visible(c: char) -> char {
+fn visible(c: char) -> char {
     if c.is_control() { '?' } else { c }
 }
 

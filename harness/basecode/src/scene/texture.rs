@@ -95,6 +95,10 @@ impl Texture {
         if !is_marked {
             return Err(cannot(format!("expected {EXPECTED}, found {}", found(&bytes, None))));
         }
+        // The decoder makes up what is missing.
+        if format == image::ImageFormat::Jpeg && !has_end(&bytes) {
+            return Err(cannot(ends_early("JPG")));
+        }
         let mut reader = image::ImageReader::with_format(Cursor::new(&bytes), format);
         let mut limits = image::Limits::default();
         limits.max_image_width = Some(MAX_SIDE);
@@ -141,6 +145,16 @@ fn found(bytes: &[u8], format: Option<image::ImageFormat>) -> String {
     }
 }
 
+/// Whether the last scan of a JPEG has an end: the marker SOS (0xFFDA) with EOI (0xFFD9) somewhere behind it.
+fn has_end(jpeg: &[u8]) -> bool {
+    let last = |marker| jpeg.windows(2).rposition(|bytes| bytes == [0xff, marker]);
+    last(0xda).is_some_and(|scan| last(0xd9).is_some_and(|end| end > scan))
+}
+
+fn ends_early(name: &str) -> String {
+    format!("the {name} ends early; was it cut off?")
+}
+
 /// Why a decoder gave up, in words: the crates' own messages hold their types.
 fn why_not_decoded(error: &image::ImageError, bytes: &[u8], format: image::ImageFormat) -> String {
     let name = found(&[0], Some(format));
@@ -158,11 +172,15 @@ fn why_not_decoded(error: &image::ImageError, bytes: &[u8], format: image::Image
                 .to_owned()
         }
         image::ImageError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => {
-            format!("the {name} ends early; was it cut off?")
+            ends_early(&name)
         }
         other => {
             let said = other.to_string();
             let said = said.rsplit(": ").next().unwrap_or_default().trim_end_matches('.');
+            // As the decoder of JPEG has it.
+            if said.starts_with("I/O errors") || said.contains("Not enough bytes") {
+                return ends_early(&name);
+            }
             let is_code = said.is_empty() || said.contains(['{', '}', '(', ')', '"', '`']);
             if is_code || said.contains("::") || said.starts_with("Format error") {
                 format!("the {name} is damaged")
@@ -249,6 +267,7 @@ mod tests {
             bytes.into_inner()
         };
         let png = encoded(2, 2, image::ImageFormat::Png);
+        let jpg = encoded(64, 64, image::ImageFormat::Jpeg);
         let mut xcode = png.clone();
         xcode.splice(8..8, *b"\0\0\0\x04CgBI\x50\0\x20\x02\x2b\xd5\xb3\x7f");
         let mut broken = png.clone();
@@ -271,6 +290,9 @@ mod tests {
             ("t.tga", b"\0\0\x02".to_vec(), "the TGA ends early"),
             ("t.png", Vec::new(), "found an empty file"),
             ("t.png", b"abc".to_vec(), "found something else"),
+            ("t.jpg", jpg[..30].to_vec(), "the JPG ends early"),
+            ("t.jpg", jpg[..jpg.len() / 2].to_vec(), "the JPG ends early"),
+            ("t.jpg", jpg[..jpg.len() - 2].to_vec(), "the JPG ends early"),
             ("t.webp", b"RIFF\0\0\0\0WEBPVP8 ".to_vec(), "found WEBP"),
         ] {
             let path = folder.join(name);
@@ -280,6 +302,10 @@ mod tests {
             let why = said.split_once(&format!("{}: ", path.display())).expect(&said).1;
             assert!(!why.contains(['{', '}', '"']) && !why.contains("::"), "{said}");
         }
+        // Cameras write more behind the end.
+        let path = folder.join("t.jpg");
+        std::fs::write(&path, [jpg, vec![0; 9]].concat()).unwrap();
+        Texture::load(&path, Mapping::default()).unwrap();
         std::fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -214,7 +214,7 @@ fn compare(options: &Options) -> anyhow::Result<u8> {
         if options.all {
             println!("{} x {}, {} channels", a.width(), a.height(), names.len());
         }
-        report(options, &tally, pixels, &names, values);
+        report(options, &tally, (a.origin(), pixels), &names, values);
     }
     if let Some(path) = &options.output
         && (tally.largest.is_some() || !options.only_different)
@@ -253,7 +253,7 @@ fn verdict(options: &Options, tally: &Tally, pixels: usize) -> u8 {
 fn report(
     options: &Options,
     tally: &Tally,
-    pixels: usize,
+    (origin, pixels): ([i32; 2], usize),
     names: &[String],
     values: Option<[Vec<f32>; 2]>,
 ) {
@@ -264,7 +264,7 @@ fn report(
     println!("  Peak SNR = {}", general(20.0 * (f64::from(tally.peak) / rms).log10(), 6));
     match (tally.largest, values) {
         (Some(largest), Some(values)) => {
-            let [x, y] = largest.at;
+            let [x, y] = [0, 1].map(|axis| i64::from(origin[axis]) + largest.at[axis] as i64);
             let [a, b] = values.map(|values| {
                 values.iter().map(|value| shortest(*value)).collect::<Vec<_>>().join(", ")
             });
@@ -321,7 +321,8 @@ fn write_difference(
         }
     }
     let channels: Vec<_> = names.iter().map(String::as_str).zip(planes).collect();
-    Ok(write_exr_channels(path, images[0].file.width(), &channels)?)
+    let file = images[0].file;
+    Ok(write_exr_channels(path, file.origin(), file.width(), &channels)?)
 }
 
 /// The channels of a file and their indices, as idiff orders them: layer by layer, R, G, B and A first.

@@ -25,6 +25,7 @@ use super::context::{Context, on_interrupt};
 use super::earlier::{Report, Row};
 use super::outputs::ensure_apart;
 use super::selection::Selection;
+use super::tree::ensure_working_folder;
 use crate::columns::count;
 use crate::intake::Severity;
 use crate::rubric::PartGrade;
@@ -65,6 +66,7 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     let folder = arguments.folder.canonicalize().with_context(name)?;
     anyhow::ensure!(folder.is_dir(), "{}: expected a folder", arguments.folder.display());
     let context = Context::new(root)?;
+    ensure_working_folder(&arguments.folder, &context.assignment.tree)?;
     let given = [crate::class::Source::given(&folder)];
     let slug = super::class::sources(&given, &arguments.output, &std::collections::HashMap::new())
         .remove(0)

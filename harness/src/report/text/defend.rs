@@ -3,6 +3,7 @@
 use super::super::number::{measure as in_words, of_part, range};
 use super::super::{BatchReport, SubmissionReport};
 use super::page::{Look, Page, Style};
+use crate::columns::of_points;
 use crate::evidence::{Check, Verdict};
 
 /// Explains the points of a part of a submission, for the instructor.
@@ -20,13 +21,15 @@ pub fn defend(
         format!("there is no part {part}; expected one of {}", parts.join(", "))
     })?;
     let mut page = Page::new(look.width, look.colours);
-    let title = format!("{part} {}: {} of {} points", graded.title, of_part(graded), graded.out_of);
+    let out_of = of_points(&graded.out_of.to_string());
+    let title = format!("{part} {}: {} of {out_of}", graded.title, of_part(graded));
     page.line(&[(Style::Heading, &title)]);
     let student = entry.student();
     let name = student.full_name();
     let who = if name.is_empty() { entry.record.name.clone() } else { name };
     let total = range(entry.grade.points, entry.grade.points_max);
-    page.wrapped(&[], Style::Plain, &format!("{who} ({}), {total} points in all", student.id));
+    let total = of_points(&total);
+    page.wrapped(&[], Style::Plain, &format!("{who} ({}), {total} in all", student.id));
     page.wrapped(&[], Style::Plain, &graded.reason);
     for applied in &entry.standing.decisions {
         if applied.decision.part.as_deref().is_none_or(|own| own == part) {
@@ -53,13 +56,19 @@ pub fn defend(
         })
     };
     let checks = &entry.record.evidence.checks;
-    page.gap();
-    page.line(&[(Style::Heading, "What decided")]);
+    let heading = |page: &mut Page, words: &str, is_empty: bool| {
+        page.gap();
+        if is_empty {
+            page.wrapped(&[], Style::Plain, &format!("{words}: nothing"));
+        } else {
+            page.line(&[(Style::Heading, words)]);
+        }
+    };
+    heading(&mut page, "What decided", !checks.iter().any(|own| decides(&own)));
     for own in checks.iter().filter(decides) {
         check(&mut page, report, own);
     }
-    page.gap();
-    page.line(&[(Style::Heading, "All that was asked about it")]);
+    heading(&mut page, "All that was asked about it", !checks.iter().any(|own| asked(&own)));
     for own in checks.iter().filter(asked) {
         let held_back = if own.held_back { ", held back" } else { "" };
         let line = format!("{} ({}{held_back}): {}", own.name(), own.verdict.name(), own.summary);

@@ -29,18 +29,24 @@ function colorTable(map) {
   return table;
 }
 
+const srgb = (v) => (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055);
+/** What Reinhard's curve shows as white, as in the pictures of a report (harness/src/imaging/pictures.rs). */
+const WHITE = 8;
 const CURVES = {
-  srgb: (v) => (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055),
+  srgb,
   gamma: (v) => v ** (1 / 2.2),
+  reinhard: (v) => srgb((v * (1 + v / WHITE ** 2)) / (1 + v)),
 };
+/** What a way to show values has for white. */
+const whiteOf = (tone) => (tone === "reinhard" ? WHITE : 1);
 
 /** The channels that can be shown. */
 const CHANNELS = ["rgb", "r", "g", "b", "mean"];
 /** How a difference is measured. */
 const METRICS = ["signed", "absolute", "relative"];
 /** How values become colors. */
-const TONES = ["srgb", "gamma", "false", "signed"];
-const TONE_NAMES = { srgb: "sRGB", gamma: "gamma 2.2", false: "false color", signed: "blue to red" };
+const TONES = ["srgb", "gamma", "false", "signed", "reinhard"];
+const TONE_NAMES = { srgb: "sRGB", gamma: "gamma 2.2", false: "false color", signed: "blue to red", reinhard: "Reinhard curve" };
 
 /** The single number that a layer shows of a pixel: one channel, the mean of all, or of a difference in all channels the
     one that differs most, with its sign, since opposite signs would cancel in a mean. */
@@ -85,7 +91,7 @@ function shade(values, layer, settings) {
   }
   const one = settings.channel === "rgb" && values.length >= 3 ? null : pick(values, settings.channel, layer.kind);
   return [0, 1, 2].map((c) => {
-    const value = Math.min(Math.max((one ?? values[c]) * gain, 0), 1);
+    const value = Math.min(Math.max((one ?? values[c]) * gain, 0), whiteOf(tone));
     return Math.round(255 * CURVES[tone](value));
   });
 }

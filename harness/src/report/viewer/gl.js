@@ -38,6 +38,7 @@ vec3 valueAt(ivec2 at) {
 }
 
 float curve(float v) {
+  if (tone == 4) v = v * (1.0 + v / ${WHITE ** 2}.0) / (1.0 + v);
   if (tone == 1) return pow(v, 1.0 / 2.2);
   return v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1.0 / 2.4) - 0.055;
 }
@@ -68,14 +69,14 @@ void main() {
     if (abs(value.g) > abs(single)) single = value.g;
     if (abs(value.b) > abs(single)) single = value.b;
   }
-  if (tone >= 2) {
+  if (tone == 2 || tone == 3) {
     float at = single * gain;
     if (tone == 3) at = 0.5 + 0.5 * at;
     else if (scale == 1) at = 0.5 + log2(max(at, 1e-9)) / ${LOG_RANGE}.0;
     color = texture(table, vec2((clamp(at, 0.0, 1.0) * 255.0 + 0.5) / 256.0, 0.5));
     return;
   }
-  vec3 shown = clamp((channel == 0 ? value : vec3(single)) * gain, 0.0, 1.0);
+  vec3 shown = clamp((channel == 0 ? value : vec3(single)) * gain, 0.0, tone == 4 ? ${WHITE}.0 : 1.0);
   color = vec4(curve(shown.r), curve(shown.g), curve(shown.b), 1.0);
 }`;
 

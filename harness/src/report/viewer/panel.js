@@ -105,12 +105,13 @@ function showLegend(layer, settings) {
   const canvas = get("legend");
   const context = canvas.getContext("2d");
   const { width, height } = canvas;
-  const limit = 2 ** -settings.exposure;
+  const white = whiteOf(settings.tone);
+  const limit = white * 2 ** -settings.exposure;
   let ends = [0, limit / 2, limit];
   const color = (at) => {
     if (settings.tone === "signed") return colorAt(DIVERGING, at);
     if (settings.tone === "false") return colorAt(VIRIDIS, at);
-    return [0, 1, 2].map(() => 255 * CURVES[settings.tone](at));
+    return [0, 1, 2].map(() => 255 * CURVES[settings.tone](white * at));
   };
   if (settings.tone === "signed") ends = [-limit, 0, limit];
   else if (layer.kind === "excess" && settings.tone === "false") ends = [-1, 0, 1].map((t) => limit * 2 ** ((t * LOG_RANGE) / 2));
@@ -166,7 +167,7 @@ function showHistogram(layer, settings) {
       context.fillRect((i * width) / BARS, height - h, width / BARS, h);
     });
   });
-  const limit = 2 ** -settings.exposure;
+  const limit = whiteOf(settings.tone) * 2 ** -settings.exposure;
   let ends = settings.tone === "signed" ? [-limit, 0, limit] : [0, limit / 2, limit];
   if (layer.kind === "excess") ends = [-1, 0, 1].map((t) => limit * 2 ** ((t * LOG_RANGE) / 2));
   ends.forEach((value, i) => { get(`axis-${i}`).textContent = digits(value, 3); });
@@ -223,12 +224,15 @@ function ruleAt({ x, y }) {
     const over = excess.at(x, y)[0];
     const difference = stage.layers.find((layer) => layer.kind === "difference");
     let bound = "";
-    if (difference && over > 0 && Number.isFinite(over)) {
+    // What is further off is kept as the largest half.
+    const most = over >= LARGEST_HALF;
+    if (difference && over > 0 && !most) {
       const size = Math.max(...layerValues(difference, x, y, { metric: "absolute" }));
       bound = ` The bound here is about ${digits(size / over, 3)}.`;
     }
     const rule = value & EDGE ? "edge (a few percent of edges may)" : "interior and blob";
-    words.push(over <= 1 ? `Within the bound.${bound}` : `${digits(over, 3)} times its bound: counts in ${rule}.${bound}`);
+    const times = most ? `More than ${LARGEST_HALF}` : digits(over, 3);
+    words.push(over <= 1 ? `Within the bound.${bound}` : `${times} times its bound: counts in ${rule}.${bound}`);
   }
   return words.join(" ");
 }

@@ -22,10 +22,11 @@ const state = {
   pin: null,
 };
 
-/** The looks that a case begins with. Exposures that are null are found from the values. */
+/** The looks that a case begins with: that of the report's pictures, if it is of a report. Exposures that are null are
+    found from the values. */
 function initialLook(about) {
   return {
-    image: { tone: "srgb", exposure: about.exposure ?? null },
+    image: { tone: about.exposure === undefined ? "srgb" : "reinhard", exposure: about.exposure ?? null },
     difference: { tone: "signed", exposure: null },
     excess: { tone: "false", exposure: 0 },
     regions: { tone: "srgb", exposure: 0 },

@@ -66,12 +66,12 @@ function exposureOf(layer, settings) {
   if (sizes.length === 0) return null;
   const sorted = Float64Array.from(sizes).sort();
   const bright = sorted[Math.min(sorted.length - 1, Math.floor(0.99 * sorted.length))];
-  return clamp(Math.round(-10 * Math.log2(bright)) / 10, EXPOSURES);
+  return clamp(Math.round(10 * Math.log2(whiteOf(settings.tone) / bright)) / 10, EXPOSURES);
 }
 
 /** Counts of values in bins over what the screen shows, of pixels spread evenly over the layer. */
 function histogram(layer, settings) {
-  const limit = 2 ** -settings.exposure;
+  const limit = whiteOf(settings.tone) * 2 ** -settings.exposure;
   const signed = settings.tone === "signed";
   const log = layer.kind === "excess";
   const all = settings.channel === "rgb";
@@ -130,6 +130,8 @@ function digits(value, count = 4) {
     : String(Number(value.toPrecision(count)));
 }
 
+const LARGEST_HALF = 65504;
+
 /** The half nearest to a number, even ones first. */
 function roundToHalf(value) {
   const unit = 2 ** (Math.max(Math.floor(Math.log2(Math.abs(value))), -14) - 10);
@@ -137,7 +139,7 @@ function roundToHalf(value) {
   const whole = Math.round(steps);
   const even = Math.abs(steps - Math.trunc(steps)) === 0.5 ? 2 * Math.round(steps / 2) : whole;
   const rounded = even * unit;
-  return Math.abs(rounded) > 65504 ? Math.sign(value) * Infinity : rounded;
+  return Math.abs(rounded) > LARGEST_HALF ? Math.sign(value) * Infinity : rounded;
 }
 
 /** The fewest digits that give the same float, or half, back; of an integer below 1e9, all of them. */

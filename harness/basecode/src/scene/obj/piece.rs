@@ -158,11 +158,7 @@ impl Piece {
                 self.marks.push((self.faces.len(), name));
             }
             "usemtl" => {
-                let name = unquoted(rest);
-                if name.is_empty() {
-                    return Err(Wrong::at(line, "usemtl names no material".to_owned()));
-                }
-                let name = Mark::Use(Named { line, name: name.to_owned() });
+                let name = Mark::Use(Named { line, name: unquoted(rest).to_owned() });
                 self.marks.push((self.faces.len(), name));
             }
             "mtllib" => self.libraries.push(Named { line, name: rest.to_owned() }),
