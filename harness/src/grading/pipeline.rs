@@ -59,6 +59,8 @@ pub struct Grading<'a> {
     pub cancel: &'a AtomicBool,
     /// What is asked about: both halves of the assignment, or one.
     pub paths: Vec<RenderPath>,
+    /// Whether realtime is judged before anything is rendered offline.
+    pub realtime_first: bool,
     /// Whether submitted images are compared with what the code draws.
     pub compares_submitted: bool,
     /// Records made before and to be made, if they are kept.
@@ -157,6 +159,7 @@ impl<'a> Grading<'a> {
             threads: store.threads,
             cancel,
             paths: RenderPath::ALL.to_vec(),
+            realtime_first: false,
             compares_submitted: true,
             cache: None,
             budget: Some(assignment.limits.budget.clone()),
@@ -335,7 +338,7 @@ impl<'a> Grading<'a> {
             session.retries.renew();
         }
         if paths.contains(&RenderPath::Realtime) {
-            _compiled = self.compile_own(&mut session, stages)?;
+            _compiled = self.compile_own(&mut session, stages, &|_| ())?;
             self.realtime(&session, library, stages, &mut checks, &mut drawn)?;
         }
         let evidence = Evidence { checks };
