@@ -424,15 +424,18 @@ fn keys_reach_what_has_the_focus_and_a_lost_context_is_replaced() {
     assert_eq!(browser.value("document.activeElement.id"), "stage");
     browser.key("1", 0);
     assert_eq!(browser.value("state.layer"), 0);
-    // So does a button.
-    let at = browser
-        .value("(({ left, top }) => [left + 4, top + 4])(get('fit').getBoundingClientRect())");
-    let [x, y] = [0, 1].map(|axis| at[axis].as_f64().unwrap());
-    browser.mouse("mousePressed", x, y);
-    browser.mouse("mouseReleased", x, y);
-    browser.key_down(" ", 0);
-    assert_eq!(browser.value("stage.held"), true);
-    browser.key_up(" ");
+    // So does a button, one of the list of images too.
+    for button in ["#fit", "#layers .show", "#layers li:last-child .against", "#auto"] {
+        let at = browser.value(&format!(
+            "(({{ left, top }}) => [left + 4, top + 4])(document.querySelector('{button}').getBoundingClientRect())"
+        ));
+        let [x, y] = [0, 1].map(|axis| at[axis].as_f64().unwrap());
+        browser.mouse("mousePressed", x, y);
+        browser.mouse("mouseReleased", x, y);
+        browser.key_down(" ", 0);
+        assert_eq!(browser.value("stage.held"), true, "{button}");
+        browser.key_up(" ");
+    }
 
     assert_eq!(browser.value("stage.painter.name"), "WebGL 2");
     browser.value("stage.gl.gl.getExtension('WEBGL_lose_context').loseContext()");
@@ -492,6 +495,101 @@ fn every_channel_is_shown_and_a_file_that_cannot_be_read_ends_nothing() {
         view.arg("view").arg(&broken).arg("-o").arg(folder.path().join("none")).output().unwrap();
     assert_eq!(run.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&run.stderr).contains("broken.exr"));
+}
+
+#[test]
+fn the_case_that_was_chosen_last_is_shown() {
+    let Some(mut browser) = Chromium::start() else { return };
+    let browser = &mut browser;
+    let folder = tempfile::tempdir().unwrap();
+    let small = Image { width: 4, height: 3, pixels: vec![Vec3::ONE; 12] };
+    let (page, _) = viewed(
+        &folder.path().join("out"),
+        &written(folder.path(), [("small.exr", &small), ("large.exr", &image(1.0))]),
+    );
+    opened(browser, &page, "#case=4x3");
+    let slow = format!(
+        "{{ const own = loadImage; window.late = []; loadImage = (about) => about.width === {WIDTH} \
+         ? own(about).then((image) => new Promise((done) => late.push(() => done(image)))) : own(about); }} 0"
+    );
+    browser.value(&slow);
+    // The address, the list, and the way back: whatever is loaded first.
+    for back in ["location.hash = 'case=4x3'", "history.back()"] {
+        browser.value(&format!("location.hash = 'case={WIDTH}x{HEIGHT}'"));
+        browser.until("state.case === '60x40' && late.length === 1");
+        browser.value(&format!("{back}; 0"));
+        browser.until("state.case === '4x3' && stage.about");
+        browser.value("late.pop()()");
+        browser.frame();
+        assert_eq!(
+            browser.value(
+                "[state.case, stage.about.id, stage.layers[0].image.width, get('case').value]"
+            ),
+            json!(["4x3", "4x3", 4, "4x3"])
+        );
+        browser.until("location.hash.startsWith('#case=4x3&')");
+    }
+    // What comes late is shown where it is still wanted.
+    browser.value(&format!("location.hash = 'case={WIDTH}x{HEIGHT}'"));
+    browser.until("late.length === 1");
+    browser.value("late.pop()()");
+    browser.until("stage.about?.id === '60x40' && stage.layers[0].image.width === 60");
+}
+
+#[test]
+fn a_long_thin_image_is_seen() {
+    let Some(mut browser) = Chromium::start() else { return };
+    let browser = &mut browser;
+    let folder = tempfile::tempdir().unwrap();
+    let sizes = [(5000, 1), (1, 5000), (8000, 2), (1, 1)];
+    let files: Vec<PathBuf> = sizes
+        .iter()
+        .map(|&(width, height)| {
+            let pixels = vec![Vec3::new(0.9, 0.4, 0.1); width * height];
+            let file = folder.path().join(format!("{width}.exr"));
+            write_exr(&file, &Image { width, height, pixels }, Precision::Float, &[]).unwrap();
+            file
+        })
+        .collect();
+    let (page, _) = viewed(&folder.path().join("out"), &files);
+    for suffix in ["", "?plain"] {
+        for (width, height) in sizes {
+            opened(browser, &page, &format!("{suffix}#case={width}x{height}"));
+            assert_eq!(browser.value("stage.layers[0].image.width"), width);
+            let apart = browser.value(SCREEN_IS_WRONG_BY).as_f64().unwrap();
+            assert!(apart <= 2.0, "{width}x{height}{suffix}: {apart} levels");
+        }
+    }
+}
+
+#[test]
+fn what_can_be_told_apart_reads_differently() {
+    let Some(mut browser) = Chromium::start() else { return };
+    let browser = &mut browser;
+    let folder = tempfile::tempdir().unwrap();
+    let flat = flat(Vec3::splat(0.1));
+    let files = ["float.exr", "half.exr", "other.exr"].map(|name| folder.path().join(name));
+    for (file, precision) in files.iter().zip([Precision::Float, Precision::Half, Precision::Half])
+    {
+        write_exr(file, &flat, precision, &[]).unwrap();
+    }
+    let probed = |browser: &mut Chromium, files: &[PathBuf], name: &str| {
+        let (page, _) = viewed(&folder.path().join(name), files);
+        opened(browser, &page, "#pixel=6,0");
+        browser.value("[...get('probe').querySelectorAll('td')].filter((_, i) => i % 3 === 0).map((cell) => cell.textContent)")
+    };
+    // Beside a float a half has digits that give its value back, not only the half.
+    assert_eq!(
+        probed(browser, &files[..2], "mixed"),
+        json!(["0.1", "0.099975586", "2.4415553e-5"])
+    );
+    assert_eq!(probed(browser, &files[1..], "halves"), json!(["0.1", "0.1", "0"]));
+    // No two regions have one color, nor one that another has in the shade of edges or highlights.
+    assert_eq!(
+        browser
+            .value("new Set([...Array(25).keys()].map((index) => regionColor(index).join())).size"),
+        25
+    );
 }
 
 #[test]

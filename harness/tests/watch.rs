@@ -198,6 +198,10 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     let right = fs::read_to_string(&file).unwrap();
     fs::write(&file, format!("{right}\nfn broken() -> f32 {{ \"words\" }}\n")).unwrap();
     browser.until("document.body.className === 'running'");
+    // The compiler's words come before anything else is checked.
+    browser.until(
+        "document.body.className === 'running' && document.getElementById('status').textContent.startsWith('Checking: does not compile: src/bsdfs/diffuse.rs:')",
+    );
     browser
         .until(&format!("{report}.querySelector('pre').textContent.includes('mismatched types')"));
     // It is not said to be done: title and status line carry the verdict.
@@ -221,6 +225,53 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     browser.until(&format!("{report}.body.textContent.includes('on purpose')"));
     browser.until("document.body.className === 'lost' && document.title.includes('of 30 points')");
     browser.until("document.getElementById('status').textContent.includes('panicked: on purpose')");
+
+    // A frame that hangs is given up by the next save, whatever it would have said.
+    fs::write(&file, &right).unwrap();
+    browser.value("window.before = live.libraries");
+    fs::write(&pass, right_pass.replace(draw, &format!("loop {{}} {draw}"))).unwrap();
+    browser.until("live.libraries > before && live.views.realtime.under > 0");
+    fs::write(&pass, &right_pass).unwrap();
+    browser.until("live.libraries > before + 1");
+    until_drawn(&mut browser);
+    browser.until("document.body.className === 'done'");
+    std::thread::sleep(std::time::Duration::from_secs(6));
+    assert_eq!(browser.value("live.views.realtime.problem.hidden"), true);
+    // So is another scene, here one with a shadow map, of the same page.
+    let new = "let camera = scene.camera(1, 1)?;";
+    assert_eq!(right_pass.matches(new).count(), 1);
+    let plain = format!("if !shadow_map {{ loop {{}} }} {new}");
+    fs::write(&pass, right_pass.replace(new, &plain)).unwrap();
+    browser.until("live.libraries > before + 2 && live.views.realtime.under > 0");
+    browser.value(
+        "window.frames = +live.views.realtime.figure.dataset.frames; control('map').click()",
+    );
+    browser.until(
+        "+live.views.realtime.figure.dataset.frames > frames && live.views.realtime.problem.hidden",
+    );
+    browser.value("control('map').click()");
+    fs::write(&pass, &right_pass).unwrap();
+
+    // Who is in the viewer stays there, as they were, until what they look at is gone.
+    let twice = right.replace("(cos_i * INV_PI)", "(2.0 * cos_i * INV_PI)");
+    assert_ne!(twice, right);
+    fs::write(&file, &twice).unwrap();
+    let link = format!("{report}.querySelector('a[href*=\"view.html\"]')");
+    browser.until(&format!("document.body.className === 'lost' && {link}"));
+    browser.value(&format!("{link}.click()"));
+    let frame = "document.getElementById('report').contentWindow";
+    browser.until(&format!("{frame}.location.hash.includes('mode=one')"));
+    browser.value(&format!(
+        "{frame}.location.hash = {frame}.location.hash.replace('mode=one', 'mode=wipe')"
+    ));
+    browser.value(&format!("{frame}.old = true; window.before = reports"));
+    fs::write(&file, format!("{twice}// saved again\n")).unwrap();
+    browser.until(&format!(
+        "reports > before && !{frame}.old && {frame}.location.pathname.endsWith('/view.html')"
+    ));
+    browser.until(&format!("{frame}.location.hash.includes('mode=wipe') && {report}.getElementById('mode-wipe')?.getAttribute('aria-pressed') === 'true'"));
+    fs::write(&file, &right).unwrap();
+    browser.until(&points);
 
     // One that hangs is ended by the next save; a frame that hangs, after a while.
     let second = "static DRAWN: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false); \
@@ -248,8 +299,12 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     ));
 
     fs::write(&shader, right_shader).unwrap();
-    // What was found offline stays, marked, until it was run again.
+    // What was found offline stays, marked, until it was run again; what changed is judged first.
     browser.until("mark.textContent.includes('offline results hold') && !mark.hidden");
+    browser.until(
+        "document.body.className === 'running' && status.textContent.includes('points so far: 2.1 5 of 5') \
+         && !status.textContent.includes('1.1 ')",
+    );
     until_drawn(&mut browser);
     browser.until("mark.hidden && document.body.className === 'done'");
     browser.until(&points);

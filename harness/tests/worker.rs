@@ -500,7 +500,9 @@ fn a_timeout_counts_when_it_is_confirmed_alone_on_the_machine() {
     let patience = RetryBudget::default();
     let report = ask(&["sleep", "sleep", ""], &patience);
     let not_asked = Outcome::NotRun {
-        reason: "not asked: the renderer ran out of time before".into(),
+        reason: "not asked: the renderer ran out of time before (stuck: no answer, and nothing done for 1 s: a \
+                 deadlock or a sleep)"
+            .into(),
         fault: Fault::Submission,
     };
     assert_eq!(report.outcomes, [late(false, 1.0), late(false, 1.0), not_asked.clone()]);

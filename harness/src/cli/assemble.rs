@@ -2,10 +2,12 @@
 //! submission and renders nothing.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail, ensure};
 use serde::{Deserialize, Serialize};
@@ -39,6 +41,31 @@ const TIMES: &str = "times.json";
 /// The remark on a submission that was judged differently from the others of its class.
 const OTHER_CONDITIONS: &str = "graded before with other scenes, limits or another version of Umbra: \
                                 not comparable, grade it again";
+
+/// How often something that takes long says how far it is.
+const PACE: Duration = Duration::from_secs(2);
+
+/// What is done once for each submission; said where it takes long.
+struct Progress<'a> {
+    what: &'a str,
+    of: usize,
+    done: Cell<usize>,
+    said: Cell<Instant>,
+}
+
+impl<'a> Progress<'a> {
+    fn new(what: &'a str, of: usize) -> Self {
+        Self { what, of, done: Cell::new(0), said: Cell::new(Instant::now()) }
+    }
+
+    fn step(&self) {
+        self.done.set(self.done.get() + 1);
+        if self.said.get().elapsed() > PACE {
+            self.said.set(Instant::now());
+            eprintln!("umbra: {}: {} of {}", self.what, self.done.get(), self.of);
+        }
+    }
+}
 
 /// What is known of a batch beside its records.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -325,7 +352,7 @@ impl Kept {
         Ok(graded(record, &self.decided()?.assignment.rules))
     }
 
-    /// Pins what is decided from now on and writes the report by it.
+    /// Pins what is decided from now on, and writes the report by it, which is the answer.
     ///
     /// # Errors
     /// When it cannot be written, or a decision means nothing.
@@ -335,12 +362,13 @@ impl Kept {
         decided: Decisions,
         reason: &str,
         undoes: bool,
-    ) -> anyhow::Result<()> {
+    ) -> anyhow::Result<BatchReport> {
         let before = self.report(output, self.decided()?)?;
         let after = self.report(output, &decided)?;
         let changes = changes(&before.report, &after.report);
         self.pins.apply(decided, reason, changes, undoes)?;
-        write(output, &after)
+        write(output, &after)?;
+        Ok(after.report)
     }
 }
 
@@ -429,7 +457,10 @@ pub fn write(output: &Path, settled: &Settled) -> anyhow::Result<()> {
     if let Some(class) = &settled.report.class {
         class::ask(class, output)?;
     }
+    // Each is asked for twice: for its pages, and for the file with all.
+    let progress = Progress::new("writing the reports", 2 * settled.report.entries.len());
     let written = report::write_outlined(output, &settled.report, &|entry| {
+        progress.step();
         let slug = entry.record.slug.clone();
         let failed =
             |error: anyhow::Error| ReportError::Entry { slug, reason: format!("{error:#}") };
@@ -532,7 +563,9 @@ pub fn settled(
     let mut decisions: Vec<Vec<Applied>> = Vec::new();
     let mut mends = Vec::new();
     // One at a time is whole.
+    let progress = Progress::new("reading what was found out", records.len());
     for earlier in &records {
+        progress.step();
         let mut record = earlier.whole()?;
         shared.judge(&mut record);
         let SubmissionReport { record, grade: mut original, standing } =

@@ -22,9 +22,7 @@ use crate::assignment::Assignment;
 use crate::class::{Attempt, Collected, Decisions, Kind, Label, Pins, Stated, Wanted, collect};
 use crate::columns::count;
 use crate::files::write_whole;
-use crate::grading::{
-    Begun, Folders, Grading, Mode, Record, RecordCache, StoredRecord, Workshop, judge_shared,
-};
+use crate::grading::{Begun, Folders, Grading, Mode, Record, RecordCache, StoredRecord, Workshop};
 use crate::held_back::recorded_seed;
 use crate::program::graded;
 use crate::report::{self, BatchReport, SubmissionReport};
@@ -71,6 +69,8 @@ pub struct Batch<'a> {
     pub force: bool,
     /// Where to leave the compiled library, if anywhere.
     pub keeps_plugin: Option<&'a Path>,
+    /// Whether realtime is judged before anything is rendered offline.
+    pub realtime_first: bool,
     /// Whether to print what each stage cost.
     pub timings: bool,
     /// Whether the submission is a copy that Umbra put into the report's folder itself.
@@ -111,6 +111,7 @@ impl<'a> Batch<'a> {
             attempt: None,
             force: false,
             keeps_plugin: None,
+            realtime_first: false,
             timings: false,
             is_own: false,
         }
@@ -151,7 +152,9 @@ impl<'a> Batch<'a> {
         collected.skipped.extend(own);
         if !self.is_own {
             // Before anything is written, pins included.
-            for source in class::sources(&collected.sources, self.output, &HashMap::new()) {
+            for source in
+                class::sources(self.mode, &collected.sources, self.output, &HashMap::new())
+            {
                 ensure_apart(self.output, &source.path, &source.slug, &context.assignment.tree)?;
             }
         }
@@ -197,7 +200,7 @@ impl<'a> Batch<'a> {
             Mode::Grade => Found::read(self.output)?.unwrap_or_default(),
             Mode::Check => Found::default(),
         };
-        let all = class::sources(&collected.sources, self.output, &earlier.names());
+        let all = class::sources(self.mode, &collected.sources, self.output, &earlier.names());
         if !collected.copies.is_empty() {
             eprintln!(
                 "umbra: {} in more than one download with the same content, graded once: {}",
@@ -277,6 +280,7 @@ impl<'a> Batch<'a> {
                 self.selection.map_or(grading.paths, |selection| selection.paths(context));
             grading.asked =
                 self.selection.map_or(Vec::new(), |selection| selection.checks(context));
+            grading.realtime_first = self.realtime_first;
             grading.compares_submitted = self.selection.is_none_or(Selection::is_all);
             let jobs = self.jobs.min(chosen.len()).max(1);
             grading.threads = (cores() / jobs as u32).max(1);
@@ -340,9 +344,8 @@ impl<'a> Batch<'a> {
                     }
                     entry
                 };
-                let mut records: Vec<Record> = records.into_iter().map(|own| own.record).collect();
-                judge_shared(&mut records);
-                let entries = records.into_iter().map(entry).collect();
+                // One alone is no batch: nobody else can have submitted the same.
+                let entries = records.into_iter().map(|own| entry(own.record)).collect();
                 let report = BatchReport::new(&context.assignment, held_back, entries);
                 report::write(self.output, &report)?;
                 report

@@ -68,6 +68,9 @@ pub struct CheckArguments {
     /// Leave the library of what compiled in this file, for the live view of `umbra watch`
     #[arg(long, value_name = "FILE", hide = true)]
     keep_plugin: Option<PathBuf>,
+    /// Judge realtime before anything is rendered offline, for a save of shaders alone
+    #[arg(long, hide = true)]
+    realtime_first: bool,
 }
 
 /// What the last check found.
@@ -108,7 +111,8 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     let source = Some(folder.clone()).filter(|folder| folder.file_name().is_some());
     let source = source.or_else(named).unwrap_or_else(|| folder.clone());
     let given = [Source::given(&source)];
-    let slug = class::sources(&given, &arguments.output, &HashMap::new()).remove(0).slug;
+    let slug =
+        class::sources(Mode::Check, &given, &arguments.output, &HashMap::new()).remove(0).slug;
     ensure_apart(&arguments.output, &source, &slug, &assignment.tree)?;
     super::writable(&arguments.output)?;
     let last_file = arguments.output.join(&slug).join(LAST);
@@ -121,6 +125,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
         perturb: Some(Perturb(None)),
         selection: Some(&selection),
         keeps_plugin: arguments.keep_plugin.as_deref(),
+        realtime_first: arguments.realtime_first,
         timings: arguments.timings,
         ..Batch::of(vec![source], &arguments.output, Mode::Check)
     };

@@ -12,7 +12,7 @@ use crate::class::slots::{content, slot};
 use crate::class::{self, Claim, Label, MATCHES, Matches, Owners, Roster};
 use crate::columns::count;
 use crate::files::write_whole;
-use crate::grading::{Folders, Record, RecordCache, Student};
+use crate::grading::{Folders, Mode, Record, RecordCache, Student};
 use crate::report;
 use crate::viewer;
 
@@ -103,20 +103,22 @@ pub fn ask(class: &class::Class, output: &Path) -> anyhow::Result<()> {
 /// else what their names allow, made unique. Those of an older download are found by `names`, what reports call the
 /// submission in each folder.
 pub fn sources(
+    mode: Mode,
     given: &[class::Source],
     output: &Path,
     names: &HashMap<String, String>,
 ) -> Vec<Source> {
-    // Folders of the report's own.
+    // Folders of the report's own; a check makes the first two alone, so that a student's may be called as they like.
     let own = [
         report::INSTRUCTOR,
+        viewer::DATA_FOLDER,
         class::pins::FOLDER,
         WORK,
         report::LIKENESS,
-        viewer::DATA_FOLDER,
         report::ERRORS,
     ];
-    let mut taken = HashSet::from(own.map(str::to_owned));
+    let own = if mode == Mode::Check { &own[..2] } else { &own };
+    let mut taken: HashSet<String> = own.iter().map(|&name| name.to_owned()).collect();
     let mut known: HashMap<String, VecDeque<String>> = HashMap::new();
     for slug in folders(output) {
         let file = output.join(report::INSTRUCTOR).join(&slug).join(SOURCE);
@@ -448,7 +450,7 @@ mod tests {
         };
         let sources = |paths: &[PathBuf], output: &Path| {
             let given: Vec<_> = paths.iter().map(|path| class::Source::given(path)).collect();
-            super::sources(&given, output, &HashMap::new())
+            super::sources(Mode::Grade, &given, output, &HashMap::new())
         };
         let slugs = |sources: &[Source]| -> Vec<String> {
             sources.iter().map(|source| source.slug.clone()).collect()
@@ -471,6 +473,12 @@ mod tests {
             slugs(&sources(&odd, &output)),
             ["instructor-2", "work-2", "settled-2", "submission", "A2-5"]
         );
+        // The folder of a check is called as the student's.
+        for (name, folder) in [("work", "work"), ("errors", "errors"), ("viewer", "viewer-2")] {
+            let given = [class::Source::given(Path::new(name))];
+            let own = super::sources(Mode::Check, &given, &output, &HashMap::new());
+            assert_eq!(slugs(&own), [folder]);
+        }
     }
 
     #[test]

@@ -13,7 +13,7 @@ use crate::class::Decisions;
 use crate::class::overrides::{Applied, Decision, OVERRIDES, entry, fingerprint};
 use crate::columns;
 use crate::files::write_whole;
-use crate::report::{self, harmless};
+use crate::report::{self, BatchReport, harmless};
 
 /// Options of `umbra override`.
 #[derive(clap::Args)]
@@ -84,9 +84,9 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
     let before = own.first().map(|own| [own.points, own.points_max]).unwrap_or_default();
     let made = decision.of(&graded, evidence)?;
     let made = Decision { part: Some(part.clone()), points: Some(*points), ..made };
-    let kept = decision.add(kept, &made)?;
+    let report = decision.add(kept, &made)?;
     // What a fix of the instructor shows is the evidence, where that counts.
-    let applied = applied(&graded, &kept, decision, Some(part))?;
+    let applied = applied(&graded, &report, Some(part));
     let [least, most] = applied.map_or(before, |own| own.before);
     println!(
         "{}: part {part} now has {}; the evidence gives {}",
@@ -103,37 +103,34 @@ pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     let kept = Kept::read(&decision.report.path)?;
     let graded = one(student, &decision.report.path, &kept)?;
     let evidence = fingerprint(&graded.subject(), &graded.entry.grade.parts);
-    let kept = decision.add(kept, &decision.of(&graded, evidence)?)?;
-    println!("{}: {}", harmless(&graded.entry.who()), confirmed(&graded, &kept, decision)?);
+    let report = decision.add(kept, &decision.of(&graded, evidence)?)?;
+    println!("{}: {}", harmless(&graded.entry.who()), confirmed(&graded, &report));
     said(&decision.report.path, &graded)
 }
 
 /// The last decision on a part, or on the whole, as the report applies it beside all others; none where the submission
 /// does not count.
-fn applied(
+fn applied<'a>(
     graded: &Graded,
-    kept: &Kept,
-    decision: &DecisionArguments,
+    report: &'a BatchReport,
     part: Option<&str>,
-) -> anyhow::Result<Option<Applied>> {
-    let report = kept.report(&decision.report.path, kept.decided()?)?.report;
+) -> Option<&'a Applied> {
     let slug = &graded.entry.record.slug;
-    let entry = report.entries.into_iter().find(|own| own.record.slug == *slug);
-    let decisions = entry.map(|own| own.standing.decisions).unwrap_or_default();
-    Ok(decisions.into_iter().rfind(|own| own.decision.part.as_deref() == part))
+    let entry = report.entries.iter().find(|own| own.record.slug == *slug)?;
+    entry.standing.decisions.iter().rfind(|own| own.decision.part.as_deref() == part)
 }
 
 /// What a confirmation is worth, beside all other decisions on the submission.
-fn confirmed(graded: &Graded, kept: &Kept, decision: &DecisionArguments) -> anyhow::Result<String> {
-    let (from, to) = match applied(graded, kept, decision, None)? {
+fn confirmed(graded: &Graded, report: &BatchReport) -> String {
+    let (from, to) = match applied(graded, report, None) {
         Some(own) => (own.before[0], own.after[0]),
         None => (0.0, graded.entry.grade.unconfirmed),
     };
     let points = ((to - from) * 100.0).round() / 100.0;
-    Ok(match points {
+    match points {
         0.0 => "confirmed; it changes no points".to_owned(),
         earned => format!("confirmed: {} for the images", columns::points(earned)),
-    })
+    }
 }
 
 /// Says where a decision is kept, and whether it shows.
@@ -187,11 +184,11 @@ impl DecisionArguments {
         })
     }
 
-    /// Adds a decision to the file, and writes the reports by it.
+    /// Adds a decision to the file, and writes the reports by it; answers the class's.
     ///
     /// # Errors
     /// When the file says what means nothing, or something cannot be written.
-    pub fn add(&self, kept: Kept, decision: &Decision) -> anyhow::Result<Kept> {
+    pub fn add(&self, kept: Kept, decision: &Decision) -> anyhow::Result<BatchReport> {
         let file = self.report.path.join(OVERRIDES);
         // Two decisions at the same time follow each other, each on what is settled by then.
         let (_lock, mut kept) = kept.locked(&self.report.path)?;
@@ -210,8 +207,7 @@ impl DecisionArguments {
         decided.check(&self.report.path)?;
         write_whole(&file, decided.overrides.as_bytes())
             .with_context(|| format!("cannot write {}", file.display()))?;
-        kept.apply(&self.report.path, decided, &decision.reason, false)?;
-        Ok(kept)
+        kept.apply(&self.report.path, decided, &decision.reason, false)
     }
 }
 

@@ -103,6 +103,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         attempt: arguments.attempt,
         force: arguments.force,
         keeps_plugin: None,
+        realtime_first: false,
         timings: arguments.timings,
         is_own: false,
     };

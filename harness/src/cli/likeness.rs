@@ -16,7 +16,7 @@ use crate::class::jplag::{self, Match, Pair, Place};
 use crate::class::{Wanted, collect};
 use crate::columns::count;
 use crate::files::{files_below, write_whole};
-use crate::grading::{ALIKE, Shared};
+use crate::grading::{ALIKE, Mode, Shared};
 use crate::harmless::harmless;
 use crate::report::{self, Alike, AlikePage, BatchReport};
 
@@ -99,7 +99,7 @@ fn write_sources(
     let wanted = Wanted { tree, limits, from: None, output: Some(output), scratch: scratch.path() };
     let there: Vec<PathBuf> = kept.paths().iter().filter(|path| path.exists()).cloned().collect();
     let collected = collect(&there, &wanted)?;
-    let sources = class::sources(&collected.sources, output, &kept.names());
+    let sources = class::sources(Mode::Grade, &collected.sources, output, &kept.names());
     let path_of = |slug: &str| {
         let found = sources.iter().find(|source| source.slug == slug);
         let place = || class::place_of(output, slug).map(PathBuf::from);

@@ -76,8 +76,7 @@ pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8>
     };
     let BatchOutcome::Report(..) = batch.run(root)? else { return Ok(super::EXIT_INTERRUPTED) };
     let made = decision.mend(&graded, text, mend.penalty)?;
-    let kept = decision.add(kept, &made)?;
-    let report = kept.report(output, kept.decided()?)?.report;
+    let report = decision.add(kept, &made)?;
     let slug = &record.slug;
     let entry = report.entries.iter().find(|entry| entry.record.slug == *slug);
     if let Some(mended) = entry.and_then(|entry| entry.standing.mended.as_ref()) {

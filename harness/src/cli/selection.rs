@@ -104,8 +104,11 @@ impl Selection {
         }
         grade.points = grade.parts.iter().map(|part| part.points).sum();
         grade.points_max = grade.parts.iter().map(|part| part.points_max).sum();
-        grade.out_of = grade.parts.iter().map(|part| part.out_of).sum();
-        grade.remarks.push(format!("only {} was checked", self.in_words()));
+        // A bonus makes no points missing, unless nothing else was asked.
+        let is_bonus = grade.parts.iter().all(|part| part.bonus);
+        let required = grade.parts.iter().filter(|part| is_bonus || !part.bonus);
+        grade.out_of = required.map(|part| part.out_of).sum();
+        grade.remarks.push(crate::report::checked_only(&self.in_words()));
     }
 
     pub fn asks(&self, part: &str) -> bool {
@@ -131,6 +134,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::evidence::Check;
 
     fn asked(parts: &[&str], scenes: &[&str]) -> Selection {
         let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
@@ -162,6 +166,35 @@ mod tests {
             error.starts_with("there is no scene teepot; expected one of teapot, cbox"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn a_bonus_is_no_part_of_what_can_be_missing() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let rules = Assignment::load(&root).unwrap().rules;
+        let out_of = |parts: &[&str], scenes: &[&str]| {
+            // Every check of every part was asked on one scene.
+            let ids = rules.parts.iter().flat_map(|part| part.evidence.clone());
+            let checks = ids.map(|id| Check::new(id, "cbox", Verdict::Pass, "")).collect();
+            let evidence = Evidence { checks };
+            let mut grade = crate::rubric::grade(&rules, &evidence);
+            asked(parts, scenes).only_of(&mut grade, &rules, &evidence);
+            (grade.out_of, grade.remarks.last().cloned().unwrap_or_default())
+        };
+        assert_eq!(out_of(&[], &[]).0, 100.0);
+        assert_eq!(
+            out_of(&[], &["cbox"]),
+            (100.0, "only scene cbox was checked, not the rest".into())
+        );
+        assert_eq!(
+            out_of(&["2.4", "2.5"], &[]),
+            (25.0, "only parts 2.4, 2.5 were checked, not the rest".into())
+        );
+        assert_eq!(
+            out_of(&["2.4"], &["cbox", "scale"]),
+            (25.0, "only part 2.4 on scenes cbox, scale was checked, not the rest".into())
+        );
+        assert_eq!(out_of(&["2.5"], &["cbox"]).0, 20.0, "the bonus alone");
     }
 
     #[test]

@@ -15,10 +15,17 @@ use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
 use crate::evidence::{Check, Verdict};
 use crate::files::{step, write_whole};
+use crate::harmless::harmless;
 use crate::intake::{self, IntakeError, Submission, SubmittedConfig};
 use crate::process::Exit;
 use crate::rubric::BUILD;
 use crate::worker::Supervisor;
+
+/// What the progress says in front of the first error of a compiler, as soon as that is known.
+pub const REFUSED: &str = "does not compile: ";
+
+/// What it says in front of the points of a path that is judged while the other is not.
+pub const SO_FAR: &str = "points so far: ";
 
 /// Receives messages about progress.
 pub type Say<'a> = &'a (dyn Fn(&str) + Sync);
@@ -138,8 +145,16 @@ impl Workshop<'_> {
         let limits = &self.assignment.limits.build;
         let isolation = self.supervisor.isolation.isolation();
         let kept = build::Kept::within(&self.assignment.cache(), isolation);
+        let own = &src;
         let compile = |src: &Path| {
-            kept.compile(self.recording, self.supervisor, src, &out, limits, self.cancel)
+            let report =
+                kept.compile(self.recording, self.supervisor, src, &out, limits, self.cancel)?;
+            if let BuildOutcome::CompileError { errors } = &report.outcome
+                && let Some(first) = errors.first().filter(|_| src == own)
+            {
+                say(&format!("{REFUSED}{}", harmless(&first.headline())));
+            }
+            Ok(report)
         };
         let template = self.assignment.template();
         let built = template_fallback::build(&compile, &src, &template, &scratch.join("mended"))?;

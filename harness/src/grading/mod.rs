@@ -39,7 +39,7 @@ mod tree_checks;
 mod uploads;
 mod zoomed;
 
-pub use begun::{Begun, Workshop};
+pub use begun::{Begun, REFUSED, SO_FAR, Workshop};
 pub use cache::{RecordCache, StoredRecord};
 pub use costs::Cost;
 pub use image_digest::ImageDigest;

@@ -61,6 +61,8 @@ pub struct Grading<'a> {
     pub paths: Vec<RenderPath>,
     /// The checks whose verdicts are asked for; all, if none is named.
     pub asked: Vec<CheckId>,
+    /// Whether realtime is judged before anything is rendered offline.
+    pub realtime_first: bool,
     /// Whether submitted images are compared with what the code draws.
     pub compares_submitted: bool,
     /// Records made before and to be made, if they are kept.
@@ -160,6 +162,7 @@ impl<'a> Grading<'a> {
             cancel,
             paths: RenderPath::ALL.to_vec(),
             asked: Vec::new(),
+            realtime_first: false,
             compares_submitted: true,
             cache: None,
             budget: Some(assignment.limits.budget.clone()),
@@ -338,7 +341,7 @@ impl<'a> Grading<'a> {
             session.retries.renew();
         }
         if paths.contains(&RenderPath::Realtime) {
-            _compiled = self.compile_own(&mut session, stages)?;
+            _compiled = self.compile_own(&mut session, stages, &|_| ())?;
             self.realtime(&session, library, stages, &mut checks, &mut drawn)?;
         }
         let evidence = Evidence { checks };

@@ -225,8 +225,7 @@ pub fn unanswered(id: CheckId, scene: &str, parts: &[&str], outcome: &Outcome) -
                 (parts, "") => format!(" in {}", parts.join(", ")),
                 (parts, scene) => format!(" in {} on scene \"{scene}\"", parts.join(", ")),
             };
-            let what = if late.computing { "endless loop" } else { "stuck" };
-            check(Verdict::Fail, format!("{what}{place}: {late}"))
+            check(Verdict::Fail, format!("{}{place}: {late}", late.what()))
         }
         Outcome::OutOfMemory => check(Verdict::Fail, "the renderer ran out of memory".into()),
         Outcome::FileTooLarge => {

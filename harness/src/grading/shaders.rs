@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
+use super::begun::{REFUSED, Say};
 use super::draw::{Frame, draw_each};
 use super::isolate;
 use super::pipeline::Grading;
@@ -18,6 +19,7 @@ use super::session::Session;
 use super::stages::Stages;
 use crate::expected::scene_digest;
 use crate::files::{copy_tree, hex, keep_newest};
+use crate::harmless::harmless;
 use crate::sandbox::Isolation;
 use crate::worker::{Outcome, software_driver};
 
@@ -35,7 +37,7 @@ impl Grading<'_> {
         let mut frames = vec![plain.clone(), Frame { toml, shadow_map: true, ..plain }];
         let shown = isolate::pass_shown().into_iter();
         frames.extend(shown.map(|stages| Frame::probe(case, stages)));
-        let folder = self.shaders_of(&mut self.session(""), Some(reference), frames)?;
+        let folder = self.shaders_of(&mut self.session(""), Some(reference), frames, &|_| ())?;
         self.supervisor.shaders.push(folder.path().to_owned());
         self.compiled = Some(folder);
         Ok(())
@@ -47,21 +49,24 @@ impl Grading<'_> {
         &self,
         session: &mut Session,
         stages: &Stages,
+        say: Say,
     ) -> anyhow::Result<Option<TempDir>> {
         let (Some(own), Some(case)) = (stages.all_own(), self.cases.first()) else {
             return Ok(None);
         };
-        let folder = self.shaders_of(session, None, vec![Frame::probe(case, own)])?;
+        let folder = self.shaders_of(session, None, vec![Frame::probe(case, own)], say)?;
         session.supervisor.shaders.push(folder.path().to_owned());
         Ok(Some(folder))
     }
 
-    /// The shaders that some frames need, compiled now or by an earlier run. Why a frame fails is told when it counts.
+    /// The shaders that some frames need, compiled now or by an earlier run. Why a frame fails is told when it counts;
+    /// the compiler's first line is said at once.
     fn shaders_of(
         &self,
         session: &mut Session,
         renderer: Option<&Path>,
         mut frames: Vec<Frame>,
+        say: Say,
     ) -> anyhow::Result<TempDir> {
         frames.iter_mut().for_each(|frame| frame.size = (16, 16));
         let builder =
@@ -74,6 +79,13 @@ impl Grading<'_> {
         session.supervisor.leaves_shaders = Some(folder.path().to_owned());
         let drawn = draw_each(session, renderer, &frames);
         session.supervisor.leaves_shaders = None;
+        let said = drawn.iter().find_map(|outcome| match outcome {
+            Outcome::StageRefused(said) => said.lines().next(),
+            _ => None,
+        });
+        if let Some(first) = said {
+            say(&format!("{REFUSED}{}", harmless(first)));
+        }
         if let Some(kept) = kept
             && drawn.iter().all(|outcome| matches!(outcome, Outcome::Done(_)))
         {

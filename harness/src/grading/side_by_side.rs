@@ -4,13 +4,15 @@ use std::panic::resume_unwind;
 use std::path::Path;
 use std::time::Instant;
 
-use super::begun::Say;
+use super::begun::{SO_FAR, Say};
 use super::costs::Costs;
 use super::offline::Drawn;
 use super::pipeline::{Grading, RenderPath};
 use super::session::Session;
 use super::stages::Stages;
-use crate::evidence::Check;
+use crate::evidence::{Check, Evidence, Verdict};
+use crate::harmless::harmless;
+use crate::rubric::{self, BUILD};
 
 /// What was found out on one path.
 pub(super) struct OnPath {
@@ -30,7 +32,8 @@ pub(super) struct BothPaths {
 }
 
 impl Grading<'_> {
-    /// What is found out on the paths that are asked about: on both at once where there are threads for it.
+    /// What is found out on the paths that are asked about: on both at once where there are threads for it, unless
+    /// realtime is wanted first.
     pub(super) fn both_paths(
         &self,
         session: &Session,
@@ -45,6 +48,7 @@ impl Grading<'_> {
             let (mut checks, mut drawn) = (Vec::new(), Vec::new());
             self.offline(session, plugin, seed, say, &mut checks, &mut drawn)?;
             checks.extend(session.used_up());
+            say(&self.so_far("offline", &checks));
             let (wall_s, cpu_s) = (begun.elapsed().as_secs_f64(), session.end_path());
             anyhow::Ok(OnPath { checks, drawn, compiler_messages: String::new(), wall_s, cpu_s })
         };
@@ -53,12 +57,13 @@ impl Grading<'_> {
         let mut realtime = || {
             let (mut checks, mut drawn) = (Vec::new(), Vec::new());
             // Lives as long as the session names it.
-            let _compiled = self.compile_own(&mut own, stages)?;
+            let _compiled = self.compile_own(&mut own, stages, say)?;
             self.realtime(&own, plugin, stages, &mut checks, &mut drawn)?;
             checks.extend(own.used_up());
             if let (Ok(mut all), Ok(printed)) = (session.printed.lock(), own.printed.lock()) {
                 *all = (*all).max(*printed);
             }
+            say(&self.so_far("realtime", &checks));
             let (wall_s, cpu_s) = (begun.elapsed().as_secs_f64(), own.end_path());
             anyhow::Ok(OnPath {
                 checks,
@@ -70,6 +75,12 @@ impl Grading<'_> {
         };
         let asks = |path| self.paths.contains(&path);
         let (offline, realtime) = match RenderPath::ALL.map(asks) {
+            [true, true] if self.realtime_first => {
+                say("drawing realtime");
+                let second = realtime()?;
+                say("rendering offline");
+                (Some(offline()), Some(Ok(second)))
+            }
             [true, true] if self.threads > 1 => {
                 say("rendering offline, drawing realtime");
                 std::thread::scope(|scope| {
@@ -114,5 +125,19 @@ impl Grading<'_> {
             }
         }
         Ok(both)
+    }
+
+    /// What the parts of a path are worth, and why where one lost something.
+    fn so_far(&self, path: &str, checks: &[Check]) -> String {
+        let built = Check::new(BUILD, "", Verdict::Pass, "");
+        let evidence = Evidence { checks: checks.iter().cloned().chain([built]).collect() };
+        let rules = &self.assignment.rules;
+        let parts = rubric::grade(rules, &evidence).parts;
+        let own = rules.parts.iter().zip(&parts).filter(|(rule, _)| rule.path == path);
+        let words = own.map(|(_, part)| {
+            let why = if part.is_lost() { format!(" ({})", part.reason) } else { String::new() };
+            format!("{} {} of {}{why}", part.id, part.points, part.out_of)
+        });
+        format!("{SO_FAR}{}", harmless(&words.collect::<Vec<_>>().join(", ")))
     }
 }

@@ -81,6 +81,10 @@ fn nobody_is_shut_out() {
     for page in pages {
         open(&mut browser, folder.path(), &page);
         assert_eq!(browser.serious_findings(), Vec::<String>::new());
+        // On a phone nothing is wider than the page, unless it scrolls in a box of its own.
+        browser.size(360, 800);
+        assert_eq!(browser.value("document.documentElement.scrollWidth"), 360);
+        browser.size(1200, 800);
     }
 }
 
@@ -130,6 +134,8 @@ fn a_submissions_page_is_short_and_runs_nothing() {
         let sizes = "[...document.querySelectorAll('.part > .pictures img')].map((i) => [i.width > 0, Math.round(i.width / i.height * 100)])";
         assert_eq!(browser.value(sizes), json!([[true, 133], [true, 133], [true, 133]]));
         assert_eq!(browser.value("document.querySelectorAll('.lobe svg').length"), 1);
+        let scenes = "[...document.querySelectorAll('.part > p')].filter((own) => own.textContent.includes('scene-')).length";
+        assert_eq!(browser.value(scenes), 1, "the scene of a picture is named once");
         for (width, most) in [(1200, 2400), (390, 4800)] {
             browser.size(width, 800);
             let height = browser.value("document.documentElement.scrollHeight").as_i64().unwrap();

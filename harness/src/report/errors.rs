@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{ReportError, put};
 use crate::evidence::{CheckId, Verdict};
-use crate::grading::Record;
+use crate::grading::{Record, SceneErrors};
 use crate::imaging::error_map::MeanError;
 
 /// The folder of the pictures, in the instructor's folder.
@@ -41,17 +41,16 @@ impl ClassErrors {
     /// Adds what was found out about a submission.
     pub fn add(&mut self, record: &Record) {
         for check in &record.evidence.checks {
-            let judged =
-                matches!(check.verdict, Verdict::Pass | Verdict::Fail | Verdict::NotImplemented);
-            if judged && IMAGES.contains(&check.id) {
+            let of = |own: &&SceneErrors| {
+                (own.check, own.held_back, &own.scene) == (check.id, check.held_back, &check.scene)
+            };
+            let map = record.error_maps.iter().find(of);
+            // A wrong image without a map was not drawn, or shows nothing yet: its errors lie nowhere.
+            if IMAGES.contains(&check.id) && (check.verdict == Verdict::Pass || map.is_some()) {
                 let key = (check.held_back, check.scene.clone(), check.id);
-                self.0.entry(key).or_default().1 += 1;
-            }
-        }
-        for own in &record.error_maps {
-            let key = (own.held_back, own.scene.clone(), own.check);
-            if let Some((mean, _)) = self.0.get_mut(&key) {
-                mean.add(&own.map);
+                let (mean, count) = self.0.entry(key).or_default();
+                *count += 1;
+                map.into_iter().for_each(|own| mean.add(&own.map));
             }
         }
     }
@@ -93,12 +92,11 @@ mod tests {
     use super::super::sample;
     use super::*;
     use crate::evidence::Check;
-    use crate::grading::SceneErrors;
     use crate::imaging::error_map::ErrorMap;
     use crate::imaging::reference::RegionMask;
 
     #[test]
-    fn the_mean_is_over_all_that_were_judged() {
+    fn the_mean_is_over_all_that_were_drawn() {
         let expected = Image { width: 2, height: 1, pixels: vec![Vec3::ONE; 2] };
         let actual = Image { pixels: vec![Vec3::splat(0.5), Vec3::ONE], ..expected.clone() };
         let mask = RegionMask { width: 2, height: 1, regions: Vec::new(), pixels: vec![0; 2] };
@@ -111,7 +109,9 @@ mod tests {
         let (scene, check) = ("cbox".to_owned(), CheckId::ImageOffline);
         wrong.error_maps = vec![SceneErrors { check, scene, held_back: false, map }];
         let mut errors = ClassErrors::default();
-        for record in [&wrong, &right, &right, &right, &right] {
+        // One that panicked or hung drew nothing that could be near or far off.
+        let not_drawn = Record { error_maps: Vec::new(), ..wrong.clone() };
+        for record in [&wrong, &right, &not_drawn, &right, &right, &right] {
             errors.add(record);
         }
         let folder = tempfile::tempdir().unwrap();

@@ -43,8 +43,8 @@ pub use self::json::{SCHEMA, VERSION, report_json};
 pub use self::outline::outline;
 pub use self::schema::report_schema;
 pub use self::text::{
-    Closing, Look, closing as text_closing, defend, detail as text_detail, explain, explain_all,
-    in_a_line, table as text_table,
+    Closing, Look, checked_only, closing as text_closing, defend, detail as text_detail, explain,
+    explain_all, in_a_line, table as text_table,
 };
 pub use crate::harmless::csv_cell;
 pub use crate::harmless::harmless;
@@ -382,14 +382,24 @@ fn view(
     let views = entry.record.views.iter().filter(|view| view.held_back == held_back);
     let views: Vec<_> = views.cloned().collect();
     if views.is_empty() {
-        return Ok(());
+        // An earlier page would show images that are gone.
+        let path = folder.join(VIEW_FILE);
+        return match std::fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                Err(ReportError::Write { path, source })
+            }
+            _ => Ok(()),
+        };
     }
     let title = format!("{} - {}", entry.student().full_name(), report.title);
     put(folder, VIEW_FILE, html_viewer(&title, Some(HTML_FILE), &views).as_bytes())
 }
 
-/// Writes one file.
+/// Writes one file, unless it is there so: of a class, a decision changes few.
 fn put(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), ReportError> {
     let path = folder.join(name);
+    if std::fs::read(&path).is_ok_and(|old| old == bytes) {
+        return Ok(());
+    }
     write_whole(&path, bytes).map_err(|source| ReportError::Write { path, source })
 }

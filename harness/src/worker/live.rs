@@ -130,6 +130,11 @@ impl LiveWorker {
         }
     }
 
+    /// What ends it, for who does not hold it: a frame that is being drawn then has no answer.
+    pub fn canceller(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.cancel)
+    }
+
     /// What it means that the process is gone.
     fn ended(&mut self) -> io::Result<Option<Outcome>> {
         let Some(thread) = self.thread.take() else { return Ok(None) };

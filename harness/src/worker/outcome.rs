@@ -111,6 +111,13 @@ pub struct Late {
     pub reference_s: Option<f64>,
 }
 
+impl Late {
+    /// What it looks like, in two words.
+    pub fn what(&self) -> &'static str {
+        if self.computing { "endless loop" } else { "stuck" }
+    }
+}
+
 impl fmt::Display for Late {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let limit_s = (10.0 * self.limit_s).round() / 10.0;

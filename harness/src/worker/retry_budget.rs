@@ -79,6 +79,8 @@ struct OfKind {
     retries: usize,
     hangs: bool,
     timeouts: usize,
+    /// How the first of them was late.
+    late: Option<Late>,
 }
 
 /// What one worker may use.
@@ -274,6 +276,7 @@ impl<'a> RetryBudget<'a> {
             let of_kind = &mut self.state().kinds[kind(job, request)];
             of_kind.timeouts += 1;
             of_kind.hangs |= confirmed && late.is_some();
+            of_kind.late = of_kind.late.or(late);
             of_kind.hangs
         };
         match late.filter(|_| hangs) {
@@ -294,7 +297,10 @@ impl<'a> RetryBudget<'a> {
         }
         let of_kind = state.kinds[kind(job, request)];
         let fault = if of_kind.hangs { Fault::Submission } else { Fault::Environment };
-        let reason = "not asked: the renderer ran out of time before".to_owned();
+        let mut reason = "not asked: the renderer ran out of time before".to_owned();
+        if let Some(late) = of_kind.late.filter(|_| of_kind.hangs) {
+            reason.push_str(&format!(" ({}: {late})", late.what()));
+        }
         (of_kind.timeouts >= MAX_TIMEOUTS).then_some(Outcome::NotRun { reason, fault })
     }
 

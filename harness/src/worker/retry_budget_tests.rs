@@ -68,7 +68,14 @@ fn one_confirmed_timeout_speaks_for_all_of_its_kind() {
     assert_eq!(over(0), None);
     assert!(retries.again(&job, 0, &limits()).is_none(), "hanging renderers do not stall a batch");
     assert!(matches!(retries.timed_out(&job, 0, LATE, false), Outcome::TimedOut(_)));
-    assert_eq!(over(0).and_then(|o| o.fault()), Some(Fault::Submission));
+    let not_asked = over(0).unwrap();
+    assert_eq!(not_asked.fault(), Some(Fault::Submission));
+    // What was late is named where it is not asked again.
+    let said = not_asked.to_string();
+    assert!(
+        said.contains("(endless loop: no answer within") || said.contains("(stuck: "),
+        "{said}"
+    );
     // Another kind of question is another matter, and so are images without shadows.
     assert_eq!(over(1), None);
     let mut plain = job.clone();

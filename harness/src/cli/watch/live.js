@@ -31,7 +31,7 @@ for (const path of ["realtime", "offline"]) {
   const canvas = figure.querySelector("canvas");
   live.views[path] = {
     figure, canvas, context: canvas.getContext("2d"), problem: figure.querySelector(".problem"), about: figure.querySelector("span"),
-    picture: null, stopped: false, asked: 0, shown: 0, under: 0, dirty: false, times: [], abort: null,
+    picture: null, stopped: false, asked: 0, answered: 0, under: 0, dirty: false, times: [], abort: null,
   };
 }
 
@@ -103,25 +103,30 @@ function address(path, spp) {
   return `frame?path=${path}&scene=${control("scene").value}&shadows=${shadows}&spp=${spp}&viewer=${live.viewer}&camera=${camera}`;
 }
 
-/** Asks for a picture and shows it, or why there is none; whether that is what was asked for last. */
+/** Asks for a picture and shows it, or why there is none; whether there is one. The newest answer wins. */
 async function ask(view, path, spp, signal) {
   const number = ++view.asked;
   const answer = await fetch(address(path, spp), { signal });
   if (answer.status === 409) {
     const words = await answer.text();
-    if (signal?.aborted) return false;
+    if (signal.aborted || number < view.answered) return false;
+    view.answered = number;
     view.stopped = true;
     view.problem.textContent = words;
     view.problem.hidden = false;
     view.about.textContent = "";
     return false;
   }
-  // Given up for a question that came before this one: it is asked again.
-  if (answer.status === 204 && !signal?.aborted) restLater();
+  // Given up, though it is still wanted here: it is asked again.
+  if (answer.status === 204 && !signal.aborted) {
+    if (path === "realtime") view.dirty = true;
+    else restLater();
+  }
   if (answer.status !== 200) return false;
   const bytes = await answer.arrayBuffer();
-  if (signal?.aborted || number < view.shown || view.stopped) return false;
-  view.shown = number;
+  if (signal.aborted || number < view.answered) return false;
+  view.answered = number;
+  view.stopped = false;
   const head = new DataView(bytes);
   view.picture = {
     width: head.getUint32(0, true), height: head.getUint32(4, true), seconds: head.getFloat32(8, true), halves: new Uint16Array(bytes, 12),
@@ -137,7 +142,10 @@ function draw() {
   if (!view.dirty || view.stopped || view.under >= REALTIME_AT_A_TIME || !live.panel.open) return;
   view.dirty = false;
   view.under++;
-  ask(view, "realtime", 1).then((shown) => { if (shown) tellRate(view); }).catch(gone).finally(() => {
+  const { signal } = view.abort ??= new AbortController();
+  ask(view, "realtime", 1, signal).then((shown) => { if (shown) tellRate(view); }).catch(gone).finally(() => {
+    // Of a question that was given up, nothing is under way any more.
+    if (signal.aborted) return;
     view.under--;
     draw();
   });
@@ -174,9 +182,13 @@ function restLater() {
   rest = setTimeout(() => refine().catch(gone), REST);
 }
 
-/** Something other than the camera changed: who had failed is asked again. */
+/** Something other than the camera changed: answers to what was asked before are nothing, and who had failed is asked
+    again. */
 function again() {
-  for (const view of Object.values(live.views)) view.stopped = false;
+  for (const view of Object.values(live.views)) {
+    view.abort?.abort();
+    Object.assign(view, { stopped: false, under: 0, abort: null });
+  }
   moved();
 }
 

@@ -10,6 +10,7 @@
 //! **Realtime.** One worker loads library and scene once, opens the pass, and draws a frame for each camera it is sent.
 //! Another scene, shadow map or library means another worker. Frames are not pushed: the browser asks for the next
 //! picture when it is ready for one, with the camera of that moment, so a slow renderer skips frames and never lags.
+//! A newer library, or another scene of the same page, ends the worker that still draws: it may hang.
 //!
 //! **Offline.** A renderer takes its camera from a scene file. So each picture is a job with a scene file of its own:
 //! the scene's, with the camera replaced, beside a link to the folder of its mesh. A camera that moved ends the job of
@@ -108,11 +109,20 @@ struct Scene {
 }
 
 /// What a live worker was started for: another question needs another one.
-#[derive(PartialEq)]
+#[derive(Clone, PartialEq)]
 struct Purpose {
     library: SystemTime,
     scene: String,
     shadow_map: bool,
+}
+
+/// The frame that is being drawn.
+struct Drawing {
+    /// The page that asked for it.
+    viewer: u64,
+    purpose: Purpose,
+    /// Ends its worker.
+    cancel: Arc<AtomicBool>,
 }
 
 /// Draws what the browser asks for.
@@ -125,6 +135,10 @@ pub struct LiveView {
     library: PathBuf,
     seen: Mutex<Option<SystemTime>>,
     realtime: Mutex<Option<(Purpose, LiveWorker)>>,
+    /// What that worker is busy with; who takes it out ends the worker.
+    drawing: Mutex<Option<Drawing>>,
+    /// What each page asked to be drawn in real time last.
+    wanted: Mutex<HashMap<u64, Purpose>>,
     /// The folder for scene files; held by who draws offline.
     offline: Mutex<TempDir>,
     /// Of each page, what ends the offline picture that it asked for last; by which camera that is.
@@ -161,6 +175,8 @@ impl LiveView {
             library: folder.path().join(crate::files::library_name("live")),
             seen: Mutex::default(),
             realtime: Mutex::default(),
+            drawing: Mutex::default(),
+            wanted: Mutex::default(),
             offline: Mutex::new(folder),
             newest: Mutex::default(),
             ended: AtomicBool::new(false),
@@ -199,34 +215,44 @@ impl LiveView {
         let scene = scene.ok_or("there is no such scene")?;
         let library = self.library_time().map_err(|_| "nothing has compiled yet".to_owned())?;
         let outcome = match question.path {
-            RenderPath::Realtime => self.draw(scene, question, library),
-            RenderPath::Offline => match self.render(scene, question) {
-                Some(outcome) => outcome,
-                None => return Ok(None),
-            },
+            RenderPath::Realtime => self.draw(scene, question, library).transpose(),
+            RenderPath::Offline => self.render(scene, question),
         };
         match outcome {
-            Ok(Outcome::Done(answer)) => Ok(Some(bytes(scene, &answer))),
-            Ok(outcome) => Err(outcome.to_string()),
-            Err(error) => Err(format!("not drawn here: {error:#}")),
+            None => Ok(None),
+            Some(Ok(Outcome::Done(answer))) => Ok(Some(bytes(scene, &answer))),
+            Some(Ok(Outcome::TimedOut(late))) => Err(format!("{}: {late}", late.what())),
+            Some(Ok(outcome)) => Err(outcome.to_string()),
+            Some(Err(error)) => Err(format!("not drawn here: {error:#}")),
         }
     }
 
+    /// None when it was given up for a newer library, or for another question of the same page.
     fn draw(
         &self,
         scene: &Scene,
         question: &Question,
         library: SystemTime,
-    ) -> anyhow::Result<Outcome> {
+    ) -> anyhow::Result<Option<Outcome>> {
         // A camera that moves on needs no picture of where it was.
         if let Some((cancel, camera)) = lock(&self.newest).get(&question.viewer)
             && *camera != question.camera
         {
             cancel.store(true, Ordering::Release);
         }
+        let viewer = question.viewer;
+        let purpose = Purpose { library, scene: scene.name.clone(), shadow_map: question.shadows };
+        lock(&self.wanted).insert(viewer, purpose.clone());
+        self.give_up(|older| {
+            older.purpose.library != library || older.viewer == viewer && older.purpose != purpose
+        });
+        let is_wanted = || {
+            !self.ended.load(Ordering::Acquire)
+                && self.library_time().is_ok_and(|newest| newest == library)
+                && lock(&self.wanted).get(&viewer) == Some(&purpose)
+        };
         let mut current = lock(&self.realtime);
         let bonus = scene.entry.bonus.as_ref().filter(|_| question.shadows);
-        let purpose = Purpose { library, scene: scene.name.clone(), shadow_map: question.shadows };
         // One that had just ended, for nobody asked it, is started again.
         for _ in 0..2 {
             anyhow::ensure!(!self.ended.load(Ordering::Acquire), "the watch has ended");
@@ -248,16 +274,31 @@ impl LiveView {
                     LiveWorker::start(&self.supervisor, library, request, &self.limits)?
                 }
             };
-            match worker.frame(&question.camera)? {
+            let (purpose, cancel) = (purpose.clone(), worker.canceller());
+            *lock(&self.drawing) = Some(Drawing { viewer, purpose: purpose.clone(), cancel });
+            // What is asked for from here on sees what is being drawn.
+            let drawn =
+                if is_wanted() { worker.frame(&question.camera)? } else { return Ok(None) };
+            if lock(&self.drawing).take().is_none() {
+                return Ok(None);
+            }
+            match drawn {
                 Some(outcome @ Outcome::Done(_)) => {
                     *current = Some((purpose, worker));
-                    return Ok(outcome);
+                    return Ok(Some(outcome));
                 }
-                Some(outcome) => return Ok(outcome),
+                Some(outcome) => return Ok(Some(outcome)),
                 None => {}
             }
         }
         anyhow::bail!("the worker ended at once")
+    }
+
+    /// Ends what is being drawn in real time, if it is so.
+    fn give_up(&self, is_given_up: impl FnOnce(&Drawing) -> bool) {
+        if let Some(older) = lock(&self.drawing).take_if(|older| is_given_up(older)) {
+            older.cancel.store(true, Ordering::Release);
+        }
     }
 
     /// None when it was given up for another question.
@@ -313,6 +354,7 @@ impl LiveView {
         for (cancel, _) in lock(&self.newest).values() {
             cancel.store(true, Ordering::Release);
         }
+        self.give_up(|_| true);
         drop(lock(&self.offline));
         lock(&self.realtime).take();
     }

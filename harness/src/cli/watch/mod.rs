@@ -27,6 +27,7 @@ use super::outputs::ensure_apart;
 use super::selection::Selection;
 use super::tree::ensure_working_folder;
 use crate::columns::count;
+use crate::grading::{Mode, REFUSED, SO_FAR};
 use crate::intake::Severity;
 use crate::rubric::PartGrade;
 
@@ -68,9 +69,14 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     let context = Context::new(root)?;
     ensure_working_folder(&arguments.folder, &context.assignment.tree)?;
     let given = [crate::class::Source::given(&folder)];
-    let slug = super::class::sources(&given, &arguments.output, &std::collections::HashMap::new())
-        .remove(0)
-        .slug;
+    let slug = super::class::sources(
+        Mode::Check,
+        &given,
+        &arguments.output,
+        &std::collections::HashMap::new(),
+    )
+    .remove(0)
+    .slug;
     // Errors come before anything opens.
     Selection { parts: arguments.part.clone(), scenes: arguments.scene.clone() }
         .restrict(&mut Context::assignment(root)?)?;
@@ -315,6 +321,10 @@ fn verdict(row: &Row, is_whole: bool) -> (Stage, String, String) {
         let message = format!("{place}{first} ({points})");
         return (Stage::Refused, "does not compile".to_owned(), message);
     }
+    // Nothing was built: that is the cause, whatever a part says.
+    if let Some(cause) = row.remarks.first().filter(|_| is_whole && row.points_max == 0.0) {
+        return (Stage::Lost, points.clone(), format!("{points}. {cause}"));
+    }
     let mut errors = row.findings.iter().filter(|found| found.severity == Severity::Error);
     let lost: Vec<&PartGrade> = row.parts.iter().filter(|part| part.is_lost()).collect();
     match lost.split_first() {
@@ -361,6 +371,9 @@ impl Check<'_> {
         let mut command = Command::new(std::env::current_exe()?);
         command.arg("check").arg(self.folder).arg("--report").arg(self.output);
         command.arg("--keep-plugin").arg(self.live.library());
+        if change == Change::Shader {
+            command.arg("--realtime-first");
+        }
         for part in &self.arguments.part {
             command.arg("--part").arg(part);
         }
@@ -381,12 +394,20 @@ impl Check<'_> {
             let (board, live) = (Arc::clone(self.board), Arc::clone(self.live));
             let happened = self.happened.clone();
             std::thread::spawn(move || {
+                let mut known: Vec<String> = Vec::new();
                 for line in BufReader::new(said).lines().map_while(Result::ok) {
                     if quiet.load(Ordering::Acquire) {
                         continue;
                     }
                     let line = line.strip_prefix("umbra: ").unwrap_or(&line);
-                    board.show(Stage::Running, line);
+                    // What the author waits for stays to be read while the rest is checked.
+                    let is_result = [REFUSED, SO_FAR].iter().any(|start| line.starts_with(start));
+                    if is_result {
+                        known.push(line.to_owned());
+                    }
+                    let doing = if is_result { None } else { Some(line.to_owned()) };
+                    let words: Vec<String> = known.iter().cloned().chain(doing).collect();
+                    board.show(Stage::Running, &words.join("; "));
                     if live.has_new_library() {
                         board.compiled();
                     }
@@ -465,7 +486,7 @@ mod tests {
             slug: "work".into(),
             digest: String::new(),
             points: parts.iter().map(|part| part.points).sum(),
-            points_max: 0.0,
+            points_max: parts.iter().map(|part| part.points_max).sum(),
             unconfirmed: 0.0,
             out_of: 20.0,
             remarks: Vec::new(),
@@ -508,5 +529,14 @@ mod tests {
         let lost = vec![part("1.1", false, 0.0, "it panics"), part("1.2", false, 1.0, "dark")];
         let (_, _, words) = told(lost, "");
         assert_eq!(words, "1 of 20 points. 1.1: it panics, and 1 other part lost points too");
+        let nothing =
+            || vec![part("1.1", false, 0.0, "there is no code"), part("1.2", false, 0.0, "no")];
+        let mut bare = row(nothing(), "");
+        bare.remarks = vec!["there is no src/lib.rs".into()];
+        assert_eq!(verdict(&bare, true).2, "0 of 20 points. there is no src/lib.rs");
+        assert_eq!(
+            told(nothing(), "").2,
+            "0 of 20 points. 1.1: there is no code, and 1 other part lost points too"
+        );
     }
 }

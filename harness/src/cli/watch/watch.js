@@ -38,9 +38,23 @@ function show({ stage, message, verdict, reports: count, libraries, fresh, holds
   if (count > 0) reload();
 }
 
-/** Loads the report where the reader is in it, the folded parts as they are. */
+/** Whether the page below shows a case of images that is still there. */
+function showsCase() {
+  const manifest = report.contentDocument?.getElementById("manifest");
+  if (!manifest) return false;
+  const wanted = new URLSearchParams(report.contentWindow.location.hash.slice(1)).get("case");
+  return JSON.parse(manifest.textContent).cases.some(({ id }) => id === wanted);
+}
+
+/** Loads again what the reader has open: the viewer as its address says, the report where they are in it, the folded
+    parts as they are. */
 function reload() {
   const page = report.contentWindow;
+  if (report.contentDocument?.getElementById("manifest")) {
+    report.addEventListener("load", () => showsCase() || loadReport(), { once: true });
+    page.location.reload();
+    return;
+  }
   let place = 0;
   let open = [];
   try {
@@ -55,6 +69,10 @@ function reload() {
     }
     report.contentWindow.scrollTo(0, place);
   }, { once: true });
+  loadReport();
+}
+
+function loadReport() {
   report.src = `report/${report.dataset.page}`;
 }
 

@@ -110,6 +110,7 @@ fn measures(html: &mut Html, measures: &[Measure]) {
     if measures.is_empty() {
         return;
     }
+    html.raw("<div class=\"wide\" role=\"region\" aria-label=\"Measures\" tabindex=\"0\">\n");
     html.raw("<table class=\"measures\">\n<thead><tr><th scope=\"col\">Measure</th>");
     html.raw("<th scope=\"col\" class=\"number\">Value</th><th scope=\"col\" class=\"number\">");
     html.raw("At most</th><th scope=\"col\">Verdict</th></tr></thead>\n<tbody>\n");
@@ -124,5 +125,5 @@ fn measures(html: &mut Html, measures: &[Measure]) {
         html.text(&value(measure.bound)).raw("</td><td>");
         html.raw(if measure.passed { "✓ pass" } else { "✗ fail" }).raw("</td></tr>\n");
     }
-    html.raw("</tbody>\n</table>\n");
+    html.raw("</tbody>\n</table>\n</div>\n");
 }

@@ -22,7 +22,7 @@ pub(super) fn lobe(html: &mut Html, lobe: &Lobe) {
     };
     let place = |[angle, value]: [f64; 2]| {
         let (sin, cos) = angle.to_radians().sin_cos();
-        let r = if value.is_finite() { radius(value.max(0.0)) } else { RADIUS };
+        let r = if value.is_finite() { radius(value.abs()) } else { RADIUS };
         (r * sin, -r * cos)
     };
     html.raw("<figure class=\"lobe\">\n<svg viewBox=\"-190 -170 380 190\" width=\"380\" height=\"190\" role=\"img\" ");
@@ -42,23 +42,82 @@ pub(super) fn lobe(html: &mut Html, lobe: &Lobe) {
         let (x, y) = place(point);
         html.text(&short(x)).raw(",").text(&short(y)).raw(" ");
     }
-    html.raw("\"/>\n<polyline class=\"found\" points=\"");
-    for &point in &lobe.found {
-        let (x, y) = place(point);
-        html.text(&short(x)).raw(",").text(&short(y)).raw(" ");
-    }
     html.raw("\"/>\n");
+    // The curve ends where the values are none of a BSDF.
+    for run in lobe.found.split(|&[_, value]| mark(value) != "found") {
+        html.raw("<polyline class=\"found\" points=\"");
+        for &point in run {
+            let (x, y) = place(point);
+            html.text(&short(x)).raw(",").text(&short(y)).raw(" ");
+        }
+        html.raw("\"/>\n");
+    }
     for &point in &lobe.found {
         let (x, y) = place(point);
-        html.raw("<circle class=\"found\" r=\"3\" cx=\"").text(&short(x)).raw("\" cy=\"");
-        html.text(&short(y)).raw("\"/>");
+        html.raw("<circle class=\"").raw(mark(point[1])).raw("\" r=\"3\" cx=\"");
+        html.text(&short(x)).raw("\" cy=\"").text(&short(y)).raw("\"/>");
     }
     html.raw("\n</svg>\n<figcaption>Your BSDF (dots) and the right one (filled) for ");
     html.text(&lobe.material).raw(", in the plane of wo and the normal; ");
     html.raw(if lobe.log { "logarithmic, four powers of ten to " } else { "to " });
-    html.text(&value(largest)).raw(" sr⁻¹ at the outer ring</figcaption></figure>\n");
+    html.text(&value(largest)).raw(" sr⁻¹ at the outer ring");
+    for (name, words) in [
+        ("bad", "; magenta, at the outer ring: not finite"),
+        ("negative", "; hollow: negative, by its size"),
+    ] {
+        let is_there = lobe.found.iter().any(|point| mark(point[1]) == name);
+        html.raw(if is_there { words } else { "" });
+    }
+    html.raw("</figcaption></figure>\n");
+}
+
+/// The class of the dot for a value: what no BSDF may answer has its own.
+fn mark(value: f64) -> &'static str {
+    match value {
+        _ if !value.is_finite() => "bad",
+        _ if value < 0.0 => "negative",
+        _ => "found",
+    }
 }
 
 fn short(value: f64) -> String {
     format!("{value:.1}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_bsdf_answers_is_marked() {
+        let drawn = |found: Vec<[f64; 2]>| {
+            let expected = vec![[0.0, 0.5]];
+            let material = "kd".to_owned();
+            let own = Lobe { material, wo_deg: 40.0, log: false, expected, found };
+            let mut html = Html::default();
+            lobe(&mut html, &own);
+            html.finish()
+        };
+        let marks =
+            |page: &str, name: &str| page.matches(&format!("<circle class=\"{name}\"")).count();
+        let right = [[-30.0, 0.2], [0.0, 0.0], [30.0, 0.25]];
+        let page = drawn(right.to_vec());
+        assert_eq!(["found", "bad", "negative"].map(|name| marks(&page, name)), [3, 0, 0]);
+        assert!(page.contains("at the outer ring</figcaption>"), "{page}");
+        for (odd, counts) in [(f64::NAN, [3, 1, 0]), (f64::INFINITY, [3, 1, 0]), (-0.1, [3, 0, 1])]
+        {
+            let page = drawn([&right[..2], &[[15.0, odd]], &right[2..]].concat());
+            assert_eq!(
+                ["found", "bad", "negative"].map(|name| marks(&page, name)),
+                counts,
+                "{odd}"
+            );
+            assert_eq!(page.matches("<polyline").count(), 2, "no curve leads through it");
+            assert_eq!(page.contains("magenta, at the outer ring: not finite"), !odd.is_finite());
+            assert_eq!(
+                page.contains("hollow: negative, by its size"),
+                odd < 0.0 && odd.is_finite()
+            );
+        }
+    }
 }

@@ -123,9 +123,6 @@ impl<'a> Lost<'a> {
                 continue;
             }
             self.pictured.push((place, &part.id));
-            if !check.scene.is_empty() {
-                html.raw("<p class=\"open\">Scene ").text(&check.scene).raw("</p>\n");
-            }
             self.places.of_check(html, check);
         }
         for diagnosis in self.record.diagnoses.iter().filter(|found| found.part == part.id) {

@@ -56,13 +56,19 @@ pub fn closing(
     let mut verdict = verdict.join(", ");
     verdict.push_str(" on the public scenes");
     if !closing.asked.is_empty() {
-        verdict.push_str(&format!("; only {} was checked", closing.asked));
+        verdict.push_str(&format!("; {}", checked_only(closing.asked)));
     }
     let whole = plain.iter().all(|part| is_whole(part)) && !grade.parts.is_empty();
     let style = if whole { Style::Good } else { Style::Bad };
     page.wrapped(&[(style, "verdict: ")], Style::Plain, &verdict);
     page.wrapped(&[(Style::Heading, "next: ")], Style::Plain, &next(report, entry, closing));
     page.finish()
+}
+
+/// What of an assignment was checked, from its words: `parts 1.1, 2.3 on scene cbox`.
+pub fn checked_only(asked: &str) -> String {
+    let several = asked.starts_with("parts ") || asked.starts_with("scenes ");
+    format!("only {asked} {} checked, not the rest", if several { "were" } else { "was" })
 }
 
 /// `2.2 0 -> 5` for each part that is worth something else now.

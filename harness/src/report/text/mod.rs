@@ -8,7 +8,7 @@ mod explain;
 mod page;
 mod table;
 
-pub use closing::{Closing, closing};
+pub use closing::{Closing, checked_only, closing};
 pub use defend::defend;
 pub use detail::detail;
 pub use explain::{explain, explain_all};

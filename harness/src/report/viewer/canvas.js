@@ -37,10 +37,11 @@ class CanvasPainter {
 
   pane({ box, origin, zoom, layer, settings }) {
     const { width, height } = layer.image;
+    // An image is at least one pixel of the screen wide and high.
     const left = Math.max(box.x, Math.ceil(origin.x - 0.5));
-    const right = Math.min(box.x + box.width, Math.ceil(origin.x + width * zoom - 0.5));
+    const right = Math.min(box.x + box.width, Math.ceil(origin.x + Math.max(width * zoom, 1) - 0.5));
     const top = Math.max(box.y, Math.ceil(origin.y - 0.5));
-    const bottom = Math.min(box.y + box.height, Math.ceil(origin.y + height * zoom - 0.5));
+    const bottom = Math.min(box.y + box.height, Math.ceil(origin.y + Math.max(height * zoom, 1) - 0.5));
     if (right <= left || bottom <= top) return;
     const colors = this.colorsOf(layer, settings);
     const picture = this.context.createImageData(right - left, bottom - top);

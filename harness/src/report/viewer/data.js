@@ -54,13 +54,20 @@ async function unpack(about, packed) {
     throw new Error(`${about.file} holds ${planes.length} bytes, expected ${samples * bytes}`);
   }
   const raw = bytes === 2 ? new Uint16Array(samples) : new Uint32Array(samples);
+  // Two loops, and a table below: of an image of 8K each sample counts.
   let last = 0;
-  for (let i = 0; i < samples; i++) {
-    let step = 0;
-    for (let plane = 0; plane < bytes; plane++) step = (step << 8) | planes[plane * samples + i];
-    last += step;
-    raw[i] = last;
-    last = raw[i];
+  if (bytes === 2) {
+    for (let i = 0; i < samples; i++) {
+      last = (last + ((planes[i] << 8) | planes[samples + i])) & 0xffff;
+      raw[i] = last;
+    }
+  } else {
+    for (let i = 0; i < samples; i++) {
+      const high = (planes[i] << 8) | planes[samples + i];
+      const low = (planes[2 * samples + i] << 8) | planes[3 * samples + i];
+      last = (last + ((high << 16) | low)) | 0;
+      raw[i] = last;
+    }
   }
   return new FloatImage(about, raw);
 }
@@ -93,6 +100,9 @@ function floatBitsOfHalf(half) {
   return (sign | ((113 - shift) << 23) | (((fraction << shift) & 0x3ff) << 13)) >>> 0;
 }
 
+/** The same for all halves, made when it is first needed. */
+let floatBits = null;
+
 /** An image as floats, channels interleaved; row 0 is on top. */
 class FloatImage {
   constructor({ width, height, channels, type }, raw) {
@@ -103,13 +113,12 @@ class FloatImage {
     }
     const pixels = width * height;
     /** The bits of `values`. A number that is not a number would lose some of its bits. */
-    this.bits = new Uint32Array(pixels * channels);
-    for (let c = 0; c < channels; c++) {
-      for (let i = 0; i < pixels; i++) {
-        const sample = raw[c * pixels + i];
-        this.bits[i * channels + c] = type === "half" ? floatBitsOfHalf(sample) : sample;
-      }
+    const bits = new Uint32Array(pixels * channels);
+    const table = type === "half" ? (floatBits ??= Uint32Array.from({ length: 65536 }, (_, half) => floatBitsOfHalf(half))) : null;
+    for (let c = 0, from = 0; c < channels; c++) {
+      for (let to = c; to < bits.length; to += channels, from++) bits[to] = table ? table[raw[from]] : raw[from];
     }
+    this.bits = bits;
     this.values = new Float32Array(this.bits.buffer);
   }
 

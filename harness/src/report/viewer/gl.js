@@ -49,7 +49,8 @@ bool finite(float v) {
 
 void main() {
   vec2 place = vec2(gl_FragCoord.x - origin.x, origin.y - gl_FragCoord.y) / zoom;
-  if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, vec2(size)))) discard;
+  // An image is at least one pixel of the screen wide and high.
+  if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, max(vec2(size), 1.0 / zoom)))) discard;
   // What is smaller than a pixel of the screen is averaged, so that noise does not flicker.
   int steps = int(clamp(ceil(1.0 / zoom), 1.0, 8.0));
   vec3 value = vec3(0.0);

@@ -127,7 +127,7 @@ function showLegend(layer, settings) {
       const swatch = element("i");
       swatch.style.background = `rgb(${regionColor(index).join(",")})`;
       return element("li", {}, swatch, ` ${name}`);
-    }), element("li", { textContent: "half gray: edges; dark: the light source, not compared" }));
+    }), element("li", { textContent: "half gray: edges; half white: highlights; black: the light source, not compared" }));
   }
   ends.forEach((value, i) => { get(`legend-${i}`).textContent = digits(value, 3); });
   get("unit").textContent = `${unitOf(layer)}${numberOf(layer, settings)}`;
@@ -185,6 +185,8 @@ function showProbe() {
   const at = stage.hover ?? state.pin;
   const { width, height } = sizeOf();
   const rows = [];
+  // Beside floats, a half has the digits of the very value: else both may read the same and still differ.
+  const halves = stage.layers.every(({ kind, image }) => kind !== "image" || image.type === "half");
   if (at && at.x >= 0 && at.y >= 0 && at.x < width && at.y < height) {
     // Of many images, those that are looked at.
     const few = stage.layers.length <= PROBED;
@@ -196,7 +198,7 @@ function showProbe() {
       const name = difference ? `${state.metric} ${layer.name}` : layer.name;
       // A difference as 32 bits hold it, like its values.
       const words = (value) => (difference && Number.isFinite(Math.fround(value))
-        ? exact(Math.fround(value), "float") : exact(value, layer.image.type));
+        ? exact(Math.fround(value), "float") : exact(value, layer.kind === "image" && !halves ? "float" : layer.image.type));
       rows.push(element("tr", {}, element("th", { scope: "rowgroup", colSpan: 3, textContent: name })),
         element("tr", {}, ...[...values].map((value) => element("td", { colSpan: values.length === 1 ? 3 : 1, textContent: words(value) }))));
     }

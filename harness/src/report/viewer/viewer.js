@@ -4,6 +4,7 @@ const manifest = JSON.parse(get("manifest").textContent);
 
 /** Does something to the state, then draws once. */
 function change(what) {
+  if (!stage.about) return;
   say("");
   what();
   const count = stage.layers.length;
@@ -11,6 +12,7 @@ function change(what) {
   state.reference = clamp(Math.floor(state.reference), [0, count - 1]);
   stage.pending ??= requestAnimationFrame(() => {
     stage.pending = null;
+    if (!stage.about) return;
     paint();
     showState();
     clearTimeout(stage.addressing);
@@ -29,9 +31,10 @@ function keepAddress() {
   }
 }
 
-/** The color of a region in the picture of regions. */
+/** The color of a region in the picture of regions; each round of colors is darker. */
 function regionColor(index) {
-  return index === 0 ? [40, 40, 40] : CATEGORIES[(index - 1) % CATEGORIES.length];
+  const shade = 0.6 ** Math.floor((index - 1) / CATEGORIES.length);
+  return index === 0 ? [40, 40, 40] : CATEGORIES[(index - 1) % CATEGORIES.length].map((level) => Math.round(shade * level));
 }
 
 /** A picture of which region each pixel belongs to. */
@@ -51,6 +54,7 @@ function pictureOfRegions(mask) {
   return picture;
 }
 
+/** Loads a case; whether it is still the one that is wanted by then. */
 async function openCase(about) {
   stage.about = null;
   say("loading the images …");
@@ -60,10 +64,12 @@ async function openCase(about) {
   }));
   const imageOf = (kind) => about.layers.find((layer) => layer.kind === kind)?.image;
   const loaded = (kind) => imageOf(kind) ? loadImage(imageOf(kind)) : null;
-  [stage.mask, stage.excess] = await Promise.all([loaded("regions"), loaded("excess")]);
-  Object.assign(stage, { layers, about, auto: new Map(), marks: [], hover: null });
+  const [mask, excess] = await Promise.all([loaded("regions"), loaded("excess")]);
+  if (stage.wanted !== about) return false;
+  Object.assign(stage, { layers, about, mask, excess, auto: new Map(), marks: [], hover: null });
   choosePainter();
   say("");
+  return true;
 }
 
 function say(words) {
@@ -89,13 +95,16 @@ async function goToAddress() {
   const wanted = new URLSearchParams(location.hash.slice(1)).get("case");
   const about = manifest.cases.find(({ id }) => id === wanted) ?? manifest.cases[0];
   if (state.case !== about.id || !stage.about) {
+    // The last choice wins, whichever is loaded first.
+    stage.wanted = about;
+    clearTimeout(stage.addressing);
     state.case = about.id;
     state.look = initialLook(about);
     Object.assign(state, { layer: 0, reference: Math.min(1, about.layers.length - 1) });
     try {
-      await openCase(about);
+      if (!await openCase(about)) return;
     } catch (error) {
-      say(`These images cannot be shown: ${error.message}`);
+      if (stage.wanted === about) say(`These images cannot be shown: ${error.message}`);
       return;
     }
     fillLayers(change);
@@ -134,9 +143,12 @@ function start() {
   get("case").replaceChildren(...manifest.cases.map(({ id, title }) => element("option", { value: id, textContent: title })));
   get("case").addEventListener("change", () => { location.hash = `case=${encodeURIComponent(get("case").value)}`; });
   const on = (id, what) => get(id).addEventListener("click", () => stage.about && change(what));
-  for (const button of document.querySelectorAll("header button, aside button")) {
-    // Of a click by the mouse: the space bar is for the images again.
-    button.addEventListener("click", (event) => event.detail > 0 && button !== get("help-button") && get("stage").focus({ preventScroll: true }));
+  for (const bar of document.querySelectorAll("header, aside")) {
+    // Of a click by the mouse: the space bar is for the images again. Buttons of layers come later.
+    bar.addEventListener("click", ({ detail, target }) => {
+      const button = target.closest("button");
+      if (detail > 0 && button && button !== get("help-button")) get("stage").focus({ preventScroll: true });
+    });
   }
   for (const mode of MODES) on(`mode-${mode}`, () => { state.mode = mode; });
   on("fit", () => { state.view = null; });
