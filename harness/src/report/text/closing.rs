@@ -68,7 +68,7 @@ pub fn closing(
 /// What of an assignment was checked, from its words: `parts 1.1, 2.3 on scene cbox`.
 pub fn checked_only(asked: &str) -> String {
     let several = asked.starts_with("parts ") || asked.starts_with("scenes ");
-    format!("only {asked} {} checked, not the rest", if several { "were" } else { "was" })
+    format!("only {asked} {} checked", if several { "were" } else { "was" })
 }
 
 /// `2.2 0 -> 5` for each part that is worth something else now.
