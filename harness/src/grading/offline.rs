@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use basecode::{Image, MaterialModel, Ray, Scene, Texture};
+use basecode::{Camera, Image, MaterialModel, Ray, Scene, Texture, Vec3};
 
 use super::conventions::{Answers, shaded_point, value};
 use super::observe;
@@ -17,7 +17,7 @@ use crate::evidence::{loops, rays};
 use crate::expected::{Expected, SurfacePoint};
 use crate::imaging::evidence::Tolerances;
 use crate::plugin::Witness;
-use crate::worker::{BsdfQuery, BsdfSource, Outcome, Request};
+use crate::worker::{BsdfQuery, BsdfSource, Outcome, RayQuery, Request};
 
 /// The witnesses that an integrator is judged under, with their names for reports.
 const WITNESSES: [(Witness, &str); 4] = [
@@ -183,10 +183,22 @@ pub fn judge_scene<'a>(
         Some([along, image]) => (along, image),
         _ => (along_centres, one_spp),
     };
+    // What the integrator answers along the same rays with directions that nobody normalized.
+    let along_longer = |rays: &[RayQuery], (width, height): (u32, u32), shadows| {
+        let camera = case.expected.scene.camera(width as usize, height as usize);
+        let longer = camera.map(|camera| longer_rays(&camera, rays)).unwrap_or_default();
+        longer.into_iter().filter_map(move |rays| {
+            let outcomes = session.run(Some(plugin), vec![radiance(&rays, Witness::True, shadows)]);
+            outcomes.first()?.answer().map(|answer| session::colours(&answer.values).to_vec())
+        })
+    };
     checks.push(match (one_spp, along_centres) {
         (Outcome::Done(image), Outcome::Done(along)) => {
             let (image, along) = (session::colours(&image.values), session::colours(&along.values));
-            loops::judge_agreement(name, &small.mask, image, along)
+            let judge = |along: &[_]| loops::judge_agreement(name, &small.mask, image, along);
+            let with_shadows = unshadowed.is_none();
+            let longer = along_longer(&centres, (small.width, small.height), with_shadows);
+            loops::priced_by_length(judge(along), image, longer, &judge)
         }
         (Outcome::Done(_), missing) => Check {
             verdict: Verdict::NotJudged,
@@ -206,7 +218,11 @@ pub fn judge_scene<'a>(
             (Outcome::Done(along), Outcome::Done(image)) => {
                 let (image, along) =
                     (session::colours(&image.values), session::colours(&along.values));
-                let (check, edges) = loops::judge_samples(name, &sampled.film, image, along);
+                let judge = |along: &[_]| loops::judge_samples(name, &sampled.film, image, along);
+                let (check, edges) = judge(along);
+                let film = (sampled.film.width, sampled.film.height);
+                let longer = along_longer(&sampled.rays, film, false);
+                let check = loops::priced_by_length(check, image, longer, &|along| judge(along).0);
                 // Where the samples are wrong already, edges are too.
                 if check.verdict == Verdict::Pass {
                     answers.edges.add(&edges);
@@ -301,6 +317,24 @@ fn plain_surfaces(case: &PreparedScene) -> Vec<(usize, BsdfQuery)> {
     asked.collect()
 }
 
+/// Camera rays with directions that nobody normalized: up to the plane at distance 1, or up to the far plane, as the
+/// inverse of the matrices gives it.
+fn longer_rays(camera: &Camera, rays: &[RayQuery]) -> [Vec<RayQuery>; 2] {
+    let to_clip = camera.projection() * camera.view();
+    let (back, axis) = (to_clip.inverse(), camera.view().row(2).truncate());
+    let near = |direction: Vec3| direction / direction.dot(-axis);
+    let far = |direction: Vec3| {
+        let on_film = to_clip.project_point3(camera.eye() + direction);
+        back.project_point3(on_film.with_z(1.0)) - camera.eye()
+    };
+    let changed = |change: &dyn Fn(Vec3) -> Vec3| {
+        let longer =
+            |ray: &RayQuery| RayQuery { direction: change(ray.direction.into()).into(), ..*ray };
+        rays.iter().map(longer).collect()
+    };
+    [changed(&near), changed(&far)]
+}
+
 /// Keeps for the diagnosis what witnesses say of light and visibility.
 fn record_rays(
     session: &Session,
@@ -315,7 +349,9 @@ fn record_rays(
         let tile = Thumbnail::of_pixels(size, small.batch.met().copied().zip(values));
         session.record(View::new(diagnosis::Kind::Lit, name), tile);
     }
-    if let (Outcome::Done(with), Outcome::Done(without)) = (with, without) {
+    if let (Outcome::Done(with), Outcome::Done(without)) = (with, without)
+        && observe::tells_visibility(small.batch.lit, session::colours(&without.values))
+    {
         let pairs = session::colours(&with.values).iter().zip(session::colours(&without.values));
         let sums = pairs.map(|(a, b)| (a.iter().sum::<f32>(), b.iter().sum::<f32>()));
         // A ray that is black without shadows tells nothing.
@@ -385,4 +421,27 @@ fn blocker(scene: &Scene, ray: &Ray) -> Option<usize> {
         rest.min_t = hit.t + hit.epsilon;
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn longer_rays_keep_their_directions() {
+        let eye = Vec3::new(1.0, 2.0, 6.0);
+        let config = basecode::CameraConfig { eye, ..basecode::CameraConfig::default() };
+        let camera = Camera::new(config, 40, 30).unwrap();
+        let rays = [session::ray(&camera.ray(20.0, 15.0)), session::ray(&camera.ray(0.5, 29.5))];
+        let [near, far] = longer_rays(&camera, &rays);
+        for (ray, (near, far)) in rays.iter().zip(near.iter().zip(&far)) {
+            let [ray, near, far] = [ray, near, far].map(|ray| Vec3::from(ray.direction));
+            assert!(
+                (near.normalize() - ray).length() < 1e-5 && (far.normalize() - ray).length() < 1e-3
+            );
+            assert!((far.length() / near.length() / Camera::FAR - 1.0).abs() < 0.05);
+        }
+        assert!((Vec3::from(near[0].direction).length() - 1.0).abs() < 1e-5);
+        assert!(Vec3::from(near[1].direction).length() > 1.01);
+    }
 }

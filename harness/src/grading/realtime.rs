@@ -11,7 +11,7 @@ use super::judged::Judged;
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
-use super::stages::{Stages, negated_normals};
+use super::stages::{MOVED, Stages, negated_normals};
 use super::zoomed;
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels;
@@ -100,6 +100,7 @@ pub fn judge_images(
         Judged { checks, drawn, fails, footprint, shading }
     });
     let mut judged: Vec<Judged> = judged.collect();
+    coverage::accept_explained(cases, &mut judged);
     coverage::look_at_black_surfaces(session, plugin, cases, &mut judged);
     coverage::refuse_silhouettes(&mut judged);
     judged
@@ -237,6 +238,39 @@ fn judge_bonus_without(
     None
 }
 
+/// Judges the bonus once more where the host's change of what a pass is given mends all frames without shadows: by
+/// visibility, and what is right then is right.
+pub fn judge_bonus_under(
+    stage: &Stage,
+    session: &Session,
+    plugin: &Path,
+    cases: &[PreparedScene],
+    tolerances: &Tolerances,
+    checks: &mut [Check],
+) {
+    let bonus = |check: &&mut Check| {
+        [CheckId::BonusImage, CheckId::BonusProbe].contains(&check.id)
+            && check.verdict == Verdict::Fail
+    };
+    for check in checks.iter_mut().filter(bonus) {
+        let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
+        let Some(with) = Frame::bonus(case) else { continue };
+        let drawn = |frame: Frame| {
+            let frame = Frame { stages: vec![stage.clone()], ..frame };
+            let (width, height) = frame.size;
+            let outcome = draw(session, Some(plugin), &frame);
+            outcome.answer().map(|answer| session::image(&answer.values, width, height))
+        };
+        let judged = || {
+            let (with, without) = (drawn(with)?, drawn(Frame::plain(case))?);
+            shadows(case).judge(&check.scene, &with, &without, tolerances)
+        };
+        if let Some(judged) = judged() {
+            *check = Check { id: check.id, ..judged };
+        }
+    }
+}
+
 /// Whether a frame itself shows shadows that are right: by another stage than the submission's they may be
 /// right where its own frame shows nothing.
 fn shows_its_shadows(
@@ -342,9 +376,9 @@ fn plain_but_for_shadows(
 }
 
 /// Judges shadows that are wrong as an image by visibility alone: against the student's own image
-/// without shadows, or else against that drawn under a vertex stage of ours, or of the scene with its normals negated
-/// or of another field of view, or as the second of two frames: what these mend is no matter of shadows. `check` is the
-/// verdict on the image, which stands when none tells.
+/// without shadows, or else against that drawn under a vertex stage of ours, or as a picture that is moved as a whole,
+/// or of the scene with its normals negated or of another field of view, or as the second of two frames: what these
+/// mend is no matter of shadows. `check` is the verdict on the image, which stands when none tells.
 fn judge_visibility(
     session: &Session,
     plugin: &Path,
@@ -376,8 +410,11 @@ fn judge_visibility(
     if let Some(swapped) = swapped.as_ref().filter(|swapped| passes(swapped)) {
         return swapped.clone();
     }
-    let negated = again(1, &[negated_normals()]).filter(passes);
-    let mended = negated.or_else(|| {
+    let moved = without.and_then(|without| {
+        MOVED.iter().find_map(|(_, moved)| judge(&moved(with), &moved(without)).filter(passes))
+    });
+    let mended = moved.or_else(|| again(1, &[negated_normals()]).filter(passes));
+    let mended = mended.or_else(|| {
         let masks = zoomed::masks(session, plugin, case)?;
         let shadows = masks.shadows(shadows.median_lit);
         shadows.judge(name, with, without?, tolerances).filter(passes)
