@@ -4,7 +4,7 @@ use std::fs;
 use std::sync::LazyLock;
 
 use basecode::exr_io::{Precision, decode_exr, write_exr};
-use basecode::{Image, Vec3};
+use basecode::{Image, Matrices, Vec3};
 use umbra::assignment::SceneEntry;
 use umbra::evidence::images::{self, Kind};
 use umbra::evidence::rays::RayBatch;
@@ -20,7 +20,7 @@ use umbra::imaging::metrics::Metrics;
 use umbra::imaging::noise::NoisyPixels;
 use umbra::imaging::pictures::{signed_error, tone_mapped};
 use umbra::imaging::reference::{ReferenceImage, RegionMask};
-use umbra::worker::{CameraValue, Matrices};
+use umbra::worker::CameraValue;
 
 const WIDTH: usize = 48;
 const HEIGHT: usize = 36;
@@ -154,7 +154,7 @@ pub fn judge(bytes: &[u8]) {
     let ProbeFilm { surface, mask, .. } = &case.probe_film;
     let camera = case.expected.scene.camera(WIDTH, HEIGHT).expect("a camera");
     let film = StageFilm { scene: &case.expected.scene, camera, surface, mask };
-    check(&[judge_vertex("a", &film, [[&image, &image]; 3])]);
+    check(&[judge_vertex("a", &film, [[&image, &image]; Matrices::ALL.len()])]);
     let frames = BoundValue::ALL.map(|bound| (bound, image.clone()));
     check(&[judge_pass("a", &film, &frames, &image, &|_, _| true)]);
     ImageDigest::new("a", "a.exr", &image);

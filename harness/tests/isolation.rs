@@ -340,7 +340,7 @@ fn realtime(kind: AdapterKind) -> Request {
             at: [0.0, 1.0, 0.0],
             up: [0.0, 1.0, 0.0],
             fov_y_deg: 20.0,
-            matrices: umbra::worker::Matrices::Usual,
+            matrices: basecode::Matrices::Usual,
         }],
     }
 }

@@ -557,7 +557,7 @@ fn a_stage_that_is_no_wgsl_is_refused_with_its_line_and_others_are_drawn() {
                 at: [0.0; 3],
                 up: [0.0, 0.0, 1.0],
                 fov_y_deg: 40.0,
-                matrices: umbra::worker::Matrices::Usual,
+                matrices: basecode::Matrices::Usual,
             }],
         }
     };
@@ -613,7 +613,7 @@ fn scenes_and_passes_that_fail_say_why() {
             at: [0.0; 3],
             up: [0.0, 0.0, 1.0],
             fov_y_deg: 40.0,
-            matrices: umbra::worker::Matrices::Usual,
+            matrices: basecode::Matrices::Usual,
         }],
     };
     let bsdf = Request::EvalBsdf { scene: missing, queries: Vec::new() };

@@ -1,7 +1,7 @@
 //! The pinhole camera.
 
 use glam::{Mat4, Vec3};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{Error, Ray, Result};
 
@@ -26,6 +26,31 @@ impl Default for CameraConfig {
     }
 }
 
+/// What a camera gives as its matrices. The host asks for other ones to see what a renderer makes of them: only the
+/// first are those of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[doc(hidden)]
+pub enum Matrices {
+    /// What their names say.
+    #[default]
+    Usual,
+    /// The view matrix holds the product, the projection matrix nothing.
+    InView,
+    /// The projection matrix holds the product, the view matrix nothing.
+    InProjection,
+    /// Both are transposed: their product with a row vector is what belongs.
+    Transposed,
+    /// The camera stands at the origin, and depth is the same everywhere: without the translation, w of a position has
+    /// no effect.
+    WithoutTranslation,
+}
+
+impl Matrices {
+    /// All of them.
+    pub const ALL: [Self; 5] =
+        [Self::Usual, Self::InView, Self::InProjection, Self::Transposed, Self::WithoutTranslation];
+}
+
 /// A pinhole camera for a film of a given size. Pixels are square.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
@@ -36,6 +61,7 @@ pub struct Camera {
     up: Vec3,
     forward: Vec3,
     tan_half_fov: f32,
+    matrices: Matrices,
 }
 
 impl Camera {
@@ -77,7 +103,14 @@ impl Camera {
             up: right.cross(forward),
             forward,
             tan_half_fov: (0.5 * config.fov_y_deg.to_radians()).tan(),
+            matrices: Matrices::Usual,
         })
+    }
+
+    /// The same camera with other matrices.
+    #[doc(hidden)]
+    pub fn with_matrices(self, matrices: Matrices) -> Self {
+        Self { matrices, ..self }
     }
 
     /// What the camera was made from.
@@ -108,19 +141,36 @@ impl Camera {
     /// World space to view space; the camera looks along -z.
     pub fn view(&self) -> Mat4 {
         let rotation = glam::Mat3::from_cols(self.right, self.up, -self.forward).transpose();
-        Mat4::from_mat3(rotation) * Mat4::from_translation(-self.config.eye)
+        let view = Mat4::from_mat3(rotation) * Mat4::from_translation(-self.config.eye);
+        match self.matrices {
+            Matrices::Usual => view,
+            Matrices::InView => self.with_matrices(Matrices::Usual).projection() * view,
+            Matrices::InProjection => Mat4::IDENTITY,
+            Matrices::Transposed => view.transpose(),
+            Matrices::WithoutTranslation => Mat4::from_mat3(rotation),
+        }
     }
 
     /// View space to clip space: y up, z in [0, 1] from [`Camera::NEAR`] to [`Camera::FAR`].
     pub fn projection(&self) -> Mat4 {
         let y = 1.0 / self.tan_half_fov;
         let depth = Self::FAR / (Self::NEAR - Self::FAR);
-        Mat4::from_cols_array_2d(&[
-            [y / self.aspect(), 0.0, 0.0, 0.0],
-            [0.0, y, 0.0, 0.0],
-            [0.0, 0.0, depth, -1.0],
-            [0.0, 0.0, Self::NEAR * depth, 0.0],
-        ])
+        let of_depth = |depth: f32, near: f32| {
+            Mat4::from_cols_array_2d(&[
+                [y / self.aspect(), 0.0, 0.0, 0.0],
+                [0.0, y, 0.0, 0.0],
+                [0.0, 0.0, depth, -1.0],
+                [0.0, 0.0, near, 0.0],
+            ])
+        };
+        let projection = of_depth(depth, Self::NEAR * depth);
+        match self.matrices {
+            Matrices::Usual => projection,
+            Matrices::InView => Mat4::IDENTITY,
+            Matrices::InProjection => projection * self.with_matrices(Matrices::Usual).view(),
+            Matrices::Transposed => projection.transpose(),
+            Matrices::WithoutTranslation => of_depth(-0.5, 0.0),
+        }
     }
 }
 

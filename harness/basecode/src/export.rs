@@ -11,11 +11,11 @@ use std::sync::{Mutex, Once};
 use glam::{Vec2, Vec3};
 pub use renderer_api as api;
 
-use crate::gpu::{AdapterKind, Footprint, Gpu, NEGATED_NORMALS, RenderPass, Target};
+use crate::gpu::{AdapterKind, Footprint, Gpu, MATRICES, NEGATED_NORMALS, RenderPass, Target};
 use crate::realtime::{RayRefused, Realtime};
 use crate::{
-    Bsdf, Camera, CameraConfig, Error, Film, Frame, Material, Ray, RenderJob, Renderer, Result,
-    Sampler, Scene, SurfaceInteraction,
+    Bsdf, Camera, CameraConfig, Error, Film, Frame, Material, Matrices, Ray, RenderJob, Renderer,
+    Result, Sampler, Scene, SurfaceInteraction,
 };
 
 /// Exports a type that implements [`Renderer`] as the library's plugin, with its name and version
@@ -97,6 +97,8 @@ struct OpenPass {
     realtime: Realtime,
     /// What making the pass handed to the device.
     opening: Footprint,
+    /// What the camera of a frame gives as its matrices.
+    matrices: Matrices,
 }
 
 /// Loads a scene into a new renderer.
@@ -266,6 +268,10 @@ unsafe extern "C" fn open_realtime(
             let (name, source) = unsafe { (text(&stage.name)?, text(&stage.source)?) };
             replaced.push((name.to_owned(), source.to_owned()));
         }
+        let asked = replaced.iter().find(|(name, _)| name == MATRICES).map(|(_, text)| text);
+        let is_asked =
+            |matrices: &Matrices| asked.is_some_and(|text| *text == format!("{matrices:?}"));
+        let matrices = Matrices::ALL.into_iter().find(is_asked).unwrap_or_default();
         let negated = replaced.iter().any(|(name, _)| name == NEGATED_NORMALS);
         let negated = negated.then(|| loaded.scene.with_negated_normals());
         let scene = negated.as_ref().unwrap_or(&loaded.scene);
@@ -285,7 +291,8 @@ unsafe extern "C" fn open_realtime(
         };
         let adapter = (kind, name.to_owned());
         let opening = gpu.take_footprint();
-        let opened = Box::new(OpenPass { pass: opened, target, gpu, adapter, realtime, opening });
+        let opened = OpenPass { pass: opened, target, gpu, adapter, realtime, opening, matrices };
+        let opened = Box::new(opened);
         // SAFETY: the host's place for the handle.
         unsafe { *pass = Box::into_raw(opened).cast() };
         Ok(())
@@ -307,6 +314,7 @@ unsafe extern "C" fn draw_frame(
             fov_y_deg: camera.fov_y_deg,
         };
         let camera = Camera::new(config, open.target.width, open.target.height)?;
+        let camera = camera.with_matrices(open.matrices);
         let OpenPass { pass, target, gpu, realtime, opening, .. } = open;
         let _ = gpu.take_footprint();
         gpu.checked(&mut || pass.draw(gpu, &camera, target))?;
@@ -339,8 +347,7 @@ unsafe extern "C" fn close_realtime(pass: api::Pass) {
     let open = unsafe { Box::from_raw(pass.cast::<OpenPass>()) };
     // A panic in a student's `drop` must not cross the boundary; the device goes with it.
     let dropped = catch_unwind(AssertUnwindSafe(|| {
-        let OpenPass { pass, target, gpu, adapter: (kind, name), realtime: _realtime, opening: _ } =
-            *open;
+        let OpenPass { pass, target, gpu, adapter: (kind, name), realtime: _realtime, .. } = *open;
         drop((pass, target));
         gpu.keep(kind, &name);
     }));

@@ -71,12 +71,13 @@
 //! #     std::fs::create_dir_all(&dir)?;
 //! #     std::fs::write(dir.join("t.obj"), "mtllib t.mtl\nv -9 -9 0\nv 9 -9 0\nv 0 9 0\nusemtl m\nf 1 2 3\n")?;
 //! #     std::fs::write(dir.join("t.mtl"), "newmtl m\nKd 1 1 1\nillum 7\n")?;
-//! #     let text = "[input]\nobjfile = 't.obj'\n[camera]\neye = [0, 0, 4]\nat = [0, 0, 0]\nup = [0, 1, 0]\nfov = 30\n";
+//! # let text = "[input]\nobjfile = 't.obj'\n[camera]\neye = [0, 0, 4]\nat = [0, 0, 0]\nup = [0, 1, 0]\nfov = 30\n";
 //! #     std::fs::write(dir.join("t.toml"), text)?;
 //! #     let renderer = Normals::new("")?;
 //! #     let scene = Scene::load(&dir.join("t.toml"), &|material| renderer.bsdf(material))?;
 //! #     std::fs::remove_dir_all(&dir)?;
-//! #     let job = RenderJob { width: 4, height: 3, spp: 1, seed: 0, threads: 1, progress: &|_, _| {}, cancelled: &|| false };
+//! # let job = RenderJob { width: 4, height: 3, spp: 1, seed: 0, threads: 1, progress: &|_, _| {}, cancelled: &|| false
+//! };
 //! #     let mut pixels = [Vec3::ZERO; 12];
 //! #     let integrator = renderer.integrator(ShadingKind::Normal, false)?;
 //! #     renderer.render(&scene, integrator.as_ref(), &job, &mut Film::new(4, &mut pixels))?;
@@ -104,7 +105,7 @@ pub mod scene;
 
 pub use bsdf::{Bsdf, ShadingKind};
 pub use bvh::Bvh;
-pub use camera::{Camera, CameraConfig};
+pub use camera::{Camera, CameraConfig, Matrices};
 pub use error::{Error, Result};
 pub use film::Film;
 pub use frame::Frame;

@@ -182,14 +182,8 @@ mod tests {
             (grade.out_of, grade.remarks.last().cloned().unwrap_or_default())
         };
         assert_eq!(out_of(&[], &[]).0, 100.0);
-        assert_eq!(
-            out_of(&[], &["cbox"]),
-            (100.0, "only scene cbox was checked".into())
-        );
-        assert_eq!(
-            out_of(&["2.4", "2.5"], &[]),
-            (25.0, "only parts 2.4, 2.5 were checked".into())
-        );
+        assert_eq!(out_of(&[], &["cbox"]), (100.0, "only scene cbox was checked".into()));
+        assert_eq!(out_of(&["2.4", "2.5"], &[]), (25.0, "only parts 2.4, 2.5 were checked".into()));
         assert_eq!(
             out_of(&["2.4"], &["cbox", "scale"]),
             (25.0, "only part 2.4 on scenes cbox, scale was checked".into())

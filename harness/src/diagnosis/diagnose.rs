@@ -42,9 +42,6 @@ impl Diagnosis {
     }
 }
 
-/// A known mistake that leaves less than this fraction of the difference is as good as exact.
-const EXACT: f64 = 0.05;
-
 /// All that a diagnosis is made from. Nothing of it comes from scenes that are held back.
 pub struct Input<'a> {
     /// What was found out.
@@ -202,13 +199,11 @@ impl Input<'_> {
         Some(Diagnosis { words: words.join("; and "), ..self.known(&[], unexplained, 1.0) })
     }
 
-    /// A known mistake that is as good as exact is worded better than a fit; fits are exact.
+    /// A known mistake that is made alone is worded better than a fit.
     fn better(&self, fitted: Option<Diagnosis>, known: Option<Diagnosis>) -> Option<Diagnosis> {
-        let exact = |known: &Diagnosis| {
-            known.mistakes.len() == 1 && known.factor.is_none() && known.unexplained < EXACT
-        };
+        let alone = |known: &Diagnosis| known.mistakes.len() == 1 && known.factor.is_none();
         match (fitted, known) {
-            (Some(_), Some(known)) if exact(&known) => Some(known),
+            (Some(_), Some(known)) if alone(&known) => Some(known),
             (fitted, known) => fitted.or(known),
         }
     }

@@ -15,8 +15,9 @@ const FLOOR: f32 = 1e-3;
 /// Mean difference from what is right below which there is nothing to explain.
 const NOTHING: f64 = 1e-5;
 /// A single mistake is named when it leaves less than this fraction of the difference unexplained.
-/// Measured: a mistake that the catalogue lacks leaves more.
-const SINGLE: f64 = 0.05;
+/// Measured: a mistake that the catalogue lacks leaves more, such as a missing highlight beside one that points into
+/// the surface.
+const SINGLE: f64 = 0.02;
 /// The same for a constant factor.
 const FACTOR: f64 = 0.03;
 /// A factor nearer to 1 than this counts as none.

@@ -1,7 +1,7 @@
 //! The known single mistakes that answers are compared with, each with what a teacher takes it for.
 
 use super::price::{Change, Class, Fitted};
-use super::shading::{Angle, Clamp, Directions, Shading, Tests};
+use super::shading::{Angle, Clamp, Directions, Shading, Terms, Tests};
 use crate::imaging::srgb;
 
 /// What can be wrong in a diffuse BSDF.
@@ -114,6 +114,10 @@ pub fn phong_changes() -> Vec<Change> {
         concept("the lobe is not normalized", lobe(|_| 1.0)),
         concept("the lobe is divided by pi alone", lobe(|_| std::f64::consts::FRAC_1_PI)),
         concept("the lobe is divided by 2 pi alone", lobe(|_| 1.0 / std::f64::consts::TAU)),
+        slip("exponent 0 in place of n", exponent(0.0, 0.0)),
+        // As where 0 to the power of 0 is 0.
+        slip("exponent 0 in place of n", exponent(0.0, 1e-9)),
+        slip("cos alpha is not raised to n", exponent(0.0, 1.0)),
         slip("exponent n + 1", exponent(1.0, 1.0)),
         slip("exponent n - 1", exponent(1.0, -1.0)),
         slip("exponent n + 2", exponent(1.0, 2.0)),
@@ -151,7 +155,11 @@ pub fn phong_changes() -> Vec<Change> {
         slip("the specular term has cos theta_i twice", Shading { cos_i: [1.0, 2.0], ..right }),
         slip("the diffuse term lacks cos theta_i", Shading { cos_i: [0.0, 1.0], ..right }),
         slip("the diffuse term has cos theta_i twice", Shading { cos_i: [2.0, 1.0], ..right }),
-        slip("Kd and Ks are exchanged", Shading { exchanged: true, ..right }),
+        slip("Kd and Ks are exchanged", Shading { colors: [1, 0], ..right }),
+        slip("Kd stands for Ks", Shading { colors: [0, 0], ..right }),
+        slip("Ks stands for Kd", Shading { colors: [1, 1], ..right }),
+        slip("the terms are multiplied", Shading { terms: Terms::Product, ..right }),
+        slip("the larger term stands for the sum", Shading { terms: Terms::Larger, ..right }),
     ]);
     changes
 }

@@ -177,6 +177,25 @@ impl<'a> Film<'a> {
             changes.push(zoomed("the aspect ratio is missing", by, 1.0));
             changes.push(zoomed("the aspect ratio is missing", 1.0, by));
         }
+        // A ray's place on the film by a wrong scale or start of one axis, or of both.
+        let axis =
+            |by: f64, start: f64, size: f64| move |at: f64| by * (at + 0.5) + start * size - 0.5;
+        for (by, start) in [
+            (aspect, 0.0),
+            (1.0 / aspect, 0.0),
+            (0.5, 0.0),
+            (2.0, 0.0),
+            (0.5, 0.25),
+            (2.0, -0.5),
+            (1.0, 0.5),
+            (1.0, -0.5),
+        ] {
+            let name = "the camera ray's place on the film is wrong by a factor or a summand";
+            let (of_x, of_y) = (axis(by, start, width), axis(by, start, height));
+            changes.push(self.moved(name, move |x, y| (of_x(x), y)));
+            changes.push(self.moved(name, move |x, y| (x, of_y(y))));
+            changes.push(self.moved(name, move |x, y| (of_x(x), of_y(y))));
+        }
         // Width and height in each other's place.
         changes.push(self.moved("the film's width and height are exchanged for the camera", {
             let by = height / width;
@@ -298,12 +317,17 @@ mod tests {
         let drawn = |wanted: &dyn Fn(usize, usize) -> bool| {
             film(&|x, y| if wanted(x, y) { right[y * width + x][0] } else { 0.0 })
         };
+        // 2 x / height - 1, and 2 x / width without the 1.
+        let by_height = film(&|x, y| at((x as f32 + 0.5) * 40.0 / 30.0, y as f32 + 0.5));
+        let unshifted = film(&|x, y| at(x as f32 + 20.5, y as f32 + 0.5));
         let tiles = drawn(&|x, y| x < 32 && y < 24);
         let broken = film(&|x, y| if y < 16 { right[y * width + x][0] } else { f32::NAN });
         let rows = drawn(&|_, y| y.is_multiple_of(2));
         for (image, what) in [
             (film(&row), "sum"),
             (exchanged, "camera"),
+            (by_height, "height for width"),
+            (unshifted, "half a film beside"),
             (tiles, "tiles"),
             (broken, "no numbers"),
             (rows, "rows"),

@@ -88,6 +88,31 @@ pub fn judge_agreement(
     check
 }
 
+/// The price of a failed check that passes where the directions of rays are not normalized: `along` is what the
+/// integrator answers along such rays, one way or another, and `judge` says whether the image is made of that.
+pub fn priced_by_length(
+    check: Check,
+    image: &[[f32; 3]],
+    mut along: impl Iterator<Item = Vec<[f32; 3]>>,
+    judge: &dyn Fn(&[[f32; 3]]) -> Check,
+) -> Check {
+    if check.verdict != Verdict::Fail || check.error <= Class::Slip.price() {
+        return check;
+    }
+    // Where rays are no numbers they are not compared.
+    let is_finite = |values: &[[f32; 3]]| values.iter().flatten().all(|value| value.is_finite());
+    let agrees = |rays: Vec<[f32; 3]>| {
+        (is_finite(&rays) || !is_finite(image)) && judge(&rays).verdict == Verdict::Pass
+    };
+    match along.any(agrees) {
+        true => check.priced(|raw| {
+            let name = "the directions of camera rays are not normalized";
+            Price { error: Class::Slip.price(), mistake: Some(name), ..Price::of_raw(raw) }
+        }),
+        false => check,
+    }
+}
+
 /// Width of the film on which several samples a pixel are judged.
 pub const SAMPLED_WIDTH: u32 = 64;
 /// Samples per pixel that the renderer takes there: a square.

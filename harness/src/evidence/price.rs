@@ -212,17 +212,21 @@ pub fn settle_by_common_mistake(checks: &mut [Check]) {
                 checks[index].error = checks[index].error.min(Class::Unknown.price());
             }
         }
-        let unknown = |index: &usize| ["", UNKNOWN, BLACK].contains(&&*checks[*index].mistake);
+        let unknown =
+            |index: &usize| ["", UNKNOWN, BLACK, ANOTHER_PLACE].contains(&&*checks[*index].mistake);
         let (others, told): (Vec<usize>, Vec<usize>) = own.into_iter().partition(unknown);
         let Some(name) = told.first().map(|&index| checks[index].mistake.clone()) else { continue };
         let one = told.iter().all(|&index| checks[index].mistake == name);
-        if !one || told.len() < others.len() {
+        let darkens = DARKENING.contains(&name.as_str());
+        // A scene that shows nothing says nothing against what darkens it.
+        let dark = others.iter().filter(|&&index| checks[index].mistake == BLACK).count();
+        let against = others.len() - if darkens { dark } else { 0 };
+        if !one || told.len() < against {
             continue;
         }
         let mut errors: Vec<f64> = told.iter().map(|&index| checks[index].error).collect();
         errors.sort_by(f64::total_cmp);
         let median = errors[errors.len() / 2];
-        let darkens = DARKENING.contains(&name.as_str());
         for index in told.into_iter().chain(others.into_iter().filter(|_| darkens)) {
             checks[index].error = checks[index].error.min(median);
         }
@@ -232,7 +236,7 @@ pub fn settle_by_common_mistake(checks: &mut [Check]) {
 /// The mistake's name for a check whose answers are all black.
 pub const BLACK: &str = "nothing is lit";
 /// The mistakes that can leave nothing lit on a scene.
-const DARKENING: [&str; 7] = [
+const DARKENING: [&str; 8] = [
     LIGHT_NEGATED,
     VIEWER_NEGATED,
     VIEWER_AT_ORIGIN,
@@ -240,6 +244,7 @@ const DARKENING: [&str; 7] = [
     LIGHT_IN_VIEW_SPACE,
     LIGHT_IN_WORLD_SPACE,
     LIGHT_AT_ORIGIN,
+    WRONG_W,
 ];
 /// wi is negated.
 pub const LIGHT_NEGATED: &str = "the direction to the light is negated";
@@ -255,6 +260,11 @@ pub const LIGHT_IN_WORLD_SPACE: &str = "the light is in world space, surfaces in
 pub const VIEWER_NOT_TURNED: &str = "the viewer comes from the view matrix without its transpose";
 /// wi leads to the origin.
 pub const LIGHT_AT_ORIGIN: &str = "the light stands at the origin";
+
+/// Surfaces lie elsewhere on the film, nobody knows how.
+pub const ANOTHER_PLACE: &str = "another clip-space position";
+/// What a vertex stage shows is right without a translation: with one, it lies behind the far plane.
+pub const WRONG_W: &str = "the translation is lost: w of the position is not 1";
 
 /// What the values of a changed renderer are multiplied by, channel by channel.
 struct Factors {
@@ -652,6 +662,13 @@ mod tests {
         // What leaves nothing lit elsewhere explains that too; another slip does not.
         assert_eq!(agreed(&[(VIEWER_AT_ORIGIN, 0.02), (BLACK, 1.0)]), [0.02, 0.02]);
         assert_eq!(agreed(&[(slip, 0.02), (BLACK, 1.0)]), [0.02, 1.0]);
+        // A scene that shows something tells more than any number that show nothing.
+        let negated = (LIGHT_NEGATED, 0.02);
+        let black = |count| [vec![(BLACK, 1.0); 2], vec![negated; count]].concat();
+        assert_eq!(agreed(&black(2)), [0.02; 4]);
+        assert_eq!(agreed(&[vec![(BLACK, 1.0); 3], vec![negated]].concat()), [0.02; 4]);
+        let unlike = [(BLACK, 1.0), negated, (UNKNOWN, 0.4), (UNKNOWN, 0.4)];
+        assert_eq!(agreed(&unlike), [1.0, 0.02, 0.4, 0.4]);
         // What follows the right answers on most scenes is more than nothing on the others.
         assert_eq!(agreed(&[(UNKNOWN, 0.4), (UNKNOWN, 0.4), ("", 1.0)]), [0.4, 0.4, 0.4]);
         assert_eq!(agreed(&[(UNKNOWN, 0.4), (UNKNOWN, 0.4), (slip, 0.8)]), [0.4, 0.4, 0.4]);

@@ -53,8 +53,10 @@ pub struct Shading {
     pub specular_channels: [usize; 3],
     /// What is made of the diffuse reflectance.
     pub albedo: fn(f64) -> f64,
-    /// Whether Kd and Ks are exchanged.
-    pub exchanged: bool,
+    /// Which of Kd (0) and Ks (1) the terms of a Phong material take.
+    pub colors: [usize; 2],
+    /// What is made of both terms.
+    pub terms: Terms,
     /// The power of 1/r.
     pub falloff: f64,
     /// Whether 1 / (1 + r^2) stands for 1 / r^2.
@@ -125,6 +127,17 @@ pub enum Tests {
     SameSide,
 }
 
+/// What is made of the diffuse term and the specular term.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Terms {
+    /// Their sum: right.
+    Sum,
+    /// Their product, times cos theta_i once.
+    Product,
+    /// The larger one.
+    Larger,
+}
+
 /// What is clamped to 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clamp {
@@ -180,7 +193,8 @@ impl Default for Shading {
             channels: [0, 1, 2],
             specular_channels: [0, 1, 2],
             albedo: |albedo| albedo,
-            exchanged: false,
+            colors: [0, 1],
+            terms: Terms::Sum,
             falloff: 2.0,
             softened: false,
             incident: |incident| incident,
@@ -253,10 +267,8 @@ impl Shading {
         let normalized = if self.diffuse_normalized { (self.normalization)(n) } else { 1.0 };
         let diffuse = normalized * diffuse / std::f64::consts::PI;
         let incident = self.attenuation(*distance);
-        let (kd, ks) = match self.exchanged && phong {
-            true => (material.specular, material.diffuse),
-            false => (material.diffuse, material.specular),
-        };
+        let colors = [material.diffuse, material.specular];
+        let [kd, ks] = if phong { self.colors.map(|color| colors[color]) } else { colors };
         let value = [0, 1, 2].map(|c| {
             let ks = f64::from(ks[self.specular_channels[c]]);
             let own = (f64::from(kd[c]) + ks).max(0.99);
@@ -265,12 +277,22 @@ impl Shading {
                 self.specular_times_diffuse.map(|power| scale.powi(power) * f64::from(kd[c]));
             let ks = ks * kd_too.unwrap_or(1.0);
             let factor = if self.scale_by_channel { 0.99 / own / scale } else { 1.0 };
-            factor * (diffuse * (self.albedo)(f64::from(kd[c])) + specular * lobe * ks)
+            let terms = [diffuse * (self.albedo)(f64::from(kd[c])), specular * lobe * ks];
+            factor * self.together(terms, if phong { cos_i } else { 0.0 })
         });
         std::array::from_fn(|c| {
             let reflected = (self.incident)(intensity[c] * incident) * value[self.channels[c]];
             (self.output)(reflected + self.ambient * f64::from(kd[c]))
         })
+    }
+
+    /// What the terms make together. Of a surface that has but one term (`cos_i` 0) it is all.
+    fn together(&self, [diffuse, specular]: [f64; 2], cos_i: f64) -> f64 {
+        match self.terms {
+            Terms::Product if cos_i != 0.0 => diffuse * specular / power(cos_i, self.cos_i[1]),
+            Terms::Larger => diffuse.max(specular),
+            Terms::Sum | Terms::Product => diffuse + specular,
+        }
     }
 
     /// What the intensity is multiplied by at this distance of the light.

@@ -1,12 +1,25 @@
 //! The small film on which pass and stages are judged apart, and where its surfaces lie.
 
-use basecode::{Camera, Scene, Vec3};
+use basecode::{Camera, CameraConfig, Scene, Vec3};
 
 use crate::expected::SurfaceBuffer;
 use crate::imaging::reference::RegionMask;
 
 /// How far surfaces may lie from their place on the film [pixels]: hardware snaps vertices to 1/256.
 pub(super) const OFFSET_PX: f64 = 0.04;
+
+/// Full vertical field of view from the origin, in degrees.
+const WIDE: f32 = 120.0;
+
+/// A camera that sees much of a scene from the origin.
+pub fn from_origin(scene: &Scene) -> CameraConfig {
+    let drawn = scene.shapes().iter().enumerate();
+    let drawn = drawn.filter(|(index, _)| !scene.material_of(*index).is_emitter());
+    let middle: Vec3 = drawn.map(|(_, shape)| shape.index_mean().normalize_or_zero()).sum();
+    let at = middle.try_normalize().unwrap_or(Vec3::NEG_Z);
+    let up = if at.y.abs() > 0.9 { Vec3::Z } else { Vec3::Y };
+    CameraConfig { eye: Vec3::ZERO, at, up, fov_y_deg: WIDE }
+}
 
 /// A scene on a small film.
 pub struct StageFilm<'a> {

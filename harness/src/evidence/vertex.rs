@@ -3,13 +3,15 @@
 //! Three outputs are judged separately: the world position, the world normal and the clip-space position. A position on
 //! a surface is right, wherever on the film it appears.
 
-use basecode::{Image, Ray, Scene, SurfaceInteraction, Vec3};
+use std::ops::Range;
 
-use super::price::{Class, Price};
-use super::stage_film::{OFFSET_PX, StageFilm, median_length};
+use basecode::{Camera, Image, Matrices, Ray, Scene, SurfaceInteraction, Vec3};
+
+use super::price::{self, Class, Price, WRONG_W};
+use super::stage_film::{OFFSET_PX, StageFilm, from_origin, median_length};
 use super::stages::STRAY_FRACTION;
 use super::{Check, CheckId, Measure, RuleId, Verdict};
-use crate::expected::SurfacePoint;
+use crate::expected::{SurfaceBuffer, SurfacePoint};
 use crate::imaging::reference::RegionMask;
 
 /// The tolerance of a position, relative to its distance from the camera: rasterized attributes
@@ -20,16 +22,19 @@ const NORMAL_ABSOLUTE: f32 = 1e-2;
 /// Fraction of the expected surface that must be visible to judge the forwarded values.
 const LEAST_SHOWN: f64 = 0.02;
 
+/// The number of kinds of matrices.
+const MATRICES: usize = Matrices::ALL.len();
+
 /// World positions and normals, as the fragment stage receives them.
 type Frames<'a> = [&'a Image; 2];
 
 /// Part 2.2: judges the world positions and normals that a student's vertex stage forwards, and
-/// where on the film they land. `frames` are drawn under each of [`crate::worker::Matrices::ALL`]: the
-/// first decides, the others tell what is wrong.
-pub fn judge_vertex(scene_name: &str, film: &StageFilm, frames: [Frames; 3]) -> Check {
+/// where on the film they land. `frames` are drawn under each of [`Matrices::ALL`]: the first decides, the others tell
+/// what is wrong.
+pub fn judge_vertex(scene_name: &str, film: &StageFilm, frames: [Frames; MATRICES]) -> Check {
     let id = CheckId::StageVertex;
     let seen = frames.map(|frames| Seen::of(film, frames));
-    let [usual, in_view, in_projection] = &seen;
+    let [usual, in_view, in_projection, ..] = &seen;
     if usual.counted == 0 {
         let summary = "no pixel away from edges shows a surface";
         return Check::new(id, scene_name, Verdict::NotJudged, summary);
@@ -80,6 +85,15 @@ pub fn judge_vertex(scene_name: &str, film: &StageFilm, frames: [Frames; 3]) -> 
         _ if in_view.lands() && in_projection.lands() => {
             "the projection belongs on the left: clip = projection * view * world"
         }
+        _ if price.mistake == Some(WRONG_SIDE) => {
+            "a matrix belongs on the left of what it transforms: clip = projection * view * world"
+        }
+        _ if price.mistake == Some(WRONG_W) => {
+            "w of a position is 1, or it is not moved: look at the fourth component"
+        }
+        _ if price.mistake == Some(DIVIDED) => {
+            "the rasterizer divides by w: leave clip space as it is"
+        }
         _ if in_view.lands() => "the clip-space position lacks the projection",
         _ if in_projection.lands() => "the clip-space position lacks the view matrix",
         (true, ..) => "nothing is drawn where it should be: look at the clip-space position",
@@ -90,6 +104,12 @@ pub fn judge_vertex(scene_name: &str, film: &StageFilm, frames: [Frames; 3]) -> 
     let check = Check::new(id, scene_name, Verdict::Fail, summary);
     Check { error: price.error, mistake: price.name(), measures, ..check }.with_hint(hint)
 }
+
+/// The matrices stand on the right of a row vector.
+const WRONG_SIDE: &str = "the position stands on the left of the matrices";
+/// What is right without a translation.
+/// What is right but for perspective.
+const DIVIDED: &str = "the clip-space position is divided by w: values lose their perspective";
 
 /// What frames show.
 struct Seen {
@@ -181,6 +201,11 @@ impl Seen {
         self.tells() && (few || self.fraction(self.wrong_normal) <= STRAY_FRACTION)
     }
 
+    /// Whether most normals are not those of the surfaces that show.
+    fn is_turned(&self) -> bool {
+        2 * self.turned > self.shown
+    }
+
     /// Whether surfaces lie where they should on the film.
     fn lands(&self) -> bool {
         let right = |wrong| self.fraction(wrong) <= STRAY_FRACTION;
@@ -194,13 +219,22 @@ impl Seen {
 const EDGES: f64 = 0.1;
 
 /// The price of wrong frames: the sum of the prices of the three outputs.
-fn price(film: &StageFilm, seen: &[Seen; 3], frames: &[Frames; 3]) -> Price {
-    let [usual, in_view, in_projection] = seen;
-    // Where nothing shows because of the matrices, the frames that show most tell the rest.
-    let most = (0..3).max_by_key(|&index| (seen[index].shown, 3 - index)).unwrap_or_default();
+fn price(film: &StageFilm, seen: &[Seen; MATRICES], frames: &[Frames; MATRICES]) -> Price {
+    let [usual, in_view, in_projection, transposed, _] = seen;
+    // Where nothing shows because of the matrices, the frames that show most tell the rest: of those that show the
+    // scene as it is, if any.
+    let most = |of: Range<usize>| {
+        of.max_by_key(|&index| (seen[index].shown, MATRICES - index)).unwrap_or_default()
+    };
+    let most = Some(most(0..3)).filter(|&most| seen[most].tells()).unwrap_or(most(0..MATRICES));
     let told = &seen[most];
-    if !told.tells() {
-        return Price::of_raw(1.0);
+    if !told.tells() || most == MATRICES - 1 {
+        // What shows from the origin alone tells no more than that.
+        let price = Price { mistake: Some(price::BLACK), ..Price::of_raw(1.0) };
+        return match lost_translation(film, frames[most][0]) && !told.is_turned() {
+            true => price.or(WRONG_W, Class::Slip, 0.0),
+            false => price,
+        };
     }
     let mut error = 0.0;
     let mut names: Vec<&str> = Vec::new();
@@ -213,9 +247,10 @@ fn price(film: &StageFilm, seen: &[Seen; 3], frames: &[Frames; 3]) -> Price {
             (true, true) => add("view and projection are exchanged", Class::Slip),
             (true, false) => add("the projection is missing", Class::Concept),
             (false, true) => add("the view matrix is missing", Class::Concept),
+            (false, false) if transposed.lands() => add(WRONG_SIDE, Class::Slip),
             (false, false) => match slip_of_place(film, frames) {
                 Some(name) => add(name, Class::Slip),
-                None => add("another clip-space position", Class::Concept),
+                None => add(price::ANOTHER_PLACE, Class::Concept),
             },
         }
     }
@@ -232,6 +267,7 @@ fn price(film: &StageFilm, seen: &[Seen; 3], frames: &[Frames; 3]) -> Price {
         }
     }
     let name = match names.as_slice() {
+        [] if lost_perspective(film, frames[0][0]) => DIVIDED,
         [] => "a few pixels are wrong",
         [name] => name,
         _ => "several things",
@@ -241,8 +277,9 @@ fn price(film: &StageFilm, seen: &[Seen; 3], frames: &[Frames; 3]) -> Price {
     Price { error: error.max(Class::Slip.price()).min(raw), raw, mistake: Some(name) }
 }
 
-/// Whether positions lie beside their pixel by a slip: mirrored, upside down, or a constant offset.
-fn slip_of_place(film: &StageFilm, frames: &[Frames; 3]) -> Option<&'static str> {
+/// Whether positions lie beside their pixel by a slip: mirrored, upside down, a constant offset, a lost translation or
+/// perspective.
+fn slip_of_place(film: &StageFilm, frames: &[Frames; MATRICES]) -> Option<&'static str> {
     let positions = frames[0][0];
     let (width, height) = (film.surface.width, film.surface.height);
     let place = |by: [f32; 2]| {
@@ -275,6 +312,37 @@ fn slip_of_place(film: &StageFilm, frames: &[Frames; 3]) -> Option<&'static str>
         .or_else(|| of([1.0, -1.0], 1.5, "the image is upside down"))
         .or_else(|| of([-1.0, 1.0], 1.5, "the image is mirrored"))
         .or_else(|| of([-1.0, -1.0], 1.5, "the image is turned by half"))
+        .or_else(|| lost_perspective(film, positions).then_some(DIVIDED))
+        .or_else(|| lost_translation(film, frames[MATRICES - 1][0]).then_some(WRONG_W))
+}
+
+/// Whether positions are those of their pixels but for perspective.
+fn lost_perspective(film: &StageFilm, positions: &Image) -> bool {
+    let to_clip = film.camera.projection() * film.camera.view();
+    let (mut all, mut wrong) = (0usize, 0usize);
+    for (index, _) in film.interior() {
+        let (ray, Some(point)) = &film.surface.pixels[index] else { continue };
+        let Some(point) = point.without_perspective(film.scene, to_clip) else { continue };
+        all += 1;
+        wrong += usize::from(!is_near(positions.pixels[index], point.position, ray.origin));
+    }
+    all > 0 && wrong as f64 <= EDGES * all as f64
+}
+
+/// Whether positions under [`Matrices::WithoutTranslation`], seen from the origin, show where these put them.
+fn lost_translation(film: &StageFilm, positions: &Image) -> bool {
+    let SurfaceBuffer { width, height, .. } = *film.surface;
+    let Ok(camera) = Camera::new(from_origin(film.scene), width, height) else { return false };
+    let camera = camera.with_matrices(Matrices::WithoutTranslation);
+    let moved = StageFilm { camera, ..*film };
+    // Emitters are white.
+    let shown = positions.pixels.iter().enumerate();
+    let shown = shown.filter(|(_, p)| ![Vec3::ZERO, Vec3::ONE].contains(p));
+    let offsets: Vec<_> = shown.map(|(index, p)| moved.offset_px(index, *p)).collect();
+    let near = |offset: &&[f32; 2]| offset.iter().all(|axis| axis.abs() <= 0.5);
+    // Near the origin places are not well known.
+    offsets.len() as f64 > LEAST_SHOWN * film.surface.pixels.len() as f64
+        && 2 * offsets.iter().filter(near).count() > offsets.len()
 }
 
 /// Whether positions are those of their pixels times one constant.
@@ -299,12 +367,12 @@ fn factor_of_positions(film: &StageFilm, positions: &Image) -> bool {
 }
 
 /// What a normal may be instead: a name, and the normal.
-type Change = (&'static str, Box<dyn Fn(&SurfacePoint) -> Vec3>);
+type OtherNormal = (&'static str, Box<dyn Fn(&SurfacePoint) -> Vec3>);
 
-/// Whether normals are those of their pixels, negated, with axes exchanged, their magnitudes, or the positions instead.
-fn slip_of_normals(film: &StageFilm, normals: &Image) -> Option<&'static str> {
+/// Slips with a normal: negated, with axes exchanged, its magnitudes, or the position instead.
+pub(super) fn other_normals() -> Vec<OtherNormal> {
     const EXCHANGED: &str = "the normal has its axes exchanged";
-    let axes = |name, [x, y, z]: [usize; 3], signs: [f32; 3]| -> Change {
+    let axes = |name, [x, y, z]: [usize; 3], signs: [f32; 3]| -> OtherNormal {
         let change = move |p: &SurfacePoint| {
             Vec3::from(signs) * Vec3::new(p.normal[x], p.normal[y], p.normal[z])
         };
@@ -321,7 +389,12 @@ fn slip_of_normals(film: &StageFilm, normals: &Image) -> Option<&'static str> {
     changes.push(("abs() of the normal", Box::new(|p: &SurfacePoint| p.normal.abs())));
     let position = |p: &SurfacePoint| p.position.normalize_or_zero();
     changes.push(("the position stands for the normal", Box::new(position)));
-    changes.into_iter().find_map(|(name, change)| {
+    changes
+}
+
+/// The slip that explains normals, if one does.
+fn slip_of_normals(film: &StageFilm, normals: &Image) -> Option<&'static str> {
+    other_normals().into_iter().find_map(|(name, change)| {
         let (mut all, mut wrong) = (0usize, 0usize);
         for (index, _) in film.interior() {
             let Some(point) = &film.surface.pixels[index].1 else { continue };

@@ -1,6 +1,6 @@
 //! What a camera sees, before any shading: the surface buffer of a scene.
 
-use basecode::{Camera, Frame, Ray, Result, Scene, SurfaceInteraction, Vec3};
+use basecode::{Camera, Frame, Mat4, Ray, Result, Scene, SurfaceInteraction, Vec3, vec2};
 
 /// Where one camera ray meets the scene, and how the light stands there.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +40,28 @@ impl SurfacePoint {
     /// Whether both directions face the surface, as every BSDF here demands.
     pub fn faces_both(&self) -> bool {
         Frame::cos_theta(self.wo) > 0.0 && Frame::cos_theta(self.wi) > 0.0
+    }
+
+    /// What is shown of its triangle at its place on the film where values are interpolated there without perspective.
+    /// `to_clip` leads to clip space. Nothing for a triangle that is in part behind the viewer.
+    pub fn without_perspective(&self, scene: &Scene, to_clip: Mat4) -> Option<Self> {
+        let shape = &scene.shapes()[self.shape];
+        let corners = shape.triangles[self.primitive].map(|corner| corner as usize);
+        let clip = corners.map(|corner| to_clip * shape.positions[corner].extend(1.0));
+        if clip.iter().any(|clip| clip.w <= Camera::NEAR) {
+            return None;
+        }
+        let [a, b, c] = clip.map(|clip| vec2(clip.x, clip.y) / clip.w);
+        let at = to_clip.project_point3(self.position).truncate();
+        let area = (b - a).perp_dot(c - a);
+        let weights =
+            [(b - at).perp_dot(c - at), (c - at).perp_dot(a - at)].map(|part| part / area);
+        let weights = [weights[0], weights[1], 1.0 - weights[0] - weights[1]];
+        let blended = |of: &[Vec3]| -> Vec3 {
+            corners.iter().zip(weights).map(|(&corner, weight)| weight * of[corner]).sum()
+        };
+        let normal = blended(&shape.normals).try_normalize()?;
+        Some(Self { position: blended(&shape.positions), normal, ..*self })
     }
 
     /// Casts one camera ray.

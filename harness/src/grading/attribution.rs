@@ -3,13 +3,14 @@
 
 use std::path::Path;
 
+use basecode::Matrices;
+
 use super::session::Session;
 use super::stages::named;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, AdapterKind, CameraValue, Fault, Job, Matrices, Outcome, Request,
-    is_environment_failure,
+    Adapter, AdapterKind, CameraValue, Fault, Job, Outcome, Request, is_environment_failure,
 };
 
 impl Session<'_> {

@@ -18,10 +18,13 @@ pub const COVERAGE: CheckId = CheckId::ImageRealtimeCoverage;
 /// Silhouettes correlate by 0, in one color or one for each surface; what follows the light does by more.
 const LEAST_SHADING: f64 = 0.2;
 
-/// Where the image shows a surface and where not.
-pub fn judge(case: &PreparedScene, image: &Image) -> Check {
+/// Fraction of the pixels that may be wrong.
+const STRAY: f64 = 5e-3;
+
+/// The pixels that count, those that show nothing where a surface is, and those that show one where none is.
+fn count(case: &PreparedScene, image: &Image) -> [usize; 3] {
     let mask = &case.expected.unshadowed_mask;
-    let (mut counted, mut wrong) = (0usize, 0usize);
+    let [mut counted, mut missing, mut extra] = [0usize; 3];
     for (pixel, &value) in image.pixels.iter().zip(&mask.pixels) {
         let background = value & RegionMask::INDEX == 0;
         if value & (RegionMask::EDGE | RegionMask::EMITTER) != 0
@@ -31,17 +34,48 @@ pub fn judge(case: &PreparedScene, image: &Image) -> Check {
         }
         counted += 1;
         let covered = *pixel != Vec3::ZERO;
-        wrong += usize::from(covered == background || !pixel.is_finite());
+        missing += usize::from(!covered && !background);
+        extra += usize::from(covered && (background || !pixel.is_finite()));
     }
-    let name = &case.entry.name;
+    [counted, missing, extra]
+}
+
+/// Where the image shows a surface and where not.
+pub fn judge(case: &PreparedScene, image: &Image) -> Check {
+    let [counted, missing, extra] = count(case, image);
+    let (name, wrong) = (&case.entry.name, missing + extra);
     let error = wrong as f64 / counted.max(1) as f64;
-    if error > 5e-3 {
+    if error > STRAY {
         let summary = format!(
             "{wrong} of {counted} pixels show a surface where none is, or none where one is"
         );
         return Check { error, ..Check::new(COVERAGE, name, Verdict::Fail, summary) };
     }
     Check::new(COVERAGE, name, Verdict::Pass, "surfaces lie where they should")
+}
+
+/// Surfaces that are dark where known mistakes of the fragment stages explain what most scenes show are there.
+pub fn accept_explained(cases: &[PreparedScene], judged: &mut [Judged]) {
+    let explained = [CheckId::ImageRealtimeDiffuse, CheckId::ImageRealtimePhong].map(|id| {
+        let own = judged.iter().flat_map(|judged| &judged.checks).filter(|check| check.id == id);
+        let own: Vec<&Check> = own.collect();
+        let fails = own.iter().any(|check| check.verdict == Verdict::Fail);
+        !fails || price::are_mostly_explained(own)
+    });
+    if explained != [true; 2] {
+        return;
+    }
+    for (case, judged) in cases.iter().zip(judged) {
+        let Some(drawn) = judged.drawn.first() else { continue };
+        let [counted, missing, extra] = count(case, &drawn.image);
+        if missing > 0 && extra as f64 <= STRAY * counted as f64 {
+            for check in judged.checks.iter_mut().filter(|check| check.id == COVERAGE) {
+                let summary =
+                    "surfaces lie where they should, some of them dark by a known mistake";
+                *check = Check::new(COVERAGE, &case.entry.name, Verdict::Pass, summary);
+            }
+        }
+    }
 }
 
 /// Looks once more at scenes whose own frame does not show its surfaces: a black surface is there too. Every fragment

@@ -2,11 +2,14 @@
 
 use std::path::Path;
 
+use basecode::Matrices;
+
 use super::prepared_scene::PreparedScene;
 use super::session::Session;
 use super::stages::named;
+use crate::evidence::stage_film::from_origin;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
-use crate::worker::{Adapter, CameraValue, Matrices, Outcome, Request, Stage};
+use crate::worker::{Adapter, CameraValue, Outcome, Request, Stage};
 
 /// A frame to be drawn.
 #[derive(Clone)]
@@ -56,12 +59,21 @@ impl<'a> Frame<'a> {
             adapter: adapter.clone(),
             stages: self.stages.clone(),
             cameras: match self.each_matrices {
-                true => Matrices::ALL
-                    .map(|matrices| CameraValue { matrices, ..self.case.camera })
-                    .into(),
+                true => Matrices::ALL.map(|matrices| self.camera_of(matrices)).into(),
                 false => vec![self.case.camera; self.times],
             },
         }
+    }
+}
+
+impl Frame<'_> {
+    /// The camera of a frame under other matrices: where they leave it at the origin, it looks at the scene from there.
+    fn camera_of(&self, matrices: Matrices) -> CameraValue {
+        let camera = match matrices {
+            Matrices::WithoutTranslation => from_origin(&self.case.expected.scene).into(),
+            _ => self.case.camera,
+        };
+        CameraValue { matrices, ..camera }
     }
 }
 

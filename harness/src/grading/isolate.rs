@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use basecode::{Image, MaterialModel, Vec3};
+use basecode::{Image, MaterialModel, Matrices, Vec3};
 
 use super::draw::{Frame, draw, draw_scenes};
 use super::kept_frames::draw_sets;
@@ -12,8 +12,7 @@ use super::observe;
 use super::own_frames;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session, headline};
-use super::stages::Stages;
-use super::stages::named;
+use super::stages::{Stages, matrices, named};
 use super::uploads::{drawn_parts, every_fragment};
 use crate::diagnosis::{Kind, Thumbnail, View};
 use crate::evidence::premultiplied::Premultiplied;
@@ -58,13 +57,18 @@ impl PassFrames {
     }
 }
 
-/// Whether a pass draws any fragment of a scene, by whatever stages.
+/// Whether a pass draws any fragment of a scene, by whatever stages: where Umbra's own show nothing, under other
+/// matrices as well.
 fn draws_surfaces(session: &Session, plugin: &Path, case: &PreparedScene) -> bool {
-    let frame = Frame::probe(case, vec![every_fragment()]);
-    let outcome = draw(session, Some(plugin), &frame);
-    let (width, height) = frame.size;
-    let image = outcome.answer().map(|answer| session::image(&answer.values, width, height));
-    image.is_some_and(|image| drawn_parts(&image).pixels.iter().any(|pixel| *pixel != Vec3::ZERO))
+    let draws = |which: Matrices| {
+        let frame = Frame::probe(case, vec![every_fragment(), matrices(which)]);
+        let outcome = draw(session, Some(plugin), &frame);
+        let (width, height) = frame.size;
+        let image = outcome.answer().map(|answer| session::image(&answer.values, width, height));
+        let drawn = image.map(|image| drawn_parts(&image).pixels);
+        drawn.is_some_and(|drawn| drawn.iter().any(|pixel| *pixel != Vec3::ZERO))
+    };
+    [Matrices::Usual, Matrices::InView, Matrices::Transposed].into_iter().any(draws)
 }
 
 /// Judges the student's pass with Umbra's stages (2.1) and the student's stages in Umbra's pass (2.2 to 2.4) on scenes.
@@ -138,9 +142,10 @@ pub fn isolate(
                 Err(outcome) => return swap_failed(session, id, case, fails, outcome),
             };
             match images.as_slice() {
-                [p0, p1, p2, n0, n1, n2] => {
-                    observe::vertex(session, case, p0, n0);
-                    let frames = [[p0, n0], [p1, n1], [p2, n2]];
+                images if index == 0 && images.len() == 2 * Matrices::ALL.len() => {
+                    let (positions, normals) = images.split_at(Matrices::ALL.len());
+                    observe::vertex(session, case, &positions[0], &normals[0]);
+                    let frames = std::array::from_fn(|at| [&positions[at], &normals[at]]);
                     on_film(id, case, |film, name| judge_vertex(name, film, frames))
                 }
                 [image] => {

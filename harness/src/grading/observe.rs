@@ -61,7 +61,7 @@ pub fn radiance(session: &Session, case: &PreparedScene, witness: Witness, value
 /// Radiance with and without shadows under a witness.
 pub fn shadows(session: &Session, case: &PreparedScene, with: &[[f32; 3]], without: &[[f32; 3]]) {
     let (batch, scene) = (&case.probe_film.batch, &case.expected.scene);
-    if case.held_back {
+    if case.held_back || !tells_visibility(batch.lit, without) {
         return;
     }
     let sum = |value: &[f32; 3]| value.iter().map(|&v| f64::from(v)).sum::<f64>();
@@ -80,6 +80,13 @@ pub fn shadows(session: &Session, case: &PreparedScene, with: &[[f32; 3]], witho
     if let Ok(mut observations) = session.observations.lock() {
         observations.shadow_rays.extend(rays);
     }
+}
+
+/// Whether radiance without shadows tells of visibility: of the `lit` rays that come first most show light. What a
+/// renderer shows of the others may be anything else's.
+pub fn tells_visibility(lit: usize, without: &[[f32; 3]]) -> bool {
+    let dark = without.iter().take(lit).filter(|value| **value == [0.0; 3]).count();
+    2 * dark <= lit
 }
 
 /// How far off everything is that blocks light, from a point toward the light and beyond.
@@ -224,4 +231,21 @@ fn keep(session: &Session, part: &'static str, samples: impl Iterator<Item = Sam
 /// Answers under a witness as colors, where there are any.
 pub fn colours(outcome: &crate::worker::Outcome) -> Option<&[[f32; 3]]> {
     outcome.answer().map(|answer| session::colours(&answer.values))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_rays_tell_nothing_of_visibility() {
+        let of = |dark: usize| {
+            let value = |ray| if ray < dark { [0.0; 3] } else { [0.0, 0.1, 0.0] };
+            let mut without: Vec<[f32; 3]> = (0..100).map(value).collect();
+            // Behind them those in shadow.
+            without.extend([[1.0; 3]; 100]);
+            tells_visibility(100, &without)
+        };
+        assert_eq!([0, 40, 60, 100].map(of), [true, true, false, false]);
+    }
 }

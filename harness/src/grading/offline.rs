@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use basecode::{Image, MaterialModel, Ray, Scene, Texture};
+use basecode::{Camera, Image, MaterialModel, Ray, Scene, Texture, Vec3};
 
 use super::conventions::{Answers, shaded_point, value};
 use super::observe;
@@ -116,8 +116,7 @@ pub fn judge_scene<'a>(
     let mut checks = asked.judge_rays(&rays, &outcomes, answers);
     checks.push(asked.judge_agreement(at_centers, &outcomes));
     checks.extend(at_samples.map(|(sampled, samples)| {
-        judge_samples(
-            case,
+        asked.judge_samples(
             sampled,
             [samples.along, samples.image].map(|of| &outcomes[of]),
             answers,
@@ -179,8 +178,7 @@ impl<'a> Asked<'_, 'a> {
     /// One sample in the center of each pixel of the small film.
     fn at_centers(&self, questions: &mut Questions, shadows: bool) -> LoopQuestions {
         let small = &self.case.probe_film;
-        let centers = small.surface.pixels.iter().map(|(center, _)| session::ray(center));
-        let centers: Vec<_> = centers.collect();
+        let centers = centers(self.case);
         LoopQuestions {
             along: questions.ask(self.radiance(&centers, Witness::True, shadows)),
             image: questions.ask(self.render((small.width, small.height), 1, 1, 1, shadows)),
@@ -268,13 +266,81 @@ impl<'a> Asked<'_, 'a> {
             record_loop(session, case, (&image.values, &along.values));
         }
         if !is_black(along) {
-            return judge_centers(case, along, image);
+            return self.judge_centers(along, image, true);
         }
         // Where shadows leave nothing to see, the loop shows without them.
         let mut questions = Questions::default();
         let asked = self.at_centers(&mut questions, false);
         let outcomes = questions.run(session, self.plugin);
-        judge_centers(case, &outcomes[asked.along], &outcomes[asked.image])
+        self.judge_centers(&outcomes[asked.along], &outcomes[asked.image], false)
+    }
+
+    fn judge_centers(&self, along: &Outcome, image: &Outcome, shadows: bool) -> Check {
+        let (id, name) = (CheckId::LoopAgreement, &self.case.entry.name);
+        let small = &self.case.probe_film;
+        match (image, along) {
+            (Outcome::Done(image), Outcome::Done(along)) => {
+                let (image, along) =
+                    (session::colours(&image.values), session::colours(&along.values));
+                let judge = |along: &[_]| loops::judge_agreement(name, &small.mask, image, along);
+                let size = (small.width, small.height);
+                let longer = self.along_longer(&centers(self.case), size, shadows);
+                loops::priced_by_length(judge(along), image, longer, &judge)
+            }
+            // Where the rays fail in the same way, it is not the loop's fault.
+            (missing, Outcome::Done(_)) => session::unanswered(id, name, &[], missing),
+            (Outcome::Done(_), missing) | (missing, _) => {
+                Check { verdict: Verdict::NotJudged, ..session::unanswered(id, name, &[], missing) }
+            }
+        }
+    }
+
+    /// Judges a render of several samples per pixel by the integrator's radiance along their rays.
+    fn judge_samples(
+        &self,
+        sampled: &Sampled,
+        [along, image]: [&Outcome; 2],
+        answers: &mut Answers,
+    ) -> Check {
+        let (id, name) = (CheckId::LoopSamples, &self.case.entry.name);
+        match (along, image) {
+            (Outcome::Done(along), Outcome::Done(image)) => {
+                let (image, along) =
+                    (session::colours(&image.values), session::colours(&along.values));
+                let judge = |along: &[_]| loops::judge_samples(name, &sampled.film, image, along);
+                let (check, edges) = judge(along);
+                let size = (sampled.film.width, sampled.film.height);
+                let longer = self.along_longer(&sampled.rays, size, false);
+                let check = loops::priced_by_length(check, image, longer, &|along| judge(along).0);
+                // Where the samples are wrong already, edges are too.
+                if check.verdict == Verdict::Pass {
+                    answers.edges.add(&edges);
+                }
+                check
+            }
+            (Outcome::Done(_), missing) => session::unanswered(id, name, &[], missing),
+            // Where the rays fail in the same way, it is not the loop's fault.
+            (missing, _) => {
+                Check { verdict: Verdict::NotJudged, ..session::unanswered(id, name, &[], missing) }
+            }
+        }
+    }
+
+    /// What the integrator answers along the same rays with directions that nobody normalized.
+    fn along_longer(
+        &self,
+        rays: &[RayQuery],
+        (width, height): (u32, u32),
+        shadows: bool,
+    ) -> impl Iterator<Item = Vec<[f32; 3]>> {
+        let camera = self.case.expected.scene.camera(width as usize, height as usize);
+        let longer = camera.map(|camera| longer_rays(&camera, rays)).unwrap_or_default();
+        longer.into_iter().filter_map(move |rays| {
+            let mut questions = Questions::default();
+            let along = questions.ask(self.radiance(&rays, Witness::True, shadows));
+            let outcomes = questions.run(self.session, self.plugin);
+            outcomes[along].answer().map(|answer| session::colours(&answer.values).to_vec())
+        })
     }
 
     /// Judges the image: on a small film first, and on the scene's own where that one is wrong. `draws_small` tells
@@ -323,45 +389,10 @@ fn size_of(expected: &Expected) -> (u32, u32) {
     (expected.unshadowed.width as u32, expected.unshadowed.height as u32)
 }
 
-fn judge_centers(case: &PreparedScene, along: &Outcome, image: &Outcome) -> Check {
-    let (id, name) = (CheckId::LoopAgreement, &case.entry.name);
-    match (image, along) {
-        (Outcome::Done(image), Outcome::Done(along)) => {
-            let (image, along) = (session::colours(&image.values), session::colours(&along.values));
-            loops::judge_agreement(name, &case.probe_film.mask, image, along)
-        }
-        // Where the rays fail in the same way, it is not the loop's fault.
-        (missing, Outcome::Done(_)) => session::unanswered(id, name, &[], missing),
-        (Outcome::Done(_), missing) | (missing, _) => {
-            Check { verdict: Verdict::NotJudged, ..session::unanswered(id, name, &[], missing) }
-        }
-    }
-}
-
-/// Judges a render of several samples per pixel by the integrator's radiance along their rays.
-fn judge_samples(
-    case: &PreparedScene,
-    sampled: &Sampled,
-    [along, image]: [&Outcome; 2],
-    answers: &mut Answers,
-) -> Check {
-    let (id, name) = (CheckId::LoopSamples, &case.entry.name);
-    match (along, image) {
-        (Outcome::Done(along), Outcome::Done(image)) => {
-            let (image, along) = (session::colours(&image.values), session::colours(&along.values));
-            let (check, edges) = loops::judge_samples(name, &sampled.film, image, along);
-            // Where the samples are wrong already, edges are too.
-            if check.verdict == Verdict::Pass {
-                answers.edges.add(&edges);
-            }
-            check
-        }
-        (Outcome::Done(_), missing) => session::unanswered(id, name, &[], missing),
-        // Where the rays fail in the same way, it is not the loop's fault.
-        (missing, _) => {
-            Check { verdict: Verdict::NotJudged, ..session::unanswered(id, name, &[], missing) }
-        }
-    }
+/// The rays through the centers of the small film's pixels.
+fn centers(case: &PreparedScene) -> Vec<RayQuery> {
+    let pixels = case.probe_film.surface.pixels.iter();
+    pixels.map(|(center, _)| session::ray(center)).collect()
 }
 
 /// A renderer that draws the small films in time is slow on a large one, no endless loop: a slip. Whether the loop is
@@ -405,6 +436,24 @@ fn plain_surfaces(case: &PreparedScene) -> Vec<(usize, BsdfQuery)> {
     asked.collect()
 }
 
+/// Camera rays with directions that nobody normalized: up to the plane at distance 1, or up to the far plane, as the
+/// inverse of the matrices gives it.
+fn longer_rays(camera: &Camera, rays: &[RayQuery]) -> [Vec<RayQuery>; 2] {
+    let to_clip = camera.projection() * camera.view();
+    let (back, axis) = (to_clip.inverse(), camera.view().row(2).truncate());
+    let near = |direction: Vec3| direction / direction.dot(-axis);
+    let far = |direction: Vec3| {
+        let on_film = to_clip.project_point3(camera.eye() + direction);
+        back.project_point3(on_film.with_z(1.0)) - camera.eye()
+    };
+    let changed = |change: &dyn Fn(Vec3) -> Vec3| {
+        let longer =
+            |ray: &RayQuery| RayQuery { direction: change(ray.direction.into()).into(), ..*ray };
+        rays.iter().map(longer).collect()
+    };
+    [changed(&near), changed(&far)]
+}
+
 /// Keeps for the diagnosis what witnesses say of light and visibility.
 fn record_rays(
     session: &Session,
@@ -419,7 +468,9 @@ fn record_rays(
         let tile = Thumbnail::of_pixels(size, small.batch.met().copied().zip(values));
         session.record(View::new(diagnosis::Kind::Lit, name), tile);
     }
-    if let (Outcome::Done(with), Outcome::Done(without)) = (with, without) {
+    if let (Outcome::Done(with), Outcome::Done(without)) = (with, without)
+        && observe::tells_visibility(small.batch.lit, session::colours(&without.values))
+    {
         let pairs = session::colours(&with.values).iter().zip(session::colours(&without.values));
         let sums = pairs.map(|(a, b)| (a.iter().sum::<f32>(), b.iter().sum::<f32>()));
         // A ray that is black without shadows tells nothing.
@@ -489,4 +540,27 @@ fn blocker(scene: &Scene, ray: &Ray) -> Option<usize> {
         rest.min_t = hit.t + hit.epsilon;
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn longer_rays_keep_their_directions() {
+        let eye = Vec3::new(1.0, 2.0, 6.0);
+        let config = basecode::CameraConfig { eye, ..basecode::CameraConfig::default() };
+        let camera = Camera::new(config, 40, 30).unwrap();
+        let rays = [session::ray(&camera.ray(20.0, 15.0)), session::ray(&camera.ray(0.5, 29.5))];
+        let [near, far] = longer_rays(&camera, &rays);
+        for (ray, (near, far)) in rays.iter().zip(near.iter().zip(&far)) {
+            let [ray, near, far] = [ray, near, far].map(|ray| Vec3::from(ray.direction));
+            assert!(
+                (near.normalize() - ray).length() < 1e-5 && (far.normalize() - ray).length() < 1e-3
+            );
+            assert!((far.length() / near.length() / Camera::FAR - 1.0).abs() < 0.05);
+        }
+        assert!((Vec3::from(near[0].direction).length() - 1.0).abs() < 1e-5);
+        assert!(Vec3::from(near[1].direction).length() > 1.01);
+    }
 }

@@ -3,20 +3,21 @@
 
 use std::path::Path;
 
-use basecode::Image;
+use basecode::{Image, Matrices};
 
 use super::draw::{Frame, draw_each};
 use super::isolate::{on_film, positions_and_normals};
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
-use super::stages::{Stages, negated_normals};
+use super::stages::{MOVED, Moved, Stages, matrices, negated_normals};
 use crate::evidence::images::{self, Kind};
-use crate::evidence::pixels::{self, LeftByPass};
+use crate::evidence::pixels::{self, LeftBySlip};
 use crate::evidence::price::{Class, Price};
 use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::imaging::evidence::Tolerances;
+use crate::worker::Stage;
 
 /// Pass and stages, each alone.
 const ALONE: [CheckId; 4] =
@@ -24,6 +25,21 @@ const ALONE: [CheckId; 4] =
 
 /// What the slip may leave of a scene's picture unexplained.
 const LEFT: f64 = 0.01;
+
+/// What explains the wrong frames of a renderer.
+#[derive(Default)]
+pub struct Found {
+    /// The checks under which it pays for all.
+    pub checks: Vec<Check>,
+    /// What the host replaces to have the pass draw the right pictures, if that is how it is known.
+    pub mended_by: Option<Stage>,
+}
+
+impl Found {
+    fn of(checks: Vec<Check>) -> Self {
+        Self { checks, mended_by: None }
+    }
+}
 
 /// The checks under which one slip pays for all wrong frames, if one explains them and nothing but its part is known to
 /// be wrong alone. `found` are the checks of pass, stages and frames, and `drawn` the frames.
@@ -34,7 +50,7 @@ pub fn judge(
     stages: &Stages,
     (found, drawn): (&[Check], &[Drawn]),
     tolerances: &Tolerances,
-) -> Vec<Check> {
+) -> Found {
     let is_open = |check: &Check| matches!(check.verdict, Verdict::Pass | Verdict::NotJudged);
     let fails = |id: CheckId| found.iter().any(|check| check.id == id && !is_open(check));
     let others_are_open = |id: CheckId| ALONE.into_iter().all(|of| of == id || !fails(of));
@@ -43,7 +59,7 @@ pub fn judge(
         drawn.iter().find(own).map(|drawn| &drawn.image)
     };
     let Some(frames) = cases.iter().map(frame).collect::<Option<Vec<&Image>>>() else {
-        return Vec::new();
+        return Found::default();
     };
     let is_wrong = |case: &PreparedScene| {
         let own =
@@ -51,95 +67,167 @@ pub fn judge(
         found.iter().any(|check| own(check) && check.verdict == Verdict::Fail)
     };
     let wrong: Vec<bool> = cases.iter().map(is_wrong).collect();
-    let slip = |id, name: &str| {
+    let slip = |id, (name, class): (&str, Class)| {
         let scene = |(case, wrong): (&PreparedScene, &bool)| {
-            ALONE.map(|other| explained(other, case, (other == id && *wrong).then_some(name)))
+            let own = |other| (other == id && *wrong).then_some((name, class));
+            ALONE.map(|other| explained(other, case, own(other)))
         };
-        cases.iter().zip(&wrong).flat_map(scene).collect()
+        Found::of(cases.iter().zip(&wrong).flat_map(scene).collect())
     };
-    let (pass, vertex) = (CheckId::PassUniforms, CheckId::StageVertex);
-    if others_are_open(pass)
-        && let Some(name) = slip_of_pass(cases, &frames, &wrong)
-    {
-        return slip(pass, name);
+    let vertex = CheckId::StageVertex;
+    if let Some((id, name)) = slip_of_frames(cases, &frames, &wrong, &others_are_open) {
+        return slip(id, (name, Class::Slip));
     }
-    if others_are_open(vertex) && mended_by_normals(session, plugin, cases, tolerances) {
-        return slip(vertex, "the normal is negated");
+    if others_are_open(vertex) {
+        let is_moved = |(_, moved): &&Moved| {
+            let moved = frames.iter().map(|frame| Some(moved(frame)));
+            are_right(cases, moved.collect(), Film::Whole, tolerances)
+        };
+        if let Some((name, _)) = MOVED.iter().find(is_moved) {
+            return slip(vertex, (name, Class::Slip));
+        }
+        let first = wrong.iter().position(|wrong| *wrong).unwrap_or_default();
+        let mended = |stage: &Stage| mended_by(stage, session, plugin, (cases, first), tolerances);
+        if mended(&negated_normals()) {
+            return slip(vertex, ("the normal is negated", Class::Slip));
+        }
+        // Of a stage that is judged alone its own frames tell.
+        if !fails(vertex)
+            && let Some((found, which)) = slip_of_matrices(&|which| mended(&matrices(which)))
+        {
+            return Found { checks: slip(vertex, found).checks, mended_by: Some(matrices(which)) };
+        }
     }
     if ALONE.into_iter().any(fails) {
-        return Vec::new();
+        return Found::default();
     }
-    vertex_under_own_pass(session, plugin, cases, stages)
+    Found::of(vertex_under_own_pass(session, plugin, cases, stages))
 }
 
-/// The check of a part under the slip that explains all frames: `name`, where it is the part's own.
-fn explained(id: CheckId, case: &PreparedScene, name: Option<&str>) -> Check {
+/// What is wrong with the matrices of a pass that is right under other ones, and which these are.
+fn slip_of_matrices(
+    is_right: &dyn Fn(Matrices) -> bool,
+) -> Option<((&'static str, Class), Matrices)> {
+    use Matrices::{InProjection, InView, Transposed};
+    let exchanged = ("view and projection are exchanged", Class::Slip);
+    Some(match (is_right(InView), is_right(InProjection)) {
+        (true, true) => (exchanged, InView),
+        (true, false) => (("the projection is missing", Class::Concept), InView),
+        (false, true) => (("the view matrix is missing", Class::Concept), InProjection),
+        (false, false) if is_right(Transposed) => {
+            (("the position stands on the left of the matrices", Class::Slip), Transposed)
+        }
+        (false, false) => return None,
+    })
+}
+
+/// The check of a part under the mistake that explains all frames: where it is the part's own.
+fn explained(id: CheckId, case: &PreparedScene, own: Option<(&str, Class)>) -> Check {
     let scene = &case.entry.name;
     let convention = "one slip explains every frame".to_owned();
-    let Some(name) = name else {
+    let Some((name, class)) = own else {
         let summary = "right but for the one slip that explains every frame";
         return Check { convention, ..Check::new(id, scene, Verdict::Pass, summary) };
     };
-    let (error, mistake) = (Class::Slip.price(), name.to_owned());
+    let (error, mistake) = (class.price(), name.to_owned());
     let summary = format!("one slip explains the submission's own frames on every scene: {name}");
     Check { error, mistake, convention, ..Check::new(id, scene, Verdict::Fail, summary) }
 }
 
-/// The one mistake in the pass's values that explains the frames of all scenes, some of them by light. It must explain
-/// every right frame and most of the `wrong` ones, because on one scene noise may decide what a surface shows.
-fn slip_of_pass(
+/// The one slip with what reaches the fragment stages that explains the frames of all scenes, some of them by light. It
+/// must explain every right frame and most of the `wrong` ones, because on one scene noise may decide what a surface
+/// shows. `is_open` tells whether no other fault is known of the part that a slip belongs to.
+fn slip_of_frames(
     cases: &[PreparedScene],
     frames: &[&Image],
     wrong: &[bool],
-) -> Option<&'static str> {
-    let of_scenes: Vec<Vec<LeftByPass>> = cases
+    is_open: &dyn Fn(CheckId) -> bool,
+) -> Option<(CheckId, &'static str)> {
+    if ![CheckId::PassUniforms, CheckId::StageVertex].into_iter().any(is_open) {
+        return None;
+    }
+    let of_scenes: Vec<Vec<LeftBySlip>> = cases
         .iter()
         .zip(frames)
         .map(|(case, frame)| {
             let expected = &case.expected;
-            pixels::left_by_pass(&expected.scene, frame, &expected.unshadowed_mask)
+            pixels::left_by_slips(&expected.scene, frame, &expected.unshadowed_mask)
         })
         .collect();
-    let names = of_scenes.first()?.iter().map(|left| left.name);
-    let explains = |index: &usize| {
+    let slips = of_scenes.first()?.iter().map(|left| (left.of, left.name));
+    let explains = |index: usize| {
         let of = |is_wrong: bool| {
             let scenes = of_scenes.iter().zip(wrong).filter(move |(_, wrong)| **wrong == is_wrong);
-            scenes.filter_map(|(scene, _)| scene.get(*index))
+            scenes.filter_map(move |(scene, _)| scene.get(index))
         };
-        let most = |lights: bool| {
+        // Where what is right explains as much, a scene tells nothing of a slip.
+        let shows = |left: &LeftBySlip| left.lights && left.left_by_right > LEFT;
+        let most = |must_show: bool| {
             let (mut all, mut explained) = (0usize, 0usize);
-            for left in of(true).filter(|left| left.lights || !lights) {
+            for left in of(true).filter(|left| shows(left) || !must_show) {
                 (all, explained) = (all + 1, explained + usize::from(left.left <= LEFT));
             }
             2 * explained > all
         };
         of(false).all(|left| left.left <= LEFT) && most(false) && most(true)
     };
-    names.enumerate().find(|(index, _)| explains(index)).map(|(_, name)| name)
+    let mut slips = slips.enumerate().filter(|(_, (of, _))| is_open(*of));
+    slips.find(|(index, _)| explains(*index)).map(|(_, slip)| slip)
 }
 
-/// Whether a pass draws the right picture of every scene whose normals are negated.
-fn mended_by_normals(
-    session: &Session,
-    plugin: &Path,
+/// The film that pictures of a scene are drawn on.
+#[derive(Clone, Copy)]
+enum Film {
+    Whole,
+    Small,
+}
+
+/// Whether pictures show their scenes, and some of them light.
+fn are_right(
     cases: &[PreparedScene],
+    pictures: Vec<Option<Image>>,
+    film: Film,
     tolerances: &Tolerances,
 ) -> bool {
-    let frame = |case| Frame::probe(case, vec![negated_normals()]);
-    let frames: Vec<Frame> = cases.iter().map(frame).collect();
-    let outcomes = draw_each(session, Some(plugin), &frames);
-    let verdict = |(frame, outcome): (&Frame, &crate::worker::Outcome)| {
-        let small = &frame.case.probe_film;
-        let image = session::image(&outcome.answer()?.values, small.width, small.height);
-        let expected = (&small.unshadowed, small.interpolated_normals.as_ref());
-        let (id, scene) = (CheckId::ImageRealtime, &frame.case.entry.name);
-        let mask = &small.unshadowed_mask;
-        Some(images::judge_shaded(id, scene, &image, expected, mask, tolerances).verdict)
+    let verdict = |(case, image): (&PreparedScene, Option<Image>)| {
+        let (expected, small) = (&case.expected, &case.probe_film);
+        let (right, normals, mask) = match film {
+            Film::Whole => {
+                (&expected.unshadowed, &expected.interpolated_normals, &expected.unshadowed_mask)
+            }
+            Film::Small => (&small.unshadowed, &small.interpolated_normals, &small.unshadowed_mask),
+        };
+        let (id, scene) = (CheckId::ImageRealtime, &case.entry.name);
+        let right = (right, normals.as_ref());
+        Some(images::judge_shaded(id, scene, &image?, right, mask, tolerances).verdict)
     };
-    let verdicts: Vec<_> = frames.iter().zip(&outcomes).map(verdict).collect();
+    let verdicts: Vec<_> = cases.iter().zip(pictures).map(verdict).collect();
     let right =
         |verdict: &Option<Verdict>| matches!(verdict, Some(Verdict::Pass | Verdict::NotJudged));
     verdicts.iter().all(right) && verdicts.contains(&Some(Verdict::Pass))
+}
+
+/// Whether a pass draws the right picture of every scene where the host changes what it is given. `first` is one that
+/// it draws wrongly otherwise: where that stays wrong, no other is drawn.
+fn mended_by(
+    stage: &Stage,
+    session: &Session,
+    plugin: &Path,
+    (cases, first): (&[PreparedScene], usize),
+    tolerances: &Tolerances,
+) -> bool {
+    let is_mended = |cases: &[PreparedScene]| {
+        let frame = |case| Frame::probe(case, vec![stage.clone()]);
+        let frames: Vec<Frame> = cases.iter().map(frame).collect();
+        let outcomes = draw_each(session, Some(plugin), &frames);
+        let image = |(frame, outcome): (&Frame, &crate::worker::Outcome)| {
+            let (width, height) = frame.size;
+            Some(session::image(&outcome.answer()?.values, width, height))
+        };
+        let pictures = frames.iter().zip(&outcomes).map(image).collect();
+        are_right(cases, pictures, Film::Small, tolerances)
+    };
+    cases.get(first..=first).is_some_and(&is_mended) && is_mended(cases)
 }
 
 /// The vertex stage under the submission's own pass: its matrices may show what Umbra's, of which the model's is an
@@ -165,7 +253,7 @@ fn vertex_under_own_pass(
         let images: Vec<Image> = images.collect();
         let [positions, normals] = images.as_slice() else { return Vec::new() };
         let check = on_film(CheckId::StageVertex, case, |film, name| {
-            judge_vertex(name, film, [[positions, normals]; 3])
+            judge_vertex(name, film, [[positions, normals]; Matrices::ALL.len()])
         });
         let convention = "the vertex stage under the submission's own pass".to_owned();
         let summary = format!("{} (convention: {convention})", check.summary);
@@ -175,4 +263,21 @@ fn vertex_under_own_pass(
     }
     // Right there as well: nothing is explained.
     if checks.iter().any(|check| check.verdict == Verdict::Fail) { checks } else { Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_matrices_mend_is_told_by_which_do() {
+        let of = |right: &[Matrices]| slip_of_matrices(&|which| right.contains(&which));
+        use Matrices::{InProjection, InView, Transposed};
+        assert_eq!(of(&[]), None);
+        let class = |right: &[Matrices]| of(right).map(|((_, class), _)| class);
+        assert_eq!(class(&[InView, InProjection]), Some(Class::Slip));
+        assert_eq!(class(&[InView]), Some(Class::Concept));
+        assert_eq!(class(&[InProjection]), Some(Class::Concept));
+        assert_eq!(class(&[Transposed]), Some(Class::Slip));
+    }
 }

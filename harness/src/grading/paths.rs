@@ -143,7 +143,13 @@ impl Grading<'_> {
                 if nothing_draws.is_none() {
                     let own = (&checks[begin..], &drawn[..]);
                     let slip = one_slip::judge(session, plugin, cases, stages, own, tolerances);
-                    checks.extend(slip);
+                    if let Some(stage) = slip.mended_by {
+                        let bonus = &mut checks[begin..];
+                        realtime::judge_bonus_under(
+                            &stage, session, plugin, cases, tolerances, bonus,
+                        );
+                    }
+                    checks.extend(slip.checks);
                 }
             }
             price::settle_by_common_mistake(&mut checks[begin..]);

@@ -11,7 +11,7 @@ use super::judged::Judged;
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
-use super::stages::{Stages, negated_normals};
+use super::stages::{MOVED, Stages, negated_normals};
 use super::zoomed;
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels;
@@ -100,6 +100,7 @@ pub fn judge_images(
         Judged { checks, drawn, fails, footprint, shading }
     });
     let mut judged: Vec<Judged> = judged.collect();
+    coverage::accept_explained(cases, &mut judged);
     coverage::look_at_black_surfaces(session, plugin, cases, &mut judged);
     coverage::refuse_silhouettes(&mut judged);
     judged
@@ -248,6 +249,39 @@ fn judge_bonus_without(
     None
 }
 
+/// Judges the bonus once more where the host's change of what a pass is given mends all frames without shadows: by
+/// visibility, and what is right then is right.
+pub fn judge_bonus_under(
+    stage: &Stage,
+    session: &Session,
+    plugin: &Path,
+    cases: &[PreparedScene],
+    tolerances: &Tolerances,
+    checks: &mut [Check],
+) {
+    let bonus = |check: &&mut Check| {
+        [CheckId::BonusImage, CheckId::BonusProbe].contains(&check.id)
+            && check.verdict == Verdict::Fail
+    };
+    for check in checks.iter_mut().filter(bonus) {
+        let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
+        let Some(with) = Frame::bonus(case) else { continue };
+        let drawn = |frame: Frame| {
+            let frame = Frame { stages: vec![stage.clone()], ..frame };
+            let (width, height) = frame.size;
+            let outcome = draw(session, Some(plugin), &frame);
+            outcome.answer().map(|answer| session::image(&answer.values, width, height))
+        };
+        let judged = || {
+            let (with, without) = (drawn(with)?, drawn(Frame::plain(case))?);
+            shadows(case).judge(&check.scene, &with, &without, tolerances)
+        };
+        if let Some(judged) = judged() {
+            *check = Check { id: check.id, ..judged };
+        }
+    }
+}
+
 /// Whether a frame itself shows shadows that are right: by another stage than the submission's they may be
 /// right where its own frame shows nothing.
 fn shows_its_shadows(
@@ -353,8 +387,9 @@ fn plain_but_for_shadows(
 }
 
 /// Judges wrong shadows by visibility alone. The image without shadows is the student's own. If that fails, it is drawn
-/// with a vertex stage of ours, with negated normals, with another field of view, or as the second of two frames. What
-/// these repair is no fault of the shadows. `check` is the verdict on the image; it stands if none of them decides.
+/// with a vertex stage of ours, moved as a whole, with negated normals, with another field of view, or as the second of
+/// two frames. What these repair is no fault of the shadows. `check` is the verdict on the image; it stands if none of
+/// them decides.
 fn judge_visibility(
     session: &Session,
     plugin: &Path,
@@ -386,8 +421,11 @@ fn judge_visibility(
     if let Some(swapped) = swapped.as_ref().filter(|swapped| passes(swapped)) {
         return swapped.clone();
     }
-    let negated = again(1, &[negated_normals()]).filter(passes);
-    let mended = negated.or_else(|| {
+    let moved = without.and_then(|without| {
+        MOVED.iter().find_map(|(_, moved)| judge(&moved(with), &moved(without)).filter(passes))
+    });
+    let mended = moved.or_else(|| again(1, &[negated_normals()]).filter(passes));
+    let mended = mended.or_else(|| {
         let masks = zoomed::masks(session, plugin, case)?;
         let shadows = masks.shadows(shadows.median_lit);
         shadows.judge(name, with, without?, tolerances).filter(passes)

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use basecode::gpu::NEGATED_NORMALS;
+use basecode::gpu::{MATRICES, NEGATED_NORMALS};
+use basecode::{Image, Matrices};
 
 use crate::evidence::stages::{bare, is_template};
 use crate::files::files_below;
@@ -139,6 +140,30 @@ fn written(texts: &BTreeMap<PathBuf, String>, template: &BTreeMap<PathBuf, Strin
 pub fn negated_normals() -> Stage {
     Stage { name: NEGATED_NORMALS.to_owned(), text: NEGATED_NORMALS.to_owned() }
 }
+
+/// What the host replaces to have a pass draw under other matrices.
+pub fn matrices(which: Matrices) -> Stage {
+    Stage { name: MATRICES.to_owned(), text: format!("{which:?}") }
+}
+
+/// A picture that is moved as a whole: what it is then, and the picture as it should be.
+pub type Moved = (&'static str, fn(&Image) -> Image);
+
+/// The ways that a picture may be moved as a whole.
+pub const MOVED: [Moved; 3] = [
+    ("the picture is upside down", |image| {
+        let rows = image.pixels.chunks(image.width).rev();
+        Image { pixels: rows.flatten().copied().collect(), ..*image }
+    }),
+    ("the picture is mirrored", |image| {
+        let rows = image.pixels.chunks(image.width);
+        Image { pixels: rows.flat_map(|row| row.iter().rev()).copied().collect(), ..*image }
+    }),
+    ("the picture is turned by half", |image| Image {
+        pixels: image.pixels.iter().rev().copied().collect(),
+        ..*image
+    }),
+];
 
 /// Texts under the names of the stages.
 pub fn named(texts: [String; 3]) -> Vec<Stage> {

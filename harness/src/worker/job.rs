@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use basecode::CameraConfig;
+use basecode::{CameraConfig, Matrices};
 use renderer_api as api;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -182,7 +182,7 @@ pub struct CameraValue {
     pub up: [f32; 3],
     /// Full vertical field of view in degrees.
     pub fov_y_deg: f32,
-    /// Which matrices are bound; a plugin binds its own.
+    /// Which matrices Umbra's own pass binds.
     #[serde(default)]
     pub matrices: Matrices,
 }
@@ -197,24 +197,6 @@ impl From<CameraConfig> for CameraValue {
             matrices: Matrices::Usual,
         }
     }
-}
-
-/// What the two matrices of `frame` hold under Umbra's own pass. Their product is always the same, so
-/// that a vertex stage that multiplies by both in order draws the same.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Matrices {
-    /// What their names say.
-    #[default]
-    Usual,
-    /// The view matrix holds the product, the projection matrix nothing.
-    InView,
-    /// The projection matrix holds the product, the view matrix nothing.
-    InProjection,
-}
-
-impl Matrices {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Usual, Self::InView, Self::InProjection];
 }
 
 impl Request {

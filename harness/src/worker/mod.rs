@@ -25,8 +25,8 @@ mod wire;
 pub use child::{child_main, draw_in_process};
 pub(crate) use command::software_driver;
 pub use job::{
-    Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, Matrices, RayQuery, Request,
-    STAGES, SceneRef, Stage,
+    Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, RayQuery, Request, STAGES,
+    SceneRef, Stage,
 };
 pub use live::LiveWorker;
 pub use outcome::{Answer, Fault, JobReport, Late, Outcome, WitnessUse, WorkerRun};

@@ -11,7 +11,7 @@ use basecode::gpu::{
 };
 use basecode::{Camera, CameraConfig, Error, Mat4, MaterialModel, Scene, wgpu};
 
-use super::job::{Adapter, AdapterKind, Matrices, Request, STAGES};
+use super::job::{Adapter, AdapterKind, Request, STAGES};
 use crate::expected::load_scene;
 use crate::plugin::{CallError, CallErrorKind};
 
@@ -85,8 +85,9 @@ impl Neutral {
                     up: camera.up.into(),
                     fov_y_deg: camera.fov_y_deg,
                 };
-                let (matrices, camera) = (camera.matrices, Camera::new(config, width, height)?);
-                open.gpu.checked(&mut || pass.draw(&open.gpu, &camera, matrices, &target))?;
+                let matrices = camera.matrices;
+                let camera = Camera::new(config, width, height)?.with_matrices(matrices);
+                open.gpu.checked(&mut || pass.draw(&open.gpu, &camera, &target))?;
                 let image = target.read_back(&open.gpu)?;
                 frame.copy_from_slice(
                     image.pixels.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>().as_slice(),
@@ -235,27 +236,9 @@ impl NeutralPass {
         })
     }
 
-    fn draw(
-        &self,
-        gpu: &Gpu,
-        camera: &Camera,
-        matrices: Matrices,
-        target: &Target,
-    ) -> basecode::Result<()> {
+    fn draw(&self, gpu: &Gpu, camera: &Camera, target: &Target) -> basecode::Result<()> {
         let [light_position, light_intensity] = self.light;
-        let both = camera.projection() * camera.view();
-        let (projection, view) = match matrices {
-            Matrices::Usual => (camera.projection(), camera.view()),
-            Matrices::InView => (Mat4::IDENTITY, both),
-            Matrices::InProjection => (both, Mat4::IDENTITY),
-        };
-        let frame = FrameUniforms {
-            view,
-            projection,
-            light_position,
-            light_intensity,
-            ..FrameUniforms::new(camera)
-        };
+        let frame = FrameUniforms { light_position, light_intensity, ..FrameUniforms::new(camera) };
         self.frame.write_frame(gpu, &frame);
         let mut encoder = gpu.encoder();
         let mut pass = target.begin(&mut encoder);

@@ -266,7 +266,7 @@ mod tests {
     #[test]
     fn a_camera_arrives_as_it_left() {
         let (eye, at, up) = ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]);
-        let matrices = super::super::job::Matrices::Usual;
+        let matrices = basecode::Matrices::Usual;
         let sent = CameraValue { eye, at, up, fov_y_deg: 10.0, matrices };
         let read = camera(&camera_bytes(&sent));
         assert_eq!((read.eye, read.at, read.up, read.fov_y_deg), (eye, at, up, 10.0));

@@ -293,7 +293,7 @@ impl Fixture {
                 at: [0.0; 3],
                 up: [0.0, 0.0, 1.0],
                 fov_y_deg: 40.0,
-                matrices: umbra::worker::Matrices::Usual,
+                matrices: basecode::Matrices::Usual,
             }],
         }
     }

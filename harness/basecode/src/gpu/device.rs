@@ -24,6 +24,9 @@ pub const EMPTY_MAPS: &str = "empty.maps";
 /// A host switch in the form of a stage name. When the host sets it, the pass is made for a scene whose normals are all
 /// negated: what it draws rightly then, it draws by a normal that is negated once more.
 pub const NEGATED_NORMALS: &str = "negated.normals";
+/// Not the name of a stage. If the host replaces it, the text names the [`crate::Matrices`] of every frame's camera:
+/// what a pass draws rightly then, it draws by a slip with them.
+pub const MATRICES: &str = "matrices";
 
 /// Name of the entry point in the text of [`EVERY_FRAGMENT`].
 const SHOWN: &str = "umbra_shown";

@@ -36,7 +36,9 @@ pub use contract::{
     COLOR_FORMAT, DEPTH_FORMAT, FRAME_GROUP, FrameUniforms, MATERIAL_GROUP, MaterialUniforms,
     OBJECT_GROUP, ObjectUniforms, SHADOW_GROUP, SHADOW_LAYERS, ShadowUniforms, VERTEX_STRIDE,
 };
-pub use device::{Device, EMPTY_MAPS, EVERY_FRAGMENT, Footprint, NEGATED_NORMALS, OUTLINES, Queue};
+pub use device::{
+    Device, EMPTY_MAPS, EVERY_FRAGMENT, Footprint, MATRICES, NEGATED_NORMALS, OUTLINES, Queue,
+};
 pub use layouts::Layouts;
 pub use matrices::{look_at, orthographic, perspective};
 pub use mesh::Mesh;

@@ -31,8 +31,8 @@ use std::time::SystemTime;
 use std::{fs, io};
 
 use anyhow::Context as _;
-use basecode::ShadingKind;
 use basecode::scene::SceneConfig;
+use basecode::{Matrices, ShadingKind};
 use half::f16;
 use serde::Serialize;
 use tempfile::TempDir;
@@ -42,8 +42,8 @@ use crate::cli::context::cores;
 use crate::grading::RenderPath;
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, AdapterKind, Answer, CameraValue, Job, LiveWorker, Matrices, Outcome, Request,
-    SceneRef, Supervisor,
+    Adapter, AdapterKind, Answer, CameraValue, Job, LiveWorker, Outcome, Request, SceneRef,
+    Supervisor,
 };
 
 /// The most samples per pixel that a picture is asked for.

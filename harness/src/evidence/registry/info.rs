@@ -143,8 +143,8 @@ impl CheckId {
             ),
             Self::StageVertex => info(
                 "Draws the student's vertex stage in Umbra's pass: the world position and normal that it \
-                    forwards, and where on the film they land. Two more frames, with the product of both \
-                    matrices in one of them, tell which matrix is missing or in the wrong order.",
+                    forwards, and where on the film they land. More frames, under other matrices, tell which \
+                    matrix is missing, in the wrong order or on the wrong side, and whether w is 1.",
                 "Position, normal and place on the film are priced apart and add up, each a slip or a \
                     concept.",
                 "Position within 2e-3 of its distance, normal within 1e-2, for all but 0.5 % of the pixels. \

@@ -32,7 +32,7 @@ impl Fixture {
         Self { scene, surface, mask, positions, normals }
     }
 
-    fn judge(&self, frames: [Frames; 3]) -> Check {
+    fn judge(&self, frames: [Frames; MATRICES]) -> Check {
         let (width, height) = FILM;
         let camera = self.scene.camera(width, height).unwrap();
         let (scene, surface, mask) = (&self.scene, &self.surface, &self.mask);
@@ -41,7 +41,7 @@ impl Fixture {
 
     /// The same frames whatever the matrices.
     fn judge_all(&self, positions: &Image, normals: &Image) -> Check {
-        self.judge([[positions, normals]; 3])
+        self.judge([[positions, normals]; MATRICES])
     }
 }
 
@@ -121,10 +121,56 @@ fn matrices_tell_which_of_them_is_missing() {
     let nothing = black(&fixture.positions);
     let nothing: Frames = [&nothing, &nothing];
     let judge = |frames| fixture.judge(frames);
-    fails(&judge([nothing, right, nothing]), &[Class::Concept], "projection is missing");
-    fails(&judge([nothing, nothing, right]), &[Class::Concept], "view matrix is missing");
-    fails(&judge([nothing, right, right]), &[Class::Slip], "exchanged");
+    fails(
+        &judge([nothing, right, nothing, nothing, nothing]),
+        &[Class::Concept],
+        "projection is missing",
+    );
+    fails(
+        &judge([nothing, nothing, right, nothing, nothing]),
+        &[Class::Concept],
+        "view matrix is missing",
+    );
+    fails(&judge([nothing, right, right, nothing, nothing]), &[Class::Slip], "exchanged");
+    fails(&judge([nothing, nothing, nothing, right, nothing]), &[Class::Slip], "on the left");
     // Frames that show nothing at all tell nothing of what is forwarded.
-    let all = judge([nothing; 3]);
+    let all = judge([nothing; MATRICES]);
     assert_eq!((all.verdict, all.error), (Verdict::Fail, 1.0), "{}", all.summary);
+}
+
+#[test]
+fn a_translation_or_perspective_that_is_lost_is_a_slip() {
+    let fixture = Fixture::new();
+    let (width, height) = FILM;
+    let (scene, nothing) = (&fixture.scene, black(&fixture.positions));
+    let camera = scene.camera(width, height).unwrap();
+    let config = crate::evidence::stage_film::from_origin(scene);
+    let from_origin = basecode::Camera::new(config, width, height).unwrap();
+    let seen = |index: usize| {
+        let (x, y) = ((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
+        // The origin lies on the floor.
+        SurfacePoint::cast(scene, Ray { min_t: 0.05, ..from_origin.ray(x, y) })
+    };
+    let seen: Vec<Option<SurfacePoint>> = (0..width * height).map(seen).collect();
+    let image = |of: &dyn Fn(&SurfacePoint) -> Vec3| {
+        let pixels = seen.iter().map(|point| point.as_ref().map_or(Vec3::ZERO, of)).collect();
+        Image { width, height, pixels }
+    };
+    let (positions, normals) = (image(&|p| p.position), image(&|p| p.normal));
+    let (nothing, moved): (Frames, Frames) = ([&nothing, &nothing], [&positions, &normals]);
+    let all = [nothing, nothing, nothing, nothing, moved];
+    fails(&fixture.judge(all), &[Class::Slip], "translation");
+    let right: Frames = [&fixture.positions, &fixture.normals];
+    let all = [nothing, nothing, nothing, nothing, right];
+    assert_eq!(fixture.judge(all).error, 1.0, "elsewhere than these matrices put it");
+    let to_clip = camera.projection() * camera.view();
+    let flat = |point: &SurfacePoint| point.without_perspective(scene, to_clip).unwrap_or(*point);
+    let shown = |of: &dyn Fn(SurfacePoint) -> Vec3| {
+        let value = |(_, point): &(Ray, Option<SurfacePoint>)| {
+            point.as_ref().map_or(Vec3::ZERO, |point| of(flat(point)))
+        };
+        Image { width, height, pixels: fixture.surface.pixels.iter().map(value).collect() }
+    };
+    let check = fixture.judge_all(&shown(&|p| p.position), &shown(&|p| p.normal));
+    fails(&check, &[Class::Slip], "perspective");
 }
