@@ -95,3 +95,26 @@ fn a_folder_above_working_folders_is_not_checked_but_told() {
     assert_eq!(code, 2, "{err}");
     assert!(err.contains(".: it holds 2 working folders, other and work among them"), "{err}");
 }
+
+/// What is said of the bonus: points and words, without its pictures.
+fn bonus(out: &str) -> String {
+    let (_, said) = out.split_once("\n  2.5 ").expect(out);
+    let said = said.split("\n\n").next().unwrap();
+    said.split("pictures:").next().unwrap().trim_end().to_owned()
+}
+
+#[test]
+fn a_stage_that_does_not_compile_earns_no_more_of_the_bonus_than_one_without_shadows() {
+    let said = |file: &str, old: &str, new: &str| {
+        let work = Work::new();
+        work.change(file, old, new);
+        bonus(&work.check(&["work", "--part", "2.5"]).1)
+    };
+    let diffuse = "shaders/diffuse.fs.wgsl";
+    let unshadowed = said(diffuse, "visibility(world_position, n) * incident", "incident");
+    let broken = said(diffuse, "let f =", "let f: i32 =");
+    assert!(!broken.contains("20/20") && broken == unshadowed, "{broken}\n{unshadowed}");
+    // Umbra's own vertex stage stands in.
+    let vertex = said("shaders/simple.vs.wgsl", "@vertex", "@vertex @vertex");
+    assert!(vertex.contains("20/20"), "{vertex}");
+}

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::time::{Duration, Instant};
 
+use nix::sys::signal::Signal;
 use similar_asserts::assert_eq;
 
 use crate::batch::{Batch, WRONG, root};
@@ -166,6 +167,53 @@ fn end_at_moments(moments: usize, class: &dyn Fn() -> Batch) {
         "killed at {killed} moments of {:.2} s, in {batches} batches: all results are those of a run undisturbed",
         whole.as_secs_f64()
     );
+}
+
+/// The process in a grader's tree that answers as a worker: the one that is locked.
+fn worker_of(grader: u32) -> Option<i32> {
+    let processes = Path::new("/proc").read_dir().unwrap().flatten().filter_map(|entry| {
+        let stat = fs::read_to_string(entry.path().join("stat")).ok()?;
+        let command = fs::read(entry.path().join("cmdline")).ok()?;
+        let (head, rest) = stat.rsplit_once(") ")?;
+        let (pid, _) = head.split_once(' ')?;
+        let parent: i32 = rest.split(' ').nth(1)?.parse().ok()?;
+        let status = fs::read_to_string(entry.path().join("status")).ok()?;
+        let is_locked = command.starts_with(b"worker\0") && status.contains("\nSeccomp:\t2");
+        Some((pid.parse::<i32>().ok()?, parent, is_locked))
+    });
+    let processes: Vec<_> = processes.collect();
+    let mut own = vec![i32::try_from(grader).unwrap()];
+    for at in 0.. {
+        let Some(&parent) = own.get(at) else { break };
+        own.extend(processes.iter().filter(|(_, of, _)| *of == parent).map(|(pid, ..)| *pid));
+    }
+    processes.iter().find(|(pid, _, locked)| *locked && own.contains(pid)).map(|(pid, ..)| *pid)
+}
+
+#[test]
+fn a_worker_that_somebody_ends_costs_nothing() {
+    let undisturbed = with_one_that_runs();
+    assert_eq!(undisturbed.grade().0, Some(0));
+    for signal in [Signal::SIGKILL, Signal::SIGTERM] {
+        let batch = with_one_that_runs();
+        let mut grader = batch.start_with(&[batch.submissions()], &[]);
+        // Those that make scenes ready run no code of a student.
+        while !batch.instructor("bob/record.json").exists() {
+            assert!(grader.try_wait().unwrap().is_none());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        loop {
+            assert!(grader.try_wait().unwrap().is_none(), "no worker was met");
+            let own = worker_of(grader.id()).map(nix::unistd::Pid::from_raw);
+            if own.is_some_and(|own| nix::sys::signal::kill(own, signal).is_ok()) {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let output = grader.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{signal}: {output:?}");
+        assert_eq!(batch.canonical(), undisturbed.canonical(), "{signal}");
+    }
 }
 
 #[test]

@@ -612,3 +612,23 @@ fn a_name_injects_nothing() {
     browser.until("window.refused > 0");
     assert!(browser.value("window.pwned ?? null").is_null());
 }
+
+#[test]
+fn pages_that_were_given_no_folder_do_not_pile_up() {
+    let place = tempfile::tempdir().unwrap();
+    let image = place.path().join("a.exr");
+    write_exr(&image, &Image::new(2, 2), Precision::Half, &[]).unwrap();
+    let others = ["umbra-view-file", "else"].map(|name| place.path().join(name));
+    others.iter().for_each(|other| std::fs::write(other, "").unwrap());
+    let mut pages = Vec::new();
+    for _ in 0..5 {
+        let mut umbra = std::process::Command::new(env!("CARGO_BIN_EXE_umbra"));
+        umbra.arg("view").arg(&image).env("TMPDIR", place.path()).env_remove("DISPLAY");
+        let said = umbra.env_remove("WAYLAND_DISPLAY").output().unwrap();
+        assert!(said.status.success(), "{said:?}");
+        pages.push(PathBuf::from(String::from_utf8(said.stdout).unwrap().trim_end()));
+    }
+    let there: Vec<bool> = pages.iter().map(|page| page.is_file()).collect();
+    assert_eq!(there, [false, false, true, true, true]);
+    assert!(others.iter().all(|other| other.exists()));
+}

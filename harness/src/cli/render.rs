@@ -363,8 +363,9 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
 
 /// What a viewer may not show of an image that no right renderer draws.
 fn looks_broken(image: &Image) -> Vec<String> {
+    type Trouble = (&'static str, fn(&Vec3) -> bool);
     let mut said = Vec::new();
-    let kinds: [(&str, fn(&Vec3) -> bool); 2] =
+    let kinds: [Trouble; 2] =
         [("not finite", |p| !p.is_finite()), ("negative", |p| p.min_element() < NEGATIVE)];
     for (what, is_it) in kinds {
         let count = image.pixels.iter().filter(|p| is_it(p)).count();
