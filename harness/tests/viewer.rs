@@ -546,7 +546,7 @@ fn a_long_thin_image_is_seen() {
         .iter()
         .map(|&(width, height)| {
             let pixels = vec![Vec3::new(0.9, 0.4, 0.1); width * height];
-            let file = folder.path().join(format!("{width}.exr"));
+            let file = folder.path().join(format!("{width}x{height}.exr"));
             write_exr(&file, &Image { width, height, pixels }, Precision::Float, &[]).unwrap();
             file
         })

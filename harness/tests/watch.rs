@@ -255,11 +255,14 @@ fn every_save_is_checked_and_what_went_wrong_is_shown_until_the_next_one() {
     // Who is in the viewer stays there, as they were, until what they look at is gone.
     let twice = right.replace("(cos_i * INV_PI)", "(2.0 * cos_i * INV_PI)");
     assert_ne!(twice, right);
+    let frame = "document.getElementById('report').contentWindow";
+    browser.value(&format!("{frame}.old = true; window.before = reports"));
     fs::write(&file, &twice).unwrap();
     let link = format!("{report}.querySelector('a[href*=\"view.html\"]')");
-    browser.until(&format!("document.body.className === 'lost' && {link}"));
+    browser.until(&format!(
+        "reports > before && !{frame}.old && document.body.className === 'lost' && {report}.readyState === 'complete' && {link}"
+    ));
     browser.value(&format!("{link}.click()"));
-    let frame = "document.getElementById('report').contentWindow";
     browser.until(&format!("{frame}.location.hash.includes('mode=one')"));
     browser.value(&format!(
         "{frame}.location.hash = {frame}.location.hash.replace('mode=one', 'mode=wipe')"

@@ -12,7 +12,7 @@ use super::session::Session;
 use super::stages::Stages;
 use crate::evidence::{Check, Evidence, Verdict};
 use crate::harmless::harmless;
-use crate::rubric::{self, BUILD};
+use crate::rubric::{self, BUILD, Part};
 
 /// What was found out on one path.
 pub(super) struct OnPath {
@@ -48,7 +48,7 @@ impl Grading<'_> {
             let (mut checks, mut drawn) = (Vec::new(), Vec::new());
             self.offline(session, plugin, seed, say, &mut checks, &mut drawn)?;
             checks.extend(session.used_up());
-            say(&self.so_far("offline", &checks));
+            say(&self.so_far(RenderPath::Offline, &checks));
             let (wall_s, cpu_s) = (begun.elapsed().as_secs_f64(), session.end_path());
             anyhow::Ok(OnPath { checks, drawn, compiler_messages: String::new(), wall_s, cpu_s })
         };
@@ -63,7 +63,7 @@ impl Grading<'_> {
             if let (Ok(mut all), Ok(printed)) = (session.printed.lock(), own.printed.lock()) {
                 *all = (*all).max(*printed);
             }
-            say(&self.so_far("realtime", &checks));
+            say(&self.so_far(RenderPath::Realtime, &checks));
             let (wall_s, cpu_s) = (begun.elapsed().as_secs_f64(), own.end_path());
             anyhow::Ok(OnPath {
                 checks,
@@ -128,12 +128,14 @@ impl Grading<'_> {
     }
 
     /// What the parts of a path are worth, and why where one lost something.
-    fn so_far(&self, path: &str, checks: &[Check]) -> String {
+    fn so_far(&self, path: RenderPath, checks: &[Check]) -> String {
         let built = Check::new(BUILD, "", Verdict::Pass, "");
         let evidence = Evidence { checks: checks.iter().cloned().chain([built]).collect() };
         let rules = &self.assignment.rules;
         let parts = rubric::grade(rules, &evidence).parts;
-        let own = rules.parts.iter().zip(&parts).filter(|(rule, _)| rule.path == path);
+        // The bonus is drawn.
+        let is_own = |rule: &Part| (rule.path == "offline") == (path == RenderPath::Offline);
+        let own = rules.parts.iter().zip(&parts).filter(|(rule, _)| is_own(rule));
         let words = own.map(|(_, part)| {
             let why = if part.is_lost() { format!(" ({})", part.reason) } else { String::new() };
             format!("{} {} of {}{why}", part.id, part.points, part.out_of)

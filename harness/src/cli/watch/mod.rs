@@ -321,8 +321,10 @@ fn verdict(row: &Row, is_whole: bool) -> (Stage, String, String) {
         let message = format!("{place}{first} ({points})");
         return (Stage::Refused, "does not compile".to_owned(), message);
     }
-    // Nothing was built: that is the cause, whatever a part says.
-    if let Some(cause) = row.remarks.first().filter(|_| is_whole && row.points_max == 0.0) {
+    // Where no code decided anything, the last remark tells why there is none.
+    let by_code = |part: &PartGrade| part.evidence.iter().any(|id| !id.starts_with("submitted."));
+    let is_bare = is_whole && row.points_max == 0.0 && !row.parts.iter().any(by_code);
+    if let Some(cause) = row.remarks.last().filter(|_| is_bare) {
         return (Stage::Lost, points.clone(), format!("{points}. {cause}"));
     }
     let mut errors = row.findings.iter().filter(|found| found.severity == Severity::Error);
@@ -532,7 +534,7 @@ mod tests {
         let nothing =
             || vec![part("1.1", false, 0.0, "there is no code"), part("1.2", false, 0.0, "no")];
         let mut bare = row(nothing(), "");
-        bare.remarks = vec!["there is no src/lib.rs".into()];
+        bare.remarks = vec!["config.json has a slip".into(), "there is no src/lib.rs".into()];
         assert_eq!(verdict(&bare, true).2, "0 of 20 points. there is no src/lib.rs");
         assert_eq!(
             told(nothing(), "").2,

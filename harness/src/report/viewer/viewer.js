@@ -92,6 +92,8 @@ function choosePainter() {
 
 /** Shows what the address says. */
 async function goToAddress() {
+  // Going back to an address of before is a choice, too.
+  stage.ownAddress = null;
   const wanted = new URLSearchParams(location.hash.slice(1)).get("case");
   const about = manifest.cases.find(({ id }) => id === wanted) ?? manifest.cases[0];
   if (state.case !== about.id || !stage.about) {
