@@ -166,21 +166,22 @@ fn answers<'a>(
 /// Where a direction lies in the surface, as from the origin on a floor through it, rounding decides what is black.
 const GRAZING: f64 = 1e-3;
 
+/// What a right stage makes of a point after a slip; `None` if that is not known.
+type Shaded<'a> = Box<dyn Fn(&SurfacePoint) -> Option<ShadedPoint> + 'a>;
+
+/// What a slip makes of a point; `None` if that is not known.
+type Moved<'a> = Box<dyn Fn(&SurfacePoint) -> Option<SurfacePoint> + 'a>;
+
 /// A slip in what reaches a fragment stage.
 struct Slip<'a> {
     of: CheckId,
     name: &'static str,
-    /// What a right stage makes of a point then; nothing where that is not known.
-    shaded: Box<dyn Fn(&SurfacePoint) -> Option<ShadedPoint> + 'a>,
+    shaded: Shaded<'a>,
 }
 
 /// Slips with the values that a pass binds.
-fn pass_slips(scene: &Scene, right: Places) -> Vec<Slip<'_>> {
-    let slip = |name, shaded: Box<dyn Fn(&SurfacePoint) -> Option<ShadedPoint>>| Slip {
-        of: CheckId::PassUniforms,
-        name,
-        shaded,
-    };
+fn pass_slips<'a>(scene: &'a Scene, right: Places) -> Vec<Slip<'a>> {
+    let slip = |name, shaded: Shaded<'a>| Slip { of: CheckId::PassUniforms, name, shaded };
     let at = |name, places: Places| {
         slip(name, Box::new(move |point| Some(places.shaded_point(scene, point))))
     };
@@ -227,7 +228,7 @@ fn pass_slips(scene: &Scene, right: Places) -> Vec<Slip<'_>> {
 fn vertex_slips<'a>(scene: &'a Scene, camera: &Camera, right: Places) -> Vec<Slip<'a>> {
     let (view, projection) = (camera.view(), camera.projection());
     let to_clip = projection * view;
-    let slip = |name, changed: Box<dyn Fn(&SurfacePoint) -> Option<SurfacePoint> + 'a>| Slip {
+    let slip = |name, changed: Moved<'a>| Slip {
         of: CheckId::StageVertex,
         name,
         shaded: Box::new(move |point| Some(right.shaded_point(scene, &changed(point)?))),
@@ -284,7 +285,7 @@ fn materials_of_others<'a>(
     right: Places,
     surfaces: &[SurfacePoint],
     found: &[[f32; 3]],
-) -> Box<dyn Fn(&SurfacePoint) -> Option<ShadedPoint> + 'a> {
+) -> Shaded<'a> {
     let count = scene.shapes().len();
     let apart = |shape: usize, other: usize| -> f64 {
         let own = surfaces.iter().zip(found).filter(|(point, _)| point.shape == shape);

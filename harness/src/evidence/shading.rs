@@ -3,6 +3,8 @@
 //! `Shading::default()` is right. A variant gives the answer of a renderer with one known mistake; [`super::price`]
 //! tests whether an answer is that of a single mistake.
 
+use std::array;
+
 use renderer_api as api;
 
 /// The radiance that a surface reflects of a point light:
@@ -256,7 +258,7 @@ impl Shading {
         let cos_i = if self.sine { (1.0 - cos_i * cos_i).max(0.0).sqrt() } else { cos_i };
         let phong = material.model == api::MATERIAL_PHONG;
         let lobe = if phong && self.factor[1] != 0.0 { self.lobe(point, length) } else { 0.0 };
-        let [diffuse, specular] = [0, 1].map(|term| {
+        let [diffuse, specular]: [f64; 2] = array::from_fn(|term| {
             let scale = if self.scaled[term] { *scale } else { 1.0 };
             self.factor[term]
                 * scale
@@ -269,7 +271,7 @@ impl Shading {
         let incident = self.attenuation(*distance);
         let colors = [material.diffuse, material.specular];
         let [kd, ks] = if phong { self.colors.map(|color| colors[color]) } else { colors };
-        let value = [0, 1, 2].map(|c| {
+        let value: [f64; 3] = array::from_fn(|c| {
             let ks = f64::from(ks[self.specular_channels[c]]);
             let own = (f64::from(kd[c]) + ks).max(0.99);
             let ks = if self.raised_ks { ks.powf(n) } else { ks };
@@ -280,7 +282,7 @@ impl Shading {
             let terms = [diffuse * (self.albedo)(f64::from(kd[c])), specular * lobe * ks];
             factor * self.together(terms, if phong { cos_i } else { 0.0 })
         });
-        std::array::from_fn(|c| {
+        array::from_fn(|c| {
             let reflected = (self.incident)(intensity[c] * incident) * value[self.channels[c]];
             (self.output)(reflected + self.ambient * f64::from(kd[c]))
         })
@@ -303,10 +305,11 @@ impl Shading {
 
     /// This change, made to another shading instead of the right one: of what conventions change
     /// too, both count.
+    #[inline]
     pub fn over(&self, other: &Self) -> Self {
         Self {
-            factor: [0, 1].map(|term| self.factor[term] * other.factor[term]),
-            cos_i: [0, 1].map(|term| self.cos_i[term] + other.cos_i[term] - 1.0),
+            factor: array::from_fn(|term| self.factor[term] * other.factor[term]),
+            cos_i: array::from_fn(|term| self.cos_i[term] + other.cos_i[term] - 1.0),
             falloff: self.falloff + other.falloff - 2.0,
             long_wi: self.long_wi != other.long_wi,
             ..*self

@@ -284,7 +284,8 @@ impl<'a> Asked<'_, 'a> {
                     (session::colours(&image.values), session::colours(&along.values));
                 let judge = |along: &[_]| loops::judge_agreement(name, &small.mask, image, along);
                 let size = (small.width, small.height);
-                let longer = self.along_longer(&centers(self.case), size, shadows);
+                let centers = centers(self.case);
+                let longer = self.along_longer(&centers, size, shadows);
                 loops::priced_by_length(judge(along), image, longer, &judge)
             }
             // Where the rays fail in the same way, it is not the loop's fault.

@@ -40,6 +40,7 @@ pub struct WitnessQuery {
 
 impl Witness {
     /// The witness' value; none for [`Witness::True`].
+    #[inline]
     pub fn value(&self, query: &WitnessQuery) -> Option<[f32; 3]> {
         let WitnessQuery { wi, wo } = *query;
         if let Self::Flat(value) = self {
