@@ -154,7 +154,9 @@ pub fn isolate(
                     shown.fragments.push((case, index, image.clone()));
                     fragment(id, case, image, index == 2, tolerances)
                 }
-                _ => unreachable!("a vertex stage draws six frames, a fragment stage one"),
+                _ => unreachable!(
+                    "a vertex stage draws two frames under each matrix, a fragment stage one"
+                ),
             }
         };
         checks.push(pass);
