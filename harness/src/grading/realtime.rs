@@ -203,10 +203,10 @@ fn judge_bonus(
     (check, Some(drawn))
 }
 
-/// Judges the bonus of a submission that draws no frame with it, if a stage is at fault: with Umbra's vertex stage or the
-/// template's fragment stage in its place, as with a Rust file that does not build. On what a fragment stage should draw,
-/// nothing is in shadow: one that draws nothing earns no more than one without shadows. Returns `None` if no frame comes
-/// of it either.
+/// Judges the bonus of a submission that draws no frame with it, if a stage is at fault: with Umbra's vertex stage or
+/// the template's fragment stage in its place, as with a Rust file that does not build. On what a fragment stage
+/// should draw, nothing is in shadow: one that draws nothing earns no more than one without shadows. Returns `None`
+/// if no frame comes of it either.
 fn judge_bonus_without(
     session: &Session,
     plugin: &Path,
