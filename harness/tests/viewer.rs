@@ -541,7 +541,7 @@ fn a_long_thin_image_is_seen() {
     let Some(mut browser) = Chromium::start() else { return };
     let browser = &mut browser;
     let folder = tempfile::tempdir().unwrap();
-    let sizes = [(5000, 1), (1, 5000), (8000, 2), (1, 1)];
+    let sizes = [(5000, 1), (1, 5000)];
     let files: Vec<PathBuf> = sizes
         .iter()
         .map(|&(width, height)| {

@@ -13,6 +13,8 @@ use tempfile::TempDir;
 
 /// Nothing in these tests may take longer, on a busy machine either.
 const PATIENCE: Duration = Duration::from_secs(60);
+/// What a page and the page in it say.
+const PAGE: &str = "[window, ...frames].map((w) => `${w.location.href}: ${w.document.body.innerText.slice(0, 1500)}`)";
 
 /// A browser with one open page.
 pub struct Chromium {
@@ -192,7 +194,10 @@ impl Chromium {
             if answer == Ok(json!(true)) {
                 return;
             }
-            assert!(begun.elapsed() < PATIENCE, "never true: {expression} ({answer:?})");
+            if begun.elapsed() > PATIENCE {
+                let page = self.evaluate(PAGE);
+                panic!("never true: {expression} ({answer:?}); the page: {page:?}");
+            }
             thread::sleep(Duration::from_millis(20));
         }
     }
