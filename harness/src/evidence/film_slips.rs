@@ -194,7 +194,10 @@ impl<'a> Film<'a> {
             let (of_x, of_y) = (axis(by, start, width), axis(by, start, height));
             changes.push(self.moved(name, move |x, y| (of_x(x), y)));
             changes.push(self.moved(name, move |x, y| (x, of_y(y))));
-            changes.push(self.moved(name, move |x, y| (of_x(x), of_y(y))));
+            // About the center it is a field of view, which is known.
+            if 2.0 * start + by != 1.0 {
+                changes.push(self.moved(name, move |x, y| (of_x(x), of_y(y))));
+            }
         }
         // Width and height in each other's place.
         changes.push(self.moved("the film's width and height are exchanged for the camera", {

@@ -75,7 +75,9 @@ pub fn judge(
         Found::of(cases.iter().zip(&wrong).flat_map(scene).collect())
     };
     let vertex = CheckId::StageVertex;
-    if let Some((id, name)) = slip_of_frames(cases, &frames, &wrong, &others_are_open) {
+    // Of a stage that is wrong alone its own frames tell.
+    let is_open = |id: CheckId| others_are_open(id) && !(id == vertex && fails(vertex));
+    if let Some((id, name)) = slip_of_frames(cases, &frames, &wrong, &is_open) {
         return slip(id, (name, Class::Slip));
     }
     if others_are_open(vertex) {
@@ -91,8 +93,7 @@ pub fn judge(
         if mended(&negated_normals()) {
             return slip(vertex, ("the normal is negated", Class::Slip));
         }
-        // Of a stage that is judged alone its own frames tell.
-        if !fails(vertex)
+        if is_open(vertex)
             && let Some((found, which)) = slip_of_matrices(&|which| mended(&matrices(which)))
         {
             return Found { checks: slip(vertex, found).checks, mended_by: Some(matrices(which)) };
