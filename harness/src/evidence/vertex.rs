@@ -105,10 +105,9 @@ pub fn judge_vertex(scene_name: &str, film: &StageFilm, frames: [Frames; MATRICE
     Check { error: price.error, mistake: price.name(), measures, ..check }.with_hint(hint)
 }
 
-/// The matrices stand on the right of a row vector.
+/// Positions are row vectors, and the matrices stand on their right.
 const WRONG_SIDE: &str = "the position stands on the left of the matrices";
-/// What is right without a translation.
-/// What is right but for perspective.
+/// Positions are right but for perspective.
 const DIVIDED: &str = "the clip-space position is divided by w: values lose their perspective";
 
 /// What frames show.
