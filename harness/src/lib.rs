@@ -30,6 +30,8 @@
 mod output;
 
 #[doc(hidden)]
+pub use evidence::{self, expected};
+#[doc(hidden)]
 pub use imaging;
 
 #[doc(hidden)]
@@ -45,10 +47,6 @@ mod columns;
 pub mod decode;
 #[doc(hidden)]
 pub mod diagnosis;
-#[doc(hidden)]
-pub mod evidence;
-#[doc(hidden)]
-pub mod expected;
 #[doc(hidden)]
 pub mod files;
 #[doc(hidden)]

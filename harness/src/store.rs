@@ -10,7 +10,7 @@ use basecode::{Image, Scene, Vec3};
 use sha2::{Digest, Sha256};
 
 use crate::assignment::{Assignment, SceneEntry};
-use crate::expected::{Expected, load_scene, region_table, regions, scene_digest};
+use crate::expected::{Expected, load_scene, region_table, regions};
 use crate::files::{hex, library_name};
 use crate::imaging::reference::{ReferenceImage, RegionMask};
 use crate::process::Limits;
@@ -423,4 +423,25 @@ fn as_mask(scene: &Scene, image: &Image) -> RegionMask {
         *value = pixel.x as u16;
     }
     mask
+}
+
+/// SHA-256 over all that an image of a scene depends on: the TOML file and the files beside its mesh.
+pub(crate) fn scene_digest(toml: &Path) -> anyhow::Result<String> {
+    let config = basecode::scene::SceneConfig::load(toml)?;
+    let mut hash = Sha256::new();
+    hash.update(std::fs::read(toml)?);
+    let folder = config.mesh.parent().unwrap_or(Path::new(""));
+    let mut files = Vec::new();
+    for entry in folder.read_dir().with_context(|| format!("{}", folder.display()))? {
+        let entry = entry?;
+        if entry.file_type()?.is_file() {
+            files.push(entry.path());
+        }
+    }
+    files.sort();
+    for file in files {
+        hash.update(file.file_name().unwrap_or_default().as_encoded_bytes());
+        hash.update(std::fs::read(&file)?);
+    }
+    Ok(hex(&hash.finalize()))
 }

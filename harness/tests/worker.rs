@@ -654,7 +654,7 @@ fn the_program_that_loads_plugins_holds_nothing_that_judges() {
     let holds = |program: &[u8], text: &str| {
         program.windows(text.len()).any(|window| window == text.as_bytes())
     };
-    let vertex = read("harness/src/evidence/shaders/vertex.wgsl");
+    let vertex = read("harness/evidence/src/shaders/vertex.wgsl");
     let mistakes = read("harness/data/mistakes.json");
     let names = ["radiance.lit", "loop.agreement", "held-back scene", "right end to end"];
     let secrets: Vec<&str> =

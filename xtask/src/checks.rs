@@ -8,7 +8,7 @@ use umbra::evidence::{CheckId, IMAGE_RULES};
 use umbra::rubric::Rules;
 
 /// What begins a part of a page that is made here.
-const BEGIN: &str = "<!-- Made by `xtask checks` from harness/src/evidence/registry/ -->\n";
+const BEGIN: &str = "<!-- Made by `xtask checks` from harness/evidence/src/registry/ -->\n";
 const END: &str = "<!-- end of what `xtask checks` made -->\n";
 /// Columns of a line.
 const COLUMNS: usize = 120;
@@ -40,7 +40,7 @@ pub fn run(root: &Path, check: bool) -> Result<String> {
 fn sources() -> String {
     let family = |check: &CheckId| check.name().split('.').next().unwrap_or_default();
     let mut table =
-        "| checks | asked in `grading/` | judged in `evidence/`, or there |\n|---|---|---|\n"
+        "| checks | asked in `src/grading/` | judged in `evidence/src/`, or there |\n|---|---|---|\n"
             .to_owned();
     for name in unique(CheckId::ALL.iter().map(family)) {
         let sources: Vec<_> = CheckId::ALL
@@ -58,9 +58,9 @@ fn sources() -> String {
     table
 }
 
-/// The path of a file without its first folder and extension.
+/// The path of a file without its first two folders and extension.
 fn module(file: &str) -> &str {
-    file.split_once('/').map_or(file, |(_, rest)| rest).trim_end_matches(".rs")
+    file.splitn(3, '/').last().unwrap_or(file).trim_end_matches(".rs")
 }
 
 /// Each item once, in the order in which they first appear.

@@ -8,8 +8,8 @@ use sha2::{Digest, Sha256};
 
 use super::cache::RecordCache;
 use super::pipeline::Grading;
-use crate::expected::scene_digest;
 use crate::files::files_below;
+use crate::store::scene_digest;
 
 impl Grading<'_> {
     /// Keeps the records that this makes; `force` finds none again.

@@ -18,9 +18,9 @@ use crate::diagnosis::{
     StoredView, Thumbnail, View,
 };
 use crate::evidence::{self, Evidence, Picture};
-use crate::expected::scene_digest;
 use crate::imaging::pictures::tone_mapped;
 use crate::rubric;
+use crate::store::scene_digest;
 use crate::viewer::{Layer, ViewedCase, write_image};
 
 /// A tile whose mean difference from what is right is less than this is not stored.

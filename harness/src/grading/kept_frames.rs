@@ -13,9 +13,9 @@ use sha2::{Digest, Sha256};
 use super::draw::{Frame, draw_each};
 use super::pipeline::Grading;
 use super::session::{KeptFrames, Session};
-use crate::expected::scene_digest;
 use crate::files::{hex, keep_newest, write_whole};
 use crate::sandbox::Isolation;
+use crate::store::scene_digest;
 use crate::worker::{Adapter, Answer, Outcome, Request};
 
 /// Number of sets of frames that are kept, of about 4 MB each; the oldest go.

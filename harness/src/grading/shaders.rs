@@ -17,10 +17,10 @@ use super::isolate;
 use super::pipeline::Grading;
 use super::session::Session;
 use super::stages::Stages;
-use crate::expected::scene_digest;
 use crate::files::{copy_tree, hex, keep_newest};
 use crate::harmless::harmless;
 use crate::sandbox::Isolation;
+use crate::store::scene_digest;
 use crate::worker::{Outcome, software_driver};
 
 /// The shaders of so many are kept, less than 1 MB each; the oldest go.

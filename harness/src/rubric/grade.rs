@@ -481,23 +481,5 @@ fn fraction(rules: &Rules, check: &Check) -> f64 {
     }
 }
 
-impl Evidence {
-    /// The checks with a name.
-    pub fn named(&self, id: CheckId) -> impl Iterator<Item = &Check> {
-        self.checks.iter().filter(move |check| check.id == id)
-    }
-}
-
-impl Check {
-    /// `id` or `id @ scene`.
-    pub fn name(&self) -> String {
-        if self.scene.is_empty() {
-            self.id.to_string()
-        } else {
-            format!("{} @ {}", self.id, self.scene)
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests;

@@ -223,7 +223,7 @@ impl Fixture {
     /// Lines of what the grader draws with and knows, none of which a student is given.
     pub fn graders_lines(&self) -> Vec<String> {
         let text = |file: &str| std::fs::read_to_string(workspace().join(file)).unwrap_or_default();
-        let vertex = text("harness/src/evidence/shaders/vertex.wgsl");
+        let vertex = text("harness/evidence/src/shaders/vertex.wgsl");
         let mut lines: Vec<String> =
             vertex.lines().filter(|line| line.contains("world")).map(str::to_owned).collect();
         lines.extend([

@@ -113,9 +113,9 @@ fn explain_check(page: &mut Page, rules: &Rules, check: CheckId) {
     let names: Vec<_> = info.rules.iter().map(|rule| rule.name()).collect();
     let rules = names.join(", ");
     let sources = check.sources();
-    let mut code = format!("harness/src/{}", sources.judged);
+    let mut code = format!("harness/{}", sources.judged);
     if sources.asked != sources.judged {
-        code += &format!("; asked in harness/src/{}", sources.asked);
+        code += &format!("; asked in harness/{}", sources.asked);
     }
     let texts =
         [("error", info.error), ("bound", info.bound), ("rules", &rules), ("judged in", &code)];
@@ -145,7 +145,7 @@ mod tests {
         assert!(check.starts_with("shadow.rays (1.4)\n  Asks for radiance"), "{check}");
         assert!(check.contains("  rules  shadow.lit, shadow.dark"), "{check}");
         assert!(
-            check.contains("  judged in  harness/src/evidence/rays/shadows.rs; asked in"),
+            check.contains("  judged in  harness/evidence/src/rays/shadows.rs; asked in"),
             "{check}"
         );
         // Every check that the rule can fail.
