@@ -99,18 +99,22 @@ fn sample(probe: &Probe, found: [f64; 3]) -> Sample {
     Sample { reflector, wo, wi, distance, intensity, found: found.map(|v| f64::from(v as f32)) }
 }
 
+/// What is said of values that a part shades.
+fn said_of_shading(part: &str, samples: &[Sample]) -> Option<Fitted> {
+    let (subject, accuracy) = match part {
+        "1.1" | "1.2" => (Subject::Bsdf, Accuracy { relative: 1e-3, stray: 2e-3 }),
+        "1.3" => (Subject::Radiance, Accuracy { relative: 5e-3, stray: 5e-3 }),
+        _ => (Subject::Color, Accuracy { relative: 1e-2, stray: 2e-2 }),
+    };
+    explain(samples, subject, accuracy)
+}
+
 /// What is said of a mistake's answers.
 fn said(mistake: &Labelled) -> Option<Fitted> {
     match mistake.answers() {
         Answers::Shading(all) => {
-            let samples: Vec<Sample> =
-                all.iter().map(|(probe, found)| sample(probe, *found)).collect();
-            let (subject, accuracy) = match mistake.part.as_str() {
-                "1.1" | "1.2" => (Subject::Bsdf, Accuracy { relative: 1e-3, stray: 2e-3 }),
-                "1.3" => (Subject::Radiance, Accuracy { relative: 5e-3, stray: 5e-3 }),
-                _ => (Subject::Color, Accuracy { relative: 1e-2, stray: 2e-2 }),
-            };
-            explain(&samples, subject, accuracy)
+            let samples = all.iter().map(|(probe, found)| sample(probe, *found));
+            said_of_shading(&mistake.part, &samples.collect::<Vec<_>>())
         }
         Answers::Shadows(all) => {
             let ray = |(ray, found): &(answers::ShadowRay, f64)| ShadowRay {
@@ -228,4 +232,24 @@ fn of_two_at_once_nothing_else_is_said() {
     println!("{both} pairs are told, {silent} are not, {} are told another", wrong.len());
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert!(both >= silent / 4, "{both} of {}", both + silent);
+}
+
+#[test]
+fn a_missing_intensity_is_told_alone_and_beside_the_falloff() {
+    for part in ["1.3", "2.3", "2.4"] {
+        let of_part = labelled().into_iter().find(|mistake| mistake.part == part).unwrap();
+        let right = Labelled { changes: Vec::new(), ..of_part };
+        let Answers::Shading(all) = right.answers() else { panic!("{part} shades nothing") };
+        for power in [0, 2] {
+            let found = |probe: &Probe, found: &[f64; 3]| {
+                std::array::from_fn(|c| found[c] * probe.r.powi(power) / probe.intensity[c])
+            };
+            let samples: Vec<Sample> =
+                all.iter().map(|(probe, value)| sample(probe, found(probe, value))).collect();
+            let said = said_of_shading(part, &samples).map(|fitted| fitted.deviations);
+            let told: Vec<_> = said.iter().flatten().map(|deviation| deviation.quantity).collect();
+            let expected: &[_] = if power == 0 { &["intensity"] } else { &["r", "intensity"] };
+            assert_eq!(told, expected, "{part}, r to {power}: {said:?}");
+        }
+    }
 }

@@ -21,6 +21,14 @@ pub fn diffuse_changes() -> Vec<Change> {
         concept("the diffuse reflectance is missing", Shading { albedo: |_| 1.0, ..right }),
         slip("the diffuse reflectance is squared", Shading { albedo: |a| a * a, ..right }),
         slip("the diffuse reflectance is its square root", Shading { albedo: f64::sqrt, ..right }),
+        slip(
+            "the diffuse reflectance is raised to 2.2",
+            Shading { albedo: |a| a.max(0.0).powf(2.2), ..right },
+        ),
+        slip(
+            "the diffuse reflectance is raised to 1 / 2.2",
+            Shading { albedo: |a| a.max(0.0).powf(1.0 / 2.2), ..right },
+        ),
         slip("cos theta_i is there twice", Shading { cos_i: [2.0; 2], ..right }),
         slip("cos theta_i is there three times", Shading { cos_i: [3.0; 2], ..right }),
         slip(
@@ -180,7 +188,8 @@ pub fn light_changes() -> Vec<Change> {
         slip("multiplied by r in place of divided by r^2", Shading { falloff: -1.0, ..right }),
         slip("r^3 in place of r^2", Shading { falloff: 3.0, ..right }),
         slip("r^4 in place of r^2", Shading { falloff: 4.0, ..right }),
-        slip("1 + r^2 in place of r^2", Shading { softened: true, ..right }),
+        slip("1 + r^2 in place of r^2", Shading { divisor: |squared| 1.0 + squared, ..right }),
+        slip("r^2 is at least 1", Shading { divisor: |squared| squared.max(1.0), ..right }),
         slip(
             "incident light is clamped to 1",
             Shading { incident: |incident| incident.clamp(0.0, 1.0), ..right },
@@ -198,6 +207,7 @@ pub fn integrator_changes() -> Vec<Change> {
     let cosines =
         |cos_i: f64, cos_o: f64| Shading { cos_i: [cos_i; 2], cos_o: [cos_o; 2], ..right };
     let mut changes = light_changes();
+    changes.push(fit("a constant is added", Fitted::Ambient));
     changes.extend([
         slip("cos theta_i is multiplied once more", cosines(2.0, 0.0)),
         slip("cos theta_i is multiplied twice more", cosines(3.0, 0.0)),
@@ -236,6 +246,7 @@ pub fn shader_changes(phong: bool) -> Vec<Change> {
         fitted: None,
     };
     bsdf.extend([
+        output("tone mapped radiance", |v| v / (1.0 + v.max(0.0))),
         output("gamma baked into radiance", |v| v.max(0.0).powf(1.0 / 2.2)),
         output("sRGB baked into radiance", |v| srgb::encode(v.max(0.0))),
         output("radiance clamped to 1", |v| v.clamp(0.0, 1.0)),

@@ -61,8 +61,8 @@ pub struct Shading {
     pub terms: Terms,
     /// The power of 1/r.
     pub falloff: f64,
-    /// Whether 1 / (1 + r^2) stands for 1 / r^2.
-    pub softened: bool,
+    /// What is made of that power of r before it divides.
+    pub divisor: fn(f64) -> f64,
     /// What is made of the intensity over the squared distance.
     pub incident: fn(f64) -> f64,
     /// Whether wi reaches the BSDF with the length r.
@@ -75,7 +75,7 @@ pub struct Shading {
     pub from_origin: bool,
     /// Whether an integrator asks the BSDF at all.
     pub asks: bool,
-    /// What is added where a surface is lit, times the diffuse reflectance.
+    /// What is added where a surface is lit, times the diffuse reflectance where a material is known.
     pub ambient: f64,
     /// What is made of radiance before it is written.
     pub output: fn(f64) -> f64,
@@ -198,7 +198,7 @@ impl Default for Shading {
             colors: [0, 1],
             terms: Terms::Sum,
             falloff: 2.0,
-            softened: false,
+            divisor: |squared| squared,
             incident: |incident| incident,
             long_wi: false,
             directions: Directions::Local,
@@ -299,8 +299,7 @@ impl Shading {
 
     /// What the intensity is multiplied by at this distance of the light.
     pub fn attenuation(&self, distance: f64) -> f64 {
-        let attenuation = distance.powf(-self.falloff);
-        if self.softened { attenuation / (1.0 + attenuation) } else { attenuation }
+        1.0 / (self.divisor)(distance.powf(self.falloff))
     }
 
     /// This change, made to another shading instead of the right one: of what conventions change
@@ -405,6 +404,8 @@ mod tests {
         assert!((sum - right.radiance(&point())[1]).abs() < 1e-12);
         let near = Shading { falloff: 1.0, ..right };
         assert!((near.radiance(&point())[2] / right.radiance(&point())[2] - 2.0).abs() < 1e-12);
+        let bounded = Shading { divisor: |squared| squared.max(1.0), ..right };
+        assert_eq!([0.5, 2.0].map(|r| bounded.attenuation(r)), [1.0, 0.25]);
         let slanted = ShadedPoint { wi: [0.6, 0.0, 0.8], ..point() };
         let twice = Shading { cos_i: [2.0; 2], ..right };
         assert!((twice.radiance(&slanted)[0] / right.radiance(&slanted)[0] - 0.8).abs() < 1e-12);

@@ -85,7 +85,7 @@ pub fn nearest(comparisons: &[Comparison], names: &[&str]) -> Option<Nearest> {
     }
     let factor = common_factor(&shown, |exhibit| exhibit.right.clone());
     let left = distance(&shown, &|exhibit| exhibit.right.map(|value| factor * value));
-    if left < FACTOR && (factor - 1.0).abs() > NO_FACTOR {
+    if left < FACTOR && is_factor(factor) {
         return Some(Nearest { guess: Hypothesis::Factor(factor), distance: left, runner_up: 1.0 });
     }
     let mut most = shown;
@@ -98,7 +98,7 @@ pub fn nearest(comparisons: &[Comparison], names: &[&str]) -> Option<Nearest> {
     for (i, first) in names.iter().enumerate() {
         let factor = common_factor(&most, |exhibit| exhibit.tile(first).clone());
         let left = distance(&most, &|exhibit| exhibit.tile(first).map(|value| factor * value));
-        if left < CLEARLY * single[i] && (factor - 1.0).abs() > NO_FACTOR {
+        if left < CLEARLY * single[i] && is_factor(factor) {
             pairs.push((left, Hypothesis::Scaled((*first).to_owned(), factor)));
         }
         for (j, second) in names.iter().enumerate().skip(i + 1) {
@@ -110,6 +110,11 @@ pub fn nearest(comparisons: &[Comparison], names: &[&str]) -> Option<Nearest> {
         }
     }
     clearest(pairs, PAIR)
+}
+
+/// Whether a factor changes values, and leaves something of them.
+fn is_factor(factor: f32) -> bool {
+    (factor - 1.0).abs() > NO_FACTOR && factor.abs() > NO_FACTOR
 }
 
 /// The mean difference of all answers from what is right: 0 is the same, 1 nothing alike.

@@ -14,9 +14,9 @@ use crate::evidence::changes;
 use crate::evidence::convention::{self, Convention, Conventional, Party};
 use crate::evidence::loops::Edges;
 use crate::evidence::physical::Probes;
-use crate::evidence::rays::{self, RayBatch, Unshadowed};
+use crate::evidence::rays::{self, OwnValue, RayBatch, Unshadowed};
 use crate::evidence::shading::{ShadedPoint, Shading};
-use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict, price};
+use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict};
 use crate::expected::SurfacePoint;
 use crate::plugin::{Witness, WitnessQuery};
 use crate::worker::{Outcome, Request};
@@ -46,6 +46,8 @@ struct LightAnswer<'a> {
     /// What the lit points look like to an integrator that asks the scene for no BSDF; empty for
     /// one that does.
     own: Vec<ShadedPoint>,
+    /// What its BSDFs answer where such an integrator's lit rays end.
+    bsdfs: Vec<OwnValue>,
 }
 
 /// Radiance without shadows of the renderer's own integrator and BSDFs, where rays meet surfaces of one kind.
@@ -173,11 +175,13 @@ impl<'a> Answers<'a> {
         self.bsdfs.push(BsdfAnswer { kind, scene, probes, values });
     }
 
-    /// Keeps the radiance of an integrator along a scene's rays, under each witness.
+    /// Keeps the radiance of an integrator along a scene's rays, under each witness. `bsdfs` is for one that asks for
+    /// none: what those of the scene answer where its rays end.
     pub fn push_light(
         &mut self,
         case: &'a PreparedScene,
         asked: &[(&Outcome, Witness, &'static str)],
+        bsdfs: Vec<OwnValue>,
     ) {
         let own = asked.iter().any(|(_, witness, _)| *witness == Witness::True);
         let points = case.probe_film.batch.points.iter().take(case.probe_film.batch.lit);
@@ -195,7 +199,7 @@ impl<'a> Answers<'a> {
             }
         });
         let values = values.collect();
-        self.lights.push(LightAnswer { case, values, own });
+        self.lights.push(LightAnswer { case, values, own, bsdfs });
     }
 
     /// Keeps what the renderer's own integrator and BSDFs make of each other along a scene's rays, without shadows.
@@ -220,36 +224,33 @@ impl<'a> Answers<'a> {
         }
     }
 
-    /// What the BSDFs do wrong alone, where an integrator may hold the same ones without asking for them.
-    fn known_mistakes(&self) -> Vec<KnownMistake> {
+    /// The kinds of BSDFs that are wrong alone, and that an integrator holds the same ones of without asking for them.
+    fn paid_by_bsdfs(&self) -> Vec<MaterialModel> {
         if self.lights.iter().all(|light| light.own.is_empty()) {
             return Vec::new();
         }
-        let known = |own: &BsdfAnswer| {
-            let values = own.values.as_ref().ok()?;
-            let check = bsdf::judge(own.kind, &own.probes, values, &Convention::default());
-            let model = match own.kind {
-                BsdfKind::Diffuse => MaterialModel::Diffuse,
-                BsdfKind::Phong => MaterialModel::Phong,
-            };
-            let is_known = check.verdict == Verdict::Fail && price::is_explained(&check);
-            is_known.then_some((model, check.mistake))
+        let kinds =
+            [(BsdfKind::Diffuse, MaterialModel::Diffuse), (BsdfKind::Phong, MaterialModel::Phong)];
+        let handout = Convention::default();
+        let is_wrong = |kind: BsdfKind| {
+            let own = self.bsdfs.iter().filter(|own| own.kind == kind);
+            own.filter_map(|own| Some((own, own.values.as_ref().ok()?)))
+                .any(|(own, values)| !bsdf::passes(&own.probes, values, &handout))
         };
-        self.bsdfs.iter().filter_map(known).collect()
+        let is_held = |model| self.lights.iter().all(|light| light.is_of_own_bsdfs(model));
+        let paid = kinds.into_iter().filter(|&(kind, model)| is_wrong(kind) && is_held(model));
+        paid.map(|(_, model)| model).collect()
     }
 
     /// The checks under the handout's convention, and under others that the plugin keeps.
     pub fn judge(&self) -> Vec<Check> {
         let bsdfs = self.bsdfs.iter().map(BsdfAnswer::question);
-        let known = self.known_mistakes();
-        let lights = self.lights.iter().map(|light| light.question(&known));
+        let paid = self.paid_by_bsdfs();
+        let lights = self.lights.iter().map(|light| light.question(&paid));
         let together = || self.together.iter().map(TogetherAnswer::judge).collect();
         convention::judge(&bsdfs.chain(lights).collect::<Vec<_>>(), &together)
     }
 }
-
-/// What a BSDF is known to do wrong by itself.
-type KnownMistake = (MaterialModel, String);
 
 impl TogetherAnswer {
     fn judge(&self) -> (Party, Check) {
@@ -307,6 +308,18 @@ impl LightAnswer<'_> {
         }
     }
 
+    /// Whether its radiance is what the BSDFs of this kind answer, on all surfaces that tell.
+    fn is_of_own_bsdfs(&self, model: MaterialModel) -> bool {
+        let batch = &self.case.probe_film.batch;
+        let model_of =
+            |ray: usize| self.case.expected.scene.material_of(batch.points[ray].shape).model;
+        let own = self.bsdfs.iter().filter(|(ray, _)| model_of(*ray) == model);
+        let own: Vec<_> = own.copied().collect();
+        self.values.as_ref().is_ok_and(|answers| {
+            answers.iter().all(|answer| rays::is_of_own_bsdfs(batch, &own, &answer.values))
+        })
+    }
+
     fn under<R>(&self, answers: &[WitnessAnswer], then: impl FnOnce(&[Unshadowed]) -> R) -> R {
         let of: Vec<_> = answers
             .iter()
@@ -328,9 +341,9 @@ impl LightAnswer<'_> {
     }
 
     /// The check of an integrator that asks the scene for no BSDF. Its BSDFs are its own: a mistake may be in one of
-    /// them alone, and then costs no more than on surfaces of that kind. One that is `known` of the BSDF itself is paid
+    /// them alone, and then costs no more than on surfaces of that kind. What the BSDFs themselves do wrong is paid
     /// there.
-    fn judge_own(&self, answers: &[Unshadowed], known: &[KnownMistake]) -> Check {
+    fn judge_own(&self, answers: &[Unshadowed], paid: &[MaterialModel]) -> Check {
         let (case, handout) = (self.case, Convention::default());
         let batch = &case.probe_film.batch;
         let changes = changes::shader_changes(true);
@@ -354,16 +367,7 @@ impl LightAnswer<'_> {
         };
         let kinds = [MaterialModel::Diffuse, MaterialModel::Phong].map(of_kind);
         let failed = kinds.into_iter().filter(|(_, check)| check.verdict == Verdict::Fail);
-        // Where little shows of a mistake, no name explains it.
-        let is_known = |(model, check): &(MaterialModel, Check)| {
-            let little = check.mistake.is_empty() && price::are_slight([check]);
-            let same = |(of, mistake): &KnownMistake| {
-                let named = *mistake == check.mistake && price::is_explained(check);
-                of == model && (named || little)
-            };
-            known.iter().any(same)
-        };
-        let (of_bsdfs, own): (Vec<_>, Vec<_>) = failed.partition(is_known);
+        let (of_bsdfs, own): (Vec<_>, Vec<_>) = failed.partition(|(model, _)| paid.contains(model));
         let black = |measure: &Measure| measure.rule == Some(RuleId::RaysBlack) && !measure.passed;
         if own.is_empty() && !of_bsdfs.is_empty() && !whole.measures.iter().any(black) {
             let summary = "right but for its BSDFs, which are judged alone";
@@ -374,7 +378,7 @@ impl LightAnswer<'_> {
         worst.filter(|worst| worst.error < whole.error).unwrap_or(whole)
     }
 
-    fn question<'b>(&'b self, known: &'b [KnownMistake]) -> Conventional<'b> {
+    fn question<'b>(&'b self, paid: &'b [MaterialModel]) -> Conventional<'b> {
         let batch = &self.case.probe_film.batch;
         Conventional {
             party: Party::Integrator,
@@ -393,7 +397,7 @@ impl LightAnswer<'_> {
                         let changes = changes::integrator_changes();
                         return rays::judge_unshadowed(batch, answers, convention, &changes);
                     }
-                    self.judge_own(answers, known)
+                    self.judge_own(answers, paid)
                 }),
                 Err(unanswered) => (**unanswered).clone(),
             }),

@@ -11,10 +11,11 @@ use super::questions::{Outcomes, Question, Questions};
 use super::session::{self, Session};
 use crate::diagnosis::{self, LoopSeen, Thumbnail, View};
 use crate::evidence::images::{self, Kind};
+use crate::evidence::loops;
 use crate::evidence::price::Class;
+use crate::evidence::rays::{self, OwnValue};
 use crate::evidence::shading::{ShadedPoint, Shading};
 use crate::evidence::{Check, CheckId, Verdict};
-use crate::evidence::{loops, rays};
 use crate::expected::{Expected, SurfacePoint};
 use crate::imaging::evidence::Tolerances;
 use crate::plugin::Witness;
@@ -87,6 +88,14 @@ struct RayQuestions {
     bsdfs: Question,
     /// Rays, by position, that end on plain surfaces.
     plain: Vec<usize>,
+}
+
+impl RayQuestions {
+    /// What the renderer's own BSDFs answer at plain surfaces, by ray; nothing where there is no answer.
+    fn own_values(&self, bsdfs: &Outcome) -> Vec<OwnValue> {
+        let values = bsdfs.answer().map_or(&[][..], |answer| session::colours(&answer.values));
+        self.plain.iter().copied().zip(values.iter().copied()).collect()
+    }
 }
 
 /// Judges integrator, shadows, loop and image on one scene. Returns no image where only a small film was
@@ -203,7 +212,8 @@ impl<'a> Asked<'_, 'a> {
         };
         if witnessed.iter().all(asks_none) {
             let name = "the scene's own: the integrator asks for none";
-            answers.push_light(case, &[(own.1, Witness::True, name)]);
+            let bsdfs = asked.own_values(&outcomes[asked.bsdfs]);
+            answers.push_light(case, &[(own.1, Witness::True, name)], bsdfs);
             let bsdf = |point: &SurfacePoint| {
                 let point =
                     ShadedPoint { intensity: [1.0; 3], distance: 1.0, ..shaded_point(case, point) };
@@ -216,7 +226,7 @@ impl<'a> Asked<'_, 'a> {
         let mut under: Vec<_> =
             under.map(|(outcome, (witness, name))| (outcome, witness, name)).collect();
         under.push((flat.1, FLAT, "constant, below the surface too"));
-        answers.push_light(case, &under);
+        answers.push_light(case, &under, Vec::new());
         answers.push_together(case, own.1);
         let bsdf = |point: &SurfacePoint| value(FLAT, point.wi, point.wo);
         let shadows = judge_shadows(case, &bsdf, flat, own);
@@ -230,9 +240,9 @@ impl<'a> Asked<'_, 'a> {
             if is_inverted { (flat.1, flat.0) } else { flat },
         );
         let mut checks = vec![shadows];
-        if let (Outcome::Done(bsdfs), Outcome::Done(radiance)) = (&outcomes[asked.bsdfs], own.1) {
-            let values = session::colours(&bsdfs.values).iter().copied();
-            let values: Vec<_> = asked.plain.iter().copied().zip(values).collect();
+        if let (bsdfs @ Outcome::Done(_), Outcome::Done(radiance)) = (&outcomes[asked.bsdfs], own.1)
+        {
+            let values = asked.own_values(bsdfs);
             let radiance = session::colours(&radiance.values);
             checks.push(rays::judge_material(&case.probe_film.batch, &values, radiance));
         }

@@ -26,7 +26,7 @@ pub const PLAIN_SEED: u64 = SEEDS[0];
 
 /// Pairs of mistakes that a student may well make together, and mistakes of renderers that do something otherwise.
 /// Not among them: one that hides the other, such as an intensity that was never set.
-const PAIRS: [[&str; 2]; 36] = [
+const PAIRS: [[&str; 2]; 37] = [
     ["diffuse-no-pi", "phong-n-plus-1"],
     ["diffuse-no-pi", "light-two-cosines"],
     ["diffuse-no-wi-test", "shadow-none"],
@@ -61,6 +61,7 @@ const PAIRS: [[&str; 2]; 36] = [
     ["directions-in-world", "phong-no-scale"],
     ["wi-from-light", "phong-n-plus-1"],
     ["own-bsdfs", "diffuse-no-pi"],
+    ["own-bsdfs", "phong-n-plus-1"],
     ["own-bsdfs", "shadow-none"],
     ["normals-negated-twice", "phong-fs-n-plus-1"],
 ];

@@ -87,6 +87,21 @@ pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]])
     Check { measures: vec![measure], ..check }
 }
 
+/// Whether radiance along lit rays is what the renderer's own BSDFs, right or wrong, make of the light: their values,
+/// cosine included, times I / r^2. For an integrator that asks the scene for none, and so keeps no convention.
+pub fn is_of_own_bsdfs(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]]) -> bool {
+    let same = |found: f32, expected: f64| {
+        let both_broken = !found.is_finite() && !expected.is_finite();
+        both_broken || (f64::from(found) - expected).abs() <= super::RELATIVE * expected.abs()
+    };
+    let is_right = |(ray, value): &&OwnValue| {
+        let expected = batch.unshadowed(*ray, value.map(f64::from));
+        radiance[*ray].iter().zip(expected).all(|(found, expected)| same(*found, expected))
+    };
+    let right = own.iter().filter(is_right).count();
+    (own.len() - right) as f64 <= STRAY_FRACTION * own.len() as f64
+}
+
 /// Radiance of a right integrator that asks the BSDF, whose value is `own`.
 fn expected(batch: &RayBatch, ray: usize, own: [f32; 3], convention: &Convention) -> [f64; 3] {
     let cos_i = f64::from(Frame::cos_theta(batch.points[ray].wi));
@@ -162,6 +177,22 @@ mod tests {
         assert_eq!(judge(|ray, own| own.map(|v| if ray == 7 { f64::NAN } else { v })).verdict, {
             Verdict::NotJudged
         });
+    }
+
+    #[test]
+    fn an_integrator_without_bsdfs_of_the_scene_may_hold_the_same_ones() {
+        let batch = batch();
+        let own = own(&batch);
+        let radiance = |factor: f64| -> Vec<[f32; 3]> {
+            let value = |(ray, value): &OwnValue| {
+                batch.unshadowed(*ray, value.map(|v| factor * f64::from(v))).map(|v| v as f32)
+            };
+            own.iter().map(value).collect()
+        };
+        assert!(is_of_own_bsdfs(&batch, &own, &radiance(1.0)));
+        // No convention excuses it, and a lobe of n + 1 is .99 of one of n + 2 where n is 98.
+        assert!(!is_of_own_bsdfs(&batch, &own, &radiance(std::f64::consts::PI)));
+        assert!(!is_of_own_bsdfs(&batch, &own, &radiance(0.99)));
     }
 
     #[test]

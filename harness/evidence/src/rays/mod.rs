@@ -15,7 +15,7 @@ use super::shading::{Directions, Shading, power};
 use crate::expected::{FARTHEST_START, SurfaceBuffer, SurfacePoint, Visibility};
 use imaging::reference::RegionMask;
 
-pub use material::judge_material;
+pub use material::{OwnValue, is_of_own_bsdfs, judge_material};
 pub use shadows::{INVERTED, Occluders, judge_shadows};
 pub use unshadowed::{Unshadowed, judge_unshadowed, passes_unshadowed};
 
@@ -235,7 +235,8 @@ impl RayBatch {
             * power(cos_i, shading.cos_i[0] - 1.0)
             * power(cos_o, shading.cos_o[0]);
         std::array::from_fn(|c| {
-            (shading.incident)(f64::from(self.intensity[c]) * incident) * value[shading.channels[c]]
+            let incident = (shading.incident)(f64::from(self.intensity[c]) * incident);
+            incident * value[shading.channels[c]] + shading.ambient
         })
     }
 }

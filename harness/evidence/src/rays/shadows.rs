@@ -263,7 +263,12 @@ fn changes<'a>(batch: &'a RayBatch, occluders: &'a Occluders<'a>) -> Vec<Change<
         ("the shadow ray ends at .75 r", 0.75, 0.0),
         ("the shadow ray ends at .5 r", 0.5, 0.0),
         ("the shadow ray ends at .25 r", 0.25, 0.0),
+        ("the shadow ray ends at .5", 0.0, 0.5),
         ("the shadow ray ends at 1", 0.0, 1.0),
+        ("the shadow ray ends at 2", 0.0, 2.0),
+        ("the shadow ray ends at 3", 0.0, 3.0),
+        ("the shadow ray ends at 5", 0.0, 5.0),
+        ("the shadow ray ends at 10", 0.0, 10.0),
         ("the shadow ray ends at 1 short of the light", 1.0, -1.0),
         ("the shadow ray ends at .1 short of the light", 1.0, -0.1),
     ] {
@@ -278,17 +283,25 @@ fn changes<'a>(batch: &'a RayBatch, occluders: &'a Occluders<'a>) -> Vec<Change<
         lit(blocks(&Ray::segment(p.position, w, eps, p.distance * p.distance)))
     };
     changes.push(("the shadow ray ends at r^2", Box::new(squared)));
-    for (name, start) in [
-        ("the shadow ray starts .01 off", 0.01),
-        ("the shadow ray starts .02 off", 0.02),
-        ("the shadow ray starts .05 off", 0.05),
-        ("the shadow ray starts .1 off", 0.1),
-        ("the shadow ray starts .2 off", 0.2),
-        ("the shadow ray starts .5 off", 0.5),
-        ("the shadow ray starts 1 off", 1.0),
+    // Its start: in the scene's units, or of the light's distance.
+    for (name, times, start) in [
+        ("the shadow ray starts .01 off", 0.0, 0.01),
+        ("the shadow ray starts .02 off", 0.0, 0.02),
+        ("the shadow ray starts .05 off", 0.0, 0.05),
+        ("the shadow ray starts .1 off", 0.0, 0.1),
+        ("the shadow ray starts .2 off", 0.0, 0.2),
+        ("the shadow ray starts .5 off", 0.0, 0.5),
+        ("the shadow ray starts 1 off", 0.0, 1.0),
+        ("the shadow ray starts at .01 r", 0.01, 0.0),
+        ("the shadow ray starts at .02 r", 0.02, 0.0),
+        ("the shadow ray starts at .05 r", 0.05, 0.0),
+        ("the shadow ray starts at .1 r", 0.1, 0.0),
+        ("the shadow ray starts at .2 r", 0.2, 0.0),
+        ("the shadow ray starts at .5 r", 0.5, 0.0),
     ] {
         let light = move |index: usize| {
             let (p, w) = (&batch.points[index], batch.to_light(index));
+            let start = times * p.distance + start;
             lit(blocks(&Ray::segment(p.position, w, start, 0.999 * p.distance)))
         };
         changes.push((name, Box::new(light)));

@@ -83,6 +83,53 @@ fn known_factors_are_named() {
     assert!(unshadowed(|_, _| 0.0).hint.contains("is 0"));
 }
 
+#[test]
+fn a_constant_beside_the_distance_or_on_top_is_a_slip() {
+    let squared = |p: &SurfacePoint| f64::from(p.distance).powi(2);
+    let softened = unshadowed(|_, p| squared(p) / (1.0 + squared(p)));
+    assert_eq!((softened.error, softened.mistake.as_str()), (0.02, "1 + r^2 in place of r^2"));
+    // 0.05 on top of each channel, whatever the light.
+    let batch = batch();
+    let values: Vec<[f32; 3]> =
+        answers(&batch, |_, _| 1.0).into_iter().map(|v| v.map(|v| v + 0.05)).collect();
+    let of =
+        |index: usize, shading: &Shading| batch.witnessed(index, shading, &|_, _| [1.0, 0.5, 0.25]);
+    let answer = Unshadowed { witness: "constant", of: &of, values: &values, black_below: true };
+    let (handout, changes) = (Convention::default(), changes::integrator_changes());
+    let added = judge_unshadowed(&batch, &[answer], &handout, &changes);
+    assert_eq!(added.mistake, "a constant is added");
+    assert!((added.error - 0.02).abs() < 1e-3, "{}", added.error);
+}
+
+#[test]
+fn a_shadow_ray_that_starts_or_ends_by_another_constant_is_a_slip() {
+    let batch = batch();
+    // What is in shadow has an occluder just before a tenth of its way, or just after; what is lit has one behind the
+    // light, beyond 5 or before.
+    let occluder = |index: usize| match index {
+        index if index < 40 => 2.5 + (index % 7) as f32,
+        index if index.is_multiple_of(2) => 0.105 * batch.points[index].distance,
+        index => 0.095 * batch.points[index].distance,
+    };
+    let blocker = |ray: &Ray| {
+        let t = occluder(ray.origin.x.round() as usize);
+        (ray.min_t..ray.max_t).contains(&t).then_some(1)
+    };
+    let occluders = Occluders { blocker: &blocker, is_phong: &|_| false };
+    let without = answers(&batch, |_, _| 1.0);
+    let judge = |is_dark: &dyn Fn(usize, f32) -> bool| {
+        let seen =
+            |index: usize, p: &SurfacePoint| f64::from(u8::from(!is_dark(index, p.distance)));
+        let with = answers(&batch, seen);
+        let shaded = (without.as_slice(), without.as_slice());
+        judge_shadows(&batch, &witness, (&with, &without), shaded, &occluders)
+    };
+    let late = judge(&|index, r| occluder(index) > 0.1 * r && index >= 40);
+    assert_eq!((late.error, late.mistake.as_str()), (0.02, "the shadow ray starts at .1 r"));
+    let fixed = judge(&|index, _| occluder(index) < 5.0);
+    assert_eq!((fixed.error, fixed.mistake.as_str()), (0.02, "the shadow ray ends at 5"));
+}
+
 const NOTHING: Occluders = Occluders { blocker: &|_| None, is_phong: &|_| false };
 
 fn shadows(with: impl Fn(usize) -> f64, without: impl Fn(usize) -> f64) -> Check {

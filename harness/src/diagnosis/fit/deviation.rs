@@ -294,6 +294,10 @@ fn of_light(formula: &Formula, say: Say) {
     }
     match formula.incident {
         Incident::Right => {}
+        Incident::Unit => {
+            let words = "the light's intensity is missing".to_owned();
+            say(Of::All, "intensity", number(0.0), words);
+        }
         Incident::Softened(k) => {
             let words = format!("the light falls off with 1 / (r^2 + {k:.3}), not 1 / r^2");
             say(Of::All, "r2_plus", number(k), words);

@@ -12,6 +12,7 @@ impl Search<'_> {
         let right = Formula::RIGHT;
         let mut all = Vec::new();
         all.extend(ORDERS.iter().map(|(order, _)| Formula { order: *order, ..right }));
+        all.push(Formula { incident: Incident::Unit, ..right });
         let witness = |s: &&Sample| matches!(s.reflector, Reflector::Witness(_));
         if self.fitted.iter().any(witness) {
             let lengths = [1.0, -1.0, 2.0, -2.0];

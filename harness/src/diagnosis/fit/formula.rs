@@ -136,6 +136,8 @@ pub enum After {
 pub enum Incident {
     /// I / r^2.
     Right,
+    /// 1 / r^2, whatever the light's intensity.
+    Unit,
     /// I / (r^2 + k).
     Softened(f64),
     /// I / r^2, cut here.
@@ -240,6 +242,7 @@ impl Formula {
             let intensity = sample.intensity[self.order[c]];
             match self.incident {
                 Incident::Right => intensity / (r * r),
+                Incident::Unit => 1.0 / (r * r),
                 Incident::Softened(k) => intensity / (r * r + k),
                 Incident::Clamp(most) => (intensity / (r * r)).min(most),
             }
