@@ -75,8 +75,9 @@ fn a_number_or_name_means_the_attempt_that_counts() {
     let (code, said) =
         umbra(&place, &root, &["override", FIRST_SLUG, "1.4", "15", "--reason", "x"]);
     assert_eq!(code, Some(0), "{said}");
-    let expected =
-        format!("no report shows it: this submission does not count, {SECOND_SLUG} does");
+    let expected = format!(
+        "no report shows it: the submission {FIRST_SLUG} does not count, {SECOND_SLUG} does"
+    );
     assert!(said.contains(&expected), "{said}");
     assert_eq!(report(&place)["submissions"][0]["points"], 5.0);
     // One that counts for less is named.
@@ -104,6 +105,50 @@ fn a_number_or_name_means_the_attempt_that_counts() {
     assert!(said.contains("0 rise, 1 fall, 1 stay"), "{said}");
     assert!(!said.contains("counts"), "{said}");
     assert!(page(&format!("out/{FIRST_SLUG}/report.html")).contains("does not count:"));
+}
+
+const THIRD: &str = "1-9 - Ann Lee - Oct 6, 2019 1030 PM/a2.zip";
+const THIRD_SLUG: &str = "1-9---Ann-Lee---Oct-6--2019-1030-PM-a2";
+
+#[test]
+fn a_decision_on_a_student_is_on_each_of_their_attempts() {
+    let (place, root) = twice(|_| ());
+    let set = |word: &str, points: &str| {
+        let (code, said) =
+            umbra(&place, &root, &["override", word, "1.4", points, "--reason", "x"]);
+        assert_eq!(code, Some(0), "{said}");
+        said
+    };
+    let ann = || {
+        let row = &report(&place)["submissions"][0];
+        (text(&row["slug"]).to_owned(), row["points"].as_f64().unwrap())
+    };
+    // Of two attempts; the last decision counts for a third one, too.
+    set("Ann Lee", "7");
+    set("260000104", "5");
+    let kept = fs::read_to_string(place.at("out/overrides.toml")).unwrap();
+    assert_eq!(kept.matches("student = \"260000104\"").count(), 2, "{kept}");
+    let files = [(FIRST, ""), (SECOND, " "), (THIRD, "  ")];
+    let configs =
+        files.map(|(name, space)| (name, config("Ann", "Lee", &format!("{space}260000104"))));
+    let files = configs.each_ref().map(|(name, config)| (*name, config.as_str()));
+    place.put("wed.zip", &download(&files));
+    place.grade(&root, &["wed.zip"]);
+    assert_eq!(ann(), (THIRD_SLUG.to_owned(), 5.0));
+    // What lowers the best attempt is not without effect, as the other one is worth as little.
+    place.grade(&root, &["wed.zip", "--attempt", "best"]);
+    let said = set("260000104", "2");
+    assert!(said.contains("the reports show it"), "{said}");
+    assert_eq!(ann().1, 2.0);
+    // By its folder it is on one attempt, and another may count by then.
+    let said = set(THIRD_SLUG, "3");
+    assert!(said.contains("the reports show it"), "{said}");
+    assert_eq!(ann(), (THIRD_SLUG.to_owned(), 3.0));
+    let said = set(THIRD_SLUG, "0");
+    assert_eq!((ann().0 != THIRD_SLUG, ann().1), (true, 2.0));
+    let expected =
+        format!("no report shows it: the submission {THIRD_SLUG} does not count, {} does", ann().0);
+    assert!(said.contains(&expected), "{said}");
 }
 
 #[test]

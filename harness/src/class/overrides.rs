@@ -27,7 +27,7 @@ pub const OVERRIDES: &str = "overrides.toml";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Decision {
-    /// The student's number by the class list or the platform, or the submission's folder in the report.
+    /// The student's number, account or name by the class list or the platform, or the submission's folder.
     pub student: String,
     /// The part that is set; none where what was left to the instructor is confirmed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -226,9 +226,10 @@ impl Overrides {
         unused.collect()
     }
 
-    /// The last fix of a submission, if there is one.
+    /// The last fix of a submission, if there is one; of several attempts' fixes, that of this one.
     pub fn mend(&self, subject: &Subject) -> Option<&Decision> {
-        self.of(subject).rfind(|own| own.patch.is_some())
+        let fixes = || self.of(subject).filter(|own| own.patch.is_some());
+        fixes().rfind(|own| own.evidence == subject.digest).or_else(|| fixes().next_back())
     }
 
     /// Applies to a grade what was decided on its submission, and notes it in the remarks. Fixes are no matter of

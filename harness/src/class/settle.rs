@@ -94,7 +94,7 @@ pub struct Class {
     pub unopened: Vec<String>,
     /// Decisions on points whose evidence has changed since.
     pub stale: Vec<String>,
-    /// Decisions on submissions that are not in this report.
+    /// Decisions on submissions that are not in this report or do not count.
     pub unused: Vec<String>,
     /// Counting attempts that earn less than another attempt of the student, such as one after the cut-off.
     pub worse: Vec<String>,

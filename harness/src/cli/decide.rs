@@ -94,7 +94,7 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
         columns::points(*points),
         columns::range([least, most])
     );
-    said(&decision.report.path, &graded)
+    said(&decision.report.path, &graded, &report)
 }
 
 /// Confirms what was left to the instructor.
@@ -105,7 +105,7 @@ pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     let evidence = fingerprint(&graded.subject(), &graded.entry.grade.parts);
     let report = decision.add(kept, &decision.of(&graded, evidence)?)?;
     println!("{}: {}", harmless(&graded.entry.who()), confirmed(&graded, &report));
-    said(&decision.report.path, &graded)
+    said(&decision.report.path, &graded, &report)
 }
 
 /// The last decision on a part, or on the whole, as the report applies it beside all others; none where the submission
@@ -133,13 +133,11 @@ fn confirmed(graded: &Graded, report: &BatchReport) -> String {
     }
 }
 
-/// Says where a decision is kept, and whether it shows.
-pub fn said(output: &Path, graded: &Graded) -> anyhow::Result<u8> {
-    let shown = match &graded.instead {
+/// Says where a decision is kept, and whether the report that was made by it shows it.
+pub fn said(output: &Path, graded: &Graded, report: &BatchReport) -> anyhow::Result<u8> {
+    let shown = match graded.not_counting(report) {
         None => "; the reports show it".to_owned(),
-        Some(instead) => {
-            format!(", but no report shows it: this submission does not count{}", harmless(instead))
-        }
+        Some(why) => format!(", but no report shows it: {why}"),
     };
     println!(
         "kept in {}{shown}; `umbra regrade --undo --report {}` takes it back",
@@ -263,7 +261,10 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
             "decisions whose evidence has changed: make them again or delete them",
             class.stale.clone(),
         ),
-        ("decisions on submissions that are not in this report", class.unused.clone()),
+        (
+            "decisions on submissions that are not in this report or do not count",
+            class.unused.clone(),
+        ),
         ("lateness unknown: `submitted` in matches.toml says it", late.collect()),
         ("not wholly judged: grade again", ranges.collect()),
     ] {

@@ -86,7 +86,7 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
     println!("{}", summary(&before.report, &after.report));
     for line in after.report.class.iter().flat_map(|class| &class.unused) {
         println!(
-            "warning: decision on a submission that is not in this report: {}",
+            "warning: decision on a submission that is not in this report or does not count: {}",
             harmless(line)
         );
     }

@@ -33,7 +33,7 @@ pub(super) fn class(page: &mut Page, report: &BatchReport, class: &Class) {
         (format!("without a submission{list}"), Style::Open, missing.collect()),
         ("decisions whose evidence has changed".to_owned(), Style::Bad, class.stale.clone()),
         (
-            "decisions on submissions that are not in this report".to_owned(),
+            "decisions on submissions that are not in this report or do not count".to_owned(),
             Style::Bad,
             class.unused.clone(),
         ),
