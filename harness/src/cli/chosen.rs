@@ -96,6 +96,8 @@ pub fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
         ),
     };
     let attempts = owners.folders(&owners.attempts(at)).into_iter().map(str::to_owned).collect();
-    let entry = kept.graded(output, &claims[at].slug)?;
+    let mut entry = kept.graded(output, &claims[at].slug)?;
+    // Messages name the student as all reports do.
+    entry.standing.student = owners.student(at).cloned();
     Ok(Graded { entry, key: owners.key(at, wanted), attempts })
 }
