@@ -97,9 +97,20 @@ fn a_number_or_name_means_the_attempt_that_counts() {
     let old = page(&format!("out/{FIRST_SLUG}/report.html"));
     assert!(old.contains(&format!("does not count: {SECOND_SLUG} does.")), "{old}");
     assert!(!page(&format!("out/{SECOND_SLUG}/report.html")).contains("does not count:"));
+    // Which attempt counts is the whole class's.
+    let only = ["A2 Download.zip", "--only", "Bo Ode", "--attempt", "first"];
+    let (code, said) = umbra(
+        &place,
+        &root,
+        &[&["grade", "--perturb", "off", "--isolation", "reduced"], &only[..]].concat(),
+    );
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("--attempt: it is the whole class's"), "{said}");
+    assert_eq!(report(&place)["submissions"][0]["points"], 5.0);
     // Its other attempt instead is one student's fall or rise.
     let (said, _) = place.grade(&root, &["A2 Download.zip", "--attempt", "first"]);
     assert!(said.contains(&format!("{FIRST}, not {SECOND}")), "{said}");
+    assert!(said.contains("--attempt first instead of latest, for the whole class"), "{said}");
     let (code, said) = umbra(&place, &root, &["regrade", "--undo"]);
     assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("0 rise, 1 fall, 1 stay"), "{said}");

@@ -32,6 +32,13 @@ pub enum Attempt {
     First,
 }
 
+impl std::fmt::Display for Attempt {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let value = clap::ValueEnum::to_possible_value(self);
+        f.write_str(value.as_ref().map_or("", |value| value.get_name()))
+    }
+}
+
 /// By what the standing of students is settled.
 pub struct Deciding<'a> {
     /// The class list, if there is one.

@@ -400,6 +400,16 @@ impl<'a> Batch<'a> {
                 self.slice.is_none() || self.attempt.is_none_or(|own| own == attempt),
                 "--attempt: all tasks of a partition choose the same one, which the first of them pinned"
             );
+            ensure!(
+                self.only.is_empty() || self.attempt.is_none_or(|own| own == attempt),
+                "--attempt: it is the whole class's, and with --only the others keep their grades; hint: leave out one of \
+                 the two"
+            );
+            if let Some(own) = self.attempt.filter(|own| *own != attempt) {
+                eprintln!(
+                    "umbra: --attempt {own} instead of {attempt}, for the whole class from now on"
+                );
+            }
             decided.attempt = self.attempt.unwrap_or(attempt);
         }
         decided.check(self.output)?;
