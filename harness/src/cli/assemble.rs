@@ -13,12 +13,12 @@ use anyhow::{Context as _, bail, ensure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
+use super::changes::changes;
 use super::class::{self, WORK};
 use super::outputs::shell_path;
 use crate::class::jplag;
 use crate::class::mending;
 use crate::class::overrides::{Applied, Subject};
-use crate::class::pins::Change;
 use crate::class::{
     Claim, Collected, Deciding, Decisions, Kind, Label, Owners, Pins, Roster, settle,
 };
@@ -659,78 +659,4 @@ pub fn settled(
     let alike = output.join(report::INSTRUCTOR).join(report::LIKENESS);
     let has_alike = alike.join(report::HTML_FILE).is_file();
     Ok(Settled { report: BatchReport { released, has_alike, ..settled }, records, shared })
-}
-
-/// Whether a submission of two reports is one student's in both.
-pub fn is_same(own: &SubmissionReport, other: &SubmissionReport) -> bool {
-    own.record.slug == other.record.slug && own.standing.student == other.standing.student
-}
-
-/// The attempt in `of` of the student whose attempt `own` is in `with` alone; that one is not in `with`.
-pub fn other_attempt<'a>(
-    own: &SubmissionReport,
-    of: &'a BatchReport,
-    with: &BatchReport,
-) -> Option<&'a SubmissionReport> {
-    let student = own.standing.student.as_ref();
-    let label = own.standing.label.as_ref().map(Label::person);
-    let is_theirs = |other: &&SubmissionReport| match student {
-        Some(student) => other.standing.student.as_ref() == Some(student),
-        None => label.is_some() && other.standing.label.as_ref().map(Label::person) == label,
-    };
-    // One that was nobody's, or another's, is not theirs in `with`.
-    let gone = |other: &&SubmissionReport| !with.entries.iter().any(|own| is_same(own, other));
-    of.entries.iter().filter(gone).find(is_theirs)
-}
-
-/// Points that are others in `after`, by student and part; an attempt that counts instead of another is the student's.
-pub fn changes(before: &BatchReport, after: &BatchReport) -> Vec<Change> {
-    let of = |report: &BatchReport, slug: &str| {
-        report.entries.iter().find(|entry| entry.record.slug == slug).cloned()
-    };
-    let mut slugs: Vec<&str> =
-        before.entries.iter().chain(&after.entries).map(|own| own.record.slug.as_str()).collect();
-    slugs.sort_by_key(|slug| slug.to_lowercase());
-    slugs.dedup();
-    let mut changes = Vec::new();
-    for slug in slugs {
-        let (old, new) = (of(before, slug), of(after, slug));
-        // Another attempt of the same student is told in one line.
-        let other = |own: &SubmissionReport, of: &BatchReport, with: &BatchReport| {
-            other_attempt(own, of, with).cloned()
-        };
-        let (old, new) = match (old, new) {
-            (None, Some(new)) => (other(&new, before, after), Some(new)),
-            (Some(old), Some(new)) if !is_same(&old, &new) => {
-                (other(&new, before, after), Some(new))
-            }
-            (Some(old), None) if other(&old, after, before).is_some() => continue,
-            both => both,
-        };
-        let who = new.as_ref().or(old.as_ref()).map(SubmissionReport::who).unwrap_or_default();
-        let mut add = |part: &str, before: Option<[f64; 2]>, after: Option<[f64; 2]>| {
-            if before != after {
-                let (slug, part, who) = (slug.to_owned(), part.to_owned(), who.clone());
-                changes.push(Change { slug, who, part, before, after });
-            }
-        };
-        let total = |own: &Option<SubmissionReport>| {
-            own.as_ref().map(|own| [own.grade.points, own.grade.points_max])
-        };
-        if let (Some(old), Some(new)) = (&old, &new) {
-            let ids = old.grade.parts.iter().chain(&new.grade.parts).map(|part| part.id.as_str());
-            let mut ids: Vec<&str> = ids.collect();
-            ids.sort_unstable();
-            ids.dedup();
-            for id in ids {
-                let points = |own: &SubmissionReport| {
-                    let part = own.grade.parts.iter().find(|part| part.id == id);
-                    part.map(|part| [part.points, part.points_max])
-                };
-                add(id, points(old), points(new));
-            }
-        }
-        add("", total(&old), total(&new));
-    }
-    changes
 }

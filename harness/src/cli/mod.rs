@@ -3,6 +3,7 @@
 mod assemble;
 mod batch;
 mod bless;
+mod changes;
 mod check;
 mod choices;
 mod chosen;
