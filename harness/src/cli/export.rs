@@ -15,7 +15,7 @@ use super::class;
 use super::earlier::{Report, Row};
 use super::outputs::shell_path;
 use super::report_folder::ReportFolder;
-use crate::class::export::{Points, grade_book};
+use crate::class::export::{Points, check_keys, grade_book};
 use crate::class::feedback::{self, Feedback};
 use crate::class::overrides::OVERRIDES;
 use crate::class::{Kind, MATCHES, Roster, Student};
@@ -303,6 +303,7 @@ fn of_platform(roster: Option<Roster>, kind: Kind, output: &Path) -> anyhow::Res
         kind.title(),
         roster.kind.title()
     );
+    check_keys(&roster).map_err(anyhow::Error::msg)?;
     Ok(roster)
 }
 
@@ -396,7 +397,12 @@ fn book(
     let item = item.item.as_ref().unwrap_or(&report.assignment.name);
     let book = grade_book(&roster, item, &graded).map_err(anyhow::Error::msg)?;
     left.extend(book.excused.iter().map(|who| format!("{who}: excused, says {}", kind.title())));
-    let written = graded.len() - book.excused.len();
+    let no_key =
+        |who: &String| format!("{who}: no column says by what {} knows them", kind.title());
+    left.extend(book.unknown.iter().map(no_key));
+    let is_written =
+        |who: &String| ![&book.excused, &book.unknown].iter().any(|own| own.contains(who));
+    let written = graded.iter().map(|own| own.student.who()).filter(is_written).count();
     ensure!(written > 0, "no grade to export: {}", harmless(&left.join("; ")));
     said.push(format!("{}: {} for {}", file.display(), count(written, "grade"), kind.title()));
     let out_of = report.submissions.first().map_or(0.0, |row| row.out_of);
