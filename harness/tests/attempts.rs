@@ -146,6 +146,13 @@ fn a_decision_on_a_student_is_on_each_of_their_attempts() {
     place.put("wed.zip", &download(&files));
     place.grade(&root, &["wed.zip"]);
     assert_eq!(ann(), (THIRD_SLUG.to_owned(), 5.0));
+    // An export says that it was made on another one.
+    let (code, said) = umbra(&place, &root, &["export", "book.csv", "--format", "brightspace"]);
+    assert_eq!(code, Some(0), "{said}");
+    let expected = format!(
+        "warning: 1 decision whose evidence has changed since:\n  {THIRD}: part 1.4 was set"
+    );
+    assert!(said.contains(&expected), "{said}");
     // What lowers the best attempt is not without effect, as the other one is worth as little.
     place.grade(&root, &["wed.zip", "--attempt", "best"]);
     let said = set("260000104", "2");

@@ -18,7 +18,7 @@ use super::report_folder::ReportFolder;
 use crate::class::export::{Points, check_keys, grade_book};
 use crate::class::feedback::{self, Feedback};
 use crate::class::overrides::OVERRIDES;
-use crate::class::{Kind, MATCHES, Roster, Student};
+use crate::class::{Class, Kind, MATCHES, Roster, Student};
 use crate::columns::count;
 use crate::files::{hex, write_whole};
 use crate::report::{self, harmless};
@@ -118,6 +118,11 @@ pub fn export(arguments: &ExportArguments) -> anyhow::Result<u8> {
             !report.submissions.is_empty(),
             "the submission {slug} does not count, so there is nothing to export"
         );
+        let own = |line: &String| report.submissions.iter().any(|row| line.starts_with(&row.name));
+        if let Some(class) = &mut report.class {
+            class.stale.retain(own);
+            class.unused.clear();
+        }
     }
     write(*format, file, output, item, &report)?;
     Ok(super::EXIT_OK)
@@ -192,8 +197,27 @@ fn write(
     };
     write_whole(file, &bytes).with_context(|| format!("cannot write {}", file.display()))?;
     note(file, &bytes, output)?;
+    said.extend(report.class.iter().flat_map(to_look_at));
     said.iter().for_each(|line| println!("{line}"));
     Ok(())
+}
+
+/// What the instructor decided and may have to decide again, whatever takes the grades.
+fn to_look_at(class: &Class) -> Vec<String> {
+    let kinds = [
+        (count(class.stale.len(), "decision"), "whose evidence has changed since", &class.stale),
+        (
+            count(class.unused.len(), "decision"),
+            "on what is not in this report or does not count",
+            &class.unused,
+        ),
+    ];
+    let mut said = Vec::new();
+    for (number, what, lines) in kinds.into_iter().filter(|(.., lines)| !lines.is_empty()) {
+        said.push(format!("warning: {number} {what}:"));
+        said.extend(lines.iter().map(|line| format!("  {}", harmless(line))));
+    }
+    said
 }
 
 /// Digests of what was exported, by path.
