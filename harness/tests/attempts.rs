@@ -153,6 +153,11 @@ fn a_decision_on_a_student_is_on_each_of_their_attempts() {
         "warning: 1 decision whose evidence has changed since:\n  {THIRD}: part 1.4 was set"
     );
     assert!(said.contains(&expected), "{said}");
+    // A report without held-back scenes stays so.
+    let (code, said) = umbra(&place, &root, &["grade", "wed.zip", "--isolation", "reduced"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(report(&place)["held_back"], Value::Null);
+    assert_eq!(report(&place)["class"]["incomparable"], json!([]));
     // What lowers the best attempt is not without effect, as the other one is worth as little.
     place.grade(&root, &["wed.zip", "--attempt", "best"]);
     let said = set("260000104", "2");

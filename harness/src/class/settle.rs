@@ -99,6 +99,8 @@ pub struct Class {
     pub not_counted: Vec<String>,
     /// Zips that look like the download of a class, among other archives: neither opened nor graded.
     pub unopened: Vec<String>,
+    /// Submissions that were graded with other scenes, limits or another version of Umbra than in the last run.
+    pub incomparable: Vec<String>,
     /// Decisions on points whose evidence has changed since.
     pub stale: Vec<String>,
     /// Decisions on submissions that are not in this report or do not count.
@@ -106,6 +108,10 @@ pub struct Class {
     /// Counting attempts that earn less than another attempt of the student, such as one after the cut-off.
     pub worse: Vec<String>,
 }
+
+/// Why submissions of one report are not comparable, for a list of them.
+pub const INCOMPARABLE: &str = "graded with other scenes, limits or another version of Umbra than the last run, so \
+                                not comparable: grade them again";
 
 /// A student without a submission that counts.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -465,7 +471,14 @@ fn charge(
 impl Class {
     /// Whether there is anything to say.
     pub fn is_quiet(&self) -> bool {
-        let decisions = [&self.not_counted, &self.unopened, &self.stale, &self.unused, &self.worse];
+        let decisions = [
+            &self.not_counted,
+            &self.unopened,
+            &self.incomparable,
+            &self.stale,
+            &self.unused,
+            &self.worse,
+        ];
         self.missing.is_empty()
             && self.undecided.is_empty()
             && decisions.iter().all(|lines| lines.is_empty())

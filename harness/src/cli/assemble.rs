@@ -38,10 +38,6 @@ const FILE: &str = "batch.json";
 /// The file that says of which content the times in `matches.toml` were said, in the instructor's folder.
 const TIMES: &str = "times.json";
 
-/// The remark on a submission that was judged differently from the others of its class.
-const OTHER_CONDITIONS: &str = "graded before with other scenes, limits or another version of Umbra: \
-                                not comparable, grade it again";
-
 /// How often something that takes long says how far it is.
 const PACE: Duration = Duration::from_secs(2);
 
@@ -568,11 +564,7 @@ pub fn settled(
         progress.step();
         let mut record = earlier.whole()?;
         shared.judge(&mut record);
-        let SubmissionReport { record, grade: mut original, standing } =
-            graded(record, &stated.rules);
-        if !earlier.comparable {
-            original.remarks.push(OTHER_CONDITIONS.to_owned());
-        }
+        let SubmissionReport { record, grade: original, standing } = graded(record, &stated.rules);
         let mut grade = original.clone();
         let subject =
             Subject { slug: &record.slug, digest: &record.digest, evidence: &record.evidence };
@@ -641,6 +633,9 @@ pub fn settled(
         let others = others.map(|seen| seen.name.clone());
         let known: Vec<String> = others.filter(|name| !standing.set_aside.contains(name)).collect();
         standing.set_aside.extend(known);
+        if !records[at].comparable {
+            class.incomparable.push(claims[at].name.clone());
+        }
         let stale = decisions[at].iter().filter(|own| own.stale);
         class.stale.extend(stale.map(|own| format!("{}: {}", claims[at].name, own.words())));
         standing.decisions.clone_from(&decisions[at]);

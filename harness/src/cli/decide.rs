@@ -9,8 +9,8 @@ use super::chosen::{Graded, one};
 use super::earlier::{Report, Row};
 use super::outputs::shell_path;
 use super::report_folder::ReportFolder;
-use crate::class::Decisions;
 use crate::class::overrides::{Applied, Decision, OVERRIDES, entry, fingerprint};
+use crate::class::{Decisions, INCOMPARABLE};
 use crate::columns;
 use crate::files::write_whole;
 use crate::report::{self, BatchReport, harmless};
@@ -267,6 +267,7 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
         ),
         ("lateness unknown: `submitted` in matches.toml says it", late.collect()),
         ("not wholly judged: grade again", ranges.collect()),
+        (INCOMPARABLE, class.incomparable.clone()),
     ] {
         waits |= !lines.is_empty();
         list(title, &lines);

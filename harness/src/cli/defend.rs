@@ -12,6 +12,7 @@ use super::outputs::at_root;
 use super::report_folder::ReportFolder;
 use super::{EXIT_OK, class, terminal};
 use crate::class::overrides::Subject;
+use crate::held_back::in_words;
 use crate::program::graded;
 use crate::report::{self, Look, SubmissionReport};
 use crate::rubric::{self, Rules};
@@ -56,7 +57,7 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
         Some(_) => Location::Here(source.canonicalize().unwrap_or(source)),
         None => Location::of(output, &slug),
     };
-    let seed = report.held_back.as_ref().map_or("off".to_owned(), |own| own.seed.to_string());
+    let seed = in_words(report.held_back.as_ref().map(|own| own.seed));
     println!(
         "  the instructor, on all:  umbra grade {} --perturb {seed} --report ANOTHER{}",
         location.arguments(),

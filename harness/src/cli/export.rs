@@ -18,7 +18,7 @@ use super::report_folder::ReportFolder;
 use crate::class::export::{Points, check_keys, grade_book};
 use crate::class::feedback::{self, Feedback};
 use crate::class::overrides::OVERRIDES;
-use crate::class::{Class, Kind, MATCHES, Roster, Student};
+use crate::class::{Class, INCOMPARABLE, Kind, MATCHES, Roster, Student};
 use crate::columns::count;
 use crate::files::{hex, write_whole};
 use crate::report::{self, harmless};
@@ -120,6 +120,7 @@ pub fn export(arguments: &ExportArguments) -> anyhow::Result<u8> {
         );
         let own = |line: &String| report.submissions.iter().any(|row| line.starts_with(&row.name));
         if let Some(class) = &mut report.class {
+            class.incomparable.retain(own);
             class.stale.retain(own);
             class.unused.clear();
         }
@@ -204,17 +205,15 @@ fn write(
 
 /// What the instructor decided and may have to decide again, whatever takes the grades.
 fn to_look_at(class: &Class) -> Vec<String> {
+    let unused = "on what is not in this report or does not count";
     let kinds = [
-        (count(class.stale.len(), "decision"), "whose evidence has changed since", &class.stale),
-        (
-            count(class.unused.len(), "decision"),
-            "on what is not in this report or does not count",
-            &class.unused,
-        ),
+        ("submission", INCOMPARABLE, &class.incomparable),
+        ("decision", "whose evidence has changed since", &class.stale),
+        ("decision", unused, &class.unused),
     ];
     let mut said = Vec::new();
-    for (number, what, lines) in kinds.into_iter().filter(|(.., lines)| !lines.is_empty()) {
-        said.push(format!("warning: {number} {what}:"));
+    for (noun, what, lines) in kinds.into_iter().filter(|(.., lines)| !lines.is_empty()) {
+        said.push(format!("warning: {} {what}:", count(lines.len(), noun)));
         said.extend(lines.iter().map(|line| format!("  {}", harmless(line))));
     }
     said
