@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::Once;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail, ensure};
@@ -22,11 +23,12 @@ use crate::class::overrides::{Applied, Subject};
 use crate::class::{
     Claim, Collected, Deciding, Decisions, Kind, Label, Owners, Pins, Roster, settle,
 };
+use crate::columns::count;
 use crate::files::{files_below, hex, write_new, write_whole};
 use crate::grading::{Record, RecordCache, Shared, StoredRecord};
 use crate::held_back::HeldBack;
 use crate::program::graded;
-use crate::report::{self, BatchReport, ReportError, SubmissionReport, outline};
+use crate::report::{self, BatchReport, ReportError, SubmissionReport, harmless, outline};
 use crate::rubric::{self, Grade};
 
 /// The file that is there once held-back scenes are released, in the instructor's folder.
@@ -217,6 +219,69 @@ impl Found {
         Ok(begun)
     }
 
+    /// Removes what tasks of a partition found where all of that is graded under the same conditions.
+    ///
+    /// # Errors
+    /// When a file cannot be read or removed.
+    pub fn supersede(output: &Path, conditions: &str) -> anyhow::Result<()> {
+        let instructor = output.join(report::INSTRUCTOR);
+        let is_graded = |seen: &Seen| {
+            RecordCache::conditions_of(&instructor.join(&seen.slug)).as_deref() == Some(conditions)
+        };
+        for (file, begun) in Self::begun(output)? {
+            if begun.counting().all(is_graded) {
+                std::fs::remove_file(&file)
+                    .with_context(|| format!("cannot remove {}", file.display()))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The submissions that must have a record.
+    pub fn counting(&self) -> impl Iterator<Item = &Seen> {
+        self.seen.iter().filter(|seen| !seen.aside && seen.empty.is_empty())
+    }
+
+    fn holds(&self, slug: &str) -> bool {
+        self.seen.iter().any(|seen| seen.slug == slug)
+    }
+
+    /// Says once what was graded since by runs that did not end, and is not in the report.
+    pub fn say_since(&self, output: &Path) {
+        static SAID: Once = Once::new();
+        let instructor = output.join(report::INSTRUCTOR);
+        let is_graded =
+            |slug: &String| RecordCache::conditions_of(&instructor.join(slug)).is_some();
+        let since = class::folders(output).into_iter().filter(|slug| !self.holds(slug));
+        let since: Vec<String> = since.filter(is_graded).collect();
+        if !since.is_empty() {
+            SAID.call_once(|| {
+                eprintln!(
+                    "umbra: {} graded since by a run that did not end, and not in the report: {}; the same `umbra grade` \
+                     as then adds them",
+                    count(since.len(), "submission"),
+                    harmless(&class::some(&since))
+                );
+            });
+        }
+    }
+
+    /// Adds submissions that were graded by runs that did not end.
+    fn add(&mut self, records: &[StoredRecord], output: &Path) {
+        for StoredRecord { record, .. } in records {
+            if self.holds(&record.slug) {
+                continue;
+            }
+            let (label, slug) = (class::label(output, &record.slug), record.slug.clone());
+            let folder = label.as_ref().map_or("", |own| own.submission.as_str());
+            let name = match record.name.starts_with(folder) {
+                true => record.name.clone(),
+                false => format!("{folder}/{}", record.name),
+            };
+            self.seen.push(Seen { slug, name, label, ..Seen::default() });
+        }
+    }
+
     /// Keeps it for later runs.
     ///
     /// # Errors
@@ -226,6 +291,22 @@ impl Found {
         write_whole(&file, &serde_json::to_vec_pretty(self)?)
             .with_context(|| format!("cannot write {}", file.display()))
     }
+}
+
+/// Makes sure that no tasks of a partition graded what the report lacks.
+///
+/// # Errors
+/// When some did, or that cannot be told.
+pub fn ensure_merged(output: &Path) -> anyhow::Result<()> {
+    let begun = Found::begun(output)?;
+    let Some((file, _)) = begun.first() else { return Ok(()) };
+    bail!(
+        "{}: the tasks of a partition are not merged yet; hint: umbra merge --report {}; if no task will run any more, \
+         grade the same submissions without --partition, or delete {}",
+        output.display(),
+        shell_path(output),
+        file.display()
+    );
 }
 
 /// A report's folder, as it was kept.
@@ -250,24 +331,20 @@ impl Kept {
             output.display()
         );
         let pins = Pins::read(&instructor)?;
+        ensure_merged(output)?;
         let Some(found) = Found::read(output)?.filter(|_| pins.current().is_some()) else {
-            ensure!(
-                Found::begun(output)?.is_empty(),
-                "{}: the tasks of a partition are not merged yet; hint: umbra merge --report {}",
-                output.display(),
-                shell_path(output)
-            );
             bail!(
                 "{}: expected the --report of an earlier `umbra grade` of this version; hint: grade once more",
                 output.display()
             );
         };
         let mut records = Vec::new();
-        for slug in class::folders(output) {
+        for slug in class::folders(output).into_iter().filter(|slug| found.holds(slug)) {
             let earlier = RecordCache::earlier(&instructor.join(&slug), &found.conditions)
                 .with_context(|| format!("{slug} cannot be settled; grade it again"))?;
             records.extend(earlier);
         }
+        found.say_since(output);
         found.name(&mut records);
         let roster = class::roster(None, output)?;
         Ok(Self { pins, found, roster, records })
@@ -434,6 +511,7 @@ pub fn finish(
     *pins = Pins::read(&instructor)?;
     let decided = &Decisions::read(output, decided.assignment.clone(), decided.attempt)?;
     found.join(Found::read(output)?.unwrap_or_default(), output);
+    found.add(&records, output);
     found.keep(output)?;
     let roster = class::roster(None, output)?;
     let settled = settled(output, decided, &found, roster.as_ref(), records)?;

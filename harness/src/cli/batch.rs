@@ -330,7 +330,12 @@ impl<'a> Batch<'a> {
                     );
                 }
                 join(self.output, &found, &mut records);
-                assemble::finish(self.output, pins, decided, found, records)?
+                let conditions = found.conditions.clone();
+                let report = assemble::finish(self.output, pins, decided, found, records)?;
+                if self.only.is_empty() {
+                    Found::supersede(self.output, &conditions)?;
+                }
+                report
             }
             _ => {
                 let rules = &context.assignment.rules;
