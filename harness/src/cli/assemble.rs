@@ -590,10 +590,13 @@ impl Settled {
     }
 }
 
-/// What submissions share, also according to JPlag.
+/// What submissions share, also according to JPlag, where it compared what they hold now.
 fn shared(output: &Path, records: &[StoredRecord]) -> anyhow::Result<Shared> {
     let near = jplag::kept(&output.join(report::INSTRUCTOR).join(report::LIKENESS))?;
-    let near = near.iter().map(|pair| (&pair.who, pair.similarity));
+    let own = |slug: &str| records.iter().find(|own| own.record.slug == slug);
+    let near =
+        near.iter().filter(|pair| pair.holds(|slug| Some(own(slug)?.record.digest.as_str())));
+    let near = near.map(|pair| (&pair.who, pair.similarity));
     Ok(Shared::of(records.iter().map(|earlier| &earlier.record)).with_near(near))
 }
 
