@@ -81,6 +81,11 @@ impl Standing {
     pub fn is_confirmed(&self) -> bool {
         self.decisions.iter().any(|own| own.decision.part.is_none() && !own.stale)
     }
+
+    /// Whether the class list says that the student has not submitted it.
+    pub fn is_draft(&self) -> bool {
+        self.student.as_ref().is_some_and(|student| student.draft)
+    }
 }
 
 /// What is known of the class as a whole.
@@ -237,6 +242,12 @@ pub fn settle(
                 Match::Student(at, by) => {
                     standing.student = Some(roster.students[at].clone());
                     by.clone_into(&mut standing.matched_by);
+                    if standing.is_draft() {
+                        let platform = roster.kind.title();
+                        grade.remarks.push(format!(
+                            "{platform} says that it is a draft, which was not submitted"
+                        ));
+                    }
                     person = format!("on the list {at}");
                     expected.insert(at, String::new());
                 }

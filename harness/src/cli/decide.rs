@@ -238,6 +238,8 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
         let private: Vec<&str> = private.map(String::as_str).collect();
         (!private.is_empty()).then(|| row(own, &private.join("; ")))
     });
+    let drafts = open().filter(|own| own.standing.is_draft());
+    let drafts = drafts.map(|own| row(own, "the student may still change it"));
     let unread = report.submissions.iter().filter(|own| own.is_unread());
     let unread = unread.map(|own| row(own, own.remarks.first().map_or("", String::as_str)));
     let late = report.submissions.iter().filter(|own| own.standing.time_unknown);
@@ -256,6 +258,7 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
         ("neither opened nor graded", class.unopened.clone()),
         ("nobody could open them: ask for other archives, or `umbra confirm`", unread.collect()),
         ("images without code, for `umbra confirm` or `umbra override`", images),
+        ("drafts, not submitted: ask, then `umbra confirm`", drafts.collect()),
         ("to be looked at, then `umbra confirm` or `umbra override`", remarks.collect::<Vec<_>>()),
         (
             "decisions whose evidence has changed: make them again or delete them",

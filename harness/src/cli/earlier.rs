@@ -73,6 +73,7 @@ impl Row {
             }
             let private = self.remarks.iter().filter(|remark| report::is_private(remark, rules));
             open.extend(private.cloned());
+            open.extend(self.standing.is_draft().then(|| "a draft, not submitted".to_owned()));
         }
         if self.standing.time_unknown {
             open.push("no penalty, since nobody knows when it was submitted".to_owned());

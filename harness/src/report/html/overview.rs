@@ -98,6 +98,10 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
         let own = entry.grade.unconfirmed;
         (own > 0.0).then(|| format!("{} for images", columns::points(own)))
     });
+    add("drafts, not submitted: ask, then confirm", &|entry| {
+        let standing = &entry.standing;
+        (standing.is_draft() && !standing.is_confirmed()).then(|| "a draft".to_owned())
+    });
     add("to be looked at, then confirmed", &|entry| {
         // What the instructor confirmed, they have looked at.
         if entry.standing.is_confirmed() {
