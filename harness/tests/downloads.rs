@@ -806,9 +806,14 @@ fn an_export_among_the_submissions_is_none() {
     let export = ["export", "class/fb.zip", "--format", "feedback", "--output", "out"];
     let (code, said, errors) = place.run(&export);
     assert_eq!(code, Some(0), "{said}{errors}");
+    // A copy that a browser made of it is one, too.
+    place.put("class/sub/fb (1).zip", &fs::read(place.at("class/fb.zip")).unwrap());
     let (said, report) = place.grade(&root, &["class"]);
     assert_eq!(report["submissions"].as_array().unwrap().len(), 1, "{said}");
-    assert!(said.contains("fb.zip (an export of this report)"), "{said}");
+    for file in ["fb.zip", "fb (1).zip"] {
+        assert!(said.contains(&format!("{file} (an export of this report)")), "{said}");
+    }
+    fs::remove_dir_all(place.at("class/sub")).unwrap();
     // Another file of that name is somebody's.
     place.put("class/fb.zip", &submission(&config("Bo", "Ode", "260000002")));
     let (said, report) = place.grade(&root, &["class"]);

@@ -197,7 +197,7 @@ fn write(
         }
     };
     write_whole(file, &bytes).with_context(|| format!("cannot write {}", file.display()))?;
-    note(file, &bytes, output)?;
+    note(&bytes, output)?;
     said.extend(report.class.iter().flat_map(to_look_at));
     said.iter().for_each(|line| println!("{line}"));
     Ok(())
@@ -219,8 +219,8 @@ fn to_look_at(class: &Class) -> Vec<String> {
     said
 }
 
-/// Digests of what was exported, by path.
-type Exports = BTreeMap<PathBuf, String>;
+/// Digests of what was exported, each with its size [bytes]: an export is known wherever it lies by now.
+type Exports = BTreeMap<String, u64>;
 
 /// What was exported from a report; nothing where that cannot be read.
 fn exports(output: &Path) -> Exports {
@@ -276,17 +276,17 @@ fn may_replace(file: &Path, format: Format, output: &Path) -> anyhow::Result<()>
 
 /// Whether a file is an export from a report, which nobody changed since.
 pub fn is_export(file: &Path, output: &Path) -> bool {
-    let is_file = file.symlink_metadata().is_ok_and(|meta| meta.is_file());
-    is_file
-        && exports(output).get(&whole_path(file)).is_some_and(|noted| {
-            std::fs::read(file).is_ok_and(|bytes| *noted == hex(&Sha256::digest(bytes)))
-        })
+    let Ok(meta) = file.symlink_metadata() else { return false };
+    let exports = exports(output);
+    meta.is_file()
+        && exports.values().any(|size| *size == meta.len())
+        && std::fs::read(file).is_ok_and(|bytes| exports.contains_key(&hex(&Sha256::digest(bytes))))
 }
 
 /// Notes what was exported, so that a later export may replace it.
-fn note(file: &Path, bytes: &[u8], output: &Path) -> anyhow::Result<()> {
+fn note(bytes: &[u8], output: &Path) -> anyhow::Result<()> {
     let mut exports = exports(output);
-    exports.insert(whole_path(file), hex(&Sha256::digest(bytes)));
+    exports.insert(hex(&Sha256::digest(bytes)), bytes.len() as u64);
     let notes = output.join(report::INSTRUCTOR).join(EXPORTS);
     write_whole(&notes, &serde_json::to_vec_pretty(&exports)?)
         .with_context(|| format!("cannot write {}", notes.display()))
