@@ -51,6 +51,6 @@ pub use submitted_config::{Field, ListedRender, SubmittedConfig};
 pub(crate) use tree::CONFIG_FILE;
 pub use tree::{REPORT_FILES, TreeFile, TreeSpec};
 pub use tree_match::{Mark, TreeLine};
-pub(crate) use unpack::{copy_unpacked, name_of, read_archive};
+pub(crate) use unpack::{copy_unpacked, known, name_of, read_archive};
 pub use unpack::{format_of_bytes, unpack, unpack_bytes};
 pub use validate::{Validation, validate_refusal, validate_submission};
