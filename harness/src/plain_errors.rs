@@ -7,6 +7,10 @@ pub fn plain(message: &str) -> String {
     if message.starts_with("unexpected leading zero") {
         return "a number begins with no 0; a student number is text in double quotes".to_owned();
     }
+    // Of an object that is written as a list.
+    if message.starts_with("invalid length ") && message.contains(", expected struct ") {
+        return "expected an object { ... }; found a list [ ... ]".to_owned();
+    }
     let told = || {
         let rest = message
             .strip_prefix("invalid type: ")
@@ -67,6 +71,7 @@ mod tests {
             (r#"{"name": null}"#, "expected text in double quotes; found null"),
             (r#"{"list": {}}"#, "expected a list [ ... ]; found an object { ... }"),
             (r#"{"list": [1]}"#, "expected true or false; found 1"),
+            (r#"[1, 2.0]"#, "expected an object { ... }; found a list [ ... ]"),
             (r#"{"counts": 1}"#, "unknown field `counts`, expected one of"),
         ] {
             let error = serde_json::from_str::<All>(text).unwrap_err().to_string();

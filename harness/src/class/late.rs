@@ -121,7 +121,9 @@ pub struct Problem {
 
 /// What to say of a text that is no date; a date that does not exist is told in the words of `error`.
 pub fn expected_date(text: &str, error: &jiff::Error) -> String {
-    let is_local = text.parse::<jiff::civil::DateTime>().is_ok();
+    // One with an offset may be out of range.
+    let has_offset = text.ends_with(['Z', 'z']) || text.rfind(['+', '-']).is_some_and(|at| at > 10);
+    let is_local = !has_offset && text.parse::<jiff::civil::DateTime>().is_ok();
     let said = if is_local { "without an offset from UTC".to_owned() } else { error.to_string() };
     format!("expected a date such as \"2019-10-06T23:59:00-04:00\", found \"{text}\" ({said})")
 }

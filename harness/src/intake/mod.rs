@@ -41,8 +41,9 @@ mod zip;
 mod zip_headers;
 
 pub use check_config::check_config;
+pub use encoding::text_of;
 pub use finding::{Excerpt, Finding, Severity};
-pub use json_lines::line_of;
+pub use json_lines::{first_slip, line_of};
 pub use limits::Limits;
 pub use pack::{Packed, archive_name, fix, mends, pack};
 pub use source_rules::{INCLUDE_INSIDE, scan_source, scan_text};
