@@ -1,5 +1,7 @@
 //! What serde says of a value of another kind, in the words of JSON and TOML instead of Rust's.
 
+use std::path::Path;
+
 /// The message, without the names of Rust's types: `invalid type: floating point `1.5`, expected u32` becomes
 /// `expected a whole number, 0 or more; found 1.5`. Other messages stay as they are.
 pub fn plain(message: &str) -> String {
@@ -19,6 +21,22 @@ pub fn plain(message: &str) -> String {
         Some(format!("expected {}; found {}", wanted(expected), found_as(found)))
     };
     told().unwrap_or_else(|| message.to_owned())
+}
+
+/// What is wrong with the text of a TOML file, with its line.
+pub fn toml_error(error: &toml::de::Error, text: &str, path: &Path) -> anyhow::Error {
+    let at = error.span().map_or(0, |span| span.start);
+    let line = 1 + text.bytes().take(at).filter(|byte| *byte == b'\n').count();
+    let own = text.lines().nth(line - 1).unwrap_or_default();
+    let own = own.split('#').next().unwrap_or_default();
+    let hint = if own.contains(['\u{201c}', '\u{201d}', '\u{201e}', '\u{2018}', '\u{2019}']) {
+        "; hint: write straight quotes: \""
+    } else if own.contains('"') && own.contains('\\') {
+        "; hint: write / in a path"
+    } else {
+        ""
+    };
+    anyhow::anyhow!("{}:{line}: {}{hint}", path.display(), plain(error.message()))
 }
 
 fn wanted(expected: &str) -> &str {

@@ -14,7 +14,7 @@ use super::owners::Owners;
 use crate::columns::{point_range, range};
 use crate::evidence::Evidence;
 use crate::files::hex;
-use crate::plain_errors::plain;
+use crate::plain_errors::toml_error;
 use crate::rubric::{Grade, IMAGES_EARN, ONCE_CONFIRMED, PartGrade, Rules};
 
 /// What takes the place of [`ONCE_CONFIRMED`] in the reason of a part whose images are confirmed.
@@ -110,10 +110,7 @@ impl Overrides {
     /// When it says what means nothing; names the file and line.
     pub fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
         let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
-        let file: File = toml::from_str(text).map_err(|error| {
-            let place = place(error.span().map_or(0, |span| span.start));
-            anyhow::anyhow!("{place}: {}", plain(error.message()))
-        })?;
+        let file: File = toml::from_str(text).map_err(|error| toml_error(&error, text, path))?;
         let mut decisions = Vec::new();
         let of = |kind: &'static str, entries: Vec<Spanned<Decision>>| {
             entries.into_iter().map(move |entry| (entry, kind))
@@ -476,6 +473,13 @@ mod tests {
         ] {
             let error = Overrides::parse(text, Path::new(OVERRIDES)).unwrap_err().to_string();
             assert!(error.starts_with(expected), "{error}");
+        }
+        for (slip, hint) in [
+            (SET.replace("\"typo\"", "\u{201c}typo\u{201d}"), "; hint: write straight quotes: \""),
+            (SET.replace("#0260000002", "sub\\a2"), "; hint: write / in a path"),
+        ] {
+            let error = Overrides::parse(&slip, Path::new(OVERRIDES)).unwrap_err().to_string();
+            assert!(error.ends_with(hint), "{error}");
         }
     }
 }
