@@ -8,6 +8,7 @@ use crate::class::mending::Mend;
 use crate::class::{Policy, Stated, late};
 use crate::files::Scratch;
 use crate::imaging::evidence::Tolerances;
+use crate::intake::Finding;
 use crate::plain_errors::plain;
 use crate::rubric::Rules;
 use crate::worker::Budget;
@@ -166,15 +167,11 @@ impl Assignment {
     /// itself; names file and line.
     pub fn load(root: &Path) -> Result<Self, AssignmentError> {
         let path = root.join("config.json");
-        let text = std::fs::read_to_string(&path)
+        let bytes = std::fs::read(&path)
             .map_err(|source| AssignmentError::Read { path: path.clone(), source })?;
+        let text = intake::text_of(&bytes);
         let mut assignment: Self =
-            serde_json::from_str(&text).map_err(|error| AssignmentError::Parse {
-                path: path.clone(),
-                line: error.line(),
-                // The place stands before the message already.
-                message: plain(error.to_string().split(" at line ").next().unwrap_or_default()),
-            })?;
+            serde_json::from_str(&text).map_err(|error| wrong_json(&path, &text, &error))?;
         if let Some(message) = assignment.problem() {
             return Err(AssignmentError::Contradiction { path, message });
         }
@@ -309,5 +306,51 @@ impl Assignment {
         let Stated { name: _, title, course, due, late, rules } = pinned.clone();
         (self.title, self.course, self.due) = (title, course, due);
         (self.late, self.rules) = (late, rules);
+    }
+}
+
+/// What is wrong with the text of `config.json`: a usual slip in the words that students read, too.
+fn wrong_json(path: &Path, text: &str, error: &serde_json::Error) -> AssignmentError {
+    // The place stands before the message already.
+    let own = || plain(error.to_string().split(" at line ").next().unwrap_or_default());
+    let slip = intake::first_slip(text).filter(|_| !error.is_data());
+    let (line, message) = match slip {
+        Some(Finding { line: Some(line), message, hint, .. }) => {
+            let hint = hint.map_or_else(String::new, |hint| format!("; hint: {hint}"));
+            (line as usize, message + &hint)
+        }
+        _ => (error.line(), own()),
+    };
+    AssignmentError::Parse { path: path.to_owned(), line, message }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usual_slips_in_the_file_are_told_and_encodings_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let load = |bytes: &[u8]| {
+            std::fs::write(folder.path().join("config.json"), bytes).unwrap();
+            let error = Assignment::load(folder.path()).unwrap_err().to_string();
+            error.split_once("config.json:").unwrap().1.to_owned()
+        };
+        let text = "{\n\"name\": \"a2\",\n\"titel\": 1}";
+        let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let bom = [b"\xef\xbb\xbf", text.as_bytes()].concat();
+        for bytes in [text.as_bytes(), &bom, &[&[0xff, 0xfe][..], &wide].concat()] {
+            let error = load(bytes);
+            assert!(error.starts_with("3: unknown field `titel`"), "{error}");
+        }
+        for (slip, expected) in [
+            ("// mine\n\"name\"", "2: "),
+            ("\u{201c}name\u{201d}", "2: "),
+            ("\"title\": \"x\",,\n\"name\"", "2: "),
+        ] {
+            let error = load(text.replace("\"name\"", slip).as_bytes());
+            assert!(error.starts_with(expected) && error.contains("; hint: "), "{error}");
+            assert!(!error.contains("key must be a string"), "{error}");
+        }
     }
 }

@@ -1,11 +1,17 @@
 //! What serde says of a value of another kind, in the words of JSON and TOML instead of Rust's.
 
+use std::path::Path;
+
 /// The message, without the names of Rust's types: `invalid type: floating point `1.5`, expected u32` becomes
 /// `expected a whole number, 0 or more; found 1.5`. Other messages stay as they are.
 pub fn plain(message: &str) -> String {
     // Of a number in a TOML file: `student = 0260000001`.
     if message.starts_with("unexpected leading zero") {
         return "a number begins with no 0; a student number is text in double quotes".to_owned();
+    }
+    // Of an object that is written as a list.
+    if message.starts_with("invalid length ") && message.contains(", expected struct ") {
+        return "expected an object { ... }; found a list [ ... ]".to_owned();
     }
     let told = || {
         let rest = message
@@ -15,6 +21,22 @@ pub fn plain(message: &str) -> String {
         Some(format!("expected {}; found {}", wanted(expected), found_as(found)))
     };
     told().unwrap_or_else(|| message.to_owned())
+}
+
+/// What is wrong with the text of a TOML file, with its line.
+pub fn toml_error(error: &toml::de::Error, text: &str, path: &Path) -> anyhow::Error {
+    let at = error.span().map_or(0, |span| span.start);
+    let line = 1 + text.bytes().take(at).filter(|byte| *byte == b'\n').count();
+    let own = text.lines().nth(line - 1).unwrap_or_default();
+    let own = own.split('#').next().unwrap_or_default();
+    let hint = if own.contains(['\u{201c}', '\u{201d}', '\u{201e}', '\u{2018}', '\u{2019}']) {
+        "; hint: write straight quotes: \""
+    } else if own.contains('"') && own.contains('\\') {
+        "; hint: write / in a path"
+    } else {
+        ""
+    };
+    anyhow::anyhow!("{}:{line}: {}{hint}", path.display(), plain(error.message()))
 }
 
 fn wanted(expected: &str) -> &str {
@@ -67,6 +89,7 @@ mod tests {
             (r#"{"name": null}"#, "expected text in double quotes; found null"),
             (r#"{"list": {}}"#, "expected a list [ ... ]; found an object { ... }"),
             (r#"{"list": [1]}"#, "expected true or false; found 1"),
+            (r#"[1, 2.0]"#, "expected an object { ... }; found a list [ ... ]"),
             (r#"{"counts": 1}"#, "unknown field `counts`, expected one of"),
         ] {
             let error = serde_json::from_str::<All>(text).unwrap_err().to_string();

@@ -75,8 +75,9 @@ fn a_number_or_name_means_the_attempt_that_counts() {
     let (code, said) =
         umbra(&place, &root, &["override", FIRST_SLUG, "1.4", "15", "--reason", "x"]);
     assert_eq!(code, Some(0), "{said}");
-    let expected =
-        format!("no report shows it: this submission does not count, {SECOND_SLUG} does");
+    let expected = format!(
+        "no report shows it: the submission {FIRST_SLUG} does not count, {SECOND_SLUG} does"
+    );
     assert!(said.contains(&expected), "{said}");
     assert_eq!(report(&place)["submissions"][0]["points"], 5.0);
     // One that counts for less is named.
@@ -96,14 +97,81 @@ fn a_number_or_name_means_the_attempt_that_counts() {
     let old = page(&format!("out/{FIRST_SLUG}/report.html"));
     assert!(old.contains(&format!("does not count: {SECOND_SLUG} does.")), "{old}");
     assert!(!page(&format!("out/{SECOND_SLUG}/report.html")).contains("does not count:"));
+    // Which attempt counts is the whole class's.
+    let only = ["A2 Download.zip", "--only", "Bo Ode", "--attempt", "first"];
+    let (code, said) = umbra(
+        &place,
+        &root,
+        &[&["grade", "--perturb", "off", "--isolation", "reduced"], &only[..]].concat(),
+    );
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("--attempt: it is the whole class's"), "{said}");
+    assert_eq!(report(&place)["submissions"][0]["points"], 5.0);
     // Its other attempt instead is one student's fall or rise.
     let (said, _) = place.grade(&root, &["A2 Download.zip", "--attempt", "first"]);
     assert!(said.contains(&format!("{FIRST}, not {SECOND}")), "{said}");
+    assert!(said.contains("--attempt first instead of latest, for the whole class"), "{said}");
     let (code, said) = umbra(&place, &root, &["regrade", "--undo"]);
     assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("0 rise, 1 fall, 1 stay"), "{said}");
     assert!(!said.contains("counts"), "{said}");
     assert!(page(&format!("out/{FIRST_SLUG}/report.html")).contains("does not count:"));
+}
+
+const THIRD: &str = "1-9 - Ann Lee - Oct 6, 2019 1030 PM/a2.zip";
+const THIRD_SLUG: &str = "1-9---Ann-Lee---Oct-6--2019-1030-PM-a2";
+
+#[test]
+fn a_decision_on_a_student_is_on_each_of_their_attempts() {
+    let (place, root) = twice(|_| ());
+    let set = |word: &str, points: &str| {
+        let (code, said) =
+            umbra(&place, &root, &["override", word, "1.4", points, "--reason", "x"]);
+        assert_eq!(code, Some(0), "{said}");
+        said
+    };
+    let ann = || {
+        let row = &report(&place)["submissions"][0];
+        (text(&row["slug"]).to_owned(), row["points"].as_f64().unwrap())
+    };
+    // Of two attempts; the last decision counts for a third one, too.
+    set("Ann Lee", "7");
+    set("260000104", "5");
+    let kept = fs::read_to_string(place.at("out/overrides.toml")).unwrap();
+    assert_eq!(kept.matches("student = \"260000104\"").count(), 2, "{kept}");
+    let files = [(FIRST, ""), (SECOND, " "), (THIRD, "  ")];
+    let configs =
+        files.map(|(name, space)| (name, config("Ann", "Lee", &format!("{space}260000104"))));
+    let files = configs.each_ref().map(|(name, config)| (*name, config.as_str()));
+    place.put("wed.zip", &download(&files));
+    place.grade(&root, &["wed.zip"]);
+    assert_eq!(ann(), (THIRD_SLUG.to_owned(), 5.0));
+    // An export says that it was made on another one.
+    let (code, said) = umbra(&place, &root, &["export", "book.csv", "--format", "brightspace"]);
+    assert_eq!(code, Some(0), "{said}");
+    let expected = format!(
+        "warning: 1 decision whose evidence has changed since:\n  {THIRD}: part 1.4 was set"
+    );
+    assert!(said.contains(&expected), "{said}");
+    // A report without held-back scenes stays so.
+    let (code, said) = umbra(&place, &root, &["grade", "wed.zip", "--isolation", "reduced"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(report(&place)["held_back"], Value::Null);
+    assert_eq!(report(&place)["class"]["incomparable"], json!([]));
+    // What lowers the best attempt is not without effect, as the other one is worth as little.
+    place.grade(&root, &["wed.zip", "--attempt", "best"]);
+    let said = set("260000104", "2");
+    assert!(said.contains("the reports show it"), "{said}");
+    assert_eq!(ann().1, 2.0);
+    // By its folder it is on one attempt, and another may count by then.
+    let said = set(THIRD_SLUG, "3");
+    assert!(said.contains("the reports show it"), "{said}");
+    assert_eq!(ann(), (THIRD_SLUG.to_owned(), 3.0));
+    let said = set(THIRD_SLUG, "0");
+    assert_eq!((ann().0 != THIRD_SLUG, ann().1), (true, 2.0));
+    let expected =
+        format!("no report shows it: the submission {THIRD_SLUG} does not count, {} does", ann().0);
+    assert!(said.contains(&expected), "{said}");
 }
 
 #[test]

@@ -405,10 +405,10 @@ fn downloads_of_other_platforms() {
             metadata.as_bytes().to_vec(),
         )],
     ];
-    let moodle = "Identifier,Full name,ID number,Grade,Maximum Grade,Last modified (submission),Last modified (grade)\n\
-                  Participant 7,Zoë O'Neil,0260000001,,100,\"Sunday, 6 October 2019, 11:58 PM\",-\n\
-                  Participant 8,Ann Lee,260000003,,100,\"Tuesday, 8 October 2019, 12:30 AM\",-\n\
-                  Participant 9,Gil Tam,260000007,,100,-,-\n";
+    let moodle = "Identifier,Full name,ID number,Status,Grade,Maximum Grade,Last modified (submission),Last modified (grade)\n\
+                  Participant 7,Zoë O'Neil,0260000001,Draft (not submitted),,100,\"Sunday, 6 October 2019, 11:58 PM\",-\n\
+                  Participant 8,Ann Lee,260000003,Submitted for grading - 1 day late,,100,\"Tuesday, 8 October 2019, 12:30 AM\",-\n\
+                  Participant 9,Gil Tam,260000007,No submission,,100,-,-\n";
     let canvas = "Student,ID,SIS User ID,SIS Login ID,Section,A2 (77)\n    Points Possible,,,,,100\n\
                   \"O'Neil, Zoë\",501,0260000001,zo,1,\n\"Lee, Ann\",502,260000003,al,1,\n\"Tam, Gil\",503,260000007,gt,1,\n";
     let github = "identifier,github_username,github_id,name\n0260000001,zo,1,\n260000003,ann-l,2,\n260000007,gt,3,\n";
@@ -468,6 +468,12 @@ fn downloads_of_other_platforms() {
             assert_eq!(numbers, ["0260000001", "260000003"], "{title} {given}: {said}");
             assert!(rows[1].2.contains(late), "{title} {given}: {}", rows[1].2);
             assert_eq!(rows[0].2.contains(unknown), late == unknown, "{title}: {}", rows[0].2);
+            let drafts = [0, 1]
+                .map(|at| rows[at].2.contains("says that it is a draft, which was not submitted"));
+            assert_eq!(drafts, [title == "Moodle", false], "{title}: {}", rows[0].2);
+            let (_, status, _) = place.run(&["status", "--output", "out"]);
+            let line = "drafts, not submitted: ask, then `umbra confirm`: 1\n";
+            assert_eq!(status.contains(line), drafts[0], "{status}");
             let missing = report["class"]["missing"].as_array().unwrap();
             assert!(missing.iter().any(|own| own["student"]["number"] == "260000007"), "{title}");
             fs::remove_dir_all(place.at("out")).unwrap();
@@ -800,9 +806,14 @@ fn an_export_among_the_submissions_is_none() {
     let export = ["export", "class/fb.zip", "--format", "feedback", "--output", "out"];
     let (code, said, errors) = place.run(&export);
     assert_eq!(code, Some(0), "{said}{errors}");
+    // A copy that a browser made of it is one, too.
+    place.put("class/sub/fb (1).zip", &fs::read(place.at("class/fb.zip")).unwrap());
     let (said, report) = place.grade(&root, &["class"]);
     assert_eq!(report["submissions"].as_array().unwrap().len(), 1, "{said}");
-    assert!(said.contains("fb.zip (an export of this report)"), "{said}");
+    for file in ["fb.zip", "fb (1).zip"] {
+        assert!(said.contains(&format!("{file} (an export of this report)")), "{said}");
+    }
+    fs::remove_dir_all(place.at("class/sub")).unwrap();
     // Another file of that name is somebody's.
     place.put("class/fb.zip", &submission(&config("Bo", "Ode", "260000002")));
     let (said, report) = place.grade(&root, &["class"]);

@@ -159,6 +159,11 @@ fn what_nobody_could_open_waits_for_the_instructor() {
             "5-9 - Ed Fox - Oct 5, 2019 1159 PM/a2.zip",
             Zip::of([Entry::stored("i.7z", b"7z\xbc\xaf\x27\x1cxxxx")]).bytes(),
         ),
+        // Of what it is packed by nothing tells.
+        (
+            "6-9 - Gu Hay - Oct 5, 2019 1159 PM/a2.zip",
+            Zip::of([Entry::stored("a2.tar.br", b"\x0b\x02\x80xxxx")]).bytes(),
+        ),
     ]
     .map(|(name, bytes)| (name.to_owned(), bytes))
     .to_vec();
@@ -167,20 +172,21 @@ fn what_nobody_could_open_waits_for_the_instructor() {
     }
     let list = "OrgDefinedId,Last Name,First Name,a2 Points Grade <Numeric MaxPoints:50>,End-of-Line Indicator\n\
                 #260000104,Lee,Ann,,#\n#260000106,Ode,Bo,,#\n#260000107,Cox,Cy,,#\n#260000108,Doe,Di,,#\n\
-                #260000109,Fox,Ed,,#\n";
+                #260000109,Fox,Ed,,#\n#260000110,Hay,Gu,,#\n";
     place.put("list.csv", list.as_bytes());
     place.grade(&root, &["in", "--class", "list.csv"]);
     let (code, said) = umbra(&place, &root, &["status"]);
     assert_eq!(code, Some(1), "{said}");
     assert!(
-        said.contains("nobody could open them: ask for other archives, or `umbra confirm`: 4"),
+        said.contains("nobody could open them: ask for other archives, or `umbra confirm`: 5"),
         "{said}"
     );
     assert!(said.contains("zip the folder"), "{said}");
+    assert!(said.contains("nothing in it belongs to the tree; it holds only a2.tar.br"), "{said}");
     let export = ["export", "grades.csv", "--format", "brightspace"];
     let (code, said) = umbra(&place, &root, &export);
     assert_eq!(code, Some(0), "{said}");
-    assert_eq!(said.matches("nobody could open it").count(), 4, "{said}");
+    assert_eq!(said.matches("nobody could open it").count(), 5, "{said}");
     assert!(
         said.contains("is out of 50 in out/instructor/class.csv, and the grades are out of 100"),
         "{said}"

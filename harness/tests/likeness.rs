@@ -117,8 +117,11 @@ fn what_is_alike_is_shown_side_by_side_to_the_instructor_alone() {
     let bytes = submission(&config("Cy", "Lee", "0260000003"), &integrator("own"));
     place.put("class/cy.zip", &bytes);
     place.grade(&root, &["class"]);
+    assert!(!read("out/instructor/cy/report.html").contains("of the tokens match"));
     let (code, said) = umbra(&[]);
     assert!(code == Some(0) && said.contains("1 pair side by side"), "{said}");
+    assert!(said.contains("1 pair of JPlag's is of sources that changed since"), "{said}");
+    assert!(!place.at("out/instructor/likeness/ann--cy.html").exists());
     assert!(!read("out/instructor/cy/report.html").contains("of the tokens match"));
 
     // A result of other submissions is none of this class.

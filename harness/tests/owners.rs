@@ -30,7 +30,8 @@ fn of(rows: &[(&str, f64)]) -> Vec<(String, f64)> {
     rows.iter().map(|(slug, points)| ((*slug).to_owned(), *points)).collect()
 }
 
-const TWO: &str = "Student ID,Last Name,First Name\n260000104,Lee,Ann\n260000106,Malone,Mallory\n";
+/// Messages name people as the list does, however they write themselves.
+const TWO: &str = "Student ID,Last Name,First Name\n260000104,Lee,Ann\n260000106,Malône,Mallory\n";
 
 #[test]
 fn a_decision_is_never_on_another_who_typed_the_same_number() {
@@ -53,7 +54,7 @@ fn a_decision_is_never_on_another_who_typed_the_same_number() {
     assert_eq!(points(&place), of(&[("a2_ann", 1.0), ("a2_mal", 3.0)]));
     let (code, said) = set("260000106", "1.1", "2");
     assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("Mallory Malone (260000106) has no submission that is theirs"), "{said}");
+    assert!(said.contains("Mallory Malône (260000106) has no submission that is theirs"), "{said}");
     let (code, said) = umbra(&place, &root, &["defend", "260000106", "1.1"]);
     assert_eq!(code, Some(2), "{said}");
     // After it: each by the number of the list.
@@ -63,10 +64,11 @@ fn a_decision_is_never_on_another_who_typed_the_same_number() {
     assert_eq!(code, Some(0), "{said}");
     let (code, said) = set("260000106", "1.4", "13");
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("Mallory Malone (a2_mal): part 1.4 now has 13 points"), "{said}");
+    assert!(said.contains("Mallory Malône (a2_mal): part 1.4 now has 13 points"), "{said}");
     assert_eq!(points(&place), of(&[("a2_ann", 1.0), ("a2_mal", 13.0)]));
     let (code, said) = umbra(&place, &root, &["confirm", "Malone, Mallory", "--reason", "x"]);
     assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("Mallory Malône (a2_mal): confirmed"), "{said}");
     let kept = fs::read_to_string(place.at("out/overrides.toml")).unwrap();
     let keys: Vec<&str> = kept.lines().filter_map(|line| line.strip_prefix("student = ")).collect();
     assert_eq!(keys, ["\"a2_mal\"", "\"260000104\"", "\"260000106\"", "\"260000106\""]);

@@ -70,9 +70,43 @@ fn the_merged_report_is_that_of_one_machine_whatever_becomes_of_the_tasks() {
     assert_eq!(merge(&batch, &[]).0, Some(0));
     assert_eq!(batch.canonical(), alone.canonical());
     batch.submission("fay", WRONG);
+    assert_eq!(task(&batch, "slice:2/2", &[]).0, Some(0));
+    let umbra = |command: &str| {
+        let mut umbra = Command::new(env!("CARGO_BIN_EXE_umbra"));
+        umbra.args(command.split(' ')).arg("--output").arg(batch.out());
+        let output = umbra.current_dir(batch.place.path()).output().unwrap();
+        let (code, errors) = said(&output);
+        (code, String::from_utf8_lossy(&output.stdout).into_owned() + &errors)
+    };
+    // As long as they are not merged, nothing is made of the half that is there.
+    let decide = "override ada 1.1 0 --reason x";
+    for command in ["status", decide, "export x.csv --format csv"] {
+        let (code, text) = umbra(command);
+        assert_eq!(code, Some(2), "{text}");
+        assert!(text.contains("the tasks of a partition are not merged yet; hint"), "{text}");
+    }
+    // A run that was interrupted leaves no such file: the report is that of the last one that was not.
+    fs::remove_dir_all(batch.instructor("work")).unwrap();
+    let (code, text) = umbra(decide);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(
+        text.contains(
+            "1 submission graded since by a run that did not end, and not in the report: fay;"
+        ),
+        "{text}"
+    );
+    assert!(!batch.canonical().contains("fay"));
+    for command in ["status", "export x.csv --format csv"] {
+        let (_, text) = umbra(command);
+        assert!(text.contains("not in the report: fay;"), "{text}");
+    }
+    assert_eq!(task(&batch, "slice:1/2", &[]).0, Some(0));
     let (code, text) = batch.grade();
     assert_eq!(code, Some(0), "{text}");
-    assert!(text.contains("5 of 6 submissions keep their earlier grades"), "{text}");
+    assert!(text.contains("6 of 6 submissions keep their earlier grades"), "{text}");
+    // It graded all that the tasks were given.
+    assert_eq!(umbra("export x.csv --format csv").0, Some(0));
+    assert!(batch.canonical().contains("fay"));
 }
 
 #[test]

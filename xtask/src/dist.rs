@@ -13,6 +13,7 @@ use anyhow::{Context, Result, ensure};
 use umbra::assignment::Assignment;
 use umbra::files::library_name;
 use umbra::grading::PreparedScene;
+use umbra::intake::text_of;
 use umbra::store::Store;
 use umbra::worker::Supervisor;
 
@@ -110,7 +111,7 @@ fn student(root: &Path, kit: &Path, programs: &[PathBuf]) -> Result<()> {
 
 /// Extensions are private to the students who have them.
 fn leave_out_extensions(config: &Path) -> Result<()> {
-    let mut assignment: serde_json::Value = serde_json::from_slice(&fs::read(config)?)?;
+    let mut assignment: serde_json::Value = serde_json::from_str(&text_of(&fs::read(config)?))?;
     let late = assignment.get_mut("late").and_then(serde_json::Value::as_object_mut);
     if late.and_then(|late| late.remove("extensions")).is_some() {
         fs::write(config, serde_json::to_vec_pretty(&assignment)?)?;

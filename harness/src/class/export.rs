@@ -27,6 +27,8 @@ pub struct Book {
     pub others: Option<Vec<String>>,
     /// Students whom the platform excuses; they are left out.
     pub excused: Vec<String>,
+    /// Students of whom no column says by what the platform knows them; they are left out.
+    pub unknown: Vec<String>,
 }
 
 /// A grade book of `roster`'s platform with the points of some students in the column `item`; everybody else is left
@@ -37,10 +39,7 @@ pub struct Book {
 /// no points.
 pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Book, String> {
     let list = roster.path.display();
-    let named = |wanted: &[&str]| -> Vec<usize> {
-        let of = |name: &String| wanted.contains(&names::letters(name).as_str());
-        roster.header.iter().enumerate().filter(|(_, name)| of(name)).map(|(at, _)| at).collect()
-    };
+    let named = |wanted: &[&str]| named(roster, wanted);
     let cell = |row: usize, column: usize| -> &str {
         let row: &[String] = roster.rows.get(row).map_or(&[], Vec::as_slice);
         row.get(column).map_or("", |text| text.trim())
@@ -71,7 +70,12 @@ pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Book
         ));
     }
     let own = own.first().copied();
-    let mut book = Book::default();
+    check_keys(roster)?;
+    let key_columns = named(keys(roster.kind));
+    let is_unknown =
+        |own: &&Points| key_columns.iter().all(|at| cell(own.student.row, *at).is_empty());
+    let unknown = graded.iter().filter(is_unknown).map(|own| own.student.who()).collect();
+    let mut book = Book { unknown, ..Book::default() };
     let copied = match roster.kind {
         Kind::Brightspace => {
             book.column =
@@ -80,7 +84,7 @@ pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Book
             let is_grade = |name: &&String| name.contains(" Grade");
             let others = || roster.header.iter().filter(is_grade).cloned().collect();
             book.others = own.is_none().then(others);
-            named(&["orgdefinedid", "username"])
+            key_columns
         }
         Kind::Canvas => {
             let Some(at) = own else {
@@ -152,7 +156,7 @@ pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Book
     end(&mut head, "End-of-Line Indicator");
     rows.push(head);
     for Points { student, points } in graded {
-        if book.excused.contains(&student.who()) {
+        if book.excused.contains(&student.who()) || book.unknown.contains(&student.who()) {
             continue;
         }
         let mut row = pick(&roster.rows[student.row]);
@@ -169,6 +173,41 @@ pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Book
     let bytes = writer.into_inner().map_err(|error| error.to_string())?;
     book.text = String::from_utf8(bytes).map_err(|error| error.to_string())?;
     Ok(book)
+}
+
+/// The columns by which a platform that imports grades knows whose they are; any of them does.
+fn keys(kind: Kind) -> &'static [&'static str] {
+    match kind {
+        Kind::Brightspace => &["OrgDefinedId", "Username"],
+        Kind::Canvas => &["ID", "SIS User ID", "SIS Login ID"],
+        Kind::Moodle => &["Identifier", "Identifiant"],
+        _ => &[],
+    }
+}
+
+/// Makes sure that a list has a column by which its platform knows whose a grade is.
+///
+/// # Errors
+/// When it has none.
+pub fn check_keys(roster: &Roster) -> Result<(), String> {
+    let keys = keys(roster.kind);
+    if keys.is_empty() || !named(roster, keys).is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "{}:1: expected one of the columns {}, by which {} knows whose a grade is, found none; hint: export the list \
+         with it, and grade with --class once more",
+        roster.path.display(),
+        keys.join(", "),
+        roster.kind.title()
+    ))
+}
+
+/// The columns of a list with some names.
+fn named(roster: &Roster, wanted: &[&str]) -> Vec<usize> {
+    let wanted: Vec<String> = wanted.iter().map(|name| names::letters(name)).collect();
+    let of = |name: &String| wanted.contains(&names::letters(name));
+    roster.header.iter().enumerate().filter(|(_, name)| of(name)).map(|(at, _)| at).collect()
 }
 
 /// The assignment that a column holds the points of; empty where it holds none.
@@ -250,6 +289,22 @@ mod tests {
              Participant 7,'@Zoë,Submitted,100,-,87.50\n"
         );
         assert!(book("Name,SID\nA,1\nB,2\n", "A2").unwrap_err().contains("grade with --class"));
+    }
+
+    #[test]
+    fn no_grade_is_nobody_s() {
+        let list = "Student ID,Last Name,First Name,A2 Points Grade,End-of-Line Indicator\n1,A,A,,#\n2,B,B,,#\n";
+        let error = book(list, "A2").unwrap_err();
+        assert!(
+            error.starts_with("list.csv:1: expected one of the columns OrgDefinedId, Username,"),
+            "{error}"
+        );
+        let list = "OrgDefinedId,Username,Last Name,First Name,End-of-Line Indicator\n#1,,A,A,#\n,#b,B,B,#\n\
+                    ,,C,C,#\n4,,D,D,#\n";
+        let own = whole(list, "A2").unwrap();
+        assert_eq!(own.unknown, ["C C"]);
+        let rows = own.text.lines().skip(1).collect::<Vec<_>>();
+        assert_eq!(rows, ["#1,,87.50,#", ",#b,87.50,#"]);
     }
 
     #[test]

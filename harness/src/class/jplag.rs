@@ -27,6 +27,16 @@ pub struct Pair {
     pub similarity: f64,
     /// Where.
     pub matches: Vec<Match>,
+    /// The digest of each submission whose sources were compared.
+    #[serde(default)]
+    pub digests: [String; 2],
+}
+
+impl Pair {
+    /// Whether it is of what the two submitted last; `digest` is that of the submission in a folder.
+    pub fn holds<'a>(&self, digest: impl Fn(&str) -> Option<&'a str>) -> bool {
+        self.who.iter().zip(&self.digests).all(|(who, own)| digest(who) == Some(own))
+    }
 }
 
 /// A passage that two submissions share.
@@ -60,7 +70,8 @@ pub fn keep(folder: &Path, pairs: &[Pair]) -> anyhow::Result<()> {
         .with_context(|| format!("cannot write {}", file.display()))
 }
 
-/// The pairs that were kept in a folder; none before there were any.
+/// The pairs that were kept in a folder; none before there were any. They may be of what was submitted earlier, see
+/// [`Pair::holds`].
 ///
 /// # Errors
 /// When they cannot be read.
@@ -174,6 +185,7 @@ impl Comparison {
             (0.0..=1.0).contains(&similarity),
             "a similarity of {similarity}; expected one from 0 to 1"
         );
+        ensure!(first != second, "it compares {first} with itself");
         let name = |id: &String| names.get(id).unwrap_or(id).clone();
         let own = |passage: Passage| Match {
             places: [
@@ -183,7 +195,8 @@ impl Comparison {
             tokens: passage.tokens.or(passage.length).unwrap_or_default(),
         };
         let matches = matches.into_iter().map(own).collect();
-        Ok(Pair { who: [name(&first), name(&second)], similarity, matches })
+        let (who, digests) = ([name(&first), name(&second)], Default::default());
+        Ok(Pair { who, similarity, matches, digests })
     }
 }
 
@@ -274,7 +287,8 @@ pub(crate) mod tests {
     fn expected(similarity: f64) -> Vec<Pair> {
         let place = |lines| Place { path: "src/integrators/simple.rs".into(), lines };
         let matches = vec![Match { places: [place([10, 30]), place([12, 32])], tokens: 139 }];
-        vec![Pair { who: ["ada".into(), "bob-2".into()], similarity, matches }]
+        let digests = Default::default();
+        vec![Pair { who: ["ada".into(), "bob-2".into()], similarity, matches, digests }]
     }
 
     #[test]
@@ -319,6 +333,9 @@ pub(crate) mod tests {
         let missing = result(&[("submissionMappings.json", names.clone())]);
         assert!(said(&missing).contains("a-b.json is not in the result"), "{}", said(&missing));
         let pair = json!({"firstSubmissionId": "a", "secondSubmissionId": "b", "matches": []});
+        let alone = json!({"firstSubmissionId": "a", "secondSubmissionId": "a", "similarity": 1.0, "matches": []});
+        let alone = [("submissionMappings.json", names.clone()), ("comparisons/a-b.json", alone)];
+        assert!(said(&result(&alone)).contains("it compares a with itself"));
         let unknown = result(&[("submissionMappings.json", names), ("comparisons/a-b.json", pair)]);
         assert!(said(&unknown).contains("no average similarity"), "{}", said(&unknown));
     }

@@ -121,7 +121,9 @@ pub struct Problem {
 
 /// What to say of a text that is no date; a date that does not exist is told in the words of `error`.
 pub fn expected_date(text: &str, error: &jiff::Error) -> String {
-    let is_local = text.parse::<jiff::civil::DateTime>().is_ok();
+    // One with an offset may be out of range.
+    let has_offset = text.ends_with(['Z', 'z']) || text.rfind(['+', '-']).is_some_and(|at| at > 10);
+    let is_local = !has_offset && text.parse::<jiff::civil::DateTime>().is_ok();
     let said = if is_local { "without an offset from UTC".to_owned() } else { error.to_string() };
     format!("expected a date such as \"2019-10-06T23:59:00-04:00\", found \"{text}\" ({said})")
 }
@@ -152,6 +154,13 @@ impl Policy {
         if let Some(error) = self.time_zone.as_ref().and_then(|zone| stamps::zone(zone).err()) {
             return wrong(&["time_zone"], format!("late.time_zone: {error}"));
         }
+        if let Some(message) = self.contradiction("due", due) {
+            return Some(Problem {
+                at: vec!["due".into()],
+                message,
+                other: Some(keys(&["time_zone"])),
+            });
+        }
         let due: Timestamp = due.parse().ok()?;
         match self.cut_off.as_ref().map(|text| text.parse::<Timestamp>()) {
             Some(Err(error)) => {
@@ -164,6 +173,11 @@ impl Policy {
                 return wrong(&["cut_off"], message.into());
             }
             _ => {}
+        }
+        let cut_off = self.cut_off.as_deref();
+        if let Some(message) = cut_off.and_then(|at| self.contradiction("late.cut_off", at)) {
+            let other = Some(keys(&["time_zone"]));
+            return Some(Problem { at: keys(&["cut_off"]), message, other });
         }
         for (index, Extension { student, due: own, late_days }) in
             self.extensions.iter().enumerate()
@@ -204,8 +218,30 @@ impl Policy {
                 }
                 _ => {}
             }
+            let said = own.as_deref();
+            if let Some(message) =
+                said.and_then(|at| self.contradiction(&format!("{name}.due"), at))
+            {
+                let other = Some(keys(&["time_zone"]));
+                return Some(Problem { at: keys(&own_keys("due")), message, other });
+            }
         }
         None
+    }
+
+    /// That a date has an offset which the time zone does not have then; UTC is every place's.
+    fn contradiction(&self, what: &str, date: &str) -> Option<String> {
+        let name = self.time_zone.as_ref()?;
+        let at: Timestamp = date.parse().ok()?;
+        let [said, own] = [zone_of(date), stamps::zone(name).ok()?].map(|zone| at.to_zoned(zone));
+        (said.offset() != own.offset() && !said.offset().is_zero()).then(|| {
+            let own = own.strftime("%:z");
+            format!(
+                "{what}: {date} has another offset than the time zone {name} then, which is {own}; hint: {}{own} if the \
+                 clock there is meant; it contradicts late.time_zone",
+                said.datetime()
+            )
+        })
     }
 
     /// Extensions of students who are not on a class list with these numbers.
@@ -593,6 +629,48 @@ mod tests {
         ] {
             let policy: Policy = serde_json::from_str(text).unwrap();
             assert!(policy.problem(DUE).unwrap().message.contains(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_offset_that_the_time_zone_does_not_have_then_is_refused() {
+        let winter = "2019-11-20T23:59:00-04:00";
+        for (due, more, at) in [
+            (DUE, "", None),
+            // The hour that comes twice, UTC, and winter time.
+            ("2019-11-03T01:30:00-04:00", "", None),
+            ("2019-11-03T01:30:00-05:00", "", None),
+            ("2019-11-21T04:59:00Z", "", None),
+            ("2019-11-21T04:59:00+00:00", "", None),
+            ("2019-11-20T23:59:00-05:00", "", None),
+            (winter, "", Some("due")),
+            ("2019-10-06T23:59:00-05:00", "", Some("due")),
+            (DUE, r#", "cut_off": "WINTER""#, Some("late cut_off")),
+            (
+                DUE,
+                r#", "extensions": [{"student": "1", "due": "WINTER"}]"#,
+                Some("late extensions 0 due"),
+            ),
+        ] {
+            for zone in ["America/Toronto", "Europe/Paris"] {
+                let text = format!(
+                    r#"{{"penalty": 1, "unit": "points", "per": "day", "time_zone": "{zone}"{}}}"#,
+                    more.replace("WINTER", winter)
+                );
+                let problem = serde_json::from_str::<Policy>(&text).unwrap().problem(due);
+                let found = problem.as_ref().map(|own| own.at.join(" "));
+                let is_utc = due.ends_with('Z') || due.ends_with("+00:00");
+                let expected = if zone == "Europe/Paris" && !is_utc { Some("due") } else { at };
+                assert_eq!(found.as_deref(), expected, "{due} {text}");
+                if let Some(problem) =
+                    problem.filter(|_| zone == "America/Toronto" && due == winter)
+                {
+                    let said = "due: 2019-11-20T23:59:00-04:00 has another offset than the time zone America/Toronto then, \
+                                which is -05:00; hint: 2019-11-20T23:59:00-05:00 if";
+                    assert!(problem.message.contains(said), "{}", problem.message);
+                    assert_eq!(problem.other.unwrap().join(" "), "late time_zone");
+                }
+            }
         }
     }
 }

@@ -11,7 +11,7 @@ use super::layout::{Kind, Label};
 use super::roster::{Roster, Student};
 use super::{names, stamps};
 use crate::harmless::printable;
-use crate::plain_errors::plain;
+use crate::plain_errors::toml_error;
 
 /// The file of the instructor's decisions on whose submissions are, in the report's folder.
 pub const MATCHES: &str = "matches.toml";
@@ -97,13 +97,7 @@ impl Matches {
     /// When it says what means nothing; names the file and line.
     pub fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
         let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
-        let file: File = toml::from_str(text).map_err(|error| {
-            anyhow::anyhow!(
-                "{}: {}",
-                place(error.span().map_or(0, |span| span.start)),
-                plain(error.message())
-            )
-        })?;
+        let file: File = toml::from_str(text).map_err(|error| toml_error(&error, text, path))?;
         let mut decisions: Vec<Decision> = Vec::new();
         for entry in file.matches {
             let place = place(entry.span().start);
@@ -134,6 +128,11 @@ impl Matches {
             if student.as_ref().is_some_and(|word| word.trim().is_empty()) {
                 bail!("{place}: student says nothing; expected a student number, or \"{NOBODY}\"");
             }
+            let is_nobody = |word: &String| word.trim().eq_ignore_ascii_case(NOBODY);
+            let student = match student {
+                Some(word) if is_nobody(&word) => Some(NOBODY.to_owned()),
+                other => other,
+            };
             let (on, outdated) = (On::Any, Vec::new());
             let own = Decision { submission, student, submitted, place, on, outdated };
             if let Some(first) = decisions
@@ -601,8 +600,10 @@ mod tests {
         let found = find(&own, &roster(), &matches).unwrap();
         assert_eq!(found, Match::Student(2, "matches.toml"));
         assert_eq!(matches.submitted(&own), Some("2019-10-07T10:00:00"));
-        let none = read(&text.replace("#260000003", "none")).unwrap();
-        assert_eq!(find(&own, &roster(), &none).unwrap(), Match::Nobody);
+        for word in ["none", "None", " NONE "] {
+            let none = read(&text.replace("#260000003", word)).unwrap();
+            assert_eq!(find(&own, &roster(), &none).unwrap(), Match::Nobody);
+        }
         let wrong = read(&text.replace("#260000003", "9")).unwrap();
         let error = find(&own, &roster(), &wrong).unwrap_err().to_string();
         assert!(error.starts_with("matches.toml:2: nobody on list.csv has the number"), "{error}");

@@ -32,4 +32,6 @@ pub use matching::{Claim, MATCHES, Matches};
 pub use owners::Owners;
 pub use pins::{Decisions, Pins, Stated};
 pub use roster::{Roster, Student};
-pub use settle::{Attempt, Class, Deciding, Missing, Standing, Undecided, set_aside, settle};
+pub use settle::{
+    Attempt, Class, Deciding, INCOMPARABLE, Missing, Standing, Undecided, set_aside, settle,
+};

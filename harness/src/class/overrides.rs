@@ -14,7 +14,7 @@ use super::owners::Owners;
 use crate::columns::{point_range, range};
 use crate::evidence::Evidence;
 use crate::files::hex;
-use crate::plain_errors::plain;
+use crate::plain_errors::toml_error;
 use crate::rubric::{Grade, IMAGES_EARN, ONCE_CONFIRMED, PartGrade, Rules};
 
 /// What takes the place of [`ONCE_CONFIRMED`] in the reason of a part whose images are confirmed.
@@ -27,7 +27,7 @@ pub const OVERRIDES: &str = "overrides.toml";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Decision {
-    /// The student's number by the class list or the platform, or the submission's folder in the report.
+    /// The student's number, account or name by the class list or the platform, or the submission's folder.
     pub student: String,
     /// The part that is set; none where what was left to the instructor is confirmed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -110,10 +110,7 @@ impl Overrides {
     /// When it says what means nothing; names the file and line.
     pub fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
         let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
-        let file: File = toml::from_str(text).map_err(|error| {
-            let place = place(error.span().map_or(0, |span| span.start));
-            anyhow::anyhow!("{place}: {}", plain(error.message()))
-        })?;
+        let file: File = toml::from_str(text).map_err(|error| toml_error(&error, text, path))?;
         let mut decisions = Vec::new();
         let of = |kind: &'static str, entries: Vec<Spanned<Decision>>| {
             entries.into_iter().map(move |entry| (entry, kind))
@@ -226,9 +223,10 @@ impl Overrides {
         unused.collect()
     }
 
-    /// The last fix of a submission, if there is one.
+    /// The last fix of a submission, if there is one; of several attempts' fixes, that of this one.
     pub fn mend(&self, subject: &Subject) -> Option<&Decision> {
-        self.of(subject).rfind(|own| own.patch.is_some())
+        let fixes = || self.of(subject).filter(|own| own.patch.is_some());
+        fixes().rfind(|own| own.evidence == subject.digest).or_else(|| fixes().next_back())
     }
 
     /// Applies to a grade what was decided on its submission, and notes it in the remarks. Fixes are no matter of
@@ -475,6 +473,13 @@ mod tests {
         ] {
             let error = Overrides::parse(text, Path::new(OVERRIDES)).unwrap_err().to_string();
             assert!(error.starts_with(expected), "{error}");
+        }
+        for (slip, hint) in [
+            (SET.replace("\"typo\"", "\u{201c}typo\u{201d}"), "; hint: write straight quotes: \""),
+            (SET.replace("#0260000002", "sub\\a2"), "; hint: write / in a path"),
+        ] {
+            let error = Overrides::parse(&slip, Path::new(OVERRIDES)).unwrap_err().to_string();
+            assert!(error.ends_with(hint), "{error}");
         }
     }
 }

@@ -124,26 +124,31 @@ impl<'a> Owners<'a> {
         Some(&self.roster?.students[self.students[at]?])
     }
 
-    /// By what a decision names a submission: the student's number by the class list or the platform, which later
-    /// attempts share; else its folder, as where that number means another submission, too.
-    pub fn key(&self, at: usize) -> String {
-        let label = self.claims[at].label.as_ref();
-        let number = match self.student(at) {
-            Some(student) => student.number.clone(),
-            None if self.roster.is_none() => {
-                label.map(|own| own.number.clone()).unwrap_or_default()
-            }
-            None => String::new(),
-        };
-        let alone = |word: &str| self.meant(word) == [at];
+    /// The other attempts of a submission's person, and itself.
+    pub fn attempts(&self, at: usize) -> Vec<usize> {
+        (0..self.claims.len()).filter(|own| self.people[*own] == self.people[at]).collect()
+    }
+
+    /// By what a decision on a submission is kept that an instructor's word means: its folder where the word is that,
+    /// else what names its student with all attempts, by the class list or the platform. What they typed may be
+    /// another's, so where nothing else names them it is the folder, too.
+    pub fn key(&self, at: usize, word: &str) -> String {
         let slug = &self.claims[at].slug;
-        if !number.is_empty() && alone(&number) {
-            number
-        } else if alone(slug) {
-            slug.clone()
-        } else {
-            format!("{slug}/")
-        }
+        let named: Vec<&str> = match (self.student(at), &self.claims[at].label) {
+            _ if word.trim().trim_end_matches('/') == slug => Vec::new(),
+            (Some(own), _) => vec![&own.number, &own.username, &own.email],
+            (None, Some(own)) if self.roster.is_none() => {
+                vec![&own.number, &own.username, &own.email, &own.name]
+            }
+            _ => Vec::new(),
+        };
+        let full_name = self.student(at).map(Student::full_name).filter(|_| !named.is_empty());
+        let named = named.into_iter().map(str::to_owned).chain(full_name);
+        let all = self.attempts(at);
+        let mut keys = named.filter(|own| self.meant(own) == all);
+        keys.next().unwrap_or_else(|| {
+            if self.meant(slug) == [at] { slug.clone() } else { format!("{slug}/") }
+        })
     }
 }
 
@@ -232,18 +237,18 @@ mod tests {
         ] {
             assert_eq!(open.meant(word), expected, "{word}");
         }
-        assert_eq!([open.key(0), open.key(1)], ["104", "mal"]);
+        assert_eq!([open.key(0, "Ann Lee"), open.key(1, "mal/")], ["104", "mal"]);
         assert_eq!(open.listed_as("106").as_deref(), Some("Mallory Malone (106)"));
         // After it.
         let matches = matched("[[match]]\nsubmission = \"mal\"\nstudent = \"106\"\n");
         let decided = Owners::of(&claims, Some(&list), &matches).unwrap();
         assert_eq!([decided.meant("104"), decided.meant("106")], [[0], [1]]);
-        assert_eq!([decided.key(0), decided.key(1)], ["104", "106"]);
+        assert_eq!([decided.key(0, "104"), decided.key(1, "106")], ["104", "106"]);
         // Nobody knows whose they are, and nothing is guessed.
         let alone = Owners::of(&claims, None, &Matches::default()).unwrap();
         assert_eq!(alone.meant("#104"), [0, 1]);
         assert!(!alone.is_one(&[0, 1]));
-        assert_eq!([alone.key(0), alone.key(1)], ["ann", "mal"]);
+        assert_eq!([alone.key(0, "Ann Lee"), alone.key(1, "mal")], ["ann", "mal"]);
         assert_eq!(alone.meant("lee ann"), [0]);
     }
 
@@ -255,7 +260,8 @@ mod tests {
         assert_eq!(owners.meant("104"), [0, 1]);
         assert!(!owners.is_one(&[0, 1]));
         assert_eq!(owners.meant("104/"), [1]);
-        assert_eq!([owners.key(0), owners.key(1)], ["ann", "106"]);
+        assert_eq!([owners.key(0, "Ann Lee"), owners.key(1, "106")], ["Ann Lee", "106"]);
+        assert_eq!([owners.key(0, "ann"), owners.key(1, "104/")], ["ann", "104/"]);
     }
 
     #[test]
@@ -274,12 +280,19 @@ mod tests {
     fn attempts_of_a_student_are_one_person_s() {
         let at = |day: u32| format!("1-9 - Ann Lee - Oct {day}, 2019 1000 PM");
         let claims = [claim(&at(6), "104", ""), claim(&at(7), "104", "")];
-        for list in [None, Some(roster())] {
-            let owners = Owners::of(&claims, list.as_ref(), &Matches::default()).unwrap();
-            assert_eq!(owners.meant("104"), [0, 1]);
-            assert!(owners.is_one(&[0, 1]));
-            // Each can be named by itself.
-            assert_eq!(owners.key(1), at(7));
+        let names = "Last Name,First Name\nLee,Ann\n";
+        let names = Roster::parse(names.as_bytes(), Path::new("list.csv")).unwrap();
+        for (list, key) in [(None, "Ann Lee"), (Some(roster()), "104"), (Some(names), "Ann Lee")] {
+            // What is decided on a student is on each attempt, however many there are by then.
+            for claims in [&claims[1..], &claims] {
+                let owners = Owners::of(claims, list.as_ref(), &Matches::default()).unwrap();
+                let last = claims.len() - 1;
+                assert_eq!(owners.meant(key).len(), claims.len());
+                assert!(owners.is_one(&owners.meant(key)));
+                assert_eq!(owners.key(last, "Lee, Ann"), key);
+                // Each can be named by itself.
+                assert_eq!(owners.key(last, &format!("{}/", at(7))), at(7));
+            }
         }
     }
 }

@@ -13,6 +13,7 @@ use super::matching::{MATCHES, Matches};
 use super::overrides::{OVERRIDES, Overrides};
 use super::settle::Attempt;
 use crate::files::write_new;
+use crate::intake::text_of;
 use crate::rubric::Rules;
 
 /// The folder of the files, in the instructor's folder.
@@ -102,9 +103,13 @@ impl Decisions {
     pub fn read(output: &Path, assignment: Stated, attempt: Attempt) -> anyhow::Result<Self> {
         let text = |name: &str| {
             let file = output.join(name);
-            match std::fs::read_to_string(&file) {
+            match std::fs::read(&file) {
                 Err(error) if error.kind() == ErrorKind::NotFound => Ok(String::new()),
-                text => text.with_context(|| format!("cannot read {}", file.display())),
+                bytes => {
+                    let bytes = bytes.with_context(|| format!("cannot read {}", file.display()))?;
+                    // As editors save it.
+                    Ok::<_, anyhow::Error>(text_of(&bytes))
+                }
             }
         };
         let (matches, overrides) = (text(MATCHES)?, text(OVERRIDES)?);
@@ -349,6 +354,22 @@ mod tests {
         other.assignment.name = "a3".into();
         let error = Pins::begin(place.path(), &other).unwrap_err().to_string();
         assert!(error.contains("is a report of assignment \"a2\", not \"a3\""), "{error}");
+    }
+
+    #[test]
+    fn files_are_read_as_editors_save_them() {
+        let place = tempfile::tempdir().unwrap();
+        let text = "# Zo\u{eb}\n[[match]]\nsubmission = \"a2.zip\"\nstudent = \"none\"\n";
+        let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let western = text.replace('\u{eb}', "?").into_bytes();
+        let western: Vec<u8> =
+            western.into_iter().map(|byte| if byte == b'?' { 0xeb } else { byte }).collect();
+        let bom = [b"\xef\xbb\xbf", text.as_bytes()].concat();
+        for bytes in [bom, [&[0xff, 0xfe][..], &wide].concat(), western] {
+            std::fs::write(place.path().join(MATCHES), bytes).unwrap();
+            let Decisions { assignment, attempt, .. } = decided("");
+            assert_eq!(Decisions::read(place.path(), assignment, attempt).unwrap().matches, text);
+        }
     }
 
     #[test]

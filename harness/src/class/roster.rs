@@ -54,6 +54,9 @@ pub struct Student {
     pub email: String,
     /// When the platform says that something was submitted, as [`stamps::parse`] writes it.
     pub submitted: String,
+    /// Whether the platform says that it is a draft, which the student has not submitted.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub draft: bool,
 }
 
 impl Student {
@@ -83,7 +86,7 @@ impl Student {
 
 /// What columns are called, without accents, signs and case, and what they hold. Numbers and names also as students
 /// call them in `config.json`.
-const COLUMNS: [(Column, &[&str]); 8] = [
+const COLUMNS: [(Column, &[&str]); 9] = [
     (
         Column::Number,
         &[
@@ -203,7 +206,11 @@ const COLUMNS: [(Column, &[&str]); 8] = [
         ],
     ),
     (Column::Submitted, &["lastmodifiedsubmission", "dernieremodificationtravailremis"]),
+    (Column::Status, &["status", "statut", "estado", "stato"]),
 ];
+
+/// How Moodle begins the status of a draft, in plain letters.
+const DRAFTS: [&str; 6] = ["draft", "brouillon", "entwurf", "borrador", "bozza", "rascunho"];
 
 /// Words of a heading for a number of a person, such as `Banner ID`, `Student #` or `N\u{b0} de dossier`.
 const NUMBER: [&str; 9] = ["id", "number", "no", "nr", "num", "numero", "n", "nummer", "code"];
@@ -262,6 +269,7 @@ enum Column {
     Full,
     Email,
     Submitted,
+    Status,
 }
 
 impl Roster {
@@ -372,6 +380,9 @@ impl Roster {
                 last_name: cell(Column::Last),
                 email: cell(Column::Email),
                 submitted: stamps::parse(&submitted).unwrap_or_default(),
+                draft: DRAFTS
+                    .iter()
+                    .any(|word| names::plain(&cell(Column::Status)).starts_with(word)),
             };
             if student.submitted.is_empty() && submitted.contains(|c: char| c.is_ascii_digit()) {
                 roster.unread_times.push(format!("line {line}, \"{}\"", printable(&submitted)));
@@ -527,6 +538,8 @@ fn columns(header: &[String], kind: Kind) -> Vec<Option<Column>> {
     let mut columns: Vec<Option<Column>> = Vec::new();
     for name in header {
         let own = column(name).filter(|own| !columns.contains(&Some(*own)));
+        // Elsewhere it is that of a person.
+        let own = own.filter(|own| *own != Column::Status || kind == Kind::Moodle);
         columns.push(own);
     }
     if kind == Kind::Plain && !columns.contains(&Some(Column::Number)) {

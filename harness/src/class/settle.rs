@@ -32,6 +32,13 @@ pub enum Attempt {
     First,
 }
 
+impl std::fmt::Display for Attempt {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let value = clap::ValueEnum::to_possible_value(self);
+        f.write_str(value.as_ref().map_or("", |value| value.get_name()))
+    }
+}
+
 /// By what the standing of students is settled.
 pub struct Deciding<'a> {
     /// The class list, if there is one.
@@ -74,6 +81,11 @@ impl Standing {
     pub fn is_confirmed(&self) -> bool {
         self.decisions.iter().any(|own| own.decision.part.is_none() && !own.stale)
     }
+
+    /// Whether the class list says that the student has not submitted it.
+    pub fn is_draft(&self) -> bool {
+        self.student.as_ref().is_some_and(|student| student.draft)
+    }
 }
 
 /// What is known of the class as a whole.
@@ -92,13 +104,19 @@ pub struct Class {
     pub not_counted: Vec<String>,
     /// Zips that look like the download of a class, among other archives: neither opened nor graded.
     pub unopened: Vec<String>,
+    /// Submissions that were graded with other scenes, limits or another version of Umbra than in the last run.
+    pub incomparable: Vec<String>,
     /// Decisions on points whose evidence has changed since.
     pub stale: Vec<String>,
-    /// Decisions on submissions that are not in this report.
+    /// Decisions on submissions that are not in this report or do not count.
     pub unused: Vec<String>,
     /// Counting attempts that earn less than another attempt of the student, such as one after the cut-off.
     pub worse: Vec<String>,
 }
+
+/// Why submissions of one report are not comparable, for a list of them.
+pub const INCOMPARABLE: &str = "graded with other scenes, limits or another version of Umbra than the last run, so \
+                                not comparable: grade them again";
 
 /// A student without a submission that counts.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -224,6 +242,12 @@ pub fn settle(
                 Match::Student(at, by) => {
                     standing.student = Some(roster.students[at].clone());
                     by.clone_into(&mut standing.matched_by);
+                    if standing.is_draft() {
+                        let platform = roster.kind.title();
+                        grade.remarks.push(format!(
+                            "{platform} says that it is a draft, which was not submitted"
+                        ));
+                    }
                     person = format!("on the list {at}");
                     expected.insert(at, String::new());
                 }
@@ -458,7 +482,14 @@ fn charge(
 impl Class {
     /// Whether there is anything to say.
     pub fn is_quiet(&self) -> bool {
-        let decisions = [&self.not_counted, &self.unopened, &self.stale, &self.unused, &self.worse];
+        let decisions = [
+            &self.not_counted,
+            &self.unopened,
+            &self.incomparable,
+            &self.stale,
+            &self.unused,
+            &self.worse,
+        ];
         self.missing.is_empty()
             && self.undecided.is_empty()
             && decisions.iter().all(|lines| lines.is_empty())

@@ -7,26 +7,28 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::Once;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail, ensure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
+use super::changes::changes;
 use super::class::{self, WORK};
 use super::outputs::shell_path;
 use crate::class::jplag;
 use crate::class::mending;
 use crate::class::overrides::{Applied, Subject};
-use crate::class::pins::Change;
 use crate::class::{
     Claim, Collected, Deciding, Decisions, Kind, Label, Owners, Pins, Roster, settle,
 };
+use crate::columns::count;
 use crate::files::{files_below, hex, write_new, write_whole};
 use crate::grading::{Record, RecordCache, Shared, StoredRecord};
 use crate::held_back::HeldBack;
 use crate::program::graded;
-use crate::report::{self, BatchReport, ReportError, SubmissionReport, outline};
+use crate::report::{self, BatchReport, ReportError, SubmissionReport, harmless, outline};
 use crate::rubric::{self, Grade};
 
 /// The file that is there once held-back scenes are released, in the instructor's folder.
@@ -37,10 +39,6 @@ const FILE: &str = "batch.json";
 
 /// The file that says of which content the times in `matches.toml` were said, in the instructor's folder.
 const TIMES: &str = "times.json";
-
-/// The remark on a submission that was judged differently from the others of its class.
-const OTHER_CONDITIONS: &str = "graded before with other scenes, limits or another version of Umbra: \
-                                not comparable, grade it again";
 
 /// How often something that takes long says how far it is.
 const PACE: Duration = Duration::from_secs(2);
@@ -221,6 +219,69 @@ impl Found {
         Ok(begun)
     }
 
+    /// Removes what tasks of a partition found where all of that is graded under the same conditions.
+    ///
+    /// # Errors
+    /// When a file cannot be read or removed.
+    pub fn supersede(output: &Path, conditions: &str) -> anyhow::Result<()> {
+        let instructor = output.join(report::INSTRUCTOR);
+        let is_graded = |seen: &Seen| {
+            RecordCache::conditions_of(&instructor.join(&seen.slug)).as_deref() == Some(conditions)
+        };
+        for (file, begun) in Self::begun(output)? {
+            if begun.counting().all(is_graded) {
+                std::fs::remove_file(&file)
+                    .with_context(|| format!("cannot remove {}", file.display()))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The submissions that must have a record.
+    pub fn counting(&self) -> impl Iterator<Item = &Seen> {
+        self.seen.iter().filter(|seen| !seen.aside && seen.empty.is_empty())
+    }
+
+    fn holds(&self, slug: &str) -> bool {
+        self.seen.iter().any(|seen| seen.slug == slug)
+    }
+
+    /// Says once what was graded since by runs that did not end, and is not in the report.
+    pub fn say_since(&self, output: &Path) {
+        static SAID: Once = Once::new();
+        let instructor = output.join(report::INSTRUCTOR);
+        let is_graded =
+            |slug: &String| RecordCache::conditions_of(&instructor.join(slug)).is_some();
+        let since = class::folders(output).into_iter().filter(|slug| !self.holds(slug));
+        let since: Vec<String> = since.filter(is_graded).collect();
+        if !since.is_empty() {
+            SAID.call_once(|| {
+                eprintln!(
+                    "umbra: {} graded since by a run that did not end, and not in the report: {}; the same `umbra grade` \
+                     as then adds them",
+                    count(since.len(), "submission"),
+                    harmless(&class::some(&since))
+                );
+            });
+        }
+    }
+
+    /// Adds submissions that were graded by runs that did not end.
+    fn add(&mut self, records: &[StoredRecord], output: &Path) {
+        for StoredRecord { record, .. } in records {
+            if self.holds(&record.slug) {
+                continue;
+            }
+            let (label, slug) = (class::label(output, &record.slug), record.slug.clone());
+            let folder = label.as_ref().map_or("", |own| own.submission.as_str());
+            let name = match record.name.starts_with(folder) {
+                true => record.name.clone(),
+                false => format!("{folder}/{}", record.name),
+            };
+            self.seen.push(Seen { slug, name, label, ..Seen::default() });
+        }
+    }
+
     /// Keeps it for later runs.
     ///
     /// # Errors
@@ -230,6 +291,22 @@ impl Found {
         write_whole(&file, &serde_json::to_vec_pretty(self)?)
             .with_context(|| format!("cannot write {}", file.display()))
     }
+}
+
+/// Makes sure that no tasks of a partition graded what the report lacks.
+///
+/// # Errors
+/// When some did, or that cannot be told.
+pub fn ensure_merged(output: &Path) -> anyhow::Result<()> {
+    let begun = Found::begun(output)?;
+    let Some((file, _)) = begun.first() else { return Ok(()) };
+    bail!(
+        "{}: the tasks of a partition are not merged yet; hint: umbra merge --report {}; if no task will run any more, \
+         grade the same submissions without --partition, or delete {}",
+        output.display(),
+        shell_path(output),
+        file.display()
+    );
 }
 
 /// A report's folder, as it was kept.
@@ -254,24 +331,20 @@ impl Kept {
             output.display()
         );
         let pins = Pins::read(&instructor)?;
+        ensure_merged(output)?;
         let Some(found) = Found::read(output)?.filter(|_| pins.current().is_some()) else {
-            ensure!(
-                Found::begun(output)?.is_empty(),
-                "{}: the tasks of a partition are not merged yet; hint: umbra merge --report {}",
-                output.display(),
-                shell_path(output)
-            );
             bail!(
                 "{}: expected the --report of an earlier `umbra grade` of this version; hint: grade once more",
                 output.display()
             );
         };
         let mut records = Vec::new();
-        for slug in class::folders(output) {
+        for slug in class::folders(output).into_iter().filter(|slug| found.holds(slug)) {
             let earlier = RecordCache::earlier(&instructor.join(&slug), &found.conditions)
                 .with_context(|| format!("{slug} cannot be settled; grade it again"))?;
             records.extend(earlier);
         }
+        found.say_since(output);
         found.name(&mut records);
         let roster = class::roster(None, output)?;
         Ok(Self { pins, found, roster, records })
@@ -438,6 +511,7 @@ pub fn finish(
     *pins = Pins::read(&instructor)?;
     let decided = &Decisions::read(output, decided.assignment.clone(), decided.attempt)?;
     found.join(Found::read(output)?.unwrap_or_default(), output);
+    found.add(&records, output);
     found.keep(output)?;
     let roster = class::roster(None, output)?;
     let settled = settled(output, decided, &found, roster.as_ref(), records)?;
@@ -516,10 +590,13 @@ impl Settled {
     }
 }
 
-/// What submissions share, also according to JPlag.
+/// What submissions share, also according to JPlag, where it compared what they hold now.
 fn shared(output: &Path, records: &[StoredRecord]) -> anyhow::Result<Shared> {
     let near = jplag::kept(&output.join(report::INSTRUCTOR).join(report::LIKENESS))?;
-    let near = near.iter().map(|pair| (&pair.who, pair.similarity));
+    let own = |slug: &str| records.iter().find(|own| own.record.slug == slug);
+    let near =
+        near.iter().filter(|pair| pair.holds(|slug| Some(own(slug)?.record.digest.as_str())));
+    let near = near.map(|pair| (&pair.who, pair.similarity));
     Ok(Shared::of(records.iter().map(|earlier| &earlier.record)).with_near(near))
 }
 
@@ -568,11 +645,7 @@ pub fn settled(
         progress.step();
         let mut record = earlier.whole()?;
         shared.judge(&mut record);
-        let SubmissionReport { record, grade: mut original, standing } =
-            graded(record, &stated.rules);
-        if !earlier.comparable {
-            original.remarks.push(OTHER_CONDITIONS.to_owned());
-        }
+        let SubmissionReport { record, grade: original, standing } = graded(record, &stated.rules);
         let mut grade = original.clone();
         let subject =
             Subject { slug: &record.slug, digest: &record.digest, evidence: &record.evidence };
@@ -641,6 +714,9 @@ pub fn settled(
         let others = others.map(|seen| seen.name.clone());
         let known: Vec<String> = others.filter(|name| !standing.set_aside.contains(name)).collect();
         standing.set_aside.extend(known);
+        if !records[at].comparable {
+            class.incomparable.push(claims[at].name.clone());
+        }
         let stale = decisions[at].iter().filter(|own| own.stale);
         class.stale.extend(stale.map(|own| format!("{}: {}", claims[at].name, own.words())));
         standing.decisions.clone_from(&decisions[at]);
@@ -659,78 +735,4 @@ pub fn settled(
     let alike = output.join(report::INSTRUCTOR).join(report::LIKENESS);
     let has_alike = alike.join(report::HTML_FILE).is_file();
     Ok(Settled { report: BatchReport { released, has_alike, ..settled }, records, shared })
-}
-
-/// Whether a submission of two reports is one student's in both.
-pub fn is_same(own: &SubmissionReport, other: &SubmissionReport) -> bool {
-    own.record.slug == other.record.slug && own.standing.student == other.standing.student
-}
-
-/// The attempt in `of` of the student whose attempt `own` is in `with` alone; that one is not in `with`.
-pub fn other_attempt<'a>(
-    own: &SubmissionReport,
-    of: &'a BatchReport,
-    with: &BatchReport,
-) -> Option<&'a SubmissionReport> {
-    let student = own.standing.student.as_ref();
-    let label = own.standing.label.as_ref().map(Label::person);
-    let is_theirs = |other: &&SubmissionReport| match student {
-        Some(student) => other.standing.student.as_ref() == Some(student),
-        None => label.is_some() && other.standing.label.as_ref().map(Label::person) == label,
-    };
-    // One that was nobody's, or another's, is not theirs in `with`.
-    let gone = |other: &&SubmissionReport| !with.entries.iter().any(|own| is_same(own, other));
-    of.entries.iter().filter(gone).find(is_theirs)
-}
-
-/// Points that are others in `after`, by student and part; an attempt that counts instead of another is the student's.
-pub fn changes(before: &BatchReport, after: &BatchReport) -> Vec<Change> {
-    let of = |report: &BatchReport, slug: &str| {
-        report.entries.iter().find(|entry| entry.record.slug == slug).cloned()
-    };
-    let mut slugs: Vec<&str> =
-        before.entries.iter().chain(&after.entries).map(|own| own.record.slug.as_str()).collect();
-    slugs.sort_by_key(|slug| slug.to_lowercase());
-    slugs.dedup();
-    let mut changes = Vec::new();
-    for slug in slugs {
-        let (old, new) = (of(before, slug), of(after, slug));
-        // Another attempt of the same student is told in one line.
-        let other = |own: &SubmissionReport, of: &BatchReport, with: &BatchReport| {
-            other_attempt(own, of, with).cloned()
-        };
-        let (old, new) = match (old, new) {
-            (None, Some(new)) => (other(&new, before, after), Some(new)),
-            (Some(old), Some(new)) if !is_same(&old, &new) => {
-                (other(&new, before, after), Some(new))
-            }
-            (Some(old), None) if other(&old, after, before).is_some() => continue,
-            both => both,
-        };
-        let who = new.as_ref().or(old.as_ref()).map(SubmissionReport::who).unwrap_or_default();
-        let mut add = |part: &str, before: Option<[f64; 2]>, after: Option<[f64; 2]>| {
-            if before != after {
-                let (slug, part, who) = (slug.to_owned(), part.to_owned(), who.clone());
-                changes.push(Change { slug, who, part, before, after });
-            }
-        };
-        let total = |own: &Option<SubmissionReport>| {
-            own.as_ref().map(|own| [own.grade.points, own.grade.points_max])
-        };
-        if let (Some(old), Some(new)) = (&old, &new) {
-            let ids = old.grade.parts.iter().chain(&new.grade.parts).map(|part| part.id.as_str());
-            let mut ids: Vec<&str> = ids.collect();
-            ids.sort_unstable();
-            ids.dedup();
-            for id in ids {
-                let points = |own: &SubmissionReport| {
-                    let part = own.grade.parts.iter().find(|part| part.id == id);
-                    part.map(|part| [part.points, part.points_max])
-                };
-                add(id, points(old), points(new));
-            }
-        }
-        add("", total(&old), total(&new));
-    }
-    changes
 }

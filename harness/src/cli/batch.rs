@@ -23,7 +23,7 @@ use crate::class::{Attempt, Collected, Decisions, Kind, Label, Pins, Stated, Wan
 use crate::columns::count;
 use crate::files::write_whole;
 use crate::grading::{Begun, Folders, Grading, Mode, Record, RecordCache, StoredRecord, Workshop};
-use crate::held_back::recorded_seed;
+use crate::held_back::{in_words, recorded_seed};
 use crate::program::graded;
 use crate::report::{self, BatchReport, SubmissionReport};
 use crate::rubric;
@@ -192,10 +192,7 @@ impl<'a> Batch<'a> {
             Mode::Check => None,
         };
         let context = &context;
-        let seed = match self.perturb {
-            Some(Perturb(seed)) => seed,
-            None => Some(recorded_seed(&instructor.join(SEED_FILE))?),
-        };
+        let seed = self.seed(&instructor.join(SEED_FILE))?;
         let earlier = match self.mode {
             Mode::Grade => Found::read(self.output)?.unwrap_or_default(),
             Mode::Check => Found::default(),
@@ -333,7 +330,12 @@ impl<'a> Batch<'a> {
                     );
                 }
                 join(self.output, &found, &mut records);
-                assemble::finish(self.output, pins, decided, found, records)?
+                let conditions = found.conditions.clone();
+                let report = assemble::finish(self.output, pins, decided, found, records)?;
+                if self.only.is_empty() {
+                    Found::supersede(self.output, &conditions)?;
+                }
+                report
             }
             _ => {
                 let rules = &context.assignment.rules;
@@ -400,10 +402,40 @@ impl<'a> Batch<'a> {
                 self.slice.is_none() || self.attempt.is_none_or(|own| own == attempt),
                 "--attempt: all tasks of a partition choose the same one, which the first of them pinned"
             );
+            ensure!(
+                self.only.is_empty() || self.attempt.is_none_or(|own| own == attempt),
+                "--attempt: it is the whole class's, and with --only the others keep their grades; hint: leave out one of \
+                 the two"
+            );
+            if let Some(own) = self.attempt.filter(|own| *own != attempt) {
+                eprintln!(
+                    "umbra: --attempt {own} instead of {attempt}, for the whole class from now on"
+                );
+            }
             decided.attempt = self.attempt.unwrap_or(attempt);
         }
         decided.check(self.output)?;
         Ok((pins, decided))
+    }
+
+    /// The seed of the held-back scenes, if there are any: the one that the report has, in `file`.
+    fn seed(&self, file: &Path) -> anyhow::Result<Option<u64>> {
+        let chosen = self.perturb.map(|Perturb(seed)| seed);
+        let seed = match (self.mode, chosen) {
+            (Mode::Check, Some(seed)) => return Ok(seed),
+            _ => recorded_seed(file, chosen)?,
+        };
+        // Before they are merged, tasks of a partition are compared with each other.
+        let is_merged = self.slice.is_none() || Found::read(self.output)?.is_some();
+        ensure!(
+            chosen.is_none_or(|own| own == seed || !is_merged),
+            "--perturb: {} is graded with {}, and all submissions of a report share their held-back scenes; hint: \
+             another --report, or delete {} and grade all of them again",
+            self.output.display(),
+            in_words(seed),
+            file.display()
+        );
+        Ok(chosen.unwrap_or(seed))
     }
 
     /// The slugs of attempts that need not be graded: another one of the same student counts.
@@ -564,7 +596,6 @@ fn same_list(list: &Path, output: &Path) -> anyhow::Result<()> {
 
 /// Makes sure that a task of a partition uses the seed of one of the tasks that graded something, if any did.
 fn same_seed(seed: Option<u64>, output: &Path) -> anyhow::Result<()> {
-    let words = |seed: Option<u64>| seed.map_or("off".to_owned(), |seed| seed.to_string());
     let begun = Found::begun(output)?;
     let seed_of = |found: &Found| found.held_back.as_ref().map(|held_back| held_back.seed);
     if begun.iter().any(|(_, found)| seed_of(found) == seed) {
@@ -576,11 +607,11 @@ fn same_seed(seed: Option<u64>, output: &Path) -> anyhow::Result<()> {
         class::folders(output).iter().filter_map(made).any(|made| made == found.conditions)
     };
     let Some((file, found)) = begun.iter().find(graded) else { return Ok(()) };
-    let other = words(seed_of(found));
+    let other = in_words(seed_of(found));
     bail!(
         "--perturb: this task would use {}, another one used {other}: all tasks of a partition use the same seed; hint: \
          --perturb {other}, or delete {} and run its task again",
-        words(seed),
+        in_words(seed),
         file.display()
     );
 }

@@ -6,7 +6,7 @@ use anyhow::{bail, ensure};
 
 use super::assemble::Kept;
 use crate::class::overrides::Subject;
-use crate::report::SubmissionReport;
+use crate::report::{BatchReport, SubmissionReport, harmless};
 
 /// A submission of a report, as it was kept.
 pub struct Graded {
@@ -14,8 +14,8 @@ pub struct Graded {
     pub entry: SubmissionReport,
     /// By what decisions name it.
     pub key: String,
-    /// Where it does not count: `, A does` where another attempt counts, else nothing.
-    pub instead: Option<String>,
+    /// The folders of all attempts of the same person.
+    attempts: Vec<String>,
 }
 
 impl Graded {
@@ -23,6 +23,19 @@ impl Graded {
     pub fn subject(&self) -> Subject<'_> {
         let record = &self.entry.record;
         Subject { slug: &record.slug, digest: &record.digest, evidence: &record.evidence }
+    }
+
+    /// Why a report shows nothing of it, if it does not count there.
+    pub fn not_counting(&self, report: &BatchReport) -> Option<String> {
+        let counts = |slug: &String| report.entries.iter().any(|own| own.record.slug == *slug);
+        let slug = &self.entry.record.slug;
+        let others: Vec<&str> =
+            self.attempts.iter().filter(|own| counts(own)).map(String::as_str).collect();
+        let words = match others[..] {
+            [] => format!("the submission {slug} does not count"),
+            _ => format!("the submission {slug} does not count, {} does", others.join(", ")),
+        };
+        (!counts(slug)).then(|| harmless(&words))
     }
 }
 
@@ -82,15 +95,9 @@ pub fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
             owners.folders(open).join(", ")
         ),
     };
-    let instead = || {
-        let other = |own: &usize| counts(own) && owners.is_one(&[at, *own]);
-        let others: Vec<usize> = (0..claims.len()).filter(other).collect();
-        match owners.folders(&others).as_slice() {
-            [] => String::new(),
-            others => format!(", {} does", others.join(", ")),
-        }
-    };
-    let instead = (!counts(&at)).then(instead);
-    let entry = kept.graded(output, &claims[at].slug)?;
-    Ok(Graded { entry, key: owners.key(at), instead })
+    let attempts = owners.folders(&owners.attempts(at)).into_iter().map(str::to_owned).collect();
+    let mut entry = kept.graded(output, &claims[at].slug)?;
+    // Messages name the student as all reports do.
+    entry.standing.student = owners.student(at).cloned();
+    Ok(Graded { entry, key: owners.key(at, wanted), attempts })
 }

@@ -287,7 +287,7 @@ pub fn claim(output: &Path, record: &Record) -> Claim {
 }
 
 /// What the platform said of a submission that an earlier run graded.
-fn label(output: &Path, slug: &str) -> Option<Label> {
+pub fn label(output: &Path, slug: &str) -> Option<Label> {
     let file = output.join(report::INSTRUCTOR).join(slug).join(LABEL);
     serde_json::from_slice(&fs::read(file).ok()?).ok()?
 }

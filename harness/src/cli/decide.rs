@@ -9,8 +9,8 @@ use super::chosen::{Graded, one};
 use super::earlier::{Report, Row};
 use super::outputs::shell_path;
 use super::report_folder::ReportFolder;
-use crate::class::Decisions;
 use crate::class::overrides::{Applied, Decision, OVERRIDES, entry, fingerprint};
+use crate::class::{Decisions, INCOMPARABLE};
 use crate::columns;
 use crate::files::write_whole;
 use crate::report::{self, BatchReport, harmless};
@@ -94,7 +94,7 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
         columns::points(*points),
         columns::range([least, most])
     );
-    said(&decision.report.path, &graded)
+    said(&decision.report.path, &graded, &report)
 }
 
 /// Confirms what was left to the instructor.
@@ -105,7 +105,7 @@ pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     let evidence = fingerprint(&graded.subject(), &graded.entry.grade.parts);
     let report = decision.add(kept, &decision.of(&graded, evidence)?)?;
     println!("{}: {}", harmless(&graded.entry.who()), confirmed(&graded, &report));
-    said(&decision.report.path, &graded)
+    said(&decision.report.path, &graded, &report)
 }
 
 /// The last decision on a part, or on the whole, as the report applies it beside all others; none where the submission
@@ -133,13 +133,11 @@ fn confirmed(graded: &Graded, report: &BatchReport) -> String {
     }
 }
 
-/// Says where a decision is kept, and whether it shows.
-pub fn said(output: &Path, graded: &Graded) -> anyhow::Result<u8> {
-    let shown = match &graded.instead {
+/// Says where a decision is kept, and whether the report that was made by it shows it.
+pub fn said(output: &Path, graded: &Graded, report: &BatchReport) -> anyhow::Result<u8> {
+    let shown = match graded.not_counting(report) {
         None => "; the reports show it".to_owned(),
-        Some(instead) => {
-            format!(", but no report shows it: this submission does not count{}", harmless(instead))
-        }
+        Some(why) => format!(", but no report shows it: {why}"),
     };
     println!(
         "kept in {}{shown}; `umbra regrade --undo --report {}` takes it back",
@@ -240,6 +238,8 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
         let private: Vec<&str> = private.map(String::as_str).collect();
         (!private.is_empty()).then(|| row(own, &private.join("; ")))
     });
+    let drafts = open().filter(|own| own.standing.is_draft());
+    let drafts = drafts.map(|own| row(own, "the student may still change it"));
     let unread = report.submissions.iter().filter(|own| own.is_unread());
     let unread = unread.map(|own| row(own, own.remarks.first().map_or("", String::as_str)));
     let late = report.submissions.iter().filter(|own| own.standing.time_unknown);
@@ -258,14 +258,19 @@ pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
         ("neither opened nor graded", class.unopened.clone()),
         ("nobody could open them: ask for other archives, or `umbra confirm`", unread.collect()),
         ("images without code, for `umbra confirm` or `umbra override`", images),
+        ("drafts, not submitted: ask, then `umbra confirm`", drafts.collect()),
         ("to be looked at, then `umbra confirm` or `umbra override`", remarks.collect::<Vec<_>>()),
         (
             "decisions whose evidence has changed: make them again or delete them",
             class.stale.clone(),
         ),
-        ("decisions on submissions that are not in this report", class.unused.clone()),
+        (
+            "decisions on submissions that are not in this report or do not count",
+            class.unused.clone(),
+        ),
         ("lateness unknown: `submitted` in matches.toml says it", late.collect()),
         ("not wholly judged: grade again", ranges.collect()),
+        (INCOMPARABLE, class.incomparable.clone()),
     ] {
         waits |= !lines.is_empty();
         list(title, &lines);

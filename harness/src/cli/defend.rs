@@ -12,8 +12,9 @@ use super::outputs::at_root;
 use super::report_folder::ReportFolder;
 use super::{EXIT_OK, class, terminal};
 use crate::class::overrides::Subject;
+use crate::held_back::in_words;
 use crate::program::graded;
-use crate::report::{self, Look, SubmissionReport, harmless};
+use crate::report::{self, Look, SubmissionReport};
 use crate::rubric::{self, Rules};
 
 /// Options of `umbra defend`.
@@ -33,16 +34,11 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
     let kept = Kept::read(output)?;
     let decided = kept.decided()?;
     let chosen = one(student, output, &kept)?;
-    let slug = chosen.entry.record.slug;
+    let slug = chosen.entry.record.slug.clone();
     let settled = kept.report(output, decided)?;
     let report = &settled.report;
-    let entry =
-        report.entries.iter().find(|entry| entry.record.slug == slug).with_context(|| {
-            format!(
-                "the submission {slug} does not count{}",
-                harmless(&chosen.instead.unwrap_or_default())
-            )
-        })?;
+    let entry = report.entries.iter().find(|entry| entry.record.slug == slug);
+    let entry = entry.with_context(|| chosen.not_counting(report).unwrap_or_default())?;
     let entry = &mut settled.whole(entry)?;
     let is_mended = entry.standing.mended.as_ref().is_some_and(|mended| mended.counts);
     let mended = class::mended_record(output, &slug)?.filter(|_| is_mended);
@@ -61,7 +57,7 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
         Some(_) => Location::Here(source.canonicalize().unwrap_or(source)),
         None => Location::of(output, &slug),
     };
-    let seed = report.held_back.as_ref().map_or("off".to_owned(), |own| own.seed.to_string());
+    let seed = in_words(report.held_back.as_ref().map(|own| own.seed));
     println!(
         "  the instructor, on all:  umbra grade {} --perturb {seed} --report ANOTHER{}",
         location.arguments(),

@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use anyhow::{Context as _, ensure};
+use anyhow::Context as _;
 use serde::Deserialize;
 
-use super::assemble::Found;
-use super::outputs::shell_path;
+use super::assemble::{Found, ensure_merged};
 use crate::class::{Class, Standing};
 use crate::columns;
 use crate::grading::StageCost;
@@ -74,17 +73,13 @@ impl Row {
             }
             let private = self.remarks.iter().filter(|remark| report::is_private(remark, rules));
             open.extend(private.cloned());
+            open.extend(self.standing.is_draft().then(|| "a draft, not submitted".to_owned()));
         }
         if self.standing.time_unknown {
             open.push("no penalty, since nobody knows when it was submitted".to_owned());
         }
         open
     }
-}
-
-/// Whether tasks of a partition graded into a report that nobody merged.
-pub fn is_begun(output: &Path) -> bool {
-    Found::begun(output).is_ok_and(|begun| !begun.is_empty())
 }
 
 impl Report {
@@ -94,12 +89,10 @@ impl Report {
     /// When there is none, or it is another version's.
     pub fn read(output: &Path) -> anyhow::Result<Self> {
         let file = output.join(report::JSON_FILE);
-        ensure!(
-            file.exists() || !is_begun(output),
-            "{}: the tasks of a partition are not merged yet; hint: umbra merge --report {}",
-            output.display(),
-            shell_path(output)
-        );
+        ensure_merged(output)?;
+        if let Some(found) = Found::read(output)? {
+            found.say_since(output);
+        }
         let opened = std::fs::File::open(&file).with_context(|| {
             format!(
                 "cannot read {}: expected the --report of an earlier `umbra grade`",

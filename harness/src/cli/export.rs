@@ -15,10 +15,10 @@ use super::class;
 use super::earlier::{Report, Row};
 use super::outputs::shell_path;
 use super::report_folder::ReportFolder;
-use crate::class::export::{Points, grade_book};
+use crate::class::export::{Points, check_keys, grade_book};
 use crate::class::feedback::{self, Feedback};
 use crate::class::overrides::OVERRIDES;
-use crate::class::{Kind, MATCHES, Roster, Student};
+use crate::class::{Class, INCOMPARABLE, Kind, MATCHES, Roster, Student};
 use crate::columns::count;
 use crate::files::{hex, write_whole};
 use crate::report::{self, harmless};
@@ -118,6 +118,12 @@ pub fn export(arguments: &ExportArguments) -> anyhow::Result<u8> {
             !report.submissions.is_empty(),
             "the submission {slug} does not count, so there is nothing to export"
         );
+        let own = |line: &String| report.submissions.iter().any(|row| line.starts_with(&row.name));
+        if let Some(class) = &mut report.class {
+            class.incomparable.retain(own);
+            class.stale.retain(own);
+            class.unused.clear();
+        }
     }
     write(*format, file, output, item, &report)?;
     Ok(super::EXIT_OK)
@@ -191,13 +197,30 @@ fn write(
         }
     };
     write_whole(file, &bytes).with_context(|| format!("cannot write {}", file.display()))?;
-    note(file, &bytes, output)?;
+    note(&bytes, output)?;
+    said.extend(report.class.iter().flat_map(to_look_at));
     said.iter().for_each(|line| println!("{line}"));
     Ok(())
 }
 
-/// Digests of what was exported, by path.
-type Exports = BTreeMap<PathBuf, String>;
+/// What the instructor decided and may have to decide again, whatever takes the grades.
+fn to_look_at(class: &Class) -> Vec<String> {
+    let unused = "on what is not in this report or does not count";
+    let kinds = [
+        ("submission", INCOMPARABLE, &class.incomparable),
+        ("decision", "whose evidence has changed since", &class.stale),
+        ("decision", unused, &class.unused),
+    ];
+    let mut said = Vec::new();
+    for (noun, what, lines) in kinds.into_iter().filter(|(.., lines)| !lines.is_empty()) {
+        said.push(format!("warning: {} {what}:", count(lines.len(), noun)));
+        said.extend(lines.iter().map(|line| format!("  {}", harmless(line))));
+    }
+    said
+}
+
+/// Digests of what was exported, each with its size [bytes]: an export is known wherever it lies by now.
+type Exports = BTreeMap<String, u64>;
 
 /// What was exported from a report; nothing where that cannot be read.
 fn exports(output: &Path) -> Exports {
@@ -253,17 +276,17 @@ fn may_replace(file: &Path, format: Format, output: &Path) -> anyhow::Result<()>
 
 /// Whether a file is an export from a report, which nobody changed since.
 pub fn is_export(file: &Path, output: &Path) -> bool {
-    let is_file = file.symlink_metadata().is_ok_and(|meta| meta.is_file());
-    is_file
-        && exports(output).get(&whole_path(file)).is_some_and(|noted| {
-            std::fs::read(file).is_ok_and(|bytes| *noted == hex(&Sha256::digest(bytes)))
-        })
+    let Ok(meta) = file.symlink_metadata() else { return false };
+    let exports = exports(output);
+    meta.is_file()
+        && exports.values().any(|size| *size == meta.len())
+        && std::fs::read(file).is_ok_and(|bytes| exports.contains_key(&hex(&Sha256::digest(bytes))))
 }
 
 /// Notes what was exported, so that a later export may replace it.
-fn note(file: &Path, bytes: &[u8], output: &Path) -> anyhow::Result<()> {
+fn note(bytes: &[u8], output: &Path) -> anyhow::Result<()> {
     let mut exports = exports(output);
-    exports.insert(whole_path(file), hex(&Sha256::digest(bytes)));
+    exports.insert(hex(&Sha256::digest(bytes)), bytes.len() as u64);
     let notes = output.join(report::INSTRUCTOR).join(EXPORTS);
     write_whole(&notes, &serde_json::to_vec_pretty(&exports)?)
         .with_context(|| format!("cannot write {}", notes.display()))
@@ -303,6 +326,7 @@ fn of_platform(roster: Option<Roster>, kind: Kind, output: &Path) -> anyhow::Res
         kind.title(),
         roster.kind.title()
     );
+    check_keys(&roster).map_err(anyhow::Error::msg)?;
     Ok(roster)
 }
 
@@ -396,7 +420,12 @@ fn book(
     let item = item.item.as_ref().unwrap_or(&report.assignment.name);
     let book = grade_book(&roster, item, &graded).map_err(anyhow::Error::msg)?;
     left.extend(book.excused.iter().map(|who| format!("{who}: excused, says {}", kind.title())));
-    let written = graded.len() - book.excused.len();
+    let no_key =
+        |who: &String| format!("{who}: no column says by what {} knows them", kind.title());
+    left.extend(book.unknown.iter().map(no_key));
+    let is_written =
+        |who: &String| ![&book.excused, &book.unknown].iter().any(|own| own.contains(who));
+    let written = graded.iter().map(|own| own.student.who()).filter(is_written).count();
     ensure!(written > 0, "no grade to export: {}", harmless(&left.join("; ")));
     said.push(format!("{}: {} for {}", file.display(), count(written, "grade"), kind.title()));
     let out_of = report.submissions.first().map_or(0.0, |row| row.out_of);

@@ -13,6 +13,7 @@ use super::context::Context;
 use crate::columns::count;
 use crate::files::files_below;
 use crate::held_back::secret_seed;
+use crate::intake::text_of;
 
 /// What runs when the image is built, and for each submission.
 const SCRIPTS: [(&str, &str); 2] = [
@@ -154,7 +155,7 @@ fn is_source(path: &Path) -> bool {
 
 /// Lateness is Gradescope's to judge, and extensions are nobody else's matter.
 fn without_late(config: &[u8]) -> anyhow::Result<Vec<u8>> {
-    let mut config: serde_json::Value = serde_json::from_slice(config)?;
+    let mut config: serde_json::Value = serde_json::from_str(&text_of(config))?;
     if let Some(config) = config.as_object_mut() {
         config.remove("late");
     }

@@ -22,6 +22,8 @@ use crate::report::{self, Alike, AlikePage, BatchReport};
 
 /// A folder of sources for each submission, in [`report::LIKENESS`].
 const SUBMISSIONS: &str = "submissions";
+/// The file with the digest of each submission whose sources were written, beside that folder.
+const DIGESTS: &str = "digests.json";
 /// The template's folder in it, which all submissions started from.
 const TEMPLATE: &str = "template";
 /// Number of pairs that are shown, JPlag's and those with equal files each: further pairs tell nothing more.
@@ -55,7 +57,7 @@ pub fn run(arguments: &LikenessArguments, root: Option<&Path>) -> anyhow::Result
 /// Reads a result and keeps its pairs.
 fn take(result: &Path, output: &Path, folder: &Path) -> anyhow::Result<()> {
     let bytes = fs::read(result).with_context(|| format!("cannot read {}", result.display()))?;
-    let pairs = jplag::read(&bytes).with_context(|| result.display().to_string())?;
+    let mut pairs = jplag::read(&bytes).with_context(|| result.display().to_string())?;
     let known = submissions(folder)?;
     ensure!(
         !known.is_empty(),
@@ -71,7 +73,44 @@ fn take(result: &Path, output: &Path, folder: &Path) -> anyhow::Result<()> {
         harmless(&unknown.into_iter().cloned().collect::<Vec<_>>().join(", ")),
         folder.join(SUBMISSIONS).display()
     );
+    let digests = digests(folder)?;
+    for pair in &mut pairs {
+        pair.digests = pair.who.each_ref().map(|who| digests.get(who).cloned().unwrap_or_default());
+    }
     jplag::keep(folder, &pairs)
+}
+
+/// The digest of each submission when its sources were written.
+fn digests(folder: &Path) -> anyhow::Result<BTreeMap<String, String>> {
+    let file = folder.join(DIGESTS);
+    if !file.is_file() {
+        return Ok(BTreeMap::new());
+    }
+    let bytes = fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
+    serde_json::from_slice(&bytes).with_context(|| format!("{}: expected digests", file.display()))
+}
+
+fn say_lost(pairs: usize) {
+    if pairs > 0 {
+        println!(
+            "{} of JPlag's {} of sources that changed since, and no longer shown: run JPlag again",
+            count(pairs, "pair"),
+            if pairs == 1 { "is" } else { "are" }
+        );
+    }
+}
+
+/// Of pairs whose sources were compared, keeps those of sources that did not change since; answers how many are lost.
+fn keep_unchanged(folder: &Path, changed: &BTreeSet<String>) -> anyhow::Result<usize> {
+    let digests = digests(folder)?;
+    let mut pairs = jplag::kept(folder)?;
+    let before = pairs.len();
+    pairs.retain(|pair| !pair.who.iter().any(|who| changed.contains(who)));
+    for pair in &mut pairs {
+        pair.digests = pair.who.each_ref().map(|who| digests.get(who).cloned().unwrap_or_default());
+    }
+    jplag::keep(folder, &pairs)?;
+    Ok(before - pairs.len())
 }
 
 /// The submissions whose sources are in the folder.
@@ -106,6 +145,7 @@ fn write_sources(
         found.map(|source| source.path.clone()).or_else(place).filter(|path| path.exists())
     };
     let (mut changed, mut missing) = (BTreeSet::new(), Vec::new());
+    let mut written = digests(folder)?;
     let copies = tempfile::tempdir_in(&context.supervisor.scratch)?;
     for record in kept.records() {
         let slug = &record.slug;
@@ -130,13 +170,15 @@ fn write_sources(
         if copy_sources(&from, &folder.join(SUBMISSIONS).join(slug).join("src"))? {
             changed.insert(slug.clone());
         }
+        written.insert(slug.clone(), record.digest.clone());
         let _ = fs::remove_dir_all(&copy);
     }
     context.progress.end();
     copy_sources(&context.assignment.template(), &folder.join(TEMPLATE).join("src"))?;
-    let mut pairs = jplag::kept(folder)?;
-    pairs.retain(|pair| !pair.who.iter().any(|who| changed.contains(who)));
-    jplag::keep(folder, &pairs)?;
+    let file = folder.join(DIGESTS);
+    write_whole(&file, &serde_json::to_vec_pretty(&written)?)
+        .with_context(|| format!("cannot write {}", file.display()))?;
+    say_lost(keep_unchanged(folder, &changed)?);
     if !missing.is_empty() {
         println!(
             "without sources, since they do not lie any more where they were graded from: {}",
@@ -189,7 +231,12 @@ fn copy_sources(from: &Path, to: &Path) -> anyhow::Result<bool> {
 /// Writes the pages, and says what is alike.
 fn show(kept: &Kept, settled: &BatchReport, folder: &Path) -> anyhow::Result<()> {
     let shared = Shared::of(kept.records());
-    let near = jplag::kept(folder)?;
+    let mut near = jplag::kept(folder)?;
+    let before = near.len();
+    near.retain(|pair| {
+        pair.holds(|slug| Some(kept.records().find(|own| own.slug == slug)?.digest.as_str()))
+    });
+    say_lost(before - near.len());
     let mut all: BTreeMap<[String; 2], Alike> = BTreeMap::new();
     let name = |slug: &String| {
         // As all pages call them: by the class list, where it knows them.

@@ -82,7 +82,7 @@ pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8>
     if let Some(mended) = entry.and_then(|entry| entry.standing.mended.as_ref()) {
         println!("{}: {}", harmless(&graded.entry.who()), harmless(&mended.words));
     }
-    said(output, &graded)
+    said(output, &graded, &report)
 }
 
 /// A copy of the submission with the fix in it, in the instructor's folder.

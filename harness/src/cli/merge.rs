@@ -53,7 +53,7 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
         None => one(output, begun)?,
     };
     let (mut records, mut absent) = (Vec::new(), Vec::new());
-    for Seen { slug, name, .. } in graded(&found) {
+    for Seen { slug, name, .. } in found.counting() {
         let earlier = RecordCache::earlier(&instructor.join(slug), &found.conditions)?;
         match earlier.filter(|earlier| earlier.comparable) {
             Some(earlier) => records.push(earlier),
@@ -64,7 +64,7 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
         absent.is_empty(),
         "{} of {} not graded yet: {}; run the tasks again, those that are done take seconds",
         absent.len(),
-        count(graded(&found).count(), "submission"),
+        count(found.counting().count(), "submission"),
         harmless(&some(&absent))
     );
     let machines = machines(&records);
@@ -102,11 +102,6 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
         std::fs::remove_file(&file).with_context(|| format!("cannot remove {}", file.display()))?;
     }
     grade::shown(&report, output, skipped)
-}
-
-/// The submissions that must have a record.
-fn graded(found: &Found) -> impl Iterator<Item = &Seen> {
-    found.seen.iter().filter(|seen| !seen.aside && seen.empty.is_empty())
 }
 
 /// What all tasks found.
@@ -155,7 +150,7 @@ fn one(output: &Path, begun: Vec<(PathBuf, Found)>) -> anyhow::Result<Found> {
             );
         }
         let holds = |seen: &Seen| last.seen.iter().any(|own| own.slug == seen.slug);
-        let lost = graded(other).find(|&seen| !holds(seen));
+        let lost = other.counting().find(|&seen| !holds(seen));
         if let Some(lost) = lost {
             bail!(
                 "the tasks were given different submissions: {} has {}, {} does not; hint: give all tasks the same \

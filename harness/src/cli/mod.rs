@@ -3,6 +3,7 @@
 mod assemble;
 mod batch;
 mod bless;
+mod changes;
 mod check;
 mod choices;
 mod chosen;
@@ -250,14 +251,17 @@ fn wrapped(text: &str, width: usize) -> String {
 
 /// An error and its causes, without causes that its message already contains and without numbers of the system's.
 fn told_once(error: &anyhow::Error) -> String {
-    let words = |cause: &(dyn std::error::Error + 'static)| match cause.downcast_ref() {
-        Some(error) => io_words(error),
-        None => without_codes(&cause.to_string()),
+    // In the words of the system, and in plain ones.
+    let words = |cause: &(dyn std::error::Error + 'static)| {
+        let own = without_codes(&cause.to_string());
+        let plain = cause.downcast_ref().map_or_else(|| own.clone(), io_words);
+        (own, plain)
     };
-    error.chain().map(words).fold(String::new(), |told, cause| match told.as_str() {
-        "" => cause,
-        told if told.contains(&cause) => told.to_owned(),
-        told => format!("{told}: {cause}"),
+    error.chain().map(words).fold(String::new(), |told, (own, plain)| match told.as_str() {
+        "" => plain,
+        told if told.contains(&own) => told.replace(&own, &plain),
+        told if told.contains(&plain) => told.to_owned(),
+        told => format!("{told}: {plain}"),
     })
 }
 
@@ -442,6 +446,8 @@ mod tests {
         let missing = || io::Error::from_raw_os_error(2);
         let error = Err::<(), _>(missing()).context("cannot read a").unwrap_err();
         assert_eq!(told_once(&error), "cannot read a: there is no such file or folder");
+        let error = Err::<(), _>(missing()).with_context(|| format!("a: {}", missing()));
+        assert_eq!(told_once(&error.unwrap_err()), "a: there is no such file or folder");
         let error = anyhow::anyhow!("a.toml:2: x (os error 2)").context("b (os error 13) c");
         assert_eq!(told_once(&error), "b c: a.toml:2: x");
         assert_eq!(io_words(&io::Error::other("disk (os error 5)")), "disk");

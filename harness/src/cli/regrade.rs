@@ -4,15 +4,16 @@ use std::path::Path;
 
 use anyhow::Context as _;
 
-use super::assemble::{self, Kept, changes, is_same, other_attempt};
+use super::assemble::{self, Kept};
+use super::changes::{changes, summary};
 use super::context::Context;
 use super::report_folder::ReportFolder;
 use crate::class::overrides::OVERRIDES;
 use crate::class::pins::Change;
 use crate::class::{Decisions, MATCHES, Stated};
-use crate::columns::{count, left, right};
+use crate::columns::{left, right};
 use crate::files::write_whole;
-use crate::report::{BatchReport, SubmissionReport, harmless};
+use crate::report::harmless;
 
 /// Options of `umbra regrade`.
 #[derive(clap::Args)]
@@ -86,7 +87,7 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
     println!("{}", summary(&before.report, &after.report));
     for line in after.report.class.iter().flat_map(|class| &class.unused) {
         println!(
-            "warning: decision on a submission that is not in this report: {}",
+            "warning: decision on a submission that is not in this report or does not count: {}",
             harmless(line)
         );
     }
@@ -124,7 +125,7 @@ fn table(changes: &[Change]) -> String {
     };
     let mut rows = vec![["student", "part", "old", "new"].map(str::to_owned)];
     for (at, Change { slug, who, part, before, after }) in changes.iter().enumerate() {
-        let first = at == 0 || changes[at - 1].slug != *slug;
+        let first = at == 0 || (&changes[at - 1].slug, &changes[at - 1].who) != (slug, who);
         let who = if first { harmless(who) } else { String::new() };
         let part = if part.is_empty() { "total".to_owned() } else { harmless(part) };
         rows.push([who, part, points(*before), points(*after)]);
@@ -145,38 +146,4 @@ fn table(changes: &[Change]) -> String {
         )
     };
     rows.iter().map(line).collect()
-}
-
-/// How many rise and fall.
-fn summary(before: &BatchReport, after: &BatchReport) -> String {
-    let total = |own: &SubmissionReport| own.grade.points + own.grade.points_max;
-    let (mut rise, mut fall, mut stay, mut new) = (0, 0, 0, 0);
-    for entry in &after.entries {
-        let now = total(entry);
-        // Of a student whose other attempt counts now, that one.
-        let other = || other_attempt(entry, before, after).map(total);
-        let same = before.entries.iter().find(|own| is_same(own, entry)).map(total);
-        match same.or_else(other) {
-            None => new += 1,
-            Some(old) if now > old => rise += 1,
-            Some(old) if now < old => fall += 1,
-            Some(_) => stay += 1,
-        }
-    }
-    let is_gone = |own: &&SubmissionReport| {
-        let is_there = after.entries.iter().any(|now| now.record.slug == own.record.slug);
-        !is_there && other_attempt(own, after, before).is_none()
-    };
-    let gone = before.entries.iter().filter(is_gone).count();
-    let mut words = format!(
-        "{}: {rise} rise, {fall} fall, {stay} stay",
-        count(after.entries.len(), "submission")
-    );
-    if new > 0 {
-        words += &format!(", {new} more now count");
-    }
-    if gone > 0 {
-        words += &format!(", {gone} no longer count");
-    }
-    words
 }

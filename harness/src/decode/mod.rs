@@ -96,7 +96,9 @@ impl<'a> Decoder<'a> {
             // Nothing is decoded: files are copied one by one.
             None => intake::unpack(source, dest, tree, limits)?,
             Some(bytes) => {
-                self.unpack_bytes(&bytes, &intake::name_of(source), dest, tree, limits)?
+                let name = intake::name_of(source);
+                let submission = self.unpack_bytes(&bytes, &name, dest, tree, limits)?;
+                intake::known(submission, dest, tree)?
             }
         };
         self.inspect(submission, tree)

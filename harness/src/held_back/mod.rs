@@ -50,15 +50,18 @@ pub fn secret_seed() -> anyhow::Result<u64> {
     Ok(u64::from_le_bytes(bytes))
 }
 
-/// The secret seed that is recorded in `file`, or a new one, which is recorded there. Processes that ask at the same
-/// time get the same.
+/// What a file holds of a report without held-back scenes.
+const OFF: &str = "off";
+
+/// The seed of held-back scenes that is recorded in `file`, if it is not that there are none. Where nothing is recorded
+/// yet, `chosen` is, else a new secret seed. Processes that ask at the same time get the same.
 ///
 /// # Errors
 /// When the file holds no seed or cannot be written, or [`secret_seed`] fails.
-pub fn recorded_seed(file: &Path) -> anyhow::Result<u64> {
+pub fn recorded_seed(file: &Path, chosen: Option<Option<u64>>) -> anyhow::Result<Option<u64>> {
     if !file.exists() {
-        let seed = secret_seed()?;
-        match write_new(file, format!("{seed}\n").as_bytes()) {
+        let seed = chosen.map_or_else(|| secret_seed().map(Some), Ok)?;
+        match write_new(file, format!("{}\n", in_words(seed)).as_bytes()) {
             // Another process was faster.
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
             written => written.with_context(|| format!("cannot write {}", file.display()))?,
@@ -66,13 +69,21 @@ pub fn recorded_seed(file: &Path) -> anyhow::Result<u64> {
     }
     let text =
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
-    text.trim().parse().with_context(|| {
+    let text = text.trim();
+    if text == OFF {
+        return Ok(None);
+    }
+    text.parse().map(Some).with_context(|| {
         format!(
-            "{}: expected the seed of held-back scenes, found \"{}\"",
-            file.display(),
-            text.trim()
+            "{}: expected the seed of held-back scenes or {OFF}, found \"{text}\"",
+            file.display()
         )
     })
+}
+
+/// The seed as `--perturb` takes it.
+pub fn in_words(seed: Option<u64>) -> String {
+    seed.map_or_else(|| OFF.to_owned(), |seed| seed.to_string())
 }
 
 /// Makes the held-back scenes of a batch below the assignment's cache, if they are not there yet.

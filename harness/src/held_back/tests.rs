@@ -209,8 +209,8 @@ fn processes_that_ask_at_the_same_time_get_the_same_seed() {
     for _ in 0..20 {
         let place = tempfile::tempdir().unwrap();
         let file = place.path().join("instructor/seed.txt");
-        let seeds: Vec<u64> = std::thread::scope(|scope| {
-            let ask = || scope.spawn(|| super::recorded_seed(&file).unwrap());
+        let seeds: Vec<Option<u64>> = std::thread::scope(|scope| {
+            let ask = || scope.spawn(|| super::recorded_seed(&file, None).unwrap());
             let threads: Vec<_> = (0..4).map(|_| ask()).collect();
             threads.into_iter().map(|thread| thread.join().unwrap()).collect()
         });

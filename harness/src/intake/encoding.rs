@@ -3,7 +3,7 @@
 use super::finding::Finding;
 
 /// The text in these bytes.
-pub(super) fn text_of(bytes: &[u8]) -> String {
+pub fn text_of(bytes: &[u8]) -> String {
     decode(bytes).0
 }
 

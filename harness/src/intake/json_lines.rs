@@ -73,6 +73,11 @@ pub(super) fn parse(bytes: &[u8]) -> Read {
     Read { node, stopped: reader.stopped, rest, text, findings: reader.findings }
 }
 
+/// The first slip in what should be JSON, if it is a usual one.
+pub fn first_slip(text: &str) -> Option<Finding> {
+    parse(text.as_bytes()).findings.into_iter().next()
+}
+
 /// The line of a key in a JSON file, from 1; `at` is the keys and indices on the way to it.
 pub fn line_of(text: &str, at: &[String]) -> Option<u32> {
     let mut node = parse(text.as_bytes()).node?;

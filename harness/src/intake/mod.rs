@@ -41,8 +41,9 @@ mod zip;
 mod zip_headers;
 
 pub use check_config::check_config;
+pub use encoding::text_of;
 pub use finding::{Excerpt, Finding, Severity};
-pub use json_lines::line_of;
+pub use json_lines::{first_slip, line_of};
 pub use limits::Limits;
 pub use pack::{Packed, archive_name, fix, mends, pack};
 pub use source_rules::{INCLUDE_INSIDE, scan_source, scan_text};
@@ -51,6 +52,6 @@ pub use submitted_config::{Field, ListedRender, SubmittedConfig};
 pub(crate) use tree::CONFIG_FILE;
 pub use tree::{REPORT_FILES, TreeFile, TreeSpec};
 pub use tree_match::{Mark, TreeLine};
-pub(crate) use unpack::{copy_unpacked, name_of, read_archive};
+pub(crate) use unpack::{copy_unpacked, known, name_of, read_archive};
 pub use unpack::{format_of_bytes, unpack, unpack_bytes};
 pub use validate::{Validation, validate_refusal, validate_submission};

@@ -79,6 +79,40 @@ fn with_source(
     Err(IntakeError::Refused(Box::new(Refusal { name, format: Some(format), findings })))
 }
 
+/// Refuses an archive that holds nothing which belongs to the tree: it may hold the submission in a form that is not
+/// known, and nobody has seen that.
+///
+/// # Errors
+/// [`IntakeError::Refused`] for such a one; `dest`, its copy, is then empty again.
+pub(crate) fn known(
+    submission: Submission,
+    dest: &Path,
+    tree: &TreeSpec,
+) -> Result<Submission, IntakeError> {
+    let is_known = |path: &str| {
+        let is_named = tree.files.iter().any(|file| base(path) == base(&file.path));
+        is_named || is_source_of_any(path) || base(path).ends_with(".exr")
+    };
+    let files = &submission.files;
+    if files.iter().any(|file| is_known(&file.path)) {
+        return Ok(submission);
+    }
+    let named = files.iter().take(NAMED).map(|file| printable(&file.path)).collect::<Vec<_>>();
+    let more = files.len().saturating_sub(NAMED);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let message =
+        format!("nothing in it belongs to the tree; it holds only {}{more}", named.join(", "));
+    let finding =
+        Finding::error("nothing_known", message).hint("pack the folder that holds config.json");
+    clear(dest)?;
+    let Submission { name, format, mut findings, .. } = submission;
+    findings.insert(0, finding);
+    Err(IntakeError::Refused(Box::new(Refusal { name, format: Some(format), findings })))
+}
+
+/// Number of files that a message names.
+const NAMED: usize = 3;
+
 /// Whether the source names files that are not there.
 fn names_what_is_lost(submission: &Submission, dest: &Path) -> bool {
     let paths: Vec<&str> = submission.files.iter().map(|file| file.path.as_str()).collect();

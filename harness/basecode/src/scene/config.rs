@@ -319,6 +319,12 @@ fn slip(value: &str) -> &'static str {
     let is_number = |word: &str| {
         word.trim_start_matches(['+', '-', '.']).starts_with(|c: char| c.is_ascii_digit())
     };
+    // `50.0 deg`
+    let has_unit = words().next().is_some_and(is_number)
+        && words().skip(1).all(|word| word.chars().all(char::is_alphabetic));
+    if has_unit && words().count() > 1 {
+        return "; hint: write a number without letters or signs behind it";
+    }
     if !words().all(is_number) {
         return "";
     }
@@ -464,6 +470,7 @@ mod tests {
             (&format!("{base}[camera]\neye = [0,\n \u{2013}3, 4]\n"), "write a minus sign as -"),
             (&format!("{base}[camera]\neye = [0.0f, 3, 4]\n"), "without letters or signs behind"),
             (&format!("{base}[camera]\nfov = 30deg\n"), "without letters or signs behind"),
+            (&format!("{base}[camera]\nfov = 50.0 deg\n"), "without letters or signs behind"),
             (&format!("{base}[camera]\neye = [.5, 3, 4]\n"), "on both sides of a point"),
             (&format!("{base}[camera]\neye = [0, 3., 4]\n"), "on both sides of a point"),
             (&format!("{base}[renderer]\nbonus = True\n"), "hint: write true"),

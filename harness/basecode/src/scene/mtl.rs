@@ -114,6 +114,17 @@ impl Library {
         found.or_else(|| alike().filter(|_| !plain.is_ascii()))
     }
 
+    /// Whether an earlier material is found by the name of this one: `Material #1` and `Material #2` are two, while
+    /// either is `Material` with a comment.
+    fn hides(&self, name: &str, plain: &str) -> bool {
+        let found = self.find(plain);
+        found.is_some_and(|at| {
+            let own = &self.names[at][0];
+            let is_comment = |whole: &str| whole.contains('#');
+            own.nfc().eq(name.nfc()) || !is_comment(own) || !is_comment(name)
+        })
+    }
+
     /// The message for a material name that is not found.
     pub(super) fn lacks(&self) -> String {
         let Some(UsedFile { path: first, .. }) = self.files.first() else {
@@ -150,7 +161,7 @@ impl Library {
             if keyword.eq_ignore_ascii_case("newmtl") {
                 self.add(path, current.take());
                 let plain = unquoted(without_comment(rest)).to_owned();
-                if self.find(&plain).is_some() {
+                if self.hides(unquoted(rest), &plain) {
                     let message =
                         format!("material \"{plain}\" is there already: the first counts");
                     self.remarks.push(format!("{}:{line}: {message}", path.display()));

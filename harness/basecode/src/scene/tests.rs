@@ -614,6 +614,9 @@ fn what_a_material_says_in_vain_is_remarked_on() {
         ("Ks 0 1.5 0", "1: material \"m\": Ks is [0, 1.5, 0]: a surface cannot reflect more"),
         ("Kd 1 1 1\nKs 1 1 1", ""),
         ("newmtl m", "1: material \"m\" is there already: the first counts"),
+        ("newmtl m # again", "1: material \"m\" is there already: the first counts"),
+        ("newmtl n #1\nnewmtl n #2", ""),
+        ("newmtl n #1\nnewmtl n #1", "2: material \"n\" is there already: the first counts"),
     ] {
         // The first line of these statements is behind `newmtl m`.
         let found = said(&format!("{MTL}newmtl m\n{statements}\n"));

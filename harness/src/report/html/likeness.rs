@@ -58,6 +58,14 @@ impl Alike {
 /// # Errors
 /// When a file cannot be written.
 pub fn write_alike(folder: &Path, page: &AlikePage) -> Result<(), ReportError> {
+    // Pages of pairs that are alike no more.
+    let is_pair = |name: &str| name.contains("--") && name.ends_with(".html");
+    for entry in folder.read_dir().into_iter().flatten().flatten() {
+        if entry.file_name().to_str().is_some_and(is_pair) {
+            let path = entry.path();
+            std::fs::remove_file(&path).map_err(|source| ReportError::Write { path, source })?;
+        }
+    }
     for pair in &page.pairs {
         put(folder, &pair.page(), pair_page(page, pair).as_bytes())?;
     }

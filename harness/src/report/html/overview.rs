@@ -11,7 +11,7 @@ use super::super::{
 use super::likeness::LIKENESS;
 use super::lost::is_lost_by_evidence;
 use super::markup::Html;
-use crate::class::Class;
+use crate::class::{Class, INCOMPARABLE};
 use crate::columns::{self, count};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::grading::{Shared, SharedFiles};
@@ -66,6 +66,7 @@ fn decisions(class: &Class) -> Vec<(String, Vec<String>)> {
     let kinds = [
         ("submission", "decide in matches.toml", undecided.collect()),
         ("download", "neither opened nor graded", class.unopened.clone()),
+        ("submission", INCOMPARABLE, class.incomparable.clone()),
         ("decision", "to look at again", again),
     ];
     let kinds = kinds.into_iter().filter(|(.., lines)| !lines.is_empty());
@@ -96,6 +97,10 @@ pub(super) fn waiting(html: &mut Html, report: &BatchReport) {
     add("images without code: confirm or refuse", &|entry| {
         let own = entry.grade.unconfirmed;
         (own > 0.0).then(|| format!("{} for images", columns::points(own)))
+    });
+    add("drafts, not submitted: ask, then confirm", &|entry| {
+        let standing = &entry.standing;
+        (standing.is_draft() && !standing.is_confirmed()).then(|| "a draft".to_owned())
     });
     add("to be looked at, then confirmed", &|entry| {
         // What the instructor confirmed, they have looked at.

@@ -2,7 +2,7 @@
 
 use super::super::BatchReport;
 use super::page::{Page, Style};
-use crate::class::{Class, recognised};
+use crate::class::{Class, INCOMPARABLE, recognised};
 
 /// Number of names that are listed of a kind.
 const NAMED: usize = 30;
@@ -31,9 +31,10 @@ pub(super) fn class(page: &mut Page, report: &BatchReport, class: &Class) {
         ),
         ("not counted, as matches.toml says".to_owned(), Style::Plain, class.not_counted.clone()),
         (format!("without a submission{list}"), Style::Open, missing.collect()),
+        (INCOMPARABLE.to_owned(), Style::Bad, class.incomparable.clone()),
         ("decisions whose evidence has changed".to_owned(), Style::Bad, class.stale.clone()),
         (
-            "decisions on submissions that are not in this report".to_owned(),
+            "decisions on submissions that are not in this report or do not count".to_owned(),
             Style::Bad,
             class.unused.clone(),
         ),
