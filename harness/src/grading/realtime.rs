@@ -276,7 +276,9 @@ pub fn judge_bonus_under(
             let (with, without) = (drawn(with)?, drawn(Frame::plain(case))?);
             shadows(case).judge(&check.scene, &with, &without, tolerances)
         };
-        if let Some(judged) = judged() {
+        if let Some(judged) =
+            judged().filter(|judged| judged.verdict != Verdict::Fail || judged.error < check.error)
+        {
             *check = Check { id: check.id, ..judged };
         }
     }
