@@ -4,7 +4,8 @@
 
 use basecode::gpu::{
     AdapterKind, DEPTH_FORMAT, EMITTER_FS, EMPTY_MAPS, EVERY_FRAGMENT, Footprint, FrameUniforms,
-    Gpu, MaterialUniforms, Mesh, OUTLINES, ObjectUniforms, ShadowMap, Stage, Target, Uniform,
+    Gpu, MaterialUniforms, Mesh, OUTLINES, ObjectUniforms, ShadowMap, Stage, Target,
+    USUAL_PIPELINES, Uniform,
 };
 use basecode::{Camera, CameraConfig, Error, Mat4, Shape, Vec2, Vec3, vec3, wgpu};
 
@@ -204,11 +205,22 @@ fn beside_the_picture(
     gpu: &Gpu,
     targets: &[Option<wgpu::ColorTargetState>],
 ) -> wgpu::RenderPipeline {
+    let attributes = wgpu::vertex_attr_array![0 => Float32x3];
+    pipeline(gpu, VS, targets, wgpu::PrimitiveState::default(), &attributes)
+}
+
+fn pipeline(
+    gpu: &Gpu,
+    vertex: Stage,
+    targets: &[Option<wgpu::ColorTargetState>],
+    primitive: wgpu::PrimitiveState,
+    attributes: &[wgpu::VertexAttribute],
+) -> wgpu::RenderPipeline {
     let module = |stage: Stage| {
         let source = wgpu::ShaderSource::Wgsl(stage.text.into());
         gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source })
     };
-    let (vertex, fragment) = (module(VS), module(POSITION_FS));
+    let (vertex, fragment) = (module(vertex), module(POSITION_FS));
     let compilation_options = wgpu::PipelineCompilationOptions::default();
     gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: None,
@@ -220,10 +232,10 @@ fn beside_the_picture(
             buffers: &[Some(wgpu::VertexBufferLayout {
                 array_stride: 24,
                 step_mode: wgpu::VertexStepMode::Vertex,
-                attributes: &wgpu::vertex_attr_array![0 => Float32x3],
+                attributes,
             })],
         },
-        primitive: wgpu::PrimitiveState::default(),
+        primitive,
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH_FORMAT,
             depth_write_enabled: Some(true),
@@ -241,6 +253,56 @@ fn beside_the_picture(
         multiview_mask: None,
         cache: None,
     })
+}
+
+/// What the corner of a square looks like that is drawn from the first (`0`) or the other attribute of its vertices,
+/// where the pass culls its front and writes red alone.
+fn drawn_by_attribute(gpu: &mut Gpu, [first, second]: [u32; 2], usual: Option<&str>) -> Vec3 {
+    const FLAT: Stage = Stage {
+        name: "",
+        text: "@vertex fn vs_main(@location(0) p: vec3f, @location(1) n: vec3f) -> @builtin(position) vec4f {
+            return vec4f(p.xy, 0.5, 1.0);
+        }",
+    };
+    let stages = usual.map(|text| (USUAL_PIPELINES.to_owned(), text.to_owned()));
+    gpu.replace_stages(stages.into_iter().collect());
+    let target = Target::new(gpu, 20, 20).unwrap();
+    let state = wgpu::ColorTargetState {
+        write_mask: wgpu::ColorWrites::RED,
+        ..basecode::gpu::COLOR_FORMAT.into()
+    };
+    let cull_mode = (first == 0).then_some(wgpu::Face::Front);
+    let primitive = wgpu::PrimitiveState { cull_mode, ..Default::default() };
+    let attributes = [(0, first), (12, second)].map(|(offset, shader_location)| {
+        let format = wgpu::VertexFormat::Float32x3;
+        wgpu::VertexAttribute { format, offset, shader_location }
+    });
+    gpu.checked(&mut || {
+        let pipeline = pipeline(gpu, FLAT, &[Some(state.clone())], primitive, &attributes);
+        let mesh = Mesh::new(gpu, &square());
+        let mut encoder = gpu.encoder();
+        let mut pass = target.begin(&mut encoder);
+        pass.set_pipeline(&pipeline);
+        pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+        pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..mesh.index_count, 0, 0..1);
+        drop(pass);
+        gpu.submit(encoder);
+        Ok(())
+    })
+    .unwrap();
+    target.read_back(gpu).unwrap().pixels[0]
+}
+
+#[test]
+fn the_host_mends_a_slip_with_a_pipeline() {
+    let mut gpu = gpu();
+    let shown = vec3(0.5, 0.5, 1e6);
+    assert_eq!(drawn_by_attribute(&mut gpu, [0, 1], None), Vec3::ZERO);
+    assert_eq!(drawn_by_attribute(&mut gpu, [0, 1], Some("")), shown);
+    // Exchanged, normals stand for positions, and nothing else is mended.
+    assert_eq!(drawn_by_attribute(&mut gpu, [1, 0], None), Vec3::ZERO);
+    assert_eq!(drawn_by_attribute(&mut gpu, [1, 0], Some("0 1")), vec3(0.5, 0.0, 0.0));
 }
 
 #[test]

@@ -183,7 +183,9 @@ impl Shadows<'_> {
                     }
                     _ => "",
                 };
-                let price = price(&known_pixels, fraction(lit), fraction(dark));
+                let unknown = |[all, known, _]: [usize; 3]| 1.0 - known as f64 / all as f64;
+                let unknown = unknown(lit).max(unknown(dark));
+                let price = price(&known_pixels, fraction(lit), fraction(dark), unknown);
                 measures.extend(price.measure());
                 let check = Check::new(id, scene, Verdict::Fail, summary);
                 Check { error: price.error, mistake: price.name(), ..check }.with_hint(hint)
@@ -242,10 +244,14 @@ fn outside(pixels: &[Known]) -> f64 {
 }
 
 /// The mistake of shadows where light belongs, and the reverse.
-const EXCHANGED: &str = "lit and dark are exchanged";
+pub const EXCHANGED: &str = "lit and dark are exchanged";
+
+/// What unknown pixels cost where some shadows are wrong: at most what known ones would.
+const UNKNOWN: f64 = 0.025;
 
 /// The price of wrong shadows, with the fractions of lit and of shadowed pixels that are wrong. The two errors add up.
-fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64) -> Price {
+/// The fraction of pixels that are `unknown`, because another mistake leaves them dark, may be wrong as well.
+fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64, unknown: f64) -> Price {
     // Without a shadow anywhere, or light, nothing is there.
     let dark = pixels.iter().filter(|pixel| pixel.visibility < f64::from(HALF_LIGHT)).count();
     let [least, most] = [0.01, 0.99].map(|fraction| fraction * pixels.len() as f64);
@@ -291,7 +297,13 @@ fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64) -> Price {
             price = price.or(name, class, residual(&light) - outside);
         }
     }
-    let price = price::partly(price, lit_wrong, dark_wrong);
+    let price = match price::partly(price, lit_wrong, dark_wrong) {
+        partly if partly.error < price.error => {
+            let error = (partly.error + UNKNOWN * unknown).min(price.error);
+            Price { error, ..partly }
+        }
+        _ => price,
+    };
     let price = match ambient(pixels) {
         (left, off) if left > 0.0 && left <= AMBIENT => {
             let residual = price::fading(left) + off + lit_wrong;
@@ -389,6 +401,23 @@ mod tests {
         let flat = image(|_| 3.0);
         let none = shadows.judge("s", &flat, &flat, &tolerances).unwrap();
         assert_eq!(none.error, 1.0);
+    }
+
+    #[test]
+    fn what_another_mistake_leaves_dark_does_not_mend_shadows() {
+        let (mask, unshadowed) = masks();
+        let shadows = Shadows { mask: &mask, unshadowed: &unshadowed, median_lit: 1.0 };
+        let tolerances = Tolerances { spare_pixels: 0, ..Tolerances::default() };
+        // Four of ten shadowed pixels are lit. Black ones hide two of these.
+        let error = |black: usize| {
+            let shown = |i: usize, light: f32| if (12..black).contains(&i) { 0.0 } else { light };
+            let without = image(|i| shown(i, 1.0));
+            let with =
+                image(|i| shown(i, f32::from(u8::from(i < 10 || [12, 13, 18, 19].contains(&i)))));
+            shadows.judge("s", &with, &without, &tolerances).unwrap().error
+        };
+        let (all, some) = (error(0), error(16));
+        assert!((0.02..0.05).contains(&all) && all <= some && some < 0.05, "{all} {some}");
     }
 
     #[test]

@@ -19,7 +19,7 @@ use imaging::reference::RegionMask;
 const POSITION_RELATIVE: f32 = 2e-3;
 /// The tolerance of a unit normal.
 const NORMAL_ABSOLUTE: f32 = 1e-2;
-/// Fraction of the expected surface that must be visible to judge the forwarded values.
+/// Fraction of the expected surface that must be visible to judge the forwarded values, or right to tell its place.
 const LEAST_SHOWN: f64 = 0.02;
 
 /// The number of kinds of matrices.
@@ -161,7 +161,10 @@ impl Seen {
                 offsets.push(film.offset_px(index, p));
             }
         }
-        seen.offset_px = median_length(&mut offsets);
+        // A few positions are near the right ones by chance.
+        if offsets.len() as f64 > LEAST_SHOWN * seen.counted as f64 {
+            seen.offset_px = median_length(&mut offsets);
+        }
         for index in 0..positions.pixels.len() {
             let (p, n) = (positions.pixels[index], normals.pixels[index]);
             if !shows(index) || mask.pixels[index] & RegionMask::EMITTER != 0 {
@@ -254,9 +257,9 @@ fn price(film: &StageFilm, seen: &[Seen; MATRICES], frames: &[Frames; MATRICES])
         }
     }
     if !told.positions_are_right() {
-        match factor_of_positions(film, frames[most][0]) {
-            true => add("the position is multiplied by a constant", Class::Slip),
-            false => add("another world position", Class::Concept),
+        match slip_of_positions(film, frames[most][0]) {
+            Some(name) => add(name, Class::Slip),
+            None => add("another world position", Class::Concept),
         }
     }
     if !told.normals_are_right() {
@@ -344,26 +347,48 @@ fn lost_translation(film: &StageFilm, positions: &Image) -> bool {
         && 2 * offsets.iter().filter(near).count() > offsets.len()
 }
 
-/// Whether positions are those of their pixels times one constant.
-fn factor_of_positions(film: &StageFilm, positions: &Image) -> bool {
+/// The slip that explains positions, if one does: axes that are exchanged or negated, or a constant.
+fn slip_of_positions(film: &StageFilm, positions: &Image) -> Option<&'static str> {
     let pairs = || {
         film.interior().filter_map(|(index, _)| {
             let (ray, point) = &film.surface.pixels[index];
             Some((positions.pixels[index], point.as_ref()?.position, ray.origin))
         })
     };
+    let all = pairs().count();
+    let explains = |change: &dyn Fn(Vec3) -> Vec3| {
+        let wrong = pairs().filter(|(p, right, eye)| !is_near(change(*p), *right, *eye)).count();
+        wrong as f64 <= EDGES * all as f64
+    };
     let mut ratios: Vec<f32> = pairs()
         .map(|(p, right, _)| p.length() / right.length())
         .filter(|r| r.is_finite())
         .collect();
     ratios.sort_by(f32::total_cmp);
-    let Some(&factor) = ratios.get(ratios.len() / 2).filter(|factor| **factor > 1e-3) else {
-        return false;
-    };
-    let all = pairs().count();
-    let wrong = pairs().filter(|(p, right, eye)| !is_near(*p / factor, *right, *eye)).count();
-    wrong as f64 <= EDGES * all as f64
+    let factor = ratios.get(ratios.len() / 2).filter(|factor| **factor > 1e-3);
+    if factor.is_some_and(|factor| explains(&|p| p / *factor)) {
+        return Some("the position is multiplied by a constant");
+    }
+    for (name, axis) in NEGATED {
+        if explains(&|p| p - 2.0 * p * axis) {
+            return Some(name);
+        }
+    }
+    ORDERS
+        .into_iter()
+        .any(|[x, y, z]| explains(&|p| Vec3::new(p[x], p[y], p[z])))
+        .then_some("the position has its axes exchanged")
 }
+
+/// An axis of a position that is negated.
+const NEGATED: [(&str, Vec3); 3] = [
+    ("x of the position is negated", Vec3::X),
+    ("y of the position is negated", Vec3::Y),
+    ("z of the position is negated", Vec3::Z),
+];
+
+/// Orders of axes but the usual one.
+const ORDERS: [[usize; 3]; 5] = [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
 
 /// What a normal may be instead: a name, and the normal.
 type OtherNormal = (&'static str, Box<dyn Fn(&SurfacePoint) -> Vec3>);
@@ -383,8 +408,7 @@ pub(super) fn other_normals() -> Vec<OtherNormal> {
         axes("y of the normal is negated", [0, 1, 2], [1.0, -1.0, 1.0]),
         axes("z of the normal is negated", [0, 1, 2], [1.0, 1.0, -1.0]),
     ];
-    let orders = [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
-    changes.extend(orders.map(|order| axes(EXCHANGED, order, [1.0; 3])));
+    changes.extend(ORDERS.map(|order| axes(EXCHANGED, order, [1.0; 3])));
     changes.push(("abs() of the normal", Box::new(|p: &SurfacePoint| p.normal.abs())));
     let position = |p: &SurfacePoint| p.position.normalize_or_zero();
     changes.push(("the position stands for the normal", Box::new(position)));

@@ -71,6 +71,12 @@ fn draws_surfaces(session: &Session, plugin: &Path, case: &PreparedScene) -> boo
     [Matrices::Usual, Matrices::InView, Matrices::Transposed].into_iter().any(draws)
 }
 
+/// Whether a pass takes the host's stages: of those that are no WGSL it then makes no frame.
+fn takes_stages(session: &Session, plugin: &Path, case: &PreparedScene) -> bool {
+    let none = named(["no WGSL"; 3].map(str::to_owned));
+    draw(session, Some(plugin), &Frame::probe(case, none)).answer().is_none()
+}
+
 /// Judges the student's pass with Umbra's stages (2.1) and the student's stages in Umbra's pass (2.2 to 2.4) on scenes.
 /// One worker draws all frames of the former; another, without any of the student's Rust code, draws those of the
 /// latter. `own_frames` is what the student's own frames show. The flag says whether one of some scene got no answer:
@@ -101,7 +107,11 @@ pub fn isolate(
     for (case, pass) in cases.iter().zip(passes) {
         let swapped: Vec<Outcome> = swapped.iter_mut().filter_map(Iterator::next).collect();
         let pass = match pass_frames(case, &pass) {
-            Ok(frames) if frames.are_black() && draws_surfaces(session, plugin, case) => {
+            Ok(frames)
+                if frames.are_black()
+                    && (!takes_stages(session, plugin, case)
+                        || draws_surfaces(session, plugin, case)) =>
+            {
                 let summary =
                     "cannot be judged alone: no stage of Umbra's draws what the pass draws";
                 Check::new(CheckId::PassUniforms, &case.entry.name, Verdict::NotJudged, summary)
@@ -311,7 +321,7 @@ fn images<'a>(case: &PreparedScene, outcomes: &'a [Outcome]) -> Result<Vec<Image
     Ok(images)
 }
 
-fn pass_check(case: &PreparedScene, outcomes: &[Outcome]) -> Check {
+pub fn pass_check(case: &PreparedScene, outcomes: &[Outcome]) -> Check {
     match pass_frames(case, outcomes) {
         Ok(frames) => judge_pass_frames(case, &frames),
         Err(check) => *check,

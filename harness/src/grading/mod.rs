@@ -37,6 +37,7 @@ pub mod submitted;
 pub mod template_fallback;
 mod tree_checks;
 mod uploads;
+mod usual_pipelines;
 mod zoomed;
 
 pub use begun::{Begun, REFUSED, SO_FAR, Workshop};

@@ -11,6 +11,7 @@ use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use super::stages::{MOVED, Moved, Stages, matrices, negated_normals};
+use super::usual_pipelines;
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels::{self, LeftBySlip};
 use crate::evidence::price::{Class, Price};
@@ -80,6 +81,14 @@ pub fn judge(
     if let Some((id, name)) = slip_of_frames(cases, &frames, &wrong, &is_open) {
         return slip(id, (name, Class::Slip));
     }
+    let first = wrong.iter().position(|wrong| *wrong).unwrap_or_default();
+    let mended = |stage: &Stage| mended_by(stage, session, plugin, (cases, first), tolerances);
+    if others_are_open(CheckId::PassUniforms)
+        && let Some((name, stage)) = usual_pipelines::slips().find(|(_, stage)| mended(stage))
+    {
+        let checks = slip(CheckId::PassUniforms, (name, Class::Slip)).checks;
+        return Found { checks, mended_by: Some(stage) };
+    }
     if others_are_open(vertex) {
         let is_moved = |(_, moved): &&Moved| {
             let moved = frames.iter().map(|frame| Some(moved(frame)));
@@ -88,8 +97,6 @@ pub fn judge(
         if let Some((name, _)) = MOVED.iter().find(is_moved) {
             return slip(vertex, (name, Class::Slip));
         }
-        let first = wrong.iter().position(|wrong| *wrong).unwrap_or_default();
-        let mended = |stage: &Stage| mended_by(stage, session, plugin, (cases, first), tolerances);
         if mended(&negated_normals()) {
             return slip(vertex, ("the normal is negated", Class::Slip));
         }

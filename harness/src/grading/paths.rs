@@ -10,7 +10,7 @@ use super::pipeline::Grading;
 use super::prepared_scene::PreparedScene;
 use super::session::Session;
 use super::stages::Stages;
-use super::{isolate, one_slip, realtime, sampler, uploads};
+use super::{isolate, one_slip, realtime, sampler, uploads, usual_pipelines};
 use crate::evidence::{Check, CheckId, Verdict, loops, price, rays, shadow_map};
 
 /// By how much the standard error of a region's mean grows when its rows share their noise: the
@@ -138,12 +138,13 @@ impl Grading<'_> {
             // what a stage does not test may show only on a scene that a wrong pass draws right.
             if !is_right {
                 let own = (&checks[begin..], fails);
-                let found = isolate::isolate(session, plugin, cases, stages, own, tolerances);
+                let mut found = isolate::isolate(session, plugin, cases, stages, own, tolerances);
+                let mended_by = usual_pipelines::price_pass(session, plugin, cases, &mut found);
                 checks.extend(found);
                 if nothing_draws.is_none() {
                     let own = (&checks[begin..], &drawn[..]);
                     let slip = one_slip::judge(session, plugin, cases, stages, own, tolerances);
-                    if let Some(stage) = slip.mended_by {
+                    if let Some(stage) = slip.mended_by.or(mended_by) {
                         let bonus = &mut checks[begin..];
                         realtime::judge_bonus_under(
                             &stage, session, plugin, cases, tolerances, bonus,

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 
 use super::device::{Footprint, Overrides, Watch};
 use super::message::readable;
-use super::{Device, EMPTY_MAPS, EVERY_FRAGMENT, Layouts, OUTLINES, Queue};
+use super::{Device, EMPTY_MAPS, EVERY_FRAGMENT, Layouts, OUTLINES, Queue, USUAL_PIPELINES};
 use crate::{Error, Result};
 
 /// Which kind of adapter to draw with.
@@ -153,13 +153,15 @@ impl Gpu {
     }
 
     /// Replaces the text of shader stages, by stage name (`simple.vs`, `diffuse.fs`, `phong.fs`).
-    /// [`EVERY_FRAGMENT`], [`OUTLINES`] and [`EMPTY_MAPS`] change pipelines that are made from then on.
+    /// [`EVERY_FRAGMENT`], [`OUTLINES`], [`EMPTY_MAPS`] and [`USUAL_PIPELINES`] change pipelines that are made from
+    /// then on.
     pub fn replace_stages(&mut self, stages: Vec<(String, String)>) {
         let find = |wanted: &str| stages.iter().find(|(name, _)| name == wanted);
         self.watch.set_overrides(Overrides {
             shown: find(EVERY_FRAGMENT).map(|(_, text)| text.clone()),
             outlines: find(OUTLINES).is_some(),
             empty_maps: find(EMPTY_MAPS).is_some(),
+            usual: find(USUAL_PIPELINES).map(|(_, text)| text.clone()),
         });
         self.stages = stages;
     }

@@ -24,6 +24,10 @@ pub const EMPTY_MAPS: &str = "empty.maps";
 /// A host switch in the form of a stage name. When the host sets it, the pass is made for a scene whose normals are all
 /// negated: what it draws rightly then, it draws by a normal that is negated once more.
 pub const NEGATED_NORMALS: &str = "negated.normals";
+/// Not the name of a stage. If the host replaces it, pipelines that draw the picture have the usual state. Where the
+/// text names two vertex attributes, such as `0 1`, they exchange their locations instead. What a pass draws rightly
+/// then, it draws by a slip with a pipeline.
+pub const USUAL_PIPELINES: &str = "usual.pipelines";
 /// Not the name of a stage. If the host replaces it, the text names the [`crate::Matrices`] of every frame's camera:
 /// what a pass draws rightly then, it draws by a slip with them.
 pub const MATRICES: &str = "matrices";
@@ -101,6 +105,34 @@ pub(super) struct Overrides {
     pub outlines: bool,
     /// [`EMPTY_MAPS`].
     pub empty_maps: bool,
+    /// The text of [`USUAL_PIPELINES`].
+    pub usual: Option<String>,
+}
+
+/// The vertex attributes that a text of [`USUAL_PIPELINES`] names.
+fn exchanged(text: &str) -> Option<[u32; 2]> {
+    let (a, b) = text.split_once(' ')?;
+    Some([a.parse().ok()?, b.parse().ok()?])
+}
+
+/// The location of a vertex attribute with two of them exchanged.
+fn exchanged_location(location: u32, [a, b]: [u32; 2]) -> u32 {
+    match location {
+        of if of == a => b,
+        of if of == b => a,
+        of => of,
+    }
+}
+
+/// Nearest fragments win, both sides of triangles are drawn, and all channels are written.
+fn set_usual_state(desc: &mut wgpu::RenderPipelineDescriptor) {
+    desc.primitive = wgpu::PrimitiveState::default();
+    if let Some(depth) = &mut desc.depth_stencil {
+        depth.depth_write_enabled = Some(true);
+        depth.depth_compare = Some(wgpu::CompareFunction::Less);
+        depth.stencil = wgpu::StencilState::default();
+        depth.bias = wgpu::DepthBiasState::default();
+    }
 }
 
 /// The state that device and queue share.
@@ -238,11 +270,7 @@ impl Device {
                     depth.depth_compare = Some(wgpu::CompareFunction::Never);
                 }
                 if let Some(fragment) = &mut desc.fragment {
-                    let unwritten = |target: &Option<wgpu::ColorTargetState>| {
-                        let write_mask = wgpu::ColorWrites::empty();
-                        target.clone().map(|target| wgpu::ColorTargetState { write_mask, ..target })
-                    };
-                    targets = fragment.targets.iter().map(unwritten).collect();
+                    targets = with_mask(fragment.targets, wgpu::ColorWrites::empty());
                     fragment.targets = &targets;
                 }
             }
@@ -253,6 +281,36 @@ impl Device {
             false => &self.watch.vertexless_pipelines,
         };
         pipelines.fetch_add(1, Relaxed);
+        let (attributes, buffers): (Vec<Vec<_>>, Vec<_>);
+        match overrides.usual.as_deref().filter(|_| takes_vertices).map(exchanged) {
+            Some(None) => {
+                set_usual_state(&mut desc);
+                if let Some(fragment) = &mut desc.fragment {
+                    targets = with_mask(fragment.targets, wgpu::ColorWrites::ALL);
+                    fragment.targets = &targets;
+                }
+            }
+            Some(Some(pair)) => {
+                let own = desc.vertex.buffers.iter().map(|buffer| {
+                    let own = buffer.iter().flat_map(|buffer| buffer.attributes);
+                    let moved = own.map(|attribute| wgpu::VertexAttribute {
+                        shader_location: exchanged_location(attribute.shader_location, pair),
+                        ..*attribute
+                    });
+                    moved.collect()
+                });
+                attributes = own.collect();
+                let layouts = desc.vertex.buffers.iter().zip(&attributes);
+                let layouts = layouts.map(|(buffer, attributes)| {
+                    let layout = buffer.as_ref()?;
+                    let (array_stride, step_mode) = (layout.array_stride, layout.step_mode);
+                    Some(wgpu::VertexBufferLayout { array_stride, step_mode, attributes })
+                });
+                buffers = layouts.collect();
+                desc.vertex.buffers = &buffers;
+            }
+            None => (),
+        }
         let outlined = self.device.features().contains(wgpu::Features::POLYGON_MODE_LINE);
         if overrides.outlines && outlined {
             desc.primitive.polygon_mode = wgpu::PolygonMode::Line;
@@ -300,6 +358,15 @@ impl Device {
         self.watch.upload(data.len() as u64);
         self.device.create_texture_with_data(&queue.queue, desc, order, data)
     }
+}
+
+/// Targets of which these channels are written.
+fn with_mask(
+    targets: &[Option<wgpu::ColorTargetState>],
+    write_mask: wgpu::ColorWrites,
+) -> Vec<Option<wgpu::ColorTargetState>> {
+    let own = targets.iter().cloned();
+    own.map(|target| Some(wgpu::ColorTargetState { write_mask, ..target? })).collect()
 }
 
 /// Whether a pipeline draws into a picture, by the format of its colors.

@@ -38,6 +38,7 @@ pub use contract::{
 };
 pub use device::{
     Device, EMPTY_MAPS, EVERY_FRAGMENT, Footprint, MATRICES, NEGATED_NORMALS, OUTLINES, Queue,
+    USUAL_PIPELINES,
 };
 pub use layouts::Layouts;
 pub use matrices::{look_at, orthographic, perspective};

@@ -90,6 +90,13 @@ fn a_slip_with_one_attribute_costs_a_slip() {
     fails(&normal(&|n| Vec3::new(n.z, n.y, n.x)), &[Class::Slip], "axes exchanged");
     let position = changed(positions, |p| p / 2.0);
     fails(&fixture.judge_all(&position, normals), &[Class::Slip], "multiplied by a constant");
+    // Few of the positions are right then, by chance: their place tells nothing.
+    let [exchanged, mirrored] = [Vec3::new(1.0, 1.0, 1.0), Vec3::new(-1.0, 1.0, 1.0)]
+        .map(|signs| changed(positions, |p| signs * Vec3::new(p.x, p.z, p.y)));
+    fails(&fixture.judge_all(&exchanged, normals), &[Class::Slip], "position has its axes");
+    fails(&fixture.judge_all(&mirrored, normals), &[Class::Concept], "another world position");
+    let negated = changed(positions, |p| Vec3::new(p.x, -p.y, p.z));
+    fails(&fixture.judge_all(&negated, normals), &[Class::Slip], "y of the position is negated");
     let direction = changed(positions, Vec3::normalize_or_zero);
     fails(
         &fixture.judge_all(positions, &direction),
