@@ -237,7 +237,11 @@ impl<'a> Answers<'a> {
             own.filter_map(|own| Some((own, own.values.as_ref().ok()?)))
                 .any(|(own, values)| !bsdf::passes(&own.probes, values, &handout))
         };
-        let is_held = |model| self.lights.iter().all(|light| light.is_of_own_bsdfs(model));
+        // Black beside black tells nothing.
+        let is_held = |model| {
+            self.lights.iter().all(|light| light.is_of_own_bsdfs(model))
+                && self.lights.iter().any(|light| light.shines(model))
+        };
         let paid = kinds.into_iter().filter(|&(kind, model)| is_wrong(kind) && is_held(model));
         paid.map(|(_, model)| model).collect()
     }
@@ -308,13 +312,24 @@ impl LightAnswer<'_> {
         }
     }
 
+    /// What its BSDFs of this kind answer, by ray.
+    fn own_bsdfs(&self, model: MaterialModel) -> Vec<OwnValue> {
+        let batch = &self.case.probe_film.batch;
+        let is_own = |(ray, _): &&OwnValue| {
+            self.case.expected.scene.material_of(batch.points[*ray].shape).model == model
+        };
+        self.bsdfs.iter().filter(is_own).copied().collect()
+    }
+
+    /// Whether one of these is light.
+    fn shines(&self, model: MaterialModel) -> bool {
+        let shines = |(_, value): &OwnValue| value.iter().any(|v| v.is_finite() && *v > 0.0);
+        self.own_bsdfs(model).iter().any(shines)
+    }
+
     /// Whether its radiance is what the BSDFs of this kind answer, on all surfaces that tell.
     fn is_of_own_bsdfs(&self, model: MaterialModel) -> bool {
-        let batch = &self.case.probe_film.batch;
-        let model_of =
-            |ray: usize| self.case.expected.scene.material_of(batch.points[ray].shape).model;
-        let own = self.bsdfs.iter().filter(|(ray, _)| model_of(*ray) == model);
-        let own: Vec<_> = own.copied().collect();
+        let (batch, own) = (&self.case.probe_film.batch, self.own_bsdfs(model));
         self.values.as_ref().is_ok_and(|answers| {
             answers.iter().all(|answer| rays::is_of_own_bsdfs(batch, &own, &answer.values))
         })
