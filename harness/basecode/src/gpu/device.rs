@@ -24,12 +24,12 @@ pub const EMPTY_MAPS: &str = "empty.maps";
 /// A host switch in the form of a stage name. When the host sets it, the pass is made for a scene whose normals are all
 /// negated: what it draws rightly then, it draws by a normal that is negated once more.
 pub const NEGATED_NORMALS: &str = "negated.normals";
-/// Not the name of a stage. If the host replaces it, pipelines that draw the picture have the usual state. Where the
-/// text names two vertex attributes, such as `0 1`, they exchange their locations instead. What a pass draws rightly
-/// then, it draws by a slip with a pipeline.
+/// A host switch in the form of a stage name. When the host sets it, pipelines that draw the picture have the usual
+/// state. If the text names two vertex attributes, such as `0 1`, these exchange their locations instead. What a pass
+/// draws rightly then, it draws by a slip with a pipeline.
 pub const USUAL_PIPELINES: &str = "usual.pipelines";
-/// Not the name of a stage. If the host replaces it, the text names the [`crate::Matrices`] of every frame's camera:
-/// what a pass draws rightly then, it draws by a slip with them.
+/// A host switch in the form of a stage name. When the host sets it, the text names the [`crate::Matrices`] of every
+/// frame's camera. What a pass draws rightly then, it draws by a slip with them.
 pub const MATRICES: &str = "matrices";
 
 /// Name of the entry point in the text of [`EVERY_FRAGMENT`].
