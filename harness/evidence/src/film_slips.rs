@@ -225,6 +225,8 @@ const LEFT: f64 = 0.005;
 
 /// Number of pixels that are looked at.
 const PRICED: usize = 6000;
+/// Every so many of them tell most slips apart.
+const FEW: usize = 16;
 
 /// The price of a wrong image: a slip in how it is written explains it, or nothing does. `room` is how far a pixel may
 /// be off, where it tells anything.
@@ -249,19 +251,49 @@ pub fn film_price(
     };
     let mut changes = film.changes(factor);
     changes.extend(film.missing(image));
-    changes.iter().fold(start, |price, change| {
-        if price.is_least() {
+    let all: Vec<usize> = (0..image.len()).step_by(step).collect();
+    let few: Vec<usize> = all.iter().copied().step_by(FEW).collect();
+    let comparison = |change: &Change, pixels: &[usize]| Compared::of(change, image, pixels, room);
+    let left = |change: &Change| comparison(change, &few).map_or(0.0, |few| few.left);
+    // What a few pixels tell most about comes first: a slip that is found early spares the others.
+    let mut changes: Vec<_> = changes.iter().map(|change| (left(change), change)).collect();
+    changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    changes.into_iter().fold(start, |price, (left, change)| {
+        if price.is_least() || left > price::surely_more_than(price.error - Class::Slip.price()) {
             return price;
         }
+        match comparison(change, &all) {
+            Some(all) if price::follows(&all.pairs) => price.or(change.name, Class::Slip, all.left),
+            _ => price,
+        }
+    })
+}
+
+/// An image beside what a slip would have made of the right one.
+struct Compared {
+    /// The values of both.
+    pairs: Moments,
+    /// Part of the image that the slip leaves unexplained.
+    left: f64,
+}
+
+impl Compared {
+    /// Nothing where too little is known of what the slip would show.
+    fn of(
+        change: &Change,
+        image: &[[f32; 3]],
+        pixels: &[usize],
+        room: &dyn Fn(usize) -> Option<f32>,
+    ) -> Option<Self> {
         let (mut apart, mut total) = (0.0, 0.0);
         let (mut all, mut known) = (0usize, 0usize);
         let mut pairs = Moments::default();
-        for (index, a) in image.iter().enumerate().step_by(step) {
+        for &index in pixels {
             let Some(room) = room(index) else { continue };
             all += 1;
             let Some([least, most]) = (change.value)(index) else { continue };
             known += 1;
-            for ((&a, least), most) in a.iter().zip(least).zip(most) {
+            for ((&a, least), most) in image[index].iter().zip(least).zip(most) {
                 if !(least.is_finite() && most.is_finite()) {
                     continue;
                 }
@@ -278,12 +310,9 @@ pub fn film_price(
                 apart += if difference > room { difference } else { 0.0 };
             }
         }
-        if (known as f64) < KNOWN * all as f64 || !price::follows(&pairs) {
-            return price;
-        }
-        let residual = apart / total.max(f64::MIN_POSITIVE) - LEFT;
-        price.or(change.name, Class::Slip, residual.max(0.0))
-    })
+        let left = (apart / total.max(f64::MIN_POSITIVE) - LEFT).max(0.0);
+        (known as f64 >= KNOWN * all as f64).then_some(Self { pairs, left })
+    }
 }
 
 /// The factor that most values share.

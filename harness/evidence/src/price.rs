@@ -38,8 +38,23 @@ impl Class {
 const TWO_SLIPS: f64 = 0.0686;
 /// What two slips may leave unexplained.
 const LEFT_BY_TWO: f64 = 0.01;
-/// Number of questions that tell which two they may be.
+/// Number of questions that tell most mistakes apart.
 const FEW: usize = 200;
+
+/// Some questions, spread over all.
+fn few_of(questions: &[usize]) -> Vec<usize> {
+    questions.iter().copied().step_by(questions.len().div_ceil(FEW).max(1)).collect()
+}
+
+/// What a few questions may leave unexplained when all leave `left`: chance makes it more, but hardly twice as much.
+pub(super) fn surely_more_than(left: f64) -> f64 {
+    2.0 * left + 0.05
+}
+
+/// The part of a group's answers that is left unexplained.
+fn left((apart, total): &(f64, f64)) -> f64 {
+    apart / total.max(f64::MIN_POSITIVE)
+}
 
 /// Answers to be compared with the right ones.
 pub struct Answers<'a> {
@@ -320,20 +335,19 @@ impl Answers<'_> {
             true => price.or(UNKNOWN, Class::Unknown, 0.0),
             false => price,
         };
-        let price = self.changes.iter().fold(price, |price, change| {
-            if price.is_least() {
+        let few = few_of(&questions);
+        let price = self.likeliest_first(&few).into_iter().fold(price, |price, (left, change)| {
+            if price.is_least() || left > surely_more_than(price.error - change.class.price()) {
                 return price;
             }
-            let (shading, factors, class) = match (change.shading, change.fitted) {
-                (Some(shading), _) => (shading, Factors::default(), change.class),
-                (None, Some(fitted)) => match self.fit(&questions, fitted) {
-                    Some(fit) => fit,
-                    None => return price,
-                },
-                (None, None) => return price,
+            let Some((shading, factors, class)) = self.changed(change, &questions) else {
+                return price;
             };
-            match self.follow(&questions, &shading, &factors) {
-                true => price.or(change.name, class, self.residual(&questions, &shading, &factors)),
+            let residual = self.residual(&questions, &shading, &factors);
+            let better = price.or(change.name, class, residual);
+            // Few are better, so that few need be compared once more.
+            match better != price && self.follow(&questions, &shading, &factors) {
+                true => better,
                 false => price,
             }
         });
@@ -348,19 +362,45 @@ impl Answers<'_> {
                 && left <= LEFT_BY_TWO
                 && (change.class == Class::Concept || (change.fitted.is_some() && left >= 0.0));
             let explains = |shading: Shading| {
-                self.residual(&questions, &shading, &Factors::default()) <= LEFT_BY_TWO
+                let factors = Factors::default();
+                self.left_of(&few, &shading, &factors) <= surely_more_than(LEFT_BY_TWO)
+                    && self.residual(&questions, &shading, &factors) <= LEFT_BY_TWO
             };
             is_named || (change.class == Class::Concept && change.shading.is_some_and(explains))
         });
-        match !is_concept && self.are_of_two_slips(&questions) {
+        match !is_concept && self.are_of_two_slips(&questions, &few) {
             true => Price { error: TWO_SLIPS, mistake: Some("two slips"), ..price },
             false => price,
         }
     }
 
+    /// The changes, each with what it leaves unexplained of a few questions. Those come first that would cost least: a
+    /// mistake that is found early spares the comparison with others.
+    fn likeliest_first(&self, few: &[usize]) -> Vec<(f64, &Change)> {
+        let left = |change: &Change| match self.changed(change, few) {
+            Some((shading, factors, _)) => self.left_of(few, &shading, &factors),
+            // More questions may tell its factor.
+            None => 0.0,
+        };
+        let mut changes: Vec<_> =
+            self.changes.iter().map(|change| (left(change), change)).collect();
+        let cost = |(left, change): &(f64, &Change)| change.class.price() + left;
+        changes.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        changes
+    }
+
+    /// A change as a shading, with the factors that the questions tell.
+    fn changed(&self, change: &Change, questions: &[usize]) -> Option<(Shading, Factors, Class)> {
+        match (change.shading, change.fitted) {
+            (Some(shading), _) => Some((shading, Factors::default(), change.class)),
+            (None, Some(fitted)) => self.fit(questions, fitted),
+            (None, None) => None,
+        }
+    }
+
     /// Whether two slips explain the answers, or a slip and a constant factor. Of two factors of the right value their
     /// product is taken, of two that light what should be black the sum. Tests that are missing go with any other slip.
-    fn are_of_two_slips(&self, questions: &[usize]) -> bool {
+    fn are_of_two_slips(&self, questions: &[usize], few: &[usize]) -> bool {
         let slips: Vec<Shading> = self
             .changes
             .iter()
@@ -371,8 +411,6 @@ impl Answers<'_> {
         let both = |right: f64, a: f64, b: f64| {
             if right != 0.0 { a / right * b } else { a + b }
         };
-        let few: Vec<usize> =
-            questions.iter().copied().step_by(questions.len().div_ceil(FEW).max(1)).collect();
         let values = |shading: &Shading| -> Vec<[f64; 3]> {
             few.iter().map(|&index| (self.of)(index, shading)).collect()
         };
@@ -486,16 +524,38 @@ impl Answers<'_> {
         *factors.by_group.get(&(self.group)(index)).unwrap_or(&factors.all)
     }
 
+    fn times_factors(&self, answer: [f64; 3], factors: &Factors, index: usize) -> [f64; 3] {
+        let factors = self.factors(factors, index);
+        std::array::from_fn(|c| factors[c] * answer[c])
+    }
+
     /// Sum of differences from what `shading` answers over the sum of that, in the worst group.
     fn residual(&self, questions: &[usize], shading: &Shading, factors: &Factors) -> f64 {
         self.residual_of(questions, &|index| {
-            let (changed, factors) = ((self.of)(index, shading), self.factors(factors, index));
-            std::array::from_fn(|c| factors[c] * changed[c])
+            self.times_factors((self.of)(index, shading), factors, index)
         })
     }
 
     /// The same for any answers.
     fn residual_of(&self, questions: &[usize], of: &dyn Fn(usize) -> [f64; 3]) -> f64 {
+        let errors = self.differences(questions, of).into_values().map(|group| left(&group));
+        errors.fold(0.0, f64::max)
+    }
+
+    /// Sum of differences from what `shading` answers over the sum of that, all groups together: no more than in the
+    /// worst.
+    fn left_of(&self, questions: &[usize], shading: &Shading, factors: &Factors) -> f64 {
+        let changed = |index| self.times_factors((self.of)(index, shading), factors, index);
+        let groups = self.differences(questions, &changed).into_values();
+        left(&groups.fold((0.0, 0.0), |all, group| (all.0 + group.0, all.1 + group.1)))
+    }
+
+    /// For each group, the sum of differences from other answers and the sum of those.
+    fn differences(
+        &self,
+        questions: &[usize],
+        of: &dyn Fn(usize) -> [f64; 3],
+    ) -> BTreeMap<usize, (f64, f64)> {
         let mut groups: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
         for &index in questions {
             let unit = (self.unit)(index);
@@ -516,8 +576,7 @@ impl Answers<'_> {
                 *total += if b.is_finite() { b.abs() / unit } else { 1.0 };
             }
         }
-        let errors = groups.values().map(|(apart, total)| apart / total.max(f64::MIN_POSITIVE));
-        errors.fold(0.0, f64::max)
+        groups
     }
 
     /// The questions of each group.
