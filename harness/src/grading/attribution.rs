@@ -26,8 +26,9 @@ impl Session<'_> {
     }
 }
 
-/// Settles the outcomes of `job` that report an environment failure. If a renderer of ours succeeds, the failure is the
-/// submission's own. Otherwise the requests are repeated while retries are left, and then stay ungraded.
+/// Settles the outcomes of `job` that report an environment failure. The requests are repeated while retries are left: a
+/// worker may have met somebody else's signal. If a renderer of ours then succeeds, the failure is the submission's own.
+/// Otherwise they stay ungraded.
 fn attribute_failures(session: &Session, job: &Job, outcomes: &mut [Outcome]) {
     loop {
         let blaming = |&index: &usize| is_environment_failure(&outcomes[index]);
@@ -36,17 +37,14 @@ fn attribute_failures(session: &Session, job: &Job, outcomes: &mut [Outcome]) {
         if session.is_cancelled() {
             return;
         }
-        if let Some(witness) = control_run(session, job, &job.requests[first]) {
-            for index in blaming {
-                outcomes[index] =
-                    Outcome::Failed(format!("{} ({witness})", said(&outcomes[index])));
-            }
-            return;
-        }
         if !session.retries.try_take() {
+            let witness = control_run(session, job, &job.requests[first]);
             for index in blaming {
-                let (reason, fault) = (said(&outcomes[index]).to_owned(), Fault::Environment);
-                outcomes[index] = Outcome::NotRun { reason, fault };
+                let reason = said(&outcomes[index]).to_owned();
+                outcomes[index] = match witness {
+                    Some(witness) => Outcome::Failed(format!("{reason} ({witness})")),
+                    None => Outcome::NotRun { reason, fault: Fault::Environment },
+                };
             }
             return;
         }

@@ -35,17 +35,22 @@ fn a_class_of_a_thousand_is_sorted_searched_and_filtered_at_once() {
     let browser = &mut browser;
     open(browser, folder.path(), &html_batch(&report, &[]).unwrap());
     assert_eq!(browser.value("document.querySelectorAll('.grades tbody tr').length"), 1000);
-    // One action and the layout after it; the bound is for a busy machine.
-    let mut takes = |action: &str| {
+    // The quickest of some: an action and the layout after it. Beside it, laying out all rows once.
+    let mut least_ms = |action: &str| {
         let timed = format!(
             "(() => {{ const begun = performance.now(); {action}; document.body.offsetHeight; return performance.now() - begun }})()"
         );
-        let ms = browser.value(&timed).as_f64().unwrap();
-        assert!(ms < 3000.0, "{action}: {ms} ms");
+        let each = (0..4).map(|_| browser.value(&timed).as_f64().unwrap());
+        each.fold(f64::INFINITY, f64::min)
     };
-    takes("document.querySelectorAll('.grades thead button')[1].click()");
-    takes("document.querySelectorAll('.grades thead button')[1].click()");
-    takes("search.value = '300000123'; search.dispatchEvent(new Event('input'))");
+    let layout = least_ms("const body = document.querySelector('.grades tbody'); body.replaceChildren(...body.rows)");
+    for action in [
+        "document.querySelectorAll('.grades thead button')[1].click()",
+        "search.value = '300000123'; search.dispatchEvent(new Event('input'))",
+    ] {
+        let ms = least_ms(action);
+        assert!(ms < 20.0 * layout, "{action}: {ms} ms, all rows {layout} ms");
+    }
     let totals = "[...document.querySelectorAll('.grades tbody tr')].map((row) => +row.cells[1].dataset.sort)";
     let sorted = format!("{totals}.every((points, i, all) => i === 0 || all[i - 1] >= points)");
     assert_eq!(browser.value(&sorted), true);
