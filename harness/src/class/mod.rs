@@ -7,6 +7,7 @@
 //!
 //! Nothing here guesses: cases that names, class list and decisions leave open are listed for the instructor.
 
+mod attempts;
 pub mod collect;
 mod download;
 pub mod export;
@@ -24,7 +25,9 @@ pub mod roster;
 pub mod settle;
 pub mod slots;
 pub mod stamps;
+pub mod standing;
 
+pub use attempts::set_aside;
 pub use collect::{Collected, Empty, Source, Wanted, collect, recognised, skipped};
 pub use late::{Late, Policy};
 pub use layout::{Kind, Label};
@@ -32,6 +35,5 @@ pub use matching::{Claim, MATCHES, Matches};
 pub use owners::Owners;
 pub use pins::{Decisions, Pins, Stated};
 pub use roster::{Roster, Student};
-pub use settle::{
-    Attempt, Class, Deciding, INCOMPARABLE, Missing, Standing, Undecided, set_aside, settle,
-};
+pub use settle::settle;
+pub use standing::{Attempt, Class, Deciding, INCOMPARABLE, Missing, Standing, Undecided};
