@@ -9,15 +9,17 @@ use std::time::Instant;
 use anyhow::{Context as _, bail, ensure};
 
 use super::MachineLacks;
-use super::assemble::{self, Found};
+use super::assemble;
 use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
 use super::class::{self, Source, Telling};
 use super::context::{Context, INTERRUPTED, cores};
 use super::export;
+use super::found::Found;
 use super::join::join;
 use super::outputs::{at_root, ensure_apart, ensure_not_read, shell_path};
 use super::render::AdapterChoice;
 use super::selection::Selection;
+use super::settled;
 use crate::assignment::Assignment;
 use crate::class::{Attempt, Collected, Decisions, Kind, Label, Pins, Stated, Wanted, collect};
 use crate::columns::count;
@@ -231,7 +233,7 @@ impl<'a> Batch<'a> {
                 class::keep_roster(list, self.output)?;
             }
             if let Some(pin) = pins.current() {
-                assemble::remember_times(self.output, &pin.decided)?;
+                settled::remember_times(self.output, &pin.decided)?;
             }
             telling = Telling { roster, matches };
         }
