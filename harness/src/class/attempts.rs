@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::claim::Claim;
 use super::layout::{Kind, Label, canvas_upload};
-use super::matching::Claim;
 use super::stamps;
 use super::standing::{Attempt, Deciding, Standing};
 use crate::rubric::Grade;

@@ -179,54 +179,53 @@ impl Policy {
             let other = Some(keys(&["time_zone"]));
             return Some(Problem { at: keys(&["cut_off"]), message, other });
         }
-        for (index, Extension { student, due: own, late_days }) in
-            self.extensions.iter().enumerate()
-        {
-            let name = format!("late.extensions[{index}]");
-            let index = index.to_string();
-            let own_keys = |key: &'static str| ["extensions", index.as_str(), key];
-            let number = names::number(student);
-            if number.is_empty() {
-                let message = format!("{name}.student: expected a student number, found nothing");
-                return wrong(&own_keys("student"), message);
-            }
-            let same = |other: &Extension| names::number(&other.student) == number;
-            let first = self.extensions.iter().position(same).map(|at| at.to_string());
-            if let Some(first) = first.filter(|first| *first != index) {
-                return Some(Problem {
-                    at: keys(&own_keys("student")),
-                    message: format!("{name}: student \"{student}\" has an extension already"),
-                    other: Some(keys(&["extensions", &first, "student"])),
-                });
-            }
-            match own.as_ref().map(|text| text.parse::<Timestamp>()) {
-                Some(Err(error)) => {
-                    let text = own.as_deref().unwrap_or_default();
-                    let message = format!("{name}.due: {}", expected_date(text, &error));
-                    return wrong(&own_keys("due"), message);
-                }
-                Some(Ok(own)) if own < due => {
-                    let message = format!(
-                        "{name}.due lies before the due date of the class; expected it then or later"
-                    );
-                    return wrong(&own_keys("due"), message);
-                }
-                None if late_days.is_none() => {
-                    let message =
-                        format!("{name} changes nothing; expected \"due\" or \"late_days\"");
-                    return wrong(&own_keys("student"), message);
-                }
-                _ => {}
-            }
-            let said = own.as_deref();
-            if let Some(message) =
-                said.and_then(|at| self.contradiction(&format!("{name}.due"), at))
-            {
-                let other = Some(keys(&["time_zone"]));
-                return Some(Problem { at: keys(&own_keys("due")), message, other });
-            }
+        let problem = |at| self.problem_of_extension(at, due);
+        (0..self.extensions.len()).find_map(problem)
+    }
+
+    /// What is wrong with an extension, if anything. `class_due` is the class's due date.
+    fn problem_of_extension(&self, index: usize, class_due: Timestamp) -> Option<Problem> {
+        let Extension { student, due, late_days } = &self.extensions[index];
+        let keys = |index: usize, key: &str| {
+            ["late", "extensions", &index.to_string(), key].map(str::to_owned).to_vec()
+        };
+        let wrong = |key: &str, message: String| {
+            Some(Problem { at: keys(index, key), message, other: None })
+        };
+        let name = format!("late.extensions[{index}]");
+        let number = names::number(student);
+        if number.is_empty() {
+            let message = format!("{name}.student: expected a student number, found nothing");
+            return wrong("student", message);
         }
-        None
+        let same = |other: &Extension| names::number(&other.student) == number;
+        if let Some(first) = self.extensions.iter().position(same).filter(|first| *first != index) {
+            return Some(Problem {
+                at: keys(index, "student"),
+                message: format!("{name}: student \"{student}\" has an extension already"),
+                other: Some(keys(first, "student")),
+            });
+        }
+        match due.as_ref().map(|text| text.parse::<Timestamp>()) {
+            Some(Err(error)) => {
+                let text = due.as_deref().unwrap_or_default();
+                return wrong("due", format!("{name}.due: {}", expected_date(text, &error)));
+            }
+            Some(Ok(own)) if own < class_due => {
+                let message = format!(
+                    "{name}.due lies before the due date of the class; expected it then or later"
+                );
+                return wrong("due", message);
+            }
+            None if late_days.is_none() => {
+                let message = format!("{name} changes nothing; expected \"due\" or \"late_days\"");
+                return wrong("student", message);
+            }
+            _ => {}
+        }
+        let message = self.contradiction(&format!("{name}.due"), due.as_deref()?)?;
+        let zone = ["late", "time_zone"].map(str::to_owned).to_vec();
+        Some(Problem { at: keys(index, "due"), message, other: Some(zone) })
     }
 
     /// That a date has an offset which the time zone does not have then; UTC is every place's.

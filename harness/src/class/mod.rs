@@ -8,6 +8,7 @@
 //! Nothing here guesses: cases that names, class list and decisions leave open are listed for the instructor.
 
 mod attempts;
+pub mod claim;
 pub mod collect;
 mod download;
 pub mod export;
@@ -15,6 +16,7 @@ pub mod feedback;
 pub mod jplag;
 pub mod late;
 pub mod layout;
+pub mod matches;
 pub mod matching;
 pub mod mending;
 pub mod names;
@@ -28,10 +30,11 @@ pub mod stamps;
 pub mod standing;
 
 pub use attempts::set_aside;
+pub use claim::Claim;
 pub use collect::{Collected, Empty, Source, Wanted, collect, recognised, skipped};
 pub use late::{Late, Policy};
 pub use layout::{Kind, Label};
-pub use matching::{Claim, MATCHES, Matches};
+pub use matches::{MATCHES, Matches};
 pub use owners::Owners;
 pub use pins::{Decisions, Pins, Stated};
 pub use roster::{Roster, Student};

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use toml::Spanned;
 
-use super::matching::line_of;
+use super::matches::line_of;
 use super::owners::Owners;
 use crate::columns::{point_range, range};
 use crate::evidence::Evidence;

@@ -4,9 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::attempts::{choose, stamp};
+use super::claim::{Claim, address};
 use super::late::Late;
 use super::layout::{Kind, Label};
-use super::matching::{Claim, Match, Matches, address, find};
+use super::matches::Matches;
+use super::matching::{Match, find};
 use super::standing::{Attempt, Class, Deciding, Missing, Standing, Undecided};
 use super::{names, owners};
 use crate::columns;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::late::{Late, Policy};
 use super::layout::{Kind, Label};
-use super::matching::Matches;
+use super::matches::Matches;
 use super::mending::Mended;
 use super::overrides::Applied;
 use super::roster::{Roster, Student};
