@@ -128,61 +128,14 @@ pub fn sources(
         }
     }
     let places: HashSet<String> = given.iter().map(|given| place(&given.place)).collect();
-    let mut older: HashMap<String, Vec<(&String, &String)>> = HashMap::new();
-    for (at, slugs) in known.iter().filter(|(at, _)| !places.contains(*at)) {
-        for slug in slugs {
-            if let Some(name) = names.get(slug) {
-                let slot = slot(label(output, slug).as_ref(), name);
-                older.entry(slot).or_default().push((slug, at));
-            }
-        }
-    }
-    let mut newer: HashMap<String, usize> = HashMap::new();
-    for given in given.iter().filter(|given| !known.contains_key(&place(&given.place))) {
-        *newer.entry(slot(given.label.as_ref(), &given.name)).or_default() += 1;
-    }
-    // The folder of the same submission in an older download, where there is no doubt.
-    let older = |given: &class::Source| -> Option<(String, String)> {
-        let slot = slot(given.label.as_ref(), &given.name);
-        let [(slug, at)] = older.get(&slot)?[..] else { return None };
-        let noted = || fs::read_to_string(output.join(report::INSTRUCTOR).join(slug).join(CONTENT));
-        // Where no platform tells submissions apart, the bytes do.
-        let same = given.label.is_some()
-            || noted().is_ok_and(|noted| content(&given.path).is_ok_and(|own| own == noted));
-        (newer.get(&slot) == Some(&1) && same).then(|| (slug.clone(), at.clone()))
-    };
-    let mut older: Vec<Option<(String, String)>> = given.iter().map(older).collect();
-    let is_new = |(given, older): &(&class::Source, &Option<(String, String)>)| {
-        older.is_none()
-            && given.label.is_none()
-            && !given.path.is_symlink()
-            && !known.contains_key(&place(&given.place))
-    };
-    if given.iter().zip(&older).any(|own| is_new(&own)) {
-        // Of the rest, the bytes tell: a file that was only renamed is the one that was graded.
-        let found: HashSet<&String> = older.iter().flatten().map(|(slug, _)| slug).collect();
-        let mut noted: HashMap<String, Vec<(String, String)>> = HashMap::new();
-        for (at, slugs) in known.iter().filter(|(at, _)| !places.contains(*at)) {
-            for slug in slugs.iter().filter(|slug| !found.contains(slug)) {
-                let file = output.join(report::INSTRUCTOR).join(slug).join(CONTENT);
-                if let Ok(own) = fs::read_to_string(file) {
-                    noted.entry(own).or_default().push((slug.clone(), at.clone()));
-                }
-            }
-        }
-        let contents: Vec<Option<String>> = given
-            .iter()
-            .zip(&older)
-            .map(|own| is_new(&own).then(|| content(&own.0.path).ok()).flatten())
-            .collect();
-        for (at, own) in contents.iter().enumerate() {
-            let Some(own) = own else { continue };
-            let alone = contents.iter().flatten().filter(|other| *other == own).count() == 1;
-            if let (true, Some([only])) = (alone, noted.get(own).map(Vec::as_slice)) {
-                older[at] = Some(only.clone());
-            }
-        }
-    }
+    let gone: Vec<Gone> = known
+        .iter()
+        .filter(|(at, _)| !places.contains(*at))
+        .flat_map(|(at, slugs)| slugs.iter().map(|slug| (slug.clone(), at.clone())))
+        .collect();
+    let is_known = |given: &class::Source| known.contains_key(&place(&given.place));
+    let mut older = in_older_downloads(given, is_known, &gone, output, names);
+    find_renamed(given, is_known, &gone, &mut older, output);
     let source = |(given, older): (&class::Source, Option<(String, String)>)| {
         let class::Source { path, name, place: at, label } = given.clone();
         let before = known.get_mut(&place(&at)).and_then(VecDeque::pop_front);
@@ -194,6 +147,79 @@ pub fn sources(
         Source { path, name, slug, place: at, label, moved }
     };
     given.iter().zip(older).map(source).collect()
+}
+
+/// A submission that was graded and is not where it was: its folder in the report, and where it was.
+type Gone = (String, String);
+
+/// The same submission in an older download, where there is no doubt.
+fn in_older_downloads(
+    given: &[class::Source],
+    is_known: impl Fn(&class::Source) -> bool,
+    gone: &[Gone],
+    output: &Path,
+    names: &HashMap<String, String>,
+) -> Vec<Option<Gone>> {
+    let mut older: HashMap<String, Vec<&Gone>> = HashMap::new();
+    for own in gone {
+        if let Some(name) = names.get(&own.0) {
+            older.entry(slot(label(output, &own.0).as_ref(), name)).or_default().push(own);
+        }
+    }
+    let mut newer: HashMap<String, usize> = HashMap::new();
+    for given in given.iter().filter(|given| !is_known(given)) {
+        *newer.entry(slot(given.label.as_ref(), &given.name)).or_default() += 1;
+    }
+    let older = |given: &class::Source| -> Option<Gone> {
+        let slot = slot(given.label.as_ref(), &given.name);
+        let [own] = older.get(&slot)?[..] else { return None };
+        // Where no platform tells submissions apart, the bytes do.
+        let same = given.label.is_some()
+            || noted_content(output, &own.0)
+                .is_some_and(|noted| content(&given.path).is_ok_and(|own| own == noted));
+        (newer.get(&slot) == Some(&1) && same).then(|| own.clone())
+    };
+    given.iter().map(older).collect()
+}
+
+/// Adds to `older` files that were only renamed: their bytes tell.
+fn find_renamed(
+    given: &[class::Source],
+    is_known: impl Fn(&class::Source) -> bool,
+    gone: &[Gone],
+    older: &mut [Option<Gone>],
+    output: &Path,
+) {
+    let is_new = |(given, older): (&class::Source, &Option<Gone>)| {
+        older.is_none() && given.label.is_none() && !given.path.is_symlink() && !is_known(given)
+    };
+    if !given.iter().zip(&*older).any(is_new) {
+        return;
+    }
+    let found: HashSet<&String> = older.iter().flatten().map(|(slug, _)| slug).collect();
+    let mut noted: HashMap<String, Vec<&Gone>> = HashMap::new();
+    for own in gone.iter().filter(|(slug, _)| !found.contains(slug)) {
+        if let Some(content) = noted_content(output, &own.0) {
+            noted.entry(content).or_default().push(own);
+        }
+    }
+    let contents: Vec<Option<String>> = given
+        .iter()
+        .zip(&*older)
+        .map(|own| is_new(own).then(|| content(&own.0.path).ok()).flatten())
+        .collect();
+    for (at, own) in contents.iter().enumerate() {
+        let Some(own) = own else { continue };
+        let alone = contents.iter().flatten().filter(|other| *other == own).count() == 1;
+        if let (true, Some([only])) = (alone, noted.get(own).map(Vec::as_slice)) {
+            older[at] = Some((*only).clone());
+        }
+    }
+}
+
+/// The digest of what was graded into a folder of the report, where no platform names it.
+fn noted_content(output: &Path, slug: &str) -> Option<String> {
+    fs::read_to_string(output.join(report::INSTRUCTOR).join(slug).join(CONTENT)).ok()
 }
 
 fn new_slug(name: &str, taken: &mut HashSet<String>) -> String {

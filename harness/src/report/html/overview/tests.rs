@@ -1,4 +1,5 @@
 use super::super::super::{html_batch, sample};
+use super::mistakes::{NO_CODE, OTHER};
 use super::*;
 use crate::grading::SourceDigest;
 
