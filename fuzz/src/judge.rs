@@ -15,11 +15,11 @@ use umbra::evidence::{Check, CheckId};
 use umbra::expected::{Expected, SurfaceBuffer, load_scene, regions};
 use umbra::grading::submitted::{SubmittedImage, judge as judge_submitted};
 use umbra::grading::{Drawn, ImageDigest, PreparedScene, ProbeFilm};
-use umbra::imaging::evidence::Tolerances;
 use umbra::imaging::metrics::Metrics;
 use umbra::imaging::noise::NoisyPixels;
 use umbra::imaging::pictures::{signed_error, tone_mapped};
 use umbra::imaging::reference::{ReferenceImage, RegionMask};
+use umbra::imaging::tolerances::Tolerances;
 use umbra::worker::CameraValue;
 
 const WIDTH: usize = 48;

@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 use basecode::{Image, Sampler, Vec3};
 use divan::black_box;
 use umbra::imaging::compare::{compare_offline, compare_realtime_linear, compare_srgb8};
-use umbra::imaging::evidence::Tolerances;
 use umbra::imaging::reference::{ReferenceImage, Region, RegionMask};
+use umbra::imaging::tolerances::Tolerances;
 
 const WIDTH: usize = 768;
 const HEIGHT: usize = 576;

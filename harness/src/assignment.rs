@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::class::mending::Mend;
 use crate::class::{Policy, Stated, late};
 use crate::files::Scratch;
-use crate::imaging::evidence::Tolerances;
+use crate::imaging::tolerances::Tolerances;
 use crate::intake::Finding;
 use crate::plain_errors::plain;
 use crate::rubric::Rules;

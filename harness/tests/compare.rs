@@ -5,9 +5,10 @@ use std::f32::consts::TAU;
 use basecode::image::Image;
 use glam::{Vec3, vec3};
 use umbra::imaging::compare::{compare_offline, compare_realtime_linear, compare_srgb8};
-use umbra::imaging::evidence::{CompareError, ComparedWith, ImageEvidence, Tolerances};
+use umbra::imaging::comparison::{CompareError, ComparedWith, ImageEvidence};
 use umbra::imaging::reference::{ReferenceError, ReferenceImage, Region, RegionMask};
 use umbra::imaging::srgb;
+use umbra::imaging::tolerances::Tolerances;
 
 /// Sebastiano Vigna's splitmix64: enough for tests.
 struct Rng(u64);

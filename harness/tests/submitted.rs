@@ -8,11 +8,11 @@ use umbra::evidence::submitted::{
 };
 use umbra::evidence::{Check, Verdict};
 use umbra::grading::ImageDigest;
-use umbra::imaging::evidence::Tolerances;
 use umbra::imaging::noise::NoisyPixels;
 use umbra::imaging::origin::{same_draws, same_levels};
 use umbra::imaging::reference::{ReferenceImage, Region, RegionMask};
 use umbra::imaging::srgb;
+use umbra::imaging::tolerances::Tolerances;
 
 const WIDTH: usize = 240;
 const HEIGHT: usize = 180;

@@ -8,11 +8,12 @@ use crate::expected::Expected;
 use imaging::compare::{
     compare_offline, compare_realtime_linear, compare_srgb8, offline, realtime_linear, srgb8,
 };
+use imaging::comparison::{CompareError, ImageEvidence};
 use imaging::correlation::Moments;
-use imaging::evidence::{CompareError, ImageEvidence, Tolerances};
 use imaging::origin::{same_draws, same_levels};
 use imaging::ratio::{RegionRatio, region_ratios};
 use imaging::reference::{Region, RegionMask};
+use imaging::tolerances::Tolerances;
 
 /// How an image came about, which decides how it is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,8 +7,8 @@ use basecode::Image;
 use super::light_levels::{Levels, what_lit_get};
 use super::price::{self, Class, Price};
 use super::{Check, CheckId, Measure, RuleId, Verdict};
-use imaging::evidence::Tolerances;
 use imaging::reference::RegionMask;
+use imaging::tolerances::Tolerances;
 
 /// A pixel is lit when it differs from the image without shadows by less than this fraction, dark
 /// when less than this fraction is left.

@@ -1,6 +1,6 @@
 //! Contiguous areas of failing pixels.
 
-use super::evidence::FailingArea;
+use super::comparison::FailingArea;
 
 /// The number of 2x2 blocks whose four pixels all fail.
 pub fn solid_blocks(failing: &[bool], width: usize) -> usize {

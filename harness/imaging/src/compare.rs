@@ -8,10 +8,11 @@
 use basecode::image::Image;
 use glam::Vec3;
 
-use super::evidence::{CompareError, ComparedWith, ImageEvidence, Tolerances};
+use super::comparison::{CompareError, ComparedWith, ImageEvidence};
 use super::reference::{ReferenceImage, RegionMask, check_mask};
 use super::srgb;
 use super::stats::{Scale, accumulate};
+use super::tolerances::Tolerances;
 
 /// Judges an offline render with `spp` jittered samples per pixel, any seed.
 ///

@@ -5,10 +5,10 @@
 
 pub mod blob;
 pub mod compare;
+pub mod comparison;
 pub mod correlation;
 pub mod difference;
 pub mod error_map;
-pub mod evidence;
 pub mod flip;
 pub mod likeness;
 pub mod metrics;
@@ -21,3 +21,4 @@ pub mod rows;
 pub mod srgb;
 mod stats;
 pub mod thresholds;
+pub mod tolerances;

@@ -4,9 +4,9 @@ use basecode::image::Image;
 use glam::Vec3;
 
 use super::blob;
-use super::evidence::Tolerances;
 use super::reference::RegionMask;
 use super::srgb;
+use super::tolerances::Tolerances;
 
 /// The largest fraction of pixels by which two draws of one renderer may differ.
 const DRAWS_APART: f64 = 1e-3;

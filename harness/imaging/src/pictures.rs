@@ -9,7 +9,7 @@ use glam::Vec3;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use thiserror::Error;
 
-use super::evidence::FailingArea;
+use super::comparison::FailingArea;
 use super::reference::RegionMask;
 use super::srgb;
 

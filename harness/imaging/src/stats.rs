@@ -4,11 +4,10 @@ use basecode::image::Image;
 use glam::{DVec3, Vec3};
 
 use super::blob;
-use super::evidence::{
-    Check, ComparedWith, FailingArea, ImageEvidence, RegionBias, Tolerances, WorstPixel,
-};
+use super::comparison::{Check, ComparedWith, FailingArea, ImageEvidence, RegionBias, WorstPixel};
 use super::ratio::triple;
 use super::reference::RegionMask;
+use super::tolerances::Tolerances;
 
 /// A dim lit region's bias is relative to this fraction of the median lit value at least.
 const DIM: f64 = 0.01;

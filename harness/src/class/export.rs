@@ -38,29 +38,62 @@ pub struct Book {
 /// When the list is no export of a platform that imports grades, or has no such column, or several, or one that takes
 /// no points.
 pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Book, String> {
-    let list = roster.path.display();
-    let named = |wanted: &[&str]| named(roster, wanted);
-    let cell = |row: usize, column: usize| -> &str {
-        let row: &[String] = roster.rows.get(row).map_or(&[], Vec::as_slice);
-        row.get(column).map_or("", |text| text.trim())
+    let own = column_of(roster, item)?;
+    check_keys(roster)?;
+    let key_columns = named(roster, keys(roster.kind));
+    let is_unknown =
+        |own: &&Points| key_columns.iter().all(|at| cell(roster, own.student.row, *at).is_empty());
+    let unknown = graded.iter().filter(is_unknown).map(|own| own.student.who()).collect();
+    let mut book = Book { unknown, ..Book::default() };
+    let copied = match roster.kind {
+        Kind::Brightspace => {
+            book.brightspace(roster, item, own);
+            key_columns
+        }
+        Kind::Canvas => book.canvas(roster, item, own, graded)?,
+        Kind::Moodle => book.moodle(roster, graded)?,
+        _ => {
+            return Err(format!(
+                "{}: expected the grade book of Brightspace or Canvas or the grading worksheet of Moodle; hint: \
+                 grade with --class and the file that your platform exports",
+                roster.path.display()
+            ));
+        }
     };
-    let title = |at: &usize| title(roster.kind, &roster.header[*at]);
-    let is_item = |at: &usize| names::plain(title(at)) == names::plain(item.trim());
-    let items: Vec<usize> = (0..roster.header.len()).filter(|at| !title(at).is_empty()).collect();
-    let called = |all: &[usize]| {
-        all.iter().map(|at| roster.header[*at].trim().to_owned()).collect::<Vec<_>>()
+    book.fill(roster, &copied, graded)?;
+    Ok(book)
+}
+
+/// The columns that hold points of an assignment.
+fn items(roster: &Roster) -> Vec<usize> {
+    let is_item = |at: &usize| !title(roster.kind, &roster.header[*at]).is_empty();
+    (0..roster.header.len()).filter(is_item).collect()
+}
+
+/// The names of some columns, for a message.
+fn called(roster: &Roster, columns: &[usize]) -> String {
+    let names = columns.iter().map(|at| roster.header[*at].trim().to_owned());
+    printable(&names.collect::<Vec<_>>().join(", "))
+}
+
+/// The column of an assignment, if there is one.
+fn column_of(roster: &Roster, item: &str) -> Result<Option<usize>, String> {
+    let items = items(roster);
+    let is_item = |at: &usize| {
+        names::plain(title(roster.kind, &roster.header[*at])) == names::plain(item.trim())
     };
     // The column as it is written goes before all that only read the same.
-    let exact = items.iter().copied().filter(|at| roster.header[*at] == item).collect::<Vec<_>>();
-    let mut own: Vec<usize> = items.iter().copied().filter(is_item).collect();
-    if !exact.is_empty() {
-        own = exact;
+    let mut own: Vec<usize> =
+        items.iter().copied().filter(|at| roster.header[*at] == item).collect();
+    if own.is_empty() {
+        own = items.into_iter().filter(is_item).collect();
     }
     if own.len() > 1 {
         return Err(format!(
-            "{list}:1: expected one column of the assignment \"{item}\", found {}: {}; hint: {}",
+            "{}:1: expected one column of the assignment \"{item}\", found {}: {}; hint: {}",
+            roster.path.display(),
             own.len(),
-            printable(&called(&own).join(", ")),
+            called(roster, &own),
             match roster.kind {
                 Kind::Canvas => {
                     format!("name one as it is written, --item \"{}\"", roster.header[own[0]])
@@ -69,110 +102,122 @@ pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Book
             }
         ));
     }
-    let own = own.first().copied();
-    check_keys(roster)?;
-    let key_columns = named(keys(roster.kind));
-    let is_unknown =
-        |own: &&Points| key_columns.iter().all(|at| cell(own.student.row, *at).is_empty());
-    let unknown = graded.iter().filter(is_unknown).map(|own| own.student.who()).collect();
-    let mut book = Book { unknown, ..Book::default() };
-    let copied = match roster.kind {
-        Kind::Brightspace => {
-            book.column =
-                own.map_or_else(|| format!("{item} Points Grade"), |at| roster.header[at].clone());
-            book.maximum = own.and_then(|at| max_points(&roster.header[at]));
-            let is_grade = |name: &&String| name.contains(" Grade");
-            let others = || roster.header.iter().filter(is_grade).cloned().collect();
-            book.others = own.is_none().then(others);
-            key_columns
-        }
-        Kind::Canvas => {
-            let Some(at) = own else {
-                return Err(format!(
-                    "{list}:1: expected one column of the assignment \"{item}\", found none; the columns are: {}; hint: \
-                     name one with --item, or export the grade book after the assignment is made",
-                    printable(&called(&items).join(", "))
-                ));
-            };
-            book.column.clone_from(&roster.header[at]);
-            let possible = |row: &usize| names::plain(cell(*row, 0)).trim() == "points possible";
-            let possible = (0..roster.rows.len()).find(possible);
-            book.maximum = possible.and_then(|row| number(cell(row, at)));
-            let is_excused = |own: &&Points| cell(own.student.row, at).eq_ignore_ascii_case("EX");
-            book.excused = graded.iter().filter(is_excused).map(|own| own.student.who()).collect();
-            let known = [
-                "student",
-                "lastname",
-                "firstname",
-                "id",
-                "sisuserid",
-                "sisloginid",
-                "integrationid",
-                "rootaccount",
-                "section",
-            ];
-            named(&known)
-        }
-        Kind::Moodle => {
-            let Some(&at) = named(&["grade", "note"]).first() else {
-                return Err(format!(
-                    "{list}:1: expected a column Grade; hint: download the grading worksheet of the assignment"
-                ));
-            };
-            let has_points =
-                |own: &usize| graded.iter().any(|row| !cell(row.student.row, *own).is_empty());
-            if named(&["scale", "bareme"]).iter().any(has_points) {
-                return Err(format!(
-                    "{list}:1: the assignment is graded on a scale of words, and points are no such word; hint: give it \
-                     a maximum grade in Moodle, and download the worksheet again"
-                ));
-            }
-            book.column.clone_from(&roster.header[at]);
-            let most = named(&["maximumgrade", "notemaximale"]);
-            let most = most.first().into_iter();
-            let most = most
-                .flat_map(|column| graded.iter().map(move |row| cell(row.student.row, *column)));
-            book.maximum = most.filter_map(number).min_by(f64::total_cmp);
-            (0..roster.header.len()).filter(|own| *own != at).collect()
-        }
-        _ => {
+    Ok(own.first().copied())
+}
+
+fn cell(roster: &Roster, row: usize, column: usize) -> &str {
+    let row: &[String] = roster.rows.get(row).map_or(&[], Vec::as_slice);
+    row.get(column).map_or("", |text| text.trim())
+}
+
+impl Book {
+    /// Names the column, which Brightspace makes where it is new.
+    fn brightspace(&mut self, roster: &Roster, item: &str, own: Option<usize>) {
+        self.column =
+            own.map_or_else(|| format!("{item} Points Grade"), |at| roster.header[at].clone());
+        self.maximum = own.and_then(|at| max_points(&roster.header[at]));
+        let is_grade = |name: &&String| name.contains(" Grade");
+        let others = || roster.header.iter().filter(is_grade).cloned().collect();
+        self.others = own.is_none().then(others);
+    }
+
+    /// Names the column, and answers those that Canvas wants beside it.
+    fn canvas(
+        &mut self,
+        roster: &Roster,
+        item: &str,
+        own: Option<usize>,
+        graded: &[Points],
+    ) -> Result<Vec<usize>, String> {
+        let Some(at) = own else {
             return Err(format!(
-                "{list}: expected the grade book of Brightspace or Canvas or the grading worksheet of Moodle; hint: \
-                 grade with --class and the file that your platform exports"
+                "{}:1: expected one column of the assignment \"{item}\", found none; the columns are: {}; hint: \
+                 name one with --item, or export the grade book after the assignment is made",
+                roster.path.display(),
+                called(roster, &items(roster))
+            ));
+        };
+        self.column.clone_from(&roster.header[at]);
+        let possible =
+            |row: &usize| names::plain(cell(roster, *row, 0)).trim() == "points possible";
+        let possible = (0..roster.rows.len()).find(possible);
+        self.maximum = possible.and_then(|row| number(cell(roster, row, at)));
+        let is_excused =
+            |own: &&Points| cell(roster, own.student.row, at).eq_ignore_ascii_case("EX");
+        self.excused = graded.iter().filter(is_excused).map(|own| own.student.who()).collect();
+        let known = [
+            "student",
+            "lastname",
+            "firstname",
+            "id",
+            "sisuserid",
+            "sisloginid",
+            "integrationid",
+            "rootaccount",
+            "section",
+        ];
+        Ok(named(roster, &known))
+    }
+
+    /// Names the column, and answers the others, which Moodle wants back.
+    fn moodle(&mut self, roster: &Roster, graded: &[Points]) -> Result<Vec<usize>, String> {
+        let list = roster.path.display();
+        let Some(&at) = named(roster, &["grade", "note"]).first() else {
+            return Err(format!(
+                "{list}:1: expected a column Grade; hint: download the grading worksheet of the assignment"
+            ));
+        };
+        let has_points =
+            |own: &usize| graded.iter().any(|row| !cell(roster, row.student.row, *own).is_empty());
+        if named(roster, &["scale", "bareme"]).iter().any(has_points) {
+            return Err(format!(
+                "{list}:1: the assignment is graded on a scale of words, and points are no such word; hint: give it \
+                 a maximum grade in Moodle, and download the worksheet again"
             ));
         }
-    };
-    let mut rows = Vec::new();
-    let pick = |cells: &[String]| -> Vec<String> {
-        copied.iter().map(|at| cells.get(*at).cloned().unwrap_or_default()).collect()
-    };
-    let end = |row: &mut Vec<String>, cell: &str| {
-        if roster.kind == Kind::Brightspace {
-            row.push(cell.to_owned());
-        }
-    };
-    let mut head = pick(&roster.header);
-    head.push(book.column.clone());
-    end(&mut head, "End-of-Line Indicator");
-    rows.push(head);
-    for Points { student, points } in graded {
-        if book.excused.contains(&student.who()) || book.unknown.contains(&student.who()) {
-            continue;
-        }
-        let mut row = pick(&roster.rows[student.row]);
-        row.push(format!("{points:.2}"));
-        end(&mut row, "#");
-        rows.push(row);
+        self.column.clone_from(&roster.header[at]);
+        let most = named(roster, &["maximumgrade", "notemaximale"]);
+        let most = most.first().into_iter().flat_map(|column| {
+            graded.iter().map(move |row| cell(roster, row.student.row, *column))
+        });
+        self.maximum = most.filter_map(number).min_by(f64::total_cmp);
+        Ok((0..roster.header.len()).filter(|own| *own != at).collect())
     }
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        // A dash alone stands for nothing, and is no formula.
-        let cells = row.iter().map(|cell| if cell == "-" { cell.clone() } else { csv_cell(cell) });
-        writer.write_record(cells).map_err(|error| error.to_string())?;
+
+    /// Writes the columns `copied` and the points, in the rows of those who are not left out.
+    fn fill(&mut self, roster: &Roster, copied: &[usize], graded: &[Points]) -> Result<(), String> {
+        let pick = |cells: &[String]| -> Vec<String> {
+            copied.iter().map(|at| cells.get(*at).cloned().unwrap_or_default()).collect()
+        };
+        let end = |row: &mut Vec<String>, cell: &str| {
+            if roster.kind == Kind::Brightspace {
+                row.push(cell.to_owned());
+            }
+        };
+        let mut head = pick(&roster.header);
+        head.push(self.column.clone());
+        end(&mut head, "End-of-Line Indicator");
+        let mut rows = vec![head];
+        for Points { student, points } in graded {
+            if self.excused.contains(&student.who()) || self.unknown.contains(&student.who()) {
+                continue;
+            }
+            let mut row = pick(&roster.rows[student.row]);
+            row.push(format!("{points:.2}"));
+            end(&mut row, "#");
+            rows.push(row);
+        }
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        for row in rows {
+            // A dash alone stands for nothing, and is no formula.
+            let cells =
+                row.iter().map(|cell| if cell == "-" { cell.clone() } else { csv_cell(cell) });
+            writer.write_record(cells).map_err(|error| error.to_string())?;
+        }
+        let bytes = writer.into_inner().map_err(|error| error.to_string())?;
+        self.text = String::from_utf8(bytes).map_err(|error| error.to_string())?;
+        Ok(())
     }
-    let bytes = writer.into_inner().map_err(|error| error.to_string())?;
-    book.text = String::from_utf8(bytes).map_err(|error| error.to_string())?;
-    Ok(book)
 }
 
 /// The columns by which a platform that imports grades knows whose they are; any of them does.

@@ -7,6 +7,8 @@
 //!
 //! Nothing here guesses: cases that names, class list and decisions leave open are listed for the instructor.
 
+mod attempts;
+pub mod claim;
 pub mod collect;
 mod download;
 pub mod export;
@@ -14,6 +16,7 @@ pub mod feedback;
 pub mod jplag;
 pub mod late;
 pub mod layout;
+pub mod matches;
 pub mod matching;
 pub mod mending;
 pub mod names;
@@ -24,14 +27,16 @@ pub mod roster;
 pub mod settle;
 pub mod slots;
 pub mod stamps;
+pub mod standing;
 
+pub use attempts::set_aside;
+pub use claim::Claim;
 pub use collect::{Collected, Empty, Source, Wanted, collect, recognised, skipped};
 pub use late::{Late, Policy};
 pub use layout::{Kind, Label};
-pub use matching::{Claim, MATCHES, Matches};
+pub use matches::{MATCHES, Matches};
 pub use owners::Owners;
 pub use pins::{Decisions, Pins, Stated};
 pub use roster::{Roster, Student};
-pub use settle::{
-    Attempt, Class, Deciding, INCOMPARABLE, Missing, Standing, Undecided, set_aside, settle,
-};
+pub use settle::settle;
+pub use standing::{Attempt, Class, Deciding, INCOMPARABLE, Missing, Standing, Undecided};

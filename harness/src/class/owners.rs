@@ -5,8 +5,10 @@
 
 use std::collections::BTreeMap;
 
+use super::claim::Claim;
 use super::layout::{Kind, Label};
-use super::matching::{Claim, Match, Matches, find};
+use super::matches::Matches;
+use super::matching::{Match, find};
 use super::names;
 use super::roster::{Roster, Student};
 

@@ -9,9 +9,9 @@ use anyhow::{Context as _, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
 use super::late::Policy;
-use super::matching::{MATCHES, Matches};
+use super::matches::{MATCHES, Matches};
 use super::overrides::{OVERRIDES, Overrides};
-use super::settle::Attempt;
+use super::standing::Attempt;
 use crate::files::write_new;
 use crate::intake::text_of;
 use crate::rubric::Rules;

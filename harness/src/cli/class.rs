@@ -128,61 +128,14 @@ pub fn sources(
         }
     }
     let places: HashSet<String> = given.iter().map(|given| place(&given.place)).collect();
-    let mut older: HashMap<String, Vec<(&String, &String)>> = HashMap::new();
-    for (at, slugs) in known.iter().filter(|(at, _)| !places.contains(*at)) {
-        for slug in slugs {
-            if let Some(name) = names.get(slug) {
-                let slot = slot(label(output, slug).as_ref(), name);
-                older.entry(slot).or_default().push((slug, at));
-            }
-        }
-    }
-    let mut newer: HashMap<String, usize> = HashMap::new();
-    for given in given.iter().filter(|given| !known.contains_key(&place(&given.place))) {
-        *newer.entry(slot(given.label.as_ref(), &given.name)).or_default() += 1;
-    }
-    // The folder of the same submission in an older download, where there is no doubt.
-    let older = |given: &class::Source| -> Option<(String, String)> {
-        let slot = slot(given.label.as_ref(), &given.name);
-        let [(slug, at)] = older.get(&slot)?[..] else { return None };
-        let noted = || fs::read_to_string(output.join(report::INSTRUCTOR).join(slug).join(CONTENT));
-        // Where no platform tells submissions apart, the bytes do.
-        let same = given.label.is_some()
-            || noted().is_ok_and(|noted| content(&given.path).is_ok_and(|own| own == noted));
-        (newer.get(&slot) == Some(&1) && same).then(|| (slug.clone(), at.clone()))
-    };
-    let mut older: Vec<Option<(String, String)>> = given.iter().map(older).collect();
-    let is_new = |(given, older): &(&class::Source, &Option<(String, String)>)| {
-        older.is_none()
-            && given.label.is_none()
-            && !given.path.is_symlink()
-            && !known.contains_key(&place(&given.place))
-    };
-    if given.iter().zip(&older).any(|own| is_new(&own)) {
-        // Of the rest, the bytes tell: a file that was only renamed is the one that was graded.
-        let found: HashSet<&String> = older.iter().flatten().map(|(slug, _)| slug).collect();
-        let mut noted: HashMap<String, Vec<(String, String)>> = HashMap::new();
-        for (at, slugs) in known.iter().filter(|(at, _)| !places.contains(*at)) {
-            for slug in slugs.iter().filter(|slug| !found.contains(slug)) {
-                let file = output.join(report::INSTRUCTOR).join(slug).join(CONTENT);
-                if let Ok(own) = fs::read_to_string(file) {
-                    noted.entry(own).or_default().push((slug.clone(), at.clone()));
-                }
-            }
-        }
-        let contents: Vec<Option<String>> = given
-            .iter()
-            .zip(&older)
-            .map(|own| is_new(&own).then(|| content(&own.0.path).ok()).flatten())
-            .collect();
-        for (at, own) in contents.iter().enumerate() {
-            let Some(own) = own else { continue };
-            let alone = contents.iter().flatten().filter(|other| *other == own).count() == 1;
-            if let (true, Some([only])) = (alone, noted.get(own).map(Vec::as_slice)) {
-                older[at] = Some(only.clone());
-            }
-        }
-    }
+    let gone: Vec<Gone> = known
+        .iter()
+        .filter(|(at, _)| !places.contains(*at))
+        .flat_map(|(at, slugs)| slugs.iter().map(|slug| (slug.clone(), at.clone())))
+        .collect();
+    let is_known = |given: &class::Source| known.contains_key(&place(&given.place));
+    let mut older = in_older_downloads(given, is_known, &gone, output, names);
+    find_renamed(given, is_known, &gone, &mut older, output);
     let source = |(given, older): (&class::Source, Option<(String, String)>)| {
         let class::Source { path, name, place: at, label } = given.clone();
         let before = known.get_mut(&place(&at)).and_then(VecDeque::pop_front);
@@ -194,6 +147,79 @@ pub fn sources(
         Source { path, name, slug, place: at, label, moved }
     };
     given.iter().zip(older).map(source).collect()
+}
+
+/// A submission that was graded and is not where it was: its folder in the report, and where it was.
+type Gone = (String, String);
+
+/// The same submission in an older download, where there is no doubt.
+fn in_older_downloads(
+    given: &[class::Source],
+    is_known: impl Fn(&class::Source) -> bool,
+    gone: &[Gone],
+    output: &Path,
+    names: &HashMap<String, String>,
+) -> Vec<Option<Gone>> {
+    let mut older: HashMap<String, Vec<&Gone>> = HashMap::new();
+    for own in gone {
+        if let Some(name) = names.get(&own.0) {
+            older.entry(slot(label(output, &own.0).as_ref(), name)).or_default().push(own);
+        }
+    }
+    let mut newer: HashMap<String, usize> = HashMap::new();
+    for given in given.iter().filter(|given| !is_known(given)) {
+        *newer.entry(slot(given.label.as_ref(), &given.name)).or_default() += 1;
+    }
+    let older = |given: &class::Source| -> Option<Gone> {
+        let slot = slot(given.label.as_ref(), &given.name);
+        let [own] = older.get(&slot)?[..] else { return None };
+        // Where no platform tells submissions apart, the bytes do.
+        let same = given.label.is_some()
+            || noted_content(output, &own.0)
+                .is_some_and(|noted| content(&given.path).is_ok_and(|own| own == noted));
+        (newer.get(&slot) == Some(&1) && same).then(|| own.clone())
+    };
+    given.iter().map(older).collect()
+}
+
+/// Adds to `older` files that were only renamed: their bytes tell.
+fn find_renamed(
+    given: &[class::Source],
+    is_known: impl Fn(&class::Source) -> bool,
+    gone: &[Gone],
+    older: &mut [Option<Gone>],
+    output: &Path,
+) {
+    let is_new = |(given, older): (&class::Source, &Option<Gone>)| {
+        older.is_none() && given.label.is_none() && !given.path.is_symlink() && !is_known(given)
+    };
+    if !given.iter().zip(&*older).any(is_new) {
+        return;
+    }
+    let found: HashSet<&String> = older.iter().flatten().map(|(slug, _)| slug).collect();
+    let mut noted: HashMap<String, Vec<&Gone>> = HashMap::new();
+    for own in gone.iter().filter(|(slug, _)| !found.contains(slug)) {
+        if let Some(content) = noted_content(output, &own.0) {
+            noted.entry(content).or_default().push(own);
+        }
+    }
+    let contents: Vec<Option<String>> = given
+        .iter()
+        .zip(&*older)
+        .map(|own| is_new(own).then(|| content(&own.0.path).ok()).flatten())
+        .collect();
+    for (at, own) in contents.iter().enumerate() {
+        let Some(own) = own else { continue };
+        let alone = contents.iter().flatten().filter(|other| *other == own).count() == 1;
+        if let (true, Some([only])) = (alone, noted.get(own).map(Vec::as_slice)) {
+            older[at] = Some((*only).clone());
+        }
+    }
+}
+
+/// The digest of what was graded into a folder of the report, where no platform names it.
+fn noted_content(output: &Path, slug: &str) -> Option<String> {
+    fs::read_to_string(output.join(report::INSTRUCTOR).join(slug).join(CONTENT)).ok()
 }
 
 fn new_slug(name: &str, taken: &mut HashSet<String>) -> String {
@@ -417,78 +443,4 @@ fn student_of(context: &Context, source: &Path) -> Option<Student> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn source(path: &str, slug: &str) -> Source {
-        Source {
-            path: path.into(),
-            name: path.into(),
-            slug: slug.into(),
-            place: path.into(),
-            label: None,
-            moved: None,
-        }
-    }
-
-    #[test]
-    fn a_submission_keeps_its_folder_and_takes_nobody_else_s() {
-        let place = tempfile::tempdir().unwrap();
-        let (output, class) = (place.path().join("out"), place.path().join("class"));
-        let path = |folder: &str| {
-            fs::create_dir_all(class.join(folder)).unwrap();
-            let path = class.join(folder).join("a2.zip");
-            fs::write(&path, folder).unwrap();
-            path
-        };
-        let note = |sources: &[Source]| {
-            for source in sources {
-                let at = |name: &str| output.join(name).join(&source.slug);
-                let out = Folders { student: at("."), instructor: at(report::INSTRUCTOR) };
-                note_source(&out, source).unwrap();
-            }
-        };
-        let sources = |paths: &[PathBuf], output: &Path| {
-            let given: Vec<_> = paths.iter().map(|path| class::Source::given(path)).collect();
-            super::sources(Mode::Grade, &given, output, &HashMap::new())
-        };
-        let slugs = |sources: &[Source]| -> Vec<String> {
-            sources.iter().map(|source| source.slug.clone()).collect()
-        };
-        let first = sources(&[path("bob"), path("eve")], &output);
-        assert_eq!(slugs(&first), ["a2", "a2-2"]);
-        note(&first);
-        // One more, and the others in another order, by another way.
-        let again = class.join("eve/../eve/a2.zip");
-        let second = sources(&[path("ann"), again, path("bob")], &output);
-        assert_eq!(slugs(&second), ["a2-3", "a2-2", "a2"]);
-        note(&second);
-        // The same one twice is two, each time.
-        let twice = sources(&[path("bob"), path("bob")], &output);
-        assert_eq!(slugs(&twice), ["a2", "a2-4"]);
-        note(&twice);
-        assert_eq!(slugs(&sources(&[path("bob"), path("bob")], &output)), ["a2", "a2-4"]);
-        let odd = ["instructor", "work.zip", "settled", "???", "A2.tar.gz"].map(PathBuf::from);
-        assert_eq!(
-            slugs(&sources(&odd, &output)),
-            ["instructor-2", "work-2", "settled-2", "submission", "A2-5"]
-        );
-        // The folder of a check is called as the student's.
-        for (name, folder) in [("work", "work"), ("errors", "errors"), ("viewer", "viewer-2")] {
-            let given = [class::Source::given(Path::new(name))];
-            let own = super::sources(Mode::Check, &given, &output, &HashMap::new());
-            assert_eq!(slugs(&own), [folder]);
-        }
-    }
-
-    #[test]
-    fn a_submission_is_called_by_its_file() {
-        let source = source("class/a2_ada.tar.gz", "a2_ada-2");
-        for name in ["a2_ada", "a2_ada.tar.gz", "a2_ada-2", "class/a2_ada.tar.gz"] {
-            assert!(is_file(&source, name), "{name}");
-        }
-        for name in ["", "ada", "a2", "class"] {
-            assert!(!is_file(&source, name), "{name}");
-        }
-    }
-}
+mod tests;

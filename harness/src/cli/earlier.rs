@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Context as _;
 use serde::Deserialize;
 
-use super::assemble::{Found, ensure_merged};
+use super::found::{Found, ensure_merged};
 use crate::class::{Class, Standing};
 use crate::columns;
 use crate::grading::StageCost;

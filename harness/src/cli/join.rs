@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use super::assemble::Found;
 use super::class::{folders, some, who};
+use super::found::Found;
 use crate::columns::count;
 use crate::grading::{Record, RecordCache, StoredRecord};
 use crate::report;

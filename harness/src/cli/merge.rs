@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
 
-use super::assemble::{self, Found, Seen};
+use super::assemble;
 use super::batch::{Batch, BatchOutcome};
 use super::choices::{IsolationChoice, Perturb};
 use super::class::{self, some};
 use super::context::Context;
+use super::found::{Found, Seen};
 use super::grade;
 use super::join::join;
 use super::outputs::{at_root, shell_path};

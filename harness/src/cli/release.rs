@@ -10,6 +10,7 @@ use zip::write::SimpleFileOptions;
 use super::assemble::{self, Kept};
 use super::context::Context;
 use super::report_folder::ReportFolder;
+use super::settled::RELEASED;
 use crate::class::late;
 use crate::files::{files_below, write_whole};
 use crate::held_back;
@@ -69,7 +70,7 @@ pub fn run(arguments: &ReleaseArguments, root: Option<&Path>) -> anyhow::Result<
     let scenes = output.join(SCENES);
     write_whole(&scenes, &zip.finish()?.into_inner())
         .with_context(|| format!("cannot write {}", scenes.display()))?;
-    let flag = output.join(report::INSTRUCTOR).join(assemble::RELEASED);
+    let flag = output.join(report::INSTRUCTOR).join(RELEASED);
     write_whole(&flag, format!("{now}\n").as_bytes())
         .with_context(|| format!("cannot write {}", flag.display()))?;
     report.released = true;

@@ -1,5 +1,6 @@
 //! `umbra render`: one image of one scene by one plugin.
 
+mod output;
 mod range;
 
 use std::path::{Path, PathBuf};
@@ -7,18 +8,18 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail, ensure};
-use basecode::exr_io::{MAX_PIXELS, MAX_SIDE, Precision, write_exr};
+use basecode::Camera;
+use basecode::exr_io::{MAX_PIXELS, MAX_SIDE};
 use basecode::scene::SceneConfig;
-use basecode::{Camera, Image, Vec3};
 
+use self::output::{Format, kind_of};
 use super::context::{Context, INTERRUPTED, cores};
 use super::outputs::ensure_not_read;
 use crate::files::library_name;
-use crate::imaging::pictures::clamped;
 use crate::intake::SubmittedConfig;
 use crate::process::Limits;
 use crate::worker::{
-    Adapter, AdapterKind, CameraValue, Fault, Job, Outcome, Request, SceneRef, as_given,
+    Adapter, AdapterKind, CameraValue, Fault, Job, JobReport, Outcome, Request, SceneRef, as_given,
     draw_in_process,
 };
 
@@ -128,51 +129,6 @@ impl FromStr for Size {
     }
 }
 
-/// Below this, a value is more than rounding.
-const NEGATIVE: f32 = -1e-6;
-
-/// What a file's name asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
-    Exr,
-    Png,
-}
-
-impl Format {
-    /// The format of an output file, which must be possible to write.
-    fn of(output: &Path) -> anyhow::Result<Self> {
-        let ending = output.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        let format = match ending.as_str() {
-            "exr" => Self::Exr,
-            "png" => Self::Png,
-            _ => bail!("{}: the name of an image ends in .exr or .png", output.display()),
-        };
-        let folder = output.parent().unwrap_or(Path::new(""));
-        if !folder.as_os_str().is_empty() && !folder.is_dir() {
-            bail!("{}: there is no folder {}", output.display(), folder.display());
-        }
-        try_to_write(output).with_context(|| output.display().to_string())?;
-        Ok(format)
-    }
-}
-
-/// Opens a file to write it, so that no work is lost on one that cannot be; changes none.
-fn try_to_write(output: &Path) -> anyhow::Result<()> {
-    let is_new = output.symlink_metadata().is_err();
-    // To open a pipe is to wait for its reader.
-    ensure!(!output.exists() || output.is_file(), "expected a file, found {}", kind_of(output));
-    std::fs::OpenOptions::new().write(true).create(true).truncate(false).open(output)?;
-    if is_new {
-        std::fs::remove_file(output)?;
-    }
-    Ok(())
-}
-
-/// What lies at a path that is no file.
-fn kind_of(path: &Path) -> &'static str {
-    if path.is_dir() { "a folder" } else { "a pipe or device" }
-}
-
 /// Loads what a scene consists of, so that its mistakes are told in the user's own names, with what
 /// it holds that no picture shows. The film has the size that is asked for. `output` is none of its files.
 fn check_scene(toml: &Path, size: Option<Size>, output: &Path) -> anyhow::Result<SceneConfig> {
@@ -220,8 +176,7 @@ fn check_scene(toml: &Path, size: Option<Size>, output: &Path) -> anyhow::Result
     Ok(config)
 }
 
-/// Renders the image and writes it: float for what is drawn offline, half for realtime as the
-/// course's own files.
+/// Renders the image and writes it.
 pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
     let format = Format::of(&arguments.output)?;
@@ -231,76 +186,10 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
         _ => arguments.scene.clone(),
     };
     let config = check_scene(&scene_file, arguments.size, &arguments.output)?;
-    let plugin = match arguments.plugin.as_str() {
-        "reference" => context.reference().context(
-            "there is no reference renderer here (a student's kit has none); hint: cargo build --release --workspace",
-        )?,
-        path => PathBuf::from(path),
-    };
-    let plugin_as_given = plugin;
-    let plugin = plugin_as_given
-        .canonicalize()
-        .with_context(|| format!("plugin {}", plugin_as_given.display()))?;
-    if !plugin.is_file() {
-        bail!(
-            "plugin {}: it is {}, expected a library such as {}",
-            plugin_as_given.display(),
-            kind_of(&plugin),
-            library_name("plugin")
-        );
-    }
+    let (plugin, plugin_as_given) = plugin(&context, &arguments.plugin)?;
     ensure_not_read(&arguments.output, [plugin.as_path()])?;
-    let (width, height) = (config.width as u32, config.height as u32);
-    let scene = SceneRef {
-        path: scene_file.canonicalize().context("scene")?,
-        options: arguments.options.clone(),
-    };
-    if config.realtime && arguments.spp.is_some() {
-        eprintln!("umbra: warning: --spp has no effect: the scene is drawn in realtime");
-    }
-    let request = if config.realtime {
-        let shadow_map = arguments.shadows.map_or(config.bonus, |Switch(on)| on);
-        let (adapter, cameras) =
-            (arguments.adapter.adapter(), vec![CameraValue::from(config.camera)]);
-        Request::RenderRealtime {
-            scene,
-            width,
-            height,
-            shadow_map,
-            adapter,
-            stages: vec![],
-            cameras,
-        }
-    } else {
-        Request::RenderOffline {
-            scene,
-            width,
-            height,
-            spp: arguments.spp.unwrap_or(config.spp as u32),
-            seed: arguments.seed.or_else(|| own_seed(&arguments.output)).unwrap_or(0),
-            threads: arguments.threads.unwrap_or_else(cores).max(1),
-            shadows: arguments.shadows.is_none_or(|Switch(on)| on),
-        }
-    };
-    let save = |values: &[f32]| -> anyhow::Result<()> {
-        let pixels = values.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v)).collect();
-        let image = Image { width: width as usize, height: height as usize, pixels };
-        for said in looks_broken(&image) {
-            eprintln!("umbra: warning: {}: {said}", arguments.output.display());
-        }
-        let precision = if config.realtime { Precision::Half } else { Precision::Float };
-        match format {
-            Format::Exr => write_exr(&arguments.output, &image, precision, &[])?,
-            Format::Png => {
-                let picture = clamped(&image);
-                let file = arguments.output.display();
-                std::fs::write(&arguments.output, picture.png()?)
-                    .with_context(|| file.to_string())?;
-                eprintln!("umbra: {file}: {}; write an .exr to compare it", picture.caption);
-            }
-        }
-        Ok(())
-    };
+    let request = request(arguments, &scene_file, &config)?;
+    let save = |values: &[f32]| format.save(values, &config, &arguments.output);
     if arguments.in_process {
         ensure!(
             arguments.plugin != "reference",
@@ -309,25 +198,7 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
         save(&draw_in_process(&plugin, &request, &|_, _| ())?)?;
         return Ok(super::EXIT_OK);
     }
-    let job = Job { plugin: Some(plugin), requests: vec![request] };
-    // A manual render has no time limit; Ctrl-C ends it.
-    let limits = Limits {
-        wall_s: 86_400.0,
-        cpu_s: 1 << 20,
-        file_size_mib: 8192,
-        memory_mib: 16_384,
-        ..Limits::default()
-    };
-    let begun = Instant::now();
-    let mut report = context.supervisor.run_job(&job, &limits, &INTERRUPTED, &mut |progress| {
-        let (done, rows) = progress.rows;
-        // A quick render needs no line in a log.
-        if begun.elapsed() < Duration::from_secs(3) {
-            return;
-        }
-        context.say(&format!("rendering: {done} of {rows} rows"));
-    });
-    context.progress.end();
+    let mut report = draw(&context, &Job { plugin: Some(plugin), requests: vec![request] });
     if INTERRUPTED.load(std::sync::atomic::Ordering::Relaxed) {
         return Ok(super::EXIT_INTERRUPTED);
     }
@@ -361,24 +232,87 @@ pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u
     }
 }
 
-/// What a viewer may not show of an image that no right renderer draws.
-fn looks_broken(image: &Image) -> Vec<String> {
-    type Trouble = (&'static str, fn(&Vec3) -> bool);
-    let mut said = Vec::new();
-    let kinds: [Trouble; 2] =
-        [("not finite", |p| !p.is_finite()), ("negative", |p| p.min_element() < NEGATIVE)];
-    for (what, is_it) in kinds {
-        let count = image.pixels.iter().filter(|p| is_it(p)).count();
-        if let Some(first) = image.pixels.iter().position(is_it) {
-            let (x, y) = (first % image.width, first / image.width);
-            let pixels = if count == 1 { "pixel is" } else { "pixels are" };
-            said.push(format!("{count} {pixels} {what}; first at ({x}, {y})"));
+/// The library of the renderer, and the path that it is named by.
+fn plugin(context: &Context, named: &str) -> anyhow::Result<(PathBuf, PathBuf)> {
+    let as_given = match named {
+        "reference" => context.reference().context(
+            "there is no reference renderer here (a student's kit has none); hint: cargo build --release --workspace",
+        )?,
+        path => PathBuf::from(path),
+    };
+    let plugin =
+        as_given.canonicalize().with_context(|| format!("plugin {}", as_given.display()))?;
+    if !plugin.is_file() {
+        bail!(
+            "plugin {}: it is {}, expected a library such as {}",
+            as_given.display(),
+            kind_of(&plugin),
+            library_name("plugin")
+        );
+    }
+    Ok((plugin, as_given))
+}
+
+/// What the renderer is asked for.
+fn request(
+    arguments: &RenderArguments,
+    scene_file: &Path,
+    config: &SceneConfig,
+) -> anyhow::Result<Request> {
+    let (width, height) = (config.width as u32, config.height as u32);
+    let scene = SceneRef {
+        path: scene_file.canonicalize().context("scene")?,
+        options: arguments.options.clone(),
+    };
+    if config.realtime && arguments.spp.is_some() {
+        eprintln!("umbra: warning: --spp has no effect: the scene is drawn in realtime");
+    }
+    Ok(if config.realtime {
+        let shadow_map = arguments.shadows.map_or(config.bonus, |Switch(on)| on);
+        let (adapter, cameras) =
+            (arguments.adapter.adapter(), vec![CameraValue::from(config.camera)]);
+        Request::RenderRealtime {
+            scene,
+            width,
+            height,
+            shadow_map,
+            adapter,
+            stages: vec![],
+            cameras,
         }
-    }
-    if image.pixels.iter().all(|p| *p == Vec3::ZERO) {
-        said.push("the image is black all over".to_owned());
-    }
-    said
+    } else {
+        Request::RenderOffline {
+            scene,
+            width,
+            height,
+            spp: arguments.spp.unwrap_or(config.spp as u32),
+            seed: arguments.seed.or_else(|| own_seed(&arguments.output)).unwrap_or(0),
+            threads: arguments.threads.unwrap_or_else(cores).max(1),
+            shadows: arguments.shadows.is_none_or(|Switch(on)| on),
+        }
+    })
+}
+
+/// Has a worker draw the image, without a time limit: Ctrl-C ends it.
+fn draw(context: &Context, job: &Job) -> JobReport {
+    let limits = Limits {
+        wall_s: 86_400.0,
+        cpu_s: 1 << 20,
+        file_size_mib: 8192,
+        memory_mib: 16_384,
+        ..Limits::default()
+    };
+    let begun = Instant::now();
+    let report = context.supervisor.run_job(job, &limits, &INTERRUPTED, &mut |progress| {
+        let (done, rows) = progress.rows;
+        // A quick render needs no line in a log.
+        if begun.elapsed() < Duration::from_secs(3) {
+            return;
+        }
+        context.say(&format!("rendering: {done} of {rows} rows"));
+    });
+    context.progress.end();
+    report
 }
 
 /// The student number of the submission that a file lies in, at its root or one folder deeper.
@@ -393,30 +327,6 @@ fn own_seed(file: &Path) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn an_image_that_no_viewer_shows_is_warned_of() {
-        let said = |pixels: [[f32; 3]; 4]| {
-            let pixels = pixels.map(Vec3::from).to_vec();
-            looks_broken(&Image { width: 2, height: 2, pixels }).join("; ")
-        };
-        let (grey, black) = ([0.5; 3], [0.0; 3]);
-        assert_eq!(said([grey, black, black, black]), "");
-        assert_eq!(said([[-1e-7; 3], grey, grey, grey]), "");
-        assert_eq!(said([black; 4]), "the image is black all over");
-        let (nan, negative) = ([f32::NAN, 0.5, 0.5], [-0.5, 0.5, 0.5]);
-        assert_eq!(said([grey, black, nan, grey]), "1 pixel is not finite; first at (0, 1)");
-        let infinite = [f32::INFINITY; 3];
-        assert_eq!(said([infinite; 4]), "4 pixels are not finite; first at (0, 0)");
-        assert_eq!(
-            said([grey, negative, grey, negative]),
-            "2 pixels are negative; first at (1, 0)"
-        );
-        assert_eq!(
-            said([grey, negative, grey, nan]),
-            "1 pixel is not finite; first at (1, 1); 1 pixel is negative; first at (1, 0)"
-        );
-    }
 
     #[test]
     fn a_size_says_which_limit_it_breaks() {

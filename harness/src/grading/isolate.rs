@@ -22,8 +22,8 @@ use crate::evidence::varyings::vertex_for;
 use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::evidence::{images, pixels};
-use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::{Region, RegionMask};
+use crate::imaging::tolerances::Tolerances;
 use crate::worker::{Outcome, STAGES, Stage};
 
 /// The checks of the three stages, and the tasks that they belong to.

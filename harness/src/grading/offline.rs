@@ -17,7 +17,7 @@ use crate::evidence::rays::{self, OwnValue};
 use crate::evidence::shading::{ShadedPoint, Shading};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::expected::{Expected, SurfacePoint};
-use crate::imaging::evidence::Tolerances;
+use crate::imaging::tolerances::Tolerances;
 use crate::plugin::Witness;
 use crate::worker::{BsdfQuery, BsdfSource, Outcome, RayQuery, Request, SceneRef};
 

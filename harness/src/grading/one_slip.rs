@@ -17,7 +17,7 @@ use crate::evidence::pixels::{self, LeftBySlip};
 use crate::evidence::price::{Class, Price};
 use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
-use crate::imaging::evidence::Tolerances;
+use crate::imaging::tolerances::Tolerances;
 use crate::worker::Stage;
 
 /// Pass and stages, each alone.

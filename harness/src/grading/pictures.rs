@@ -12,8 +12,8 @@ use super::submitted::SubmittedImage;
 use crate::evidence::images::{Kind, compare_pixels, reference_of};
 use crate::evidence::{Check, CheckId, Picture, Verdict};
 use crate::imaging::error_map::ErrorMap;
-use crate::imaging::evidence::Tolerances;
 use crate::imaging::pictures::{self, full_scale, signed_error, tone_mapped};
+use crate::imaging::tolerances::Tolerances;
 use crate::viewer::{
     ImageFile, Layer, LayerKind, ViewedCase, remove_others, write_excess, write_image, write_mask,
     write_shared,

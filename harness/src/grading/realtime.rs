@@ -20,8 +20,8 @@ use crate::evidence::shadow_map::{EXCHANGED, Shadows};
 use crate::evidence::stages::VERTEX;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::expected::Expected;
-use crate::imaging::evidence::Tolerances;
 use crate::imaging::reference::{Region, RegionMask};
+use crate::imaging::tolerances::Tolerances;
 use crate::worker::{Fault, Outcome, STAGES, Stage};
 
 type View = (CheckId, &'static dyn Fn(&Region) -> bool);

@@ -15,9 +15,9 @@ use crate::evidence::submitted::{
     has_own_noise, judge_copied, judge_noise, judge_scene, judge_seed,
 };
 use crate::evidence::{Check, CheckId, Verdict};
-use crate::imaging::evidence::Tolerances;
 use crate::imaging::noise::NoisyPixels;
 use crate::imaging::reference::Region;
+use crate::imaging::tolerances::Tolerances;
 use crate::intake::{Finding, TreeSpec};
 use crate::worker::Request;
 

@@ -108,34 +108,14 @@ pub(super) fn match_tree(submission: &Submission, tree: &TreeSpec) -> Result<Mat
             Lost::None => {}
         }
     }
-    let moved = matched.lines.iter().filter(|line| line.mark == Mark::WrongPlace);
-    let source = MovedSource::of(
-        moved.filter_map(|line| Some((line.expected.as_deref()?, line.found.as_deref()?))),
-        tree,
-    );
-    let places: BTreeMap<&str, String> = files
-        .iter()
-        .map(|file| file.path.as_str())
-        .filter(|path| !taken.contains(path))
-        .filter_map(|path| Some((path, source_place(path, source.as_ref(), tree)?)))
-        .filter(|(path, place)| path != place)
-        .collect();
+    let places = matched.places_of_sources(files, &taken, tree);
     for folder in &tree.open_folders {
-        let inside = |path: &str| tree.open_folder_of(path) == Some(folder);
+        let inside = |path: &&str| tree.open_folder_of(path) == Some(folder);
         let free = |path: &&str| !taken.contains(path) && !places.contains_key(path);
-        let further: Vec<&str> = files
-            .iter()
-            .map(|file| file.path.as_str())
-            .filter(|path| inside(path))
-            .filter(free)
-            .collect();
+        let further: Vec<&str> =
+            files.iter().map(|file| file.path.as_str()).filter(inside).filter(free).collect();
         if !further.is_empty() {
-            matched.lines.push(TreeLine {
-                expected: Some(format!("{folder}/")),
-                found: Some(format!("{folder}/")),
-                mark: Mark::Ok,
-                advice: count(further.len(), "further file"),
-            });
+            matched.further_files(folder, further.len());
         }
         taken.extend(further);
     }
@@ -302,6 +282,36 @@ impl Matched {
             found: Some(found.to_owned()),
             mark: Mark::Unexpected,
             advice: hint.to_owned(),
+        });
+    }
+
+    /// The sources outside of their place that belong to a folder of the tree, with their places there.
+    fn places_of_sources<'a>(
+        &self,
+        files: &'a [SubmittedFile],
+        taken: &BTreeSet<&str>,
+        tree: &TreeSpec,
+    ) -> BTreeMap<&'a str, String> {
+        let moved = self.lines.iter().filter(|line| line.mark == Mark::WrongPlace);
+        let source = MovedSource::of(
+            moved.filter_map(|line| Some((line.expected.as_deref()?, line.found.as_deref()?))),
+            tree,
+        );
+        files
+            .iter()
+            .map(|file| file.path.as_str())
+            .filter(|path| !taken.contains(path))
+            .filter_map(|path| Some((path, source_place(path, source.as_ref(), tree)?)))
+            .filter(|(path, place)| path != place)
+            .collect()
+    }
+
+    fn further_files(&mut self, folder: &str, number: usize) {
+        self.lines.push(TreeLine {
+            expected: Some(format!("{folder}/")),
+            found: Some(format!("{folder}/")),
+            mark: Mark::Ok,
+            advice: count(number, "further file"),
         });
     }
 }

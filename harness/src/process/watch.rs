@@ -98,24 +98,11 @@ pub fn run(
     }
     let (status, usage) = group.end()?;
     let wall_s = begin.elapsed().as_secs_f64();
-    let drained = Instant::now() + DRAIN;
-    while pipes.iter().any(Pipe::is_open) && Instant::now() < drained {
-        wait_readable(&pipes, drained.saturating_duration_since(Instant::now()));
-        pipes.iter_mut().for_each(|pipe| {
-            pipe.read();
-        });
-    }
+    drain(&mut pipes);
     let left_process = pipes.iter().any(Pipe::is_open);
     let cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
     let out_of_cpu = cpu_s >= confinement.limits.cpu_s as f64;
-    let exit = match (ended_by_us, libc::WIFSIGNALED(status).then(|| libc::WTERMSIG(status))) {
-        (Some(exit), _) => exit,
-        (None, Some(libc::SIGXCPU)) => Exit::OutOfCpu,
-        (None, Some(libc::SIGXFSZ)) => Exit::FileTooLarge,
-        (None, Some(libc::SIGKILL)) if out_of_cpu => Exit::OutOfCpu,
-        (None, Some(signal)) => Exit::Signal(signal),
-        (None, None) => Exit::Code(libc::WEXITSTATUS(status)),
-    };
+    let exit = ended_by_us.unwrap_or_else(|| exit_of(status, out_of_cpu));
     let in_force = match confinement.sandbox.as_ref().map(in_force) {
         // It was not confined, and nothing foreign ran: only the machine can be at fault.
         Some(Err(error)) if ended_by_us.is_none() => return Err(io::Error::other(error)),
@@ -141,6 +128,28 @@ pub fn run(
         in_force,
         left_process,
     })
+}
+
+/// How a child ended by itself, from its status.
+fn exit_of(status: i32, out_of_cpu: bool) -> Exit {
+    match libc::WIFSIGNALED(status).then(|| libc::WTERMSIG(status)) {
+        Some(libc::SIGXCPU) => Exit::OutOfCpu,
+        Some(libc::SIGXFSZ) => Exit::FileTooLarge,
+        Some(libc::SIGKILL) if out_of_cpu => Exit::OutOfCpu,
+        Some(signal) => Exit::Signal(signal),
+        None => Exit::Code(libc::WEXITSTATUS(status)),
+    }
+}
+
+/// Reads what is left in the pipes of a child that is gone.
+fn drain(pipes: &mut [Pipe]) {
+    let drained = Instant::now() + DRAIN;
+    while pipes.iter().any(Pipe::is_open) && Instant::now() < drained {
+        wait_readable(pipes, drained.saturating_duration_since(Instant::now()));
+        pipes.iter_mut().for_each(|pipe| {
+            pipe.read();
+        });
+    }
 }
 
 /// What was in force, if it was what had been asked for.

@@ -20,10 +20,11 @@ use nix::sys::stat::Mode;
 use nix::unistd::mkfifo;
 use tempfile::TempDir;
 
+use super::files::Files;
 use super::job::{CameraValue, Job, Request};
 use super::outcome::{Late, Outcome};
 use super::retry_budget::Allowed;
-use super::supervise::{Files, Ready, Supervisor, death, not_started};
+use super::supervise::{Ready, Supervisor, death, not_started};
 use super::table::SlotState;
 use super::wire::{Folder, camera_bytes};
 use crate::process::{self, ChildOutcome, Exit, Limits};

@@ -9,6 +9,7 @@
 
 mod child;
 mod command;
+mod files;
 mod job;
 #[cfg_attr(not(unix), path = "live_fallback.rs")]
 mod live;

@@ -1,7 +1,7 @@
 //! The parent's side: prepares a worker's files, runs it, and judges what it left.
 
-use std::fs::{self, File};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::fs;
+use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,13 +13,13 @@ use renderer_api as api;
 use tempfile::TempDir;
 
 use super::command::{Program, command, program_beside, software_driver};
+use super::files::Files;
 use super::job::{Job, Request};
-use super::outcome::{Answer, Fault, JobReport, Late, Outcome, WitnessUse, WorkerRun};
+use super::outcome::{Fault, JobReport, Late, Outcome, WorkerRun};
 use super::policy::WorkerPolicy;
 use super::retry_budget::{Allowed, CANNOT_RUN, RetryBudget};
-use super::table::{SLOT_BYTES, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE, SlotState};
-use super::wire::{Folder, Place, WireJob, WireRequest, take_input};
-use crate::plugin::Witness;
+use super::table::SlotState;
+use super::wire::Folder;
 use crate::process::{self, ChildOutcome, Confinement, Exit, Limits, signal_name};
 use crate::sandbox::{self, Bind, Layers};
 
@@ -198,28 +198,8 @@ impl Supervisor {
                 continue;
             }
             if let Some(allowed) = retries.again(job, first, limits) {
-                let alone = self.machine.write().unwrap_or_else(PoisonError::into_inner);
-                let run = self.run_worker(job, &[first], &allowed, cancel, &mut |_, _| ());
-                drop(alone);
-                outcomes[first] = match run {
-                    Ok(run) => {
-                        retries.spent(job, &run.ended);
-                        let late = run.ended.exit.is_out_of_time();
-                        report.runs.push(WorkerRun { requests: vec![first], ended: run.ended });
-                        let outcome = run.outcomes.into_iter().next().flatten();
-                        match (late, outcome) {
-                            (true, _) if used_up() => None,
-                            (true, Some(Outcome::TimedOut(late))) => {
-                                Some(retries.timed_out(job, first, Some(late), true))
-                            }
-                            (true, None | Some(Outcome::NotRun { .. })) => {
-                                Some(retries.timed_out(job, first, None, true))
-                            }
-                            (_, outcome) => outcome,
-                        }
-                    }
-                    Err(error) => Some(cannot_run(&error)),
-                };
+                outcomes[first] =
+                    self.run_again_alone(job, first, &allowed, retries, cancel, &mut report.runs);
             } else if let Some(was) = was {
                 let late = match was {
                     Outcome::TimedOut(late) => Some(late),
@@ -230,6 +210,38 @@ impl Supervisor {
         }
         report.outcomes = outcomes.into_iter().flatten().collect();
         report
+    }
+
+    /// Runs one late request again, alone on the machine. Returns nothing when no time is left to settle it.
+    fn run_again_alone(
+        &self,
+        job: &Job,
+        index: usize,
+        allowed: &Allowed,
+        retries: &RetryBudget,
+        cancel: &AtomicBool,
+        runs: &mut Vec<WorkerRun>,
+    ) -> Option<Outcome> {
+        let alone = self.machine.write().unwrap_or_else(PoisonError::into_inner);
+        let run = self.run_worker(job, &[index], allowed, cancel, &mut |_, _| ());
+        drop(alone);
+        let run = match run {
+            Ok(run) => run,
+            Err(error) => return Some(cannot_run(&error)),
+        };
+        retries.spent(job, &run.ended);
+        let is_late = run.ended.exit.is_out_of_time();
+        runs.push(WorkerRun { requests: vec![index], ended: run.ended });
+        let outcome = run.outcomes.into_iter().next().flatten();
+        if !is_late {
+            return outcome;
+        }
+        match outcome {
+            _ if job.plugin.is_some() && retries.used_up().is_some() => None,
+            Some(Outcome::TimedOut(late)) => Some(retries.timed_out(job, index, Some(late), true)),
+            None | Some(Outcome::NotRun { .. }) => Some(retries.timed_out(job, index, None, true)),
+            outcome => outcome,
+        }
     }
 
     /// A folder for one worker's files.
@@ -352,132 +364,6 @@ pub(super) struct Ready {
     pub confinement: Confinement,
     /// To be held until it has started.
     pub _program: Program,
-}
-
-/// The files of a worker, as the parent holds them: opened before it began, read only by plain
-/// reads. (A mapping could be pulled away from under us by whoever truncates the file.)
-pub(super) struct Files {
-    table: File,
-    output: File,
-    places: Vec<Place>,
-}
-
-impl Files {
-    fn prepare(
-        dir: &Path,
-        own: &WorkerPolicy,
-        requests: &[&Request],
-        live: bool,
-    ) -> io::Result<Self> {
-        let folder = Folder(dir);
-        let new = |path| File::options().create_new(true).read(true).write(true).open(path);
-        let (mut input, mut output) = (new(folder.input())?, new(folder.output())?);
-        let (mut input_end, mut output_end) = (0, 0);
-        let mut wired = Vec::new();
-        for (request, scene) in requests.iter().zip(&own.scenes) {
-            let (mut rest, words) = take_input(request);
-            rest.scene_mut().path.clone_from(scene);
-            let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_ne_bytes()).collect();
-            input.write_all(&bytes)?;
-            let place = Place::new(output_end, request.answer_floats());
-            output.write_all(&f32::NAN.to_ne_bytes().repeat(place.size / 4))?;
-            wired.push(WireRequest {
-                request: rest,
-                input: (input_end, bytes.len()),
-                output: place,
-            });
-            input_end += bytes.len();
-            output_end += place.size;
-        }
-        let mut table = new(folder.table())?;
-        table.write_all(&vec![0; SLOT_BYTES * (1 + requests.len())])?;
-        let places = wired.iter().map(|request| request.output).collect();
-        let wired = WireJob { plugin: own.plugin.clone(), requests: wired, live };
-        fs::write(folder.job(), serde_json::to_vec(&wired)?)?;
-        // As root, the worker is another user; the folder above lets nobody else in.
-        #[cfg(unix)]
-        for path in [folder.job(), folder.input()] {
-            use std::os::unix::fs::PermissionsExt;
-            fs::set_permissions(path, fs::Permissions::from_mode(0o644))?;
-        }
-        Ok(Self { table, output, places })
-    }
-
-    /// All records; what is missing at the end of the file was not started.
-    pub fn records(&mut self) -> io::Result<Vec<SlotState>> {
-        let size = SLOT_BYTES * (1 + self.places.len());
-        let mut bytes = read_at(&mut self.table, 0, size)?;
-        bytes.resize(size, 0);
-        let (records, _) = bytes.as_chunks::<SLOT_BYTES>();
-        Ok(records.iter().map(SlotState::parse).collect())
-    }
-
-    pub fn outcome(
-        &mut self,
-        index: usize,
-        request: &Request,
-        noted: &SlotState,
-    ) -> io::Result<Outcome> {
-        let SlotState::Answered { status, message, seconds, calls, worst_norm_error, footprint } =
-            noted
-        else {
-            return Err(io::Error::other("only an answer becomes an outcome"));
-        };
-        let message = message.clone();
-        Ok(match *status {
-            api::STATUS_OK => {
-                let place = self.places[index];
-                let bytes = read_at(&mut self.output, place.start as u64, place.size)?;
-                let Some(values) = values(&bytes, place) else {
-                    let message = "the plugin wrote before the start of its output buffer, or cut \
-                                   the file short";
-                    return Ok(Outcome::Rejected(message.to_owned()));
-                };
-                let witnessed = match request {
-                    Request::Radiance { witness, .. } => *witness != Witness::True,
-                    _ => false,
-                };
-                let witness = witnessed.then_some(WitnessUse {
-                    calls: *calls,
-                    worst_norm_error: worst_norm_error.is_finite().then_some(*worst_norm_error),
-                });
-                let (footprint, seconds) = (*footprint, *seconds);
-                Outcome::Done(Answer { values, witness, footprint, seconds, adapter: message })
-            }
-            api::STATUS_ERROR => Outcome::Failed(message),
-            api::STATUS_NOT_IMPLEMENTED => Outcome::NotImplemented(message),
-            api::STATUS_PANICKED => Outcome::Panicked(message),
-            api::STATUS_CANCELLED => Outcome::Failed(format!(
-                "the plugin says it was asked to stop, but it was not: {message}"
-            )),
-            api::STATUS_NO_ADAPTER => Outcome::NoAdapter(message),
-            STATUS_REJECTED => Outcome::Rejected(message),
-            STATUS_STAGE => Outcome::StageRefused(message),
-            STATUS_OURS => Outcome::NotRun { reason: message, fault: Fault::Internal },
-            unknown => Outcome::Failed(format!("unknown status {unknown}: {message}")),
-        })
-    }
-}
-
-/// Reads up to `size` bytes, fewer where the file ends.
-fn read_at(file: &mut File, start: u64, size: usize) -> io::Result<Vec<u8>> {
-    file.seek(SeekFrom::Start(start))?;
-    let mut bytes = Vec::with_capacity(size);
-    file.take(size as u64).read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
-
-/// The floats of a region; none when its size or its filler is not as the parent left it.
-fn values(region: &[u8], place: Place) -> Option<Vec<f32>> {
-    if region.len() != place.size {
-        return None;
-    }
-    let (filler, answer) = region.split_at(place.offset());
-    let (filler, _) = filler.as_chunks::<4>();
-    if filler.iter().any(|bytes| *bytes != f32::NAN.to_ne_bytes()) {
-        return None;
-    }
-    Some(answer.as_chunks::<4>().0.iter().map(|bytes| f32::from_ne_bytes(*bytes)).collect())
 }
 
 /// Number of answers, and the rows of the request that is being worked at.

@@ -1,13 +1,16 @@
 //! The TOML file of a scene.
 
+mod written;
+
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use toml::de::DeTable;
 
+use self::written::{SLASH, Written, key_at, line_at, misread, plain_lines};
 use super::mesh::MeshFile;
 use super::named_file::{file_of, is_elsewhere, taken_beside, why_missing};
-use super::text::{decode, read};
+use super::text::read;
 use crate::exr_io::{MAX_PIXELS, MAX_SIDE};
 use crate::{Camera, CameraConfig, Error, Result, ShadingKind};
 
@@ -81,20 +84,6 @@ impl Default for RendererSection {
     }
 }
 
-const KNOWN_KEYS: &[&str] = &[
-    "input.objfile",
-    "camera.eye",
-    "camera.at",
-    "camera.up",
-    "camera.fov",
-    "film.width",
-    "film.height",
-    "renderer.realtime",
-    "renderer.type",
-    "renderer.spp",
-    "renderer.bonus",
-];
-
 impl SceneConfig {
     /// Loads the scene's mesh.
     ///
@@ -137,122 +126,18 @@ impl SceneConfig {
     /// As [`SceneConfig::load`].
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
         let text = &plain_lines(bytes);
-        let wrong = |line, message: String| Error::File { path: path.to_owned(), line, message };
-        let misread = |error: toml::de::Error| {
-            let line = error.span().map(|span| line_at(text, span.start));
-            // The parser names Rust's types.
-            let mut message = error.message().to_owned();
-            for (own, plain) in [
-                ("expected i64", "expected a whole number"),
-                ("expected f32", "expected a number"),
-                ("expected a sequence of 3 f32 values", "expected 3 numbers: [x, y, z]"),
-                (" as i128", ""),
-                (" as u128", ""),
-            ] {
-                message = message.replace(own, plain);
-            }
-            if message.starts_with("invalid type: integer") && message.ends_with("number") {
-                message = message.replace("invalid type: integer", "out of range: integer");
-            }
-            let statement =
-                line.and_then(|line: usize| text.lines().nth(line - 1)).unwrap_or_default();
-            match statement.split_once('=') {
-                Some((key, value)) => {
-                    if !message.contains(&format!("`{}`", key.trim())) {
-                        message = format!("{}: {message}", key.trim());
-                    }
-                    message += slip(value);
-                }
-                // A value of several lines goes on here.
-                None if statement.contains(',') => message += slip(statement),
-                None => {}
-            }
-            if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("toml")) {
-                message = format!("expected a scene's TOML file: {message}");
-            }
-            wrong(line, message)
-        };
-        let table = DeTable::parse(text).map_err(misread)?.into_inner();
-        for (name, value) in &table {
-            let name = name.get_ref();
-            let is_section =
-                KNOWN_KEYS.iter().any(|key| key.split('.').next() == Some(name.as_ref()));
-            if is_section && !value.get_ref().is_table() {
-                let line = Some(line_at(text, value.span().start));
-                let found = value.get_ref().type_str();
-                return Err(wrong(
-                    line,
-                    format!("{name} is of type {found}, expected a section [{name}]"),
-                ));
-            }
-        }
-        let file: File = toml::from_str(text).map_err(misread)?;
-        let line_of_key =
-            |section: &str, key: &str| key_at(&table, section, key).map(|at| line_at(text, at));
-        let in_range = |section: &str, key: &str, value: i64, max: i64| {
-            usize::try_from(value).ok().filter(|_| (1..=max).contains(&value)).ok_or_else(|| {
-                let line = line_of_key(section, key);
-                wrong(line, format!("{section}.{key} is {value} but must lie between 1 and {max}"))
-            })
-        };
-        let camera = file.camera;
-        for (key, value) in [("eye", camera.eye), ("at", camera.at), ("up", camera.up)] {
-            if !value.is_finite() {
-                let line = line_of_key("camera", key);
-                return Err(wrong(line, format!("camera.{key} is {value} but must be finite")));
-            }
-        }
-        let fov = camera.fov_y_deg;
-        if !(fov > 0.0 && fov < 180.0) {
-            let line = line_of_key("camera", "fov");
-            let message = format!("camera.fov is {fov} but must lie between 0 and 180 degrees");
-            return Err(wrong(line, message));
-        }
-        // Serde takes the first three of four.
-        let numbers = |key| {
-            let value = table.get("camera")?.get_ref().get(key)?;
-            Some(value.get_ref().as_array()?.len())
-        };
-        for key in ["eye", "at", "up"] {
-            if let Some(count) = numbers(key).filter(|count| *count != 3) {
-                let line = line_of_key("camera", key);
-                let message = format!("camera.{key} has {count} numbers, expected 3: [x, y, z]");
-                return Err(wrong(line, message));
-            }
-        }
-        if let Err(error) = Camera::new(camera, 1, 1) {
-            let line = ["eye", "at", "up"].iter().find_map(|key| line_of_key("camera", key));
-            return Err(wrong(line, error.to_string()));
-        }
-        let renderer = file.renderer;
-        // Written on Windows, perhaps.
-        let name = file.input.objfile.trim().replace('\\', "/");
-        let wrong_mesh = |message| wrong(line_of_key("input", "objfile"), message);
-        if name.is_empty() {
-            return Err(wrong_mesh("input.objfile names no file".to_owned()));
-        }
-        if name.contains(|c: char| c.is_ascii_control()) {
-            let message =
-                "input.objfile holds a control character, which a \\ and a letter stand for";
-            return Err(wrong_mesh(format!("{message}{SLASH}")));
-        }
-        // A worker sees the files under other names; so does whoever moves the folder.
-        let on_drive = matches!(name.as_bytes(), [b'a'..=b'z' | b'A'..=b'Z', b':', ..]);
-        if on_drive || name.starts_with('/') || Path::new(&name).is_absolute() {
-            let message =
-                format!("input.objfile is {name} but must be relative to the folder of this file");
-            return Err(wrong_mesh(message));
-        }
+        let written = Written::read(path, text)?;
+        let file: File = toml::from_str(text).map_err(|error| misread(path, text, &error))?;
+        let camera = camera(file.camera, &written)?;
+        let name = mesh_name(&file.input.objfile, &written)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let mesh = file_of(folder, &[file.input.objfile.trim()]);
-        let unknown = unknown_keys(&table).into_iter().map(|(name, at)| {
-            format!("{}:{}: unknown key {name}", path.display(), line_at(text, at))
-        });
-        let mut remarks: Vec<String> = unknown.collect();
+        let mut remarks = written.unknown_keys();
         if is_elsewhere(folder, &name) && mesh.is_file() {
-            let line = line_of_key("input", "objfile").unwrap_or_default();
+            let line = written.line_of_key("input", "objfile").unwrap_or_default();
             remarks.push(taken_beside(path, line, &name, &mesh));
         }
+        let renderer = file.renderer;
         let kind = match renderer.kind.as_deref() {
             None | Some("simple" | "direct") => ShadingKind::Simple,
             Some("normal") => ShadingKind::Normal,
@@ -260,16 +145,15 @@ impl SceneConfig {
                 let message = format!(
                     "renderer.type is \"{other}\" but must be \"simple\", \"direct\" or \"normal\""
                 );
-                return Err(wrong(line_of_key("renderer", "type"), message));
+                return Err(written.wrong("renderer", "type", message));
             }
         };
-        let width = in_range("film", "width", file.film.width, MAX_SIDE as i64)?;
-        let height = in_range("film", "height", file.film.height, MAX_SIDE as i64)?;
+        let width = written.in_range("film", "width", file.film.width, MAX_SIDE as i64)?;
+        let height = written.in_range("film", "height", file.film.height, MAX_SIDE as i64)?;
         if width * height > MAX_PIXELS {
-            let line = line_of_key("film", "width");
             let message =
                 format!("film has {} pixels but must have at most {MAX_PIXELS}", width * height);
-            return Err(wrong(line, message));
+            return Err(written.wrong("film", "width", message));
         }
         Ok(Self {
             path: path.to_owned(),
@@ -279,254 +163,62 @@ impl SceneConfig {
             height,
             realtime: renderer.realtime,
             kind,
-            spp: in_range("renderer", "spp", renderer.spp, 1 << 20)?,
+            spp: written.in_range("renderer", "spp", renderer.spp, 1 << 20)?,
             bonus: renderer.bonus,
             remarks,
         })
     }
 }
 
-const SLASH: &str = "; hint: write / in a path";
-const POINT: &str = "; hint: write a point in square brackets: [x, y, z]";
-
-/// The hint on a value that was written as other languages, a calculator or a word processor have it.
-fn slip(value: &str) -> &'static str {
-    let value = value.split('#').next().unwrap_or_default().trim();
-    if value.contains(['\u{201c}', '\u{201d}', '\u{201e}', '\u{2018}', '\u{2019}']) {
-        return "; hint: write straight quotes: \"";
-    }
-    if value.contains(['"', '\'']) {
-        return if value.contains('"') && value.contains('\\') { SLASH } else { "" };
-    }
-    if value.contains("//") {
-        return "; hint: a comment begins with #";
-    }
-    if value.ends_with(';') {
-        return "; hint: a line ends without ;";
-    }
-    if value.contains(['\u{2212}', '\u{2010}', '\u{2011}', '\u{2013}', '\u{2014}']) {
-        return "; hint: write a minus sign as -";
-    }
-    match value.to_ascii_lowercase().as_str() {
-        "true" | "on" | "yes" => return "; hint: write true",
-        "false" | "off" | "no" => return "; hint: write false",
-        _ => {}
-    }
-    if value.contains(['(', '<']) || value.contains('{') && !value.contains('=') {
-        return POINT;
-    }
-    let words = || value.split([',', '[', ']', ' ', '\t']).filter(|word| !word.is_empty());
-    let is_number = |word: &str| {
-        word.trim_start_matches(['+', '-', '.']).starts_with(|c: char| c.is_ascii_digit())
-    };
-    // `50.0 deg`
-    let has_unit = words().next().is_some_and(is_number)
-        && words().skip(1).all(|word| word.chars().all(char::is_alphabetic));
-    if has_unit && words().count() > 1 {
-        return "; hint: write a number without letters or signs behind it";
-    }
-    if !words().all(is_number) {
-        return "";
-    }
-    if words().any(|word| word.ends_with(|c: char| !c.is_ascii_digit() && c != '.')) {
-        return "; hint: write a number without letters or signs behind it";
-    }
-    let has_bare_point = |word: &str| word.trim_start_matches(['+', '-']).starts_with('.');
-    if words().any(|word| has_bare_point(word) || word.ends_with('.')) {
-        return "; hint: write digits on both sides of a point, as in 0.5";
-    }
-    match (words().count(), value.matches(',').count(), value.contains('[')) {
-        (3.., commas, true) if commas < 2 => "; hint: write commas between numbers: [x, y, z]",
-        (3.., _, false) => POINT,
-        (2, 1, false) => "; hint: write a point in a number, as in 50.0",
-        _ => "",
-    }
-}
-
-/// A text whose lines end with LF: TOML knows none that ends with CR alone.
-fn plain_lines(bytes: &[u8]) -> String {
-    let text = decode(bytes).replace("\r\n", "\n").replace('\r', "\n");
-    // Joined files hold a byte order mark inside.
-    text.replace("\n\u{feff}", "\n")
-}
-
-/// Keys that nobody knows, as `section.key`, and the byte that each stands at.
-fn unknown_keys(table: &DeTable) -> Vec<(String, usize)> {
-    let mut unknown = Vec::new();
-    for (section, value) in table {
-        let name = section.get_ref();
-        match value.get_ref().as_table() {
-            Some(keys) => unknown.extend(
-                keys.keys()
-                    .map(|key| (format!("{name}.{}", key.get_ref()), key.span().start))
-                    .filter(|(key, _)| !KNOWN_KEYS.contains(&key.as_str())),
-            ),
-            None => unknown.push((name.to_string(), section.span().start)),
+/// The camera, if one can look so.
+fn camera(camera: CameraConfig, written: &Written) -> Result<CameraConfig> {
+    for (key, value) in [("eye", camera.eye), ("at", camera.at), ("up", camera.up)] {
+        if !value.is_finite() {
+            let message = format!("camera.{key} is {value} but must be finite");
+            return Err(written.wrong("camera", key, message));
         }
     }
-    unknown
+    let fov = camera.fov_y_deg;
+    if !(fov > 0.0 && fov < 180.0) {
+        let message = format!("camera.fov is {fov} but must lie between 0 and 180 degrees");
+        return Err(written.wrong("camera", "fov", message));
+    }
+    // Serde takes the first three of four.
+    for key in ["eye", "at", "up"] {
+        if let Some(count) = written.numbers("camera", key).filter(|count| *count != 3) {
+            let message = format!("camera.{key} has {count} numbers, expected 3: [x, y, z]");
+            return Err(written.wrong("camera", key, message));
+        }
+    }
+    if let Err(error) = Camera::new(camera, 1, 1) {
+        let keys = ["eye", "at", "up"];
+        let key = keys.into_iter().find(|key| written.line_of_key("camera", key).is_some());
+        return Err(written.wrong("camera", key.unwrap_or_default(), error.to_string()));
+    }
+    Ok(camera)
 }
 
-/// The line (from 1) that holds byte `offset`.
-pub(super) fn line_at(text: &str, offset: usize) -> usize {
-    1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
-}
-
-/// The byte where `key` of `section` stands, however it is written.
-fn key_at(table: &DeTable, section: &str, key: &str) -> Option<usize> {
-    let keys = table.get(section)?.get_ref().as_table()?;
-    keys.keys().find(|own| own.get_ref() == key).map(|own| own.span().start)
+/// The mesh as it is named, with `/` between folders.
+fn mesh_name(objfile: &str, written: &Written) -> Result<String> {
+    let wrong = |message| Err(written.wrong("input", "objfile", message));
+    // Written on Windows, perhaps.
+    let name = objfile.trim().replace('\\', "/");
+    if name.is_empty() {
+        return wrong("input.objfile names no file".to_owned());
+    }
+    if name.contains(|c: char| c.is_ascii_control()) {
+        let message = "input.objfile holds a control character, which a \\ and a letter stand for";
+        return wrong(format!("{message}{SLASH}"));
+    }
+    // A worker sees the files under other names; so does whoever moves the folder.
+    let on_drive = matches!(name.as_bytes(), [b'a'..=b'z' | b'A'..=b'Z', b':', ..]);
+    if on_drive || name.starts_with('/') || Path::new(&name).is_absolute() {
+        return wrong(format!(
+            "input.objfile is {name} but must be relative to the folder of this file"
+        ));
+    }
+    Ok(name)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn parse(text: &str) -> Result<SceneConfig> {
-        SceneConfig::parse(Path::new("a/tinyrender/b.toml"), text.as_bytes())
-    }
-
-    #[test]
-    fn defaults_are_the_original_course_ones() {
-        let config = parse("[input]\nobjfile = \"../mesh/b.obj\"\n").unwrap();
-        assert_eq!((config.width, config.height, config.spp), (768, 576, 1));
-        assert_eq!(config.mesh, Path::new("a/tinyrender/../mesh/b.obj"));
-        assert_eq!(config.camera, CameraConfig::default());
-        let found = (config.realtime, config.kind, config.bonus);
-        assert_eq!(found, (false, ShadingKind::Simple, false));
-    }
-
-    #[test]
-    fn simple_and_direct_are_the_same_kind_on_both_paths() {
-        let base = "[input]\nobjfile = \"b.obj\"\n[renderer]\n";
-        for realtime in ["", "realtime = true\n"] {
-            for (line, expected) in [
-                ("", ShadingKind::Simple),
-                ("type = \"simple\"", ShadingKind::Simple),
-                ("type = 'direct'", ShadingKind::Simple),
-                ("type = \"normal\"", ShadingKind::Normal),
-            ] {
-                let config = parse(&format!("{base}{realtime}{line}\n")).unwrap();
-                assert_eq!(config.kind, expected, "{realtime}{line}");
-            }
-        }
-    }
-
-    #[test]
-    fn mistakes_name_file_line_and_key() {
-        let base = "[input]\nobjfile = \"b.obj\"\n";
-        for (text, expected) in [
-            ("[input\n", "b.toml:1"),
-            ("[camera]\nfov = 30\n", "missing field `input`"),
-            (
-                "[[input]]\nobjfile = \"b.obj\"\n",
-                "b.toml:1: input is of type array, expected a section [input]",
-            ),
-            (
-                &format!("film = 3\n{base}"),
-                "b.toml:1: film is of type integer, expected a section [film]",
-            ),
-            (&format!("{base}[[camera]]\nfov = 3\n"), "b.toml:3: camera is of type array"),
-            (&format!("{base}[camera]\nup = [1, 1, 0]\n"), "b.toml:4: camera eye"),
-            (&format!("{base}[camera]\nat = [1, 1, 0]\n"), "b.toml:4: camera eye"),
-            (
-                &format!("film = {{ width = 9,\n height = 0 }}\n{base}"),
-                "b.toml:2: film.height is 0",
-            ),
-            (&format!("film.width = 0\n{base}"), "b.toml:1: film.width is 0"),
-            (&format!("{base}[film]\n\"width\" = 0\n"), "b.toml:4: film.width is 0"),
-            (&format!("{base}[film]\nwidth = 0\n"), "b.toml:4: film.width is 0"),
-            (&format!("{base}[film]\nheight = 99999\n"), "b.toml:4: film.height is 99999"),
-            (
-                &format!("{base}[film]\nwidth = 16384\nheight = 4097\n"),
-                "b.toml:4: film has 67125248 pixels but must have at most 67108864",
-            ),
-            (&format!("{base}[renderer]\nspp = -1\n"), "b.toml:4: renderer.spp is -1"),
-            (
-                &format!("{base}[renderer]\nspp = 4\ntype = \"glass\"\n"),
-                "b.toml:5: renderer.type is \"glass\" but must be \"simple\", \"direct\" or \"normal\"",
-            ),
-            (&format!("{base}[renderer]\ntype = \"Simple\"\n"), "b.toml:4: renderer.type is"),
-            (&format!("{base}[renderer]\ntype = \"\"\n"), "b.toml:4: renderer.type is \"\""),
-            (&format!("{base}[renderer]\ntype = 1\n"), "b.toml:4: type: invalid type: integer"),
-            (&format!("{base}[camera]\neye = [0, nan, 0]\n"), "b.toml:4: camera.eye"),
-            (
-                &format!("{base}[camera]\nfov = \"wide\"\n"),
-                "b.toml:4: fov: invalid type: string \"wide\", expected a number",
-            ),
-            (&format!("{base}[film]\nwidth = \"7\"\n"), "expected a whole number"),
-            (&format!("{base}[film]\nwidth = \"7\"\n"), "b.toml:4: width: invalid type"),
-            (
-                &format!("{base}[film]\nwidth = 99999999999999999999\n"),
-                "b.toml:4: width: out of range: integer",
-            ),
-            (&format!("{base}[camera]\nfov = 50,0\n"), "write a point in a number"),
-            (&format!("{base}[camera]\neye = (0, 3, 4)\n"), "in square brackets: [x, y, z]"),
-            (&format!("{base}[camera]\neye = [(0, 3, 4)]\n"), "in square brackets: [x, y, z]"),
-            (&format!("{base}[camera]\neye = 0, 3.5, -4 # m\n"), "in square brackets: [x, y, z]"),
-            (&format!("{base}[camera]\neye = 0 3 4\n"), "in square brackets: [x, y, z]"),
-            (&format!("{base}[camera]\neye = [0 3 4]\n"), "commas between numbers: [x, y, z]"),
-            (&format!("{base}[camera]\neye = [0, \u{2212}3, 4]\n"), "write a minus sign as -"),
-            (&format!("{base}[camera]\neye = [0,\n \u{2013}3, 4]\n"), "write a minus sign as -"),
-            (&format!("{base}[camera]\neye = [0.0f, 3, 4]\n"), "without letters or signs behind"),
-            (&format!("{base}[camera]\nfov = 30deg\n"), "without letters or signs behind"),
-            (&format!("{base}[camera]\nfov = 50.0 deg\n"), "without letters or signs behind"),
-            (&format!("{base}[camera]\neye = [.5, 3, 4]\n"), "on both sides of a point"),
-            (&format!("{base}[camera]\neye = [0, 3., 4]\n"), "on both sides of a point"),
-            (&format!("{base}[renderer]\nbonus = True\n"), "hint: write true"),
-            ("[input]\nobjfile = \"..\\s.obj\"\n", "hint: write / in a path"),
-            ("[input]\nobjfile = \"..\\bunny.obj\"\n", "hint: write / in a path"),
-            ("[input]\nobjfile = \"C:\\Users\\a.obj\"\n", "hint: write / in a path"),
-            (&format!("{base}[camera]\nfov = 50.0;\n"), "a line ends without ;"),
-            (&format!("{base}[camera]\nfov = 50.0 // deg\n"), "a comment begins with #"),
-            ("[input]\nobjfile = \u{201c}b.obj\u{201d}\n", "write straight quotes"),
-            (&format!("{base}[camera]\nfov = 180\n"), "b.toml:4: camera.fov is 180"),
-            (&format!("{base}[camera]\nfov = nan\n"), "b.toml:4: camera.fov is NaN"),
-            ("[input]\nobjfile = \"\"\n", "b.toml:2: input.objfile names no file"),
-            (
-                "[input]\nobjfile = \"/m/b.obj\"\n",
-                "b.toml:2: input.objfile is /m/b.obj but must be relative",
-            ),
-        ] {
-            let message = parse(text).unwrap_err().to_string();
-            assert!(message.contains(expected), "{text:?} gave {message:?}");
-        }
-        for text in ["[film]\nsize = {{ width = 9, }, }\n", "[film\nwidth = 9\n", "fov = -\n"] {
-            let message = parse(&format!("{base}{text}")).unwrap_err().to_string();
-            assert!(!message.contains("hint"), "{text:?} gave {message:?}");
-        }
-    }
-
-    #[test]
-    fn what_is_no_toml_file_is_said_to_be_none() {
-        let error = SceneConfig::parse(Path::new("s.obj"), b"v 0 0 0\n").unwrap_err().to_string();
-        assert!(error.starts_with("s.obj:1: expected a scene's TOML file: "), "{error}");
-    }
-
-    #[test]
-    fn every_encoding_and_line_end_is_read() {
-        let plain = "# gr\u{fc}n\n[input]\nobjfile = '..\\mesh\\b.obj'\n[film]\nwidth = 7\n";
-        let latin: Vec<u8> = plain.chars().map(|c| c as u8).collect();
-        let utf16 = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>();
-        for bytes in [
-            plain.as_bytes().to_vec(),
-            format!("\u{feff}{plain}").into_bytes(),
-            utf16(&format!("\u{feff}{plain}")),
-            latin,
-            plain.replace('\n', "\r\n").into_bytes(),
-            plain.replace('\n', "\r").into_bytes(),
-        ] {
-            let config = SceneConfig::parse(Path::new("a/b.toml"), &bytes).unwrap();
-            let found = (config.width, config.mesh);
-            assert_eq!(found, (7, PathBuf::from("a/../mesh/b.obj")), "{bytes:?}");
-        }
-    }
-
-    #[test]
-    fn unknown_keys_are_listed_not_refused() {
-        let config = parse("title = 1\n[input]\nobjfile = \"b.obj\"\n[film]\nwdth = 3\n").unwrap();
-        let path = "a/tinyrender/b.toml";
-        let expected = ["5: unknown key film.wdth", "1: unknown key title"];
-        assert_eq!(config.remarks, expected.map(|expected| format!("{path}:{expected}")));
-    }
-}
+mod tests;

@@ -3,41 +3,27 @@
 //! Each check runs `umbra check` as a separate program, so that no renderer can end the watch. A new save ends the
 //! running check. The page is served only on this machine, under an address that nobody can guess.
 
+mod check;
 mod live;
 mod page;
+mod saves;
 mod server;
 
-use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant, SystemTime};
+use std::sync::mpsc::channel;
 
 use anyhow::Context as _;
-use notify::{EventKind, RecursiveMode, Watcher as _};
 
+use self::check::{Check, is_judged};
 use self::live::LiveView;
+use self::saves::{Change, Happened, Watched, wait};
 use self::server::{Board, Server, Stage};
 use super::context::{Context, on_interrupt};
-use super::earlier::{Report, Row};
 use super::outputs::ensure_apart;
 use super::selection::Selection;
 use super::tree::ensure_working_folder;
-use crate::columns::count;
-use crate::grading::{Mode, REFUSED, SO_FAR};
-use crate::intake::Severity;
-use crate::rubric::PartGrade;
-
-/// A save is over after this long without another change: an editor may write several files, and one file in several
-/// steps.
-const QUIET: Duration = Duration::from_millis(150);
-/// How often it is looked whether a folder that is gone is back.
-const LOOK: Duration = Duration::from_millis(500);
-/// Time that a check has to end once it is told to.
-const GRACE: Duration = Duration::from_secs(10);
+use crate::grading::Mode;
 
 /// Options of `umbra watch`.
 #[derive(clap::Args)]
@@ -90,22 +76,8 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     on_interrupt(move || {
         let _ = interrupted.send(Happened::Interrupted);
     })?;
-    let changed = happened.clone();
-    let (watched, written) = (folder.clone(), output.clone());
-    let mut watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
-        // What cannot be told counts as a change.
-        let paths = match event {
-            Ok(event) if matches!(event.kind, EventKind::Access(_)) => return,
-            Ok(event) => event.paths,
-            Err(_) => vec![watched.clone()],
-        };
-        for path in paths.iter().filter(|path| is_source(path, &watched, &written)) {
-            let change = if is_shader(path) { Change::Shader } else { Change::Other };
-            let _ = changed.send(Happened::Saved(change));
-        }
-    })?;
-    watcher.watch(&folder, RecursiveMode::Recursive).with_context(name)?;
-    let mut watched = identity(&folder);
+    let mut watched = Watched::new(&folder, &output, happened.clone())?;
+    watched.begin().with_context(name)?;
 
     let board = Arc::new(Board::default());
     let server = Server::start(output.join(slug), Arc::clone(&board), Arc::clone(&live))?;
@@ -131,22 +103,15 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     // Whether the last whole report tells how the offline half of the source is now.
     let mut offline_holds = false;
     loop {
-        match wait(&happens, watched.is_none()) {
+        match wait(&happens, watched.is_gone()) {
             Happened::Saved(change) => {
-                let (now, before) = (identity(&folder), watched);
-                if now.is_none() && before.is_none() {
+                if !watched.follow() {
                     continue;
                 }
                 if let Some(older) = running.take() {
                     older.end();
                 }
-                if now != before {
-                    // A folder that was replaced, or is back, is another one to the system.
-                    let _ = watcher.unwatch(&folder);
-                    watched =
-                        now.filter(|_| watcher.watch(&folder, RecursiveMode::Recursive).is_ok());
-                }
-                if watched.is_none() {
+                if watched.is_gone() {
                     let gone =
                         format!("{} is gone; it is checked when it is back", folder.display());
                     eprintln!("umbra: {gone}");
@@ -174,371 +139,5 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
                 return Ok(super::EXIT_OK);
             }
         }
-    }
-}
-
-/// What tells a folder from another one of its name; none where there is no folder.
-fn identity(folder: &Path) -> Option<Identity> {
-    let about = folder.metadata().ok().filter(std::fs::Metadata::is_dir)?;
-    #[cfg(unix)]
-    let (device, number) = {
-        use std::os::unix::fs::MetadataExt as _;
-        (about.dev(), about.ino())
-    };
-    #[cfg(not(unix))]
-    let (device, number) = (0, 0);
-    Some(Identity { device, number, created: about.created().ok() })
-}
-
-/// See [`identity`]. The system gives the number of a folder that was removed to a new one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Identity {
-    device: u64,
-    number: u64,
-    created: Option<SystemTime>,
-}
-
-/// Whether a change of a file can change what a check finds.
-fn is_source(path: &Path, watched: &Path, written: &Path) -> bool {
-    let Ok(inside) = path.strip_prefix(watched) else { return false };
-    let hidden = |part: std::path::Component| {
-        let name = part.as_os_str().to_string_lossy();
-        name.starts_with('.') || name == "target" || name.ends_with('~')
-    };
-    !path.starts_with(written) && !inside.components().any(hidden)
-}
-
-/// Whether a file can change nothing but the realtime half of what a check finds.
-fn is_shader(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "wgsl")
-}
-
-/// What was saved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Change {
-    /// WGSL alone: what was found offline still holds.
-    Shader,
-    Other,
-}
-
-/// What a watch waits for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Happened {
-    Saved(Change),
-    /// The check with this number.
-    Ended(usize),
-    Interrupted,
-}
-
-/// What happens next; of a save, all that belongs to it. Nothing is looked at until then: an idle watch costs nothing.
-/// Only a folder that is `gone` sends no word when it is back: then a while without any counts as a save.
-fn wait(happens: &Receiver<Happened>, gone: bool) -> Happened {
-    let first = match gone {
-        true => happens.recv_timeout(LOOK),
-        false => happens.recv().map_err(RecvTimeoutError::from),
-    };
-    let first = match first {
-        Ok(first) => first,
-        Err(RecvTimeoutError::Timeout) => return Happened::Saved(Change::Other),
-        Err(RecvTimeoutError::Disconnected) => return Happened::Interrupted,
-    };
-    let Happened::Saved(mut all) = first else { return first };
-    while let Ok(next) = happens.recv_timeout(QUIET) {
-        match next {
-            Happened::Saved(change) if change == Change::Other => all = change,
-            // What ended is about the save before.
-            Happened::Saved(_) | Happened::Ended(_) => {}
-            Happened::Interrupted => return next,
-        }
-    }
-    Happened::Saved(all)
-}
-
-/// A check that runs.
-struct Running {
-    /// Tells it from others.
-    number: usize,
-    child: Child,
-    /// Whether it was told to end: nobody needs to read that it did.
-    ended: Arc<AtomicBool>,
-    /// Puts what it says on the board.
-    said: Option<JoinHandle<()>>,
-}
-
-impl Running {
-    /// Lets a check clean up after itself, and ends it if it does not.
-    fn end(mut self) {
-        self.ended.store(true, Ordering::Release);
-        #[cfg(unix)]
-        if let Ok(id) = i32::try_from(self.child.id()) {
-            use nix::sys::signal::{Signal, kill};
-            let _ = kill(nix::unistd::Pid::from_raw(id), Signal::SIGTERM);
-            let begun = Instant::now();
-            while begun.elapsed() < GRACE && !self.child.try_wait().is_ok_and(|end| end.is_some()) {
-                std::thread::sleep(Duration::from_millis(20));
-            }
-        }
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-        self.hear_out();
-    }
-
-    /// Waits until everything that it said is on the board, so that nothing old follows what is new.
-    fn hear_out(&mut self) {
-        if let Some(said) = self.said.take() {
-            let _ = said.join();
-        }
-    }
-}
-
-/// How a folder is checked.
-struct Check<'a> {
-    folder: &'a Path,
-    /// Where the report goes.
-    output: &'a Path,
-    arguments: &'a WatchArguments,
-    root: Option<&'a Path>,
-    board: &'a Arc<Board>,
-    live: &'a Arc<LiveView>,
-    /// Where the end of a check is reported.
-    happened: Sender<Happened>,
-}
-
-/// Whether a check came to a report.
-fn is_judged(status: ExitStatus) -> bool {
-    matches!(status.code(), Some(0 | 1))
-}
-
-/// What a report comes to: in a few words, and in a sentence with what is to be mended first. Where everything was
-/// asked (`is_whole`), that is what keeps it from being submitted, too.
-fn verdict(row: &Row, is_whole: bool) -> (Stage, String, String) {
-    let points = format!("{} of {} points", row.points, row.out_of);
-    if let Some(first) = row.diagnostics.lines().find(|line| !line.trim().is_empty()) {
-        // rustc says the place on the next line.
-        let place = row.diagnostics.lines().skip_while(|line| *line != first).nth(1);
-        let place = place.and_then(|line| line.trim_start().strip_prefix("--> "));
-        let place = place.map_or(String::new(), |place| format!("{place}: "));
-        let message = format!("{place}{first} ({points})");
-        return (Stage::Refused, "does not compile".to_owned(), message);
-    }
-    // Where no code decided anything, the last remark tells why there is none.
-    let by_code = |part: &PartGrade| part.evidence.iter().any(|id| !id.starts_with("submitted."));
-    let is_bare = is_whole && row.points_max == 0.0 && !row.parts.iter().any(by_code);
-    if let Some(cause) = row.remarks.last().filter(|_| is_bare) {
-        return (Stage::Lost, points.clone(), format!("{points}. {cause}"));
-    }
-    let mut errors = row.findings.iter().filter(|found| found.severity == Severity::Error);
-    let lost: Vec<&PartGrade> = row.parts.iter().filter(|part| part.is_lost()).collect();
-    match lost.split_first() {
-        None => match errors.next().filter(|_| is_whole) {
-            Some(error) => {
-                let error = error.to_string();
-                let error = error.trim_start_matches("error: ");
-                let short = format!("{points}, not ready to submit");
-                (Stage::Unready, short, format!("{points}. {error}"))
-            }
-            None => (Stage::Done, points.clone(), points),
-        },
-        Some((first, others)) => {
-            let others = match others.len() {
-                0 => String::new(),
-                more => format!(", and {} lost points too", count(more, "other part")),
-            };
-            let message = format!("{points}. {}: {}{others}", first.id, first.reason);
-            (Stage::Lost, points, message)
-        }
-    }
-}
-
-impl Check<'_> {
-    /// Shows how a check ended.
-    fn show(&self, status: ExitStatus) {
-        let row = is_judged(status).then(|| Report::read(self.output).ok()).flatten();
-        match row.and_then(|report| report.submissions.into_iter().next()) {
-            Some(row) => {
-                let is_whole = self.arguments.part.is_empty() && self.arguments.scene.is_empty();
-                let (stage, verdict, message) = verdict(&row, is_whole);
-                self.board.report(stage, &verdict, &message);
-            }
-            // The last line said why.
-            None => self.board.show(Stage::Failed, ""),
-        }
-    }
-
-    /// Checks what was saved.
-    fn start(&self, change: Change, begun: &mut usize) -> anyhow::Result<Running> {
-        self.board.saved(change == Change::Shader);
-        *begun += 1;
-        let number = *begun;
-        let mut command = Command::new(std::env::current_exe()?);
-        command.arg("check").arg(self.folder).arg("--report").arg(self.output);
-        command.arg("--keep-plugin").arg(self.live.library());
-        if change == Change::Shader {
-            command.arg("--realtime-first");
-        }
-        for part in &self.arguments.part {
-            command.arg("--part").arg(part);
-        }
-        for scene in &self.arguments.scene {
-            command.arg("--scene").arg(scene);
-        }
-        if let Some(root) = self.root {
-            command.arg("--root").arg(root);
-        }
-        // A group of its own: Ctrl-C reaches it through this program, once.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        command.stdin(Stdio::null()).stderr(Stdio::piped());
-        let mut child = command.spawn().context("cannot start umbra check")?;
-        let ended = Arc::<AtomicBool>::default();
-        let quiet = Arc::clone(&ended);
-        let said = child.stderr.take().map(|said| {
-            let (board, live) = (Arc::clone(self.board), Arc::clone(self.live));
-            let happened = self.happened.clone();
-            std::thread::spawn(move || {
-                let mut known: Vec<String> = Vec::new();
-                for line in BufReader::new(said).lines().map_while(Result::ok) {
-                    if quiet.load(Ordering::Acquire) {
-                        continue;
-                    }
-                    let line = line.strip_prefix("umbra: ").unwrap_or(&line);
-                    // What the author waits for stays to be read while the rest is checked.
-                    let is_result = [REFUSED, SO_FAR].iter().any(|start| line.starts_with(start));
-                    if is_result {
-                        known.push(line.to_owned());
-                    }
-                    let doing = if is_result { None } else { Some(line.to_owned()) };
-                    let words: Vec<String> = known.iter().cloned().chain(doing).collect();
-                    board.show(Stage::Running, &words.join("; "));
-                    if live.has_new_library() {
-                        board.compiled();
-                    }
-                    // The terminal may be gone.
-                    let _ = writeln!(std::io::stderr(), "umbra: {line}");
-                }
-                // It says nothing more: it has ended, or is about to.
-                let _ = happened.send(Happened::Ended(number));
-            })
-        });
-        Ok(Running { number, child, ended, said })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_what_a_check_reads_starts_one() {
-        let [watched, written] =
-            [Path::new("/home/a/work"), Path::new("/home/a/work/umbra-report")];
-        for (path, counts) in [
-            ("/home/a/work/src/bsdfs/phong.rs", true),
-            ("/home/a/work/config.json", true),
-            ("/home/a/work/umbra-report/work/report.html", false),
-            ("/home/a/work/.git/index", false),
-            ("/home/a/work/src/.phong.rs.swp", false),
-            ("/home/a/work/src/phong.rs~", false),
-            ("/home/a/work/target/release/x", false),
-            ("/home/a/other/src/lib.rs", false),
-        ] {
-            assert_eq!(is_source(Path::new(path), watched, written), counts, "{path}");
-        }
-        assert!(is_shader(Path::new("/home/a/work/src/shaders/phong.fs.wgsl")));
-        assert!(!is_shader(Path::new("/home/a/work/src/shaders/phong.rs")));
-    }
-
-    #[test]
-    fn a_save_of_shaders_alone_is_told_from_others() {
-        for (saved, told) in [
-            (vec![Change::Shader], Change::Shader),
-            (vec![Change::Shader, Change::Shader], Change::Shader),
-            (vec![Change::Shader, Change::Other, Change::Shader], Change::Other),
-            (vec![Change::Other, Change::Shader], Change::Other),
-        ] {
-            let (happened, happens) = channel();
-            saved.iter().for_each(|&change| happened.send(Happened::Saved(change)).unwrap());
-            // What ends meanwhile was about the save before.
-            happened.send(Happened::Ended(7)).unwrap();
-            assert_eq!(wait(&happens, false), Happened::Saved(told), "{saved:?}");
-            happened.send(Happened::Ended(8)).unwrap();
-            assert_eq!(wait(&happens, false), Happened::Ended(8));
-            happened.send(Happened::Saved(Change::Other)).unwrap();
-            happened.send(Happened::Interrupted).unwrap();
-            assert_eq!(wait(&happens, false), Happened::Interrupted);
-        }
-    }
-
-    #[test]
-    fn a_verdict_is_green_only_where_nothing_is_wrong() {
-        use crate::intake::Finding;
-        let part = |id: &str, bonus: bool, points: f64, reason: &str| PartGrade {
-            id: id.into(),
-            title: id.into(),
-            out_of: 10.0,
-            bonus,
-            points,
-            points_max: points,
-            unconfirmed: 0.0,
-            reason: reason.into(),
-            evidence: Vec::new(),
-        };
-        let row = |parts: Vec<PartGrade>, diagnostics: &str| Row {
-            name: "work".into(),
-            slug: "work".into(),
-            digest: String::new(),
-            points: parts.iter().map(|part| part.points).sum(),
-            points_max: parts.iter().map(|part| part.points_max).sum(),
-            unconfirmed: 0.0,
-            out_of: 20.0,
-            remarks: Vec::new(),
-            parts,
-            standing: crate::class::Standing::default(),
-            diagnostics: diagnostics.into(),
-            findings: Vec::new(),
-        };
-        let told = |parts, diagnostics| verdict(&row(parts, diagnostics), true);
-        let full = || vec![part("1.1", false, 10.0, ""), part("1.2", false, 10.0, "")];
-        let (stage, short, _) = told(full(), "");
-        assert_eq!((stage, short.as_str()), (Stage::Done, "20 of 20 points"));
-        // A bonus that nobody tried for is nothing lost; one that was begun is.
-        let bonus = |points| [full(), vec![part("2.5", true, points, "the map is black")]].concat();
-        assert_eq!(told(bonus(0.0), "").0, Stage::Done);
-        let (stage, _, words) = told(bonus(4.0), "");
-        assert_eq!(
-            (stage, words.as_str()),
-            (Stage::Lost, "24 of 20 points. 2.5: the map is black")
-        );
-        let (stage, short, words) =
-            told(full(), "\nerror[E0308]: mismatched types\n --> src/lib.rs:7:1\n  |");
-        assert_eq!((stage, short.as_str()), (Stage::Refused, "does not compile"));
-        assert_eq!(words, "src/lib.rs:7:1: error[E0308]: mismatched types (20 of 20 points)");
-        let (_, _, words) = told(full(), "phong.fs.wgsl:3:1: expected `;`\n3 | let x");
-        assert!(words.starts_with("phong.fs.wgsl:3:1: expected"), "{words}");
-        // What cannot be submitted is not right, whatever its points.
-        let mut broken = row(full(), "");
-        broken.findings = vec![
-            Finding::warning("w", "a slip"),
-            Finding::error("e", "the text has no closing quote").at("config.json").on_line(9),
-        ];
-        assert_eq!(verdict(&broken, false).0, Stage::Done, "of a part alone");
-        let (stage, short, words) = verdict(&broken, true);
-        assert_eq!(
-            (stage, short.as_str()),
-            (Stage::Unready, "20 of 20 points, not ready to submit")
-        );
-        assert_eq!(words, "20 of 20 points. config.json:9: the text has no closing quote");
-        let lost = vec![part("1.1", false, 0.0, "it panics"), part("1.2", false, 1.0, "dark")];
-        let (_, _, words) = told(lost, "");
-        assert_eq!(words, "1 of 20 points. 1.1: it panics, and 1 other part lost points too");
-        let nothing =
-            || vec![part("1.1", false, 0.0, "there is no code"), part("1.2", false, 0.0, "no")];
-        let mut bare = row(nothing(), "");
-        bare.remarks = vec!["config.json has a slip".into(), "there is no src/lib.rs".into()];
-        assert_eq!(verdict(&bare, true).2, "0 of 20 points. there is no src/lib.rs");
-        assert_eq!(
-            told(nothing(), "").2,
-            "0 of 20 points. 1.1: there is no code, and 1 other part lost points too"
-        );
     }
 }
