@@ -310,10 +310,12 @@ impl<'a> Bench<'a> {
         let names: Vec<&str> = switches(mistakes).collect();
         let reference = self.root.join("reference_impl/src");
         let mut own = Stages::read(&reference, &self.assignment.template());
-        for (name, text) in STAGES.iter().zip(&mut own.own) {
-            let right = text.take().with_context(|| format!("the reference has no {name}"))?;
-            *text =
-                Some(stages::apply(name, &right, &names).map_err(anyhow::Error::msg)?.into_owned());
+        for (index, name) in STAGES.into_iter().enumerate() {
+            let right =
+                own.own[index].take().with_context(|| format!("the reference has no {name}"))?;
+            let text = stages::apply(name, &right, &names).map_err(anyhow::Error::msg)?;
+            own.set_text(&format!("shaders/{name}.wgsl"), &text);
+            own.own[index] = Some(text.into_owned());
         }
         if mistakes.iter().any(|name| name == choice::ELSEWHERE) {
             own.own = [const { None }; 3];

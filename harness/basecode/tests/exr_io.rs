@@ -242,16 +242,23 @@ fn every_coding_but_dwa_and_plain_tiles_are_read() {
         rounding_mode: RoundingMode::Down,
     });
     use Compression::{B44, B44A, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
+    let [half, float] = [SampleType::F16, SampleType::F32];
+    let mixed = [
+        BGR,
+        [("B", float), ("G", float), ("R", float)],
+        [("B", float), ("G", half), ("R", float)],
+        [("B", half), ("G", half), ("R", float)],
+    ];
     for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24, B44, B44A] {
-        for blocks in [LINES, tiles] {
-            let file = decode(&foreign(&BGR, compression, blocks, |_| ())).unwrap();
-            assert_eq!(file.layers[""].pixels, vec![vec3(2.0, 1.0, 0.0); 12], "{compression}");
+        for (blocks, channels) in
+            [LINES, tiles].into_iter().flat_map(|of| mixed.map(|all| (of, all)))
+        {
+            let file = decode(&foreign(&channels, compression, blocks, |_| ())).unwrap();
+            let expected = vec![vec3(2.0, 1.0, 0.0); 12];
+            assert_eq!(file.layers[""].pixels, expected, "{compression} {channels:?}");
             assert!(file.notes.is_empty());
         }
     }
-    let mixed = [("B", SampleType::F32), ("G", SampleType::F16), ("R", SampleType::F32)];
-    let file = decode(&foreign(&mixed, Uncompressed, LINES, |_| ())).unwrap();
-    assert_eq!(file.layers[""].pixels, vec![vec3(2.0, 1.0, 0.0); 12]);
 }
 
 #[test]

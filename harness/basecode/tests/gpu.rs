@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used)] // its helpers are tests too
 
 use basecode::gpu::{
-    AdapterKind, DEPTH_FORMAT, EMITTER_FS, EMPTY_MAPS, EVERY_FRAGMENT, Footprint, FrameUniforms,
-    Gpu, MaterialUniforms, Mesh, OUTLINES, ObjectUniforms, ShadowMap, Stage, Target,
-    USUAL_PIPELINES, Uniform,
+    AdapterKind, DEPTH_FORMAT, EDITED_LINE, EMITTER_FS, EMPTY_MAPS, EVERY_FRAGMENT, Footprint,
+    FrameUniforms, Gpu, MaterialUniforms, Mesh, NOTHING_UNSET, OUTLINES, ObjectUniforms, ShadowMap,
+    Stage, Target, USUAL_PIPELINES, Uniform,
 };
 use basecode::{Camera, CameraConfig, Error, Mat4, Shape, Vec2, Vec3, vec3, wgpu};
 
@@ -303,6 +303,42 @@ fn the_host_mends_a_slip_with_a_pipeline() {
     // Exchanged, normals stand for positions, and nothing else is mended.
     assert_eq!(drawn_by_attribute(&mut gpu, [1, 0], None), Vec3::ZERO);
     assert_eq!(drawn_by_attribute(&mut gpu, [1, 0], Some("0 1")), vec3(0.5, 0.0, 0.0));
+}
+
+#[test]
+fn the_host_edits_a_line_of_wgsl() {
+    let mut gpu = gpu();
+    let wrong = "@fragment fn fs_main() -> @location(0) vec4f {\n    return vec4f(0.25); // so\n}";
+    let mut shown = |edit: Option<&str>| {
+        let edit = edit.map(|text| (EDITED_LINE.to_owned(), text.to_owned()));
+        gpu.replace_stages(edit.into_iter().collect());
+        let target = Target::new(&gpu, 8, 8).unwrap();
+        draw(&gpu, Stage { name: "phong.fs", text: wrong }, &target).unwrap();
+        target.read_back(&gpu).unwrap().at(4, 4)
+    };
+    assert_eq!(shown(None), Vec3::splat(0.25));
+    assert_eq!(shown(Some("return vec4f(0.25); // so\nreturn vec4f(0.5);")), Vec3::splat(0.5));
+    assert_eq!(shown(Some("return vec4f(0.25);\nreturn vec4f(0.5);")), Vec3::splat(0.25));
+}
+
+#[test]
+fn what_nobody_sets_is_one_where_the_host_asks_for_it() {
+    const LIGHT: &str = "struct F { a: mat4x4f, b: mat4x4f, eye: vec4f, light: vec4f, i: vec4f }
+        @group(0) @binding(0) var<storage, read> f: F;
+        @fragment fn fs_main() -> @location(0) vec4f { return f.i + vec4f(f.eye.x, f.b[3].x, 0.0, 0.0); }";
+    let mut gpu = gpu();
+    let mut shown = |names: &[&str]| {
+        let all = names.iter().map(|name| ((*name).to_owned(), String::new()));
+        gpu.replace_stages(all.collect());
+        let target = Target::new(&gpu, 8, 8).unwrap();
+        draw(&gpu, Stage { name: "phong.fs", text: LIGHT }, &target).unwrap();
+        target.read_back(&gpu).unwrap().at(4, 4)
+    };
+    let unset = shown(&[]);
+    assert_eq!(unset.z, 0.0, "the square is drawn without a light");
+    let set = shown(&[NOTHING_UNSET]);
+    assert_eq!(set.z, 1.0);
+    assert_eq!(set - unset, Vec3::ONE, "what is set stays as it is");
 }
 
 #[test]

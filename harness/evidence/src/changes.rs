@@ -51,6 +51,19 @@ pub fn diffuse_changes() -> Vec<Change> {
             Shading { tests: Tests::SameSide, ..right },
         ),
         slip("sin theta_i in place of cos theta_i", Shading { sine: true, ..right }),
+        slip("cos theta_i is wrapped", Shading { wrapped: true, ..right }),
+        slip(
+            "cos theta_i is wrapped, wi is not tested",
+            Shading { wrapped: true, tests: Tests::Wo, ..right },
+        ),
+        slip(
+            "cos theta_i is wrapped, nothing is tested",
+            Shading { wrapped: true, tests: Tests::Neither, ..right },
+        ),
+        slip(
+            "cos theta_i is wrapped and squared",
+            Shading { wrapped: true, cos_i: [2.0; 2], tests: Tests::Wo, ..right },
+        ),
         slip("x of wi in place of its cosine", Shading { axis: 0, ..right }),
         slip("y of wi in place of its cosine", Shading { axis: 1, ..right }),
         slip("red and blue exchanged", Shading { channels: [2, 1, 0], ..right }),
@@ -99,6 +112,14 @@ pub fn phong_changes() -> Vec<Change> {
         slip(
             "the diffuse term is normalized as the lobe is",
             Shading { diffuse_normalized: true, ..right },
+        ),
+        slip(
+            "the diffuse term is multiplied by 1 - Ks",
+            Shading { diffuse_less_specular: Some(0), ..right },
+        ),
+        slip(
+            "the diffuse term is multiplied by 1 - Ks, scaled",
+            Shading { diffuse_less_specular: Some(1), ..right },
         ),
         slip("Ks is raised to n, too", Shading { raised_ks: true, ..right }),
         slip("n is raised to cos alpha", Shading { swapped_power: true, ..right }),
@@ -172,6 +193,14 @@ pub fn phong_changes() -> Vec<Change> {
     changes
 }
 
+/// Attenuation by 1 + a r + b r^2, as tables of game engines have it for lights that reach so far.
+const GAME_7: fn(f64) -> f64 = |squared| 1.0 + 0.7 * squared.sqrt() + 1.8 * squared;
+const GAME_13: fn(f64) -> f64 = |squared| 1.0 + 0.35 * squared.sqrt() + 0.44 * squared;
+const GAME_20: fn(f64) -> f64 = |squared| 1.0 + 0.22 * squared.sqrt() + 0.2 * squared;
+const GAME_32: fn(f64) -> f64 = |squared| 1.0 + 0.14 * squared.sqrt() + 0.07 * squared;
+const GAME_50: fn(f64) -> f64 = |squared| 1.0 + 0.09 * squared.sqrt() + 0.032 * squared;
+const GAME_100: fn(f64) -> f64 = |squared| 1.0 + 0.045 * squared.sqrt() + 0.0075 * squared;
+
 /// What can be wrong in the light that reaches a surface.
 pub fn light_changes() -> Vec<Change> {
     let right = Shading::default();
@@ -189,6 +218,12 @@ pub fn light_changes() -> Vec<Change> {
         slip("r^3 in place of r^2", Shading { falloff: 3.0, ..right }),
         slip("r^4 in place of r^2", Shading { falloff: 4.0, ..right }),
         slip("1 + r^2 in place of r^2", Shading { divisor: |squared| 1.0 + squared, ..right }),
+        concept("the light fades as in a game", Shading { divisor: GAME_7, ..right }),
+        concept("the light fades as in a game", Shading { divisor: GAME_13, ..right }),
+        concept("the light fades as in a game", Shading { divisor: GAME_20, ..right }),
+        concept("the light fades as in a game", Shading { divisor: GAME_32, ..right }),
+        concept("the light fades as in a game", Shading { divisor: GAME_50, ..right }),
+        concept("the light fades as in a game", Shading { divisor: GAME_100, ..right }),
         slip("r^2 is at least 1", Shading { divisor: |squared| squared.max(1.0), ..right }),
         slip(
             "incident light is clamped to 1",
@@ -229,6 +264,19 @@ pub fn integrator_changes() -> Vec<Change> {
         slip("wi stands for wo", directions(Directions::WiTwice)),
         concept("wi is the light's position", directions(Directions::LightFromOrigin)),
         concept("wi leads from the viewer to the light", directions(Directions::LightFromViewer)),
+        slip("wi is brought to world space", directions(Directions::WiToWorld)),
+        slip("wi and wo are brought to world space", directions(Directions::BothToWorld)),
+        slip("wo is brought to the local frame twice", directions(Directions::WoLocalTwice)),
+        slip("wi is brought to the local frame twice", directions(Directions::WiLocalTwice)),
+        slip("x and y of wi are exchanged", directions(Directions::WiTurned([1, 0, 2]))),
+        slip("y and z of wi are exchanged", directions(Directions::WiTurned([0, 2, 1]))),
+        slip("x and z of wi are exchanged", directions(Directions::WiTurned([2, 1, 0]))),
+        slip("x and y of wo are exchanged", directions(Directions::WoTurned([1, 0, 2]))),
+        slip("y and z of wo are exchanged", directions(Directions::WoTurned([0, 2, 1]))),
+        slip("x and z of wo are exchanged", directions(Directions::WoTurned([2, 1, 0]))),
+        slip("x is left out of r^2", Shading { without_axis: Some(0), ..right }),
+        slip("y is left out of r^2", Shading { without_axis: Some(1), ..right }),
+        slip("z is left out of r^2", Shading { without_axis: Some(2), ..right }),
         slip("r is the distance along the ray", Shading { along_ray: true, ..right }),
         slip("r is the light's distance from the origin", Shading { from_origin: true, ..right }),
         slip("wi is the sum of light and point", directions(Directions::LightPlusPoint)),

@@ -113,8 +113,9 @@ pub fn priced_by_length(
     }
 }
 
-/// Width of the film on which several samples a pixel are judged.
-pub const SAMPLED_WIDTH: u32 = 64;
+/// Width of the film on which several samples a pixel are judged: odd, so that a loop that takes several pixels at once
+/// shows what it makes of the rest of a row. On most films its height is odd too.
+pub const SAMPLED_WIDTH: u32 = 63;
 /// Samples per pixel that the renderer takes there: a square.
 pub const SAMPLES: u32 = 16;
 /// Rays per pixel that it is asked: one set to find edges by, one to judge by. Found and judged by

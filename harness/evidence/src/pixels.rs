@@ -112,6 +112,8 @@ pub struct LeftBySlip {
     pub left_by_right: f64,
     /// Whether it draws any light: one black image is as good as another.
     pub lights: bool,
+    /// What is left on diffuse and on Phong surfaces alone, where it draws light on them.
+    pub left_of_lit: [Option<f64>; 2],
 }
 
 /// How far single slips in what reaches a fragment stage explain an unshadowed realtime image: those that are no slip
@@ -139,19 +141,95 @@ pub fn left_by_slips(scene: &Scene, image: &Image, mask: &RegionMask) -> Vec<Lef
         let told = shaded.iter().zip(&found);
         let told = told.filter_map(|(shaded, found)| Some((shaded.as_ref()?, *found)));
         let grazes = |p: &ShadedPoint| p.wo[2].abs() < GRAZING || p.wi[2].abs() < GRAZING;
-        let (changed, found): (Vec<[f64; 3]>, Vec<[f32; 3]>) = told
-            .filter(|(shaded, _)| !grazes(shaded))
-            .map(|(shaded, found)| (radiance(shaded), found))
-            .unzip();
+        let told: Vec<_> = told.filter(|(shaded, _)| !grazes(shaded)).collect();
+        let left_of_lit = [api::MATERIAL_DIFFUSE, api::MATERIAL_PHONG].map(|model| {
+            let own = told.iter().filter(|(shaded, _)| shaded.material.model == model);
+            let own = own.map(|(shaded, found)| (radiance(shaded), *found));
+            let own = own.filter(|(radiance, _)| *radiance != [0.0; 3]);
+            let (changed, found): (Vec<[f64; 3]>, Vec<[f32; 3]>) = own.unzip();
+            let of = |index: usize, _: &Shading| changed[index];
+            let left = || answers(&found, &of, &unit).residual_of_right().min(1.0);
+            (found.len() >= LEAST_SHOWN).then(left)
+        });
+        let (changed, found): (Vec<[f64; 3]>, Vec<[f32; 3]>) =
+            told.into_iter().map(|(shaded, found)| (radiance(shaded), found)).unzip();
         let slipped = |index: usize, _: &Shading| changed[index];
         let answers = answers(&found, &slipped, &unit);
         // A scene of which little is left tells nothing of this slip.
         let tells = 4 * found.len() >= surfaces.len();
         let lights = tells && answers.total() >= LEAST_LEFT * found.len() as f64;
         let left = if tells { answers.residual_of_right().min(1.0) } else { 0.0 };
-        LeftBySlip { of: slip.of, name: slip.name, left, left_by_right, lights }
+        LeftBySlip { of: slip.of, name: slip.name, left, left_by_right, lights, left_of_lit }
     };
-    slips.iter().map(left).collect()
+    let mut all: Vec<LeftBySlip> = slips.iter().map(left).collect();
+    let missing = Missing::of(scene, &surfaces, &found, places, mean);
+    all.push(LeftBySlip {
+        of: CheckId::PassUniforms,
+        name: SURFACES_MISSING,
+        left: missing.left,
+        left_by_right,
+        lights: missing.shown.iter().sum::<usize>() >= LEAST_SHOWN,
+        left_of_lit: missing.shown.map(|shown| (shown >= LEAST_SHOWN).then_some(missing.left)),
+    });
+    all
+}
+
+/// Number of points that tell something of surfaces.
+const LEAST_SHOWN: usize = 10;
+
+/// The slip that some surfaces are not drawn: what is there is right.
+pub const SURFACES_MISSING: &str = "surfaces are missing";
+
+/// What an image shows of surfaces if some of them are not drawn.
+struct Missing {
+    /// Fraction of the points that show neither their surface, nor one behind it, nor nothing.
+    left: f64,
+    /// Lit points that show their own surface, diffuse and Phong ones.
+    shown: [usize; 2],
+}
+
+/// So many surfaces behind another are looked at.
+const BEHIND: usize = 8;
+
+impl Missing {
+    fn of(
+        scene: &Scene,
+        surfaces: &[SurfacePoint],
+        found: &[[f32; 3]],
+        places: Places,
+        mean: f64,
+    ) -> Self {
+        let shows = |point: &SurfacePoint, found: &[f32; 3]| {
+            let right = Shading::default().radiance(&places.shaded_point(scene, point));
+            let is_close = |c: usize| {
+                let apart = (f64::from(found[c]) - right[c]).abs();
+                apart <= RELATIVE * right[c].abs() + 1e-3 * mean
+            };
+            [0, 1, 2].into_iter().all(is_close)
+        };
+        let shows_behind = |point: &SurfacePoint, found: &[f32; 3]| {
+            let mut ray = point.ray;
+            for _ in 0..BEHIND {
+                let Some(hit) = scene.intersect(&ray) else { return false };
+                ray.min_t = hit.t + hit.epsilon;
+                if SurfacePoint::cast(scene, ray).is_some_and(|next| shows(&next, found)) {
+                    return true;
+                }
+            }
+            false
+        };
+        let (mut left, mut shown) = (0usize, [0usize; 2]);
+        for (point, found) in surfaces.iter().zip(found) {
+            if shows(point, found) {
+                let lit = found.iter().any(|value| f64::from(*value) > 1e-2 * mean);
+                let phong = scene.material_of(point.shape).model == MaterialModel::Phong;
+                shown[usize::from(phong)] += usize::from(lit);
+            } else if *found != [0.0; 3] && !shows_behind(point, found) {
+                left += 1;
+            }
+        }
+        Self { left: left as f64 / surfaces.len().max(1) as f64, shown }
+    }
 }
 
 /// What was found beside what `of` says of each question.
@@ -206,6 +284,7 @@ fn pass_slips<'a>(scene: &'a Scene, right: Places) -> Vec<Slip<'a>> {
         at(price::VIEWER_AT_ORIGIN, Places { eye: Vec3::ZERO, ..right }),
         at(price::LIGHT_AT_ORIGIN, Places { light: Vec3::ZERO, ..right }),
         at("the light stands where the viewer does", Places { light: right.eye, ..right }),
+        changed("the intensity is missing", |p| p.intensity = [1.0; 3]),
         changed("the intensity is grey", |p| p.intensity = [p.intensity[0]; 3]),
         changed("the intensity is divided by 4 pi", |p| {
             p.intensity = p.intensity.map(|v| v / (2.0 * std::f64::consts::TAU));
@@ -378,6 +457,15 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
             }),
         ),
         of(
+            "wo is not of unit length",
+            Class::Slip,
+            Box::new(move |point| {
+                let shaded = right.shaded_point(scene, point);
+                let length = f64::from((right.eye - point.position).length());
+                ShadedPoint { wo: shaded.wo.map(|v| length * v), ..shaded }
+            }),
+        ),
+        of(
             "the direction to the viewer is the viewer's position",
             Class::Slip,
             Box::new(move |point| {
@@ -505,7 +593,41 @@ mod tests {
         let pixels = (0..width * height).map(pixel).collect();
         let left = left_by_slips(&scene, &Image { width, height, pixels }, &mask);
         let explains = left.iter().filter(|left| left.left < 1e-3 && left.lights);
-        explains.map(|left| left.name).collect()
+        // What is dark may be missing as well: where there are holes, nobody's pixels tell.
+        explains.map(|left| left.name).filter(|name| *name != SURFACES_MISSING).collect()
+    }
+
+    /// What the slip that surfaces are missing leaves of right pictures that are changed so, by pixel; and whether
+    /// diffuse and Phong surfaces are shown.
+    fn left_by_missing(change: &dyn Fn(usize, Vec3) -> Vec3) -> (f64, [bool; 2]) {
+        let (width, height) = (64, 48);
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let scene = load_scene(&root.join("scenes/a2").join(EXPONENTS)).unwrap();
+        let [_, mask] = regions(&scene, width, height).unwrap();
+        let camera = scene.camera(width, height).unwrap();
+        let places = Places { light: scene.first_light_position(), eye: camera.eye() };
+        let pixel = |index: usize| {
+            let ray = camera.ray((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
+            let point = SurfacePoint::cast(&scene, ray);
+            let right = point.map_or([0.0; 3], |point| {
+                Shading::default().radiance(&places.shaded_point(&scene, &point))
+            });
+            change(index, Vec3::from(right.map(|value| value as f32)))
+        };
+        let pixels = (0..width * height).map(pixel).collect();
+        let left = left_by_slips(&scene, &Image { width, height, pixels }, &mask);
+        let own = left.iter().find(|left| left.name == SURFACES_MISSING).unwrap();
+        (own.left, own.left_of_lit.map(|left| left.is_some()))
+    }
+
+    #[test]
+    fn surfaces_that_are_missing_leave_the_others_right() {
+        let some = left_by_missing(&|index, right| if index % 3 == 0 { Vec3::ZERO } else { right });
+        assert_eq!(some.0, 0.0);
+        assert!(some.1.contains(&true));
+        // Nothing that is drawn shows of a black picture that it is right, and what is drawn darker is not.
+        assert_eq!(left_by_missing(&|_, _| Vec3::ZERO).1, [false; 2]);
+        assert!(left_by_missing(&|_, right| 0.5 * right).0 > 0.5);
     }
 
     #[test]

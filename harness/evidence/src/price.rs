@@ -85,6 +85,13 @@ pub struct Change {
     pub(super) fitted: Option<Fitted>,
 }
 
+impl Change {
+    /// A slip that makes a renderer shade so.
+    pub(super) fn slip(name: &'static str, shading: Shading) -> Self {
+        Self { name, class: Class::Slip, shading: Some(shading), fitted: None }
+    }
+}
+
 /// A factor that is taken from the answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fitted {

@@ -39,6 +39,10 @@ pub struct Shading {
     pub raised_ks: bool,
     /// The specular term is multiplied by Kd too, itself with this power of the energy scale.
     pub specular_times_diffuse: Option<i32>,
+    /// The diffuse term is multiplied by one minus Ks, itself with this power of the energy scale.
+    pub diffuse_less_specular: Option<i32>,
+    /// Whether cos theta_i is replaced by half of it plus one half.
+    pub wrapped: bool,
     /// Whether the diffuse term is multiplied by the lobe's normalization too.
     pub diffuse_normalized: bool,
     /// Where a surface is black.
@@ -73,6 +77,10 @@ pub struct Shading {
     pub along_ray: bool,
     /// Whether the distance of the light from the world's origin stands for its distance.
     pub from_origin: bool,
+    /// The axis that is left out of the distance of the light.
+    pub without_axis: Option<usize>,
+    /// How far the light stands from its place, world space.
+    pub light_offset: [f32; 3],
     /// Whether an integrator asks the BSDF at all.
     pub asks: bool,
     /// What is added where a surface is lit, times the diffuse reflectance where a material is known.
@@ -104,6 +112,18 @@ pub enum Directions {
     WoTwice,
     /// wi in both places.
     WiTwice,
+    /// wi brought from the local frame to world space, though it is in world space.
+    WiToWorld,
+    /// wi and wo brought from the local frame to world space.
+    BothToWorld,
+    /// wo brought to the local frame twice.
+    WoLocalTwice,
+    /// wi brought to the local frame twice.
+    WiLocalTwice,
+    /// wi with two of its components exchanged.
+    WiTurned([usize; 3]),
+    /// wo with two of its components exchanged.
+    WoTurned([usize; 3]),
     /// The light's position, as a direction, in the place of wi.
     LightFromOrigin,
     /// The direction from the viewer to the light in the place of wi.
@@ -187,6 +207,8 @@ impl Default for Shading {
             swapped_power: false,
             raised_ks: false,
             specular_times_diffuse: None,
+            diffuse_less_specular: None,
+            wrapped: false,
             diffuse_normalized: false,
             tests: Tests::Each,
             axis: 2,
@@ -204,6 +226,8 @@ impl Default for Shading {
             directions: Directions::Local,
             along_ray: false,
             from_origin: false,
+            without_axis: None,
+            light_offset: [0.0; 3],
             asks: true,
             ambient: 0.0,
             output: |radiance| radiance,
@@ -256,6 +280,7 @@ impl Shading {
             return [0.0; 3];
         }
         let cos_i = if self.sine { (1.0 - cos_i * cos_i).max(0.0).sqrt() } else { cos_i };
+        let cos_i = if self.wrapped { 0.5 * cos_i + 0.5 } else { cos_i };
         let phong = material.model == api::MATERIAL_PHONG;
         let lobe = if phong && self.factor[1] != 0.0 { self.lobe(point, length) } else { 0.0 };
         let [diffuse, specular]: [f64; 2] = array::from_fn(|term| {
@@ -274,12 +299,14 @@ impl Shading {
         let value: [f64; 3] = array::from_fn(|c| {
             let ks = f64::from(ks[self.specular_channels[c]]);
             let own = (f64::from(kd[c]) + ks).max(0.99);
+            let less = self.diffuse_less_specular.filter(|_| phong);
+            let less = less.map_or(1.0, |power| 1.0 - scale.powi(power) * ks);
             let ks = if self.raised_ks { ks.powf(n) } else { ks };
             let kd_too =
                 self.specular_times_diffuse.map(|power| scale.powi(power) * f64::from(kd[c]));
             let ks = ks * kd_too.unwrap_or(1.0);
             let factor = if self.scale_by_channel { 0.99 / own / scale } else { 1.0 };
-            let terms = [diffuse * (self.albedo)(f64::from(kd[c])), specular * lobe * ks];
+            let terms = [diffuse * less * (self.albedo)(f64::from(kd[c])), specular * lobe * ks];
             factor * self.together(terms, if phong { cos_i } else { 0.0 })
         });
         array::from_fn(|c| {

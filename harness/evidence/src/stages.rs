@@ -5,8 +5,9 @@
 
 use std::collections::BTreeMap;
 
-use basecode::{Camera, Image, MaterialModel, Scene, Vec3};
+use basecode::{Camera, Image, MaterialModel, Scene, Vec2, Vec3};
 
+use super::pixels::SURFACES_MISSING;
 use super::price::{self, Class, Price};
 use super::stage_film::{OFFSET_PX, StageFilm, median_length};
 use super::{Check, CheckId, Measure, RuleId, Verdict};
@@ -68,7 +69,7 @@ impl BoundValue {
     }
 
     /// The rule that it is judged by.
-    fn rule(self) -> RuleId {
+    pub fn rule(self) -> RuleId {
         match self {
             Self::CameraPosition => RuleId::PassCameraPosition,
             Self::LightPosition => RuleId::PassLightPosition,
@@ -203,12 +204,16 @@ pub fn judge_pass(
             // A pass that shows hardly one value, on no shape, is no pass, whatever it draws.
             let price = match wrong > NO_PASS && shapes.wrong == shapes.shapes {
                 true if seen.all_values_right => {
-                    Price::of_raw(wrong).or("surfaces are missing", Class::Concept, 0.0)
+                    Price::of_raw(wrong).or(SURFACES_MISSING, Class::Concept, 0.0)
                 }
                 true => Price::of_raw(wrong),
                 false => {
                     let other = other_pipeline(film, frames);
-                    shapes.price(price_of_values(wrong, &measures, other))
+                    let price = shapes.price(price_of_values(wrong, &measures, other));
+                    match seen.all_values_right {
+                        true => price.or(SURFACES_MISSING, Class::Slip, 0.0),
+                        false => price,
+                    }
                 }
             };
             // What is seen has its values: one state of the pipeline is wrong, such as the depth test.
@@ -282,16 +287,21 @@ impl Seen {
             let shown = frames.iter().map(|(_, frame)| frame).chain([positions]);
             let found = positions.pixels[index];
             let distance = (found - point.position).length();
+            let is_right = |(bound, frame): &(BoundValue, Image)| {
+                let expected = bound.expected(film.scene, &film.camera, shape);
+                expected.is_none_or(|expected| is_close(frame.pixels[index], expected))
+            };
+            let is_right = frames.iter().all(is_right);
+            // Close behind it, on the same pixel: the values are another surface's.
+            let depth = (point.position - ray.origin).length();
+            let is_behind = distance > BEHIND * depth
+                && Vec2::from(film.offset_px(index, found)).length() < OFFSET_PX as f32;
             let place = if shown.map(|frame| frame.pixels[index]).all(|value| value == Vec3::ZERO) {
                 &mut seen.empty
-            } else if distance > NEAR * (point.position - ray.origin).length() {
+            } else if distance > NEAR * depth || (is_behind && !is_right) {
                 &mut seen.elsewhere
             } else {
-                let is_right = |(bound, frame): &(BoundValue, Image)| {
-                    let expected = bound.expected(film.scene, &film.camera, shape);
-                    expected.is_none_or(|expected| is_close(frame.pixels[index], expected))
-                };
-                right += usize::from(frames.iter().all(is_right));
+                right += usize::from(is_right);
                 continue;
             };
             *place = (place.0 + 1, place.1.or(Some(index)));
@@ -351,6 +361,10 @@ fn median_offset_px(film: &StageFilm, positions: &Image) -> f64 {
 
 /// From this fraction on, positions that are not those of the pixels tell of a vertex stage with outputs of its own.
 const HALF: f64 = 0.5;
+
+/// Positions on one pixel that are further apart than this, relative to their distance from the camera, are those of
+/// two surfaces.
+const BEHIND: f32 = 5e-3;
 
 /// Positions are near, relative to their distance from the camera: a few pixels of the small film.
 const NEAR: f32 = 0.1;

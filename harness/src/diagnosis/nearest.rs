@@ -20,6 +20,9 @@ const NOTHING: f64 = 1e-5;
 const SINGLE: f64 = 0.02;
 /// The same for a constant factor.
 const FACTOR: f64 = 0.03;
+/// The same for a mistake with a constant factor on top: both together come near much that is neither, such as another
+/// function of the distance, and leave next to nothing of what they are.
+const SCALED: f64 = 3e-3;
 /// A factor nearer to 1 than this counts as none.
 const NO_FACTOR: f32 = 5e-3;
 /// The same for two mistakes together, which fit more easily.
@@ -98,7 +101,7 @@ pub fn nearest(comparisons: &[Comparison], names: &[&str]) -> Option<Nearest> {
     for (i, first) in names.iter().enumerate() {
         let factor = common_factor(&most, |exhibit| exhibit.tile(first).clone());
         let left = distance(&most, &|exhibit| exhibit.tile(first).map(|value| factor * value));
-        if left < CLEARLY * single[i] && is_factor(factor) {
+        if left < SCALED && left < CLEARLY * single[i] && is_factor(factor) {
             pairs.push((left, Hypothesis::Scaled((*first).to_owned(), factor)));
         }
         for (j, second) in names.iter().enumerate().skip(i + 1) {

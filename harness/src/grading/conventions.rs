@@ -229,20 +229,20 @@ impl<'a> Answers<'a> {
         if self.lights.iter().all(|light| light.own.is_empty()) {
             return Vec::new();
         }
-        let kinds =
-            [(BsdfKind::Diffuse, MaterialModel::Diffuse), (BsdfKind::Phong, MaterialModel::Phong)];
         let handout = Convention::default();
         let is_wrong = |kind: BsdfKind| {
             let own = self.bsdfs.iter().filter(|own| own.kind == kind);
             own.filter_map(|own| Some((own, own.values.as_ref().ok()?)))
                 .any(|(own, values)| !bsdf::passes(&own.probes, values, &handout))
         };
-        // Black beside black tells nothing.
-        let is_held = |model| {
-            self.lights.iter().all(|light| light.is_of_own_bsdfs(model))
-                && self.lights.iter().any(|light| light.shines(model))
+        let held = |model| {
+            let of = |light: &LightAnswer| (light.is_of_own_bsdfs(model), light.shines(model));
+            self.lights.iter().map(of).collect::<Vec<_>>()
         };
-        let paid = kinds.into_iter().filter(|&(kind, model)| is_wrong(kind) && is_held(model));
+        let kinds =
+            [(BsdfKind::Diffuse, MaterialModel::Diffuse), (BsdfKind::Phong, MaterialModel::Phong)];
+        let paid =
+            kinds.into_iter().filter(|&(kind, model)| is_wrong(kind) && is_held(&held(model)));
         paid.map(|(_, model)| model).collect()
     }
 
@@ -254,6 +254,12 @@ impl<'a> Answers<'a> {
         let together = || self.together.iter().map(TogetherAnswer::judge).collect();
         convention::judge(&bsdfs.chain(lights).collect::<Vec<_>>(), &together)
     }
+}
+
+/// Whether an integrator holds the BSDFs of a kind: of each scene, whether its radiance is what they answer, and whether
+/// any of that is light. Black beside black tells nothing.
+fn is_held(scenes: &[(bool, bool)]) -> bool {
+    scenes.iter().all(|(same, _)| *same) && scenes.iter().any(|(_, shines)| *shines)
 }
 
 impl TogetherAnswer {
@@ -490,4 +496,19 @@ fn shape_probes(kind: BsdfKind, case: &PreparedScene) -> Vec<BsdfProbe> {
         }
     }
     probes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bsdfs_are_held_where_every_scene_shows_them_and_one_shows_light() {
+        assert!(is_held(&[(true, true), (true, true)]));
+        // A scene without such surfaces shows the same nothing.
+        assert!(is_held(&[(true, true), (true, false)]));
+        assert!(!is_held(&[(true, true), (false, true)]), "one scene shows another BSDF");
+        assert!(!is_held(&[(true, false), (true, false)]), "black beside black");
+        assert!(!is_held(&[]));
+    }
 }

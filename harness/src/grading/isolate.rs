@@ -74,7 +74,12 @@ fn draws_surfaces(session: &Session, plugin: &Path, case: &PreparedScene) -> boo
 /// Whether a pass takes the host's stages: of those that are no WGSL it then makes no frame.
 fn takes_stages(session: &Session, plugin: &Path, case: &PreparedScene) -> bool {
     let none = named(["no WGSL"; 3].map(str::to_owned));
-    draw(session, Some(plugin), &Frame::probe(case, none)).answer().is_none()
+    needs_wgsl(&draw(session, Some(plugin), &Frame::probe(case, none)))
+}
+
+/// Whether a frame under stages that are no WGSL shows that a pass needs them.
+fn needs_wgsl(outcome: &Outcome) -> bool {
+    outcome.answer().is_none()
 }
 
 /// Judges the student's pass with Umbra's stages (2.1) and the student's stages in Umbra's pass (2.2 to 2.4) on scenes.
@@ -321,6 +326,17 @@ fn images<'a>(case: &PreparedScene, outcomes: &'a [Outcome]) -> Result<Vec<Image
     Ok(images)
 }
 
+/// Judges a pass by one bound value and the world positions that it draws, where both are there.
+pub fn pass_check_of(case: &PreparedScene, bound: BoundValue, outcomes: &[Outcome]) -> Verdict {
+    match images(case, outcomes).as_deref() {
+        Ok([value, positions]) => {
+            let (bound, positions) = (vec![(bound, value.clone())], positions.clone());
+            judge_pass_frames(case, &PassFrames { bound, positions }).verdict
+        }
+        _ => Verdict::NotJudged,
+    }
+}
+
 pub fn pass_check(case: &PreparedScene, outcomes: &[Outcome]) -> Check {
     match pass_frames(case, outcomes) {
         Ok(frames) => judge_pass_frames(case, &frames),
@@ -443,6 +459,15 @@ fn not_possible(id: CheckId, case: &PreparedScene, message: &str) -> Check {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pass_takes_stages_if_none_can_be_drawn_without_wgsl() {
+        use crate::worker::Answer;
+        assert!(needs_wgsl(&Outcome::StageRefused("expected global item".into())));
+        assert!(needs_wgsl(&Outcome::Failed("a pipeline is refused".into())));
+        // It draws the same whatever the host hands to it.
+        assert!(!needs_wgsl(&Outcome::Done(Answer { values: vec![0.5; 3], ..Answer::default() })));
+    }
 
     #[test]
     fn an_input_that_nobody_writes_is_the_cause_and_not_what_comes_of_it() {

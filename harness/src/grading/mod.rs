@@ -14,6 +14,7 @@ mod isolate;
 mod judged;
 mod kept_frames;
 mod likeness;
+mod line_edits;
 mod measure_reference;
 mod observe;
 mod offline;

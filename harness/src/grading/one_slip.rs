@@ -5,24 +5,29 @@ use std::path::Path;
 
 use basecode::{Image, Matrices};
 
-use super::draw::{Frame, draw_each};
+use super::draw::{Frame, draw_each, draw_one_each};
 use super::isolate::{on_film, positions_and_normals};
+use super::line_edits::{self, LineEdit};
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use super::stages::{MOVED, Moved, Stages, matrices, negated_normals};
 use super::usual_pipelines;
 use crate::evidence::images::{self, Kind};
-use crate::evidence::pixels::{self, LeftBySlip};
-use crate::evidence::price::{Class, Price};
+use crate::evidence::pixels::{self, LeftBySlip, SURFACES_MISSING};
+use crate::evidence::price::{self, Class, Price};
 use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
+use crate::imaging::reference::Region;
 use crate::imaging::tolerances::Tolerances;
-use crate::worker::Stage;
+use crate::worker::{Outcome, Stage};
 
 /// Pass and stages, each alone.
 const ALONE: [CheckId; 4] =
     [CheckId::PassUniforms, CheckId::StageVertex, CheckId::StageDiffuse, CheckId::StagePhong];
+
+/// The convention of parts that one slip pays for.
+const ONE_SLIP: &str = "one slip explains every frame";
 
 /// What the slip may leave of a scene's picture unexplained.
 const LEFT: f64 = 0.01;
@@ -34,11 +39,13 @@ pub struct Found {
     pub checks: Vec<Check>,
     /// What the host replaces to have the pass draw the right pictures, if that is how it is known.
     pub mended_by: Option<Stage>,
+    /// Whether some surfaces are not drawn, and no more is wrong.
+    pub is_of_missing_surfaces: bool,
 }
 
 impl Found {
     fn of(checks: Vec<Check>) -> Self {
-        Self { checks, mended_by: None }
+        Self { checks, ..Self::default() }
     }
 }
 
@@ -59,27 +66,41 @@ pub fn judge(
         let own = |drawn: &&Drawn| drawn.scene == case.entry.name && drawn.kind == Kind::Realtime;
         drawn.iter().find(own).map(|drawn| &drawn.image)
     };
-    let Some(frames) = cases.iter().map(frame).collect::<Option<Vec<&Image>>>() else {
-        return Found::default();
-    };
+    // A pipeline that cannot be drawn with leaves no frame.
+    let frames: Option<Vec<&Image>> = cases.iter().map(frame).collect();
     let is_wrong = |case: &PreparedScene| {
         let own =
             |check: &Check| check.scene == case.entry.name && check.id == CheckId::ImageRealtime;
         found.iter().any(|check| own(check) && check.verdict == Verdict::Fail)
     };
     let wrong: Vec<bool> = cases.iter().map(is_wrong).collect();
-    let slip = |id, (name, class): (&str, Class)| {
+    let slips = |ids: &[CheckId], (name, class): (&str, Class), place: &str| {
         let scene = |(case, wrong): (&PreparedScene, &bool)| {
-            let own = |other| (other == id && *wrong).then_some((name, class));
-            ALONE.map(|other| explained(other, case, own(other)))
+            let own = |other| (ids.contains(&other) && *wrong).then_some((name, class, place));
+            // What a pass shows by itself tells more than its frames.
+            let shown = |other| {
+                let own = |check: &&Check| check.id == other && check.scene == case.entry.name;
+                let is_worse =
+                    |check: &&Check| check.verdict == Verdict::Fail && check.error > class.price();
+                let pass = ids.contains(&other) && other == CheckId::PassUniforms;
+                found.iter().filter(|_| pass).find(own).filter(is_worse)
+            };
+            ALONE.map(|other| match shown(other) {
+                Some(shown) => Check { convention: ONE_SLIP.to_owned(), ..shown.clone() },
+                None => explained(other, case, own(other)),
+            })
         };
         Found::of(cases.iter().zip(&wrong).flat_map(scene).collect())
     };
+    let slip = |id, found: (&str, Class)| slips(&[id], found, "");
     let vertex = CheckId::StageVertex;
     // Of a stage that is wrong alone its own frames tell.
     let is_open = |id: CheckId| others_are_open(id) && !(id == vertex && fails(vertex));
-    if let Some((id, name)) = slip_of_frames(cases, &frames, &wrong, &is_open) {
-        return slip(id, (name, Class::Slip));
+    let told = |frames: &Vec<&Image>| slips_of_frames(cases, frames, &wrong);
+    let slips_of_frames = frames.as_ref().map(told).unwrap_or_default();
+    let mut of_frames = slips_of_frames.iter().filter(|(id, _)| is_open(*id));
+    if let Some((id, name)) = of_frames.find(|(_, name)| *name != SURFACES_MISSING) {
+        return slip(*id, (name, Class::Slip));
     }
     let first = wrong.iter().position(|wrong| *wrong).unwrap_or_default();
     let mended = |stage: &Stage| mended_by(stage, session, plugin, (cases, first), tolerances);
@@ -87,8 +108,9 @@ pub fn judge(
         && let Some((name, stage)) = usual_pipelines::slips().find(|(_, stage)| mended(stage))
     {
         let checks = slip(CheckId::PassUniforms, (name, Class::Slip)).checks;
-        return Found { checks, mended_by: Some(stage) };
+        return Found { mended_by: Some(stage), ..Found::of(checks) };
     }
+    let Some(frames) = frames else { return Found::default() };
     if others_are_open(vertex) {
         let is_moved = |(_, moved): &&Moved| {
             let moved = frames.iter().map(|frame| Some(moved(frame)));
@@ -103,13 +125,100 @@ pub fn judge(
         if is_open(vertex)
             && let Some((found, which)) = slip_of_matrices(&|which| mended(&matrices(which)))
         {
-            return Found { checks: slip(vertex, found).checks, mended_by: Some(matrices(which)) };
+            return Found { mended_by: Some(matrices(which)), ..slip(vertex, found) };
         }
+    }
+    let edits = line_edits::all(stages).into_iter();
+    let edits: Vec<LineEdit> = edits.filter(|edit| pays(edit, found)).collect();
+    let tries = |edits: &[LineEdit]| drawn_with(edits, session, plugin, &cases[first]);
+    let are_right = |image: Option<Image>| {
+        let case = std::slice::from_ref(&cases[first]);
+        are_right(case, vec![image], Film::Small, tolerances)
+    };
+    for edits in edits.chunks(line_edits::TRIED_AT_ONCE) {
+        let right = edits.iter().zip(tries(edits)).filter(|(_, image)| are_right(image.clone()));
+        let mut right = right.map(|(edit, _)| (edit, edit.stage()));
+        if let Some((edit, stage)) = right.find(|(_, stage)| mended(stage)) {
+            let of = slips(&paying(edit, found), (edit.name, Class::Slip), &edit.place());
+            return Found { mended_by: Some(stage), ..of };
+        }
+    }
+    let hole = |check: &&Check| {
+        check.id == CheckId::ImageRealtimeCoverage && check.verdict == Verdict::Fail
+    };
+    let holes = found.iter().filter(hole).count();
+    let missing = slips_of_frames.iter().find(|(_, name)| *name == SURFACES_MISSING);
+    if let Some((id, name)) = missing.filter(|(id, _)| others_are_open(*id))
+        && 2 * holes > wrong.iter().filter(|wrong| **wrong).count()
+    {
+        return Found { is_of_missing_surfaces: true, ..slip(*id, (name, Class::Slip)) };
     }
     if ALONE.into_iter().any(fails) {
         return Found::default();
     }
     Found::of(vertex_under_own_pass(session, plugin, cases, stages))
+}
+
+/// The parts of an edit: what reaches it and draws wrongly.
+fn paying(edit: &LineEdit, found: &[Check]) -> Vec<CheckId> {
+    if !edit.of.fragment {
+        return vec![CheckId::StageVertex];
+    }
+    let fails =
+        |id: CheckId| found.iter().any(|check| check.id == id && check.verdict == Verdict::Fail);
+    let stages = [
+        (CheckId::StageDiffuse, CheckId::ImageRealtimeDiffuse),
+        (CheckId::StagePhong, CheckId::ImageRealtimePhong),
+    ];
+    stages.into_iter().filter(|(_, frames)| fails(*frames)).map(|(stage, _)| stage).collect()
+}
+
+/// Whether an edit may mend what nothing else explains: its parts lose more than a slip, and no other is wrong alone.
+fn pays(edit: &LineEdit, found: &[Check]) -> bool {
+    let ids = paying(edit, found);
+    let failed = |id: CheckId| {
+        found.iter().filter(move |check| check.id == id && check.verdict == Verdict::Fail)
+    };
+    let open = |id: CheckId| {
+        let lost: Vec<&Check> = failed(id).collect();
+        let concept = Class::Concept.price() - 1e-3;
+        let of_concept = |check: &&&Check| price::is_explained(check) && check.error >= concept;
+        let is_concept = 2 * lost.iter().filter(of_concept).count() > lost.len();
+        let unexplained = |check: &&Check| {
+            !price::are_slight(std::iter::once(*check)) && !price::is_explained(check)
+        };
+        lost.iter().any(unexplained) && !is_concept
+    };
+    let is_judged = |id: CheckId| {
+        let mut own = found.iter().filter(|check| check.id == id);
+        own.any(|check| matches!(check.verdict, Verdict::Pass | Verdict::Fail))
+    };
+    let by_frames = |id: CheckId| match id {
+        CheckId::StageDiffuse => CheckId::ImageRealtimeDiffuse,
+        CheckId::StagePhong => CheckId::ImageRealtimePhong,
+        _ => CheckId::ImageRealtimeCoverage,
+    };
+    let alone = ALONE.into_iter().all(|id| ids.contains(&id) || failed(id).next().is_none());
+    let lost = |id: &CheckId| open(if is_judged(*id) { *id } else { by_frames(*id) });
+    // Where nothing can be judged alone, surfaces that are missing are the fragment stage's as well.
+    let missing = !is_judged(CheckId::PassUniforms) && open(CheckId::ImageRealtimeCoverage);
+    alone && (ids.iter().any(lost) || missing)
+}
+
+/// What a pass draws of a scene with each of some edits.
+fn drawn_with(
+    edits: &[LineEdit],
+    session: &Session,
+    plugin: &Path,
+    case: &PreparedScene,
+) -> Vec<Option<Image>> {
+    let frame = |edit: &LineEdit| Frame::probe(case, vec![edit.stage()]);
+    let frames: Vec<Frame> = edits.iter().map(frame).collect();
+    let outcomes = draw_each(session, Some(plugin), &frames);
+    let image = |(frame, outcome): (&Frame, &Outcome)| {
+        Some(session::image(&outcome.answer()?.values, frame.size.0, frame.size.1))
+    };
+    frames.iter().zip(&outcomes).map(image).collect()
 }
 
 /// What is wrong with the matrices of a pass that is right under other ones, and which these are.
@@ -130,30 +239,28 @@ fn slip_of_matrices(
 }
 
 /// The check of a part under the mistake that explains all frames: where it is the part's own.
-fn explained(id: CheckId, case: &PreparedScene, own: Option<(&str, Class)>) -> Check {
+fn explained(id: CheckId, case: &PreparedScene, own: Option<(&str, Class, &str)>) -> Check {
     let scene = &case.entry.name;
-    let convention = "one slip explains every frame".to_owned();
-    let Some((name, class)) = own else {
+    let convention = ONE_SLIP.to_owned();
+    let Some((name, class, place)) = own else {
         let summary = "right but for the one slip that explains every frame";
         return Check { convention, ..Check::new(id, scene, Verdict::Pass, summary) };
     };
     let (error, mistake) = (class.price(), name.to_owned());
-    let summary = format!("one slip explains the submission's own frames on every scene: {name}");
+    let place = if place.is_empty() { String::new() } else { format!(" in {place}") };
+    let summary =
+        format!("one slip explains the submission's own frames on every scene: {name}{place}");
     Check { error, mistake, convention, ..Check::new(id, scene, Verdict::Fail, summary) }
 }
 
-/// The one slip with what reaches the fragment stages that explains the frames of all scenes, some of them by light. It
-/// must explain every right frame and most of the `wrong` ones, because on one scene noise may decide what a surface
-/// shows. `is_open` tells whether no other fault is known of the part that a slip belongs to.
-fn slip_of_frames(
+/// The slips with what reaches the fragment stages that explain the frames of all scenes, some of them by light on
+/// diffuse and on Phong surfaces. One must explain every right frame and most of the `wrong` ones, because on one scene
+/// noise may decide what a surface shows.
+fn slips_of_frames(
     cases: &[PreparedScene],
     frames: &[&Image],
     wrong: &[bool],
-    is_open: &dyn Fn(CheckId) -> bool,
-) -> Option<(CheckId, &'static str)> {
-    if ![CheckId::PassUniforms, CheckId::StageVertex].into_iter().any(is_open) {
-        return None;
-    }
+) -> Vec<(CheckId, &'static str)> {
     let of_scenes: Vec<Vec<LeftBySlip>> = cases
         .iter()
         .zip(frames)
@@ -162,7 +269,13 @@ fn slip_of_frames(
             pixels::left_by_slips(&expected.scene, frame, &expected.unshadowed_mask)
         })
         .collect();
-    let slips = of_scenes.first()?.iter().map(|left| (left.of, left.name));
+    let Some(first) = of_scenes.first() else { return Vec::new() };
+    let slips = first.iter().map(|left| (left.of, left.name));
+    // Kinds of surfaces that there are: what leaves one of them dark explains nothing that is wrong with it.
+    let kinds = [false, true].map(|phong| {
+        let own = |region: &Region| region.lit && (region.exponent > 0.0) == phong;
+        cases.iter().any(|case| case.expected.unshadowed_mask.regions.iter().any(own))
+    });
     let explains = |index: usize| {
         let of = |is_wrong: bool| {
             let scenes = of_scenes.iter().zip(wrong).filter(move |(_, wrong)| **wrong == is_wrong);
@@ -177,10 +290,18 @@ fn slip_of_frames(
             }
             2 * explained > all
         };
-        of(false).all(|left| left.left <= LEFT) && most(false) && most(true)
+        let explains_kind = |kind: usize| {
+            let all = of(true).chain(of(false));
+            let lit: Vec<f64> = all.filter_map(|left| left.left_of_lit[kind]).collect();
+            let explained = lit.iter().filter(|left| **left <= LEFT).count();
+            // What a pass leaves out may be all of a kind, and is then nobody's to know.
+            let is_dark = lit.is_empty() && first[index].name != SURFACES_MISSING;
+            is_dark || 2 * explained > lit.len()
+        };
+        let all_kinds = (0..kinds.len()).all(|kind| !kinds[kind] || explains_kind(kind));
+        of(false).all(|left| left.left <= LEFT) && most(false) && most(true) && all_kinds
     };
-    let mut slips = slips.enumerate().filter(|(_, (of, _))| is_open(*of));
-    slips.find(|(index, _)| explains(*index)).map(|(_, slip)| slip)
+    slips.enumerate().filter(|(index, _)| explains(*index)).map(|(_, slip)| slip).collect()
 }
 
 /// The film that pictures of a scene are drawn on.
@@ -227,12 +348,17 @@ fn mended_by(
     let is_mended = |cases: &[PreparedScene]| {
         let frame = |case| Frame::probe(case, vec![stage.clone()]);
         let frames: Vec<Frame> = cases.iter().map(frame).collect();
-        let outcomes = draw_each(session, Some(plugin), &frames);
-        let image = |(frame, outcome): (&Frame, &crate::worker::Outcome)| {
+        let image = |frame: &Frame, outcome: &Outcome| {
             let (width, height) = frame.size;
             Some(session::image(&outcome.answer()?.values, width, height))
         };
-        let pictures = frames.iter().zip(&outcomes).map(image).collect();
+        let is_right = |case: &PreparedScene, outcome: &Outcome| {
+            let picture = image(&Frame::probe(case, Vec::new()), outcome);
+            are_right(std::slice::from_ref(case), vec![picture], Film::Small, tolerances)
+        };
+        let outcomes = draw_one_each(session, plugin, &frames, &is_right);
+        let pictures = frames.iter().zip(&outcomes);
+        let pictures = pictures.map(|(frame, outcome)| image(frame, outcome)).collect();
         are_right(cases, pictures, Film::Small, tolerances)
     };
     cases.get(first..=first).is_some_and(&is_mended) && is_mended(cases)

@@ -9,7 +9,7 @@ use super::offline::{self, Drawn, Run};
 use super::pipeline::Grading;
 use super::prepared_scene::PreparedScene;
 use super::session::Session;
-use super::stages::Stages;
+use super::stages::{Stages, nothing_unset};
 use super::{isolate, one_slip, realtime, sampler, uploads, usual_pipelines};
 use crate::evidence::{Check, CheckId, Verdict, loops, price, rays, shadow_map};
 
@@ -139,19 +139,35 @@ impl Grading<'_> {
             if !is_right {
                 let own = (&checks[begin..], fails);
                 let mut found = isolate::isolate(session, plugin, cases, stages, own, tolerances);
-                let mended_by = usual_pipelines::price_pass(session, plugin, cases, &mut found);
-                checks.extend(found);
-                if nothing_draws.is_none() {
+                session.retries.uncounted(|| {
+                    let mended_by = usual_pipelines::price_pass(session, plugin, cases, &mut found);
+                    checks.extend(found);
+                    if nothing_draws.is_some() {
+                        return;
+                    }
                     let own = (&checks[begin..], &drawn[..]);
                     let slip = one_slip::judge(session, plugin, cases, stages, own, tolerances);
-                    if let Some(stage) = slip.mended_by.or(mended_by) {
-                        let bonus = &mut checks[begin..];
-                        realtime::judge_bonus_under(
-                            &stage, session, plugin, cases, tolerances, bonus,
-                        );
+                    // What a pass forgets to set leaves no light to see shadows by.
+                    let mended_by = slip.mended_by.or(mended_by);
+                    let stage = |case: &PreparedScene| {
+                        let light = case.expected.scene.first_light_position();
+                        mended_by.clone().unwrap_or_else(|| nothing_unset(light))
+                    };
+                    let bonus = &mut checks[begin..];
+                    realtime::judge_bonus_under(&stage, session, plugin, cases, tolerances, bonus);
+                    if slip.is_of_missing_surfaces {
+                        realtime::judge_bonus_where_seen(cases, drawn, tolerances, bonus);
                     }
                     checks.extend(slip.checks);
-                }
+                });
+            }
+            if nothing_draws.is_none() {
+                let bonus = &mut checks[begin..];
+                session.retries.uncounted(|| {
+                    realtime::price_bonus_by_edits(
+                        session, plugin, cases, stages, drawn, tolerances, bonus,
+                    );
+                });
             }
             price::settle_by_common_mistake(&mut checks[begin..]);
             mark(&mut checks[begin..], cases);

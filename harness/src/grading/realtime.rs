@@ -6,8 +6,9 @@ use basecode::gpu::{EMPTY_MAPS, Footprint};
 use basecode::{Image, Vec3};
 
 use super::coverage;
-use super::draw::{Frame, draw, draw_one_each};
+use super::draw::{Frame, draw, draw_each, draw_one_each};
 use super::judged::Judged;
+use super::line_edits::{self, LineEdit};
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
@@ -15,7 +16,7 @@ use super::stages::{MOVED, Stages, negated_normals};
 use super::zoomed;
 use crate::evidence::images::{self, Kind};
 use crate::evidence::pixels;
-use crate::evidence::price::{Class, Price};
+use crate::evidence::price::{self, Class, Price};
 use crate::evidence::shadow_map::{EXCHANGED, Shadows};
 use crate::evidence::stages::VERTEX;
 use crate::evidence::{Check, CheckId, Verdict};
@@ -117,7 +118,7 @@ fn settle_exchanged_visibility(
     let drawn = |judged: &Judged, kind| {
         judged.drawn.iter().find(|drawn| drawn.kind == kind).map(|drawn| drawn.image.clone())
     };
-    let exchanged = |(case, judged): (&PreparedScene, &Judged)| {
+    let seen = |(case, judged): (&PreparedScene, &Judged)| {
         let Expected { unshadowed, unshadowed_mask: mask, .. } = &case.expected;
         let plain = drawn(judged, Kind::Realtime)?;
         let mut pixels = plain.pixels.iter().zip(&mask.pixels);
@@ -125,15 +126,32 @@ fn settle_exchanged_visibility(
         let is_black = pixels.all(|(pixel, value)| apart(*value) || *pixel == Vec3::ZERO);
         let bonus = drawn(judged, Kind::RealtimeShadows)
             .map(|with| shadows(case).judge(&case.entry.name, &with, unshadowed, tolerances));
-        let is_exchanged =
-            |check: &Check| check.mistake == EXCHANGED && check.error <= 1.5 * Class::Slip.price();
-        match bonus {
-            _ if !is_black => None,
-            None => Some(None),
-            Some(check) => check.filter(is_exchanged).map(Some),
-        }
+        Some(SeenVisibility { is_black, bonus })
     };
-    let found: Option<Vec<Option<Check>>> = cases.iter().zip(&*judged).map(exchanged).collect();
+    let seen: Option<Vec<SeenVisibility>> = cases.iter().zip(&*judged).map(seen).collect();
+    if let Some(seen) = seen {
+        settle_exchanged(judged, seen);
+    }
+}
+
+/// What tells of a scene whether lit and dark are exchanged.
+struct SeenVisibility {
+    /// Whether the frame without shadows is all black.
+    is_black: bool,
+    /// The check of the frame with shadows, by a right one without, if the scene has such a frame; nothing in it where
+    /// that tells too little.
+    bonus: Option<Option<Check>>,
+}
+
+fn settle_exchanged(judged: &mut [Judged], seen: Vec<SeenVisibility>) {
+    let is_exchanged =
+        |check: &Check| check.mistake == EXCHANGED && check.error <= 1.5 * Class::Slip.price();
+    let exchanged = |seen: SeenVisibility| match seen.bonus {
+        _ if !seen.is_black => None,
+        None => Some(None),
+        Some(check) => check.filter(is_exchanged).map(Some),
+    };
+    let found: Option<Vec<Option<Check>>> = seen.into_iter().map(exchanged).collect();
     let Some(found) = found.filter(|found| found.iter().any(Option::is_some)) else { return };
     for (judged, bonus) in judged.iter_mut().zip(found) {
         for check in &mut judged.checks {
@@ -295,7 +313,7 @@ fn judge_bonus_without(
 /// Judges the bonus once more where the host's change of what a pass is given mends all frames without shadows: by
 /// visibility, and what is right then is right.
 pub fn judge_bonus_under(
-    stage: &Stage,
+    stage: &dyn Fn(&PreparedScene) -> Stage,
     session: &Session,
     plugin: &Path,
     cases: &[PreparedScene],
@@ -310,7 +328,7 @@ pub fn judge_bonus_under(
         let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
         let Some(with) = Frame::bonus(case) else { continue };
         let drawn = |frame: Frame| {
-            let frame = Frame { stages: vec![stage.clone()], ..frame };
+            let frame = Frame { stages: vec![stage(case)], ..frame };
             let (width, height) = frame.size;
             let outcome = draw(session, Some(plugin), &frame);
             outcome.answer().map(|answer| session::image(&answer.values, width, height))
@@ -326,6 +344,107 @@ pub fn judge_bonus_under(
         }
     }
 }
+
+/// Judges the bonus once more, by visibility, where the frame without shadows shows what belongs there: elsewhere
+/// surfaces are missing that cast shadows all the same.
+pub fn judge_bonus_where_seen(
+    cases: &[PreparedScene],
+    drawn: &[Drawn],
+    tolerances: &Tolerances,
+    checks: &mut [Check],
+) {
+    let bonus = |check: &&mut Check| {
+        [CheckId::BonusImage, CheckId::BonusProbe].contains(&check.id)
+            && check.verdict == Verdict::Fail
+    };
+    for check in checks.iter_mut().filter(bonus) {
+        let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
+        let frame = |kind| {
+            let own = |drawn: &&Drawn| drawn.scene == check.scene && drawn.kind == kind;
+            drawn.iter().find(own).map(|drawn| drawn.image.clone())
+        };
+        let (Some(with), Some(mut without)) = (frame(Kind::RealtimeShadows), frame(Kind::Realtime))
+        else {
+            continue;
+        };
+        for (pixel, right) in without.pixels.iter_mut().zip(&case.expected.unshadowed.pixels) {
+            let is_seen = (*pixel - *right).abs().max_element() <= SEEN * right.max_element();
+            if !is_seen {
+                *pixel = Vec3::ZERO;
+            }
+        }
+        let judged = shadows(case).judge(&check.scene, &with, &without, tolerances);
+        if let Some(judged) =
+            judged.filter(|judged| judged.verdict != Verdict::Fail || judged.error < check.error)
+        {
+            *check = Check { id: check.id, ..judged };
+        }
+    }
+}
+
+/// Prices the bonus as a slip if one word of one line of the submission's own WGSL mends it on every scene that it fails
+/// on, where no known mistake explains it. `drawn` has the frames without shadows.
+pub fn price_bonus_by_edits(
+    session: &Session,
+    plugin: &Path,
+    cases: &[PreparedScene],
+    stages: &Stages,
+    drawn: &[Drawn],
+    tolerances: &Tolerances,
+    checks: &mut [Check],
+) {
+    let is_open = |check: &Check| {
+        [CheckId::BonusImage, CheckId::BonusProbe].contains(&check.id)
+            && check.verdict == Verdict::Fail
+            && !price::are_slight([check])
+            && !price::is_explained(check)
+            // What fails although the picture is right draws no shadow map.
+            && check.measures.iter().any(|measure| !measure.passed)
+    };
+    let fails = |case: &&PreparedScene| {
+        checks.iter().any(|check| is_open(check) && check.scene == case.entry.name)
+    };
+    let mut failing: Vec<&PreparedScene> = cases.iter().filter(fails).collect();
+    failing.sort_by_key(|case| !case.entry.bonus_required);
+    let Some(first) = failing.first() else { return };
+    let shows = |case: &PreparedScene, edits: &[LineEdit]| -> Vec<bool> {
+        let own = |drawn: &&Drawn| drawn.scene == case.entry.name && drawn.kind == Kind::Realtime;
+        let plain = drawn.iter().find(own).map(|drawn| &drawn.image);
+        let frame =
+            |edit: &LineEdit| Some(Frame { stages: vec![edit.stage()], ..Frame::bonus(case)? });
+        let frames: Vec<Frame> = edits.iter().filter_map(frame).collect();
+        let outcomes = draw_each(session, Some(plugin), &frames);
+        let is_right = |(frame, outcome): (&Frame, &Outcome)| {
+            let Some(answer) = outcome.answer() else { return false };
+            let with = session::image(&answer.values, frame.size.0, frame.size.1);
+            let has_map = || {
+                let made = answer.footprint.as_ref();
+                made.is_none_or(|made| no_shadow_map(session, plugin, frame, made, &with).is_none())
+            };
+            shows_its_shadows(case, &with, plain, tolerances)
+                && (!case.entry.bonus_required || has_map())
+        };
+        frames.iter().zip(&outcomes).map(is_right).collect()
+    };
+    let edits = line_edits::all(stages);
+    for edits in edits.chunks(line_edits::TRIED_AT_ONCE) {
+        let right = edits.iter().zip(shows(first, edits)).filter(|(_, right)| *right);
+        let everywhere = |edit: &LineEdit| {
+            failing[1..].iter().all(|case| shows(case, std::slice::from_ref(edit)) == [true])
+        };
+        let Some((edit, _)) = right.into_iter().find(|(edit, _)| everywhere(edit)) else {
+            continue;
+        };
+        for check in checks.iter_mut().filter(|check| is_open(check)) {
+            (check.error, check.mistake) = (Class::Slip.price(), edit.name.to_owned());
+            check.summary = format!("{}: {} ({})", edit.name, edit.place(), check.summary);
+        }
+        return;
+    }
+}
+
+/// The largest relative difference of a pixel from what is right that shows the surface that belongs there.
+const SEEN: f32 = 0.01;
 
 /// Whether a frame itself shows shadows that are right: by another stage than the submission's they may be
 /// right where its own frame shows nothing.
@@ -366,7 +485,8 @@ fn no_shadow_map(
         return none.then(|| why.to_owned());
     }
     let stage = Stage { name: EMPTY_MAPS.to_owned(), text: EMPTY_MAPS.to_owned() };
-    let outcome = draw(session, Some(plugin), &Frame { stages: vec![stage], ..frame.clone() });
+    let stages = [frame.stages.clone(), vec![stage]].concat();
+    let outcome = draw(session, Some(plugin), &Frame { stages, ..frame.clone() });
     let without = session::image(&outcome.answer()?.values, frame.size.0, frame.size.1);
     let mask = &frame.case.expected.offline.mask;
     let inside = |value: u16| {
@@ -477,4 +597,48 @@ fn judge_visibility(
     });
     let mended = mended.or_else(|| again(2, &[]).filter(passes));
     mended.or(own).or(swapped).unwrap_or(check)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(id: CheckId, mistake: &str, error: f64) -> Check {
+        let check = Check::new(id, "s", Verdict::Fail, "");
+        Check { mistake: mistake.to_owned(), error, ..check }
+    }
+
+    /// The verdicts and errors of a scene's frame and bonus frame, where two scenes show this.
+    fn settled(seen: [(bool, Option<Option<(&str, f64)>>); 2]) -> Vec<(Verdict, f64)> {
+        let judged = || {
+            let checks =
+                vec![check(CheckId::ImageRealtime, "", 1.0), check(CheckId::BonusImage, "", 1.0)];
+            Judged { checks, drawn: Vec::new(), fails: false, footprint: None, shading: None }
+        };
+        let mut all = [judged(), judged()];
+        let seen = seen.map(|(is_black, bonus)| {
+            let of = |(mistake, error)| check(CheckId::BonusImage, mistake, error);
+            SeenVisibility { is_black, bonus: bonus.map(|bonus| bonus.map(of)) }
+        });
+        settle_exchanged(&mut all, seen.into());
+        let [first, _] = all;
+        first.checks.iter().map(|check| (check.verdict, check.error)).collect()
+    }
+
+    #[test]
+    fn exchanged_visibility_is_the_bonus_slip_alone() {
+        let slip = Class::Slip.price();
+        let unsettled = vec![(Verdict::Fail, 1.0); 2];
+        let exchanged = (true, Some(Some((EXCHANGED, slip))));
+        let without = (true, None);
+        let paid = vec![(Verdict::Pass, 0.0), (Verdict::Fail, slip)];
+        assert_eq!(settled([exchanged, without]), paid);
+        // A scene that is not black, that shows another mistake, or too little of it.
+        assert_eq!(settled([exchanged, (false, None)]), unsettled);
+        assert_eq!(settled([exchanged, (true, Some(Some(("another", slip))))]), unsettled);
+        assert_eq!(settled([exchanged, (true, Some(Some((EXCHANGED, 0.3))))]), unsettled);
+        assert_eq!(settled([exchanged, (true, Some(None))]), unsettled);
+        // Black frames alone tell nothing.
+        assert_eq!(settled([without, without]), unsettled);
+    }
 }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use basecode::gpu::{MATRICES, NEGATED_NORMALS};
-use basecode::{Image, Matrices};
+use basecode::gpu::{MATRICES, NEGATED_NORMALS, NOTHING_UNSET};
+use basecode::{Image, Matrices, Vec3};
 
 use crate::evidence::stages::{bare, is_template};
 use crate::files::files_below;
@@ -21,7 +21,12 @@ pub struct Stages {
     named: [bool; 3],
     /// Whether there is a vertex stage, and a fragment stage, that is not the template's.
     written: Written,
+    /// The WGSL of the source, by path below `src/`; lines that are none are blank.
+    wgsl: BTreeMap<String, String>,
 }
+
+/// Texts that are longer are no stages that somebody wrote, in bytes.
+const LONGEST_TEXT: usize = 64 << 10;
 
 /// Which kinds of stages a source holds besides the template's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,6 +43,7 @@ impl Default for Stages {
             template: Default::default(),
             named: [false; 3],
             written: Written { vertex: true, fragment: true },
+            wgsl: BTreeMap::new(),
         }
     }
 }
@@ -48,14 +54,38 @@ impl Stages {
     pub fn read(src: &Path, template: &Path) -> Self {
         let stage =
             |src: &Path, name| std::fs::read_to_string(src.join(format!("shaders/{name}.wgsl")));
-        let found = texts(src);
-        Self {
+        let (found, template_texts) = (texts(src), texts(template));
+        let mut stages = Self {
             own: STAGES.map(|name| stage(src, name).ok()),
             template: STAGES.map(|name| stage(template, name).unwrap_or_default()),
             named: STAGES
                 .map(|name| found.values().any(|text| text.contains(&format!("{name}.wgsl")))),
-            written: written(&found, &texts(template)),
+            written: written(&found, &template_texts),
+            wgsl: BTreeMap::new(),
+        };
+        for (path, text) in &found {
+            if template_texts.get(path).is_none_or(|template| !is_template(text, template)) {
+                stages.set_text(&path.to_string_lossy(), text);
+            }
         }
+        stages
+    }
+
+    /// Keeps the WGSL of a file of the source.
+    pub fn set_text(&mut self, path: &str, text: &str) {
+        if text.len() > LONGEST_TEXT {
+            return;
+        }
+        let is_rust = Path::new(path).extension().is_some_and(|ending| ending == "rs");
+        let wgsl = if is_rust { strings_of_stages(text) } else { text.to_owned() };
+        if ["@vertex", "@fragment"].iter().any(|word| wgsl.contains(word)) {
+            self.wgsl.insert(path.to_owned(), wgsl);
+        }
+    }
+
+    /// The WGSL of the source: paths below `src/`, and texts.
+    pub fn wgsl(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.wgsl.iter().map(|(path, text)| (path.as_str(), text.as_str()))
     }
 
     /// All three, when none is missing or the template's.
@@ -119,6 +149,30 @@ fn texts(folder: &Path) -> BTreeMap<PathBuf, String> {
     files.into_iter().filter_map(text).collect()
 }
 
+/// What stands in those strings of a Rust source that hold an entry point; all else is blank.
+fn strings_of_stages(rust: &str) -> String {
+    let (mut strings, mut end) = (Vec::new(), 0);
+    for (at, _) in rust.match_indices("@vertex").chain(rust.match_indices("@fragment")) {
+        let begin = rust[..at].rfind('"').map_or(0, |quote| quote + 1);
+        let length = rust[at..].find('"').unwrap_or(rust.len() - at);
+        strings.push(begin..at + length);
+    }
+    strings.sort_by_key(|range| range.start);
+    let mut text = String::with_capacity(rust.len());
+    let blank = |text: &mut String, from: &str| {
+        text.extend(from.chars().map(|c| if c == '\n' { '\n' } else { ' ' }));
+    };
+    for range in strings {
+        if range.start >= end {
+            blank(&mut text, &rust[end..range.start]);
+            text.push_str(&rust[range.clone()]);
+            end = range.end;
+        }
+    }
+    blank(&mut text, &rust[end..]);
+    text
+}
+
 /// Looks through texts of any kind: WGSL may stand in a Rust string, or be put together by code. A file
 /// that equals the template's, apart from comments and white space, does not count.
 fn written(texts: &BTreeMap<PathBuf, String>, template: &BTreeMap<PathBuf, String>) -> Written {
@@ -139,6 +193,12 @@ fn written(texts: &BTreeMap<PathBuf, String>, template: &BTreeMap<PathBuf, Strin
 /// What the host replaces to have a pass draw a scene whose normals are negated.
 pub fn negated_normals() -> Stage {
     Stage { name: NEGATED_NORMALS.to_owned(), text: NEGATED_NORMALS.to_owned() }
+}
+
+/// What the host replaces to have a pass draw with ones where it sets nothing, and with the light in its place.
+pub fn nothing_unset(light: Vec3) -> Stage {
+    let text = format!("{} {} {}", light.x, light.y, light.z);
+    Stage { name: NOTHING_UNSET.to_owned(), text }
 }
 
 /// What the host replaces to have a pass draw under other matrices.

@@ -47,6 +47,9 @@ impl Integrator for Mistaken {
         if visible == 0.0 && has(M::ShadowColor) {
             return Vec3::splat(0.05);
         }
+        if visible == 0.0 && has(M::ShadowAlbedo) {
+            return scene.material_of(i.shape).diffuse.average();
+        }
         if visible == 0.0 || has(M::IntegratorBlack) {
             return Vec3::ZERO;
         }
@@ -55,6 +58,7 @@ impl Integrator for Mistaken {
         }
         let distance = match () {
             () if has(M::RayDistance) => i.t,
+            () if has(M::DistanceWithoutZ) => to_light.with_z(0.0).length(),
             () if has(M::DistanceFromOrigin) => self.light_position(scene).length(),
             () => distance,
         };
@@ -113,6 +117,15 @@ impl Mistaken {
         if has(M::DirectionsInWorld) {
             (i.wi, i.wo) = (direction, -ray.direction);
         }
+        if has(M::WiToWorld) {
+            i.wi = i.frame_ns.to_world(wi);
+        }
+        if has(M::WoLocalTwice) {
+            i.wo = i.frame_ns.to_local(i.wo);
+        }
+        if has(M::WiAxesSwapped) {
+            i.wi = Vec3::new(i.wi.y, i.wi.x, i.wi.z);
+        }
         if has(M::WiReversed) || has(M::WiFromLight) {
             i.wi = -i.wi;
         }
@@ -170,6 +183,7 @@ impl Mistaken {
                 }
                 corners.iter().sum::<Vec3>() / corners.len() as f32
             }
+            _ if self.mistakes.has(M::LightTooHigh) => scene.first_light_position() + 0.1 * Vec3::Y,
             _ => scene.first_light_position(),
         }
     }
@@ -185,6 +199,7 @@ impl Mistaken {
             () if has(M::OverRCubed) => distance * squared,
             () if has(M::OverRFourth) => squared * squared,
             () if has(M::Softened) => 1.0 + squared,
+            () if has(M::GameAttenuation) => 1.0 + 0.09 * distance + 0.032 * squared,
             () => squared,
         };
         let incident = self.light_intensity(scene) / falloff;

@@ -96,6 +96,11 @@ fn spoil_objects(mistakes: &Mistakes, gpu: &Gpu, scene: &Scene, pass: &mut Simpl
     {
         pass.objects.remove(last);
     }
+    if has(M::HalfOfTriangles) {
+        for object in &mut pass.objects {
+            object.mesh.index_count = object.mesh.index_count / 6 * 3;
+        }
+    }
     if has(M::PassBlack) {
         pass.objects.clear();
     }

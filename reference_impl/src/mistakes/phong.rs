@@ -190,6 +190,9 @@ impl Bsdf for Phong {
         if has(M::PhongDiffuseNormalised) {
             diffuse *= (self.exponent + 2.0) * INV_TWO_PI;
         }
+        if has(M::PhongDiffuseLessSpecular) {
+            diffuse *= Vec3::ONE - ks;
+        }
         if has(M::PhongKsRaised) {
             ks = ks.powf(self.exponent);
         }

@@ -29,6 +29,9 @@ pub fn render(
         let whole = |size: usize| size / 20 * 20;
         let mut before = Vec3::ZERO;
         for (x, pixel) in row.iter_mut().enumerate() {
+            if has(M::WholeEightsOnly) && x >= job.width / 8 * 8 {
+                continue;
+            }
             if has(M::WholeTilesOnly) && (x >= whole(job.width) || y >= whole(job.height)) {
                 continue;
             }

@@ -25,7 +25,7 @@ pub(crate) struct Pipelines {
 
 /// A shape on the device.
 pub(crate) struct Object {
-    mesh: Mesh,
+    pub(crate) mesh: Mesh,
     placement: Uniform,
     pub(crate) material: Material,
     pub(crate) surface: Uniform,

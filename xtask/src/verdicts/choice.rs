@@ -26,7 +26,7 @@ pub const PLAIN_SEED: u64 = SEEDS[0];
 
 /// Pairs of mistakes that a student may well make together, and mistakes of renderers that do something otherwise.
 /// Not among them: one that hides the other, such as an intensity that was never set.
-const PAIRS: [[&str; 2]; 37] = [
+const PAIRS: [[&str; 2]; 41] = [
     ["diffuse-no-pi", "phong-n-plus-1"],
     ["diffuse-no-pi", "light-two-cosines"],
     ["diffuse-no-wi-test", "shadow-none"],
@@ -54,6 +54,10 @@ const PAIRS: [[&str; 2]; 37] = [
     [ELSEWHERE, "diffuse-fs-no-pi"],
     [ELSEWHERE, "phong-fs-n-plus-1"],
     [ELSEWHERE, "vertex-normal-negated"],
+    [ELSEWHERE, "vertex-depth-is-w"],
+    [ELSEWHERE, "vertex-clip-w-zero"],
+    [ELSEWHERE, "phong-fs-facing-reversed"],
+    [ELSEWHERE, "pass-half-of-triangles"],
     [ELSEWHERE, "pass-rho-swapped"],
     [ELSEWHERE, "pass-camera-unset"],
     ["third-varying", "vertex-normal-negated"],

@@ -5,9 +5,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::device::{Footprint, Overrides, Watch};
+use super::device::{Footprint, Overrides, Watch, named_position};
 use super::message::readable;
-use super::{Device, EMPTY_MAPS, EVERY_FRAGMENT, Layouts, OUTLINES, Queue, USUAL_PIPELINES};
+use super::{
+    Device, EDITED_LINE, EMPTY_MAPS, EVERY_FRAGMENT, FrameUniforms, Layouts, NOTHING_UNSET,
+    OUTLINES, Queue, USUAL_PIPELINES,
+};
 use crate::{Error, Result};
 
 /// Which kind of adapter to draw with.
@@ -153,8 +156,8 @@ impl Gpu {
     }
 
     /// Replaces the text of shader stages, by stage name (`simple.vs`, `diffuse.fs`, `phong.fs`).
-    /// [`EVERY_FRAGMENT`], [`OUTLINES`], [`EMPTY_MAPS`] and [`USUAL_PIPELINES`] change pipelines that are made from
-    /// then on.
+    /// [`EVERY_FRAGMENT`], [`OUTLINES`], [`EMPTY_MAPS`], [`USUAL_PIPELINES`] and [`EDITED_LINE`] change modules and
+    /// pipelines that are made from then on, and [`NOTHING_UNSET`] what is written to buffers.
     pub fn replace_stages(&mut self, stages: Vec<(String, String)>) {
         let find = |wanted: &str| stages.iter().find(|(name, _)| name == wanted);
         self.watch.set_overrides(Overrides {
@@ -162,6 +165,8 @@ impl Gpu {
             outlines: find(OUTLINES).is_some(),
             empty_maps: find(EMPTY_MAPS).is_some(),
             usual: find(USUAL_PIPELINES).map(|(_, text)| text.clone()),
+            edited: find(EDITED_LINE).map(|(_, text)| text.clone()),
+            nothing_unset: find(NOTHING_UNSET).map(|(_, text)| text.clone()),
         });
         self.stages = stages;
     }
@@ -172,6 +177,17 @@ impl Gpu {
         let replaced = self.stages.iter().find(|(stage, _)| stage == name);
         let text = replaced.map_or(own, |(_, text)| text);
         text.strip_prefix('\u{feff}').unwrap_or(text)
+    }
+
+    /// A frame's uniforms, with the light in its place if it has none and the host asks for [`NOTHING_UNSET`].
+    pub(super) fn nothing_unset(&self, values: &FrameUniforms) -> FrameUniforms {
+        let light = self.watch.overrides().nothing_unset.as_deref().and_then(named_position);
+        match light {
+            Some(light) if values.light_position.truncate() == glam::Vec3::ZERO => {
+                FrameUniforms { light_position: light.extend(1.0), ..*values }
+            }
+            _ => *values,
+        }
     }
 
     /// What was handed to the device since the last call.

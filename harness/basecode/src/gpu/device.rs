@@ -32,6 +32,15 @@ pub const USUAL_PIPELINES: &str = "usual.pipelines";
 /// frame's camera. What a pass draws rightly then, it draws by a slip with them.
 pub const MATRICES: &str = "matrices";
 
+/// A host switch in the form of a stage name. When the host sets it, its text holds two lines: wherever the first one
+/// stands in WGSL, the second one stands instead. What a pass draws rightly then, it draws by a slip in that line.
+pub const EDITED_LINE: &str = "edited.line";
+/// A host switch in the form of a stage name. When the host sets it, four floats in uniforms and storage that are all
+/// zero are all one: what a pass forgets to set leaves nothing dark then. The text holds the light's position, such as
+/// `1 2 3`, which [`crate::gpu::FrameUniforms`] without one have. Resources of a [`crate::gpu::ShadowMap`] stay as they
+/// are.
+pub const NOTHING_UNSET: &str = "nothing.unset";
+
 /// Name of the entry point in the text of [`EVERY_FRAGMENT`].
 const SHOWN: &str = "umbra_shown";
 
@@ -107,6 +116,43 @@ pub(super) struct Overrides {
     pub empty_maps: bool,
     /// The text of [`USUAL_PIPELINES`].
     pub usual: Option<String>,
+    /// The text of [`EDITED_LINE`].
+    pub edited: Option<String>,
+    /// The text of [`NOTHING_UNSET`].
+    pub nothing_unset: Option<String>,
+}
+
+/// The position that a text of [`NOTHING_UNSET`] names.
+pub(super) fn named_position(text: &str) -> Option<glam::Vec3> {
+    let numbers: Vec<f32> = text.split(' ').filter_map(|number| number.parse().ok()).collect();
+    <[f32; 3]>::try_from(numbers).ok().map(glam::Vec3::from)
+}
+
+/// WGSL with a line in place of another, as a text of [`EDITED_LINE`] says.
+fn with_line(text: &str, edit: &str) -> String {
+    let (from, to) = edit.split_once('\n').unwrap_or((edit, edit));
+    let line =
+        |line: &str| if line.trim() == from.trim() { to.to_owned() } else { line.to_owned() };
+    text.lines().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Whether a buffer holds what a stage reads by name, and no vertices.
+fn takes_values(usage: wgpu::BufferUsages) -> bool {
+    use wgpu::BufferUsages as Of;
+    usage.intersects(Of::UNIFORM | Of::STORAGE) && !usage.intersects(Of::VERTEX | Of::INDEX)
+}
+
+/// Bytes of four floats.
+const FOUR_FLOATS: usize = 16;
+
+/// What is written of a buffer with ones where four floats are all zero.
+fn nothing_unset(data: &[u8]) -> Vec<u8> {
+    let mut data = data.to_owned();
+    for four in data.chunks_exact_mut(FOUR_FLOATS).filter(|four| four.iter().all(|byte| *byte == 0))
+    {
+        four.copy_from_slice(&[1.0f32.to_ne_bytes(); 4].concat());
+    }
+    data
 }
 
 /// The vertex attributes that a text of [`USUAL_PIPELINES`] names.
@@ -169,7 +215,7 @@ impl Watch {
         self.uploaded.fetch_add(bytes, Relaxed);
     }
 
-    fn overrides(&self) -> Overrides {
+    pub(super) fn overrides(&self) -> Overrides {
         self.overrides.lock().map(|overrides| overrides.clone()).unwrap_or_default()
     }
 }
@@ -242,7 +288,11 @@ impl Device {
         let wgpu::ShaderModuleDescriptor { label, mut source } = desc;
         if let wgpu::ShaderSource::Wgsl(text) = &mut source {
             self.watch.upload((text.len() as u64).saturating_sub(LONG_WGSL));
-            if let Some(shown) = self.watch.overrides().shown {
+            let Overrides { shown, edited, .. } = self.watch.overrides();
+            if let Some(edit) = edited {
+                *text = with_line(text, &edit).into();
+            }
+            if let Some(shown) = shown {
                 *text = format!("{text}\n{shown}\n").into();
             }
         }
@@ -337,6 +387,15 @@ impl Device {
     pub fn create_buffer(&self, desc: &wgpu::BufferDescriptor) -> wgpu::Buffer {
         if desc.mapped_at_creation || desc.usage.contains(wgpu::BufferUsages::MAP_WRITE) {
             self.watch.upload(desc.size);
+        } else if takes_values(desc.usage) && self.watch.overrides().nothing_unset.is_some() {
+            // What nobody writes is zero otherwise.
+            let contents = &nothing_unset(&vec![0; desc.size as usize]);
+            let (label, usage) = (desc.label, desc.usage);
+            return self.device.create_buffer_init(&BufferInitDescriptor {
+                label,
+                contents,
+                usage,
+            });
         }
         self.device.create_buffer(desc)
     }
@@ -344,6 +403,10 @@ impl Device {
     /// As [`DeviceExt::create_buffer_init`].
     pub fn create_buffer_init(&self, desc: &BufferInitDescriptor) -> wgpu::Buffer {
         self.watch.upload(desc.contents.len() as u64);
+        if takes_values(desc.usage) && self.watch.overrides().nothing_unset.is_some() {
+            let contents = &nothing_unset(desc.contents);
+            return self.device.create_buffer_init(&BufferInitDescriptor { contents, ..*desc });
+        }
         self.device.create_buffer_init(desc)
     }
 
@@ -382,6 +445,14 @@ impl Queue {
 
     /// As [`wgpu::Queue::write_buffer`].
     pub fn write_buffer(&self, buffer: &wgpu::Buffer, offset: u64, data: &[u8]) {
+        match takes_values(buffer.usage()) && self.watch.overrides().nothing_unset.is_some() {
+            true => self.write_exactly(buffer, offset, &nothing_unset(data)),
+            false => self.write_exactly(buffer, offset, data),
+        }
+    }
+
+    /// The same, whatever the host asks for.
+    pub(super) fn write_exactly(&self, buffer: &wgpu::Buffer, offset: u64, data: &[u8]) {
         self.watch.upload(data.len() as u64);
         self.queue.write_buffer(buffer, offset, data);
     }

@@ -37,8 +37,8 @@ pub use contract::{
     OBJECT_GROUP, ObjectUniforms, SHADOW_GROUP, SHADOW_LAYERS, ShadowUniforms, VERTEX_STRIDE,
 };
 pub use device::{
-    Device, EMPTY_MAPS, EVERY_FRAGMENT, Footprint, MATRICES, NEGATED_NORMALS, OUTLINES, Queue,
-    USUAL_PIPELINES,
+    Device, EDITED_LINE, EMPTY_MAPS, EVERY_FRAGMENT, Footprint, MATRICES, NEGATED_NORMALS,
+    NOTHING_UNSET, OUTLINES, Queue, USUAL_PIPELINES,
 };
 pub use layouts::Layouts;
 pub use matrices::{look_at, orthographic, perspective};

@@ -99,6 +99,8 @@ impl ShadowMap {
         });
         let bytes = bytemuck::bytes_of(values);
         let buffer = filled_buffer(gpu, "shadow", bytes, wgpu::BufferUsages::STORAGE);
+        // Where nothing is unset, its zeros still say that no shadows are drawn.
+        gpu.queue.write_exactly(&buffer, 0, bytes);
         let all = view(wgpu::TextureViewDimension::D2Array, 0, count);
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {

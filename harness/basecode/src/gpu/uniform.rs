@@ -12,7 +12,8 @@ pub struct Uniform {
 impl Uniform {
     /// For bind group 0.
     pub fn frame(gpu: &Gpu, values: &FrameUniforms) -> Self {
-        Self::new(gpu, "frame", &gpu.layouts.frame, bytemuck::bytes_of(values))
+        let values = gpu.nothing_unset(values);
+        Self::new(gpu, "frame", &gpu.layouts.frame, bytemuck::bytes_of(&values))
     }
 
     /// For bind group 1.
@@ -27,7 +28,8 @@ impl Uniform {
 
     /// Replaces what a frame's uniform buffer holds, from the next submission on.
     pub fn write_frame(&self, gpu: &Gpu, values: &FrameUniforms) {
-        gpu.queue.write_buffer(&self.buffer, 0, bytemuck::bytes_of(values));
+        let values = gpu.nothing_unset(values);
+        gpu.queue.write_buffer(&self.buffer, 0, bytemuck::bytes_of(&values));
     }
 
     fn new(gpu: &Gpu, name: &str, layout: &wgpu::BindGroupLayout, bytes: &[u8]) -> Self {

@@ -8,6 +8,7 @@ mod material;
 mod shadows;
 mod unshadowed;
 
+use basecode::glam::{DMat3, DVec3};
 use basecode::{Frame, MaterialModel, Ray, Scene, Vec3};
 
 use super::Check;
@@ -26,6 +27,10 @@ pub(super) const RELATIVE: f64 = 3e-3;
 /// Fraction of the rays that may still differ: a student's own intersection code meets other triangles along seams that
 /// no mask knows.
 pub(super) const STRAY_FRACTION: f64 = 2e-3;
+/// Steps of Gauss and Newton that find a light.
+const LIGHT_STEPS: usize = 20;
+/// Number of distances that tell where a light stands.
+const LEAST_DISTANCES: usize = 20;
 /// Shadowed rays in contact: their occluder is nearer than this, as a fraction of the light's distance.
 const CONTACT: f32 = 0.03;
 /// Number of rays in contact that are asked.
@@ -183,6 +188,38 @@ impl RayBatch {
         (self.light - self.points[index].position) / self.points[index].distance
     }
 
+    /// The same with the light elsewhere: what each ray's point sees of it there, all of them lit.
+    fn with_light(&self, light: Vec3) -> Self {
+        let seen = |point: &SurfacePoint| {
+            let to_light = light - point.position;
+            let wi = Frame::from_normal(point.normal).to_local(to_light.normalize_or_zero());
+            SurfacePoint { wi, distance: to_light.length(), ..*point }
+        };
+        Self { light, points: self.points.iter().map(seen).collect(), ..self.clone() }
+    }
+
+    /// Where the light stands, if the radiance of each of these rays is what is right there times the inverse square
+    /// of another distance: by least squares, from where it belongs on. `ratios` are those of what is right to what was
+    /// found.
+    fn light_by_distances(&self, ratios: &[(usize, f64)]) -> Option<Vec3> {
+        let mut light = self.light.as_dvec3();
+        for _ in 0..LIGHT_STEPS {
+            let (mut matrix, mut right) = (DMat3::ZERO, DVec3::ZERO);
+            for (ray, ratio) in ratios {
+                let point = &self.points[*ray];
+                let from_point = light - point.position.as_dvec3();
+                let squared = ratio * f64::from(point.distance).powi(2);
+                // Relative to it: what is near counts as much as what is far.
+                let row = 2.0 * from_point / squared;
+                matrix += DMat3::from_cols(row * row.x, row * row.y, row * row.z);
+                right += row * (1.0 - from_point.length_squared() / squared);
+            }
+            light += matrix.inverse() * right;
+        }
+        let light = light.as_vec3();
+        (ratios.len() >= LEAST_DISTANCES && light.is_finite()).then_some(light)
+    }
+
     /// (wi, wo) as they reach the BSDF along ray `index`.
     fn directions(&self, index: usize, directions: Directions) -> (Vec3, Vec3) {
         let point = &self.points[index];
@@ -202,6 +239,12 @@ impl RayBatch {
             Directions::Exchanged => (wo, wi),
             Directions::WoTwice => (wo, wo),
             Directions::WiTwice => (wi, wi),
+            Directions::WiToWorld => (frame.to_world(world_wi), wo),
+            Directions::BothToWorld => (frame.to_world(world_wi), frame.to_world(world_wo)),
+            Directions::WoLocalTwice => (wi, frame.to_local(wo)),
+            Directions::WiLocalTwice => (frame.to_local(wi), wo),
+            Directions::WiTurned([x, y, z]) => (Vec3::new(wi[x], wi[y], wi[z]), wo),
+            Directions::WoTurned([x, y, z]) => (wi, Vec3::new(wo[x], wo[y], wo[z])),
             Directions::LightFromOrigin => (local(self.light), wo),
             Directions::LightFromViewer => (local(self.light - point.ray.origin), wo),
             Directions::LightPlusPoint => (local(self.light + point.position), wo),
@@ -216,12 +259,23 @@ impl RayBatch {
         shading: &Shading,
         bsdf: &dyn Fn(Vec3, Vec3) -> [f64; 3],
     ) -> [f64; 3] {
+        if shading.light_offset != [0.0; 3] {
+            let light = self.light + Vec3::from(shading.light_offset);
+            let moved = Self { points: vec![self.points[index]], ..Self::default() };
+            let moved = Self { intensity: self.intensity, ..moved.with_light(light) };
+            return moved.witnessed(0, &Shading { light_offset: [0.0; 3], ..*shading }, bsdf);
+        }
         let point = &self.points[index];
         let r = match shading.directions {
             Directions::LightFromOrigin => self.light.length(),
             Directions::LightFromViewer => (self.light - point.ray.origin).length(),
             Directions::LightPlusPoint => (self.light + point.position).length(),
             _ if shading.from_origin => self.light.length(),
+            _ if shading.without_axis.is_some() => {
+                let mut to_light = self.light - point.position;
+                to_light[shading.without_axis.unwrap_or_default()] = 0.0;
+                to_light.length()
+            }
             _ if shading.along_ray => (point.position - point.ray.origin).length(),
             _ => point.distance,
         };

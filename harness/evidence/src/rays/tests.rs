@@ -307,3 +307,137 @@ fn rays_that_no_light_reaches_must_be_black() {
     assert_eq!((blue.verdict, blue.error), (Verdict::Fail, 0.02));
     assert!(blue.summary.contains("5 of 5 rays"), "{}", blue.summary);
 }
+
+/// Lit points of a hilly floor, seen from above.
+fn floor(light: Vec3) -> RayBatch {
+    let eye = Vec3::new(0.5, 1.0, 9.0);
+    let point = |index: usize| {
+        let (x, y) = ((index % 9) as f32 - 4.0, (index / 9) as f32 - 4.0);
+        let position = Vec3::new(x, y, 0.4 * (1.3 * x).sin() + 0.3 * (0.9 * y).cos());
+        let normal = Vec3::new(0.7 * x.sin(), 0.6 * y.cos(), 1.0).normalize();
+        let frame = Frame::from_normal(normal);
+        let (to_light, to_eye) = (light - position, (eye - position).normalize());
+        SurfacePoint {
+            ray: Ray::new(eye, -to_eye),
+            shape: 0,
+            primitive: 0,
+            position,
+            normal,
+            wo: frame.to_local(to_eye),
+            wi: frame.to_local(to_light.normalize()),
+            distance: to_light.length(),
+            visibility: Visibility::Clear,
+        }
+    };
+    let points: Vec<SurfacePoint> = (0..81).map(point).collect();
+    RayBatch {
+        rays: points.iter().map(|p| p.ray).collect(),
+        pixels: (0..81).collect(),
+        lit: points.len(),
+        points,
+        light,
+        ..batch()
+    }
+}
+
+#[test]
+fn a_slip_with_frames_distances_or_the_lights_place_is_one() {
+    let batch = floor(Vec3::new(1.0, -1.5, 4.0));
+    let witnesses: [&dyn Fn(Vec3, Vec3) -> [f64; 3]; 3] = [
+        &|_, _| [1.0, 0.5, 0.25],
+        &|wi, wo| {
+            [wi.x + 2.0 * wi.y + 4.0 * wi.z, wo.x + 2.0 * wo.y, 1.0].map(|v| f64::from(v) + 3.0)
+        },
+        &|wi, wo| [f64::from(wi.dot(wo)) + 2.0; 3],
+    ];
+    let judge = |shading: &Shading| {
+        let values = witnesses.map(|witness| -> Vec<[f32; 3]> {
+            let value = |ray| batch.witnessed(ray, shading, witness).map(|v| v as f32);
+            (0..batch.lit).map(value).collect()
+        });
+        let of = witnesses
+            .map(|witness| move |ray: usize, shading: &Shading| batch_of(ray, shading, witness));
+        let answers: Vec<Unshadowed> = (0..witnesses.len())
+            .map(|at| Unshadowed {
+                witness: "",
+                of: &of[at],
+                values: &values[at],
+                black_below: true,
+            })
+            .collect();
+        judge_unshadowed(&batch, &answers, &Convention::default(), &changes::integrator_changes())
+    };
+    fn batch_of(
+        ray: usize,
+        shading: &Shading,
+        witness: &dyn Fn(Vec3, Vec3) -> [f64; 3],
+    ) -> [f64; 3] {
+        floor(Vec3::new(1.0, -1.5, 4.0)).witnessed(ray, shading, witness)
+    }
+    let right = Shading::default();
+    assert_eq!(judge(&right).verdict, Verdict::Pass);
+    let directions = |directions| Shading { directions, ..right };
+    for (slip, name) in [
+        (Shading { light_offset: [0.0, 0.8, 0.0], ..right }, "the light stands elsewhere"),
+        (Shading { without_axis: Some(2), ..right }, "z is left out of r^2"),
+        (directions(Directions::WiToWorld), "wi is brought to world space"),
+        (directions(Directions::WoLocalTwice), "wo is brought to the local frame twice"),
+        (directions(Directions::WiTurned([1, 0, 2])), "x and y of wi are exchanged"),
+    ] {
+        let check = judge(&slip);
+        assert_eq!(check.mistake, name);
+        assert!((check.error - Class::Slip.price()).abs() < 2e-3, "{name}: {}", check.error);
+    }
+}
+
+#[test]
+fn shadows_are_those_of_the_light_where_the_integrator_has_it() {
+    // A wall whose edge is at x = 0, half way up.
+    let blocker = |ray: &Ray| {
+        let t = (2.0 - ray.origin.z) / ray.direction.z;
+        (t < ray.max_t && ray.at(t).x < 0.0).then_some(1)
+    };
+    let occluders = Occluders { blocker: &blocker, is_phong: &|_| false };
+    let light = Vec3::new(1.0, -1.5, 4.0);
+    let batch = |light: Vec3| {
+        let mut batch = floor(light);
+        let blocked = |p: &SurfacePoint| {
+            let toward = (light - p.position) / p.distance;
+            blocker(&Ray::segment(p.position, toward, 1e-4, p.distance)).is_some()
+        };
+        let (dark, lit): (Vec<_>, Vec<_>) = batch.points.iter().copied().partition(blocked);
+        batch.lit = lit.len();
+        batch.points = lit.into_iter().chain(dark).collect();
+        batch
+    };
+    let right = batch(light);
+    // What is seen of a light in another place, along the rays of the right one.
+    let seen = |light: Vec3, shadows_of: Vec3| {
+        let radiance = |p: &SurfacePoint| {
+            let squared = f64::from((light - p.position).length_squared());
+            witness(p).map(|v| v / squared)
+        };
+        let without: Vec<[f32; 3]> = right
+            .points
+            .iter()
+            .map(|p| std::array::from_fn(|c| (radiance(p)[c] * [1.0, 2.0, 3.0][c]) as f32))
+            .collect();
+        let with: Vec<[f32; 3]> = right
+            .points
+            .iter()
+            .zip(&without)
+            .map(|(p, lit)| {
+                let way = shadows_of - p.position;
+                let ray = Ray::segment(p.position, way.normalize(), 1e-4, way.length());
+                if blocker(&ray).is_some() { [0.0; 3] } else { *lit }
+            })
+            .collect();
+        judge_shadows(&right, &witness, (&with, &without), (&without, &without), &occluders)
+    };
+    let elsewhere = light + Vec3::X;
+    assert_eq!(seen(light, light).verdict, Verdict::Pass);
+    assert_eq!(seen(elsewhere, elsewhere).verdict, Verdict::Pass);
+    // Of a light that is where it belongs, shadows are too.
+    assert_eq!(seen(light, elsewhere).verdict, Verdict::Fail);
+    assert_eq!(seen(elsewhere, light).verdict, Verdict::Pass);
+}

@@ -122,9 +122,33 @@ fn price_of(
     let mean = (sum / (3 * found.len()) as f64).max(f64::MIN_POSITIVE);
     let group = |index: usize| index / batch.lit;
     let unit = |_| mean;
-    let answers =
-        Answers { found: &found, of: &of, unit: &unit, group: &group, relative: RELATIVE, changes };
+    let mut changes = changes.to_vec();
+    changes.extend(light_elsewhere(batch, &answers[0], right));
+    let answers = Answers {
+        found: &found,
+        of: &of,
+        unit: &unit,
+        group: &group,
+        relative: RELATIVE,
+        changes: &changes,
+    };
     answers.price(Some(raw))
+}
+
+/// The mistake of a light in another place.
+pub(super) const ELSEWHERE: &str = "the light stands elsewhere";
+
+/// The light in the place that the radiance under a constant BSDF tells, as a mistake.
+fn light_elsewhere(batch: &RayBatch, constant: &Unshadowed, right: &Shading) -> Option<Change> {
+    let ratio = |ray: usize| {
+        let found: f64 = constant.values[ray].iter().map(|v| f64::from(*v)).sum();
+        let expected: f64 = (constant.of)(ray, right).iter().sum();
+        let ratio = expected / found;
+        (ratio.is_finite() && ratio > 0.0).then_some((ray, ratio))
+    };
+    let ratios: Vec<(usize, f64)> = (0..batch.lit).filter_map(ratio).collect();
+    let offset = batch.light_by_distances(&ratios)? - batch.light;
+    Some(Change::slip(ELSEWHERE, Shading { light_offset: offset.into(), ..Shading::default() }))
 }
 
 /// How one witness' answers differ from the right ones.

@@ -94,7 +94,7 @@ impl CheckId {
                 &[RuleId::LoopAgreement],
             ),
             Self::LoopSamples => info(
-                "Renders at 16 samples per pixel, 64 pixels wide, without shadows. The result must be the \
+                "Renders at 16 samples per pixel, 63 pixels wide, without shadows. The result must be the \
                     average of the integrator's radiance along 16 stratified rays of each pixel, whether \
                     that radiance is right or wrong. This tests sum, count and spread on both axes. Random, \
                     stratified, Sobol, lattice and grid samples pass.",

@@ -29,6 +29,7 @@ mistakes! {
     "diffuse-fs-no-wo-test": (DIFFUSE, FACING, "if cos_i <= 0.0 {");
     "diffuse-fs-no-wi-test": (DIFFUSE, FACING, "if cos_o <= 0.0 {");
     "diffuse-fs-no-tests": (DIFFUSE, FACING, "if false {");
+    "diffuse-fs-wrapped": (DIFFUSE, COSINE, "let cos_i = 0.5 * dot(n, wi) + 0.5;");
     "diffuse-fs-abs-cosine": (DIFFUSE, COSINE, "let cos_i = abs(dot(n, wi));");
     "diffuse-fs-view-space-light": (DIFFUSE, TO_LIGHT, VIEW_LIGHT);
     "diffuse-fs-light-direction": (DIFFUSE, TO_LIGHT, NO_MINUS);

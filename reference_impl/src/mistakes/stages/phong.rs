@@ -78,5 +78,8 @@ mistakes! {
     "phong-fs-gamma": (PHONG, RETURN, GAMMA);
     "phong-fs-clamped": (PHONG, RETURN, CLAMPED);
     "phong-fs-black": (PHONG, RETURN, BLACK);
+    "phong-fs-facing-reversed": (PHONG, FACING, "if cos_i >= 0.0 || cos_o <= 0.0 {");
+    "phong-fs-wo-not-normalized":
+        (PHONG, TO_VIEWER, "let wo = frame.camera_position.xyz - world_position;");
     "phong-fs-ambient": (PHONG, RETURN, "return vec4f(radiance + 0.1 * material.rho_d.rgb, 1.0);");
 }

@@ -33,6 +33,9 @@ mistakes! {
         (VS, CLIP, "vec4f(1.0, -1.0, 1.0, 1.0) * (frame.projection * frame.view * world);");
     "vertex-mirrored":
         (VS, CLIP, "vec4f(-1.0, 1.0, 1.0, 1.0) * (frame.projection * frame.view * world);");
+    "vertex-depth-is-w": (VS, CLIP, "(frame.projection * frame.view * world).xyww;");
+    "vertex-clip-w-zero":
+        (VS, RETURN, "out.clip_position = vec4f(out.clip_position.xyz, 0.0);\n    return out;");
     "vertex-shifted":
         (VS, RETURN, "out.clip_position.x += 0.002 * out.clip_position.w;\n    return out;");
 }
