@@ -20,7 +20,7 @@ cargo build --release --workspace
 
 # Compiles the template, prepares all scenes, held-back ones too: a submission does not wait for that.
 target/release/umbra grade student_template --isolation reduced --jobs 1 \
-    --perturb "$(cat "$source_dir/held-back-seed.txt")" --report /tmp/umbra-first
+    --held-back "$(cat "$source_dir/held-back-seed.txt")" --report /tmp/umbra-first
 rm -rf /tmp/umbra-first
 
 # Students' code runs as another user, and need not read right answers, the grader, or the seed. Programs, scenes and the

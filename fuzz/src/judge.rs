@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use basecode::exr_io::{Precision, decode_exr, write_exr};
 use basecode::{Image, Matrices, Vec3};
 use umbra::assignment::SceneEntry;
-use umbra::evidence::images::{self, Kind};
+use umbra::evidence::images::{self, ImageKind};
 use umbra::evidence::rays::RayBatch;
 use umbra::evidence::stage_film::StageFilm;
 use umbra::evidence::stages::{BoundValue, judge_pass};
@@ -100,7 +100,7 @@ static CASE: LazyLock<PreparedScene> = LazyLock::new(|| {
             weight: 1.0,
             film: None,
             stored: false,
-            perturb: false,
+            held_back_copies: false,
             submitted: None,
         },
         held_back: false,
@@ -130,8 +130,14 @@ pub fn judge(bytes: &[u8]) {
     let image = through_a_file(bits, precision);
     let case = &*CASE;
     let tolerances = Tolerances::default();
-    for kind in [Kind::Offline { spp: case.spp }, Kind::SubmittedRealtime, Kind::SubmittedShadows] {
-        for drawn_as in [Kind::Offline { spp: case.spp }, Kind::Realtime, Kind::RealtimeShadows] {
+    for kind in [
+        ImageKind::Offline { spp: case.spp },
+        ImageKind::SubmittedRealtime,
+        ImageKind::SubmittedShadows,
+    ] {
+        for drawn_as in
+            [ImageKind::Offline { spp: case.spp }, ImageKind::Realtime, ImageKind::RealtimeShadows]
+        {
             let submitted = SubmittedImage::new(case, "a.exr", kind, Ok(image.clone()));
             let own = Image { pixels: image.pixels.iter().rev().copied().collect(), ..image };
             let drawn = [Drawn { scene: "a".into(), kind: drawn_as, image: own }];
@@ -139,7 +145,7 @@ pub fn judge(bytes: &[u8]) {
         }
     }
     // The same bits may come from the code itself.
-    for kind in [Kind::Offline { spp: 1 }, Kind::Realtime, Kind::RealtimeShadows] {
+    for kind in [ImageKind::Offline { spp: 1 }, ImageKind::Realtime, ImageKind::RealtimeShadows] {
         let expected = &case.expected;
         check(&[images::judge(
             CheckId::ImageOffline,

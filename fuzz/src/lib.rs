@@ -12,7 +12,7 @@ use basecode::exr_io::{MAX_PIXELS, MAX_SIDE, decode_exr};
 use basecode::scene::{Scene, SceneConfig};
 use umbra::decode::read_answer;
 use umbra::intake::{
-    Finding, IntakeError, Limits, SubmittedConfig, TreeSpec, scan_source, unpack_bytes,
+    ArchiveLimits, Finding, IntakeError, SubmittedConfig, TreeSpec, scan_source, unpack_bytes,
     validate_submission,
 };
 use umbra::worker::{SLOT_BYTES, SlotState};
@@ -20,7 +20,7 @@ use umbra::worker::{SLOT_BYTES, SlotState};
 pub use judge::judge;
 
 /// Small, so that bombs are small.
-const LIMITS: Limits = Limits {
+const LIMITS: ArchiveLimits = ArchiveLimits {
     max_entries: 64,
     max_total_mib: 4,
     max_file_mib: 2,

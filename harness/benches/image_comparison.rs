@@ -28,8 +28,8 @@ static IMAGES: LazyLock<Images> = LazyLock::new(|| {
     let mut mask = RegionMask::background(WIDTH, HEIGHT);
     mask.regions.push(Region { name: "wall".into(), lit: true, exponent: 20.0 });
     mask.pixels.fill(1);
-    let (mean, variance, centre) = (noise(0.5), noise(0.001), noise(0.5));
-    let reference = ReferenceImage::new(mean, variance, 256, centre, mask).expect("of one size");
+    let (mean, variance, center) = (noise(0.5), noise(0.001), noise(0.5));
+    let reference = ReferenceImage::new(mean, variance, 256, center, mask).expect("of one size");
     Images { actual: noise(0.5), reference, tolerances: Tolerances::default() }
 });
 
@@ -54,13 +54,13 @@ fn offline_at_16_spp() {
 #[divan::bench]
 fn realtime_in_linear_floats() {
     let Images { actual, reference: right, tolerances } = &*IMAGES;
-    let (centre, mask) = (&right.centre, &right.mask);
-    drop(black_box(compare_realtime_linear(black_box(actual), centre, mask, tolerances)));
+    let (center, mask) = (&right.center, &right.mask);
+    drop(black_box(compare_realtime_linear(black_box(actual), center, mask, tolerances)));
 }
 
 #[divan::bench]
 fn realtime_in_8_bit_levels() {
     let Images { actual, reference: right, tolerances } = &*IMAGES;
-    let (centre, mask) = (&right.centre, &right.mask);
-    drop(black_box(compare_srgb8(black_box(actual), centre, mask, tolerances)));
+    let (center, mask) = (&right.center, &right.mask);
+    drop(black_box(compare_srgb8(black_box(actual), center, mask, tolerances)));
 }

@@ -6,8 +6,8 @@ use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
 use divan::Bencher;
-use umbra::process::Limits;
-use umbra::sandbox::{Bind, Kind, Policy, command, doctor};
+use umbra::process::ProcessLimits;
+use umbra::sandbox::{Bind, ChildKind, Policy, command, doctor};
 use umbra::worker::{Fault, Job, Outcome, Request, SceneRef, Supervisor};
 
 fn main() {
@@ -28,7 +28,7 @@ fn plain_start() {
 #[divan::bench(args = ["nothing", "pid_ns", "net_ns", "landlock", "seccomp"])]
 fn locked_by_all_but(bencher: Bencher, layer: &str) {
     let umbra = umbra();
-    let mut policy = Policy::new(Kind::Build);
+    let mut policy = Policy::new(ChildKind::Build);
     policy.read_only.push(Bind::new(&umbra, "/umbra"));
     if let Some(switch) = policy.layers.switch(layer) {
         *switch = false;
@@ -50,7 +50,7 @@ fn supervised_worker(bencher: Bencher) {
         let scene = SceneRef { path: "none.toml".into(), options: String::new() };
         let requests = vec![Request::EvalBsdf { scene, queries: Vec::new() }];
         let (job, never) = (Job { plugin: None, requests }, AtomicBool::new(false));
-        let report = supervisor.run_job(&job, &Limits::default(), &never, &mut |_| ());
+        let report = supervisor.run_job(&job, &ProcessLimits::default(), &never, &mut |_| ());
         let refused =
             matches!(&report.outcomes[..], [Outcome::NotRun { fault: Fault::Internal, .. }]);
         assert!(refused && report.runs.len() == 1, "no worker ran: {report:?}");

@@ -127,7 +127,7 @@ fn grade(root: &Path, download: &Path, output: &Path, size: usize) -> anyhow::Re
     let begun = Instant::now();
     let mut umbra = Command::new(root.join("target/release/umbra"));
     umbra.arg("grade").arg(download).arg("--output").arg(output).arg("--root").arg(root);
-    umbra.args(["--isolation", "reduced", "--perturb", "20191006"]);
+    umbra.args(["--isolation", "reduced", "--held-back", "20191006"]);
     let mut child = umbra.stdout(Stdio::null()).spawn()?;
     let mut peak_kib = 0;
     let code = loop {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::class::mending::Mend;
-use crate::class::{Policy, Stated, late};
+use crate::class::{LatePolicy, Stated, late};
 use crate::files::Scratch;
 use crate::imaging::tolerances::Tolerances;
 use crate::intake::Finding;
@@ -28,7 +28,7 @@ pub struct Assignment {
     pub due: String,
     /// What a late submission costs; nothing when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub late: Option<Policy>,
+    pub late: Option<LatePolicy>,
     /// What an instructor may mend in a submission; nothing when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mend: Option<Mend>,
@@ -43,7 +43,7 @@ pub struct Assignment {
     /// Where "different" begins for images.
     pub tolerances: Tolerances,
     /// What a submission may use.
-    pub limits: Limits,
+    pub limits: AssignmentLimits,
     /// The folder that all paths are relative to, absolute; not in the file.
     #[serde(skip)]
     pub root: PathBuf,
@@ -52,15 +52,15 @@ pub struct Assignment {
 /// What a submission may use, at each stage.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Limits {
+pub struct AssignmentLimits {
     /// The archive.
-    pub archive: intake::Limits,
+    pub archive: intake::ArchiveLimits,
     /// Each child that decodes a file of it.
-    pub decode: process::Limits,
+    pub decode: process::ProcessLimits,
     /// The compiler.
-    pub build: process::Limits,
+    pub build: process::ProcessLimits,
     /// Each worker.
-    pub run: process::Limits,
+    pub run: process::ProcessLimits,
     /// All workers of a submission, on each path.
     pub budget: Budget,
 }
@@ -95,7 +95,8 @@ pub struct SceneEntry {
     pub stored: bool,
     /// Whether changed copies of it are held back from students.
     #[serde(default)]
-    pub perturb: bool,
+    #[serde(rename = "perturb")]
+    pub held_back_copies: bool,
     /// Images that a submission holds of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub submitted: Option<SubmittedPaths>,

@@ -13,7 +13,7 @@ use crate::assignment::{Assignment, SceneEntry};
 use crate::expected::{Expected, load_scene, region_table, regions};
 use crate::files::{hex, library_name};
 use crate::imaging::reference::{ReferenceImage, RegionMask};
-use crate::process::Limits;
+use crate::process::ProcessLimits;
 use crate::worker::{
     Adapter, AdapterKind, CameraValue, Job, Outcome, Request, SceneRef, Supervisor,
 };
@@ -78,19 +78,19 @@ impl Store<'_> {
         let own = [scene.config().width as u32, scene.config().height as u32];
         let [width, height] = entry.film.unwrap_or(own);
         let stored = entry.stored && [width, height] == own;
-        let (mean, variance, n, centre) = if stored {
+        let (mean, variance, n, center) = if stored {
             self.stored(entry, &toml, width, height)?
         } else {
             let file = self.cached(&toml, width, height, "offline")?;
             let layers = self.layers(&file, &["mean", "variance", "centre"], || {
                 self.render_offline(&toml, width, height, CACHED_SPP)
             })?;
-            let [mean, variance, centre] = layers;
-            (mean, variance, BATCHES * CACHED_SPP, centre)
+            let [mean, variance, center] = layers;
+            (mean, variance, BATCHES * CACHED_SPP, center)
         };
         let unshadowed = self.unshadowed(&toml, width, height)?;
         let [mask, unshadowed_mask] = self.masks(&toml, &scene, width, height)?;
-        let offline = ReferenceImage::new(mean, variance, n, centre, mask)
+        let offline = ReferenceImage::new(mean, variance, n, center, mask)
             .with_context(|| format!("scene \"{}\"", entry.name))?;
         let realtime = self.assignment.root.join(&entry.realtime);
         let interpolated_normals = self.interpolated_normals(&realtime, width, height)?;
@@ -347,8 +347,8 @@ impl Store<'_> {
             let spread = (square[index] - sum[index] * sum[index] / batches) / (batches - 1.0);
             (f64::from(spp) * spread).max(glam::DVec3::ZERO)
         });
-        let centre = self.render(self.request(toml, width, height, 1, 0, true))?;
-        let layers = [("mean", mean), ("variance", variance), ("centre", centre)];
+        let center = self.render(self.request(toml, width, height, 1, 0, true))?;
+        let layers = [("mean", mean), ("variance", variance), ("centre", center)];
         let layers = layers.map(|(name, image)| (name.to_owned(), image)).into();
         Ok(ExrLayers { layers, ..Default::default() })
     }
@@ -392,8 +392,12 @@ impl Store<'_> {
             );
         };
         let job = Job { plugin: Some(reference.clone()), requests };
-        let limits =
-            Limits { wall_s: 600.0, cpu_s: 1200, file_size_mib: 1024, ..Limits::default() };
+        let limits = ProcessLimits {
+            wall_s: 600.0,
+            cpu_s: 1200,
+            file_size_mib: 1024,
+            ..ProcessLimits::default()
+        };
         let report = self.supervisor.run_job(&job, &limits, &AtomicBool::new(false), &mut |_| ());
         let answers = report.outcomes.into_iter().map(|outcome| match outcome {
             Outcome::Done(answer) if answer.values.iter().all(|v| v.is_finite()) => {

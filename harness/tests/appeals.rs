@@ -113,7 +113,7 @@ fn a_grade_is_defended_mended_and_what_was_held_back_released() {
         "What decided\n",
         "(not implemented)",
         "umbra check DIR --part 1.3",
-        "--perturb 20191006 --report ANOTHER",
+        "--held-back 20191006 --report ANOTHER",
         "held back from the student until `umbra release`",
         "(at most 2 lines, less 10 points), never fewer",
     ] {

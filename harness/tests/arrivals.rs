@@ -78,7 +78,7 @@ fn a_class_as_a_learning_platform_lays_it_out() {
     put(at("Gil_7/onlinetext.txt"), b"I forgot");
 
     let out = place.path().join("out");
-    let arguments = ["grade", "--perturb", "off", "--isolation", "reduced", "--output"];
+    let arguments = ["grade", "--held-back", "off", "--isolation", "reduced", "--output"];
     let (code, said, errors) = umbra(&arguments, &[&out, &at("")]);
     assert_eq!(code, Some(0), "{said}{errors}");
     assert!(

@@ -102,7 +102,7 @@ fn a_number_or_name_means_the_attempt_that_counts() {
     let (code, said) = umbra(
         &place,
         &root,
-        &[&["grade", "--perturb", "off", "--isolation", "reduced"], &only[..]].concat(),
+        &[&["grade", "--held-back", "off", "--isolation", "reduced"], &only[..]].concat(),
     );
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("--attempt: it is the whole class's"), "{said}");

@@ -313,10 +313,10 @@ fn a_class_grows_and_nobody_falls_out_of_it() {
     assert!(!page.contains("not comparable"));
     // The report keeps its held-back scenes.
     for other in ["off", "7"] {
-        let (code, said) = batch.grade_with(&["b"], &["--perturb", other]);
+        let (code, said) = batch.grade_with(&["b"], &["--held-back", other]);
         assert_eq!(code, Some(2), "{said}");
         assert!(
-            said.contains("--perturb: ") && said.contains(" is graded with 20191006, and all"),
+            said.contains("--held-back: ") && said.contains(" is graded with 20191006, and all"),
             "{said}"
         );
     }

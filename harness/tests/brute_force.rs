@@ -191,8 +191,8 @@ fn stored_images_are_what_a_slow_tracer_in_f64_without_a_bvh_draws() {
         let toml = std::fs::read_to_string(folder.join(file)).unwrap();
         let world = World::read(&folder.join(format!("mesh/{name}.obj")));
         let stored = read_exr_layers(root.join(format!("expected/a2/{name}.exr"))).unwrap();
-        let (centre, mean) = (&stored.layers["centre"], &stored.layers["mean"]);
-        let (width, height) = (centre.width, centre.height);
+        let (center, mean) = (&stored.layers["centre"], &stored.layers["mean"]);
+        let (width, height) = (center.width, center.height);
         let (mut lit, mut dark, mut wrong) = (0, 0, Vec::new());
         let (mut sum, mut sum_of_means) = (DVec3::ZERO, DVec3::ZERO);
         // A stride without a common factor with the width visits all columns.
@@ -201,7 +201,7 @@ fn stored_images_are_what_a_slow_tracer_in_f64_without_a_bvh_draws() {
             let (x, y) = (pixel % width, pixel / width);
             let (eye, direction) = camera_ray(&toml, width, height, x, y);
             let Some(expected) = world.radiance(eye, direction) else { continue };
-            let found = centre.pixels[pixel].as_dvec3();
+            let found = center.pixels[pixel].as_dvec3();
             if expected == DVec3::ZERO {
                 dark += 1
             } else {

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use umbra::build::{BuildOutcome, BuildReport, Recording, compile, default_limits};
 use umbra::grading::template_fallback;
-use umbra::process::Limits;
+use umbra::process::ProcessLimits;
 use umbra::worker::{BsdfQuery, BsdfSource, Job, Request, SceneRef, Supervisor};
 
 fn workspace() -> &'static Path {
@@ -22,13 +22,13 @@ fn recording() -> &'static Recording {
     RECORDING.get_or_init(|| Recording::obtain(workspace(), umbra()).unwrap())
 }
 
-fn build(src: &Path, out: &Path, limits: &Limits) -> BuildReport {
+fn build(src: &Path, out: &Path, limits: &ProcessLimits) -> BuildReport {
     let supervisor = Supervisor::new(umbra().to_owned(), out.to_owned());
     compile(recording(), &supervisor, src, out, limits, &AtomicBool::new(false)).unwrap()
 }
 
 /// Compiles a crate of one file.
-fn build_text(text: &str, limits: &Limits) -> BuildReport {
+fn build_text(text: &str, limits: &ProcessLimits) -> BuildReport {
     let dir = tempfile::tempdir().unwrap();
     let (src, out) = (dir.path().join("handin/src"), dir.path().join("out"));
     std::fs::create_dir_all(&src).unwrap();
@@ -99,7 +99,7 @@ fn cargo_and_the_replay_build_renderers_that_draw_the_same() {
     let draw = |plugin: &Path| {
         let job = Job { plugin: Some(plugin.to_owned()), requests: requests.clone() };
         let cancel = AtomicBool::new(false);
-        let report = supervisor.run_job(&job, &Limits::default(), &cancel, &mut |_| {});
+        let report = supervisor.run_job(&job, &ProcessLimits::default(), &cancel, &mut |_| {});
         let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
         let answers = report.outcomes.iter().map(|outcome| match outcome.answer() {
             Some(answer) => bits(&answer.values),
@@ -165,7 +165,7 @@ fn warnings_are_kept_and_umbras_own_crates_are_out_of_reach() {
 fn a_compiler_that_does_not_end_is_ended() {
     let text = "#![allow(long_running_const_eval)]\n\
                 pub const N: u64 = { let mut i = 0u64; while i < u64::MAX { i += 1; } i };\n";
-    let limits = Limits { cpu_s: 1, ..default_limits() };
+    let limits = ProcessLimits { cpu_s: 1, ..default_limits() };
     let report = build_text(text, &limits);
     assert!(
         matches!(report.outcome, BuildOutcome::Ended(exit) if exit.is_out_of_time()),

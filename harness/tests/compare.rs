@@ -63,7 +63,7 @@ struct Disc;
 impl Disc {
     const WIDTH: usize = 96;
     const HEIGHT: usize = 64;
-    const CENTRE: (f32, f32) = (44.3, 31.6);
+    const CENTER: (f32, f32) = (44.3, 31.6);
     const RADIUS: f32 = 25.2;
     const SHADOW: f32 = 55.37;
     const SPOT: (f32, f32) = (36.0, 24.0);
@@ -73,7 +73,7 @@ impl Disc {
     }
 
     fn radiance(x: f32, y: f32) -> Vec3 {
-        if Self::distance(x, y, Self::CENTRE) > Self::RADIUS || x > Self::SHADOW {
+        if Self::distance(x, y, Self::CENTER) > Self::RADIUS || x > Self::SHADOW {
             return Vec3::ZERO;
         }
         let diffuse = 0.2 + 0.004 * x + 0.1 * (y * 0.21).sin();
@@ -127,7 +127,7 @@ impl Disc {
         mask.regions.push(Region { name: "disc, shadowed".into(), lit: false, exponent: 0.0 });
         for (i, m) in mask.pixels.iter_mut().enumerate() {
             let (x, y) = ((i % Self::WIDTH) as f32 + 0.5, (i / Self::WIDTH) as f32 + 0.5);
-            let rim = Self::distance(x, y, Self::CENTRE) - Self::RADIUS;
+            let rim = Self::distance(x, y, Self::CENTER) - Self::RADIUS;
             *m = match (rim > 0.0, x > Self::SHADOW) {
                 (true, _) => 0,
                 (_, true) => 2,
@@ -269,7 +269,7 @@ fn emitters_are_never_compared() {
     actual.pixels[9] = Vec3::NAN;
     assert!(offline(&actual, &reference, 16).passed());
     let t = Tolerances::default();
-    let realtime = compare_realtime_linear(&actual, &reference.centre, &reference.mask, &t);
+    let realtime = compare_realtime_linear(&actual, &reference.center, &reference.mask, &t);
     assert!(realtime.unwrap().passed());
 }
 
@@ -331,7 +331,7 @@ fn correct_renders_pass_at_every_seed_and_spp() {
     );
     let evidence = offline(&Disc::fixed(0.5), &reference, 1);
     assert!(evidence.passed());
-    assert_eq!(evidence.compared_with, ComparedWith::Centre);
+    assert_eq!(evidence.compared_with, ComparedWith::Center);
 }
 
 #[test]
@@ -384,9 +384,9 @@ fn black_nan_and_constant_images_never_pass() {
                 assert!(failed.contains(&rule), "{value} at {spp} spp: {failed:?}");
             }
         }
-        let (centre, mask, t) = (&reference.centre, &reference.mask, Tolerances::default());
-        assert!(!compare_realtime_linear(&fill(value), centre, mask, &t).unwrap().passed());
-        assert!(!compare_srgb8(&fill(value), centre, mask, &t).unwrap().passed());
+        let (center, mask, t) = (&reference.center, &reference.mask, Tolerances::default());
+        assert!(!compare_realtime_linear(&fill(value), center, mask, &t).unwrap().passed());
+        assert!(!compare_srgb8(&fill(value), center, mask, &t).unwrap().passed());
     }
     // A copy of the reference passes every rule, and its missing noise shows.
     let copy = offline(&reference.mean, &reference, 16);
@@ -397,7 +397,7 @@ fn black_nan_and_constant_images_never_pass() {
 #[test]
 fn a_silhouette_may_move_inside_its_mask_but_a_blob_may_not_appear() {
     let reference = Disc::reference();
-    let mut moved = reference.centre.clone();
+    let mut moved = reference.center.clone();
     let edges: Vec<usize> = (0..moved.pixels.len())
         .filter(|&i| reference.mask.pixels[i] & RegionMask::EDGE != 0)
         .collect();
@@ -409,7 +409,7 @@ fn a_silhouette_may_move_inside_its_mask_but_a_blob_may_not_appear() {
     assert!(evidence.passed(), "{:?}", failed(&evidence));
     assert!(evidence.check("edge").unwrap().value > 0.03);
 
-    let mut blob = reference.centre.clone();
+    let mut blob = reference.center.clone();
     for (x, y) in [(30, 40), (31, 40), (30, 41), (31, 41)] {
         blob.pixels[y * Disc::WIDTH + x] *= 0.8;
     }
@@ -432,10 +432,10 @@ fn realtime_floats_allow_for_pow_only() {
     let mut reference = flat(8, 8, Vec3::splat(0.5), 0.0);
     let mut judge = |factor: f32, exponent: f32| {
         reference.mask.regions[1].exponent = exponent;
-        let mut actual = reference.centre.clone();
+        let mut actual = reference.center.clone();
         actual.pixels.iter_mut().for_each(|p| *p *= factor);
         let t = Tolerances::default();
-        compare_realtime_linear(&actual, &reference.centre, &reference.mask, &t).unwrap()
+        compare_realtime_linear(&actual, &reference.center, &reference.mask, &t).unwrap()
     };
     assert!(judge(1.002, 0.0).passed());
     assert_eq!(failed(&judge(1.0028, 0.0)), ["interior", "blob"]);
@@ -447,7 +447,7 @@ fn realtime_floats_allow_for_pow_only() {
 
 /// Hardware snaps vertices to 1/256 of a pixel: what it draws is that far off in both directions at most.
 #[test]
-fn realtime_floats_allow_for_the_rasterisers_grid() {
+fn realtime_floats_allow_for_the_rasterizers_grid() {
     let mut reference = flat(48, 48, Vec3::splat(0.4), 0.0);
     // A highlight 1.5 pixels wide on a dim wall, as a ray tracer and a shifted rasterizer see it.
     let draw = |shift: f32| {
@@ -458,10 +458,10 @@ fn realtime_floats_allow_for_the_rasterisers_grid() {
         }
         image
     };
-    reference.centre = draw(0.0);
+    reference.center = draw(0.0);
     let judge = |shift: f32| {
         let t = Tolerances::default();
-        compare_realtime_linear(&draw(shift), &reference.centre, &reference.mask, &t).unwrap()
+        compare_realtime_linear(&draw(shift), &reference.center, &reference.mask, &t).unwrap()
     };
     assert!(judge(1.0 / 256.0).passed());
     assert!(judge(-1.0 / 256.0).passed());
@@ -469,7 +469,7 @@ fn realtime_floats_allow_for_the_rasterisers_grid() {
     assert_eq!(failed(&off)[..2], ["interior", "blob"], "a sixteenth of a pixel");
     let without = Tolerances { realtime_snap_px: 0.0, ..Tolerances::default() };
     let strict =
-        compare_realtime_linear(&draw(1.0 / 256.0), &reference.centre, &reference.mask, &without);
+        compare_realtime_linear(&draw(1.0 / 256.0), &reference.center, &reference.mask, &without);
     assert!(!strict.unwrap().passed(), "the allowance is what lets it pass");
 }
 
@@ -479,16 +479,16 @@ fn levels_of_submitted_realtime_images() {
     let mut mask = RegionMask::background(width, width);
     mask.regions.push(lit("wall"));
     mask.pixels.fill(1);
-    let mut centre = Image::new(width, width);
-    for (i, p) in centre.pixels.iter_mut().enumerate() {
+    let mut center = Image::new(width, width);
+    for (i, p) in center.pixels.iter_mut().enumerate() {
         *p = Vec3::splat(i as f32 / 2000.0); // from 0 to 2: beyond what 8 bits hold
     }
     let t = Tolerances::default();
-    let judge = |image: &Image| compare_srgb8(image, &centre, &mask, &t).unwrap();
-    assert!(judge(&centre).passed(), "linear and not clamped");
+    let judge = |image: &Image| compare_srgb8(image, &center, &mask, &t).unwrap();
+    assert!(judge(&center).passed(), "linear and not clamped");
 
     let shift = |levels: i32| {
-        let mut image = centre.clone();
+        let mut image = center.clone();
         for p in &mut image.pixels {
             let l = (i32::from(srgb::level(p.x)) + levels).clamp(0, 255);
             *p = Vec3::splat(srgb::decode(f64::from(l) / 255.0) as f32);
@@ -502,7 +502,7 @@ fn levels_of_submitted_realtime_images() {
 
     // 4096 pixels: a quarter of a percent is 10, and 4 to spare.
     for (count, passes) in [(14, true), (15, false)] {
-        let mut few = centre.clone();
+        let mut few = center.clone();
         for i in 0..count {
             few.pixels[i * 97] = Vec3::splat(0.9);
         }

@@ -12,7 +12,7 @@ use basecode::{Image, Vec3};
 use umbra::assignment::Assignment;
 use umbra::decode::Decoder;
 use umbra::intake::{IntakeError, TreeSpec, scan_source, unpack, validate_submission};
-use umbra::process::Limits;
+use umbra::process::ProcessLimits;
 use umbra::sandbox::Isolation;
 use umbra::worker::Supervisor;
 
@@ -28,7 +28,7 @@ fn bits(image: &Image) -> Vec<[u32; 3]> {
 }
 
 /// A file of the repository's own limits, with some of them changed.
-fn limits(change: impl FnOnce(&mut Limits)) -> Limits {
+fn limits(change: impl FnOnce(&mut ProcessLimits)) -> ProcessLimits {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let mut limits = Assignment::load(root).unwrap().limits.decode;
     change(&mut limits);
@@ -146,7 +146,7 @@ fn a_decoder_that_dies_refuses_its_file_and_no_other() {
             let place = Scratch::new();
             let tree = TreeSpec::default();
             let before = place.outside();
-            let large = umbra::intake::Limits::default();
+            let large = umbra::intake::ArchiveLimits::default();
             let result = decoder.unpack_bytes(&archive, "a.zip", &place.dest, &tree, &large);
             let Err(IntakeError::Refused(refusal)) = result else { panic!("{result:?}") };
             assert_eq!(refusal.findings[0].code, "decoder_ended");

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use basecode::{Image, Vec3};
 use umbra::assignment::Assignment;
 use umbra::diagnosis::{
-    Catalogue, Diagnosis, Input, Kind, KnownMistake, LoopSeen, Observations, Stored, StoredView,
+    Catalogue, Diagnosis, Input, KnownMistake, LoopSeen, Observations, Stored, StoredView, ViewKind,
 };
 use umbra::evidence::{Check, CheckId, Evidence, Verdict};
 use umbra::files::library_name;
@@ -46,9 +46,9 @@ fn evidence(stored: &Stored, mistake: &KnownMistake) -> Evidence {
         views.any(|(_, content)| content.mistakes.contains_key(&mistake.name))
     };
     let mut failing = mistake.findings.clone();
-    if seen(Kind::Lit) {
+    if seen(ViewKind::Lit) {
         failing.push(CheckId::RadianceLit);
-    } else if seen(Kind::Offline) {
+    } else if seen(ViewKind::Offline) {
         failing.push(CheckId::LoopAgreement);
     }
     let checks = failing.iter().map(|id| Check::new(*id, "s", Verdict::Fail, "wrong"));

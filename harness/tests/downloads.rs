@@ -104,7 +104,7 @@ impl Place {
         root: &Path,
         arguments: &[&str],
     ) -> (String, Value) {
-        let fixed = ["--perturb", "off", "--isolation", "reduced", "--output", "out", "--root"];
+        let fixed = ["--held-back", "off", "--isolation", "reduced", "--output", "out", "--root"];
         let mut all = vec!["grade"];
         all.extend(fixed);
         let root = root.to_str().unwrap();

@@ -6,11 +6,11 @@ use std::sync::atomic::AtomicBool;
 
 use basecode::Image;
 use umbra::assignment::{Assignment, SceneEntry};
-use umbra::evidence::images::{Kind, judge};
+use umbra::evidence::images::{ImageKind, judge};
 use umbra::evidence::{Check, CheckId, Evidence, Verdict};
 use umbra::expected::Expected;
 use umbra::files::library_name;
-use umbra::process::Limits;
+use umbra::process::ProcessLimits;
 use umbra::rubric::grade;
 use umbra::store::Store;
 use umbra::worker::{Job, Outcome, Request, SceneRef, Supervisor};
@@ -57,7 +57,7 @@ fn stored_images_agree_with_a_render_of_another_seed_and_a_small_gain_costs_poin
         };
         let job =
             Job { plugin: Some(reference.clone()), requests: vec![render(own_spp), render(1)] };
-        let limits = Limits { wall_s: 300.0, cpu_s: 600, ..Limits::default() };
+        let limits = ProcessLimits { wall_s: 300.0, cpu_s: 600, ..ProcessLimits::default() };
         let report = supervisor.run_job(&job, &limits, &AtomicBool::new(false), &mut |_| ());
         let images = report.outcomes.into_iter().map(|outcome| match outcome {
             Outcome::Done(answer) => image(&answer.values, width, height),
@@ -65,14 +65,14 @@ fn stored_images_agree_with_a_render_of_another_seed_and_a_small_gain_costs_poin
         });
         let judged = |kind, image: &Image| judged(&entry.name, kind, image, &expected, &assignment);
         for (spp, image) in [own_spp, 1].into_iter().zip(images) {
-            let kind = Kind::Offline { spp };
+            let kind = ImageKind::Offline { spp };
             for (gain, right) in [(1.0, true), (0.99, false), (1.01, false)] {
                 let (full, said) = judged(kind, &scaled(&image, gain));
                 assert_eq!(full, right, "{} at {spp} spp, gain {gain}: {said}", entry.name);
             }
         }
         for (gain, right) in [(1.0, true), (0.98, false), (1.02, false)] {
-            let (full, said) = judged(Kind::Realtime, &scaled(&expected.unshadowed, gain));
+            let (full, said) = judged(ImageKind::Realtime, &scaled(&expected.unshadowed, gain));
             assert_eq!(full, right, "{} realtime, gain {gain}: {said}", entry.name);
         }
     }
@@ -82,13 +82,14 @@ fn stored_images_agree_with_a_render_of_another_seed_and_a_small_gain_costs_poin
 /// Whether a submission earns everything when this image is like that and all other evidence is right.
 fn judged(
     name: &str,
-    kind: Kind,
+    kind: ImageKind,
     image: &Image,
     expected: &Expected,
     assignment: &Assignment,
 ) -> (bool, String) {
     let rules = &assignment.rules;
-    let id = if kind == Kind::Realtime { CheckId::ImageRealtime } else { CheckId::ImageOffline };
+    let id =
+        if kind == ImageKind::Realtime { CheckId::ImageRealtime } else { CheckId::ImageOffline };
     let check = judge(id, name, kind, image, expected, &|_| true, &assignment.tolerances);
     let said = check.summary.clone();
     let right = |id: &CheckId| Check::new(*id, name, Verdict::Pass, "right");

@@ -19,7 +19,7 @@ fn the_autograder_grades_and_always_leaves_results() {
         "extensions": [{"student": "260000001", "late_days": 1}]});
     let root = one_scene(&at("assignment"), |config| config["late"] = late.clone());
     let output = Command::new(env!("CARGO_BIN_EXE_umbra"))
-        .args(["gradescope-pack", "autograder.zip", "--perturb", "20191006", "--root"])
+        .args(["gradescope-pack", "autograder.zip", "--held-back", "20191006", "--root"])
         .arg(&root)
         .current_dir(place.path())
         .output()

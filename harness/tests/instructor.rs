@@ -134,7 +134,7 @@ fn a_list_that_is_refused_changes_nothing() {
     let (code, said) = umbra(
         &place,
         &root,
-        &["grade", "in", "--class", "wrong.csv", "--perturb", "off", "--isolation", "reduced"],
+        &["grade", "in", "--class", "wrong.csv", "--held-back", "off", "--isolation", "reduced"],
     );
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("matches.toml:1: nobody on wrong.csv has the number"), "{said}");
@@ -331,7 +331,7 @@ fn tasks_of_a_partition_share_list_and_seed() {
                 list,
                 "--partition",
                 slice,
-                "--perturb",
+                "--held-back",
                 seed,
                 "--isolation",
                 "reduced",
@@ -351,7 +351,7 @@ fn tasks_of_a_partition_share_list_and_seed() {
     let (code, said) = task("slice:2/2", "list.csv", "7");
     assert_eq!(code, Some(2), "{said}");
     assert!(
-        said.contains("all tasks of a partition use the same seed; hint: --perturb off"),
+        said.contains("all tasks of a partition use the same seed; hint: --held-back off"),
         "{said}"
     );
     assert!(!place.at("out/instructor/a2_bo").exists());

@@ -9,7 +9,8 @@ use std::fs;
 use std::path::Path;
 
 use umbra::intake::{
-    Finding, IntakeError, Limits, Submission, TreeSpec, Validation, unpack_bytes, validate_refusal,
+    ArchiveLimits, Finding, IntakeError, Submission, TreeSpec, Validation, unpack_bytes,
+    validate_refusal,
 };
 
 use crate::support::scratch::{Scratch, with_decoder};
@@ -81,7 +82,7 @@ fn validate_bytes(bytes: &[u8], name: &str) -> Validation {
 /// As `umbra validate` does.
 fn validate(source: &Path) -> Result<Validation, IntakeError> {
     let copy = tempfile::tempdir().unwrap();
-    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    let (tree, limits) = (TreeSpec::default(), ArchiveLimits::default());
     match with_decoder(|decoder| decoder.receive(source, copy.path(), &tree, &limits)) {
         Ok(received) => Ok(received.validation),
         Err(IntakeError::Refused(refusal)) => Ok(validate_refusal(&refusal)),
@@ -96,6 +97,6 @@ fn validate_files(files: &[(String, Vec<u8>)]) -> Validation {
 /// A copy, whatever is to be said of it.
 fn accepted(files: &[(String, Vec<u8>)]) -> (Submission, Scratch) {
     let scratch = Scratch::new();
-    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    let (tree, limits) = (TreeSpec::default(), ArchiveLimits::default());
     (unpack_bytes(&zip_of(files), "a.zip", &scratch.dest, &tree, &limits).unwrap(), scratch)
 }

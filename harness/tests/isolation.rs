@@ -13,7 +13,7 @@ use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
 use umbra::build::{BuildOutcome, Recording, compile, default_limits};
-use umbra::process::Limits;
+use umbra::process::ProcessLimits;
 use umbra::sandbox::{Isolation, Layers};
 use umbra::worker::{
     Adapter, AdapterKind, CameraValue, Fault, Job, JobReport, Outcome, Request, SceneRef,
@@ -109,7 +109,7 @@ impl TestEnv {
 
 fn run(supervisor: &Supervisor, plugin: &Path, requests: Vec<Request>) -> JobReport {
     let job = Job { plugin: Some(plugin.to_owned()), requests };
-    let limits = Limits { wall_s: 20.0, ..Limits::default() };
+    let limits = ProcessLimits { wall_s: 20.0, ..ProcessLimits::default() };
     let report = supervisor.run_job(&job, &limits, &AtomicBool::new(false), &mut |_| {});
     let wanted = supervisor.isolation.isolation();
     for run in &report.runs {
@@ -273,7 +273,7 @@ fn nothing_is_left_of_a_worker_that_is_ended() {
     let house = TestEnv::new();
     let plugin = house.plugin("attack.so", &[]);
     let job = Job { plugin: Some(plugin), requests: vec![house.offline("sleep 60")] };
-    let limits = Limits { wall_s: 0.5, cpu_s: 1, ..Limits::default() };
+    let limits = ProcessLimits { wall_s: 0.5, cpu_s: 1, ..ProcessLimits::default() };
     let late = |report: &JobReport, computing| matches!(&report.outcomes[..], [Outcome::TimedOut(late)] if late.computing == computing);
     let never = AtomicBool::new(false);
     let report = house.supervisor.run_job(&job, &limits, &never, &mut |_| {});
@@ -297,7 +297,7 @@ fn a_layer_that_cannot_be_had_is_the_machines_matter() {
     let liar = Supervisor { umbra: "/bin/true".into(), ..house.supervisor.clone() };
     let job = Job { plugin: Some(plugin), requests: vec![house.offline("")] };
     let never = AtomicBool::new(false);
-    let report = liar.run_job(&job, &Limits::default(), &never, &mut |_| {});
+    let report = liar.run_job(&job, &ProcessLimits::default(), &never, &mut |_| {});
     assert!(
         matches!(&report.outcomes[0], Outcome::NotRun { fault: Fault::Environment, .. }),
         "{report:?}"

@@ -25,8 +25,7 @@ mod intake_properties;
 mod isolation;
 mod kept_frames;
 mod kill;
-mod labelled;
-mod likeness;
+mod labeled;
 mod metrics;
 mod original_scene;
 mod outputs;
@@ -38,6 +37,7 @@ mod regrade;
 mod render_command;
 #[path = "sandbox/main.rs"]
 mod sandbox;
+mod similarity;
 mod statistics;
 mod submitted;
 mod support;

@@ -43,10 +43,9 @@ fn obj() -> String {
 }
 
 fn mtl() -> String {
-    let colour = |key: &str, [r, g, b]: [f64; 3]| format!("{key} {r} {g} {b}\n");
-    let (floor, mirror, mixture) =
-        (colour("Kd", FLOOR), colour("Kd", MIRROR), colour("Kd", MIXTURE));
-    let light = colour("Ke", INTENSITY);
+    let color = |key: &str, [r, g, b]: [f64; 3]| format!("{key} {r} {g} {b}\n");
+    let (floor, mirror, mixture) = (color("Kd", FLOOR), color("Kd", MIRROR), color("Kd", MIXTURE));
+    let light = color("Ke", INTENSITY);
     format!(
         "# Exported\nnewmtl floor\nKa 1 1 1\n{floor}Ni 1.000000\nd 1.0\nTr 0.0\nTf 1 1 1\nillum 7\n\n\
          newmtl mirror\n{mirror}Ks 1 1 1\nillum 5\nnewmtl mixture\n{mixture}illum 8\n\
@@ -108,8 +107,8 @@ fn pixel([x, y, z]: [f64; 3]) -> ((usize, usize), [f64; 3]) {
     let half = (5.0 - y) * 30f64.to_radians().tan();
     let scale = SIDE as f64 / 2.0 / half;
     let index = |v: f64| (v * scale + SIDE as f64 / 2.0).floor();
-    let centre = |v: f64| (index(v) + 0.5 - SIDE as f64 / 2.0) / scale;
-    ((index(x) as usize, index(z) as usize), [centre(x), y, centre(z)])
+    let center = |v: f64| (index(v) + 0.5 - SIDE as f64 / 2.0) / scale;
+    ((index(x) as usize, index(z) as usize), [center(x), y, center(z)])
 }
 
 #[track_caller]

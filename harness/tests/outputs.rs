@@ -80,8 +80,8 @@ fn nothing_is_written_into_a_submission_that_is_read() {
         "watch mine --report mine/src",
         "watch mine --report .",
         "grade mine --report mine/offline",
-        "grade class --report class/ann/src --perturb off",
-        "grade class --report class --perturb off",
+        "grade class --report class/ann/src --held-back off",
+        "grade class --report class --held-back off",
         "pack mine -o mine/a.zip",
         "pack mine -o mine",
         "pack mine -o mine/../mine/src/a.zip",
@@ -205,7 +205,7 @@ fn no_output_takes_the_place_of_an_input() {
         ("compare page/view.html b.exr --html page", 2),
         ("compare a.exr page/expected.png --pictures page", 2),
         ("view page/view.html b.exr -o page", 2),
-        ("grade work --class r/grades.csv --report r --perturb off", 2),
+        ("grade work --class r/grades.csv --report r --held-back off", 2),
     ] {
         // The root goes before what idiff takes.
         let mut words: Vec<&str> = line.split(' ').collect();

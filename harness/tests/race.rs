@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use nix::fcntl::{AT_FDCWD, RenameFlags, renameat2};
 use umbra::files::files_below;
-use umbra::intake::{IntakeError, Limits, TreeSpec, unpack};
+use umbra::intake::{ArchiveLimits, IntakeError, TreeSpec, unpack};
 
 const SECRET: &str = "the secret of another student";
 /// Enough for some ten thousand swaps and some thousand copies.
@@ -29,7 +29,7 @@ fn swap(a: &Path, b: &Path, stop: &AtomicBool) -> u64 {
 
 /// Copies `submission` while `a` and `b` are exchanged; answers copies, refusals and swaps.
 fn race(place: &Path, submission: &Path, a: &Path, b: &Path) -> (u32, u32, u64) {
-    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    let (tree, limits) = (TreeSpec::default(), ArchiveLimits::default());
     let stop = AtomicBool::new(false);
     let (mut copies, mut refusals) = (0, 0);
     let swaps = std::thread::scope(|scope| {

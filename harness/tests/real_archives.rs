@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::support::scratch::{Scratch, with_decoder};
-use umbra::intake::{Limits, Severity, TreeSpec, fix, unpack};
+use umbra::intake::{ArchiveLimits, Severity, TreeSpec, fix, unpack};
 
 /// What is to be said of an archive besides that it is right.
 const SAID: [(&str, &str); 6] = [
@@ -27,7 +27,7 @@ fn fixtures() -> Vec<PathBuf> {
 
 #[test]
 fn every_archive_is_read_as_it_was_meant_and_mended_to_a_plain_one() {
-    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    let (tree, limits) = (TreeSpec::default(), ArchiveLimits::default());
     let mut digests = Vec::new();
     for path in fixtures() {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
@@ -58,7 +58,7 @@ fn every_archive_is_read_as_it_was_meant_and_mended_to_a_plain_one() {
 fn a_submission_of_2019_lacks_nothing_but_the_language() {
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/a2_fern_gleamton_2019.zip");
-    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    let (tree, limits) = (TreeSpec::default(), ArchiveLimits::default());
     let scratch = Scratch::new();
     let (validation, images) = with_decoder(|decoder| {
         let received = decoder.receive(&path, &scratch.dest, &tree, &limits).unwrap();

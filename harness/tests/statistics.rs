@@ -17,7 +17,7 @@ use umbra::grading::{CORRELATED, row_correlation};
 use umbra::imaging::compare::compare_offline;
 use umbra::imaging::reference::ReferenceImage;
 use umbra::plugin::Witness;
-use umbra::process::Limits;
+use umbra::process::ProcessLimits;
 use umbra::store::Store;
 use umbra::worker::{Job, Outcome, RayQuery, Request, SceneRef, Supervisor};
 
@@ -175,7 +175,7 @@ impl Bench<'_> {
         };
         let along = Request::Radiance {
             scene: SceneRef { path: toml.to_owned(), options: String::new() },
-            rays: surface.pixels.iter().map(|(centre, _)| ray(centre)).collect(),
+            rays: surface.pixels.iter().map(|(center, _)| ray(center)).collect(),
             shadows: true,
             witness: Witness::True,
             seed: 1,
@@ -216,7 +216,7 @@ impl Bench<'_> {
 
     fn ask(&self, requests: Vec<Request>) -> Vec<Vec<f32>> {
         let job = Job { plugin: Some(self.reference.clone()), requests };
-        let limits = Limits { wall_s: 300.0, cpu_s: 600, ..Limits::default() };
+        let limits = ProcessLimits { wall_s: 300.0, cpu_s: 600, ..ProcessLimits::default() };
         let cancel = AtomicBool::new(false);
         let report = self.supervisor.run_job(&job, &limits, &cancel, &mut |_| ());
         let answers = report.outcomes.into_iter().map(|outcome| match outcome {

@@ -80,8 +80,8 @@ impl Scene {
             let spread = squares - sum * sum / n as f32;
             variance.pixels[i] = (spread / (n - 1) as f32).max(Vec3::ZERO);
         }
-        let centre = fixed(|x, y| radiance(x + 0.5, y + 0.5).1);
-        Self { reference: ReferenceImage::new(mean, variance, n, centre, mask).unwrap() }
+        let center = fixed(|x, y| radiance(x + 0.5, y + 0.5).1);
+        Self { reference: ReferenceImage::new(mean, variance, n, center, mask).unwrap() }
     }
 
     fn noisy(&self) -> NoisyPixels<'_> {
@@ -92,7 +92,7 @@ impl Scene {
     fn render(&self, spp: u32, seed: u64) -> Image {
         let mut rng = Rng(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ seed << 7);
         rng.uniform();
-        let mut image = self.reference.centre.clone();
+        let mut image = self.reference.center.clone();
         for i in 0..image.pixels.len() {
             if self.reference.mask.pixels[i] & RegionMask::EDGE != 0 {
                 let sum: Vec3 = (0..spp).map(|_| sample(i, &mut rng)).sum();
@@ -108,7 +108,7 @@ impl Scene {
 
     fn copied(&self, image: &Image) -> Verdict {
         let published =
-            [("the mean", &self.reference.mean), ("the centres", &self.reference.centre)];
+            [("the mean", &self.reference.mean), ("the centres", &self.reference.center)];
         judge_copied("scene", "a.exr", image, Some(&self.noisy()), &published).verdict
     }
 
@@ -212,8 +212,8 @@ fn of_a_wrong_image_too_much_noise_is_not_said_but_too_little_is() {
 #[test]
 fn a_copy_is_found_whatever_it_was_rounded_to() {
     let scene = Scene::new();
-    let ReferenceImage { mean, centre, .. } = &scene.reference;
-    for published in [mean, centre] {
+    let ReferenceImage { mean, center, .. } = &scene.reference;
+    for published in [mean, center] {
         let mut touched = half(published);
         touched.pixels[WIDTH * 90 + 40] = Vec3::splat(0.5);
         for copy in [published.clone(), half(published), eight_bits(published), touched] {
@@ -225,7 +225,7 @@ fn a_copy_is_found_whatever_it_was_rounded_to() {
     // One sample in the middle of each pixel: everybody's are equal and tell nobody from another.
     let noise = |image: &Image| has_own_noise(scene.noisy().measure(image));
     assert!(noise(&scene.render(16, 3)) && noise(&scene.render(4, 3)));
-    assert!(!noise(centre) && !noise(&Image::new(WIDTH, HEIGHT)));
+    assert!(!noise(center) && !noise(&Image::new(WIDTH, HEIGHT)));
 }
 
 #[test]
@@ -262,20 +262,20 @@ fn a_stale_image_is_not_what_the_code_draws() {
     }
     assert!(!same(&a, &Image::new(WIDTH, WIDTH)));
 
-    let centre = &scene.reference.centre;
+    let center = &scene.reference.center;
     let same = |a: &Image, b: &Image| same_levels(a, b, &scene.reference.mask, &tolerances);
-    assert!(same(&eight_bits(centre), centre) && same(&half(centre), centre));
+    assert!(same(&eight_bits(center), center) && same(&half(center), center));
     assert!(same(&Image::new(WIDTH, HEIGHT), &Image::new(WIDTH, HEIGHT)), "black draws black");
-    assert!(!same(&map(centre, |p| 1.04 * p), centre));
+    assert!(!same(&map(center, |p| 1.04 * p), center));
 }
 
 #[test]
 fn wrong_images_show_the_scene_and_other_pictures_do_not() {
     let scene = Scene::new();
     let right = scene.render(SPP, 1);
-    let centre = &scene.reference.centre;
-    let flipped = fixed(|x, y| centre.pixels[(HEIGHT - 1 - y as usize) * WIDTH + x as usize]);
-    let mirrored = fixed(|x, y| centre.pixels[y as usize * WIDTH + WIDTH - 1 - x as usize]);
+    let center = &scene.reference.center;
+    let flipped = fixed(|x, y| center.pixels[(HEIGHT - 1 - y as usize) * WIDTH + x as usize]);
+    let mirrored = fixed(|x, y| center.pixels[y as usize * WIDTH + WIDTH - 1 - x as usize]);
     let silhouettes = map(&right, |p| Vec3::splat(if p == Vec3::ZERO { 1.0 } else { 0.2 }));
     let small = fixed(|x, y| radiance(2.0 * x, 2.0 * y).1);
     let mut half_size = Image::new(WIDTH / 2, HEIGHT / 2);

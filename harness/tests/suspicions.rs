@@ -143,7 +143,7 @@ fn merging_again_takes_what_was_decided() {
     place.put("in/notes.pdf", b"x");
     place.put("list.csv", LIST.as_bytes());
     let grade = ["grade", "in", "--class", "list.csv", "--partition", "slice:1/1"];
-    let options = ["--perturb", "off", "--isolation", "reduced"];
+    let options = ["--held-back", "off", "--isolation", "reduced"];
     let (code, said) = umbra(&place, &root, &[&grade[..], &options].concat());
     assert_eq!(code, Some(0), "{said}");
     let (code, said) = umbra(&place, &root, &["merge"]);

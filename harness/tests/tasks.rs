@@ -114,12 +114,12 @@ fn what_was_judged_otherwise_is_refused_by_name() {
     let batch = Batch::new(&FIVE[..3]);
     assert_eq!(task(&batch, "slice:1/2", &[]).0, Some(0));
     // Said before it grades; a task on a machine that does not see the others' files yet goes on.
-    let (code, text) = task(&batch, "slice:2/2", &["--perturb", "off"]);
+    let (code, text) = task(&batch, "slice:2/2", &["--held-back", "off"]);
     assert_eq!(code, Some(2), "{text}");
     assert!(text.contains("all tasks of a partition use the same seed"), "{text}");
     let (work, aside) = (batch.instructor("work"), batch.out().join("aside"));
     fs::rename(&work, &aside).unwrap();
-    assert_eq!(task(&batch, "slice:2/2", &["--perturb", "off"]).0, Some(0));
+    assert_eq!(task(&batch, "slice:2/2", &["--held-back", "off"]).0, Some(0));
     for file in aside.read_dir().unwrap().flatten() {
         fs::rename(file.path(), work.join(file.file_name())).unwrap();
     }

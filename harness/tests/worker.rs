@@ -6,11 +6,11 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use umbra::plugin::{Witness, WitnessQuery};
-use umbra::process::{Exit, Limits};
+use umbra::process::{Exit, ProcessLimits};
 use umbra::sandbox::Layers;
 use umbra::worker::{
-    Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Fault, Job, JobReport, Late, Outcome,
-    RayQuery, Request, RetryBudget, SceneRef, Stage, Supervisor,
+    Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Fault, Job, JobReport, Outcome,
+    RayQuery, Request, RetryBudget, SceneRef, StageText, Supervisor, Timeout,
 };
 
 /// A floor in y = 0 from -4 to 4, facing up, a small blocker over x > 2 at y = 1, and a light at
@@ -63,7 +63,7 @@ const FAULT: &str = "tests/c_plugin/fault.c";
 struct TestEnv {
     dir: tempfile::TempDir,
     supervisor: Supervisor,
-    limits: Limits,
+    limits: ProcessLimits,
 }
 
 impl TestEnv {
@@ -75,12 +75,12 @@ impl TestEnv {
         let scratch = dir.path().join("scratch");
         std::fs::create_dir(&scratch).unwrap();
         let umbra = PathBuf::from(env!("CARGO_BIN_EXE_umbra"));
-        let limits = Limits {
+        let limits = ProcessLimits {
             wall_s: 5.0,
             cpu_s: 5,
             memory_mib: 1024,
             output_kib: 256,
-            ..Limits::default()
+            ..ProcessLimits::default()
         };
         Self { dir, supervisor: Supervisor::new(umbra, scratch), limits }
     }
@@ -308,7 +308,7 @@ fn tables_that_do_not_fit_are_refused_with_both_values_named() {
 
 /// Out of time: of CPU time, or because nothing was done.
 fn late(computing: bool, limit_s: f64) -> Outcome {
-    Outcome::TimedOut(Late { computing, limit_s, reference_s: None })
+    Outcome::TimedOut(Timeout { computing, limit_s, reference_s: None })
 }
 
 #[test]
@@ -439,7 +439,7 @@ fn questions_of_one_worker_have_limits_of_their_own() {
         let requests = modes.iter().map(|mode| house.offline(mode, 1, 1)).collect();
         let job = Job { plugin: Some(plugin.clone()), requests };
         let (never, patience) = (AtomicBool::new(false), RetryBudget::with(None, None));
-        let limits = Limits { wall_s: 1.0, cpu_s: 20, ..house.limits.clone() };
+        let limits = ProcessLimits { wall_s: 1.0, cpu_s: 20, ..house.limits.clone() };
         house.supervisor.run_job_with_retries(&job, &limits, &patience, &never, &mut |_| {})
     };
     // On a machine so busy that a plain render is late too, nothing is decided: asked again.
@@ -543,7 +543,7 @@ const FRAGMENT: &str = "@fragment fn fs_main() -> @location(0) vec4f {
 fn a_stage_that_is_no_wgsl_is_refused_with_its_line_and_others_are_drawn() {
     let house = TestEnv::new();
     let with = |vertex: &str, phong: &str| {
-        let stage = |(name, text): (&str, &str)| Stage { name: name.into(), text: text.into() };
+        let stage = |(name, text): (&str, &str)| StageText { name: name.into(), text: text.into() };
         let stages = [("simple.vs", vertex), ("diffuse.fs", FRAGMENT), ("phong.fs", phong)];
         Request::RenderRealtime {
             scene: house.scene(""),

@@ -21,7 +21,7 @@ use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 use umbra::assignment::{Assignment, SceneEntry};
-use umbra::build::{BuildOutcome, Kept, Recording};
+use umbra::build::{BuildOutcome, KeptLibraries, Recording};
 use umbra::files::{Scratch, hex};
 use umbra::worker::{
     Adapter, AdapterKind, Answer, CameraValue, Job, Outcome, Request, SceneRef, Supervisor,
@@ -175,7 +175,7 @@ struct Packer {
     assignment: Assignment,
     supervisor: Supervisor,
     recording: Recording,
-    kept: Kept,
+    kept: KeptLibraries,
     /// What all archives depend on.
     key: String,
     /// The supervisor's.
@@ -208,7 +208,7 @@ impl Packer {
         fs::create_dir_all(&out)?;
         let recording = Recording::obtain(root, &umbra)?;
         let supervisor = Supervisor::available(umbra, scratch.path().to_owned());
-        let kept = Kept::within(&assignment.cache(), supervisor.isolation.isolation());
+        let kept = KeptLibraries::within(&assignment.cache(), supervisor.isolation.isolation());
         let mut hash = Sha256::new();
         hash.update(&recording.key);
         for (path, bytes) in read_tree(&root.join("scenes"))? {

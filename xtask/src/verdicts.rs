@@ -40,7 +40,7 @@ const SMALL_FILM: [u32; 2] = [128, 96];
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Grade only mistakes, pairs, variants and samples whose name holds this (repeatable); `plain` for the
-    /// reference, `unseen scenes` for what confirms the thresholds
+    /// reference, `held-back scenes` for what confirms the thresholds
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
     /// Scenes on their own films; without it the large ones are drawn at 128x96
@@ -57,8 +57,8 @@ pub struct Arguments {
     #[arg(long)]
     explain: bool,
     /// Seed of held-back scenes to grade on as well [default: none are made]
-    #[arg(long, value_name = "SEED")]
-    perturb: Option<u64>,
+    #[arg(long = "held-back", alias = "perturb", value_name = "SEED")]
+    held_back_seed: Option<u64>,
     /// Graphics adapter for realtime scenes
     #[arg(long, value_enum, default_value_t = AdapterChoice::Software)]
     adapter: AdapterChoice,
@@ -102,7 +102,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
     };
     let cancel = AtomicBool::new(false);
     let grading =
-        Grading::prepare(&store, arguments.adapter.adapter(), arguments.perturb, &cancel)?;
+        Grading::prepare(&store, arguments.adapter.adapter(), arguments.held_back_seed, &cancel)?;
     if let Err(why) = &grading.adapter {
         anyhow::bail!("realtime cannot be judged here: {why}");
     }
@@ -169,14 +169,14 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
     if arguments.only.is_empty() && !arguments.quick {
         figures.push(rules);
     }
-    let unseen = named(confirm::NAME) && arguments.perturb.is_none();
-    if unseen {
+    let held_back = named(confirm::NAME) && arguments.held_back_seed.is_none();
+    if held_back {
         let few = arguments.quick;
         figures.push(confirm::figure(&bench, &store, few, jobs)?);
     }
     let sources = sources::grade(root, &umbra, &assignment.rules, &named, arguments)?;
     let graded = matrix.variants.len() + matrix.singles.len() + matrix.pairs.len() + combined;
-    ensure!(graded > 0 || unseen || sources.is_some(), "nothing has a name like that");
+    ensure!(graded > 0 || held_back || sources.is_some(), "nothing has a name like that");
     figures.extend(sources);
     summary(&figures)
 }

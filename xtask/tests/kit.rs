@@ -137,7 +137,7 @@ fn the_kit_is_whole_and_holds_nothing_of_the_reference() {
         let name = &entry.name;
         assert!(a.expected.offline.mean == b.expected.offline.mean, "{name}: mean");
         assert!(a.expected.offline.variance == b.expected.offline.variance, "{name}: variance");
-        assert!(a.expected.offline.centre == b.expected.offline.centre, "{name}: centre");
+        assert!(a.expected.offline.center == b.expected.offline.center, "{name}: centre");
         assert!(a.expected.offline.mask == b.expected.offline.mask, "{name}: mask");
         assert!(a.expected.unshadowed == b.expected.unshadowed, "{name}: unshadowed");
         assert!(
@@ -279,7 +279,7 @@ fn a_check_in_the_kit_says_what_the_grader_says() {
             report(student.args(["check", archive]).current_dir(&kit), &kit.join("report"));
         let out = kit.join("graded");
         let mut grader = Command::new(root().join("target/release/umbra"));
-        grader.args(["grade", archive, "--isolation", "reduced", "--perturb", "off"]);
+        grader.args(["grade", archive, "--isolation", "reduced", "--held-back", "off"]);
         grader.arg("--root").arg(root());
         let ours = report(&mut grader, &out);
         let parts = |report: &Value| report["submissions"][0]["parts"].clone();

@@ -198,10 +198,10 @@ mod tests {
     }
 
     #[test]
-    fn the_centre_ray_looks_at_the_target_and_row_0_is_on_top() {
+    fn the_center_ray_looks_at_the_target_and_row_0_is_on_top() {
         let camera = camera();
-        let centre = camera.ray(20.0, 15.0).direction;
-        assert!((centre - (vec3(0.0, 0.5, -1.0) - camera.eye()).normalize()).length() < 1e-6);
+        let center = camera.ray(20.0, 15.0).direction;
+        assert!((center - (vec3(0.0, 0.5, -1.0) - camera.eye()).normalize()).length() < 1e-6);
         assert!(camera.ray(20.0, 0.0).direction.y > camera.ray(20.0, 30.0).direction.y);
         let angle = camera.ray(20.0, 0.0).direction.angle_between(camera.ray(20.0, 30.0).direction);
         assert!((angle.to_degrees() - 40.0).abs() < 1e-3, "vertical field of view {angle}");

@@ -54,9 +54,9 @@ fn message(bytes: &[u8]) -> String {
 }
 
 /// A folder of its own for each test, gone when the test ends.
-struct Folder(std::path::PathBuf);
+struct TestFolder(std::path::PathBuf);
 
-impl Folder {
+impl TestFolder {
     fn new(test: &str) -> Self {
         let path = std::env::temp_dir().join(format!("umbra-exr-{test}-{}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
@@ -64,7 +64,7 @@ impl Folder {
     }
 }
 
-impl Drop for Folder {
+impl Drop for TestFolder {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.0);
     }
@@ -150,7 +150,7 @@ fn patched(mut bytes: Vec<u8>, after: &[u8], skip: usize, with: &[u8]) -> Vec<u8
 
 #[test]
 fn float_round_trip_is_exact() {
-    let folder = Folder::new("float");
+    let folder = TestFolder::new("float");
     let path = folder.0.join("a.exr");
     write_exr(&path, &difficult(), Precision::Float, &[]).unwrap();
     assert_same_bits(&read_exr(&path).unwrap(), &difficult());
@@ -158,7 +158,7 @@ fn float_round_trip_is_exact() {
 
 #[test]
 fn half_round_trip_keeps_nan_infinity_and_the_sign_of_zero() {
-    let folder = Folder::new("half");
+    let folder = TestFolder::new("half");
     let path = folder.0.join("a.exr");
     let mut image = difficult();
     image.pixels[7].y = 5.960_464_5e-8; // the smallest half
@@ -176,7 +176,7 @@ fn half_round_trip_keeps_nan_infinity_and_the_sign_of_zero() {
 
 #[test]
 fn a_written_file_is_what_the_course_hands_out() {
-    let folder = Folder::new("course");
+    let folder = TestFolder::new("course");
     let path = folder.0.join("a.exr");
     write_exr(&path, &difficult(), Precision::Half, &[("seed", "260000000")]).unwrap();
     let meta = exr::meta::MetaData::read_from_file(&path, true).unwrap();
@@ -193,7 +193,7 @@ fn a_written_file_is_what_the_course_hands_out() {
 
 #[test]
 fn layers_come_back_with_their_provenance_and_the_same_bytes() {
-    let folder = Folder::new("layers");
+    let folder = TestFolder::new("layers");
     let (a, b) = (folder.0.join("a.exr"), folder.0.join("b.exr"));
     let mut content = ExrLayers::default();
     for (i, name) in ["mean", "variance", "centre"].into_iter().enumerate() {
@@ -309,7 +309,7 @@ fn incomplete_and_integer_layers_are_ignored_with_a_note() {
     let read = decode(&bytes).unwrap();
     assert_eq!(read.notes, ["layer without a name is ignored: no channel B"]);
     assert_eq!(read.layers["x"].pixels[0], vec3(4.0, 3.0, 2.0));
-    let folder = Folder::new("incomplete");
+    let folder = TestFolder::new("incomplete");
     let path = folder.0.join("a.exr");
     std::fs::write(&path, bytes).unwrap();
     assert!(read_exr(&path).unwrap_err().to_string().contains("no channel B; expected R, G and B"));
@@ -536,7 +536,7 @@ fn rows_are_read_from_anywhere() {
         rounding_mode: RoundingMode::Down,
     });
     let kinds = [SampleType::F16, SampleType::F32, SampleType::F16, SampleType::F32];
-    let folder = Folder::new("rows");
+    let folder = TestFolder::new("rows");
     for (round, (compression, blocks)) in [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24]
         .into_iter()
         .flat_map(|compression| [LINES, tiles].map(|blocks| (compression, blocks)))

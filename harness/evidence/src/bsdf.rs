@@ -411,7 +411,7 @@ fn hint(mut ratios: Vec<f64>, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Stri
 
 #[cfg(test)]
 mod tests {
-    use super::super::price::Class;
+    use super::super::price::PriceClass;
     use super::*;
 
     fn judge_plain(kind: BsdfKind, probes: &[BsdfProbe], values: &[[f32; 3]]) -> Check {
@@ -525,7 +525,7 @@ mod tests {
         ];
         for (index, slip) in slips.into_iter().enumerate() {
             let check = error(slip);
-            let off = check.error / Class::Slip.price();
+            let off = check.error / PriceClass::Slip.price();
             assert!((0.9..1.2).contains(&off), "{index}: {} {}", check.error, check.mistake);
             assert!(!check.hint.contains("negative base"), "{index}: {}", check.hint);
         }

@@ -1,6 +1,6 @@
 //! The known single mistakes that answers are compared with, each with what a teacher takes it for.
 
-use super::price::{Change, Class, Fitted};
+use super::price::{Change, Fitted, PriceClass};
 use super::shading::{Angle, Clamp, Directions, Shading, Terms, Tests};
 use imaging::srgb;
 
@@ -15,7 +15,7 @@ pub fn diffuse_changes() -> Vec<Change> {
     ];
     let of =
         |class| move |name, shading| Change { name, class, shading: Some(shading), fitted: None };
-    let (slip, concept) = (of(Class::Slip), of(Class::Concept));
+    let (slip, concept) = (of(PriceClass::Slip), of(PriceClass::Concept));
     changes.extend([
         concept("cos theta_i is missing", Shading { cos_i: [0.0; 2], ..right }),
         concept("the diffuse reflectance is missing", Shading { albedo: |_| 1.0, ..right }),
@@ -79,7 +79,7 @@ pub fn phong_changes() -> Vec<Change> {
     let right = Shading::default();
     let of =
         |class| move |name, shading| Change { name, class, shading: Some(shading), fitted: None };
-    let (slip, concept) = (of(Class::Slip), of(Class::Concept));
+    let (slip, concept) = (of(PriceClass::Slip), of(PriceClass::Concept));
     let lobe = |normalization| Shading { normalization, ..right };
     let exponent = |a, b| Shading { exponent: [a, b], ..right };
     let mut changes = diffuse_changes();
@@ -206,7 +206,7 @@ pub fn light_changes() -> Vec<Change> {
     let right = Shading::default();
     let of =
         |class| move |name, shading| Change { name, class, shading: Some(shading), fitted: None };
-    let (slip, concept) = (of(Class::Slip), of(Class::Concept));
+    let (slip, concept) = (of(PriceClass::Slip), of(PriceClass::Concept));
     vec![
         fit("a constant factor", Fitted::All),
         fit("a factor by channel", Fitted::Channels),
@@ -238,7 +238,7 @@ pub fn integrator_changes() -> Vec<Change> {
     let right = Shading::default();
     let of =
         |class| move |name, shading| Change { name, class, shading: Some(shading), fitted: None };
-    let (slip, concept) = (of(Class::Slip), of(Class::Concept));
+    let (slip, concept) = (of(PriceClass::Slip), of(PriceClass::Concept));
     let cosines =
         |cos_i: f64, cos_o: f64| Shading { cos_i: [cos_i; 2], cos_o: [cos_o; 2], ..right };
     let mut changes = light_changes();
@@ -289,7 +289,7 @@ pub fn shader_changes(phong: bool) -> Vec<Change> {
     let mut bsdf = if phong { phong_changes() } else { diffuse_changes() };
     let output = |name, output| Change {
         name,
-        class: Class::Slip,
+        class: PriceClass::Slip,
         shading: Some(Shading { output, ..Shading::default() }),
         fitted: None,
     };
@@ -305,5 +305,5 @@ pub fn shader_changes(phong: bool) -> Vec<Change> {
 }
 
 fn fit(name: &'static str, fitted: Fitted) -> Change {
-    Change { name, class: Class::Slip, shading: None, fitted: Some(fitted) }
+    Change { name, class: PriceClass::Slip, shading: None, fitted: Some(fitted) }
 }

@@ -1,6 +1,6 @@
 //! The price of a wrong image: slips in how a film is written or viewed.
 
-use super::price::{self, Class, Price};
+use super::price::{self, Price, PriceClass};
 use super::rays::RELATIVE;
 use imaging::correlation::Moments;
 use imaging::srgb;
@@ -164,10 +164,10 @@ impl<'a> Film<'a> {
         for (dx, dy) in [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)] {
             changes.push(self.moved("half a pixel beside", move |x, y| (x + dx, y + dy)));
         }
-        let (centre_x, centre_y) = (0.5 * last_x, 0.5 * last_y);
+        let (center_x, center_y) = (0.5 * last_x, 0.5 * last_y);
         let zoomed = |name, by_x: f64, by_y: f64| {
             let from = move |x: f64, y: f64| {
-                (centre_x + by_x * (x - centre_x), centre_y + by_y * (y - centre_y))
+                (center_x + by_x * (x - center_x), center_y + by_y * (y - center_y))
             };
             self.moved(name, from)
         };
@@ -246,7 +246,7 @@ pub fn film_price(
     let pairs = pairs.map(|(a, b)| (f64::from(*a), f64::from(*b)));
     let likeness = Moments::of(pairs).correlation();
     let start = match likeness >= price::LIKE {
-        true => Price::of_raw(raw).or(price::UNKNOWN, Class::Unknown, 0.0),
+        true => Price::of_raw(raw).or(price::UNKNOWN, PriceClass::Unknown, 0.0),
         false => Price::of_raw(raw),
     };
     let mut changes = film.changes(factor);
@@ -259,11 +259,15 @@ pub fn film_price(
     let mut changes: Vec<_> = changes.iter().map(|change| (left(change), change)).collect();
     changes.sort_by(|a, b| a.0.total_cmp(&b.0));
     changes.into_iter().fold(start, |price, (left, change)| {
-        if price.is_least() || left > price::surely_more_than(price.error - Class::Slip.price()) {
+        if price.is_least()
+            || left > price::surely_more_than(price.error - PriceClass::Slip.price())
+        {
             return price;
         }
         match comparison(change, &all) {
-            Some(all) if price::follows(&all.pairs) => price.or(change.name, Class::Slip, all.left),
+            Some(all) if price::follows(&all.pairs) => {
+                price.or(change.name, PriceClass::Slip, all.left)
+            }
             _ => price,
         }
     })
@@ -387,7 +391,7 @@ mod tests {
         let price =
             |image: &[[f32; 3]]| film_price((width, height), image, &right, &|_| Some(0.0), 0.9);
         let doubled = film(&|x, y| 2.0 * at(x, y));
-        assert!((price(&doubled).error - Class::Slip.price()).abs() < 1e-6);
+        assert!((price(&doubled).error - PriceClass::Slip.price()).abs() < 1e-6);
         // As bright as the right image is on average, and one that has nothing to do with it.
         let [flat, other] = [film(&|_, _| 3.0), film(&|x, _| 3.0 + 2.0 * (1.7 * x).sin())];
         for (image, what) in [(flat, "flat"), (other, "another"), (film(&|_, _| 0.0), "black")] {

@@ -17,7 +17,7 @@ use imaging::tolerances::Tolerances;
 
 /// How an image came about, which decides how it is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ImageKind {
     /// Rendered offline with shadows at this many samples per pixel.
     Offline {
         /// Samples per pixel.
@@ -34,13 +34,13 @@ pub enum Kind {
 }
 
 /// What an image of a kind is compared with, and its regions.
-pub fn reference_of(kind: Kind, expected: &Expected) -> (&Image, &RegionMask) {
+pub fn reference_of(kind: ImageKind, expected: &Expected) -> (&Image, &RegionMask) {
     match kind {
-        Kind::Offline { spp: 1 } | Kind::RealtimeShadows | Kind::SubmittedShadows => {
-            (&expected.offline.centre, &expected.offline.mask)
-        }
-        Kind::Offline { .. } => (&expected.offline.mean, &expected.offline.mask),
-        Kind::Realtime | Kind::SubmittedRealtime => {
+        ImageKind::Offline { spp: 1 }
+        | ImageKind::RealtimeShadows
+        | ImageKind::SubmittedShadows => (&expected.offline.center, &expected.offline.mask),
+        ImageKind::Offline { .. } => (&expected.offline.mean, &expected.offline.mask),
+        ImageKind::Realtime | ImageKind::SubmittedRealtime => {
             (&expected.unshadowed, &expected.unshadowed_mask)
         }
     }
@@ -52,7 +52,7 @@ pub fn reference_of(kind: Kind, expected: &Expected) -> (&Image, &RegionMask) {
 /// # Errors
 /// When the sizes differ.
 pub fn compare_pixels(
-    kind: Kind,
+    kind: ImageKind,
     actual: &Image,
     expected: &Expected,
     tolerances: &Tolerances,
@@ -61,11 +61,11 @@ pub fn compare_pixels(
     let mut excess = Vec::with_capacity(mask.pixels.len());
     let kept = Some(&mut excess);
     let evidence = match kind {
-        Kind::Offline { spp } => offline(actual, &expected.offline, spp, tolerances, kept),
-        Kind::Realtime | Kind::RealtimeShadows => {
+        ImageKind::Offline { spp } => offline(actual, &expected.offline, spp, tolerances, kept),
+        ImageKind::Realtime | ImageKind::RealtimeShadows => {
             realtime_linear(actual, reference, mask, tolerances, kept)
         }
-        Kind::SubmittedRealtime | Kind::SubmittedShadows => {
+        ImageKind::SubmittedRealtime | ImageKind::SubmittedShadows => {
             srgb8(actual, reference, mask, tolerances, kept)
         }
     };
@@ -76,7 +76,7 @@ pub fn compare_pixels(
 pub fn judge(
     id: CheckId,
     scene: &str,
-    kind: Kind,
+    kind: ImageKind,
     actual: &Image,
     expected: &Expected,
     wanted: &dyn Fn(&Region) -> bool,
@@ -89,21 +89,21 @@ pub fn judge(
         return Check::new(id, scene, Verdict::NotJudged, summary);
     }
     let compared = match kind {
-        Kind::Offline { spp } => {
+        ImageKind::Offline { spp } => {
             let reference = imaging::reference::ReferenceImage {
                 mask: mask.clone(),
                 ..expected.offline.clone()
             };
             compare_offline(actual, &reference, spp, tolerances)
         }
-        Kind::Realtime => {
+        ImageKind::Realtime => {
             let raw = expected.interpolated_normals.as_ref();
             return judge_shaded(id, scene, actual, (reference, raw), &mask, tolerances);
         }
-        Kind::RealtimeShadows => {
+        ImageKind::RealtimeShadows => {
             return judge_realtime(id, scene, actual, reference, &mask, tolerances);
         }
-        Kind::SubmittedRealtime | Kind::SubmittedShadows => {
+        ImageKind::SubmittedRealtime | ImageKind::SubmittedShadows => {
             compare_srgb8(actual, reference, &mask, tolerances)
         }
     };
@@ -119,7 +119,7 @@ pub fn judge(
 
 /// The price of an image that is `raw` off: a slip in how it is written explains it, or nothing does.
 pub fn film_price(image: &Image, right: &Image, mask: &RegionMask, raw: f64) -> Price {
-    let colours = |image: &Image| image.pixels.iter().map(|p| p.to_array()).collect::<Vec<_>>();
+    let colors = |image: &Image| image.pixels.iter().map(|p| p.to_array()).collect::<Vec<_>>();
     let room = |index: usize| {
         let never = RegionMask::EDGE | RegionMask::EMITTER;
         (mask.pixels[index] & never == 0).then_some(0.0)
@@ -128,24 +128,24 @@ pub fn film_price(image: &Image, right: &Image, mask: &RegionMask, raw: f64) -> 
     if size != (right.width, right.height) {
         return Price::of_raw(raw);
     }
-    film_slips::film_price(size, &colours(image), &colours(right), &room, raw)
+    film_slips::film_price(size, &colors(image), &colors(right), &room, raw)
 }
 
 /// Whether two images of one scene come from one renderer: equal within noise offline, within a
 /// level of 8-bit sRGB realtime.
 pub fn same_origin(
-    kind: Kind,
+    kind: ImageKind,
     a: &Image,
     b: &Image,
     expected: &Expected,
     tolerances: &Tolerances,
 ) -> bool {
     let mask = match kind {
-        Kind::Offline { spp } => {
+        ImageKind::Offline { spp } => {
             return same_draws(a, b, spp, expected.offline.median_lit, tolerances);
         }
-        Kind::Realtime | Kind::SubmittedRealtime => &expected.unshadowed_mask,
-        Kind::RealtimeShadows | Kind::SubmittedShadows => &expected.offline.mask,
+        ImageKind::Realtime | ImageKind::SubmittedRealtime => &expected.unshadowed_mask,
+        ImageKind::RealtimeShadows | ImageKind::SubmittedShadows => &expected.offline.mask,
     };
     same_levels(a, b, mask, tolerances)
 }
@@ -155,12 +155,12 @@ pub fn judge_realtime(
     id: CheckId,
     scene: &str,
     actual: &Image,
-    centre: &Image,
+    center: &Image,
     mask: &RegionMask,
     tolerances: &Tolerances,
 ) -> Check {
-    match compare_realtime_linear(actual, centre, mask, tolerances) {
-        Ok(found) => describe(id, scene, &found, actual, centre, mask),
+    match compare_realtime_linear(actual, center, mask, tolerances) {
+        Ok(found) => describe(id, scene, &found, actual, center, mask),
         Err(error) => Check::new(id, scene, Verdict::NotJudged, error.to_string()),
     }
 }
@@ -171,18 +171,18 @@ pub fn judge_shaded(
     id: CheckId,
     scene: &str,
     actual: &Image,
-    (centre, raw): (&Image, Option<&Image>),
+    (center, raw): (&Image, Option<&Image>),
     mask: &RegionMask,
     tolerances: &Tolerances,
 ) -> Check {
-    let check = judge_realtime(id, scene, actual, centre, mask, tolerances);
+    let check = judge_realtime(id, scene, actual, center, mask, tolerances);
     let Some(raw) = raw.filter(|_| check.verdict == Verdict::Fail) else { return check };
     let taken: [&dyn Fn(&Region) -> bool; 3] =
         [&|_| true, &|region| region.exponent == 0.0, &|region| region.exponent > 0.0];
     for taken in taken {
-        let pixels = centre.pixels.iter().zip(&raw.pixels).zip(&mask.pixels);
+        let pixels = center.pixels.iter().zip(&raw.pixels).zip(&mask.pixels);
         let mixed = pixels.map(|((a, b), value)| if taken(mask.region(*value)) { *b } else { *a });
-        let mixed = Image { pixels: mixed.collect(), ..*centre };
+        let mixed = Image { pixels: mixed.collect(), ..*center };
         let accepted = judge_realtime(id, scene, actual, &mixed, mask, tolerances);
         if accepted.verdict == Verdict::Pass {
             let summary =
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn normals_that_are_not_renormalised_are_accepted_by_material() {
+    fn normals_that_are_not_renormalized_are_accepted_by_material() {
         let mut mask = RegionMask::background(16, 16);
         for exponent in [0.0, 20.0] {
             mask.regions.push(Region { name: "ball".into(), lit: true, exponent });

@@ -1,6 +1,6 @@
 //! How much of the light most lit and most dark points have, where shadows are wrong (parts 1.4 and 2.5).
 
-use super::price::{self, Class, Price};
+use super::price::{self, Price, PriceClass};
 
 /// The mistake of shadows that are not black.
 pub const LEAVES_LIGHT: &str = "shadows leave some light";
@@ -34,7 +34,7 @@ impl Levels {
         let price = match self.dark > 0.0 && self.dark < 1.0 {
             true => {
                 let residual = price::fading(self.dark) + residual(1.0, self.dark);
-                price.or(LEAVES_LIGHT, Class::Slip, residual)
+                price.or(LEAVES_LIGHT, PriceClass::Slip, residual)
             }
             false => price,
         };
@@ -44,9 +44,11 @@ impl Levels {
             false => (GAINS_LIGHT, 1.0 / self.lit),
         };
         match kept > 0.0 && kept < 1.0 {
-            true => {
-                price.or(name, Class::Slip, price::fading(1.0 - kept) + residual(self.lit, 0.0))
-            }
+            true => price.or(
+                name,
+                PriceClass::Slip,
+                price::fading(1.0 - kept) + residual(self.lit, 0.0),
+            ),
             false => price,
         }
     }
@@ -87,7 +89,7 @@ mod tests {
 
     #[test]
     fn one_constant_is_a_slip_whichever_way() {
-        let slip = Class::Slip.price();
+        let slip = PriceClass::Slip.price();
         for (lit, dark, name) in [
             (0.8, 0.0, LOSES_LIGHT),
             (1.125, 0.0, GAINS_LIGHT),

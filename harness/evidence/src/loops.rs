@@ -2,7 +2,7 @@
 //! along rays that the host chooses, right or wrong.
 
 use super::film_slips::film_price;
-use super::price::{Class, Price};
+use super::price::{Price, PriceClass};
 use super::rays::{RELATIVE, STRAY_FRACTION};
 use super::{Check, CheckId, Measure, RuleId, Verdict};
 use imaging::reference::RegionMask;
@@ -96,7 +96,7 @@ pub fn priced_by_length(
     mut along: impl Iterator<Item = Vec<[f32; 3]>>,
     judge: &dyn Fn(&[[f32; 3]]) -> Check,
 ) -> Check {
-    if check.verdict != Verdict::Fail || check.error <= Class::Slip.price() {
+    if check.verdict != Verdict::Fail || check.error <= PriceClass::Slip.price() {
         return check;
     }
     // Where rays are no numbers they are not compared.
@@ -107,7 +107,7 @@ pub fn priced_by_length(
     match along.any(agrees) {
         true => check.priced(|raw| {
             let name = "the directions of camera rays are not normalized";
-            Price { error: Class::Slip.price(), mistake: Some(name), ..Price::of_raw(raw) }
+            Price { error: PriceClass::Slip.price(), mistake: Some(name), ..Price::of_raw(raw) }
         }),
         false => check,
     }
@@ -367,9 +367,9 @@ pub fn judge_samples(
     if inside as f64 <= OFF_FRACTION * counted as f64 + SPARE_PIXELS {
         // All but edges is right, or a few pixels.
         price = match stray.is_empty() {
-            true => price.or("samples that do not cover their pixels", Class::Slip, 0.0),
+            true => price.or("samples that do not cover their pixels", PriceClass::Slip, 0.0),
             false => Price {
-                error: Class::Slip.price(),
+                error: PriceClass::Slip.price(),
                 mistake: Some("a few pixels are wrong"),
                 ..price
             },
@@ -406,7 +406,7 @@ pub fn judge_edges(edges: &Edges) -> Check {
         measure.value
     );
     let check = Check::new(id, "", Verdict::Fail, summary);
-    let check = Check { error: Class::Slip.price(), measures: vec![measure], ..check };
+    let check = Check { error: PriceClass::Slip.price(), measures: vec![measure], ..check };
     check.with_hint("look at whether both axes have random numbers of their own")
 }
 

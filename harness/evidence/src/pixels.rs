@@ -6,7 +6,7 @@ use renderer_api as api;
 
 use super::CheckId;
 use super::changes::shader_changes;
-use super::price::{self, Answers, Class, Price};
+use super::price::{self, Answers, Price, PriceClass};
 use super::shading::{ShadedPoint, Shading};
 use super::vertex::other_normals;
 use crate::expected::SurfacePoint;
@@ -394,7 +394,7 @@ struct Places {
 }
 
 /// A mistake in a shader's use of its inputs: its name, and what the shader shades instead.
-type Input<'a> = (&'static str, Class, Box<dyn Fn(&SurfacePoint) -> ShadedPoint + 'a>);
+type Input<'a> = (&'static str, PriceClass, Box<dyn Fn(&SurfacePoint) -> ShadedPoint + 'a>);
 
 /// The mistakes that are looked for.
 fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
@@ -410,25 +410,25 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
             change(&mut shaded);
             shaded
         };
-        (name, Class::Slip, Box::new(shaded))
+        (name, PriceClass::Slip, Box::new(shaded))
     };
     let mut inputs = vec![
-        at(price::LIGHT_IN_VIEW_SPACE, Class::Slip, Places { light: seen, ..right }),
+        at(price::LIGHT_IN_VIEW_SPACE, PriceClass::Slip, Places { light: seen, ..right }),
         at(
             price::LIGHT_IN_WORLD_SPACE,
-            Class::Slip,
+            PriceClass::Slip,
             Places { light: view.inverse().transform_point3(right.light), ..right },
         ),
         at(
             price::VIEWER_NOT_TURNED,
-            Class::Slip,
+            PriceClass::Slip,
             Places { eye: -view.transform_vector3(view.w_axis.truncate()), ..right },
         ),
-        at(price::VIEWER_AT_ORIGIN, Class::Slip, Places { eye: Vec3::ZERO, ..right }),
-        at(price::LIGHT_AT_ORIGIN, Class::Concept, Places { light: Vec3::ZERO, ..right }),
+        at(price::VIEWER_AT_ORIGIN, PriceClass::Slip, Places { eye: Vec3::ZERO, ..right }),
+        at(price::LIGHT_AT_ORIGIN, PriceClass::Concept, Places { light: Vec3::ZERO, ..right }),
         at(
             "light and viewer are exchanged",
-            Class::Concept,
+            PriceClass::Concept,
             Places { light: right.eye, eye: right.light },
         ),
         changed(price::LIGHT_NEGATED, |p| p.wi = p.wi.map(|v| -v)),
@@ -442,7 +442,7 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
     inputs.extend([
         of(
             "the distance is that of the viewer",
-            Class::Slip,
+            PriceClass::Slip,
             Box::new(move |point| ShadedPoint {
                 distance: f64::from((right.eye - point.position).length()),
                 ..right.shaded_point(scene, point)
@@ -450,7 +450,7 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
         ),
         of(
             "the distance is that of the light from the origin",
-            Class::Slip,
+            PriceClass::Slip,
             Box::new(move |point| ShadedPoint {
                 distance: f64::from(right.light.length()),
                 ..right.shaded_point(scene, point)
@@ -458,7 +458,7 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
         ),
         of(
             "wo is not of unit length",
-            Class::Slip,
+            PriceClass::Slip,
             Box::new(move |point| {
                 let shaded = right.shaded_point(scene, point);
                 let length = f64::from((right.eye - point.position).length());
@@ -467,7 +467,7 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
         ),
         of(
             "the direction to the viewer is the viewer's position",
-            Class::Slip,
+            PriceClass::Slip,
             Box::new(move |point| {
                 let frame = Frame::from_normal(point.normal);
                 let wo = frame.to_local(right.eye.normalize_or_zero()).to_array().map(f64::from);
@@ -476,7 +476,7 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
         ),
         of(
             "the direction to the light is the light's position",
-            Class::Concept,
+            PriceClass::Concept,
             Box::new(move |point| {
                 let frame = Frame::from_normal(point.normal);
                 let wi = frame.to_local(right.light.normalize_or_zero()).to_array().map(f64::from);
@@ -486,7 +486,7 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
         ),
         of(
             "the normal is that of a triangle's first corner",
-            Class::Slip,
+            PriceClass::Slip,
             Box::new(move |point| {
                 let shape = &scene.shapes()[point.shape];
                 let corner = shape.triangles[point.primitive][0] as usize;
@@ -497,7 +497,7 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
         ),
         of(
             "the normal points up",
-            Class::Concept,
+            PriceClass::Concept,
             Box::new(move |point| {
                 right.shaded_point(scene, &SurfacePoint { normal: Vec3::Y, ..*point })
             }),
@@ -511,7 +511,7 @@ fn inputs<'a>(scene: &'a Scene, camera: &'a Camera) -> Vec<Input<'a>> {
             shaded.material.exponent = exponent;
             shaded
         };
-        inputs.push(of("the exponent is a constant", Class::Slip, Box::new(shaded)));
+        inputs.push(of("the exponent is a constant", PriceClass::Slip, Box::new(shaded)));
     }
     inputs
 }

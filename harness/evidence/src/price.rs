@@ -14,7 +14,7 @@ use imaging::correlation::Moments;
 
 /// How a teacher would class a mistake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Class {
+pub enum PriceClass {
     /// One constant, sign, power, index or division: 10 to 25 % of a part.
     Slip,
     /// Something that the part is about is missing: 40 to 80 %.
@@ -23,7 +23,7 @@ pub enum Class {
     Unknown,
 }
 
-impl Class {
+impl PriceClass {
     /// The error that a mistake of this class counts as, in [0, 1].
     pub fn price(self) -> f64 {
         match self {
@@ -78,7 +78,7 @@ pub struct Change {
     /// What the mistake is, for reports.
     pub name: &'static str,
     /// Its class.
-    pub class: Class,
+    pub class: PriceClass,
     /// The changed shading; `None` where a factor is fitted.
     pub(super) shading: Option<Shading>,
     /// Which factor is fitted.
@@ -88,7 +88,7 @@ pub struct Change {
 impl Change {
     /// A slip that makes a renderer shade so.
     pub(super) fn slip(name: &'static str, shading: Shading) -> Self {
-        Self { name, class: Class::Slip, shading: Some(shading), fitted: None }
+        Self { name, class: PriceClass::Slip, shading: Some(shading), fitted: None }
     }
 }
 
@@ -132,7 +132,7 @@ impl Price {
 
     /// Whether no mistake can make it smaller.
     pub fn is_least(&self) -> bool {
-        self.error <= Class::Slip.price()
+        self.error <= PriceClass::Slip.price()
     }
 
     /// The single mistake that explains the answers best, if there is one.
@@ -152,7 +152,7 @@ impl Price {
     }
 
     /// The same, when a mistake of this class leaves `residual` unexplained.
-    pub fn or(self, name: &'static str, class: Class, residual: f64) -> Self {
+    pub fn or(self, name: &'static str, class: PriceClass, residual: f64) -> Self {
         let error = class.price() + residual;
         if error < self.error { Self { error, mistake: Some(name), ..self } } else { self }
     }
@@ -173,15 +173,15 @@ impl Check {
 
 /// Whether one mistake explains a check's answers and leaves next to nothing.
 pub fn is_explained(check: &Check) -> bool {
-    let leaves_nothing = |class: Class| (check.error - class.price()).abs() < 1e-3;
+    let leaves_nothing = |class: PriceClass| (check.error - class.price()).abs() < 1e-3;
     let is_known = ![UNKNOWN, ""].contains(&check.mistake.as_str());
-    is_known && [Class::Slip, Class::Concept].into_iter().any(leaves_nothing)
+    is_known && [PriceClass::Slip, PriceClass::Concept].into_iter().any(leaves_nothing)
 }
 
 /// Whether a failed check is no further off than a slip: what one explains may leave as much as a seam does.
 fn is_slight(check: &Check) -> bool {
     let is_known = ![UNKNOWN, ""].contains(&check.mistake.as_str());
-    check.error <= if is_known { 1.5 } else { 1.0 } * Class::Slip.price()
+    check.error <= if is_known { 1.5 } else { 1.0 } * PriceClass::Slip.price()
 }
 
 /// Whether failed checks are no further off than a slip.
@@ -223,7 +223,7 @@ pub fn settle_by_common_mistake(checks: &mut [Check]) {
     for (own, right) in of_id.into_values().zip(right) {
         // A mistake that leaves most unexplained is no explanation.
         let unexplained = |check: &Check| {
-            let barely = check.error > Class::Unknown.price() && check.mistake != BLACK;
+            let barely = check.error > PriceClass::Unknown.price() && check.mistake != BLACK;
             check.mistake.is_empty() || barely
         };
         let (nothing, others): (Vec<usize>, Vec<usize>) =
@@ -231,7 +231,7 @@ pub fn settle_by_common_mistake(checks: &mut [Check]) {
         let told = others.iter().filter(|&&index| checks[index].mistake != BLACK).count();
         if told + right >= nothing.len() {
             for index in nothing {
-                checks[index].error = checks[index].error.min(Class::Unknown.price());
+                checks[index].error = checks[index].error.min(PriceClass::Unknown.price());
             }
         }
         let unknown =
@@ -339,7 +339,7 @@ impl Answers<'_> {
         }
         let price = match self.pairs(&questions, &right, &Factors::default()).correlation() >= LIKE
         {
-            true => price.or(UNKNOWN, Class::Unknown, 0.0),
+            true => price.or(UNKNOWN, PriceClass::Unknown, 0.0),
             false => price,
         };
         let few = few_of(&questions);
@@ -364,16 +364,18 @@ impl Answers<'_> {
         // A concept that explains them is one, also where it is far from the right answers by little: without falloff
         // is no r in place of r^2, made twice.
         let is_concept = self.changes.iter().any(|change| {
-            let left = price.error - Class::Concept.price();
+            let left = price.error - PriceClass::Concept.price();
             let is_named = price.mistake == Some(change.name)
                 && left <= LEFT_BY_TWO
-                && (change.class == Class::Concept || (change.fitted.is_some() && left >= 0.0));
+                && (change.class == PriceClass::Concept
+                    || (change.fitted.is_some() && left >= 0.0));
             let explains = |shading: Shading| {
                 let factors = Factors::default();
                 self.left_of(&few, &shading, &factors) <= surely_more_than(LEFT_BY_TWO)
                     && self.residual(&questions, &shading, &factors) <= LEFT_BY_TWO
             };
-            is_named || (change.class == Class::Concept && change.shading.is_some_and(explains))
+            is_named
+                || (change.class == PriceClass::Concept && change.shading.is_some_and(explains))
         });
         match !is_concept && self.are_of_two_slips(&questions, &few) {
             true => Price { error: TWO_SLIPS, mistake: Some("two slips"), ..price },
@@ -397,7 +399,11 @@ impl Answers<'_> {
     }
 
     /// A change as a shading, with the factors that the questions tell.
-    fn changed(&self, change: &Change, questions: &[usize]) -> Option<(Shading, Factors, Class)> {
+    fn changed(
+        &self,
+        change: &Change,
+        questions: &[usize],
+    ) -> Option<(Shading, Factors, PriceClass)> {
         match (change.shading, change.fitted) {
             (Some(shading), _) => Some((shading, Factors::default(), change.class)),
             (None, Some(fitted)) => self.fit(questions, fitted),
@@ -411,7 +417,7 @@ impl Answers<'_> {
         let slips: Vec<Shading> = self
             .changes
             .iter()
-            .filter(|change| change.class == Class::Slip)
+            .filter(|change| change.class == PriceClass::Slip)
             .filter_map(|change| change.shading)
             .collect();
         let right = Shading::default();
@@ -596,7 +602,7 @@ impl Answers<'_> {
     }
 
     /// A factor, as the answers have it. Nothing when it cannot be told, or leaves nothing.
-    fn fit(&self, questions: &[usize], fitted: Fitted) -> Option<(Shading, Factors, Class)> {
+    fn fit(&self, questions: &[usize], fitted: Fitted) -> Option<(Shading, Factors, PriceClass)> {
         let right = Shading::default();
         let (diffuse, specular) =
             (Shading { factor: [1.0, 0.0], ..right }, Shading { factor: [0.0, 1.0], ..right });
@@ -618,17 +624,23 @@ impl Answers<'_> {
                 ratios.get(ratios.len() / 2).copied()
             };
         let all = [0, 1, 2];
-        let class = |factor: f64| if factor.abs() < NOTHING { Class::Concept } else { Class::Slip };
+        let class = |factor: f64| {
+            if factor.abs() < NOTHING { PriceClass::Concept } else { PriceClass::Slip }
+        };
         match fitted {
             Fitted::All => {
                 let factor = ratios(questions, &all, &right, None)?;
-                (factor.abs() >= NOTHING).then_some((right, Factors::of([factor; 3]), Class::Slip))
+                (factor.abs() >= NOTHING).then_some((
+                    right,
+                    Factors::of([factor; 3]),
+                    PriceClass::Slip,
+                ))
             }
             Fitted::Channels => {
                 let factors = all.map(|c| ratios(questions, &[c], &right, None));
                 let factors = [factors[0]?, factors[1]?, factors[2]?];
                 let some = factors.iter().any(|factor| factor.abs() >= NOTHING);
-                some.then_some((right, Factors::of(factors), Class::Slip))
+                some.then_some((right, Factors::of(factors), PriceClass::Slip))
             }
             Fitted::Groups => {
                 let mut factors = Factors::default();
@@ -639,7 +651,7 @@ impl Answers<'_> {
                     }
                     factors.by_group.insert(group, [factor; 3]);
                 }
-                Some((right, factors, Class::Slip))
+                Some((right, factors, PriceClass::Slip))
             }
             Fitted::Colors => {
                 let mut factors = Factors::default();
@@ -651,7 +663,7 @@ impl Answers<'_> {
                     }
                     factors.by_group.insert(group, factor);
                 }
-                Some((right, factors, Class::Concept))
+                Some((right, factors, PriceClass::Concept))
             }
             Fitted::Diffuse => {
                 let factor = ratios(questions, &all, &diffuse, Some(&specular))?;
@@ -662,7 +674,7 @@ impl Answers<'_> {
                 let one = Shading { factor: [0.0; 2], ambient: 1.0, ..right };
                 let ambient = ratios(questions, &all, &one, Some(&right))?;
                 let shading = Shading { ambient, ..right };
-                Some((shading, Factors::default(), Class::Slip))
+                Some((shading, Factors::default(), PriceClass::Slip))
             }
             Fitted::Specular => {
                 let factor = ratios(questions, &all, &specular, Some(&diffuse))?;
@@ -689,11 +701,11 @@ const DARK: f64 = 0.4;
 pub fn partly(price: Price, lit_wrong: f64, dark_wrong: f64) -> Price {
     let few = 0.02;
     let price = match dark_wrong <= few && lit_wrong <= 1.0 - LIT {
-        true => price.or("some lit points are in shadow", Class::Slip, 0.015 * lit_wrong),
+        true => price.or("some lit points are in shadow", PriceClass::Slip, 0.015 * lit_wrong),
         false => price,
     };
     match lit_wrong <= few && dark_wrong <= 1.0 - DARK {
-        true => price.or("some shadows are missing", Class::Slip, 0.025 * dark_wrong),
+        true => price.or("some shadows are missing", PriceClass::Slip, 0.025 * dark_wrong),
         false => price,
     }
 }
@@ -752,7 +764,7 @@ mod tests {
             checks[passes].error
         };
         // As with another mistake beside it, which explains what is right here.
-        assert_eq!(settled(CheckId::BsdfDiffuse, 1), Class::Unknown.price());
+        assert_eq!(settled(CheckId::BsdfDiffuse, 1), PriceClass::Unknown.price());
         assert_eq!(settled(CheckId::BsdfDiffuse, 0), 1.0);
         // Scenes without a shadow are passed without any.
         assert_eq!(settled(CheckId::ShadowRays, 1), 1.0);
@@ -803,8 +815,8 @@ mod tests {
         }
         // One is cheaper, a third is more, and a concept is a concept.
         let no_falloff = Shading { falloff: 0.0, ..right };
-        assert_eq!(price(&no_falloff, 1.0).error, Class::Concept.price());
-        assert_eq!(price(&two_cosines, 1.0).error, Class::Slip.price());
+        assert_eq!(price(&no_falloff, 1.0).error, PriceClass::Concept.price());
+        assert_eq!(price(&two_cosines, 1.0).error, PriceClass::Slip.price());
         let three = Shading { falloff: 1.0, normalization: lobe, ..two_cosines };
         assert!(price(&three, 2.0).error > TWO_SLIPS);
     }

@@ -195,7 +195,7 @@ named! {
     /// One student number, two names.
     SubmissionNumber = "submission.number",
     /// Source that is another submission's, too.
-    SubmissionLikeness = "submission.likeness",
+    SubmissionSimilarity = "submission.likeness",
     /// The build.
     SubmissionBuild = "submission.build",
     /// Files replaced by the template's.

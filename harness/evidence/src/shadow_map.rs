@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use basecode::Image;
 
 use super::light_levels::{Levels, what_lit_get};
-use super::price::{self, Class, Price};
+use super::price::{self, Price, PriceClass};
 use super::{Check, CheckId, Measure, RuleId, Verdict};
 use imaging::reference::RegionMask;
 use imaging::tolerances::Tolerances;
@@ -257,7 +257,7 @@ fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64, unknown: f64) -> Pri
     let [least, most] = [0.01, 0.99].map(|fraction| fraction * pixels.len() as f64);
     let price = Price::of_raw(lit_wrong + dark_wrong);
     let price = match dark as f64 > least && (dark as f64) < most {
-        true => price.or(price::UNKNOWN, Class::Unknown, 0.0),
+        true => price.or(price::UNKNOWN, PriceClass::Unknown, 0.0),
         false => price,
     };
     let residual = |light: &dyn Fn(&Known) -> f64| {
@@ -283,11 +283,15 @@ fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64, unknown: f64) -> Pri
         left.clone().count() as f64 > 0.05 * dark.count() as f64 && 2 * seen > left.count()
     };
     for (name, class, light) in [
-        (EXCHANGED, Class::Slip, (|p: &Known| f64::from(u8::from(!p.lit))) as fn(&Known) -> f64),
-        ("no shadow falls on Phong materials", Class::Concept, |p| {
+        (
+            EXCHANGED,
+            PriceClass::Slip,
+            (|p: &Known| f64::from(u8::from(!p.lit))) as fn(&Known) -> f64,
+        ),
+        ("no shadow falls on Phong materials", PriceClass::Concept, |p| {
             f64::from(u8::from(p.lit || p.phong))
         }),
-        ("no shadow falls on diffuse materials", Class::Concept, |p| {
+        ("no shadow falls on diffuse materials", PriceClass::Concept, |p| {
             f64::from(u8::from(p.lit || !p.phong))
         }),
     ] {
@@ -307,7 +311,7 @@ fn price(pixels: &[Known], lit_wrong: f64, dark_wrong: f64, unknown: f64) -> Pri
     let price = match ambient(pixels) {
         (left, off) if left > 0.0 && left <= AMBIENT => {
             let residual = price::fading(left) + off + lit_wrong;
-            price.or("an ambient term is left in shadow", Class::Slip, residual)
+            price.or("an ambient term is left in shadow", PriceClass::Slip, residual)
         }
         _ => price,
     };
@@ -373,7 +377,7 @@ mod tests {
             let check = shadows.judge("s", &with, &without, &tolerances).unwrap();
             (check.error, check.mistake)
         };
-        let slip = (Class::Slip.price(), EXCHANGED.to_owned());
+        let slip = (PriceClass::Slip.price(), EXCHANGED.to_owned());
         let within: Vec<usize> = (0..7).collect();
         assert_eq!(error(&within), slip);
         assert_eq!(error(&(0..10).collect::<Vec<_>>()), slip);

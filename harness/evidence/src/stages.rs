@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use basecode::{Camera, Image, MaterialModel, Scene, Vec2, Vec3};
 
 use super::pixels::SURFACES_MISSING;
-use super::price::{self, Class, Price};
+use super::price::{self, Price, PriceClass};
 use super::stage_film::{OFFSET_PX, StageFilm, median_length};
 use super::{Check, CheckId, Measure, RuleId, Verdict};
 
@@ -204,14 +204,14 @@ pub fn judge_pass(
             // A pass that shows hardly one value, on no shape, is no pass, whatever it draws.
             let price = match wrong > NO_PASS && shapes.wrong == shapes.shapes {
                 true if seen.all_values_right => {
-                    Price::of_raw(wrong).or(SURFACES_MISSING, Class::Concept, 0.0)
+                    Price::of_raw(wrong).or(SURFACES_MISSING, PriceClass::Concept, 0.0)
                 }
                 true => Price::of_raw(wrong),
                 false => {
                     let other = other_pipeline(film, frames);
                     let price = shapes.price(price_of_values(wrong, &measures, other));
                     match seen.all_values_right {
-                        true => price.or(SURFACES_MISSING, Class::Slip, 0.0),
+                        true => price.or(SURFACES_MISSING, PriceClass::Slip, 0.0),
                         false => price,
                     }
                 }
@@ -219,7 +219,7 @@ pub fn judge_pass(
             // What is seen has its values: one state of the pipeline is wrong, such as the depth test.
             let few = STRAY_FRACTION * seen.all as f64;
             let price = match seen.all_values_right && seen.empty.0 as f64 <= few {
-                true => price.or("another surface is seen", Class::Slip, 0.0),
+                true => price.or("another surface is seen", PriceClass::Slip, 0.0),
                 false => price,
             };
             measures.extend(price.measure());
@@ -239,7 +239,7 @@ pub fn judge_pass(
             && fraction < HALF
             && let Some((summary, hint)) = seen.in_words(film)
         {
-            let error = Class::Slip.price();
+            let error = PriceClass::Slip.price();
             check = Check { error, ..Check::new(id, scene_name, Verdict::Fail, summary) };
             check = check.with_hint(hint);
             check.mistake = "another surface is seen".to_owned();
@@ -252,7 +252,7 @@ pub fn judge_pass(
         offset_px,
         OFFSET_PX,
     );
-    let least = Class::Slip.price();
+    let least = PriceClass::Slip.price();
     if !placed.passed && check.error < least {
         let summary = format!("surfaces lie {offset_px:.2} pixels beside their place");
         check = Check { error: least, ..Check::new(id, scene_name, Verdict::Fail, summary) };
@@ -378,15 +378,15 @@ fn price_of_values(wrong: f64, measures: &[Measure], other_pipeline: bool) -> Pr
     let price = match measures.iter().filter(|measure| !measure.passed).count() {
         1 if other_pipeline => Price::of_raw(wrong).or(
             "Phong materials are drawn by the diffuse pipeline",
-            Class::Concept,
+            PriceClass::Concept,
             0.0,
         ),
-        1 => Price::of_raw(wrong).or("one value is wrong", Class::Slip, 0.0),
-        2 => Price::of_raw(wrong).or("two values are wrong", Class::Concept, 0.0),
-        _ => Price::of_raw(wrong).or(price::UNKNOWN, Class::Unknown, 0.0),
+        1 => Price::of_raw(wrong).or("one value is wrong", PriceClass::Slip, 0.0),
+        2 => Price::of_raw(wrong).or("two values are wrong", PriceClass::Concept, 0.0),
+        _ => Price::of_raw(wrong).or(price::UNKNOWN, PriceClass::Unknown, 0.0),
     };
     let most_wrong = measures.iter().map(|measure| measure.value).fold(0.0, f64::max);
-    price.or("some of the film is wrong", Class::Slip, 0.08 * most_wrong)
+    price.or("some of the film is wrong", PriceClass::Slip, 0.08 * most_wrong)
 }
 
 /// Whether all Phong materials in view are drawn by the diffuse pipeline.
@@ -416,9 +416,9 @@ struct WrongShapes {
 impl WrongShapes {
     fn price(&self, price: Price) -> Price {
         let explained =
-            self.slips.iter().fold(price, |price, name| price.or(name, Class::Slip, 0.0));
+            self.slips.iter().fold(price, |price, name| price.or(name, PriceClass::Slip, 0.0));
         match self.wrong == 1 && self.shapes > 1 {
-            true => explained.or("one shape is wrong or missing", Class::Slip, 0.0),
+            true => explained.or("one shape is wrong or missing", PriceClass::Slip, 0.0),
             false => explained,
         }
     }
@@ -638,7 +638,7 @@ mod tests {
         assert!(place(&right).is_some_and(|value| value < OFFSET_PX), "{:?}", place(&right));
         let shifted = judged(1, |p| p);
         assert_eq!(shifted.verdict, Verdict::Fail);
-        assert!((shifted.error - Class::Slip.price()).abs() < 0.01, "{}", shifted.error);
+        assert!((shifted.error - PriceClass::Slip.price()).abs() < 0.01, "{}", shifted.error);
         assert!(place(&shifted).is_some_and(|value| (value - 1.0).abs() < 0.01));
         // A vertex stage of its own may forward anything; nothing is claimed of where that lies.
         let own = judged(0, |p| 5.0 * p);
@@ -651,7 +651,7 @@ mod tests {
         let some = (0..40).map(|step| all(0.25 * step as f32 - 5.0)).find(|check| {
             check.verdict == Verdict::Fail && check.summary.starts_with("another surface is seen")
         });
-        assert!(some.is_some_and(|check| check.error == Class::Slip.price()));
+        assert!(some.is_some_and(|check| check.error == PriceClass::Slip.price()));
         // Elsewhere everywhere: outputs of a vertex stage of its own.
         assert_eq!(all(-1e9).verdict, Verdict::Pass);
     }
@@ -661,7 +661,7 @@ mod tests {
         let some = judged_where(0, |p| p, |index| index % 20 == 0);
         assert!(some.summary.starts_with("nothing is drawn on 95 %"), "{}", some.summary);
         assert_eq!(some.mistake, "surfaces are missing");
-        assert!((some.error - Class::Concept.price()).abs() < 1e-9, "{}", some.error);
+        assert!((some.error - PriceClass::Concept.price()).abs() < 1e-9, "{}", some.error);
         let none = judged_where(0, |p| p, |_| false);
         assert!(none.summary.starts_with("nothing is drawn on 100 %"), "{}", none.summary);
         assert_eq!(none.error, 1.0);

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use basecode::{Camera, Image, Matrices, Ray, Scene, SurfaceInteraction, Vec3};
 
-use super::price::{self, Class, Price, WRONG_W};
+use super::price::{self, Price, PriceClass, WRONG_W};
 use super::stage_film::{OFFSET_PX, StageFilm, from_origin, median_length};
 use super::stages::STRAY_FRACTION;
 use super::{Check, CheckId, Measure, RuleId, Verdict};
@@ -234,38 +234,38 @@ fn price(film: &StageFilm, seen: &[Seen; MATRICES], frames: &[Frames; MATRICES])
         // What shows from the origin alone tells no more than that.
         let price = Price { mistake: Some(price::BLACK), ..Price::of_raw(1.0) };
         return match lost_translation(film, frames[most][0]) && !told.is_turned() {
-            true => price.or(WRONG_W, Class::Slip, 0.0),
+            true => price.or(WRONG_W, PriceClass::Slip, 0.0),
             false => price,
         };
     }
     let mut error = 0.0;
     let mut names: Vec<&str> = Vec::new();
-    let mut add = |name: &'static str, class: Class| {
+    let mut add = |name: &'static str, class: PriceClass| {
         error += class.price();
         names.push(name);
     };
     if !usual.lands() {
         match (in_view.lands(), in_projection.lands()) {
-            (true, true) => add("view and projection are exchanged", Class::Slip),
-            (true, false) => add("the projection is missing", Class::Concept),
-            (false, true) => add("the view matrix is missing", Class::Concept),
-            (false, false) if transposed.lands() => add(WRONG_SIDE, Class::Slip),
+            (true, true) => add("view and projection are exchanged", PriceClass::Slip),
+            (true, false) => add("the projection is missing", PriceClass::Concept),
+            (false, true) => add("the view matrix is missing", PriceClass::Concept),
+            (false, false) if transposed.lands() => add(WRONG_SIDE, PriceClass::Slip),
             (false, false) => match slip_of_place(film, frames) {
-                Some(name) => add(name, Class::Slip),
-                None => add(price::ANOTHER_PLACE, Class::Concept),
+                Some(name) => add(name, PriceClass::Slip),
+                None => add(price::ANOTHER_PLACE, PriceClass::Concept),
             },
         }
     }
     if !told.positions_are_right() {
         match slip_of_positions(film, frames[most][0]) {
-            Some(name) => add(name, Class::Slip),
-            None => add("another world position", Class::Concept),
+            Some(name) => add(name, PriceClass::Slip),
+            None => add("another world position", PriceClass::Concept),
         }
     }
     if !told.normals_are_right() {
         match slip_of_normals(film, frames[most][1]) {
-            Some(name) => add(name, Class::Slip),
-            None => add("another world normal", Class::Concept),
+            Some(name) => add(name, PriceClass::Slip),
+            None => add("another world normal", PriceClass::Concept),
         }
     }
     let name = match names.as_slice() {
@@ -276,7 +276,7 @@ fn price(film: &StageFilm, seen: &[Seen; MATRICES], frames: &[Frames; MATRICES])
     };
     let raw = usual.fraction(usual.wrong_position.max(usual.wrong_normal).max(usual.missing));
     let raw = if raw <= STRAY_FRACTION { 1.0 } else { raw };
-    Price { error: error.max(Class::Slip.price()).min(raw), raw, mistake: Some(name) }
+    Price { error: error.max(PriceClass::Slip.price()).min(raw), raw, mistake: Some(name) }
 }
 
 /// Whether positions lie beside their pixel by a slip: mirrored, upside down, a constant offset, a lost translation or

@@ -29,13 +29,13 @@ pub fn largest_area(failing: &[bool], width: usize) -> Option<FailingArea> {
             let x = i % width;
             (left, right, bottom) = (left.min(x), right.max(x), bottom.max(i / width));
             pixels += 1;
-            let neighbours = [
+            let neighbors = [
                 (x > 0).then(|| i - 1),
                 (x + 1 < width).then_some(i + 1),
                 i.checked_sub(width),
                 Some(i + width).filter(|&j| j < failing.len()),
             ];
-            for j in neighbours.into_iter().flatten() {
+            for j in neighbors.into_iter().flatten() {
                 if failing[j] && !seen[j] {
                     seen[j] = true;
                     stack.push(j);

@@ -42,7 +42,7 @@ pub fn offline(
     check_size(actual, &reference.mean)?;
     let (expected, with, samples) = match spp {
         0 => return Err(CompareError::NoSamples),
-        1 => (&reference.centre, ComparedWith::Centre, None),
+        1 => (&reference.center, ComparedWith::Center, None),
         n => (&reference.mean, ComparedWith::Mean, Some(1.0 / n as f32 + 1.0 / reference.n as f32)),
     };
     let floor = (tolerances.floor_of_median * f64::from(reference.median_lit)) as f32;
@@ -86,22 +86,22 @@ pub fn offline(
 /// When the sizes differ, or the mask does not fit the reference.
 pub fn compare_realtime_linear(
     actual: &Image,
-    centre: &Image,
+    center: &Image,
     mask: &RegionMask,
     tolerances: &Tolerances,
 ) -> Result<ImageEvidence, CompareError> {
-    realtime_linear(actual, centre, mask, tolerances, None)
+    realtime_linear(actual, center, mask, tolerances, None)
 }
 
 /// [`compare_realtime_linear`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
 pub fn realtime_linear(
     actual: &Image,
-    centre: &Image,
+    center: &Image,
     mask: &RegionMask,
     tolerances: &Tolerances,
     excess: Option<&mut Vec<f32>>,
 ) -> Result<ImageEvidence, CompareError> {
-    let (width, scale) = realtime_scale(actual, centre, mask, tolerances.interior_fraction)?;
+    let (width, scale) = realtime_scale(actual, center, mask, tolerances.interior_fraction)?;
     let floor = Vec3::splat((tolerances.floor_of_median * f64::from(scale.median_lit)) as f32);
     let relative: Vec<f32> = mask
         .regions
@@ -112,13 +112,13 @@ pub fn realtime_linear(
         .map(|r| r as f32)
         .collect();
     let snap = tolerances.realtime_snap_px as f32;
-    let stats = accumulate(actual, centre, mask, tolerances, excess, |y, row| {
-        let other = |y: usize| &centre.pixels[y * width..][..width];
-        let (above, below) = (other(y.saturating_sub(1)), other((y + 1).min(centre.height - 1)));
+    let stats = accumulate(actual, center, mask, tolerances, excess, |y, row| {
+        let other = |y: usize| &center.pixels[y * width..][..width];
+        let (above, below) = (other(y.saturating_sub(1)), other((y + 1).min(center.height - 1)));
         for x in 0..width {
             let relative = relative[usize::from(row.mask[x] & RegionMask::INDEX)];
             let b = row.expected[x];
-            let to = |neighbour: Vec3| (neighbour - b).abs();
+            let to = |neighbor: Vec3| (neighbor - b).abs();
             let dx =
                 to(row.expected[x.saturating_sub(1)]).max(to(row.expected[(x + 1).min(width - 1)]));
             let dy = to(above[x]).max(to(below[x]));
@@ -126,7 +126,7 @@ pub fn realtime_linear(
             row.excess2[x] = ((row.actual[x] - b).abs() / allowed).max_element().powi(2);
         }
     });
-    Ok(stats.judge(mask, ComparedWith::Centre, &scale, tolerances))
+    Ok(stats.judge(mask, ComparedWith::Center, &scale, tolerances))
 }
 
 /// Judges a realtime image that was submitted as EXR: both images clamped to [0, 1] and rounded to 8-bit sRGB levels,
@@ -138,25 +138,25 @@ pub fn realtime_linear(
 /// When the sizes differ, or the mask does not fit the reference.
 pub fn compare_srgb8(
     actual: &Image,
-    centre: &Image,
+    center: &Image,
     mask: &RegionMask,
     tolerances: &Tolerances,
 ) -> Result<ImageEvidence, CompareError> {
-    srgb8(actual, centre, mask, tolerances, None)
+    srgb8(actual, center, mask, tolerances, None)
 }
 
 /// [`compare_srgb8`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
 pub fn srgb8(
     actual: &Image,
-    centre: &Image,
+    center: &Image,
     mask: &RegionMask,
     tolerances: &Tolerances,
     excess: Option<&mut Vec<f32>>,
 ) -> Result<ImageEvidence, CompareError> {
-    let (width, scale) = realtime_scale(actual, centre, mask, tolerances.srgb_fraction)?;
+    let (width, scale) = realtime_scale(actual, center, mask, tolerances.srgb_fraction)?;
     // A pixel fails from `srgb_levels` on, so the allowed difference lies half a level below.
     let allowed = tolerances.srgb_levels as f32 - 0.5;
-    let mut stats = accumulate(actual, centre, mask, tolerances, excess, |_, row| {
+    let mut stats = accumulate(actual, center, mask, tolerances, excess, |_, row| {
         for x in 0..width {
             let apart = srgb::levels_apart(row.actual[x], row.expected[x]);
             row.excess2[x] = (apart as f32 / allowed).powi(2);
@@ -164,7 +164,7 @@ pub fn srgb8(
     });
     // Rounding to levels and clamping move a region's mean; the levels have judged it already.
     stats.regions.clear();
-    Ok(stats.judge(mask, ComparedWith::CentreSrgb8, &scale, tolerances))
+    Ok(stats.judge(mask, ComparedWith::CenterSrgb8, &scale, tolerances))
 }
 
 fn check_size(actual: &Image, expected: &Image) -> Result<(), CompareError> {
@@ -178,14 +178,14 @@ fn check_size(actual: &Image, expected: &Image) -> Result<(), CompareError> {
 
 fn realtime_scale(
     actual: &Image,
-    centre: &Image,
+    center: &Image,
     mask: &RegionMask,
     interior_fraction: f64,
 ) -> Result<(usize, Scale), CompareError> {
-    check_size(actual, centre)?;
+    check_size(actual, center)?;
     let median_lit =
-        check_mask(mask, centre).map_err(|e| CompareError::Reference(e.to_string()))?;
-    Ok((centre.width, Scale { median_lit, interior_fraction }))
+        check_mask(mask, center).map_err(|e| CompareError::Reference(e.to_string()))?;
+    Ok((center.width, Scale { median_lit, interior_fraction }))
 }
 
 /// Per column the largest variance of rows y - 1 to y + 1.

@@ -6,7 +6,7 @@ use thiserror::Error;
 /// One rule with its value, its bound and its verdict; passed ones are listed too.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Check {
+pub struct RuleCheck {
     /// A stable name: `non_finite`, `negative`, `interior`, `blob`, `edge`, or `bias: <region>`.
     pub id: String,
     /// What was measured; always finite ([`f64::MAX`] if it could not be measured).
@@ -80,9 +80,11 @@ pub enum ComparedWith {
     /// The mean of many jittered samples, with its variance.
     Mean,
     /// One sample at every pixel's center, linear.
-    Centre,
+    #[serde(rename = "centre")]
+    Center,
     /// One sample at every pixel's center, in 8-bit sRGB levels.
-    CentreSrgb8,
+    #[serde(rename = "centre_srgb8")]
+    CenterSrgb8,
 }
 
 /// All that the comparison of one image found.
@@ -96,7 +98,7 @@ pub struct ImageEvidence {
     /// What it was compared with.
     pub compared_with: ComparedWith,
     /// Every rule, in the order of `docs/evidence.md`.
-    pub checks: Vec<Check>,
+    pub checks: Vec<RuleCheck>,
     /// The mean of every region with interior pixels.
     pub regions: Vec<RegionBias>,
     /// The largest contiguous area of failing interior pixels.
@@ -116,7 +118,7 @@ impl ImageEvidence {
     }
 
     /// The check with this name.
-    pub fn check(&self, id: &str) -> Option<&Check> {
+    pub fn check(&self, id: &str) -> Option<&RuleCheck> {
         self.checks.iter().find(|check| check.id == id)
     }
 }

@@ -119,7 +119,7 @@ fn to_xyz() -> Mat3 {
 /// Linearized CIELAB, the papers' YCxCz, of a tone-mapped image.
 fn opponent(image: &Image, tone: impl Fn(Vec3) -> Vec3 + Sync) -> [Vec<f32>; 3] {
     let matrix = to_xyz();
-    let colours: Vec<Vec3> = image
+    let colors: Vec<Vec3> = image
         .pixels
         .par_iter()
         .map(|&p| {
@@ -127,7 +127,7 @@ fn opponent(image: &Image, tone: impl Fn(Vec3) -> Vec3 + Sync) -> [Vec<f32>; 3] 
             vec3(116.0 * xyz.y - 16.0, 500.0 * (xyz.x - xyz.y), 200.0 * (xyz.y - xyz.z))
         })
         .collect();
-    [0, 1, 2].map(|c| colours.iter().map(|p| p[c]).collect())
+    [0, 1, 2].map(|c| colors.iter().map(|p| p[c]).collect())
 }
 
 /// CIELAB with Hunt's adjustment: colors count for less where it is dark.
@@ -148,7 +148,7 @@ fn hyab(a: Vec3, b: Vec3) -> f32 {
 /// The filters for one viewing distance, all separable.
 struct Filters {
     /// Contrast sensitivity of Y, Cx, Cz: for each the Gaussians it is the sum of, the weight folded into the second.
-    colour: [Vec<[Vec<f32>; 2]>; 3],
+    color: [Vec<[Vec<f32>; 2]>; 3],
     /// The edge detector's profile: smoothing, first and second derivative.
     smooth: Vec<f32>,
     first: Vec<f32>,
@@ -161,7 +161,7 @@ fn profile(radius: i32, weight: impl Fn(f32) -> f32) -> Vec<f32> {
 }
 
 /// Scales the positive weights to a sum of 1 and the negative ones to -1.
-fn normalised(weights: Vec<f32>) -> Vec<f32> {
+fn normalized(weights: Vec<f32>) -> Vec<f32> {
     let positive: f32 = weights.iter().filter(|w| **w > 0.0).sum();
     let negative: f32 = -weights.iter().filter(|w| **w < 0.0).sum::<f32>();
     weights
@@ -178,7 +178,7 @@ impl Filters {
             [&[(1.0, 0.0047)], &[(1.0, 0.0053)], &[(34.1, 0.04), (13.5, 0.025)]];
         // Three standard deviations of the widest of them.
         let radius = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as i32;
-        let colour = table.map(|terms| {
+        let color = table.map(|terms| {
             let mut gaussians: Vec<_> = terms
                 .iter()
                 .map(|&(a, b)| {
@@ -200,10 +200,10 @@ impl Filters {
         let radius = (3.0 * sigma).ceil() as i32;
         let g = |x: f32| (-x * x / (2.0 * sigma * sigma)).exp();
         Self {
-            colour,
-            smooth: normalised(profile(radius, g)),
-            first: normalised(profile(radius, |x| -x * g(x))),
-            second: normalised(profile(radius, |x| (x * x / (sigma * sigma) - 1.0) * g(x))),
+            color,
+            smooth: normalized(profile(radius, g)),
+            first: normalized(profile(radius, |x| -x * g(x))),
+            second: normalized(profile(radius, |x| (x * x / (sigma * sigma) - 1.0) * g(x))),
         }
     }
 
@@ -211,7 +211,7 @@ impl Filters {
     fn difference(&self, a: &[Vec<f32>; 3], b: &[Vec<f32>; 3], like: &Image) -> FlipMap {
         let width = like.width;
         let back = to_xyz().inverse();
-        let (colours_a, colours_b) = (self.seen(a, width), self.seen(b, width));
+        let (colors_a, colors_b) = (self.seen(a, width), self.seen(b, width));
         let (features_a, features_b) = (self.features(&a[0], width), self.features(&b[0], width));
         let forth = to_xyz();
         let (green, blue) = (hunt_lab(forth.y_axis), hunt_lab(forth.z_axis));
@@ -227,15 +227,15 @@ impl Filters {
             .into_par_iter()
             .map(|i| {
                 let pick = |c: &[Vec<f32>; 3]| lab(vec3(c[0][i], c[1][i], c[2][i]));
-                let colour = hyab(pick(&colours_a), pick(&colours_b)).powf(0.7);
-                let colour = if colour < knee {
-                    0.95 * colour / knee
+                let color = hyab(pick(&colors_a), pick(&colors_b)).powf(0.7);
+                let color = if color < knee {
+                    0.95 * color / knee
                 } else {
-                    0.95 + 0.05 * (colour - knee) / (largest - knee)
+                    0.95 + 0.05 * (color - knee) / (largest - knee)
                 };
                 let apart = |k: usize| (features_a[k][i] - features_b[k][i]).abs();
                 let feature = (apart(0).max(apart(1)) * std::f32::consts::FRAC_1_SQRT_2).sqrt();
-                colour.powf(1.0 - feature)
+                color.powf(1.0 - feature)
             })
             .collect();
         FlipMap { width, height: like.height, errors }
@@ -245,7 +245,7 @@ impl Filters {
     fn seen(&self, planes: &[Vec<f32>; 3], width: usize) -> [Vec<f32>; 3] {
         [0, 1, 2].map(|c| {
             let mut sum = vec![0.0; planes[c].len()];
-            for [across, down] in &self.colour[c] {
+            for [across, down] in &self.color[c] {
                 let part = convolve_down(&convolve_across(&planes[c], width, across), width, down);
                 for (s, p) in sum.iter_mut().zip(part) {
                     *s += p;
@@ -257,11 +257,11 @@ impl Filters {
 
     /// Strength of edges and of points.
     fn features(&self, y: &[f32], width: usize) -> [Vec<f32>; 2] {
-        let grey: Vec<f32> = y.iter().map(|y| (y + 16.0) / 116.0).collect();
-        let smooth = convolve_across(&grey, width, &self.smooth);
+        let gray: Vec<f32> = y.iter().map(|y| (y + 16.0) / 116.0).collect();
+        let smooth = convolve_across(&gray, width, &self.smooth);
         [&self.first, &self.second].map(|derivative| {
             let across =
-                convolve_down(&convolve_across(&grey, width, derivative), width, &self.smooth);
+                convolve_down(&convolve_across(&gray, width, derivative), width, &self.smooth);
             let down = convolve_down(&smooth, width, derivative);
             across.iter().zip(&down).map(|(x, y)| x.hypot(*y)).collect()
         })

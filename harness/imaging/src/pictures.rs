@@ -16,7 +16,7 @@ use super::srgb;
 /// What is not a number.
 const MAGENTA: [u8; 3] = [255, 0, 255];
 /// What is not compared.
-const GREY: [u8; 3] = [128, 128, 128];
+const GRAY: [u8; 3] = [128, 128, 128];
 /// The median lit value of the expected image comes to this linear value before tone mapping.
 const MIDDLE: f32 = 0.25;
 /// This linear value becomes white.
@@ -178,18 +178,18 @@ pub fn signed_error(
         return None;
     }
     let darkest = (DARKEST * median_lit).max(f32::MIN_POSITIVE);
-    let colour = |((a, b), flags): ((&Vec3, &Vec3), &u16)| {
+    let color = |((a, b), flags): ((&Vec3, &Vec3), &u16)| {
         if flags & RegionMask::EMITTER != 0 {
-            return GREY;
+            return GRAY;
         }
         if !a.is_finite() {
             return MAGENTA;
         }
         let (a, b) = (a.element_sum() / 3.0, b.element_sum() / 3.0);
-        let colour = diverging((a - b) / b.max(darkest) / full_scale);
-        if flags & RegionMask::EDGE != 0 { mix(colour, GREY, 0.5) } else { colour }
+        let color = diverging((a - b) / b.max(darkest) / full_scale);
+        if flags & RegionMask::EDGE != 0 { mix(color, GRAY, 0.5) } else { color }
     };
-    let pixels = actual.pixels.iter().zip(&expected.pixels).zip(&mask.pixels).map(colour).collect();
+    let pixels = actual.pixels.iter().zip(&expected.pixels).zip(&mask.pixels).map(color).collect();
     Some(Picture {
         width: size.0,
         height: size.1,
@@ -227,19 +227,19 @@ pub fn full_scale(actual: &Image, expected: &Image, mask: &RegionMask, median_li
 /// Width and height of a ray's square in its map, in pixels.
 const RAY_SIDE: usize = 6;
 /// Lit, though it should be in shadow; and the other way round (Okabe and Ito 2008: told apart by the color-blind).
-const RAY_COLOURS: [[u8; 3]; 2] = [[230, 159, 0], [86, 180, 233]];
+const RAY_COLORS: [[u8; 3]; 2] = [[230, 159, 0], [86, 180, 233]];
 
 /// A film without shadows in gray, and on it the rays that were judged wrongly: the pixel of each, and whether it
 /// should be lit.
 pub fn ray_map(film: &Image, rays: &[(usize, bool)], median_lit: f32) -> Picture {
     let mut small = tone_mapped(film, median_lit);
     for pixel in &mut small.pixels {
-        let grey = pixel.iter().map(|&level| u16::from(level)).sum::<u16>() / 6;
-        *pixel = [grey as u8; 3];
+        let gray = pixel.iter().map(|&level| u16::from(level)).sum::<u16>() / 6;
+        *pixel = [gray as u8; 3];
     }
     for &(index, should_be_lit) in rays {
         if let Some(pixel) = small.pixels.get_mut(index) {
-            *pixel = RAY_COLOURS[usize::from(should_be_lit)];
+            *pixel = RAY_COLORS[usize::from(should_be_lit)];
         }
     }
     let (width, height) = (small.width * RAY_SIDE, small.height * RAY_SIDE);
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_have_their_colours() {
+    fn errors_have_their_colors() {
         let expected = row(&[Vec3::ONE; 8]);
         let mut actual = expected.clone();
         let mut mask = RegionMask::background(8, 1);
@@ -300,7 +300,7 @@ mod tests {
         let picture = signed_error(&actual, &expected, &mask, 1.0, 0.1).unwrap();
         let [blue, _, white, pink, red] = DIVERGING;
         let half = [188; 3];
-        assert_eq!(picture.pixels, [white, red, blue, pink, red, MAGENTA, GREY, half]);
+        assert_eq!(picture.pixels, [white, red, blue, pink, red, MAGENTA, GRAY, half]);
         assert!(picture.caption.contains("blue 10 % darker"), "{}", picture.caption);
 
         // Where black is expected, errors are relative to a twentieth of the scene's median.
@@ -334,7 +334,7 @@ mod tests {
         let film = Image { width: 3, height: 1, pixels: vec![Vec3::ONE; 3] };
         let map = ray_map(&film, &[(0, false), (2, true), (99, true)], 1.0);
         assert_eq!((map.width, map.height), (18, 6));
-        assert_eq!([map.pixels[0], map.pixels[18 * 6 - 1]], RAY_COLOURS);
+        assert_eq!([map.pixels[0], map.pixels[18 * 6 - 1]], RAY_COLORS);
         let [r, g, b] = map.pixels[8];
         assert!(r == g && g == b);
     }

@@ -67,7 +67,7 @@ pub struct ReferenceImage {
     /// Samples per pixel of `mean`.
     pub n: u32,
     /// The image with one sample at every pixel's center.
-    pub centre: Image,
+    pub center: Image,
     /// Which pixel shows what.
     pub mask: RegionMask,
     /// Median over lit interior pixels of the mean of the three channels: the scene's own scale.
@@ -128,7 +128,7 @@ impl ReferenceImage {
         mean: Image,
         variance: Image,
         n: u32,
-        centre: Image,
+        center: Image,
         mask: RegionMask,
     ) -> Result<Self, ReferenceError> {
         if n == 0 {
@@ -137,13 +137,13 @@ impl ReferenceImage {
         let expected = (mean.width, mean.height);
         let sizes = [
             ("variance", (variance.width, variance.height)),
-            ("centre", (centre.width, centre.height)),
+            ("centre", (center.width, center.height)),
             ("mask", (mask.width, mask.height)),
         ];
         if let Some(&(part, found)) = sizes.iter().find(|(_, size)| *size != expected) {
             return Err(ReferenceError::Size { part, found, expected });
         }
-        for (part, image) in [("mean", &mean), ("variance", &variance), ("centre", &centre)] {
+        for (part, image) in [("mean", &mean), ("variance", &variance), ("centre", &center)] {
             let bad = image.pixels.iter().position(|p| !p.is_finite() || p.min_element() < 0.0);
             if let Some(i) = bad {
                 let (x, y, value) = (i % image.width, i / image.width, image.pixels[i]);
@@ -151,7 +151,7 @@ impl ReferenceImage {
             }
         }
         let median_lit = check_mask(&mask, &mean)?;
-        Ok(Self { mean, variance, n, centre, mask, median_lit })
+        Ok(Self { mean, variance, n, center, mask, median_lit })
     }
 }
 

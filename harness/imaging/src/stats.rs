@@ -4,7 +4,9 @@ use basecode::image::Image;
 use glam::{DVec3, Vec3};
 
 use super::blob;
-use super::comparison::{Check, ComparedWith, FailingArea, ImageEvidence, RegionBias, WorstPixel};
+use super::comparison::{
+    ComparedWith, FailingArea, ImageEvidence, RegionBias, RuleCheck, WorstPixel,
+};
 use super::ratio::triple;
 use super::reference::RegionMask;
 use super::tolerances::Tolerances;
@@ -21,7 +23,7 @@ pub(super) struct Scale {
 }
 
 /// One row as the rule of a comparison sees it.
-pub(super) struct Row<'a> {
+pub(super) struct PixelRow<'a> {
     pub actual: &'a [Vec3],
     pub expected: &'a [Vec3],
     pub mask: &'a [u16],
@@ -92,7 +94,7 @@ pub(super) fn accumulate(
     mask: &RegionMask,
     tolerances: &Tolerances,
     mut excess: Option<&mut Vec<f32>>,
-    mut rule: impl FnMut(usize, &mut Row<'_>),
+    mut rule: impl FnMut(usize, &mut PixelRow<'_>),
 ) -> ComparisonStats {
     let (width, height) = (expected.width, expected.height);
     let negative_limit = -tolerances.negative_limit as f32;
@@ -113,7 +115,7 @@ pub(super) fn accumulate(
     let mut worst2 = 0.0f32;
     for y in 0..height {
         let start = y * width;
-        let mut row = Row {
+        let mut row = PixelRow {
             actual: &actual.pixels[start..start + width],
             expected: &expected.pixels[start..start + width],
             mask: &mask.pixels[start..start + width],
@@ -191,7 +193,7 @@ impl ComparisonStats {
         scale: &Scale,
         tolerances: &Tolerances,
     ) -> ImageEvidence {
-        let spots = |id: &str, spots: &PixelCount, what: &str| Check {
+        let spots = |id: &str, spots: &PixelCount, what: &str| RuleCheck {
             id: id.into(),
             value: f64::from(spots.count),
             bound: 0.0,
@@ -232,7 +234,7 @@ impl ComparisonStats {
         }
     }
 
-    fn interior_check(&self, scale: &Scale, tolerances: &Tolerances) -> Check {
+    fn interior_check(&self, scale: &Scale, tolerances: &Tolerances) -> RuleCheck {
         let Tally { pixels, failing } = self.interior;
         let few = f64::from(tolerances.spare_pixels) / f64::from(pixels.max(1));
         let bound = scale.interior_fraction + few;
@@ -246,7 +248,7 @@ impl ComparisonStats {
             ),
             _ => String::new(),
         };
-        Check {
+        RuleCheck {
             id: "interior".into(),
             value: self.interior.fraction(),
             bound,
@@ -256,9 +258,9 @@ impl ComparisonStats {
         }
     }
 
-    fn blob_check(&self, largest: &Option<FailingArea>) -> Check {
+    fn blob_check(&self, largest: &Option<FailingArea>) -> RuleCheck {
         let blocks = blob::solid_blocks(&self.failing, self.width);
-        Check {
+        RuleCheck {
             id: "blob".into(),
             value: blocks as f64,
             bound: 0.0,
@@ -278,11 +280,11 @@ impl ComparisonStats {
         }
     }
 
-    fn edge_check(&self, tolerances: &Tolerances) -> Check {
+    fn edge_check(&self, tolerances: &Tolerances) -> RuleCheck {
         let Tally { pixels, failing } = self.edge;
         let few = f64::from(tolerances.spare_pixels) / f64::from(pixels.max(1));
         let bound = tolerances.edge_fraction + few;
-        Check {
+        RuleCheck {
             id: "edge".into(),
             value: self.edge.fraction(),
             bound,
@@ -301,7 +303,7 @@ impl RegionSums {
         lit: bool,
         scale: &Scale,
         tolerances: &Tolerances,
-    ) -> (Check, RegionBias) {
+    ) -> (RuleCheck, RegionBias) {
         let median = f64::from(scale.median_lit);
         let finite = f64::from((self.pixels - self.non_finite).max(1));
         let (actual, expected) = (self.actual / finite, self.expected / finite);
@@ -340,7 +342,7 @@ impl RegionSums {
                 100.0 * bound
             ),
         };
-        let check = Check {
+        let check = RuleCheck {
             id: format!("bias: {name}"),
             value: if self.non_finite == self.pixels { f64::MAX } else { presentable(bias) },
             bound: presentable(bound),

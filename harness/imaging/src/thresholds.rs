@@ -4,7 +4,7 @@ use super::rows::Row;
 
 /// When a difference counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct Thresholds {
     /// |a - b| counts above this.
     pub absolute: f32,
     /// And above this fraction of the mean of |a| and |b|.
@@ -68,7 +68,7 @@ impl Default for Tally {
 
 impl Tally {
     /// Takes a channel of a row in. After the last one comes [`Tally::end_row`].
-    pub fn add(&mut self, row: &Row, channel: usize, fail: &Limits, warn: &Limits) {
+    pub fn add(&mut self, row: &Row, channel: usize, fail: &Thresholds, warn: &Thresholds) {
         let (a, b) = (row.values(0, channel), row.values(1, channel));
         self.flags.resize(a.len(), 0);
         let (mut largest, mut peak) = (0, 0);
@@ -79,7 +79,7 @@ impl Tally {
             // Two finite values may be further apart than any 32-bit number.
             let infinite = size == f32::INFINITY;
             let not_finite = infinite & !(a.is_finite() & b.is_finite());
-            let above = |limits: &Limits| {
+            let above = |limits: &Thresholds| {
                 infinite | (size > limits.absolute.max(limits.relative * mean)) & (size > 0.0)
             };
             for (is_so, flag) in

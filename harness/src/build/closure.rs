@@ -25,11 +25,11 @@ struct Node {
 #[derive(Deserialize)]
 struct Dependency {
     pkg: String,
-    dep_kinds: Vec<Kind>,
+    dep_kinds: Vec<DependencyKind>,
 }
 
 #[derive(Deserialize)]
-struct Kind {
+struct DependencyKind {
     kind: Option<String>,
 }
 
@@ -43,14 +43,18 @@ impl Metadata {
     /// How many packages cargo compiles to build the named ones: these, and all that they or a build
     /// script of theirs are linked with.
     pub fn compiled_for(&self, packages: &[&str]) -> usize {
-        let needed = |kind: &Kind| kind.kind.as_deref() != Some("dev");
+        let needed = |kind: &DependencyKind| kind.kind.as_deref() != Some("dev");
         let named = |node: &&Node| packages.iter().any(|name| is_package(&node.id, name));
         let named: HashSet<&str> =
             self.resolve.nodes.iter().filter(named).map(|node| node.id.as_str()).collect();
         self.reached_from(packages, &needed).union(&named).count()
     }
 
-    fn reached_from(&self, packages: &[&str], wanted: &dyn Fn(&Kind) -> bool) -> HashSet<&str> {
+    fn reached_from(
+        &self,
+        packages: &[&str],
+        wanted: &dyn Fn(&DependencyKind) -> bool,
+    ) -> HashSet<&str> {
         let nodes: HashMap<&str, &Node> =
             self.resolve.nodes.iter().map(|node| (node.id.as_str(), node)).collect();
         let mut found = HashSet::new();

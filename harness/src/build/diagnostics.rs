@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// A place in the submission.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Place {
+pub struct SourcePlace {
     /// The file, as `src/...`.
     pub file: String,
     /// The line, counted from 1.
@@ -17,7 +17,7 @@ pub struct Diagnostic {
     /// The message alone.
     pub message: String,
     /// Where, when the compiler says so.
-    pub place: Option<Place>,
+    pub place: Option<SourcePlace>,
     /// The whole text with the source lines that it is about. It quotes the submission: it may hold
     /// anything at all.
     pub rendered: String,
@@ -27,7 +27,7 @@ impl Diagnostic {
     /// `FILE:LINE: message`, without the place where there is none.
     pub fn headline(&self) -> String {
         match &self.place {
-            Some(Place { file, line }) => format!("{file}:{line}: {}", self.message),
+            Some(SourcePlace { file, line }) => format!("{file}:{line}: {}", self.message),
             None => self.message.clone(),
         }
     }
@@ -72,7 +72,7 @@ pub fn parse(output: &str) -> Diagnostics {
         let diagnostic = Diagnostic {
             rendered: message.rendered.unwrap_or_else(|| message.message.clone()),
             message: message.message,
-            place: primary.map(|span| Place { file: span.file_name, line: span.line_start }),
+            place: primary.map(|span| SourcePlace { file: span.file_name, line: span.line_start }),
         };
         match &*message.level {
             "warning" => found.warnings.push(diagnostic),
@@ -97,7 +97,7 @@ note: not json
 {"message":"For more information","level":"failure-note","spans":[],"rendered":"x"}"#;
         let found = parse(output);
         assert_eq!((found.errors.len(), found.warnings.len()), (1, 1));
-        assert_eq!(found.errors[0].place, Some(Place { file: "src/lib.rs".into(), line: 7 }));
+        assert_eq!(found.errors[0].place, Some(SourcePlace { file: "src/lib.rs".into(), line: 7 }));
         assert_eq!(found.errors[0].rendered, "error: no\n");
         assert_eq!((&*found.warnings[0].rendered, &found.warnings[0].place), ("hm", &None));
     }

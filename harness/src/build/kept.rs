@@ -3,7 +3,7 @@
 //! Only the parent writes here. It stores what the compiler's sandbox produced for a source, under a digest of the
 //! whole source and the compiler call. So a submission can only affect its own entry. Without full isolation, a plugin
 //! could write here, and the compiler could read files that the digest does not cover
-//! (`include_str!("../config.json")`). Nothing is kept then: see [`Kept::within`].
+//! (`include_str!("../config.json")`). Nothing is kept then: see [`KeptLibraries::within`].
 
 use std::fs;
 use std::io;
@@ -15,7 +15,7 @@ use sha2::{Digest, Sha256};
 
 use super::{BuildOutcome, BuildReport, Diagnostic, Recording, TEMPLATE};
 use crate::files::{files_below, hex, keep_newest, library_name, write_whole};
-use crate::process::Limits;
+use crate::process::ProcessLimits;
 use crate::sandbox::Isolation;
 use crate::worker::Supervisor;
 
@@ -25,7 +25,7 @@ const KEPT: usize = 64;
 const NOTE: &str = "note.json";
 
 /// The libraries that were built before, if any can be kept here.
-pub struct Kept(Option<PathBuf>);
+pub struct KeptLibraries(Option<PathBuf>);
 
 /// What is known of a kept library.
 #[derive(Serialize, Deserialize)]
@@ -34,7 +34,7 @@ struct Note {
     warnings: Vec<Diagnostic>,
 }
 
-impl Kept {
+impl KeptLibraries {
     /// Libraries are kept within `cache` where isolation is full: where the compiler sees nothing but the source, and
     /// no plugin can write there.
     pub fn within(cache: &Path, isolation: Isolation) -> Self {
@@ -51,7 +51,7 @@ impl Kept {
         supervisor: &Supervisor,
         src: &Path,
         out: &Path,
-        limits: &Limits,
+        limits: &ProcessLimits,
         cancel: &AtomicBool,
     ) -> io::Result<BuildReport> {
         self.found_or(recording, src, out, || {
@@ -145,7 +145,7 @@ mod tests {
         };
         let calls = Cell::new(0);
         let built = |recording: &Recording| {
-            let kept = Kept::within(place.path(), Isolation::Full);
+            let kept = KeptLibraries::within(place.path(), Isolation::Full);
             let report = kept.found_or(recording, &src, &out, || {
                 calls.set(calls.get() + 1);
                 let library = out.join(library_name(TEMPLATE));
@@ -190,14 +190,14 @@ mod tests {
             key: String::new(),
             version: String::new(),
         };
-        let kept = Kept::within(place.path(), Isolation::Full);
+        let kept = KeptLibraries::within(place.path(), Isolation::Full);
         let outcome = BuildOutcome::CompileError { errors: Vec::new() };
         let report = BuildReport { outcome, warnings: Vec::new(), wall_s: 1.0, cpu_s: 1.0 };
         let again = kept.found_or(&recording, place.path(), place.path(), || Ok(report.clone()));
         assert_eq!(again.unwrap(), report);
         assert_eq!(fs::read_dir(&place).unwrap().count(), 0);
         // Nor is what was compiled where others can write.
-        let kept = Kept::within(place.path(), Isolation::None);
+        let kept = KeptLibraries::within(place.path(), Isolation::None);
         let library = place.path().join("src.rs");
         fs::write(&library, "").unwrap();
         let built = BuildReport { outcome: BuildOutcome::Built { library }, ..report };

@@ -3,7 +3,7 @@
 //!
 //! [`Recording::obtain`] records that call once for a state of the base code; [`compile`] replays
 //! it. The compiler sees a staged folder with the base code's closure and nothing else of
-//! `target/`. [`Kept`] remembers what was built.
+//! `target/`. [`KeptLibraries`] remembers what was built.
 
 mod closure;
 mod diagnostics;
@@ -11,8 +11,8 @@ mod kept;
 mod record;
 mod replay;
 
-pub use diagnostics::{Diagnostic, Place};
-pub use kept::Kept;
+pub use diagnostics::{Diagnostic, SourcePlace};
+pub use kept::KeptLibraries;
 pub use record::{Compiling, RecordError, Recording, wrapper_main};
 pub use replay::{BuildOutcome, BuildReport, compile, default_limits};
 

@@ -12,9 +12,9 @@ use super::diagnostics::parse;
 use super::record::externs;
 use super::{Diagnostic, Recording, TEMPLATE};
 use crate::files::library_name;
-use crate::process::{self, Confinement, Exit, Limits};
+use crate::process::{self, Confinement, Exit, ProcessLimits};
 use crate::sandbox::policy::{CLOSURE, SCRATCH, SRC, TOOLCHAIN};
-use crate::sandbox::{Bind, Kind, Policy};
+use crate::sandbox::{Bind, ChildKind, Policy};
 use crate::worker::Supervisor;
 
 /// Number of characters shown of output that is no compiler message.
@@ -51,8 +51,8 @@ pub struct BuildReport {
 }
 
 /// Enough for a submission many times the template's size on a slow machine.
-pub fn default_limits() -> Limits {
-    Limits {
+pub fn default_limits() -> ProcessLimits {
+    ProcessLimits {
         wall_s: 120.0,
         cpu_s: 120,
         memory_mib: 4096,
@@ -76,7 +76,7 @@ pub fn compile(
     supervisor: &Supervisor,
     src: &Path,
     out: &Path,
-    limits: &Limits,
+    limits: &ProcessLimits,
     cancel: &AtomicBool,
 ) -> io::Result<BuildReport> {
     let late = |report: &io::Result<BuildReport>| match report {
@@ -92,7 +92,7 @@ fn compile_once(
     supervisor: &Supervisor,
     src: &Path,
     out: &Path,
-    limits: &Limits,
+    limits: &ProcessLimits,
     cancel: &AtomicBool,
 ) -> io::Result<BuildReport> {
     let (src, out) = (std::path::absolute(src)?, std::path::absolute(out)?);
@@ -100,7 +100,7 @@ fn compile_once(
     let file = library_name(TEMPLATE);
     let library = out.join(&file);
     let report = tempfile::NamedTempFile::new_in(&out)?;
-    let mut policy = Policy::new(Kind::Build);
+    let mut policy = Policy::new(ChildKind::Build);
     policy.layers = supervisor.isolation;
     policy.read_only.push(Bind::new(&recording.sysroot, TOOLCHAIN));
     policy.read_only.push(Bind::new(&recording.closure, CLOSURE));

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::claim::Claim;
-use super::layout::{Kind, Label, canvas_upload};
+use super::layout::{Label, Platform, canvas_upload};
 use super::stamps;
 use super::standing::{Attempt, Deciding, Standing};
 use crate::rubric::Grade;
@@ -113,7 +113,7 @@ pub(super) fn choose(
 
 /// Of a file from Canvas, its number there and its name.
 fn upload(claim: &Claim) -> Option<(u64, String)> {
-    claim.label.as_ref().filter(|label| label.kind == Kind::Canvas)?;
+    claim.label.as_ref().filter(|label| label.kind == Platform::Canvas)?;
     canvas_upload(claim.name.rsplit('/').next()?)
 }
 

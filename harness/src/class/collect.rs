@@ -9,13 +9,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 
-use self::labels::Found;
+use self::labels::SearchResult;
 use self::search::{MAX_DEPTH, Search, is_submission};
 pub use super::download::Ambiguous;
-use super::layout::{Kind, Label};
+use super::layout::{Label, Platform};
 use super::slots::{content, slot};
 use crate::harmless::printable;
-use crate::intake::{Limits, TreeSpec};
+use crate::intake::{ArchiveLimits, TreeSpec};
 /// Number of skipped files that are named.
 const NAMED: usize = 12;
 
@@ -63,7 +63,7 @@ impl Empty {
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Collected {
     /// Where it comes from; of several downloads, where most of it does.
-    pub kind: Kind,
+    pub kind: Platform,
     /// The submissions, in the order of their names below each given path.
     pub sources: Vec<Source>,
     /// What is none.
@@ -111,9 +111,9 @@ impl Collected {
     }
 
     /// Where the submissions come from, in words; nothing where that is no platform.
-    pub fn recognised(&self) -> Option<String> {
+    pub fn recognized(&self) -> Option<String> {
         let labels = self.sources.iter().filter_map(|source| source.label.as_ref());
-        recognised(self.kind, labels)
+        recognized(self.kind, labels)
     }
 
     /// What was skipped, in words; nothing when nothing was.
@@ -123,9 +123,10 @@ impl Collected {
 }
 
 /// As what downloads were recognised, in words; nothing where they are no platform's.
-pub fn recognised<'a>(kind: Kind, labels: impl Iterator<Item = &'a Label>) -> Option<String> {
-    let kinds: Vec<Kind> = labels.map(|label| label.kind).chain([kind]).collect();
-    let titles = Kind::PLATFORMS.into_iter().filter(|kind| kinds.contains(kind)).map(Kind::title);
+pub fn recognized<'a>(kind: Platform, labels: impl Iterator<Item = &'a Label>) -> Option<String> {
+    let kinds: Vec<Platform> = labels.map(|label| label.kind).chain([kind]).collect();
+    let titles =
+        Platform::PLATFORMS.into_iter().filter(|kind| kinds.contains(kind)).map(Platform::title);
     match &titles.collect::<Vec<_>>()[..] {
         [] => None,
         [only] => Some(format!("recognized as a download of {only}")),
@@ -146,13 +147,13 @@ pub fn skipped(names: &[String]) -> Option<String> {
 }
 
 /// What is asked for.
-pub struct Wanted<'a> {
+pub struct CollectOptions<'a> {
     /// The tree of a submission.
     pub tree: &'a TreeSpec,
     /// The size of a submission.
-    pub limits: &'a Limits,
+    pub limits: &'a ArchiveLimits,
     /// What the instructor says the download is; else it is recognized.
-    pub from: Option<Kind>,
+    pub from: Option<Platform>,
     /// A folder that is no submission, should it lie there.
     pub output: Option<&'a Path>,
     /// An empty folder for what zips of many hold.
@@ -163,9 +164,9 @@ pub struct Wanted<'a> {
 ///
 /// # Errors
 /// When a path leads nowhere or to no submission, or a zip of many cannot be unpacked.
-pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> {
+pub fn collect(paths: &[PathBuf], wanted: &CollectOptions) -> anyhow::Result<Collected> {
     let output = wanted.output.and_then(|output| output.canonicalize().ok());
-    let mut search = Search { wanted, output, unpacked: 0, found: Found::default() };
+    let mut search = Search { wanted, output, unpacked: 0, found: SearchResult::default() };
     // Of each submission, with which others it was found: those of a folder, or those that the command line names.
     let mut groups: Vec<usize> = Vec::new();
     for (index, path) in paths.iter().enumerate() {
@@ -185,7 +186,7 @@ pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> 
                 skipped(found).map_or("it is empty".into(), |names| format!("it holds {names}"));
             let unopened = search.found.unopened.first().map(|(_, why)| why.clone());
             let other = unopened.unwrap_or(other);
-            let platform = wanted.from.filter(|kind| *kind != Kind::Plain);
+            let platform = wanted.from.filter(|kind| *kind != Platform::Plain);
             let platform = platform.map_or(String::new(), |kind| {
                 format!(", in {} named like {}", kind.title(), kind.pattern())
             });
@@ -196,7 +197,7 @@ pub fn collect(paths: &[PathBuf], wanted: &Wanted) -> anyhow::Result<Collected> 
             );
         }
     }
-    let mut collected = search.found.labelled(wanted, &groups);
+    let mut collected = search.found.labeled(wanted, &groups);
     collected.leave_out_copies(paths)?;
     Ok(collected)
 }

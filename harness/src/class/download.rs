@@ -11,9 +11,9 @@ use std::path::{Component, Path, PathBuf};
 use anyhow::Context as _;
 use zip::ZipArchive;
 
-use super::layout::{Kind, end_of, has_end_of_archive, label_of};
+use super::layout::{Platform, end_of, has_end_of_archive, label_of};
 use crate::harmless::printable;
-use crate::intake::{Limits, TreeSpec};
+use crate::intake::{ArchiveLimits, TreeSpec};
 
 /// The file that tells a Gradescope export.
 pub const GRADESCOPE_METADATA: &str = "submission_metadata.yml";
@@ -68,14 +68,14 @@ fn named_twice(path: &Path) -> io::Result<Option<String>> {
 }
 
 /// The platform whose download a zip with these names looks like, beyond doubt.
-pub fn platform(names: &[String], tree: &TreeSpec) -> Option<Kind> {
+pub fn platform(names: &[String], tree: &TreeSpec) -> Option<Platform> {
     if !is_download(names, tree, None) {
         return None;
     }
-    let any = |kind: Kind| {
+    let any = |kind: Platform| {
         names.iter().flat_map(|name| name.split('/')).any(|part| label_of(kind, part).is_some())
     };
-    Kind::PLATFORMS.into_iter().find(|kind| any(*kind))
+    Platform::PLATFORMS.into_iter().find(|kind| any(*kind))
 }
 
 /// The one archive in a zip that holds nothing else but what systems add.
@@ -125,17 +125,17 @@ fn mend_backslashes(names: &mut [String]) {
 
 /// Whether a zip with these names is a download of many submissions, not a submission. `from` is what the
 /// instructor says that it is.
-pub fn is_download(names: &[String], tree: &TreeSpec, from: Option<Kind>) -> bool {
+pub fn is_download(names: &[String], tree: &TreeSpec, from: Option<Platform>) -> bool {
     let tops = |depth: usize| names.iter().filter_map(move |name| name.split('/').nth(depth));
-    let labelled = |kind: Kind| {
+    let labeled = |kind: Platform| {
         let of = |depth| tops(depth).filter_map(|top| label_of(kind, top));
         of(0).chain(of(1)).map(|label| label.submission).collect::<HashSet<String>>().len()
     };
-    if labelled(Kind::Brightspace) + labelled(Kind::Moodle) > 0 {
+    if labeled(Platform::Brightspace) + labeled(Platform::Moodle) > 0 {
         return true;
     }
     if names.iter().any(|name| name.ends_with(GRADESCOPE_METADATA))
-        || labelled(Kind::Gradescope) > 1
+        || labeled(Platform::Gradescope) > 1
     {
         return true;
     }
@@ -151,7 +151,7 @@ pub fn is_download(names: &[String], tree: &TreeSpec, from: Option<Kind>) -> boo
         return false;
     }
     let file = |name: &&&String| {
-        name.rsplit('/').next().is_some_and(|f| label_of(Kind::Canvas, f).is_some())
+        name.rsplit('/').next().is_some_and(|f| label_of(Platform::Canvas, f).is_some())
     };
     let canvas = archives.iter().filter(file).count();
     canvas == archives.len() || archives.len() > 1 || from.is_some()
@@ -161,7 +161,7 @@ pub fn is_download(names: &[String], tree: &TreeSpec, from: Option<Kind>) -> boo
 ///
 /// # Errors
 /// When the zip cannot be read, or a file not be written.
-pub fn unpack(path: &Path, into: &Path, limits: &Limits) -> anyhow::Result<Vec<String>> {
+pub fn unpack(path: &Path, into: &Path, limits: &ArchiveLimits) -> anyhow::Result<Vec<String>> {
     let cannot = || format!("cannot unpack {}", path.display());
     let mut zip = ZipArchive::new(BufReader::new(File::open(path).with_context(cannot)?))
         .with_context(cannot)?;

@@ -1,15 +1,15 @@
 //! Grades as a learning platform imports them: its own class list or grade book back, with one column filled.
 
-use super::layout::Kind;
+use super::layout::Platform;
 use super::names;
-use super::roster::{Roster, Student};
+use super::roster::{ListedStudent, Roster};
 use crate::harmless::{csv_cell, printable};
 
 /// The points of one student of a class list.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Points<'a> {
     /// The student.
-    pub student: &'a Student,
+    pub student: &'a ListedStudent,
     /// What they earned.
     pub points: f64,
 }
@@ -46,12 +46,12 @@ pub fn grade_book(roster: &Roster, item: &str, graded: &[Points]) -> Result<Book
     let unknown = graded.iter().filter(is_unknown).map(|own| own.student.who()).collect();
     let mut book = Book { unknown, ..Book::default() };
     let copied = match roster.kind {
-        Kind::Brightspace => {
+        Platform::Brightspace => {
             book.brightspace(roster, item, own);
             key_columns
         }
-        Kind::Canvas => book.canvas(roster, item, own, graded)?,
-        Kind::Moodle => book.moodle(roster, graded)?,
+        Platform::Canvas => book.canvas(roster, item, own, graded)?,
+        Platform::Moodle => book.moodle(roster, graded)?,
         _ => {
             return Err(format!(
                 "{}: expected the grade book of Brightspace or Canvas or the grading worksheet of Moodle; hint: \
@@ -95,7 +95,7 @@ fn column_of(roster: &Roster, item: &str) -> Result<Option<usize>, String> {
             own.len(),
             called(roster, &own),
             match roster.kind {
-                Kind::Canvas => {
+                Platform::Canvas => {
                     format!("name one as it is written, --item \"{}\"", roster.header[own[0]])
                 }
                 _ => "rename one on the platform and export again".to_owned(),
@@ -190,7 +190,7 @@ impl Book {
             copied.iter().map(|at| cells.get(*at).cloned().unwrap_or_default()).collect()
         };
         let end = |row: &mut Vec<String>, cell: &str| {
-            if roster.kind == Kind::Brightspace {
+            if roster.kind == Platform::Brightspace {
                 row.push(cell.to_owned());
             }
         };
@@ -221,11 +221,11 @@ impl Book {
 }
 
 /// The columns by which a platform that imports grades knows whose they are; any of them does.
-fn keys(kind: Kind) -> &'static [&'static str] {
+fn keys(kind: Platform) -> &'static [&'static str] {
     match kind {
-        Kind::Brightspace => &["OrgDefinedId", "Username"],
-        Kind::Canvas => &["ID", "SIS User ID", "SIS Login ID"],
-        Kind::Moodle => &["Identifier", "Identifiant"],
+        Platform::Brightspace => &["OrgDefinedId", "Username"],
+        Platform::Canvas => &["ID", "SIS User ID", "SIS Login ID"],
+        Platform::Moodle => &["Identifier", "Identifiant"],
         _ => &[],
     }
 }
@@ -256,16 +256,16 @@ fn named(roster: &Roster, wanted: &[&str]) -> Vec<usize> {
 }
 
 /// The assignment that a column holds the points of; empty where it holds none.
-fn title(kind: Kind, column: &str) -> &str {
+fn title(kind: Platform, column: &str) -> &str {
     let column = column.trim();
     match kind {
         // `A2 Points Grade <Numeric MaxPoints:100>`
-        Kind::Brightspace => {
+        Platform::Brightspace => {
             let name = column.split(" <").next().unwrap_or_default();
             name.strip_suffix(" Points Grade").unwrap_or_default()
         }
         // `A2 (55502)`
-        Kind::Canvas => {
+        Platform::Canvas => {
             let parts = column.strip_suffix(')').and_then(|rest| rest.rsplit_once(" ("));
             let is_number = |id: &str| !id.is_empty() && id.bytes().all(|b| b.is_ascii_digit());
             parts.filter(|(_, id)| is_number(id)).map_or("", |(name, _)| name)
@@ -401,7 +401,7 @@ mod tests {
                     \"Participant 702\",\"Bob Bay\",260000102,x,,\"100,00\",-\n";
         let roster = Roster::parse(list.as_bytes(), Path::new("list.csv")).unwrap();
         let ann = &roster.students[0];
-        assert_eq!((roster.kind, ann.id.as_str()), (Kind::Moodle, "701"));
+        assert_eq!((roster.kind, ann.id.as_str()), (Platform::Moodle, "701"));
         assert_eq!(
             [ann.number.as_str(), ann.submitted.as_str()],
             ["260000101", "2019-10-08T13:05:00"]

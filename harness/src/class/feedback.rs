@@ -6,7 +6,7 @@ use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-use super::layout::{Kind, Label};
+use super::layout::{Label, Platform};
 use crate::files::files_below;
 
 /// The feedback on one submission.
@@ -39,16 +39,16 @@ impl Feedback<'_> {
         let Some(label) = self.label else { return Place::Folder(self.slug.to_owned()) };
         let own = &label.submission;
         match label.kind {
-            Kind::Brightspace => Place::Packed(format!("{own}/{FILE}")),
-            Kind::Moodle => Place::Packed(format!("{own}_assignfeedback_file_{FILE}")),
-            Kind::Canvas => {
+            Platform::Brightspace => Place::Packed(format!("{own}/{FILE}")),
+            Platform::Moodle => Place::Packed(format!("{own}_assignfeedback_file_{FILE}")),
+            Platform::Canvas => {
                 // The file's own name, which holds the numbers of the student and of the file.
                 let file = self.name.rsplit('/').next().unwrap_or(self.name);
                 let ending = if file.to_lowercase().ends_with(".zip") { "" } else { ".zip" };
                 Place::Packed(format!("{file}{ending}"))
             }
-            Kind::Gradescope | Kind::Github => Place::Folder(own.clone()),
-            Kind::Plain => Place::Folder(self.slug.to_owned()),
+            Platform::Gradescope | Platform::Github => Place::Folder(own.clone()),
+            Platform::Plain => Place::Folder(self.slug.to_owned()),
         }
     }
 }
@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn each_platform_finds_its_own_names() {
-        let packed = |kind: Kind, component: &str, name: &str| {
+        let packed = |kind: Platform, component: &str, name: &str| {
             let label = label_of(kind, component).unwrap();
             let feedback =
                 Feedback { label: Some(&label), name, slug: "slug", folder: Path::new(".") };
@@ -111,43 +111,43 @@ mod tests {
         };
         for (kind, component, name, expected) in [
             (
-                Kind::Brightspace,
+                Platform::Brightspace,
                 "12-3 - Zoë O'Neil-Ode - Oct 5, 2019 1159 PM",
                 "12-3 - Zoë O'Neil-Ode - Oct 5, 2019 1159 PM/a2.zip",
                 "12-3 - Zoë O'Neil-Ode - Oct 5, 2019 1159 PM/feedback.zip",
             ),
             // Flat.
             (
-                Kind::Brightspace,
+                Platform::Brightspace,
                 "12-3 - Ann Lee - Oct 5, 2019 1159 PM - a2_ann.zip",
                 "12-3 - Ann Lee - Oct 5, 2019 1159 PM - a2_ann.zip",
                 "12-3 - Ann Lee - Oct 5, 2019 1159 PM/feedback.zip",
             ),
             (
-                Kind::Canvas,
+                Platform::Canvas,
                 "leeann_LATE_502_9002_a2_7_8-1.zip",
                 "leeann_LATE_502_9002_a2_7_8-1.zip",
                 "leeann_LATE_502_9002_a2_7_8-1.zip",
             ),
             (
-                Kind::Canvas,
+                Platform::Canvas,
                 "anon_x7Yz_456_a2.tar.gz",
                 "anon_x7Yz_456_a2.tar.gz",
                 "anon_x7Yz_456_a2.tar.gz.zip",
             ),
             (
-                Kind::Moodle,
+                Platform::Moodle,
                 "Zoë O'Neil_7_assignsubmission_file",
                 "Zoë O'Neil_7_assignsubmission_file/a2.zip",
                 "Zoë O'Neil_7_assignfeedback_file_feedback.zip",
             ),
             (
-                Kind::Moodle,
+                Platform::Moodle,
                 "Participant_12_assignsubmission_file_a2.zip",
                 "Participant_12_assignsubmission_file_a2.zip",
                 "Participant_12_assignfeedback_file_feedback.zip",
             ),
-            (Kind::Gradescope, "submission_11", "submission_11", "submission_11/"),
+            (Platform::Gradescope, "submission_11", "submission_11", "submission_11/"),
         ] {
             assert_eq!(packed(kind, component, name), expected, "{component}");
         }

@@ -26,7 +26,7 @@ pub struct Pair {
     /// The share of their tokens that match, in [0, 1]: JPlag's average similarity.
     pub similarity: f64,
     /// Where.
-    pub matches: Vec<Match>,
+    pub matches: Vec<SharedPassage>,
     /// The digest of each submission whose sources were compared.
     #[serde(default)]
     pub digests: [String; 2],
@@ -41,16 +41,16 @@ impl Pair {
 
 /// A passage that two submissions share.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Match {
+pub struct SharedPassage {
     /// In the first and in the second one.
-    pub places: [Place; 2],
+    pub places: [PassagePlace; 2],
     /// Number of tokens.
     pub tokens: usize,
 }
 
 /// Where a passage stands.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Place {
+pub struct PassagePlace {
     /// The file, by its path in the submission.
     pub path: String,
     /// First and last line, counted from 1.
@@ -187,7 +187,7 @@ impl Comparison {
         );
         ensure!(first != second, "it compares {first} with itself");
         let name = |id: &String| names.get(id).unwrap_or(id).clone();
-        let own = |passage: Passage| Match {
+        let own = |passage: Passage| SharedPassage {
             places: [
                 place(&passage.first_file, &first, passage.first_start, passage.first_end),
                 place(&passage.second_file, &second, passage.second_start, passage.second_end),
@@ -201,13 +201,13 @@ impl Comparison {
 }
 
 /// A file's path begins with the submission's identifier, and has backslashes where JPlag ran on Windows.
-fn place(file: &str, id: &str, start: Line, end: Line) -> Place {
+fn place(file: &str, id: &str, start: Line, end: Line) -> PassagePlace {
     let line = |line| match line {
         Line::Alone(line) | Line::Position { line } => line,
     };
     let file = file.replace('\\', "/");
     let below = file.strip_prefix(id).and_then(|rest| rest.strip_prefix('/'));
-    Place { path: below.unwrap_or(&file).to_owned(), lines: [line(start), line(end)] }
+    PassagePlace { path: below.unwrap_or(&file).to_owned(), lines: [line(start), line(end)] }
 }
 
 fn json<T: DeserializeOwned>(zip: &mut ZipArchive<Cursor<&[u8]>>, name: &str) -> anyhow::Result<T> {
@@ -285,8 +285,9 @@ pub(crate) mod tests {
     }
 
     fn expected(similarity: f64) -> Vec<Pair> {
-        let place = |lines| Place { path: "src/integrators/simple.rs".into(), lines };
-        let matches = vec![Match { places: [place([10, 30]), place([12, 32])], tokens: 139 }];
+        let place = |lines| PassagePlace { path: "src/integrators/simple.rs".into(), lines };
+        let matches =
+            vec![SharedPassage { places: [place([10, 30]), place([12, 32])], tokens: 139 }];
         let digests = Default::default();
         vec![Pair { who: ["ada".into(), "bob-2".into()], similarity, matches, digests }]
     }

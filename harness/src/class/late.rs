@@ -12,7 +12,7 @@ use crate::rubric::Grade;
 /// The policy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Policy {
+pub struct LatePolicy {
     /// Minutes after the due date that cost nothing. What is later is late from the due date on.
     #[serde(default)]
     pub grace_min: u32,
@@ -87,7 +87,8 @@ pub struct Extension {
 
 /// How late a submission is, and what that costs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Late {
+#[schemars(rename = "Late")]
+pub struct Lateness {
     /// When it was submitted, RFC 3339.
     pub submitted: String,
     /// When it was due for this student, RFC 3339.
@@ -128,7 +129,7 @@ pub fn expected_date(text: &str, error: &jiff::Error) -> String {
     format!("expected a date such as \"2019-10-06T23:59:00-04:00\", found \"{text}\" ({said})")
 }
 
-impl Policy {
+impl LatePolicy {
     /// What is wrong with the policy itself, if anything. `due` is the class's due date.
     pub fn problem(&self, due: &str) -> Option<Problem> {
         let keys = |at: &[&str]| -> Vec<String> {
@@ -267,7 +268,12 @@ impl Policy {
 
     /// How late a submission of the stamp `submitted` is, for a student whom the numbers `own` name. The time zone is
     /// the policy's, else the offset of `due`. Returns `None` if the stamp or the due date says nothing.
-    pub fn judge(&self, due: &str, submitted: &str, own: impl Fn(&str) -> bool) -> Option<Late> {
+    pub fn judge(
+        &self,
+        due: &str,
+        submitted: &str,
+        own: impl Fn(&str) -> bool,
+    ) -> Option<Lateness> {
         let zone = self.zone(due)?;
         let extension = self.extensions.iter().find(|extension| own(&extension.student));
         let class_due: Timestamp = due.parse().ok()?;
@@ -319,11 +325,11 @@ impl Policy {
         let [submitted, due] = [when, due].map(|at| at.to_string());
         let (before, after) = ([0.0; 2], [0.0; 2]);
         let cut_off = cut_off.is_some();
-        Some(Late { submitted, due, late_s, charged, late_days, cut_off, before, after, words })
+        Some(Lateness { submitted, due, late_s, charged, late_days, cut_off, before, after, words })
     }
 
     /// Takes the penalty from a grade and notes it before and after.
-    pub fn charge(&self, late: &mut Late, grade: &mut Grade) {
+    pub fn charge(&self, late: &mut Lateness, grade: &mut Grade) {
         let loss = |points: f64| {
             let each = match (self.unit, self.of) {
                 (Unit::Points, _) => self.penalty,
@@ -385,14 +391,14 @@ fn in_zone(at: Timestamp, zone: &TimeZone) -> String {
 }
 
 /// A time as the class reads it: in the policy's time zone, else in that of the due date.
-pub fn shown(at: Timestamp, due: &str, policy: Option<&Policy>) -> String {
+pub fn shown(at: Timestamp, due: &str, policy: Option<&LatePolicy>) -> String {
     let zone = policy.and_then(|policy| policy.zone(due));
     in_zone(at, &zone.unwrap_or_else(|| zone_of(due)))
 }
 
 /// From when on nobody submits any more: the due date, the cut-off and the last extension, with late days and grace.
 /// Returns `None` if the due date says no time.
-pub fn end(due: &str, policy: Option<&Policy>) -> Option<Timestamp> {
+pub fn end(due: &str, policy: Option<&LatePolicy>) -> Option<Timestamp> {
     let class_due: Timestamp = due.parse().ok()?;
     let Some(policy) = policy else { return Some(class_due) };
     let after = |due: Timestamp, days: u32| {

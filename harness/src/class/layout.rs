@@ -20,7 +20,8 @@ use super::{names, stamps};
     clap::ValueEnum,
 )]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+#[schemars(rename = "Kind")]
+pub enum Platform {
     /// Brightspace (D2L): `12345-67890 - First Last - Oct 5, 2019 1159 PM/`
     Brightspace,
     /// Canvas: `lastfirst_123_456_name.zip`
@@ -36,7 +37,7 @@ pub enum Kind {
     Plain,
 }
 
-impl Kind {
+impl Platform {
     /// Those with names that say something.
     pub const PLATFORMS: [Self; 5] =
         [Self::Brightspace, Self::Canvas, Self::Moodle, Self::Gradescope, Self::Github];
@@ -71,7 +72,7 @@ impl Kind {
 #[serde(default)]
 pub struct Label {
     /// The platform.
-    pub kind: Kind,
+    pub kind: Platform,
     /// What it calls the submission: a folder, or the beginning of a file's name.
     pub submission: String,
     /// The student's name. Canvas runs last and first name together.
@@ -96,12 +97,12 @@ impl Label {
     /// Whose it is, as far as the platform tells people apart.
     pub fn person(&self) -> String {
         let own = match self.kind {
-            Kind::Brightspace => format!("{} {}", self.id, names::words(&self.name)),
-            Kind::Canvas | Kind::Moodle => self.id.clone(),
-            Kind::Github => self.username.to_lowercase(),
-            Kind::Gradescope if !self.number.is_empty() => names::number(&self.number),
-            Kind::Gradescope if !self.email.is_empty() => self.email.to_lowercase(),
-            Kind::Gradescope | Kind::Plain => self.submission.clone(),
+            Platform::Brightspace => format!("{} {}", self.id, names::words(&self.name)),
+            Platform::Canvas | Platform::Moodle => self.id.clone(),
+            Platform::Github => self.username.to_lowercase(),
+            Platform::Gradescope if !self.number.is_empty() => names::number(&self.number),
+            Platform::Gradescope if !self.email.is_empty() => self.email.to_lowercase(),
+            Platform::Gradescope | Platform::Plain => self.submission.clone(),
         };
         format!("{} {own}", self.kind.title())
     }
@@ -115,26 +116,26 @@ impl Label {
 
 /// What one component of a path says, as a platform of this kind names folders and files; none of GitHub's clones,
 /// which only their `.git/` tells.
-pub fn label_of(kind: Kind, component: &str) -> Option<Label> {
+pub fn label_of(kind: Platform, component: &str) -> Option<Label> {
     match kind {
-        Kind::Brightspace => brightspace(component),
-        Kind::Canvas => canvas(component),
-        Kind::Moodle => moodle(component),
-        Kind::Gradescope => gradescope(component),
-        Kind::Github | Kind::Plain => None,
+        Platform::Brightspace => brightspace(component),
+        Platform::Canvas => canvas(component),
+        Platform::Moodle => moodle(component),
+        Platform::Gradescope => gradescope(component),
+        Platform::Github | Platform::Plain => None,
     }
 }
 
 /// Whether a component is named as some platform names a student's folder or file.
-pub fn is_labelled(component: &str) -> bool {
-    Kind::PLATFORMS.into_iter().any(|kind| label_of(kind, component).is_some())
+pub fn is_labeled(component: &str) -> bool {
+    Platform::PLATFORMS.into_iter().any(|kind| label_of(kind, component).is_some())
 }
 
 /// A clone: `a2-ada`, where `prefix` is `a2-`.
 pub fn clone(component: &str, prefix: &str) -> Label {
     let username = component.strip_prefix(prefix).filter(|rest| !rest.is_empty());
     Label {
-        kind: Kind::Github,
+        kind: Platform::Github,
         submission: component.to_owned(),
         username: username.unwrap_or(component).to_owned(),
         ..Label::default()
@@ -169,7 +170,7 @@ fn brightspace(component: &str) -> Option<Label> {
         let name = rest[..at].trim();
         let end = component.len() - after.len();
         return (!name.is_empty()).then(|| Label {
-            kind: Kind::Brightspace,
+            kind: Platform::Brightspace,
             submission: component[..end].trim_end().to_owned(),
             name: name.to_owned(),
             id: id.to_owned(),
@@ -185,7 +186,7 @@ fn canvas(component: &str) -> Option<Label> {
     let tokens: Vec<&str> = component.split('_').collect();
     let is_number = |token: &&str| !token.is_empty() && token.bytes().all(|b| b.is_ascii_digit());
     let label = |name: String, id: &str, used: usize, late: bool| Label {
-        kind: Kind::Canvas,
+        kind: Platform::Canvas,
         submission: tokens[..used].join("_"),
         name,
         id: id.to_owned(),
@@ -227,7 +228,7 @@ fn moodle(component: &str) -> Option<Label> {
     // A blind download says no names.
     let name = if names::plain(name) == "participant" { "" } else { name };
     is_number.then(|| Label {
-        kind: Kind::Moodle,
+        kind: Platform::Moodle,
         submission: component[..at].to_owned(),
         name: name.replace('_', " ").trim().to_owned(),
         id: id.to_owned(),
@@ -240,7 +241,7 @@ fn gradescope(component: &str) -> Option<Label> {
     let id = component.strip_prefix("submission_")?;
     let is_number = !id.is_empty() && id.bytes().all(|b| b.is_ascii_digit());
     is_number.then(|| Label {
-        kind: Kind::Gradescope,
+        kind: Platform::Gradescope,
         submission: component.to_owned(),
         ..Label::default()
     })

@@ -49,7 +49,7 @@ enum On {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
+struct MatchesFile {
     #[serde(default, rename = "match")]
     matches: Vec<Spanned<Entry>>,
 }
@@ -69,7 +69,8 @@ impl Matches {
     /// When it says what means nothing; names the file and line.
     pub fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
         let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
-        let file: File = toml::from_str(text).map_err(|error| toml_error(&error, text, path))?;
+        let file: MatchesFile =
+            toml::from_str(text).map_err(|error| toml_error(&error, text, path))?;
         let mut decisions: Vec<Decision> = Vec::new();
         for entry in file.matches {
             let place = place(entry.span().start);

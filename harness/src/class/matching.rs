@@ -1,10 +1,10 @@
 //! Matches submissions to students of the class list.
 
 use super::claim::Claim;
-use super::layout::{Kind, Label};
+use super::layout::{Label, Platform};
 use super::matches::Matches;
 use super::names;
-use super::roster::{Roster, Student};
+use super::roster::{ListedStudent, Roster};
 
 /// Whose a submission is.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,7 +88,7 @@ fn group(label: &Label, roster: &Roster) -> Match {
 
 /// The students whom each thing that a submission says fits.
 fn evidence(claim: &Claim, label: &Label, roster: &Roster) -> [(&'static str, Vec<usize>); 6] {
-    let of = |wanted: &dyn Fn(&Student) -> bool| -> Vec<usize> {
+    let of = |wanted: &dyn Fn(&ListedStudent) -> bool| -> Vec<usize> {
         let all = roster.students.iter().enumerate();
         all.filter(|(_, student)| wanted(student)).map(|(index, _)| index).collect()
     };
@@ -100,7 +100,7 @@ fn evidence(claim: &Claim, label: &Label, roster: &Roster) -> [(&'static str, Ve
         (
             "the platform's own number",
             of(&|student| {
-                label.kind != Kind::Brightspace
+                label.kind != Platform::Brightspace
                     && roster.kind == label.kind
                     && same(&label.id, &student.id)
             }),
@@ -148,7 +148,7 @@ fn by_number(roster: &Roster, number: &str) -> Vec<usize> {
     of(&|own| !bare.is_empty() && own.trim_start_matches('0') == bare)
 }
 
-fn is_named(name: &str, student: &Student) -> bool {
+fn is_named(name: &str, student: &ListedStudent) -> bool {
     let wanted = names::words(name);
     if wanted.is_empty() {
         return false;

@@ -31,12 +31,12 @@ pub mod standing;
 
 pub use attempts::set_aside;
 pub use claim::Claim;
-pub use collect::{Collected, Empty, Source, Wanted, collect, recognised, skipped};
-pub use late::{Late, Policy};
-pub use layout::{Kind, Label};
+pub use collect::{CollectOptions, Collected, Empty, Source, collect, recognized, skipped};
+pub use late::{LatePolicy, Lateness};
+pub use layout::{Label, Platform};
 pub use matches::{MATCHES, Matches};
 pub use owners::Owners;
 pub use pins::{Decisions, Pins, Stated};
-pub use roster::{Roster, Student};
+pub use roster::{ListedStudent, Roster};
 pub use settle::settle;
 pub use standing::{Attempt, Class, Deciding, INCOMPARABLE, Missing, Standing, Undecided};

@@ -71,7 +71,7 @@ struct Entry {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
+struct OverridesFile {
     #[serde(default, rename = "override")]
     overrides: Vec<Spanned<Decision>>,
     #[serde(default, rename = "confirm")]
@@ -110,7 +110,8 @@ impl Overrides {
     /// When it says what means nothing; names the file and line.
     pub fn parse(text: &str, path: &Path) -> anyhow::Result<Self> {
         let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
-        let file: File = toml::from_str(text).map_err(|error| toml_error(&error, text, path))?;
+        let file: OverridesFile =
+            toml::from_str(text).map_err(|error| toml_error(&error, text, path))?;
         let mut decisions = Vec::new();
         let of = |kind: &'static str, entries: Vec<Spanned<Decision>>| {
             entries.into_iter().map(move |entry| (entry, kind))

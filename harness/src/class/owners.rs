@@ -6,11 +6,11 @@
 use std::collections::BTreeMap;
 
 use super::claim::Claim;
-use super::layout::{Kind, Label};
+use super::layout::{Label, Platform};
 use super::matches::Matches;
 use super::matching::{Match, find};
 use super::names;
-use super::roster::{Roster, Student};
+use super::roster::{ListedStudent, Roster};
 
 /// Submissions of a report, with the students that they are matched to.
 pub struct Owners<'a> {
@@ -87,7 +87,7 @@ impl<'a> Owners<'a> {
     /// The students of the class list whom a word means, by index.
     fn listed(&self, word: &str) -> Vec<usize> {
         let students = self.roster.map_or(&[][..], |roster| &roster.students);
-        let of = |wanted: &dyn Fn(&Student) -> bool| -> Vec<usize> {
+        let of = |wanted: &dyn Fn(&ListedStudent) -> bool| -> Vec<usize> {
             let own = students.iter().enumerate().filter(|(_, student)| wanted(student));
             own.map(|(at, _)| at).collect()
         };
@@ -106,7 +106,7 @@ impl<'a> Owners<'a> {
     }
 
     /// Whether a word means a student of the class list.
-    pub fn listed_is(&self, word: &str, student: &Student) -> bool {
+    pub fn listed_is(&self, word: &str, student: &ListedStudent) -> bool {
         let students = self.roster.map_or(&[][..], |roster| &roster.students);
         self.listed(word).into_iter().any(|at| students[at] == *student)
     }
@@ -122,7 +122,7 @@ impl<'a> Owners<'a> {
     }
 
     /// The student of the class list.
-    pub fn student(&self, at: usize) -> Option<&Student> {
+    pub fn student(&self, at: usize) -> Option<&ListedStudent> {
         Some(&self.roster?.students[self.students[at]?])
     }
 
@@ -144,7 +144,8 @@ impl<'a> Owners<'a> {
             }
             _ => Vec::new(),
         };
-        let full_name = self.student(at).map(Student::full_name).filter(|_| !named.is_empty());
+        let full_name =
+            self.student(at).map(ListedStudent::full_name).filter(|_| !named.is_empty());
         let named = named.into_iter().map(str::to_owned).chain(full_name);
         let all = self.attempts(at);
         let mut keys = named.filter(|own| self.meant(own) == all);
@@ -169,7 +170,7 @@ pub fn people(claims: &[Claim]) -> Vec<String> {
     let mut known: BTreeMap<(String, String), String> = BTreeMap::new();
     for (at, claim) in claims.iter().enumerate() {
         let number = names::number(&claim.number);
-        let label = claim.label.as_ref().filter(|label| label.kind == Kind::Brightspace);
+        let label = claim.label.as_ref().filter(|label| label.kind == Platform::Brightspace);
         let Some(label) = label.filter(|_| !number.is_empty()) else { continue };
         let person = people[at].clone();
         let first = known.entry((names::words(&label.name), number)).or_insert(person.clone());
@@ -186,7 +187,7 @@ pub fn number(claim: &Claim) -> &str {
 
 /// The name that a submission is known by: the platform's, else its own. Canvas runs names together.
 pub fn name(claim: &Claim) -> &str {
-    let label = claim.label.as_ref().filter(|label| label.kind != Kind::Canvas);
+    let label = claim.label.as_ref().filter(|label| label.kind != Platform::Canvas);
     let name = label.map_or("", |label| &label.name);
     if name.is_empty() { &claim.full_name } else { name }
 }
@@ -202,7 +203,7 @@ mod tests {
         Claim {
             name: format!("{slug}.zip"),
             slug: slug.into(),
-            label: label_of(Kind::Brightspace, slug),
+            label: label_of(Platform::Brightspace, slug),
             number: number.into(),
             full_name: full_name.into(),
             digest: String::new(),

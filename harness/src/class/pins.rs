@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, anyhow, bail};
 use serde::{Deserialize, Serialize};
 
-use super::late::Policy;
+use super::late::LatePolicy;
 use super::matches::{MATCHES, Matches};
 use super::overrides::{OVERRIDES, Overrides};
 use super::standing::Attempt;
@@ -44,7 +44,7 @@ pub struct Stated {
     /// When it was due, RFC 3339 with offset.
     pub due: String,
     /// What a late submission costs, if anything.
-    pub late: Option<Policy>,
+    pub late: Option<LatePolicy>,
     /// How evidence becomes points.
     pub rules: Rules,
 }

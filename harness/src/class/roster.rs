@@ -13,7 +13,7 @@ use self::cells::{
     decode, delimiter, is_rounded, no_text, open_quote, separator, unwrapped, whole,
 };
 use self::columns::{Column, columns, kind, tells_students};
-use super::layout::Kind;
+use super::layout::Platform;
 use super::{names, stamps};
 use crate::harmless::printable;
 
@@ -23,13 +23,13 @@ pub struct Roster {
     /// The file.
     pub path: PathBuf,
     /// The platform that exports such a file.
-    pub kind: Kind,
+    pub kind: Platform,
     /// The columns' names, as they are written.
     pub header: Vec<String>,
     /// All rows below the header, as they are written.
     pub rows: Vec<Vec<String>>,
     /// The students, in the order of the file.
-    pub students: Vec<Student>,
+    pub students: Vec<ListedStudent>,
     /// Rows that are no student, with their lines.
     #[serde(default)]
     pub left_out: Vec<String>,
@@ -41,8 +41,7 @@ pub struct Roster {
 /// A student of a class list. A text is empty where the list does not say it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
-#[schemars(rename = "ListedStudent")]
-pub struct Student {
+pub struct ListedStudent {
     /// Line in the file, from 1.
     pub line: usize,
     /// Index of the row below the header.
@@ -66,7 +65,7 @@ pub struct Student {
     pub draft: bool,
 }
 
-impl Student {
+impl ListedStudent {
     /// `First Last`, or what there is of it.
     pub fn full_name(&self) -> String {
         format!("{} {}", self.first_name, self.last_name).trim().to_owned()
@@ -196,7 +195,7 @@ impl Roster {
         }
         let status = names::plain(&cell(Column::Status));
         let (submitted, full) = (cell(Column::Submitted), cell(Column::Full));
-        let mut student = Student {
+        let mut student = ListedStudent {
             line,
             row: self.rows.len(),
             number: whole(&number).to_owned(),
@@ -213,7 +212,7 @@ impl Roster {
             self.unread_times.push(format!("line {line}, \"{}\"", printable(&submitted)));
         }
         // Canvas's rows of points and its made-up student.
-        if self.kind == Kind::Canvas && (student.id.is_empty() || full == "Student, Test") {
+        if self.kind == Platform::Canvas && (student.id.is_empty() || full == "Student, Test") {
             return Ok(());
         }
         let is_sum = SUMS.contains(&names::plain(&full).trim())
@@ -227,11 +226,11 @@ impl Roster {
         student.take_name(full, at(Column::Last).is_some());
         match self.kind {
             // `Participant 123`
-            Kind::Moodle => {
+            Platform::Moodle => {
                 student.id = student.id.chars().filter(char::is_ascii_digit).collect();
             }
             // The instructor's own identifier may be the number.
-            Kind::Github if student.number.is_empty() => {
+            Platform::Github if student.number.is_empty() => {
                 student.number = std::mem::take(&mut student.id);
             }
             _ => {}

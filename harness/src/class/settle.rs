@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::attempts::{choose, stamp};
 use super::claim::{Claim, address};
-use super::late::Late;
-use super::layout::{Kind, Label};
+use super::late::Lateness;
+use super::layout::{Label, Platform};
 use super::matches::Matches;
 use super::matching::{Match, find};
 use super::standing::{Attempt, Class, Deciding, Missing, Standing, Undecided};
@@ -27,7 +27,7 @@ pub fn settle(
     claims: &[Claim],
     grades: &mut [Grade],
     absent: &[(Label, String)],
-    kind: Kind,
+    kind: Platform,
     deciding: &Deciding,
 ) -> anyhow::Result<(Vec<(usize, Standing)>, Class)> {
     let matches = &deciding.matches.among(claims);
@@ -69,7 +69,7 @@ struct Settling<'a> {
 }
 
 impl<'a> Settling<'a> {
-    fn new(claims: &'a [Claim], kind: Kind, deciding: &'a Deciding<'a>) -> Self {
+    fn new(claims: &'a [Claim], kind: Platform, deciding: &'a Deciding<'a>) -> Self {
         let list = deciding.roster.and_then(|roster| roster.path.file_name());
         let list = list.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         Self {
@@ -110,7 +110,10 @@ impl<'a> Settling<'a> {
         standing.late = charge(claim, &standing, grade, self.deciding);
         standing.time_unknown = standing.late.is_none()
             && self.deciding.policy.is_some()
-            && claim.label.as_ref().is_none_or(|own| own.marked_late || own.kind != Kind::Canvas);
+            && claim
+                .label
+                .as_ref()
+                .is_none_or(|own| own.marked_late || own.kind != Platform::Canvas);
         self.people.entry(person).or_default().push(index);
         self.standings.push(standing);
         Ok(())
@@ -280,7 +283,7 @@ fn charge(
     standing: &Standing,
     grade: &mut Grade,
     deciding: &Deciding,
-) -> Option<Late> {
+) -> Option<Lateness> {
     let policy = deciding.policy?;
     let number = match &standing.student {
         Some(student) => &student.number,
@@ -300,7 +303,7 @@ fn charge(
             label.kind.title()
         )),
         // Canvas marks those that are late.
-        Some(label) if label.kind == Kind::Canvas => {}
+        Some(label) if label.kind == Platform::Canvas => {}
         _ => grade
             .remarks
             .push("when it was submitted is not known: no points are taken for lateness".into()),

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 
-use super::layout::{Kind, Label, label_of};
+use super::layout::{Label, Platform, label_of};
 use crate::files::{files_below, hex};
 
 /// Folders that are no part of a submission, and may be large.
@@ -18,7 +18,7 @@ pub fn slot(label: Option<&Label>, name: &str) -> String {
     let Some(label) = label else { return name.to_owned() };
     let parts: Vec<&str> = name.split('/').collect();
     let is = |part: &&str| match label.kind {
-        Kind::Github => **part == label.submission,
+        Platform::Github => **part == label.submission,
         kind => label_of(kind, part).is_some_and(|own| own.submission == label.submission),
     };
     let below = match parts.iter().rposition(is) {
@@ -34,8 +34,8 @@ pub fn slot(label: Option<&Label>, name: &str) -> String {
 fn flat<'a>(label: &Label, part: &'a str) -> &'a str {
     let rest = part.strip_prefix(&label.submission).unwrap_or_default();
     let file = match label.kind {
-        Kind::Brightspace => Some(rest.trim_start_matches([' ', '-'])),
-        Kind::Moodle => {
+        Platform::Brightspace => Some(rest.trim_start_matches([' ', '-'])),
+        Platform::Moodle => {
             let rest = rest.strip_prefix("_assignsubmission_");
             rest.and_then(|rest| rest.split_once('_')).map(|(_, file)| file)
         }
@@ -87,29 +87,32 @@ mod tests {
 
     #[test]
     fn a_slot_is_the_same_in_every_download() {
-        let slot = |kind: Kind, component: &str, name: &str| {
+        let slot = |kind: Platform, component: &str, name: &str| {
             super::slot(label_of(kind, component).as_ref(), name)
         };
         let own = "102-902 - Ann Lee - Oct 5, 2019 1159 PM";
         let expected = format!("Brightspace: {own}/a2.zip");
         for name in [format!("{own}/a2.zip"), format!("tue.zip/Lab/{own}/a2.zip"), "a2.zip".into()]
         {
-            assert_eq!(slot(Kind::Brightspace, own, &name), expected, "{name}");
+            assert_eq!(slot(Platform::Brightspace, own, &name), expected, "{name}");
         }
         let canvas = "leeann_101_2001_a2.zip";
         for name in [canvas.to_owned(), format!("mon/{canvas}")] {
-            assert_eq!(slot(Kind::Canvas, canvas, &name), format!("Canvas: leeann_101/{canvas}"));
+            assert_eq!(
+                slot(Platform::Canvas, canvas, &name),
+                format!("Canvas: leeann_101/{canvas}")
+            );
         }
         let moodle = "Ann Lee_7_assignsubmission_file";
         assert_eq!(
-            slot(Kind::Moodle, moodle, &format!("x/{moodle}/a2.zip")),
+            slot(Platform::Moodle, moodle, &format!("x/{moodle}/a2.zip")),
             "Moodle: Ann Lee_7/a2.zip"
         );
         // Flat files, as the platforms also name them.
         let flat = format!("{moodle}_a2.zip");
-        assert_eq!(slot(Kind::Moodle, &flat, &flat), "Moodle: Ann Lee_7/a2.zip");
+        assert_eq!(slot(Platform::Moodle, &flat, &flat), "Moodle: Ann Lee_7/a2.zip");
         let flat = format!("{own} - a2.zip");
-        assert_eq!(slot(Kind::Brightspace, &flat, &format!("x/{flat}")), expected);
+        assert_eq!(slot(Platform::Brightspace, &flat, &format!("x/{flat}")), expected);
         assert_eq!(super::slot(None, "ann/a2.zip"), "ann/a2.zip");
     }
 

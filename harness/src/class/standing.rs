@@ -3,12 +3,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::late::{Late, Policy};
-use super::layout::{Kind, Label};
+use super::late::{LatePolicy, Lateness};
+use super::layout::{Label, Platform};
 use super::matches::Matches;
 use super::mending::Mended;
 use super::overrides::Applied;
-use super::roster::{Roster, Student};
+use super::roster::{ListedStudent, Roster};
 
 /// Which of a student's attempts counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -37,7 +37,7 @@ pub struct Deciding<'a> {
     /// The instructor's decisions.
     pub matches: &'a Matches,
     /// What lateness costs, if anything.
-    pub policy: Option<&'a Policy>,
+    pub policy: Option<&'a LatePolicy>,
     /// When it was due, RFC 3339 with offset.
     pub due: &'a str,
     /// Which attempt counts.
@@ -51,7 +51,7 @@ pub struct Standing {
     /// What the platform says.
     pub label: Option<Label>,
     /// Whose it is, by the class list.
-    pub student: Option<Student>,
+    pub student: Option<ListedStudent>,
     /// What told so.
     pub matched_by: String,
     /// The student's other attempts, which do not count.
@@ -64,7 +64,7 @@ pub struct Standing {
     /// Whether there is a policy on lateness, and no time stamp to judge by.
     pub time_unknown: bool,
     /// How late it is; absent without a policy or a time stamp.
-    pub late: Option<Late>,
+    pub late: Option<Lateness>,
 }
 
 impl Standing {
@@ -84,7 +84,7 @@ impl Standing {
 #[serde(default)]
 pub struct Class {
     /// Where the submissions come from.
-    pub kind: Kind,
+    pub kind: Platform,
     /// File name of the class list; empty without one.
     pub list: String,
     /// Students of the list without a submission that counts.
@@ -113,7 +113,7 @@ pub const INCOMPARABLE: &str = "graded with other scenes, limits or another vers
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Missing {
     /// Who.
-    pub student: Student,
+    pub student: ListedStudent,
     /// What is known of it; mostly nothing.
     pub reason: String,
 }
@@ -126,7 +126,7 @@ pub struct Undecided {
     /// Why it is not certain.
     pub reason: String,
     /// Between whom.
-    pub candidates: Vec<Student>,
+    pub candidates: Vec<ListedStudent>,
 }
 
 impl Class {

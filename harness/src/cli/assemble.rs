@@ -10,24 +10,24 @@ use anyhow::{Context as _, bail, ensure};
 
 use super::changes::changes;
 use super::class;
-use super::found::{Found, ensure_merged};
-use super::settled::{Progress, Settled, settled, shared, whole};
-use crate::class::{Claim, Decisions, Kind, Owners, Pins, Roster};
+use super::found::{BatchIndex, ensure_merged};
+use super::settled::{Settled, StepCounter, settled, shared, whole};
+use crate::class::{Claim, Decisions, Owners, Pins, Platform, Roster};
 use crate::grading::{Record, RecordCache, StoredRecord};
 use crate::held_back::HeldBack;
 use crate::program::graded;
 use crate::report::{self, BatchReport, ReportError, SubmissionReport};
 
 /// A report's folder, as it was kept.
-pub struct Kept {
+pub struct KeptReport {
     /// What grades are settled by.
     pub pins: Pins,
-    found: Found,
+    found: BatchIndex,
     roster: Option<Roster>,
     records: Vec<StoredRecord>,
 }
 
-impl Kept {
+impl KeptReport {
     /// Reads everything that a report is made from.
     ///
     /// # Errors
@@ -41,7 +41,7 @@ impl Kept {
         );
         let pins = Pins::read(&instructor)?;
         ensure_merged(output)?;
-        let Some(found) = Found::read(output)?.filter(|_| pins.current().is_some()) else {
+        let Some(found) = BatchIndex::read(output)?.filter(|_| pins.current().is_some()) else {
             bail!(
                 "{}: expected the --report of an earlier `umbra grade` of this version; hint: grade once more",
                 output.display()
@@ -78,7 +78,7 @@ impl Kept {
     }
 
     /// Where the submissions come from.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> Platform {
         self.found.kind
     }
 
@@ -162,7 +162,7 @@ pub fn finish(
     output: &Path,
     pins: &mut Pins,
     decided: &Decisions,
-    mut found: Found,
+    mut found: BatchIndex,
     records: Vec<StoredRecord>,
 ) -> anyhow::Result<BatchReport> {
     let instructor = output.join(report::INSTRUCTOR);
@@ -170,7 +170,7 @@ pub fn finish(
     // Something may have been decided while this was graded.
     *pins = Pins::read(&instructor)?;
     let decided = &Decisions::read(output, decided.assignment.clone(), decided.attempt)?;
-    found.join(Found::read(output)?.unwrap_or_default(), output);
+    found.join(BatchIndex::read(output)?.unwrap_or_default(), output);
     found.add(&records, output);
     found.keep(output)?;
     let roster = class::roster(None, output)?;
@@ -192,7 +192,7 @@ pub fn write(output: &Path, settled: &Settled) -> anyhow::Result<()> {
         class::ask(class, output)?;
     }
     // Each is asked for twice: for its pages, and for the file with all.
-    let progress = Progress::new("writing the reports", 2 * settled.report.entries.len());
+    let progress = StepCounter::new("writing the reports", 2 * settled.report.entries.len());
     let written = report::write_outlined(output, &settled.report, &|entry| {
         progress.step();
         let slug = entry.record.slug.clone();

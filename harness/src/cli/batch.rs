@@ -11,14 +11,14 @@ use anyhow::{Context as _, ensure};
 
 use self::prepare::{same_seed, tell_of_copies};
 use super::assemble;
-use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
+use super::choices::{BudgetChoice, HeldBackSeed, IsolationChoice, Slice};
 use super::class::{self, Source, Telling};
 use super::context::{Context, INTERRUPTED, cores};
-use super::found::Found;
+use super::found::BatchIndex;
 use super::join::join;
 use super::render::AdapterChoice;
 use super::selection::Selection;
-use crate::class::{Attempt, Collected, Kind};
+use crate::class::{Attempt, Collected, Platform};
 use crate::files::write_whole;
 use crate::grading::{Grading, Mode, RecordCache, StoredRecord};
 use crate::held_back::HeldBack;
@@ -47,7 +47,7 @@ pub struct Batch<'a> {
     /// The isolation to demand.
     pub isolation: IsolationChoice,
     /// The held-back scenes; `None` for the seed that is recorded with the batch.
-    pub perturb: Option<Perturb>,
+    pub held_back_seed: Option<HeldBackSeed>,
     /// How much time each has in all.
     pub budget: BudgetChoice,
     /// The parts and scenes to ask about; `None` for all.
@@ -57,7 +57,7 @@ pub struct Batch<'a> {
     /// Which share of them alone is graded, without a report.
     pub slice: Option<Slice>,
     /// Where they come from; recognized where it is not said.
-    pub from: Option<Kind>,
+    pub from: Option<Platform>,
     /// The class list; that of an earlier run where none is named.
     pub list: Option<&'a Path>,
     /// Which attempt of a student counts; as before where it is not said.
@@ -105,7 +105,7 @@ impl<'a> Batch<'a> {
             jobs,
             mode,
             isolation,
-            perturb: None,
+            held_back_seed: None,
             budget: BudgetChoice::Config,
             selection: None,
             only: &[],
@@ -143,8 +143,8 @@ impl<'a> Batch<'a> {
         let context = &context;
         let seed = self.seed(&self.output.join(report::INSTRUCTOR).join(SEED_FILE))?;
         let earlier = match self.mode {
-            Mode::Grade => Found::read(self.output)?.unwrap_or_default(),
-            Mode::Check => Found::default(),
+            Mode::Grade => BatchIndex::read(self.output)?.unwrap_or_default(),
+            Mode::Check => BatchIndex::default(),
         };
         let names = earlier.names();
         let all = class::sources(self.mode, &collected.sources, self.output, &names);
@@ -204,7 +204,7 @@ impl<'a> Batch<'a> {
                 let conditions = found.conditions.clone();
                 let report = assemble::finish(self.output, pins, decided, found, records)?;
                 if self.only.is_empty() {
-                    Found::supersede(self.output, &conditions)?;
+                    BatchIndex::supersede(self.output, &conditions)?;
                 }
                 report
             }
@@ -223,7 +223,7 @@ impl<'a> Batch<'a> {
         store: &Store,
         seed: Option<u64>,
         chosen: &[&Source],
-        found: &mut Found,
+        found: &mut BatchIndex,
     ) -> anyhow::Result<Graded> {
         let adapter = self.adapter.adapter();
         // What a student waits for is compiled while scenes are made ready.
@@ -294,8 +294,8 @@ impl<'a> Batch<'a> {
     }
 
     /// What is known of the batch before anything is graded.
-    fn found(&self, collected: &Collected, all: &[Source], aside: &HashSet<String>) -> Found {
-        let mut found = Found::new(collected, all, |source| aside.contains(&source.slug));
+    fn found(&self, collected: &Collected, all: &[Source], aside: &HashSet<String>) -> BatchIndex {
+        let mut found = BatchIndex::new(collected, all, |source| aside.contains(&source.slug));
         let list = self.list.and_then(Path::file_name);
         found.list = list.unwrap_or_default().to_string_lossy().into_owned();
         let whole = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());

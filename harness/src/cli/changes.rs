@@ -121,7 +121,7 @@ pub fn summary(before: &BatchReport, after: &BatchReport) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::class::Student;
+    use crate::class::ListedStudent;
     use crate::report::sample;
 
     /// A report of one submission for each student of a class list, by number, with its points.
@@ -132,10 +132,10 @@ mod tests {
             let mut own = entry.clone();
             own.record.slug = (*slug).to_owned();
             let number = number.to_string();
-            own.standing.student = (number != "0").then(|| Student {
+            own.standing.student = (number != "0").then(|| ListedStudent {
                 first_name: format!("S{number}"),
                 number,
-                ..Student::default()
+                ..ListedStudent::default()
             });
             own.grade.parts.clear();
             (own.grade.points, own.grade.points_max) = (*points, *points);

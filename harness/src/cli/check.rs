@@ -9,7 +9,7 @@ use anyhow::ensure;
 use serde::{Deserialize, Serialize};
 
 use super::batch::{Batch, BatchOutcome};
-use super::choices::Perturb;
+use super::choices::HeldBackSeed;
 use super::context::Context;
 use super::outputs::{ensure_apart, shell_word};
 use super::render::AdapterChoice;
@@ -122,7 +122,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     eprintln!("umbra: {}", plan(folder, &what, last.seconds.get(&what).copied()));
     let batch = Batch {
         adapter: arguments.adapter,
-        perturb: Some(Perturb(None)),
+        held_back_seed: Some(HeldBackSeed(None)),
         selection: Some(&selection),
         keeps_plugin: arguments.keep_plugin.as_deref(),
         realtime_first: arguments.realtime_first,
@@ -135,7 +135,7 @@ pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<
     };
     let entry = &report.entries[0].for_student(&report.rules, false);
     let width = terminal::width().min(READABLE_COLUMNS);
-    let look = Look { width, colours: terminal::colours() };
+    let look = Look { width, colors: terminal::colors() };
     print_as_is!("{}", report::text_detail(&report, entry, look, arguments.verbose));
     let folder_of_page = arguments.output.join(&entry.record.slug);
     if arguments.pictures {

@@ -13,9 +13,9 @@ pub enum BudgetChoice {
 
 /// A seed of held-back scenes, or none of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Perturb(pub Option<u64>);
+pub struct HeldBackSeed(pub Option<u64>);
 
-impl FromStr for Perturb {
+impl FromStr for HeldBackSeed {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {

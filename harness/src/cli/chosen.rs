@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{bail, ensure};
 
-use super::assemble::Kept;
+use super::assemble::KeptReport;
 use crate::class::overrides::Subject;
 use crate::report::{BatchReport, SubmissionReport, harmless};
 
@@ -43,7 +43,7 @@ impl Graded {
 ///
 /// # Errors
 /// When there is none, when several students are called so, and when it is open which attempt counts.
-pub fn one(wanted: &str, output: &Path, kept: &Kept) -> anyhow::Result<Graded> {
+pub fn one(wanted: &str, output: &Path, kept: &KeptReport) -> anyhow::Result<Graded> {
     let claims = kept.claims(output);
     let owners = kept.owners(&claims, output)?;
     let meant = owners.meant(wanted);

@@ -114,7 +114,7 @@ pub fn sources(
         viewer::DATA_FOLDER,
         class::pins::FOLDER,
         WORK,
-        report::LIKENESS,
+        report::SIMILARITY,
         report::ERRORS,
     ];
     let own = if mode == Mode::Check { &own[..2] } else { &own };

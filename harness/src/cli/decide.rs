@@ -4,9 +4,9 @@ use std::path::Path;
 
 use anyhow::{Context as _, ensure};
 
-use super::assemble::Kept;
+use super::assemble::KeptReport;
 use super::chosen::{Graded, one};
-use super::earlier::{Report, Row};
+use super::earlier::{ReportRow, StoredReport};
 use super::outputs::shell_path;
 use super::report_folder::ReportFolder;
 use crate::class::overrides::{Applied, Decision, OVERRIDES, entry, fingerprint};
@@ -66,7 +66,7 @@ fn points(text: &str) -> Result<f64, String> {
 /// Sets the points of a part.
 pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
     let OverrideArguments { student, part, points, decision } = arguments;
-    let kept = Kept::read(&decision.report.path)?;
+    let kept = KeptReport::read(&decision.report.path)?;
     let parts = &kept.decided()?.assignment.rules.parts;
     let known = parts.iter().find(|own| own.id == *part).with_context(|| {
         let parts: Vec<&str> = parts.iter().map(|own| own.id.as_str()).collect();
@@ -100,7 +100,7 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
 /// Confirms what was left to the instructor.
 pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     let ConfirmArguments { student, decision } = arguments;
-    let kept = Kept::read(&decision.report.path)?;
+    let kept = KeptReport::read(&decision.report.path)?;
     let graded = one(student, &decision.report.path, &kept)?;
     let evidence = fingerprint(&graded.subject(), &graded.entry.grade.parts);
     let report = decision.add(kept, &decision.of(&graded, evidence)?)?;
@@ -186,7 +186,7 @@ impl DecisionArguments {
     ///
     /// # Errors
     /// When the file says what means nothing, or something cannot be written.
-    pub fn add(&self, kept: Kept, decision: &Decision) -> anyhow::Result<BatchReport> {
+    pub fn add(&self, kept: KeptReport, decision: &Decision) -> anyhow::Result<BatchReport> {
         let file = self.report.path.join(OVERRIDES);
         // Two decisions at the same time follow each other, each on what is settled by then.
         let (_lock, mut kept) = kept.locked(&self.report.path)?;
@@ -224,10 +224,10 @@ fn account() -> Option<String> {
 
 /// Lists what waits for the instructor; exit 1 where anything does.
 pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
-    let report = Report::read(&arguments.report.path)?;
+    let report = StoredReport::read(&arguments.report.path)?;
     let class = report.class.unwrap_or_default();
     let rules = &report.assignment.rules;
-    let row = |row: &Row, what: &str| format!("{} ({}): {what}", row.name, row.slug);
+    let row = |row: &ReportRow, what: &str| format!("{} ({}): {what}", row.name, row.slug);
     let open = || report.submissions.iter().filter(|row| !row.standing.is_confirmed());
     let images = open().filter(|own| own.unconfirmed > 0.0);
     let images: Vec<String> = images

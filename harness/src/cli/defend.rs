@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Context as _;
 
-use super::assemble::Kept;
+use super::assemble::KeptReport;
 use super::chosen::one;
 use super::context::Context;
 use super::location::Location;
@@ -31,7 +31,7 @@ pub struct DefendArguments {
 /// Prints the evidence, its bounds, how to reproduce it, and what a right part would have earned.
 pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let DefendArguments { student, part, report: ReportFolder { path: output } } = arguments;
-    let kept = Kept::read(output)?;
+    let kept = KeptReport::read(output)?;
     let decided = kept.decided()?;
     let chosen = one(student, output, &kept)?;
     let slug = chosen.entry.record.slug.clone();
@@ -46,7 +46,7 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
         // The points are those of the mended source, so its evidence belongs to them.
         entry.record.evidence = rubric::settle(&report.rules, &mended.evidence);
     }
-    let look = Look { width: terminal::width(), colours: terminal::colours() };
+    let look = Look { width: terminal::width(), colors: terminal::colors() };
     let text = report::defend(report, entry, part, look).map_err(anyhow::Error::msg)?;
     print!("{text}");
     // How to see it again.
@@ -59,7 +59,7 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
     };
     let seed = in_words(report.held_back.as_ref().map(|own| own.seed));
     println!(
-        "  the instructor, on all:  umbra grade {} --perturb {seed} --report ANOTHER{}",
+        "  the instructor, on all:  umbra grade {} --held-back {seed} --report ANOTHER{}",
         location.arguments(),
         at_root(root)
     );
@@ -92,9 +92,9 @@ pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u
 }
 
 /// What a settled submission would be worth, had a mend made a part right: after the instructor's decisions, the
-/// mend's penalty and lateness, as [`Kept::report`] settles it.
+/// mend's penalty and lateness, as [`KeptReport::report`] settles it.
 fn with_part_right(
-    kept: &Kept,
+    kept: &KeptReport,
     output: &Path,
     rules: &Rules,
     entry: &SubmissionReport,

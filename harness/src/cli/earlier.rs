@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Context as _;
 use serde::Deserialize;
 
-use super::found::{Found, ensure_merged};
+use super::found::{BatchIndex, ensure_merged};
 use crate::class::{Class, Standing};
 use crate::columns;
 use crate::grading::StageCost;
@@ -16,9 +16,9 @@ use crate::rubric::{PartGrade, Rules};
 
 /// A report.
 #[derive(Deserialize)]
-pub struct Report {
+pub struct StoredReport {
     pub assignment: About,
-    pub submissions: Vec<Row>,
+    pub submissions: Vec<ReportRow>,
     pub class: Option<Class>,
     pub timings: BTreeMap<String, Vec<StageCost>>,
 }
@@ -33,7 +33,7 @@ pub struct About {
 
 /// A submission.
 #[derive(Deserialize)]
-pub struct Row {
+pub struct ReportRow {
     pub name: String,
     pub slug: String,
     /// Of what was submitted; empty where nobody could open it.
@@ -53,14 +53,14 @@ pub struct Row {
     pub findings: Vec<Finding>,
 }
 
-impl Row {
+impl ReportRow {
     /// Whether the archive could not be opened, and the instructor has not decided on it.
     pub fn is_unread(&self) -> bool {
         report::is_unread(&self.digest, [self.points, self.points_max], &self.standing)
     }
 }
 
-impl Row {
+impl ReportRow {
     /// What waits for the instructor, though the points are a number: nothing that a grade book shows.
     pub fn open(&self, rules: &Rules) -> Vec<String> {
         let mut open = Vec::new();
@@ -82,7 +82,7 @@ impl Row {
     }
 }
 
-impl Report {
+impl StoredReport {
     /// Reads the report in a folder.
     ///
     /// # Errors
@@ -90,7 +90,7 @@ impl Report {
     pub fn read(output: &Path) -> anyhow::Result<Self> {
         let file = output.join(report::JSON_FILE);
         ensure_merged(output)?;
-        if let Some(found) = Found::read(output)? {
+        if let Some(found) = BatchIndex::read(output)? {
             found.say_since(output);
         }
         let opened = std::fs::File::open(&file).with_context(|| {

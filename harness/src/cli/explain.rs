@@ -21,7 +21,7 @@ pub struct ExplainArguments {
 /// When there is no assignment, or nothing has this name.
 pub fn run(arguments: &ExplainArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let rules = Context::assignment(root)?.rules;
-    let look = Look { width: terminal::width(), colours: terminal::colours() };
+    let look = Look { width: terminal::width(), colors: terminal::colors() };
     let text = match &arguments.name {
         Some(name) => report::explain(&rules, name, look).map_err(anyhow::Error::msg)?,
         None => report::explain_all(&rules, look),

@@ -13,13 +13,13 @@ use self::grade_book::{book, of_platform};
 use self::gradescope::gradescope;
 pub use self::noted::is_export;
 use self::noted::{is_same, may_replace, note};
-use super::assemble::Kept;
+use super::assemble::KeptReport;
 use super::chosen::one;
 use super::class;
-use super::earlier::{Report, Row};
+use super::earlier::{ReportRow, StoredReport};
 use super::report_folder::ReportFolder;
 use crate::class::feedback::{self, Feedback};
-use crate::class::{Class, INCOMPARABLE, Kind, Roster};
+use crate::class::{Class, INCOMPARABLE, Platform, Roster};
 use crate::columns::count;
 use crate::files::write_whole;
 use crate::report::{self, harmless};
@@ -27,7 +27,7 @@ use crate::rubric::Rules;
 
 /// What takes the grades.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Format {
+pub enum ExportFormat {
     /// The grade book of Brightspace (D2L), as it was exported
     Brightspace,
     /// The grade book of Canvas, as it was exported
@@ -46,7 +46,7 @@ pub enum Format {
     Json,
 }
 
-impl Format {
+impl ExportFormat {
     /// The file that `umbra grade --export` writes into the report.
     fn file(self) -> &'static str {
         match self {
@@ -62,11 +62,11 @@ impl Format {
     }
 
     /// The platform whose grade book it fills, if it does.
-    fn platform(self) -> Option<Kind> {
+    fn platform(self) -> Option<Platform> {
         match self {
-            Self::Brightspace => Some(Kind::Brightspace),
-            Self::Canvas => Some(Kind::Canvas),
-            Self::Moodle => Some(Kind::Moodle),
+            Self::Brightspace => Some(Platform::Brightspace),
+            Self::Canvas => Some(Platform::Canvas),
+            Self::Moodle => Some(Platform::Moodle),
             _ => None,
         }
     }
@@ -79,7 +79,7 @@ pub struct ExportArguments {
     file: PathBuf,
     /// What takes the grades; brightspace, canvas and moodle fill the file that `umbra grade --class` was given
     #[arg(long, value_enum)]
-    format: Format,
+    format: ExportFormat,
     #[command(flatten)]
     report: ReportFolder,
     #[command(flatten)]
@@ -101,13 +101,13 @@ pub struct Item {
 pub fn export(arguments: &ExportArguments) -> anyhow::Result<u8> {
     let ExportArguments { file, format, report: ReportFolder { path: output }, item, only } =
         arguments;
-    let mut report = Report::read(output)?;
+    let mut report = StoredReport::read(output)?;
     if let Some(only) = only {
         ensure!(
-            !matches!(format, Format::Csv | Format::Json),
+            !matches!(format, ExportFormat::Csv | ExportFormat::Json),
             "--only: expected a format that can hold one submission, such as gradescope or junit"
         );
-        let slug = one(only, output, &Kept::read(output)?)?.entry.record.slug;
+        let slug = one(only, output, &KeptReport::read(output)?)?.entry.record.slug;
         report.submissions.retain(|row| row.slug == slug);
         ensure!(
             !report.submissions.is_empty(),
@@ -129,7 +129,7 @@ pub fn export(arguments: &ExportArguments) -> anyhow::Result<u8> {
 ///
 /// # Errors
 /// When there is no class list, or it is another platform's.
-pub fn check(formats: &[Format], output: &Path, list: Option<&Path>) -> anyhow::Result<()> {
+pub fn check(formats: &[ExportFormat], output: &Path, list: Option<&Path>) -> anyhow::Result<()> {
     for kind in formats.iter().filter_map(|format| format.platform()) {
         let roster = match list {
             Some(list) => Some(Roster::read(list)?),
@@ -144,9 +144,9 @@ pub fn check(formats: &[Format], output: &Path, list: Option<&Path>) -> anyhow::
 ///
 /// # Errors
 /// As [`export`].
-pub fn beside(formats: &[Format], output: &Path, item: &Item) -> anyhow::Result<()> {
+pub fn beside(formats: &[ExportFormat], output: &Path, item: &Item) -> anyhow::Result<()> {
     for format in formats {
-        let report = Report::read(output)?;
+        let report = StoredReport::read(output)?;
         write(*format, &output.join(format.file()), output, item, &report).with_context(|| {
             format!("the report is there, but cannot be exported to {}", format.file())
         })?;
@@ -155,32 +155,32 @@ pub fn beside(formats: &[Format], output: &Path, item: &Item) -> anyhow::Result<
 }
 
 fn write(
-    format: Format,
+    format: ExportFormat,
     file: &Path,
     output: &Path,
     item: &Item,
-    report: &Report,
+    report: &StoredReport,
 ) -> anyhow::Result<()> {
     may_replace(file, format, output)?;
     let mut said = Vec::new();
     let bytes = match format {
-        Format::Brightspace | Format::Canvas | Format::Moodle => {
+        ExportFormat::Brightspace | ExportFormat::Canvas | ExportFormat::Moodle => {
             let kind = format.platform().unwrap_or_default();
             book(file, output, item, report, kind, &mut said)?.into_bytes()
         }
-        Format::Feedback => feedback_archive(file, output, report, &mut said)?,
-        Format::Gradescope | Format::Junit => {
+        ExportFormat::Feedback => feedback_archive(file, output, report, &mut said)?,
+        ExportFormat::Gradescope | ExportFormat::Junit => {
             said.push(format!(
                 "{}: {}",
                 file.display(),
                 count(report.submissions.len(), "submission")
             ));
             match format {
-                Format::Junit => junit::junit(report, output).into_bytes(),
+                ExportFormat::Junit => junit::junit(report, output).into_bytes(),
                 _ => gradescope(report, output)?.into_bytes(),
             }
         }
-        Format::Csv | Format::Json => {
+        ExportFormat::Csv | ExportFormat::Json => {
             let own = output.join(format.file());
             if is_same(&own, file) {
                 println!("{}: the report keeps it there already", file.display());
@@ -215,7 +215,7 @@ fn to_look_at(class: &Class) -> Vec<String> {
 }
 
 /// Why a submission is not handed back yet, if it is not.
-fn waits(row: &Row, report: &Report) -> Option<&'static str> {
+fn waits(row: &ReportRow, report: &StoredReport) -> Option<&'static str> {
     let undecided = report.class.as_ref().map(|class| class.undecided.as_slice());
     if undecided
         .unwrap_or_default()
@@ -231,7 +231,7 @@ fn waits(row: &Row, report: &Report) -> Option<&'static str> {
 fn feedback_archive(
     file: &Path,
     output: &Path,
-    report: &Report,
+    report: &StoredReport,
     said: &mut Vec<String>,
 ) -> anyhow::Result<Vec<u8>> {
     let (mut all, mut left) = (Vec::new(), Vec::new());
@@ -261,7 +261,7 @@ fn left_out(left: &[String]) -> impl Iterator<Item = String> {
 }
 
 /// What was said for the student's eyes about the whole.
-fn remarks(row: &Row, rules: &Rules) -> String {
+fn remarks(row: &ReportRow, rules: &Rules) -> String {
     let public = row.remarks.iter().filter(|remark| !report::is_private(remark, rules));
     public.map(|remark| harmless(remark)).collect::<Vec<_>>().join("; ")
 }

@@ -11,23 +11,23 @@ use sha2::{Digest as _, Sha256};
 
 use super::class::{self, WORK};
 use super::outputs::shell_path;
-use crate::class::{Collected, Kind, Label};
+use crate::class::{Collected, Label, Platform};
 use crate::columns::count;
 use crate::files::{files_below, hex, write_new, write_whole};
 use crate::grading::{RecordCache, StoredRecord};
 use crate::held_back::HeldBack;
 use crate::report::{self, harmless};
 
-/// The file of [`Found`], in the instructor's folder.
+/// The file of [`BatchIndex`], in the instructor's folder.
 const FILE: &str = "batch.json";
 
 /// What is known of a batch beside its records.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Found {
+pub struct BatchIndex {
     /// Digest of what the last run judged by: records of another one are not comparable.
     pub conditions: String,
     /// Where the submissions come from.
-    pub kind: Kind,
+    pub kind: Platform,
     /// File name of the class list; empty without one.
     pub list: String,
     /// What is held back, if anything.
@@ -61,7 +61,7 @@ pub struct Seen {
     pub empty: String,
 }
 
-impl Found {
+impl BatchIndex {
     /// What one run found: submissions `all`, of which those in `aside` do not count, and what is none.
     pub fn new(
         collected: &Collected,
@@ -89,7 +89,7 @@ impl Found {
     /// Adds what an earlier run into `output` found of those that this one was not given.
     pub fn join(&mut self, earlier: Self, output: &Path) {
         let instructor = output.join(report::INSTRUCTOR);
-        if self.kind == Kind::default() {
+        if self.kind == Platform::default() {
             self.kind = earlier.kind;
         }
         if self.list.is_empty() {
@@ -254,7 +254,7 @@ impl Found {
 /// # Errors
 /// When some did, or that cannot be told.
 pub fn ensure_merged(output: &Path) -> anyhow::Result<()> {
-    let begun = Found::begun(output)?;
+    let begun = BatchIndex::begun(output)?;
     let Some((file, _)) = begun.first() else { return Ok(()) };
     bail!(
         "{}: the tasks of a partition are not merged yet; hint: umbra merge --report {}; if no task will run any more, \

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use super::batch::{Batch, BatchOutcome};
-use super::choices::{BudgetChoice, IsolationChoice, Perturb, Slice};
+use super::choices::{BudgetChoice, HeldBackSeed, IsolationChoice, Slice};
 use super::context::cores;
-use super::export::{self, Format, Item};
+use super::export::{self, ExportFormat, Item};
 use super::outputs::{at_root, shell_path};
 use super::render::AdapterChoice;
 use super::terminal;
-use crate::class::{Attempt, Kind, MATCHES};
+use crate::class::{Attempt, MATCHES, Platform};
 use crate::columns::count;
 use crate::evidence::Verdict;
 use crate::grading::{INTERNAL_ERROR, Mode};
@@ -23,7 +23,7 @@ pub struct GradeArguments {
     submissions: Vec<PathBuf>,
     /// Where the submissions come from [default: recognized by their names]
     #[arg(long, value_enum, value_name = "KIND")]
-    from: Option<Kind>,
+    from: Option<Platform>,
     /// The class list: a CSV file as a learning platform exports it
     ///
     /// Umbra matches submissions to its students and lists who is missing. The report keeps a copy for later runs.
@@ -55,8 +55,13 @@ pub struct GradeArguments {
     isolation: IsolationChoice,
     /// Seed of the held-back scenes, to reproduce a batch; `off` uses public scenes alone [default: the secret seed of
     /// the report]
-    #[arg(long, value_name = "SEED|off", overrides_with = "perturb")]
-    perturb: Option<Perturb>,
+    #[arg(
+        long = "held-back",
+        alias = "perturb",
+        value_name = "SEED|off",
+        overrides_with = "held_back_seed"
+    )]
+    held_back_seed: Option<HeldBackSeed>,
     /// Grade only this student's submission, by number, name or file name; the others keep their grades
     #[arg(long, value_name = "STUDENT")]
     only: Vec<String>,
@@ -77,7 +82,7 @@ pub struct GradeArguments {
     timings: bool,
     /// Also write the grades as `umbra export` does, into --report; may be repeated
     #[arg(long, value_enum, value_name = "FORMAT", conflicts_with = "partition")]
-    export: Vec<Format>,
+    export: Vec<ExportFormat>,
     #[command(flatten)]
     item: Item,
 }
@@ -93,7 +98,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
         jobs: arguments.jobs.unwrap_or(cores() as usize).max(1),
         mode: Mode::Grade,
         isolation: arguments.isolation,
-        perturb: arguments.perturb,
+        held_back_seed: arguments.held_back_seed,
         budget: arguments.budget,
         selection: None,
         only: &arguments.only,
@@ -126,7 +131,7 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
 
 /// Prints the table of a report, what was skipped, and what is left to do; the exit code that it stands for.
 pub fn shown(report: &BatchReport, output: &Path, skipped: Option<String>) -> anyhow::Result<u8> {
-    print_as_is!("{}", report::text_table(report, terminal::width(), terminal::colours())?);
+    print_as_is!("{}", report::text_table(report, terminal::width(), terminal::colors())?);
     if let Some(skipped) = skipped {
         println!("skipped, not submissions: {skipped}");
     }
@@ -136,7 +141,7 @@ pub fn shown(report: &BatchReport, output: &Path, skipped: Option<String>) -> an
     }
     println!("report: {}", output.join(report::HTML_FILE).display());
     if let Some(held_back) = &report.held_back {
-        println!("held-back seed {0}; --perturb {0} reproduces this batch", held_back.seed);
+        println!("held-back seed {0}; --held-back {0} reproduces this batch", held_back.seed);
     }
     let unopened = report.class.as_ref().is_some_and(|class| !class.unopened.is_empty());
     Ok(match exit_code(&report.entries) {

@@ -36,8 +36,8 @@ pub struct PackArguments {
     #[arg(default_value = "autograder.zip")]
     out: PathBuf,
     /// Seed of the held-back scenes, such as that of another report [default: a new secret one]
-    #[arg(long, value_name = "SEED")]
-    perturb: Option<u64>,
+    #[arg(long = "held-back", alias = "perturb", value_name = "SEED")]
+    held_back_seed: Option<u64>,
 }
 
 /// Writes the zip and says what to do with it.
@@ -53,7 +53,7 @@ pub fn run(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8>
     let out = &arguments.out;
     // A new seed would give half of the class other scenes.
     let kept = if out.symlink_metadata().is_ok() { Some(seed_of(out)?) } else { None };
-    let seed = arguments.perturb.or(kept).map_or_else(secret_seed, Ok)?;
+    let seed = arguments.held_back_seed.or(kept).map_or_else(secret_seed, Ok)?;
     match kept {
         Some(kept) if kept == seed => println!("it keeps the seed of the zip that it replaces"),
         Some(kept) => println!("warning: the zip that it replaces had another seed, {kept}"),
@@ -62,7 +62,7 @@ pub fn run(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8>
     let written = write(&assignment.root, seed, out)
         .with_context(|| format!("cannot write {}", out.display()))?;
     println!(
-        "{}: {}; held-back seed {seed}: `umbra grade --perturb {seed}` asks the same here",
+        "{}: {}; held-back seed {seed}: `umbra grade --held-back {seed}` asks the same here",
         out.display(),
         count(written, "file")
     );

@@ -4,17 +4,17 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use super::class::{folders, some, who};
-use super::found::Found;
+use super::found::BatchIndex;
 use crate::columns::count;
 use crate::grading::{Record, RecordCache, StoredRecord};
 use crate::report;
 
 /// Adds to `records`, made of some of the submissions that were found, what earlier runs into the same report
 /// found out about others, and says so.
-pub fn join(output: &Path, found: &Found, records: &mut Vec<StoredRecord>) {
+pub fn join(output: &Path, found: &BatchIndex, records: &mut Vec<StoredRecord>) {
     let graded: HashSet<String> = records.iter().map(|own| own.record.slug.clone()).collect();
     let mut gone = Vec::new();
-    let before = Found::read(output).ok().flatten().unwrap_or_default();
+    let before = BatchIndex::read(output).ok().flatten().unwrap_or_default();
     found.name(records);
     let slugs = |aside: bool| -> HashSet<&str> {
         let own = found.seen.iter().filter(|seen| seen.aside == aside && seen.empty.is_empty());
@@ -78,7 +78,7 @@ pub fn join(output: &Path, found: &Found, records: &mut Vec<StoredRecord>) {
 }
 
 /// A record under the name that reports call it by.
-fn named(earlier: StoredRecord, before: &Found) -> StoredRecord {
+fn named(earlier: StoredRecord, before: &BatchIndex) -> StoredRecord {
     let mut own = [earlier];
     before.name(&mut own);
     let [earlier] = own;

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use super::class;
 use super::context::Context;
 use super::outputs::shell_path;
-use crate::class::{Kind, Wanted, collect};
+use crate::class::{CollectOptions, Platform, collect};
 
 /// Where a submission lies.
 pub enum Location {
@@ -59,17 +59,17 @@ impl Location {
 /// When it does not lie any more where it was graded from.
 pub fn fetch(
     location: &Location,
-    kind: Kind,
+    kind: Platform,
     context: &Context,
     scratch: &Path,
 ) -> anyhow::Result<PathBuf> {
     match location {
         Location::Here(path) => Ok(path.clone()),
         Location::Packed { download, inside } => {
-            let wanted = Wanted {
+            let wanted = CollectOptions {
                 tree: &context.assignment.tree,
                 limits: &context.assignment.limits.archive,
-                from: Some(kind).filter(|kind| *kind != Kind::Plain),
+                from: Some(kind).filter(|kind| *kind != Platform::Plain),
                 output: None,
                 scratch,
             };

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
 
-use super::assemble::Kept;
+use super::assemble::KeptReport;
 use super::batch::{Batch, BatchOutcome};
-use super::choices::{IsolationChoice, Perturb};
+use super::choices::{HeldBackSeed, IsolationChoice};
 use super::chosen::one;
 use super::class;
 use super::context::Context;
@@ -61,7 +61,7 @@ pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8>
         patch.display(),
         mend.lines
     );
-    let kept = Kept::read(output)?;
+    let kept = KeptReport::read(output)?;
     let graded = one(student, output, &kept)?;
     let record = &graded.entry.record;
     let folder = class::mended(output, &record.slug);
@@ -70,7 +70,7 @@ pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8>
     let batch = Batch {
         adapter: arguments.adapter,
         isolation: arguments.isolation,
-        perturb: Some(Perturb(seed)),
+        held_back_seed: Some(HeldBackSeed(seed)),
         is_own: true,
         ..Batch::of(vec![source], &folder, Mode::Grade)
     };
@@ -90,7 +90,7 @@ fn mended_source(
     arguments: &MendArguments,
     root: Option<&Path>,
     patch: &str,
-    kept: &Kept,
+    kept: &KeptReport,
     record: &Record,
 ) -> anyhow::Result<PathBuf> {
     let output = &arguments.decision.report.path;

@@ -8,10 +8,10 @@ use anyhow::{Context as _, bail, ensure};
 
 use super::assemble;
 use super::batch::{Batch, BatchOutcome};
-use super::choices::{IsolationChoice, Perturb};
+use super::choices::{HeldBackSeed, IsolationChoice};
 use super::class::{self, some};
 use super::context::Context;
-use super::found::{Found, Seen};
+use super::found::{BatchIndex, Seen};
 use super::grade;
 use super::join::join;
 use super::outputs::{at_root, shell_path};
@@ -46,10 +46,10 @@ pub struct MergeArguments {
 pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let MergeArguments { output, allow_mixed } = arguments;
     let instructor = output.join(report::INSTRUCTOR);
-    let begun = Found::begun(output)?;
+    let begun = BatchIndex::begun(output)?;
     let files: Vec<PathBuf> = begun.iter().map(|(file, _)| file.clone()).collect();
     // What is merged already is made again, with what the instructor decided since.
-    let found = match Found::read(output)?.filter(|_| begun.is_empty()) {
+    let found = match BatchIndex::read(output)?.filter(|_| begun.is_empty()) {
         Some(merged) => merged,
         None => one(output, begun)?,
     };
@@ -106,7 +106,7 @@ pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<
 }
 
 /// What all tasks found.
-fn one(output: &Path, begun: Vec<(PathBuf, Found)>) -> anyhow::Result<Found> {
+fn one(output: &Path, begun: Vec<(PathBuf, BatchIndex)>) -> anyhow::Result<BatchIndex> {
     let instructor = output.join(report::INSTRUCTOR);
     ensure!(
         !begun.is_empty(),
@@ -121,7 +121,7 @@ fn one(output: &Path, begun: Vec<(PathBuf, Found)>) -> anyhow::Result<Found> {
         }
     }
     // Other tasks repeated the work of tasks that left nothing.
-    let made = |found: &Found| judged.contains_key(&found.conditions);
+    let made = |found: &BatchIndex| judged.contains_key(&found.conditions);
     let any = begun.iter().any(|(_, found)| made(found));
     let mut begun: Vec<_> = begun.into_iter().filter(|(_, found)| !any || made(found)).collect();
     // A class that grew between two runs.
@@ -129,7 +129,7 @@ fn one(output: &Path, begun: Vec<(PathBuf, Found)>) -> anyhow::Result<Found> {
     let (file, last) = begun.pop().context("nothing to merge")?;
     for (other_file, other) in &begun {
         if other.conditions != last.conditions {
-            let line = |file: &Path, found: &Found| {
+            let line = |file: &Path, found: &BatchIndex| {
                 let own = judged.get(&found.conditions).map(|slugs| some(slugs));
                 let seed = found.held_back.as_ref().map(|held_back| held_back.seed);
                 format!(
@@ -192,7 +192,7 @@ fn in_words((conditions, records): &(Conditions, Vec<StoredRecord>)) -> String {
 fn compare(
     root: Option<&Path>,
     output: &Path,
-    found: &Found,
+    found: &BatchIndex,
     machines: &[(Conditions, Vec<StoredRecord>)],
 ) -> anyhow::Result<()> {
     let scratch =
@@ -204,7 +204,9 @@ fn compare(
     let batch = Batch {
         jobs: 1,
         isolation: IsolationChoice::Reduced,
-        perturb: Some(Perturb(found.held_back.as_ref().map(|held_back| held_back.seed))),
+        held_back_seed: Some(HeldBackSeed(
+            found.held_back.as_ref().map(|held_back| held_back.seed),
+        )),
         only: &only,
         from: Some(found.kind),
         ..Batch::of(found.paths.clone(), &again, Mode::Grade)

@@ -21,7 +21,6 @@ mod found;
 mod grade;
 mod gradescope_pack;
 mod join;
-mod likeness;
 mod location;
 mod mend;
 mod merge;
@@ -32,6 +31,7 @@ mod render;
 mod report_folder;
 mod selection;
 mod settled;
+mod similarity;
 mod terminal;
 mod terminal_pictures;
 mod tree;
@@ -124,7 +124,8 @@ enum Command {
     /// Show submissions with similar sources side by side
     ///
     /// Reads results of JPlag. Costs no points.
-    Likeness(likeness::LikenessArguments),
+    #[command(alias = "likeness")]
+    Similarity(similarity::SimilarityArguments),
     /// Write an autograder for Gradescope
     ///
     /// The zip installs and builds Umbra there, and grades each submission.
@@ -209,7 +210,7 @@ pub fn main() -> ExitCode {
         }
         Err(error) => {
             let text = error.render();
-            let text = if terminal::colours() { text.ansi().to_string() } else { text.to_string() };
+            let text = if terminal::colors() { text.ansi().to_string() } else { text.to_string() };
             print_as_is!("{}", wrapped(&text, terminal::width().min(HELP_COLUMNS)));
             Ok(EXIT_OK)
         }
@@ -387,7 +388,7 @@ fn run(command: Command, root: Option<&Path>) -> anyhow::Result<u8> {
         Command::Regrade(arguments) => regrade::regrade(&arguments, root),
         Command::Status(arguments) => decide::status(&arguments),
         Command::Export(arguments) => export::export(&arguments),
-        Command::Likeness(arguments) => likeness::run(&arguments, root),
+        Command::Similarity(arguments) => similarity::run(&arguments, root),
         Command::GradescopePack(arguments) => gradescope_pack::run(&arguments, root),
         Command::Validate(arguments) => tree::validate(&arguments, root),
         Command::Pack(arguments) => tree::pack(&arguments, root),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Context as _;
 
-use super::assemble::{self, Kept};
+use super::assemble::{self, KeptReport};
 use super::changes::{changes, summary};
 use super::context::Context;
 use super::report_folder::ReportFolder;
@@ -36,7 +36,7 @@ pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Res
     let RegradeArguments { apply, undo, reason, report: ReportFolder { path: output } } = arguments;
     let reason = reason.as_deref().map(str::trim);
     anyhow::ensure!(reason != Some(""), "--reason: expected a reason, found nothing");
-    let kept = Kept::read(output)?;
+    let kept = KeptReport::read(output)?;
     let (_lock, mut kept) = match *apply || *undo {
         true => kept.locked(output).map(|(lock, kept)| (Some(lock), kept))?,
         false => (None, kept),

@@ -7,7 +7,7 @@ use anyhow::{Context as _, bail, ensure};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-use super::assemble::{self, Kept};
+use super::assemble::{self, KeptReport};
 use super::context::Context;
 use super::report_folder::ReportFolder;
 use super::settled::RELEASED;
@@ -30,7 +30,7 @@ pub struct ReleaseArguments {
 pub fn run(arguments: &ReleaseArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let output = &arguments.report.path;
     let assignment = Context::assignment(root)?;
-    let kept = Kept::read(output)?;
+    let kept = KeptReport::read(output)?;
     let decided = kept.decided()?;
     let stated = &decided.assignment;
     let end = late::end(&stated.due, stated.late.as_ref())
@@ -44,7 +44,7 @@ pub fn run(arguments: &ReleaseArguments, root: Option<&Path>) -> anyhow::Result<
     let mut settled = kept.report(output, decided)?;
     let report = &mut settled.report;
     let Some(seed) = report.held_back.as_ref().map(|held_back| held_back.seed) else {
-        bail!("{} holds nothing back: it was graded with --perturb off", output.display());
+        bail!("{} holds nothing back: it was graded with --held-back off", output.display());
     };
     let (made, entries) = held_back::make(&assignment, seed)?;
     ensure!(

@@ -12,12 +12,12 @@ use basecode::Camera;
 use basecode::exr_io::{MAX_PIXELS, MAX_SIDE};
 use basecode::scene::SceneConfig;
 
-use self::output::{Format, kind_of};
+use self::output::{ImageFormat, kind_of};
 use super::context::{Context, INTERRUPTED, cores};
 use super::outputs::ensure_not_read;
 use crate::files::library_name;
 use crate::intake::SubmittedConfig;
-use crate::process::Limits;
+use crate::process::ProcessLimits;
 use crate::worker::{
     Adapter, AdapterKind, CameraValue, Fault, Job, JobReport, Outcome, Request, SceneRef, as_given,
     draw_in_process,
@@ -179,7 +179,7 @@ fn check_scene(toml: &Path, size: Option<Size>, output: &Path) -> anyhow::Result
 /// Renders the image and writes it.
 pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
-    let format = Format::of(&arguments.output)?;
+    let format = ImageFormat::of(&arguments.output)?;
     // A scene's other files lie where the file is, not where a link to it is.
     let scene_file = match arguments.scene.canonicalize() {
         Ok(target) if arguments.scene.is_symlink() => target,
@@ -295,12 +295,12 @@ fn request(
 
 /// Has a worker draw the image, without a time limit: Ctrl-C ends it.
 fn draw(context: &Context, job: &Job) -> JobReport {
-    let limits = Limits {
+    let limits = ProcessLimits {
         wall_s: 86_400.0,
         cpu_s: 1 << 20,
         file_size_mib: 8192,
         memory_mib: 16_384,
-        ..Limits::default()
+        ..ProcessLimits::default()
     };
     let begun = Instant::now();
     let report = context.supervisor.run_job(job, &limits, &INTERRUPTED, &mut |progress| {

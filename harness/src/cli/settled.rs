@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 
 use super::class;
-use super::found::{Found, Seen};
+use super::found::{BatchIndex, Seen};
 use crate::class::jplag;
 use crate::class::mending::{self, Mended};
 use crate::class::overrides::{Applied, Overrides, Subject};
@@ -30,14 +30,14 @@ const TIMES: &str = "times.json";
 const PACE: Duration = Duration::from_secs(2);
 
 /// What is done once for each submission; said where it takes long.
-pub struct Progress<'a> {
+pub struct StepCounter<'a> {
     what: &'a str,
     of: usize,
     done: Cell<usize>,
     said: Cell<Instant>,
 }
 
-impl<'a> Progress<'a> {
+impl<'a> StepCounter<'a> {
     pub fn new(what: &'a str, of: usize) -> Self {
         Self { what, of, done: Cell::new(0), said: Cell::new(Instant::now()) }
     }
@@ -81,7 +81,7 @@ impl Settled {
 pub fn settled(
     output: &Path,
     decided: &Decisions,
-    found: &Found,
+    found: &BatchIndex,
     roster: Option<&Roster>,
     mut records: Vec<StoredRecord>,
 ) -> anyhow::Result<Settled> {
@@ -98,7 +98,7 @@ pub fn settled(
     let overrides = decided.overrides(output)?.on(&owners);
     let (mut grades, mut regraded) = (Vec::new(), Vec::new());
     // One at a time is whole.
-    let progress = Progress::new("reading what was found out", records.len());
+    let progress = StepCounter::new("reading what was found out", records.len());
     for earlier in &records {
         progress.step();
         let mut record = earlier.whole()?;
@@ -156,9 +156,9 @@ pub fn settled(
     let held_back = found.held_back.clone();
     let instructor = output.join(report::INSTRUCTOR);
     let released = instructor.join(RELEASED).is_file();
-    let has_alike = instructor.join(report::LIKENESS).join(report::HTML_FILE).is_file();
+    let has_similarity = instructor.join(report::SIMILARITY).join(report::HTML_FILE).is_file();
     let settled = BatchReport::settled(stated.clone(), held_back, counting, class);
-    Ok(Settled { report: BatchReport { released, has_alike, ..settled }, records, shared })
+    Ok(Settled { report: BatchReport { released, has_similarity, ..settled }, records, shared })
 }
 
 /// A submission with what the instructor decided on its points, which are kept apart.
@@ -205,7 +205,7 @@ fn regrade(
 }
 
 /// Those of whom the platform has something that is not graded, with the reason.
-fn absent(found: &Found, is_graded: impl Fn(&Seen) -> bool) -> Vec<(Label, String)> {
+fn absent(found: &BatchIndex, is_graded: impl Fn(&Seen) -> bool) -> Vec<(Label, String)> {
     let open = found.seen.iter().filter(|seen| !seen.aside && !is_graded(seen));
     open.filter_map(|seen| {
         let reason = if seen.empty.is_empty() { "not graded yet" } else { &seen.empty };
@@ -215,7 +215,7 @@ fn absent(found: &Found, is_graded: impl Fn(&Seen) -> bool) -> Vec<(Label, Strin
 }
 
 /// Decisions in `matches.toml` on nothing that is graded.
-fn lost(matches: &Matches, found: &Found) -> Vec<String> {
+fn lost(matches: &Matches, found: &BatchIndex) -> Vec<String> {
     let is_called = |seen: &Seen, word: &str| {
         let label = seen.label.as_ref().is_some_and(|own| own.submission == word);
         seen.slug == word || seen.name == word || label
@@ -227,7 +227,11 @@ fn lost(matches: &Matches, found: &Found) -> Vec<String> {
 }
 
 /// The names of a student's attempts that were not graded, as another one counts by its time.
-fn aside_of(standing: &Standing, found: &Found, is_graded: impl Fn(&Seen) -> bool) -> Vec<String> {
+fn aside_of(
+    standing: &Standing,
+    found: &BatchIndex,
+    is_graded: impl Fn(&Seen) -> bool,
+) -> Vec<String> {
     let own = standing.label.as_ref().map(Label::person);
     let others = found.seen.iter().filter(|seen| seen.aside && !is_graded(seen));
     let others = others.filter(|seen| seen.label.as_ref().map(Label::person) == own);
@@ -236,7 +240,7 @@ fn aside_of(standing: &Standing, found: &Found, is_graded: impl Fn(&Seen) -> boo
 
 /// What submissions share, also according to JPlag, where it compared what they hold now.
 pub fn shared(output: &Path, records: &[StoredRecord]) -> anyhow::Result<Shared> {
-    let near = jplag::kept(&output.join(report::INSTRUCTOR).join(report::LIKENESS))?;
+    let near = jplag::kept(&output.join(report::INSTRUCTOR).join(report::SIMILARITY))?;
     let own = |slug: &str| records.iter().find(|own| own.record.slug == slug);
     let near =
         near.iter().filter(|pair| pair.holds(|slug| Some(own(slug)?.record.digest.as_str())));
@@ -265,7 +269,7 @@ pub fn remember_times(output: &Path, pinned: &Decisions) -> anyhow::Result<()> {
         // What cannot be read is told where it is needed.
         records.extend(RecordCache::earlier(&instructor.join(slug), "").ok().flatten());
     }
-    Found::read(output)?.unwrap_or_default().name(&mut records);
+    BatchIndex::read(output)?.unwrap_or_default().name(&mut records);
     let claims: Vec<Claim> = records.iter().map(|own| class::claim(output, &own.record)).collect();
     let mut known = times(output)?;
     let before = known.len();

@@ -23,7 +23,7 @@ pub fn width() -> usize {
 
 /// Whether standard output takes colors; a `NO_COLOR` that is not empty refuses them, and changes
 /// nothing else.
-pub fn colours() -> bool {
+pub fn colors() -> bool {
     let refused = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
     std::io::stdout().is_terminal() && !refused
 }

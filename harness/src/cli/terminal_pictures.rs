@@ -307,8 +307,8 @@ mod tests {
         let (width, height) = picture().dimensions();
         assert_eq!(drawn(&sixel(&picture()), width, height), picture());
         // Gray between two levels is so on the mean.
-        let grey = RgbImage::from_pixel(64, 64, Rgb([70; 3]));
-        let drawn = drawn(&sixel(&grey), 64, 64);
+        let gray = RgbImage::from_pixel(64, 64, Rgb([70; 3]));
+        let drawn = drawn(&sixel(&gray), 64, 64);
         let mean = drawn.pixels().map(|pixel| f64::from(pixel.0[1])).sum::<f64>() / 4096.0;
         assert!((mean - 70.0).abs() < 3.0, "{mean}");
     }

@@ -11,7 +11,7 @@ use unicode_width::UnicodeWidthStr as _;
 use super::context::{Context, INTERRUPTED};
 use super::outputs::{ensure_outside, place_inside};
 use crate::class::collect::Ambiguous;
-use crate::class::{Collected, Kind, Wanted, collect};
+use crate::class::{CollectOptions, Collected, Platform, collect};
 use crate::columns::count;
 use crate::harmless::{harmless, harmless_json};
 use crate::intake::{self, CONFIG_FILE, IntakeError, Severity, Submission, TreeSpec, Validation};
@@ -27,7 +27,7 @@ pub struct ValidateArguments {
     submissions: Vec<PathBuf>,
     /// Where the submissions come from [default: recognized by their names]
     #[arg(long, value_enum, value_name = "KIND")]
-    from: Option<Kind>,
+    from: Option<Platform>,
     /// Print the findings as JSON: a list with one entry for each submission
     #[arg(long, conflicts_with = "fix")]
     json: bool,
@@ -62,7 +62,7 @@ pub fn validate(arguments: &ValidateArguments, root: Option<&Path>) -> anyhow::R
         // A folder that holds none is one itself, of which much is missing; a link is refused.
         [only] if only.is_symlink() => None,
         paths => {
-            let wanted = Wanted {
+            let wanted = CollectOptions {
                 tree: &context.assignment.tree,
                 limits: &context.assignment.limits.archive,
                 from: arguments.from,
@@ -164,8 +164,8 @@ fn many(arguments: &ValidateArguments, found: &Collected, context: &Context) -> 
             println!("{name}{gap}  {}", harmless(&in_a_line(validation)));
         }
         println!();
-        if let Some(recognised) = found.recognised() {
-            println!("{recognised}");
+        if let Some(recognized) = found.recognized() {
+            println!("{recognized}");
         }
         let all = validations.len();
         println!("{}: {} conforming, {wrong} not", count(all, "submission"), all - wrong);

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use basecode::exr_io::read_exr;
 
-use super::wire::{Answer, Folder, Question, write_answer};
+use super::wire::{DecodeAnswer, DecodeFolder, DecodeQuestion, write_answer};
 use crate::intake::{self, IntakeError, Submission};
 use crate::process::{self, exit_now};
 
@@ -21,31 +21,33 @@ pub fn child_main(dir: &Path) -> ExitCode {
 }
 
 fn answer(dir: &Path) -> io::Result<()> {
-    let folder = Folder(dir);
+    let folder = DecodeFolder(dir);
     let question = std::fs::read(folder.question())?;
-    let (question, about): (Question, PathBuf) = serde_json::from_slice(&question)?;
+    let (question, about): (DecodeQuestion, PathBuf) = serde_json::from_slice(&question)?;
     let mut out = BufWriter::new(File::options().write(true).open(folder.output())?);
     match question {
-        Question::Unpack { name, tree, limits } => {
+        DecodeQuestion::Unpack { name, tree, limits } => {
             let bytes = std::fs::read(about)?;
             // The current folder is the scratch.
             let dest = std::env::current_dir()?;
             match intake::unpack_bytes(&bytes, &name, &dest, &tree, &limits) {
                 Ok(copy) => {
                     let mut content = |out: &mut dyn Write| contents(&copy, out);
-                    write_answer(&mut out, &Answer::Unpacked(copy.clone()), &mut content)?;
+                    write_answer(&mut out, &DecodeAnswer::Unpacked(copy.clone()), &mut content)?;
                 }
-                Err(IntakeError::Refused(refusal)) => plain(&mut out, &Answer::Refused(*refusal))?,
+                Err(IntakeError::Refused(refusal)) => {
+                    plain(&mut out, &DecodeAnswer::Refused(*refusal))?
+                }
                 Err(error) => return Err(io::Error::other(error)),
             }
         }
-        Question::Inspect { submission, tree } => {
+        DecodeQuestion::Inspect { submission, tree } => {
             let validation = intake::validate_submission(&submission, &tree);
             let source = intake::scan_source(&submission).map_err(io::Error::other)?;
             let validation = validation.map_err(io::Error::other)?;
-            plain(&mut out, &Answer::Inspected { validation, source })?;
+            plain(&mut out, &DecodeAnswer::Inspected { validation, source })?;
         }
-        Question::Image { name } => image(&about, &name, &mut out)?,
+        DecodeQuestion::Image { name } => image(&about, &name, &mut out)?,
     }
     out.flush()
 }
@@ -61,7 +63,7 @@ fn contents(copy: &Submission, out: &mut dyn Write) -> io::Result<()> {
 fn image(file: &Path, name: &str, out: &mut impl Write) -> io::Result<()> {
     match read_exr(file) {
         Ok(image) => {
-            let answer = Answer::Image { width: image.width, height: image.height };
+            let answer = DecodeAnswer::Image { width: image.width, height: image.height };
             write_answer(out, &answer, &mut |out| {
                 image
                     .pixels
@@ -72,12 +74,12 @@ fn image(file: &Path, name: &str, out: &mut impl Write) -> io::Result<()> {
         }
         Err(error) => {
             let message = error.to_string().replace(&file.display().to_string(), name);
-            plain(out, &Answer::Failed(message))
+            plain(out, &DecodeAnswer::Failed(message))
         }
     }
 }
 
 /// Writes an answer that nothing follows.
-fn plain(out: &mut impl Write, answer: &Answer) -> io::Result<()> {
+fn plain(out: &mut impl Write, answer: &DecodeAnswer) -> io::Result<()> {
     write_answer(out, answer, &mut |_| Ok(()))
 }

@@ -23,12 +23,12 @@ pub use child::child_main;
 
 use crate::harmless::printable;
 use crate::intake::{self, Finding, IntakeError, Refusal, Submission, TreeSpec, Validation};
-use crate::process::{self, ChildOutcome, Confinement, Exit, Limits};
-use crate::sandbox::{Bind, Kind, Policy, policy::JOB};
+use crate::process::{self, ChildOutcome, Confinement, Exit, ProcessLimits};
+use crate::sandbox::{Bind, ChildKind, Policy, policy::JOB};
 use crate::worker::Supervisor;
 // Public for its fuzz target: a child may write anything.
-pub use wire::{Answer, read_answer};
-use wire::{Folder, Question};
+pub use wire::{DecodeAnswer, read_answer};
+use wire::{DecodeFolder, DecodeQuestion};
 
 /// Bytes of a child's output that are kept.
 const KEEP_OUTPUT: usize = 4 << 10;
@@ -38,7 +38,7 @@ pub struct Decoder<'a> {
     /// Which program is Umbra, and what isolates its children.
     pub supervisor: &'a Supervisor,
     /// What each child may use.
-    pub limits: &'a Limits,
+    pub limits: &'a ProcessLimits,
     /// Ctrl-C.
     pub cancel: &'a AtomicBool,
     /// CPU seconds of all children so far.
@@ -76,7 +76,11 @@ impl From<io::Error> for NoAnswer {
 
 impl<'a> Decoder<'a> {
     /// One that starts children of `supervisor`'s kind.
-    pub fn new(supervisor: &'a Supervisor, limits: &'a Limits, cancel: &'a AtomicBool) -> Self {
+    pub fn new(
+        supervisor: &'a Supervisor,
+        limits: &'a ProcessLimits,
+        cancel: &'a AtomicBool,
+    ) -> Self {
         Self { supervisor, limits, cancel, cpu_s: Mutex::new(0.0) }
     }
 
@@ -90,7 +94,7 @@ impl<'a> Decoder<'a> {
         source: &Path,
         dest: &Path,
         tree: &TreeSpec,
-        limits: &intake::Limits,
+        limits: &intake::ArchiveLimits,
     ) -> Result<Received, IntakeError> {
         let submission = match intake::read_archive(source, limits)? {
             // Nothing is decoded: files are copied one by one.
@@ -114,29 +118,32 @@ impl<'a> Decoder<'a> {
         name: &str,
         dest: &Path,
         tree: &TreeSpec,
-        limits: &intake::Limits,
+        limits: &intake::ArchiveLimits,
     ) -> Result<Submission, IntakeError> {
         let refused = |finding: Finding| {
             let findings = vec![finding];
             let name = printable(name);
             IntakeError::Refused(Box::new(Refusal { name, format: None, findings }))
         };
-        let question =
-            Question::Unpack { name: name.to_owned(), tree: tree.clone(), limits: limits.clone() };
-        let wanted = |folder: &Folder| {
+        let question = DecodeQuestion::Unpack {
+            name: name.to_owned(),
+            tree: tree.clone(),
+            limits: limits.clone(),
+        };
+        let wanted = |folder: &DecodeFolder| {
             fs::write(folder.input(), bytes)?;
-            Ok(Bind::new(folder.input(), Folder(Path::new(JOB)).input()))
+            Ok(Bind::new(folder.input(), DecodeFolder(Path::new(JOB)).input()))
         };
         // The names of all files, and as much content as an archive may hold.
         let most = limits.max_entries * (limits.max_path_bytes + 256);
         let most = most + (limits.max_total_mib << 20) + (1 << 20);
         match self.ask(&question, &wanted, most) {
-            Ok((Answer::Unpacked(unpacked), contents)) => {
+            Ok((DecodeAnswer::Unpacked(unpacked), contents)) => {
                 let copy = intake::copy_unpacked(&unpacked, &contents, dest, tree, limits)?;
                 // What was left out and what was odd is known to whoever saw the archive.
                 Ok(Submission { findings: unpacked.findings, ..copy })
             }
-            Ok((Answer::Refused(refusal), _)) => Err(IntakeError::Refused(Box::new(refusal))),
+            Ok((DecodeAnswer::Refused(refusal), _)) => Err(IntakeError::Refused(Box::new(refusal))),
             Ok(_) => Err(refused(ended("it gave no answer"))),
             Err(NoAnswer::Died { how, .. }) => Err(refused(ended(&how))),
             Err(NoAnswer::Machine(error)) => {
@@ -147,17 +154,17 @@ impl<'a> Decoder<'a> {
 
     /// Validates a private copy and scans its source, in a child.
     fn inspect(&self, submission: Submission, tree: &TreeSpec) -> Result<Received, IntakeError> {
-        let inside = Folder(Path::new(JOB)).input();
+        let inside = DecodeFolder(Path::new(JOB)).input();
         let root = std::path::absolute(&submission.root)
             .map_err(|error| IntakeError::io("find", &submission.root, error))?;
         let bind = Bind::new(&root, inside);
-        let question = Question::Inspect {
+        let question = DecodeQuestion::Inspect {
             submission: Submission { root: self.seen(&bind), ..submission.clone() },
             tree: tree.clone(),
         };
         let most = 16 << 20;
         match self.ask(&question, &|_| Ok(bind.clone()), most) {
-            Ok((Answer::Inspected { validation, source }, _)) => {
+            Ok((DecodeAnswer::Inspected { validation, source }, _)) => {
                 Ok(Received { submission, validation, source })
             }
             Ok(_) => Err(refused_copy(&submission, "it gave no answer")),
@@ -172,13 +179,13 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// The machine's matters and Ctrl-C.
     pub fn image(&self, file: &Path, name: &str) -> io::Result<Result<Image, String>> {
-        let bind = Bind::new(std::path::absolute(file)?, Folder(Path::new(JOB)).input());
+        let bind = Bind::new(std::path::absolute(file)?, DecodeFolder(Path::new(JOB)).input());
         let most = 12 * MAX_PIXELS as u64 + (1 << 20);
-        let question = Question::Image { name: name.to_owned() };
+        let question = DecodeQuestion::Image { name: name.to_owned() };
         Ok(match self.ask(&question, &|_| Ok(bind.clone()), most) {
-            Ok((Answer::Image { width, height }, content)) => image(width, height, &content)
+            Ok((DecodeAnswer::Image { width, height }, content)) => image(width, height, &content)
                 .ok_or_else(|| format!("{name}: its decoder answered another size")),
-            Ok((Answer::Failed(message), _)) => Err(message),
+            Ok((DecodeAnswer::Failed(message), _)) => Err(message),
             Ok(_) => Err(format!("{name}: its decoder gave no answer")),
             Err(NoAnswer::Died { how, .. }) => Err(format!("{name}: cannot be decoded: {how}")),
             Err(NoAnswer::Machine(error)) => return Err(error),
@@ -223,10 +230,10 @@ impl<'a> Decoder<'a> {
     /// answer is read up to `most` bytes.
     fn ask(
         &self,
-        question: &Question,
-        wanted: &dyn Fn(&Folder) -> io::Result<Bind>,
+        question: &DecodeQuestion,
+        wanted: &dyn Fn(&DecodeFolder) -> io::Result<Bind>,
         most: u64,
-    ) -> Result<(Answer, Vec<u8>), NoAnswer> {
+    ) -> Result<(DecodeAnswer, Vec<u8>), NoAnswer> {
         let once = || self.ask_once(question, wanted, most);
         let late = |answer: &Result<_, NoAnswer>| match answer {
             Err(NoAnswer::Died { late, .. }) => *late,
@@ -238,14 +245,14 @@ impl<'a> Decoder<'a> {
 
     fn ask_once(
         &self,
-        question: &Question,
-        wanted: &dyn Fn(&Folder) -> io::Result<Bind>,
+        question: &DecodeQuestion,
+        wanted: &dyn Fn(&DecodeFolder) -> io::Result<Bind>,
         most: u64,
-    ) -> Result<(Answer, Vec<u8>), NoAnswer> {
+    ) -> Result<(DecodeAnswer, Vec<u8>), NoAnswer> {
         let scratch = &self.supervisor.scratch;
         let private = tempfile::Builder::new().prefix("umbra-decode-").tempdir_in(scratch)?;
-        let folder = Folder(private.path());
-        let inside = Folder(Path::new(JOB));
+        let folder = DecodeFolder(private.path());
+        let inside = DecodeFolder(Path::new(JOB));
         fs::create_dir(folder.scratch())?;
         let bind = wanted(&folder)?;
         write_json(&folder, &(question, self.seen(&bind)))?;
@@ -257,7 +264,7 @@ impl<'a> Decoder<'a> {
             // As root, the child is another user; the folder above lets nobody else in.
             fs::set_permissions(path, fs::Permissions::from_mode(0o644))?;
         }
-        let mut policy = Policy::new(Kind::Decode);
+        let mut policy = Policy::new(ChildKind::Decode);
         policy.layers = self.supervisor.isolation;
         policy.scratch.without_mount = Some(folder.scratch());
         // Folders count as well.
@@ -392,7 +399,7 @@ fn image(width: usize, height: usize, content: &[u8]) -> Option<Image> {
     Some(Image { width, height, pixels: pixels.iter().map(pixel).collect() })
 }
 
-fn write_json(folder: &Folder, value: &impl Serialize) -> io::Result<()> {
+fn write_json(folder: &DecodeFolder, value: &impl Serialize) -> io::Result<()> {
     fs::write(folder.question(), serde_json::to_vec(value)?)
 }
 

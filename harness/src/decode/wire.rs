@@ -9,7 +9,7 @@ use crate::intake::{self, Finding, Refusal, Submission, TreeSpec, Validation};
 
 /// What a child is asked, about one file or folder.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub enum Question {
+pub enum DecodeQuestion {
     /// What the archive holds.
     Unpack {
         /// What messages call it.
@@ -17,7 +17,7 @@ pub enum Question {
         /// The expected tree.
         tree: TreeSpec,
         /// How much it may hold.
-        limits: intake::Limits,
+        limits: intake::ArchiveLimits,
     },
     /// The findings on a private copy; its root is the folder in question.
     Inspect {
@@ -35,7 +35,7 @@ pub enum Question {
 
 /// What a child answers.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Answer {
+pub enum DecodeAnswer {
     /// The archive's files; their contents follow, in order.
     Unpacked(Submission),
     /// The archive is refused.
@@ -59,9 +59,9 @@ pub enum Answer {
 }
 
 /// The files of a child's private folder.
-pub struct Folder<'a>(pub &'a Path);
+pub struct DecodeFolder<'a>(pub &'a Path);
 
-impl Folder<'_> {
+impl DecodeFolder<'_> {
     /// The question, and the path of what it is about.
     pub fn question(&self) -> PathBuf {
         self.0.join("question.json")
@@ -86,7 +86,7 @@ impl Folder<'_> {
 /// When it cannot be written.
 pub fn write_answer(
     out: &mut impl Write,
-    answer: &Answer,
+    answer: &DecodeAnswer,
     content: &mut dyn FnMut(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
     let json = serde_json::to_vec(answer)?;
@@ -96,7 +96,7 @@ pub fn write_answer(
 }
 
 /// Parses an answer and its content from untrusted bytes.
-pub fn read_answer(bytes: Vec<u8>) -> Option<(Answer, Vec<u8>)> {
+pub fn read_answer(bytes: Vec<u8>) -> Option<(DecodeAnswer, Vec<u8>)> {
     let length = u64::from_le_bytes(*bytes.first_chunk::<8>()?);
     let end = usize::try_from(length).ok()?.checked_add(8)?;
     let answer = serde_json::from_slice(bytes.get(8..end)?).ok()?;
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn whatever_comes_is_an_answer_or_none() {
-        let answer = Answer::Image { width: 3, height: 1 };
+        let answer = DecodeAnswer::Image { width: 3, height: 1 };
         let mut bytes = Vec::new();
         write_answer(&mut bytes, &answer, &mut |out| out.write_all(b"pixels")).unwrap();
         assert_eq!(read_answer(bytes.clone()), Some((answer, b"pixels".to_vec())));

@@ -36,7 +36,7 @@ pub struct RightVariant {
 /// was measured. `xtask verdicts` has the range of each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Class {
+pub enum MistakeClass {
     /// One constant, sign, power, index or division is wrong.
     Slip,
     /// Something that the handout asks for is missing.
@@ -60,7 +60,7 @@ pub struct KnownMistake {
     /// The parts that it belongs to, such as `1.3`: what it must cost, and all that it may.
     pub parts: Vec<String>,
     /// How much it should cost.
-    pub class: Class,
+    pub class: MistakeClass,
     /// The findings that it leads to although it costs nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<CheckId>,
@@ -161,7 +161,7 @@ mod tests {
         }
         for mistake in &catalogue.mistakes {
             assert!(mistake.parts.iter().all(|part| parts.contains(&part.as_str())), "{mistake:?}");
-            let free = mistake.class == Class::Finding;
+            let free = mistake.class == MistakeClass::Finding;
             assert_eq!(free, mistake.parts.is_empty(), "{mistake:?}");
         }
     }

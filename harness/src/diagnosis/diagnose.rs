@@ -10,7 +10,7 @@ use super::fit::{
 use super::loops;
 use super::nearest::{Comparison, Hypothesis, Nearest, is_black, nearest};
 use super::stored::{Material, Stored};
-use super::view::{Kind, Observations, View};
+use super::view::{Observations, View, ViewKind};
 use crate::evidence::rays::INVERTED;
 use crate::evidence::{CheckId, Evidence, Picture, Verdict};
 use crate::imaging::ratio::ratio_name;
@@ -60,9 +60,9 @@ pub struct Input<'a> {
 struct Question {
     part: &'static str,
     checks: &'static [CheckId],
-    isolated: &'static [Kind],
+    isolated: &'static [ViewKind],
     /// The image that shows it too.
-    image: Kind,
+    image: ViewKind,
     /// The material that it is about, if any.
     material: Option<Material>,
 }
@@ -71,29 +71,35 @@ const QUESTIONS: [Question; 9] = {
     const fn question(
         part: &'static str,
         checks: &'static [CheckId],
-        isolated: &'static [Kind],
-        image: Kind,
+        isolated: &'static [ViewKind],
+        image: ViewKind,
         material: Option<Material>,
     ) -> Question {
         Question { part, checks, isolated, image, material }
     }
     let (diffuse, phong) = (Some(Material::Diffuse), Some(Material::Phong));
     [
-        question("1.1", &[CheckId::BsdfDiffuse], &[Kind::Diffuse], Kind::Offline, diffuse),
-        question("1.2", &[CheckId::BsdfPhong], &[Kind::Phong], Kind::Offline, phong),
+        question("1.1", &[CheckId::BsdfDiffuse], &[ViewKind::Diffuse], ViewKind::Offline, diffuse),
+        question("1.2", &[CheckId::BsdfPhong], &[ViewKind::Phong], ViewKind::Offline, phong),
         question(
             "1.3",
             &[CheckId::RadianceLit, CheckId::LoopAgreement],
-            &[Kind::Lit],
-            Kind::Offline,
+            &[ViewKind::Lit],
+            ViewKind::Offline,
             None,
         ),
-        question("1.4", &[CheckId::ShadowRays], &[Kind::Shadow], Kind::Offline, None),
-        question("2.1", &[CheckId::PassUniforms], &[], Kind::Realtime, None),
-        question("2.2", &[CheckId::StageVertex], &[], Kind::Realtime, None),
-        question("2.3", &[CheckId::StageDiffuse], &[Kind::Fragment], Kind::Realtime, diffuse),
-        question("2.4", &[CheckId::StagePhong], &[Kind::Fragment], Kind::Realtime, phong),
-        question("2.5", &[CheckId::BonusImage], &[Kind::Bonus], Kind::Bonus, None),
+        question("1.4", &[CheckId::ShadowRays], &[ViewKind::Shadow], ViewKind::Offline, None),
+        question("2.1", &[CheckId::PassUniforms], &[], ViewKind::Realtime, None),
+        question("2.2", &[CheckId::StageVertex], &[], ViewKind::Realtime, None),
+        question(
+            "2.3",
+            &[CheckId::StageDiffuse],
+            &[ViewKind::Fragment],
+            ViewKind::Realtime,
+            diffuse,
+        ),
+        question("2.4", &[CheckId::StagePhong], &[ViewKind::Fragment], ViewKind::Realtime, phong),
+        question("2.5", &[CheckId::BonusImage], &[ViewKind::Bonus], ViewKind::Bonus, None),
     ]
 };
 
@@ -173,7 +179,7 @@ impl Input<'_> {
             // What isolates a part may hide how it went wrong: a surface point that is overwritten
             // under a constant witness.
             self.among(&isolated, own).or_else(|| self.among(&image, own))
-        } else if question.image == Kind::Bonus || alone() {
+        } else if question.image == ViewKind::Bonus || alone() {
             self.among(&image, own)
         } else {
             None
@@ -222,15 +228,18 @@ impl Input<'_> {
         };
         let by_loop = || {
             // Scenes that nothing is stored of are held back.
-            let public =
-                |scene: &&String| self.stored.views.contains_key(&View::new(Kind::Offline, scene));
+            let public = |scene: &&String| {
+                self.stored.views.contains_key(&View::new(ViewKind::Offline, scene))
+            };
             let scenes = self.observations.loops.iter().filter(|(scene, _)| public(scene));
             let made = loops::explain(scenes.map(|(_, seen)| seen));
             made.map(|(name, left)| self.known(&[name], left, 1.0))
                 .or_else(|| self.among(image, |mistake| own(mistake) && looping(mistake)))
         };
         let film = || {
-            self.among(&self.comparisons(&[Kind::Film], None), |mistake| mistake.family == "loop")
+            self.among(&self.comparisons(&[ViewKind::Film], None), |mistake| {
+                mistake.family == "loop"
+            })
         };
         let found = match (rays_fail, loop_fails) {
             (true, true) => match (radiance(), by_loop()) {
@@ -246,11 +255,12 @@ impl Input<'_> {
     }
 
     /// What the renderer answered to questions of these kinds, beside what the store knows.
-    fn comparisons(&self, kinds: &[Kind], material: Option<Material>) -> Vec<Comparison<'_>> {
+    fn comparisons(&self, kinds: &[ViewKind], material: Option<Material>) -> Vec<Comparison<'_>> {
         let seen = self.observations.tiles.iter().filter(|(view, _)| kinds.contains(&view.kind));
         let comparisons = seen.filter_map(|(view, tile)| {
             let stored = self.stored.views.get(view)?;
-            let everything = material.is_none() || matches!(view.kind, Kind::Diffuse | Kind::Phong);
+            let everything =
+                material.is_none() || matches!(view.kind, ViewKind::Diffuse | ViewKind::Phong);
             let counts = |shown: &Material| match everything {
                 true => *shown != Material::Ignored,
                 false => Some(*shown) == material,
@@ -264,7 +274,7 @@ impl Input<'_> {
         });
         let comparisons: Vec<Comparison> = comparisons.collect();
         // Darkness is an answer to whether a point is lit, and elsewhere has any reason.
-        let lightless = |kind: &Kind| matches!(kind, Kind::Shadow | Kind::Bonus);
+        let lightless = |kind: &ViewKind| matches!(kind, ViewKind::Shadow | ViewKind::Bonus);
         if !kinds.iter().all(lightless) && is_black(&comparisons) {
             return Vec::new();
         }

@@ -10,8 +10,8 @@ mod stored;
 mod thumbnail;
 mod view;
 
-pub use catalogue::{Catalogue, CatalogueError, Class, KnownMistake, RightVariant};
+pub use catalogue::{Catalogue, CatalogueError, KnownMistake, MistakeClass, RightVariant};
 pub use diagnose::{Diagnosis, Input};
 pub use stored::{Material, Stored, StoredError, StoredView};
 pub use thumbnail::{LENGTH, Thumbnail};
-pub use view::{Kind, LoopSeen, Observations, View};
+pub use view::{LoopSeen, Observations, View, ViewKind};

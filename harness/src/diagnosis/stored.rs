@@ -230,7 +230,7 @@ impl StoredView {
 
 #[cfg(test)]
 mod tests {
-    use super::super::view::Kind;
+    use super::super::view::ViewKind;
     use super::*;
 
     fn view() -> StoredView {
@@ -247,7 +247,7 @@ mod tests {
 
     fn folder() -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
-        let views = [(View::new(Kind::Lit, "cbox"), view())].into();
+        let views = [(View::new(ViewKind::Lit, "cbox"), view())].into();
         Stored { views }.save(folder.path()).unwrap();
         folder
     }
@@ -256,7 +256,7 @@ mod tests {
     fn what_was_saved_is_loaded() {
         let folder = folder();
         let stored = Stored::load(folder.path()).unwrap();
-        let (found, expected) = (&stored.views[&View::new(Kind::Lit, "cbox")], view());
+        let (found, expected) = (&stored.views[&View::new(ViewKind::Lit, "cbox")], view());
         assert_eq!(found.materials, expected.materials);
         assert_eq!(found.digest, "abc");
         let bits = |tile: &Thumbnail| format!("{:?}", tile.values());

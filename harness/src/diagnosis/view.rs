@@ -10,7 +10,7 @@ use super::thumbnail::Thumbnail;
 
 /// What was asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum ViewKind {
     /// The diffuse BSDF at the probes of part 1.1.
     Diffuse,
     /// The Phong BSDF at the probes of part 1.2.
@@ -31,7 +31,7 @@ pub enum Kind {
     Bonus,
 }
 
-impl Kind {
+impl ViewKind {
     /// All of them.
     pub const ALL: [Self; 9] = [
         Self::Diffuse,
@@ -70,21 +70,21 @@ impl Kind {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct View {
     /// What is asked.
-    pub kind: Kind,
+    pub kind: ViewKind,
     /// Name of the scene; empty for BSDFs given by value.
     pub scene: String,
 }
 
 impl View {
     /// A question on a scene.
-    pub fn new(kind: Kind, scene: &str) -> Self {
+    pub fn new(kind: ViewKind, scene: &str) -> Self {
         Self { kind, scene: scene.to_owned() }
     }
 
     /// The view of a name that [`View`] was shown as.
     pub fn named(name: &str) -> Option<Self> {
         let (kind, scene) = name.split_once('-').unwrap_or((name, ""));
-        let kind = Kind::ALL.into_iter().find(|known| known.name() == kind)?;
+        let kind = ViewKind::ALL.into_iter().find(|known| known.name() == kind)?;
         Some(Self::new(kind, scene))
     }
 }
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn views_have_names() {
-        for kind in Kind::ALL {
+        for kind in ViewKind::ALL {
             for scene in ["", "cbox", "sphere_phong", "a-b"] {
                 let view = View::new(kind, scene);
                 assert_eq!(View::named(&view.to_string()), Some(view));

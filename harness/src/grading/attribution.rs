@@ -8,7 +8,7 @@ use basecode::Matrices;
 use super::session::Session;
 use super::stages::named;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
-use crate::process::Limits;
+use crate::process::ProcessLimits;
 use crate::worker::{
     Adapter, AdapterKind, CameraValue, Fault, Job, Outcome, Request, is_environment_failure,
 };
@@ -76,7 +76,7 @@ fn control_run(session: &Session, job: &Job, request: &Request) -> Option<&'stat
     }
     let control = Job { plugin: reference.map(Into::into), requests: vec![request] };
     // The limits of submissions do not apply to our own renderers.
-    let limits = Limits { threads: session.limits.threads, ..Limits::default() };
+    let limits = ProcessLimits { threads: session.limits.threads, ..ProcessLimits::default() };
     let report = session.supervisor.run_job(&control, &limits, session.cancel, &mut |_| ());
     let outcome = report.outcomes.first()?;
     let offline = !matches!(job.requests.first(), Some(Request::RenderRealtime { .. }));

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use super::costs::Costs;
 use super::record::{Record, Student};
 use super::tree_checks::{Mode, config_check, refused_checks, tree_check};
-use super::{likeness, template_fallback};
+use super::{similarity, template_fallback};
 use crate::assignment::Assignment;
 use crate::build::{self, BuildOutcome, Recording};
 use crate::decode::{Decoder, Received};
@@ -117,7 +117,7 @@ impl Workshop<'_> {
         record.student = Student::of(&config);
         record.findings.clone_from(&validation.findings);
         record.findings.extend(source);
-        record.sources = likeness::digests(&submission, &self.assignment.template())
+        record.sources = similarity::digests(&submission, &self.assignment.template())
             .context("cannot read the source")?;
         begun.checks = vec![tree_check(&validation, &submission, tree, mode)];
         begun.checks.extend(config_check(&validation));
@@ -144,7 +144,7 @@ impl Workshop<'_> {
         std::fs::create_dir(&out)?;
         let limits = &self.assignment.limits.build;
         let isolation = self.supervisor.isolation.isolation();
-        let kept = build::Kept::within(&self.assignment.cache(), isolation);
+        let kept = build::KeptLibraries::within(&self.assignment.cache(), isolation);
         let own = &src;
         let compile = |src: &Path| {
             let report =

@@ -86,7 +86,7 @@ struct Met {
 
 /// What is in the file of a record.
 #[derive(Serialize, Deserialize)]
-struct File<R> {
+struct RecordFile<R> {
     /// SHA-256 over all that the record depends on, but for the rules; empty when it is not to be found
     /// again, but only listed.
     key: String,
@@ -185,7 +185,7 @@ impl RecordCache {
     /// # Errors
     /// When it cannot be read.
     pub fn earlier(instructor: &Path, conditions: &str) -> anyhow::Result<Option<StoredRecord>> {
-        let earlier = |file: File<Record>| {
+        let earlier = |file: RecordFile<Record>| {
             StoredRecord::kept(file.record, file.batch == conditions, instructor)
         };
         Ok(Self::file(instructor)?.map(earlier))
@@ -204,7 +204,7 @@ impl RecordCache {
         Self::file(instructor).ok()?.map(|file| file.batch)
     }
 
-    fn file(instructor: &Path) -> anyhow::Result<Option<File<Record>>> {
+    fn file(instructor: &Path) -> anyhow::Result<Option<RecordFile<Record>>> {
         let path = instructor.join(FILE);
         let bytes = match fs::read(&path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -224,7 +224,7 @@ impl RecordCache {
     /// Whose record an earlier run kept in an instructor's folder.
     pub fn student(instructor: &Path) -> Option<Student> {
         let bytes = fs::read(instructor.join(FILE)).ok()?;
-        let file: File<Record> = serde_json::from_slice(&bytes).ok()?;
+        let file: RecordFile<Record> = serde_json::from_slice(&bytes).ok()?;
         Some(file.record.student).filter(|student| *student != Student::default())
     }
 
@@ -246,7 +246,7 @@ impl RecordCache {
     /// # Errors
     /// When it cannot be written.
     pub fn keep_replaced(instructor: &Path, older: &[u8], record: &Record) -> anyhow::Result<bool> {
-        let kept: Result<File<Record>, _> = serde_json::from_slice(older);
+        let kept: Result<RecordFile<Record>, _> = serde_json::from_slice(older);
         if kept.is_ok_and(|kept| kept.record.digest == record.digest) {
             return Ok(false);
         }
@@ -264,7 +264,8 @@ impl RecordCache {
     ) -> anyhow::Result<Vec<u8>> {
         let path = out.instructor.join(FILE);
         let batch = hex(&self.batch);
-        let bytes = serde_json::to_vec(&File { key: key.to_owned(), batch, failing, record })?;
+        let bytes =
+            serde_json::to_vec(&RecordFile { key: key.to_owned(), batch, failing, record })?;
         let failed = || format!("cannot keep {}", path.display());
         write_whole(&path, &bytes).with_context(failed)?;
         Ok(bytes)
@@ -304,7 +305,7 @@ impl RecordCache {
         out: &Folders,
     ) -> Option<Record> {
         let bytes = fs::read(out.instructor.join(FILE)).ok()?;
-        let file: File<Record> = serde_json::from_slice(&bytes).ok()?;
+        let file: RecordFile<Record> = serde_json::from_slice(&bytes).ok()?;
         let same = file.key == key
             && file.failing == failing(&file.record.evidence)
             && (budget || file.record.evidence.named(BUDGET).next().is_none())
@@ -336,7 +337,8 @@ impl RecordCache {
         }
         let bytes = self.write(key, failing(&record.evidence), &record, out)?;
         self.settle(&record, false);
-        let file: File<Record> = serde_json::from_slice(&bytes).context("a record just kept")?;
+        let file: RecordFile<Record> =
+            serde_json::from_slice(&bytes).context("a record just kept")?;
         Ok(file.record)
     }
 }

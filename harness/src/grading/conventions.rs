@@ -119,13 +119,13 @@ impl<'a> Answers<'a> {
             // A renderer that does not answer them keeps no such convention.
             let (Some(known), Some(answer)) = (known, outcome.answer()) else { continue };
             if let Ok(values) = &mut known.values {
-                values.extend(session::colours(&answer.values));
+                values.extend(session::colors(&answer.values));
                 known.probes.extend(probes);
             }
         }
         let physical = physical.iter().zip(of_physical);
         let judge = |((kind, probes), outcome): (&(BsdfKind, Probes), &Outcome)| {
-            probes.judge(*kind, session::colours(&outcome.answer()?.values))
+            probes.judge(*kind, session::colors(&outcome.answer()?.values))
         };
         physical.filter_map(judge).collect()
     }
@@ -158,12 +158,12 @@ impl<'a> Answers<'a> {
         outcome: &Outcome,
     ) {
         let (id, part, view) = match kind {
-            BsdfKind::Diffuse => (CheckId::BsdfDiffuse, "1.1", diagnosis::Kind::Diffuse),
-            BsdfKind::Phong => (CheckId::BsdfPhong, "1.2", diagnosis::Kind::Phong),
+            BsdfKind::Diffuse => (CheckId::BsdfDiffuse, "1.1", diagnosis::ViewKind::Diffuse),
+            BsdfKind::Phong => (CheckId::BsdfPhong, "1.2", diagnosis::ViewKind::Phong),
         };
         let values = match outcome {
             Outcome::Done(answer) => {
-                let values = session::colours(&answer.values);
+                let values = session::colors(&answer.values);
                 session.record(View::new(view, &scene), Thumbnail::of_list(values));
                 if scene.is_empty() {
                     observe::bsdf(session, kind, &probes, values);
@@ -189,7 +189,7 @@ impl<'a> Answers<'a> {
             if own { points.map(|point| shaded_point(case, point)).collect() } else { Vec::new() };
         let values = asked.iter().map(|(outcome, witness, name)| match outcome {
             Outcome::Done(answer) => {
-                let values = session::colours(&answer.values).to_vec();
+                let values = session::colors(&answer.values).to_vec();
                 Ok(WitnessAnswer { witness: *witness, name, values })
             }
             other => {
@@ -206,7 +206,7 @@ impl<'a> Answers<'a> {
     pub fn push_together(&mut self, case: &PreparedScene, radiance: &Outcome) {
         let Some(answer) = radiance.answer() else { return };
         let (scene, batch) = (&case.expected.scene, &case.probe_film.batch);
-        let values = session::colours(&answer.values);
+        let values = session::colors(&answer.values);
         for (kind, model) in
             [(BsdfKind::Diffuse, MaterialModel::Diffuse), (BsdfKind::Phong, MaterialModel::Phong)]
         {
@@ -437,7 +437,7 @@ pub fn shaded_point(case: &PreparedScene, point: &SurfacePoint) -> ShadedPoint {
     let scene = &case.expected.scene;
     let material = scene.material_of(point.shape);
     let uv = scene.intersect(&point.ray).map_or(Vec2::ZERO, |hit| hit.uv);
-    let (model, colours) = match material.model {
+    let (model, colors) = match material.model {
         MaterialModel::Diffuse => (api::MATERIAL_DIFFUSE, 1.0),
         MaterialModel::Phong => (api::MATERIAL_PHONG, 1.0),
         MaterialModel::Mirror => (api::MATERIAL_DIFFUSE, 0.0),
@@ -445,8 +445,8 @@ pub fn shaded_point(case: &PreparedScene, point: &SurfacePoint) -> ShadedPoint {
     ShadedPoint {
         material: api::MaterialValue {
             model,
-            diffuse: (colours * material.diffuse.lookup(uv)).into(),
-            specular: (colours * material.specular.lookup(uv)).into(),
+            diffuse: (colors * material.diffuse.lookup(uv)).into(),
+            specular: (colors * material.specular.lookup(uv)).into(),
             exponent: material.exponent,
         },
         scale: f64::from(material.energy_scale()),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use basecode::{Image, Vec3};
 
-use super::draw::{Frame, draw_each};
+use super::draw::{FrameRequest, draw_each};
 use super::judged::Judged;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
@@ -89,9 +89,11 @@ pub fn look_at_black_surfaces(
     let fails = |check: &Check| check.id == COVERAGE && check.verdict == Verdict::Fail;
     let wrong = |judged: &Judged| !judged.drawn.is_empty() && judged.checks.iter().any(fails);
     let again: Vec<usize> = (0..cases.len()).filter(|&index| wrong(&judged[index])).collect();
-    let frame =
-        |&index: &usize| Frame { stages: vec![every_fragment()], ..Frame::plain(&cases[index]) };
-    let frames: Vec<Frame> = again.iter().map(frame).collect();
+    let frame = |&index: &usize| FrameRequest {
+        stages: vec![every_fragment()],
+        ..FrameRequest::plain(&cases[index])
+    };
+    let frames: Vec<FrameRequest> = again.iter().map(frame).collect();
     for (index, outcome) in again.into_iter().zip(draw_each(session, Some(plugin), &frames)) {
         let (case, (width, height)) = (&cases[index], cases[index].film());
         let image = outcome.answer().map(|answer| session::image(&answer.values, width, height));

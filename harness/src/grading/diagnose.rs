@@ -7,15 +7,15 @@ use anyhow::Context;
 use rayon::prelude::*;
 
 use super::conventions::Answers;
-use super::draw::{Frame, draw_each};
+use super::draw::{FrameRequest, draw_each};
 use super::offline::{self, Drawn, Run};
 use super::pipeline::Grading;
 use super::realtime;
 use super::session::{self, Session};
 use super::stages::Stages;
 use crate::diagnosis::{
-    Catalogue, Diagnosis, Input, Kind, KnownMistake, LENGTH, Material, Observations, Stored,
-    StoredView, Thumbnail, View,
+    Catalogue, Diagnosis, Input, KnownMistake, LENGTH, Material, Observations, Stored, StoredView,
+    Thumbnail, View, ViewKind,
 };
 use crate::evidence::{self, Evidence, Picture};
 use crate::imaging::pictures::tone_mapped;
@@ -116,16 +116,17 @@ impl Grading<'_> {
                 let own = drawn.iter().find(|drawn| drawn.scene == *name && drawn.kind == kind);
                 own.map(|drawn| &drawn.image)
             };
-            let plain = of(evidence::images::Kind::Realtime);
-            let shadows = of(evidence::images::Kind::RealtimeShadows);
+            let plain = of(evidence::images::ImageKind::Realtime);
+            let shadows = of(evidence::images::ImageKind::RealtimeShadows);
             if let (Some(with), Some(without)) = (shadows, plain) {
-                session.record(View::new(Kind::Bonus, name), Thumbnail::of_ratio(with, without));
+                session
+                    .record(View::new(ViewKind::Bonus, name), Thumbnail::of_ratio(with, without));
             }
             if case.is_probe() {
                 // At one sample the film shows no more than the rays.
-                let film = of(evidence::images::Kind::Offline { spp: case.spp });
+                let film = of(evidence::images::ImageKind::Offline { spp: case.spp });
                 let film = film.filter(|_| case.spp > 1);
-                for (kind, image) in [(Kind::Realtime, plain), (Kind::Film, film)] {
+                for (kind, image) in [(ViewKind::Realtime, plain), (ViewKind::Film, film)] {
                     if let Some(image) = image {
                         session.record(View::new(kind, name), Thumbnail::of_image(image));
                     }
@@ -149,10 +150,14 @@ impl Grading<'_> {
         for (view, tile) in right.tiles {
             let case = self.cases.iter().find(|case| case.entry.name == view.scene);
             let materials = match (view.kind, case) {
-                (Kind::Offline, Some(case)) => Material::of_mask(&case.probe_film.mask),
-                (Kind::Fragment, Some(case)) => Material::of_mask(&case.probe_film.unshadowed_mask),
-                (Kind::Film, Some(case)) => Material::of_mask(&case.expected.offline.mask),
-                (Kind::Realtime, Some(case)) => Material::of_mask(&case.expected.unshadowed_mask),
+                (ViewKind::Offline, Some(case)) => Material::of_mask(&case.probe_film.mask),
+                (ViewKind::Fragment, Some(case)) => {
+                    Material::of_mask(&case.probe_film.unshadowed_mask)
+                }
+                (ViewKind::Film, Some(case)) => Material::of_mask(&case.expected.offline.mask),
+                (ViewKind::Realtime, Some(case)) => {
+                    Material::of_mask(&case.expected.unshadowed_mask)
+                }
                 _ => vec![Material::None; LENGTH],
             };
             let digest = case.map(|case| scene_digest(&case.offline)).transpose()?;
@@ -212,15 +217,15 @@ impl Grading<'_> {
             );
             drawn.extend(judged.into_iter().flat_map(|judged| judged.drawn));
             // Under the reference's own vertex stage, which is right where a fragment stage is not.
-            let frames: Vec<Frame> =
-                self.cases.iter().map(|case| Frame::probe(case, Vec::new())).collect();
+            let frames: Vec<FrameRequest> =
+                self.cases.iter().map(|case| FrameRequest::probe(case, Vec::new())).collect();
             let outcomes = draw_each(&session, Some(reference), &frames);
             for (case, outcome) in self.cases.iter().zip(outcomes) {
                 if let Some(answer) = outcome.answer() {
                     let (width, height) = (case.probe_film.width, case.probe_film.height);
                     let image = session::image(&answer.values, width, height);
                     session.record(
-                        View::new(Kind::Fragment, &case.entry.name),
+                        View::new(ViewKind::Fragment, &case.entry.name),
                         Thumbnail::of_image(&image),
                     );
                 }
@@ -245,7 +250,7 @@ fn pictures(
     out: &Path,
 ) -> anyhow::Result<Option<(Vec<Picture>, ViewedCase)>> {
     let [alike] = diagnosis.mistakes.as_slice() else { return Ok(None) };
-    let kind = if diagnosis.part.starts_with('1') { Kind::Offline } else { Kind::Realtime };
+    let kind = if diagnosis.part.starts_with('1') { ViewKind::Offline } else { ViewKind::Realtime };
     let views = input.stored.views.iter().filter(|(view, _)| view.kind == kind);
     let shown = views.filter_map(|(view, stored)| {
         let known = stored.mistakes.get(alike.first()?)?;
@@ -286,17 +291,17 @@ fn pictures(
 }
 
 /// Whether a view is one of those that a mistake is looked for in.
-fn shows(kind: Kind, mistake: &KnownMistake) -> bool {
+fn shows(kind: ViewKind, mistake: &KnownMistake) -> bool {
     let any = |parts: &[&str]| mistake.parts.iter().any(|part| parts.contains(&part.as_str()));
     match kind {
-        Kind::Diffuse => any(&["1.1"]),
-        Kind::Phong => any(&["1.2"]),
-        Kind::Lit => any(&["1.3"]),
-        Kind::Shadow => any(&["1.4"]),
-        Kind::Offline => any(&["1.1", "1.2", "1.3", "1.4"]),
-        Kind::Film => mistake.family == "loop",
-        Kind::Realtime => any(&["2.1", "2.2", "2.3", "2.4"]),
-        Kind::Fragment => any(&["2.3", "2.4"]),
-        Kind::Bonus => any(&["2.5"]),
+        ViewKind::Diffuse => any(&["1.1"]),
+        ViewKind::Phong => any(&["1.2"]),
+        ViewKind::Lit => any(&["1.3"]),
+        ViewKind::Shadow => any(&["1.4"]),
+        ViewKind::Offline => any(&["1.1", "1.2", "1.3", "1.4"]),
+        ViewKind::Film => mistake.family == "loop",
+        ViewKind::Realtime => any(&["2.1", "2.2", "2.3", "2.4"]),
+        ViewKind::Fragment => any(&["2.3", "2.4"]),
+        ViewKind::Bonus => any(&["2.5"]),
     }
 }

@@ -9,11 +9,11 @@ use super::session::Session;
 use super::stages::named;
 use crate::evidence::stage_film::from_origin;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
-use crate::worker::{Adapter, CameraValue, Outcome, Request, Stage};
+use crate::worker::{Adapter, CameraValue, Outcome, Request, StageText};
 
 /// A frame to be drawn.
 #[derive(Clone)]
-pub struct Frame<'a> {
+pub struct FrameRequest<'a> {
     /// The scene, whose camera looks.
     pub case: &'a PreparedScene,
     /// Which of its TOML files.
@@ -27,10 +27,10 @@ pub struct Frame<'a> {
     /// Whether it is drawn once for each of [`Matrices::ALL`] instead, and each is looked at.
     pub each_matrices: bool,
     /// Stages to replace; all three where there is no plugin.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<StageText>,
 }
 
-impl<'a> Frame<'a> {
+impl<'a> FrameRequest<'a> {
     /// The realtime image of a scene, on the film that it is judged on.
     pub fn plain(case: &'a PreparedScene) -> Self {
         let toml = case.realtime.as_path();
@@ -45,7 +45,7 @@ impl<'a> Frame<'a> {
     }
 
     /// A scene's small film under other stages.
-    pub fn probe(case: &'a PreparedScene, stages: Vec<Stage>) -> Self {
+    pub fn probe(case: &'a PreparedScene, stages: Vec<StageText>) -> Self {
         Self { size: (case.probe_film.width, case.probe_film.height), stages, ..Self::plain(case) }
     }
 
@@ -66,7 +66,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-impl Frame<'_> {
+impl FrameRequest<'_> {
     /// The camera of a frame under other matrices: where they leave it at the origin, it looks at the scene from there.
     fn camera_of(&self, matrices: Matrices) -> CameraValue {
         let camera = match matrices {
@@ -78,13 +78,17 @@ impl Frame<'_> {
 }
 
 /// Draws one frame in a worker of its own.
-pub fn draw(session: &Session, plugin: Option<&Path>, frame: &Frame) -> Outcome {
+pub fn draw(session: &Session, plugin: Option<&Path>, frame: &FrameRequest) -> Outcome {
     let mut outcomes = draw_each(session, plugin, std::slice::from_ref(frame));
     outcomes.pop().unwrap_or_else(|| unreachable!("each frame has an outcome"))
 }
 
 /// Draws frames, all in one worker while it lives.
-pub fn draw_each(session: &Session, plugin: Option<&Path>, frames: &[Frame]) -> Vec<Outcome> {
+pub fn draw_each(
+    session: &Session,
+    plugin: Option<&Path>,
+    frames: &[FrameRequest],
+) -> Vec<Outcome> {
     let adapter = match &session.adapter {
         Ok(adapter) => adapter,
         Err(reason) => return vec![Outcome::NoAdapter(reason.clone()); frames.len()],
@@ -106,11 +110,11 @@ pub fn draw_each(session: &Session, plugin: Option<&Path>, frames: &[Frame]) -> 
 pub fn draw_scenes(
     session: &Session,
     plugin: &Path,
-    scenes: &[Vec<Frame>],
+    scenes: &[Vec<FrameRequest>],
     is_right: &dyn Fn(usize, &[Outcome]) -> bool,
 ) -> Vec<Vec<Outcome>> {
     let mut outcomes = draw_each(session, Some(plugin), &scenes.concat()).into_iter();
-    let of_scene = |frames: &Vec<Frame>| outcomes.by_ref().take(frames.len()).collect();
+    let of_scene = |frames: &Vec<FrameRequest>| outcomes.by_ref().take(frames.len()).collect();
     let mut drawn: Vec<Vec<Outcome>> = scenes.iter().map(of_scene).collect();
     // A renderer may rely on a process of its own for each scene, as a command line gives it. So
     // what is wrong must be wrong alone. Where that is so for the last, nothing was left behind.
@@ -130,10 +134,10 @@ pub fn draw_scenes(
 pub fn draw_one_each(
     session: &Session,
     plugin: &Path,
-    frames: &[Frame],
+    frames: &[FrameRequest],
     is_right: &dyn Fn(&PreparedScene, &Outcome) -> bool,
 ) -> Vec<Outcome> {
-    let scenes: Vec<Vec<Frame>> = frames.iter().map(|frame| vec![frame.clone()]).collect();
+    let scenes: Vec<Vec<FrameRequest>> = frames.iter().map(|frame| vec![frame.clone()]).collect();
     let all_right = |index: usize, outcomes: &[Outcome]| {
         outcomes.iter().all(|outcome| is_right(frames[index].case, outcome))
     };
@@ -157,7 +161,8 @@ fn same(a: &Outcome, b: &Outcome) -> bool {
 /// Why not, in words.
 pub fn probe_adapter(session: &Session, case: &PreparedScene) -> Result<String, String> {
     let stages = named([VERTEX, SHOW_NORMAL, SHOW_NORMAL].map(str::to_owned));
-    match draw(session, None, &Frame { size: (16, 16), ..Frame::probe(case, stages) }) {
+    match draw(session, None, &FrameRequest { size: (16, 16), ..FrameRequest::probe(case, stages) })
+    {
         Outcome::Done(answer) => Ok(answer.adapter),
         Outcome::NoAdapter(message) | Outcome::Failed(message) => Err(message),
         Outcome::NotRun { reason, .. } => Err(reason),

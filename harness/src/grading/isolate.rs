@@ -6,7 +6,7 @@ use std::path::Path;
 
 use basecode::{Image, MaterialModel, Matrices, Vec3};
 
-use super::draw::{Frame, draw, draw_scenes};
+use super::draw::{FrameRequest, draw, draw_scenes};
 use super::kept_frames::draw_sets;
 use super::observe;
 use super::own_frames;
@@ -14,7 +14,7 @@ use super::prepared_scene::PreparedScene;
 use super::session::{self, Session, headline};
 use super::stages::{Stages, matrices, named};
 use super::uploads::{drawn_parts, every_fragment};
-use crate::diagnosis::{Kind, Thumbnail, View};
+use crate::diagnosis::{Thumbnail, View, ViewKind};
 use crate::evidence::premultiplied::Premultiplied;
 use crate::evidence::stage_film::StageFilm;
 use crate::evidence::stages::{BLACK, BoundValue, SHOW_NORMAL, SHOW_POSITION, VERTEX, judge_pass};
@@ -24,7 +24,7 @@ use crate::evidence::{Check, CheckId, Verdict};
 use crate::evidence::{images, pixels};
 use crate::imaging::reference::{Region, RegionMask};
 use crate::imaging::tolerances::Tolerances;
-use crate::worker::{Outcome, STAGES, Stage};
+use crate::worker::{Outcome, STAGES, StageText};
 
 /// The checks of the three stages, and the tasks that they belong to.
 const CHECKS: [(CheckId, &str); 3] = [
@@ -34,7 +34,7 @@ const CHECKS: [(CheckId, &str); 3] = [
 ];
 
 /// The stages of ours that show what a pass binds, and then world positions.
-pub fn pass_shown() -> Vec<Vec<Stage>> {
+pub fn pass_shown() -> Vec<Vec<StageText>> {
     let of = |fragments: [String; 2]| {
         let [diffuse, phong] = fragments;
         named([VERTEX.to_owned(), diffuse, phong])
@@ -61,7 +61,7 @@ impl PassFrames {
 /// matrices as well.
 fn draws_surfaces(session: &Session, plugin: &Path, case: &PreparedScene) -> bool {
     let draws = |which: Matrices| {
-        let frame = Frame::probe(case, vec![every_fragment(), matrices(which)]);
+        let frame = FrameRequest::probe(case, vec![every_fragment(), matrices(which)]);
         let outcome = draw(session, Some(plugin), &frame);
         let (width, height) = frame.size;
         let image = outcome.answer().map(|answer| session::image(&answer.values, width, height));
@@ -74,7 +74,7 @@ fn draws_surfaces(session: &Session, plugin: &Path, case: &PreparedScene) -> boo
 /// Whether a pass takes the host's stages: of those that are no WGSL it then makes no frame.
 fn takes_stages(session: &Session, plugin: &Path, case: &PreparedScene) -> bool {
     let none = named(["no WGSL"; 3].map(str::to_owned));
-    needs_wgsl(&draw(session, Some(plugin), &Frame::probe(case, none)))
+    needs_wgsl(&draw(session, Some(plugin), &FrameRequest::probe(case, none)))
 }
 
 /// Whether a frame under stages that are no WGSL shows that a pass needs them.
@@ -99,12 +99,12 @@ pub fn isolate(
         |index, frames: &[Outcome]| pass_check(&cases[index], frames).verdict == Verdict::Pass;
     let passes = draw_scenes(session, plugin, &under(cases, &pass_shown()), &is_right);
     let own =
-        |stage: &Stage| stage.name == STAGES[0] && stages.own[0].as_ref() == Some(&stage.text);
-    let frame = |case, set: &Vec<Stage>| Frame {
+        |stage: &StageText| stage.name == STAGES[0] && stages.own[0].as_ref() == Some(&stage.text);
+    let frame = |case, set: &Vec<StageText>| FrameRequest {
         each_matrices: set.iter().any(own),
-        ..Frame::probe(case, set.clone())
+        ..FrameRequest::probe(case, set.clone())
     };
-    let frames: Vec<Vec<Frame>> =
+    let frames: Vec<Vec<FrameRequest>> =
         sets.iter().map(|set| cases.iter().map(|case| frame(case, set)).collect()).collect();
     let mut swapped: Vec<_> = draw_sets(session, &frames).into_iter().map(Vec::into_iter).collect();
     let mut shown = Shown::default();
@@ -270,14 +270,15 @@ impl Shown<'_> {
 }
 
 /// The frames of each scene under all sets of stages.
-fn under<'a>(cases: &'a [PreparedScene], sets: &[Vec<Stage>]) -> Vec<Vec<Frame<'a>>> {
-    let frames =
-        |case: &'a PreparedScene| sets.iter().map(|set| Frame::probe(case, set.clone())).collect();
+fn under<'a>(cases: &'a [PreparedScene], sets: &[Vec<StageText>]) -> Vec<Vec<FrameRequest<'a>>> {
+    let frames = |case: &'a PreparedScene| {
+        sets.iter().map(|set| FrameRequest::probe(case, set.clone())).collect()
+    };
     cases.iter().map(frames).collect()
 }
 
 /// A vertex stage with stages of ours that show the positions, and the normals, that it forwards.
-pub fn positions_and_normals(vertex: &str) -> [Vec<Stage>; 2] {
+pub fn positions_and_normals(vertex: &str) -> [Vec<StageText>; 2] {
     let under = |show: &str| named([vertex.to_owned(), show.to_owned(), show.to_owned()]);
     [SHOW_POSITION, SHOW_NORMAL].map(under)
 }
@@ -293,7 +294,7 @@ enum Swap {
 }
 
 /// How each stage is looked at, and the sets of stages that it takes, the same for every scene.
-fn swaps(stages: &Stages) -> ([Swap; 3], Vec<Vec<Stage>>) {
+fn swaps(stages: &Stages) -> ([Swap; 3], Vec<Vec<StageText>>) {
     let mut sets = Vec::new();
     let swaps = [0, 1, 2].map(|index| {
         if stages.is_template(index) {
@@ -424,7 +425,7 @@ fn record_fragment(session: &Session, case: &PreparedScene, image: &Image, phong
     });
     let own = own.map(|(index, (pixel, _))| (index, (*pixel).into()));
     let tile = Thumbnail::of_pixels((image.width, image.height), own);
-    session.record(View::new(Kind::Fragment, &case.entry.name), tile);
+    session.record(View::new(ViewKind::Fragment, &case.entry.name), tile);
 }
 
 /// The check for a stage that draws nothing under our pass. One that is no WGSL is at fault where a

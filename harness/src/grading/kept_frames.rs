@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::draw::{Frame, draw_each};
+use super::draw::{FrameRequest, draw_each};
 use super::pipeline::Grading;
 use super::session::{KeptFrames, Session};
 use crate::files::{hex, keep_newest, write_whole};
@@ -35,15 +35,15 @@ impl Grading<'_> {
 }
 
 /// Draws sets of frames with Umbra's own pass, all in one worker while it lives; those that are kept are not drawn.
-pub fn draw_sets(session: &Session, sets: &[Vec<Frame>]) -> Vec<Vec<Outcome>> {
+pub fn draw_sets(session: &Session, sets: &[Vec<FrameRequest>]) -> Vec<Vec<Outcome>> {
     let (Some(kept), Ok(adapter)) = (session.kept_frames, &session.adapter) else {
         return draw_missing(session, sets.iter().collect());
     };
     // Where the program cannot be read, nothing is found and nothing kept.
     let conditions = kept.conditions().ok();
-    let file = |set: &Vec<Frame>| kept.file(session, adapter, set, &conditions?).ok();
+    let file = |set: &Vec<FrameRequest>| kept.file(session, adapter, set, &conditions?).ok();
     let files: Vec<Option<PathBuf>> = sets.iter().map(file).collect();
-    let found = |(set, file): (&Vec<Frame>, &Option<PathBuf>)| {
+    let found = |(set, file): (&Vec<FrameRequest>, &Option<PathBuf>)| {
         let requests = set.iter().map(|frame| frame.request(session, adapter));
         outcomes(&fs::read(file.as_ref()?).ok()?, requests)
     };
@@ -60,7 +60,7 @@ pub fn draw_sets(session: &Session, sets: &[Vec<Frame>]) -> Vec<Vec<Outcome>> {
 }
 
 /// Draws sets of as many frames each, scene by scene.
-fn draw_missing(session: &Session, sets: Vec<&Vec<Frame>>) -> Vec<Vec<Outcome>> {
+fn draw_missing(session: &Session, sets: Vec<&Vec<FrameRequest>>) -> Vec<Vec<Outcome>> {
     let count = sets.first().map_or(0, |set| set.len());
     let by_scene = (0..count).flat_map(|scene| sets.iter().map(move |set| set[scene].clone()));
     let outcomes = draw_each(session, None, &by_scene.collect::<Vec<_>>());
@@ -80,7 +80,7 @@ impl KeptFrames {
         &self,
         session: &Session,
         adapter: &Adapter,
-        frames: &[Frame],
+        frames: &[FrameRequest],
         conditions: &[u8; 32],
     ) -> anyhow::Result<PathBuf> {
         let mut hash = Sha256::new();

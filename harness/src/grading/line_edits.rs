@@ -7,7 +7,7 @@ use std::ops::Range;
 use basecode::gpu::EDITED_LINE;
 
 use super::stages::Stages;
-use crate::worker::Stage;
+use crate::worker::StageText;
 
 /// One line of a source with one word of it changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,8 +42,8 @@ const FUNCTIONS: usize = 200;
 
 impl LineEdit {
     /// What the host replaces to have a pass draw with it.
-    pub fn stage(&self) -> Stage {
-        Stage { name: EDITED_LINE.to_owned(), text: format!("{}\n{}", self.from, self.to) }
+    pub fn stage(&self) -> StageText {
+        StageText { name: EDITED_LINE.to_owned(), text: format!("{}\n{}", self.from, self.to) }
     }
 
     /// Where it is, for reports.

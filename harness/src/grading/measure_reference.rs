@@ -8,7 +8,7 @@ use super::costs::Cost;
 use super::pipeline::Grading;
 use super::stages::Stages;
 use crate::files::hex;
-use crate::process::Limits;
+use crate::process::ProcessLimits;
 use crate::worker::{Job, Reference, Request, RetryBudget};
 
 impl Grading<'_> {
@@ -56,7 +56,7 @@ impl Reference for Grading<'_> {
         }
         let what = format!("{} of {}", request.kind(), request.scene().path.display());
         let job = Job { plugin: Some(reference), requests: vec![request] };
-        let limits = Limits { threads: self.threads, ..Limits::default() };
+        let limits = ProcessLimits { threads: self.threads, ..ProcessLimits::default() };
         let report = self.supervisor.run_job(&job, &limits, self.cancel, &mut |_| ());
         let answered = report.outcomes.iter().all(|outcome| outcome.answer().is_some());
         let cpu_s = report.runs.iter().map(|run| run.ended.cpu_s).sum::<f64>();

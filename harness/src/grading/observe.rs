@@ -122,11 +122,11 @@ pub fn fragment(session: &Session, case: &PreparedScene, image: &Image, phong: b
     let count = own.len();
     let samples = few(own.into_iter(), count).map(|(point, pixel)| {
         let material = scene.material_of(point.shape);
-        let colour = |colour: Vec3| (material.energy_scale() * colour).to_array().map(f64::from);
+        let color = |color: Vec3| (material.energy_scale() * color).to_array().map(f64::from);
         let reflector = Reflector::Surface {
             phong,
-            diffuse: colour(material.diffuse.average()),
-            specular: colour(material.specular.average()),
+            diffuse: color(material.diffuse.average()),
+            specular: color(material.specular.average()),
             exponent: f64::from(material.exponent),
             unscaled: false,
         };
@@ -229,8 +229,8 @@ fn keep(session: &Session, part: &'static str, samples: impl Iterator<Item = Sam
 }
 
 /// Answers under a witness as colors, where there are any.
-pub fn colours(outcome: &crate::worker::Outcome) -> Option<&[[f32; 3]]> {
-    outcome.answer().map(|answer| session::colours(&answer.values))
+pub fn colors(outcome: &crate::worker::Outcome) -> Option<&[[f32; 3]]> {
+    outcome.answer().map(|answer| session::colors(&answer.values))
 }
 
 #[cfg(test)]

@@ -10,9 +10,9 @@ use super::prepared_scene::{PreparedScene, Sampled};
 use super::questions::{Outcomes, Question, Questions};
 use super::session::{self, Session};
 use crate::diagnosis::{self, LoopSeen, Thumbnail, View};
-use crate::evidence::images::{self, Kind};
+use crate::evidence::images::{self, ImageKind};
 use crate::evidence::loops;
-use crate::evidence::price::Class;
+use crate::evidence::price::PriceClass;
 use crate::evidence::rays::{self, OwnValue};
 use crate::evidence::shading::{ShadedPoint, Shading};
 use crate::evidence::{Check, CheckId, Verdict};
@@ -37,7 +37,7 @@ pub struct Drawn {
     /// Name of the scene.
     pub scene: String,
     /// How it came about.
-    pub kind: Kind,
+    pub kind: ImageKind,
     /// The image.
     pub image: Image,
 }
@@ -93,7 +93,7 @@ struct RayQuestions {
 impl RayQuestions {
     /// What the renderer's own BSDFs answer at plain surfaces, by ray; nothing where there is no answer.
     fn own_values(&self, bsdfs: &Outcome) -> Vec<OwnValue> {
-        let values = bsdfs.answer().map_or(&[][..], |answer| session::colours(&answer.values));
+        let values = bsdfs.answer().map_or(&[][..], |answer| session::colors(&answer.values));
         self.plain.iter().copied().zip(values.iter().copied()).collect()
     }
 }
@@ -243,7 +243,7 @@ impl<'a> Asked<'_, 'a> {
         if let (bsdfs @ Outcome::Done(_), Outcome::Done(radiance)) = (&outcomes[asked.bsdfs], own.1)
         {
             let values = asked.own_values(bsdfs);
-            let radiance = session::colours(&radiance.values);
+            let radiance = session::colors(&radiance.values);
             checks.push(rays::judge_material(&case.probe_film.batch, &values, radiance));
         }
         checks
@@ -257,12 +257,12 @@ impl<'a> Asked<'_, 'a> {
         shadows: bool,
     ) {
         for ((witness, _), outcome) in WITNESSES.iter().zip(witnessed) {
-            if let Some(values) = observe::colours(outcome) {
+            if let Some(values) = observe::colors(outcome) {
                 observe::radiance(self.session, self.case, *witness, values);
             }
         }
         if let (true, Some(with), Some(without)) =
-            (shadows, observe::colours(with), observe::colours(without))
+            (shadows, observe::colors(with), observe::colors(without))
         {
             observe::shadows(self.session, self.case, with, without);
         }
@@ -291,7 +291,7 @@ impl<'a> Asked<'_, 'a> {
         match (image, along) {
             (Outcome::Done(image), Outcome::Done(along)) => {
                 let (image, along) =
-                    (session::colours(&image.values), session::colours(&along.values));
+                    (session::colors(&image.values), session::colors(&along.values));
                 let judge = |along: &[_]| loops::judge_agreement(name, &small.mask, image, along);
                 let size = (small.width, small.height);
                 let centers = centers(self.case);
@@ -317,7 +317,7 @@ impl<'a> Asked<'_, 'a> {
         match (along, image) {
             (Outcome::Done(along), Outcome::Done(image)) => {
                 let (image, along) =
-                    (session::colours(&image.values), session::colours(&along.values));
+                    (session::colors(&image.values), session::colors(&along.values));
                 let judge = |along: &[_]| loops::judge_samples(name, &sampled.film, image, along);
                 let (check, edges) = judge(along);
                 let size = (sampled.film.width, sampled.film.height);
@@ -350,7 +350,7 @@ impl<'a> Asked<'_, 'a> {
             let mut questions = Questions::default();
             let along = questions.ask(self.radiance(&rays, Witness::True, shadows));
             let outcomes = questions.run(self.session, self.plugin);
-            outcomes[along].answer().map(|answer| session::colours(&answer.values).to_vec())
+            outcomes[along].answer().map(|answer| session::colors(&answer.values).to_vec())
         })
     }
 
@@ -363,7 +363,7 @@ impl<'a> Asked<'_, 'a> {
         tolerances: &Tolerances,
     ) -> (Check, Option<Drawn>) {
         let (case, name) = (self.case, &self.case.entry.name);
-        let kind = Kind::Offline { spp: case.spp };
+        let kind = ImageKind::Offline { spp: case.spp };
         let judge = |outcome: &Outcome, expected: &Expected| {
             let id = CheckId::ImageOffline;
             let Outcome::Done(answer) = outcome else {
@@ -412,7 +412,7 @@ fn settle_slow(check: &mut Check, full: &Outcome) {
     if let Outcome::TimedOut(late) = full
         && late.computing
     {
-        check.error = Class::Slip.price();
+        check.error = PriceClass::Slip.price();
         check.summary = format!("too slow on the whole film of scene \"{}\": {late}", check.scene);
     }
 }
@@ -475,20 +475,20 @@ fn record_rays(
     let (name, small) = (&case.entry.name, &case.probe_film);
     let size = (small.width as usize, small.height as usize);
     if let Outcome::Done(lit) = lit {
-        let values = session::colours(&lit.values).iter().copied();
+        let values = session::colors(&lit.values).iter().copied();
         let tile = Thumbnail::of_pixels(size, small.batch.met().copied().zip(values));
-        session.record(View::new(diagnosis::Kind::Lit, name), tile);
+        session.record(View::new(diagnosis::ViewKind::Lit, name), tile);
     }
     if let (Outcome::Done(with), Outcome::Done(without)) = (with, without)
-        && observe::tells_visibility(small.batch.lit, session::colours(&without.values))
+        && observe::tells_visibility(small.batch.lit, session::colors(&without.values))
     {
-        let pairs = session::colours(&with.values).iter().zip(session::colours(&without.values));
+        let pairs = session::colors(&with.values).iter().zip(session::colors(&without.values));
         let sums = pairs.map(|(a, b)| (a.iter().sum::<f32>(), b.iter().sum::<f32>()));
         // A ray that is black without shadows tells nothing.
         let told = small.batch.met().zip(sums).filter(|(_, (_, without))| *without != 0.0);
         let visibility = told.map(|(&pixel, (with, without))| (pixel, [with / without; 3]));
         session.record(
-            View::new(diagnosis::Kind::Shadow, name),
+            View::new(diagnosis::ViewKind::Shadow, name),
             Thumbnail::of_pixels(size, visibility),
         );
     }
@@ -502,7 +502,7 @@ fn record_loop(session: &Session, case: &PreparedScene, (image, along): (&[f32],
     let (name, small) = (&case.entry.name, &case.probe_film);
     let [image, rays] =
         [image, along].map(|values| session::image(values, small.width, small.height));
-    session.record(View::new(diagnosis::Kind::Offline, name), Thumbnail::of_image(&image));
+    session.record(View::new(diagnosis::ViewKind::Offline, name), Thumbnail::of_image(&image));
     if let Ok(mut observations) = session.observations.lock() {
         observations.loops.insert(name.clone(), LoopSeen { rays, image });
     }
@@ -517,12 +517,11 @@ fn judge_shadows(
     let (id, name) = (CheckId::ShadowRays, &case.entry.name);
     match (with, without) {
         (Outcome::Done(with), Outcome::Done(without)) => {
-            let (with, without) =
-                (session::colours(&with.values), session::colours(&without.values));
+            let (with, without) = (session::colors(&with.values), session::colors(&without.values));
             // Where there is no BSDF yet, nothing is told of what it would shade.
             let shaded = match shaded {
                 (Outcome::Done(on), Outcome::Done(off)) => {
-                    (session::colours(&on.values), session::colours(&off.values))
+                    (session::colors(&on.values), session::colors(&off.values))
                 }
                 _ => (without, without),
             };

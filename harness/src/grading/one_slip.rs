@@ -5,7 +5,7 @@ use std::path::Path;
 
 use basecode::{Image, Matrices};
 
-use super::draw::{Frame, draw_each, draw_one_each};
+use super::draw::{FrameRequest, draw_each, draw_one_each};
 use super::isolate::{on_film, positions_and_normals};
 use super::line_edits::{self, LineEdit};
 use super::offline::Drawn;
@@ -13,14 +13,14 @@ use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use super::stages::{MOVED, Moved, Stages, matrices, negated_normals};
 use super::usual_pipelines;
-use crate::evidence::images::{self, Kind};
+use crate::evidence::images::{self, ImageKind};
 use crate::evidence::pixels::{self, LeftBySlip, SURFACES_MISSING};
-use crate::evidence::price::{self, Class, Price};
+use crate::evidence::price::{self, Price, PriceClass};
 use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::imaging::reference::Region;
 use crate::imaging::tolerances::Tolerances;
-use crate::worker::{Outcome, Stage};
+use crate::worker::{Outcome, StageText};
 
 /// Pass and stages, each alone.
 const ALONE: [CheckId; 4] =
@@ -38,7 +38,7 @@ pub struct Found {
     /// The checks under which it pays for all.
     pub checks: Vec<Check>,
     /// What the host replaces to have the pass draw the right pictures, if that is how it is known.
-    pub mended_by: Option<Stage>,
+    pub mended_by: Option<StageText>,
     /// Whether some surfaces are not drawn, and no more is wrong.
     pub is_of_missing_surfaces: bool,
 }
@@ -63,7 +63,8 @@ pub fn judge(
     let fails = |id: CheckId| found.iter().any(|check| check.id == id && !is_open(check));
     let others_are_open = |id: CheckId| ALONE.into_iter().all(|of| of == id || !fails(of));
     let frame = |case: &PreparedScene| {
-        let own = |drawn: &&Drawn| drawn.scene == case.entry.name && drawn.kind == Kind::Realtime;
+        let own =
+            |drawn: &&Drawn| drawn.scene == case.entry.name && drawn.kind == ImageKind::Realtime;
         drawn.iter().find(own).map(|drawn| &drawn.image)
     };
     // A pipeline that cannot be drawn with leaves no frame.
@@ -74,7 +75,7 @@ pub fn judge(
         found.iter().any(|check| own(check) && check.verdict == Verdict::Fail)
     };
     let wrong: Vec<bool> = cases.iter().map(is_wrong).collect();
-    let slips = |ids: &[CheckId], (name, class): (&str, Class), place: &str| {
+    let slips = |ids: &[CheckId], (name, class): (&str, PriceClass), place: &str| {
         let scene = |(case, wrong): (&PreparedScene, &bool)| {
             let own = |other| (ids.contains(&other) && *wrong).then_some((name, class, place));
             // What a pass shows by itself tells more than its frames.
@@ -92,7 +93,7 @@ pub fn judge(
         };
         Found::of(cases.iter().zip(&wrong).flat_map(scene).collect())
     };
-    let slip = |id, found: (&str, Class)| slips(&[id], found, "");
+    let slip = |id, found: (&str, PriceClass)| slips(&[id], found, "");
     let vertex = CheckId::StageVertex;
     // Of a stage that is wrong alone its own frames tell.
     let is_open = |id: CheckId| others_are_open(id) && !(id == vertex && fails(vertex));
@@ -100,14 +101,14 @@ pub fn judge(
     let slips_of_frames = frames.as_ref().map(told).unwrap_or_default();
     let mut of_frames = slips_of_frames.iter().filter(|(id, _)| is_open(*id));
     if let Some((id, name)) = of_frames.find(|(_, name)| *name != SURFACES_MISSING) {
-        return slip(*id, (name, Class::Slip));
+        return slip(*id, (name, PriceClass::Slip));
     }
     let first = wrong.iter().position(|wrong| *wrong).unwrap_or_default();
-    let mended = |stage: &Stage| mended_by(stage, session, plugin, (cases, first), tolerances);
+    let mended = |stage: &StageText| mended_by(stage, session, plugin, (cases, first), tolerances);
     if others_are_open(CheckId::PassUniforms)
         && let Some((name, stage)) = usual_pipelines::slips().find(|(_, stage)| mended(stage))
     {
-        let checks = slip(CheckId::PassUniforms, (name, Class::Slip)).checks;
+        let checks = slip(CheckId::PassUniforms, (name, PriceClass::Slip)).checks;
         return Found { mended_by: Some(stage), ..Found::of(checks) };
     }
     let Some(frames) = frames else { return Found::default() };
@@ -117,10 +118,10 @@ pub fn judge(
             are_right(cases, moved.collect(), Film::Whole, tolerances)
         };
         if let Some((name, _)) = MOVED.iter().find(is_moved) {
-            return slip(vertex, (name, Class::Slip));
+            return slip(vertex, (name, PriceClass::Slip));
         }
         if mended(&negated_normals()) {
-            return slip(vertex, ("the normal is negated", Class::Slip));
+            return slip(vertex, ("the normal is negated", PriceClass::Slip));
         }
         if is_open(vertex)
             && let Some((found, which)) = slip_of_matrices(&|which| mended(&matrices(which)))
@@ -139,7 +140,7 @@ pub fn judge(
         let right = edits.iter().zip(tries(edits)).filter(|(_, image)| are_right(image.clone()));
         let mut right = right.map(|(edit, _)| (edit, edit.stage()));
         if let Some((edit, stage)) = right.find(|(_, stage)| mended(stage)) {
-            let of = slips(&paying(edit, found), (edit.name, Class::Slip), &edit.place());
+            let of = slips(&paying(edit, found), (edit.name, PriceClass::Slip), &edit.place());
             return Found { mended_by: Some(stage), ..of };
         }
     }
@@ -151,7 +152,7 @@ pub fn judge(
     if let Some((id, name)) = missing.filter(|(id, _)| others_are_open(*id))
         && 2 * holes > wrong.iter().filter(|wrong| **wrong).count()
     {
-        return Found { is_of_missing_surfaces: true, ..slip(*id, (name, Class::Slip)) };
+        return Found { is_of_missing_surfaces: true, ..slip(*id, (name, PriceClass::Slip)) };
     }
     if ALONE.into_iter().any(fails) {
         return Found::default();
@@ -181,7 +182,7 @@ fn pays(edit: &LineEdit, found: &[Check]) -> bool {
     };
     let open = |id: CheckId| {
         let lost: Vec<&Check> = failed(id).collect();
-        let concept = Class::Concept.price() - 1e-3;
+        let concept = PriceClass::Concept.price() - 1e-3;
         let of_concept = |check: &&&Check| price::is_explained(check) && check.error >= concept;
         let is_concept = 2 * lost.iter().filter(of_concept).count() > lost.len();
         let unexplained = |check: &&Check| {
@@ -212,10 +213,10 @@ fn drawn_with(
     plugin: &Path,
     case: &PreparedScene,
 ) -> Vec<Option<Image>> {
-    let frame = |edit: &LineEdit| Frame::probe(case, vec![edit.stage()]);
-    let frames: Vec<Frame> = edits.iter().map(frame).collect();
+    let frame = |edit: &LineEdit| FrameRequest::probe(case, vec![edit.stage()]);
+    let frames: Vec<FrameRequest> = edits.iter().map(frame).collect();
     let outcomes = draw_each(session, Some(plugin), &frames);
-    let image = |(frame, outcome): (&Frame, &Outcome)| {
+    let image = |(frame, outcome): (&FrameRequest, &Outcome)| {
         Some(session::image(&outcome.answer()?.values, frame.size.0, frame.size.1))
     };
     frames.iter().zip(&outcomes).map(image).collect()
@@ -224,22 +225,22 @@ fn drawn_with(
 /// What is wrong with the matrices of a pass that is right under other ones, and which these are.
 fn slip_of_matrices(
     is_right: &dyn Fn(Matrices) -> bool,
-) -> Option<((&'static str, Class), Matrices)> {
+) -> Option<((&'static str, PriceClass), Matrices)> {
     use Matrices::{InProjection, InView, Transposed};
-    let exchanged = ("view and projection are exchanged", Class::Slip);
+    let exchanged = ("view and projection are exchanged", PriceClass::Slip);
     Some(match (is_right(InView), is_right(InProjection)) {
         (true, true) => (exchanged, InView),
-        (true, false) => (("the projection is missing", Class::Concept), InView),
-        (false, true) => (("the view matrix is missing", Class::Concept), InProjection),
+        (true, false) => (("the projection is missing", PriceClass::Concept), InView),
+        (false, true) => (("the view matrix is missing", PriceClass::Concept), InProjection),
         (false, false) if is_right(Transposed) => {
-            (("the position stands on the left of the matrices", Class::Slip), Transposed)
+            (("the position stands on the left of the matrices", PriceClass::Slip), Transposed)
         }
         (false, false) => return None,
     })
 }
 
 /// The check of a part under the mistake that explains all frames: where it is the part's own.
-fn explained(id: CheckId, case: &PreparedScene, own: Option<(&str, Class, &str)>) -> Check {
+fn explained(id: CheckId, case: &PreparedScene, own: Option<(&str, PriceClass, &str)>) -> Check {
     let scene = &case.entry.name;
     let convention = ONE_SLIP.to_owned();
     let Some((name, class, place)) = own else {
@@ -339,21 +340,21 @@ fn are_right(
 /// Whether a pass draws the right picture of every scene where the host changes what it is given. `first` is one that
 /// it draws wrongly otherwise: where that stays wrong, no other is drawn.
 fn mended_by(
-    stage: &Stage,
+    stage: &StageText,
     session: &Session,
     plugin: &Path,
     (cases, first): (&[PreparedScene], usize),
     tolerances: &Tolerances,
 ) -> bool {
     let is_mended = |cases: &[PreparedScene]| {
-        let frame = |case| Frame::probe(case, vec![stage.clone()]);
-        let frames: Vec<Frame> = cases.iter().map(frame).collect();
-        let image = |frame: &Frame, outcome: &Outcome| {
+        let frame = |case| FrameRequest::probe(case, vec![stage.clone()]);
+        let frames: Vec<FrameRequest> = cases.iter().map(frame).collect();
+        let image = |frame: &FrameRequest, outcome: &Outcome| {
             let (width, height) = frame.size;
             Some(session::image(&outcome.answer()?.values, width, height))
         };
         let is_right = |case: &PreparedScene, outcome: &Outcome| {
-            let picture = image(&Frame::probe(case, Vec::new()), outcome);
+            let picture = image(&FrameRequest::probe(case, Vec::new()), outcome);
             are_right(std::slice::from_ref(case), vec![picture], Film::Small, tolerances)
         };
         let outcomes = draw_one_each(session, plugin, &frames, &is_right);
@@ -376,8 +377,10 @@ fn vertex_under_own_pass(
         return Vec::new();
     };
     let sets = positions_and_normals(own);
-    let frames: Vec<Frame> =
-        cases.iter().flat_map(|case| sets.clone().map(|set| Frame::probe(case, set))).collect();
+    let frames: Vec<FrameRequest> = cases
+        .iter()
+        .flat_map(|case| sets.clone().map(|set| FrameRequest::probe(case, set)))
+        .collect();
     let outcomes = draw_each(session, Some(plugin), &frames);
     let mut checks = Vec::new();
     for (case, pair) in cases.iter().zip(outcomes.chunks(sets.len())) {
@@ -393,7 +396,9 @@ fn vertex_under_own_pass(
         let summary = format!("{} (convention: {convention})", check.summary);
         let check = Check { convention, summary, ..check };
         // Identities show nothing wrong, so a matrix stands where another belongs.
-        checks.push(check.priced(|raw| Price::of_raw(raw).or("another matrix", Class::Slip, 0.0)));
+        checks.push(
+            check.priced(|raw| Price::of_raw(raw).or("another matrix", PriceClass::Slip, 0.0)),
+        );
     }
     // Right there as well: nothing is explained.
     if checks.iter().any(|check| check.verdict == Verdict::Fail) { checks } else { Vec::new() }
@@ -409,9 +414,9 @@ mod tests {
         use Matrices::{InProjection, InView, Transposed};
         assert_eq!(of(&[]), None);
         let class = |right: &[Matrices]| of(right).map(|((_, class), _)| class);
-        assert_eq!(class(&[InView, InProjection]), Some(Class::Slip));
-        assert_eq!(class(&[InView]), Some(Class::Concept));
-        assert_eq!(class(&[InProjection]), Some(Class::Concept));
-        assert_eq!(class(&[Transposed]), Some(Class::Slip));
+        assert_eq!(class(&[InView, InProjection]), Some(PriceClass::Slip));
+        assert_eq!(class(&[InView]), Some(PriceClass::Concept));
+        assert_eq!(class(&[InProjection]), Some(PriceClass::Concept));
+        assert_eq!(class(&[Transposed]), Some(PriceClass::Slip));
     }
 }

@@ -9,7 +9,7 @@ use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::record::{Folders, SceneErrors};
 use super::submitted::SubmittedImage;
-use crate::evidence::images::{Kind, compare_pixels, reference_of};
+use crate::evidence::images::{ImageKind, compare_pixels, reference_of};
 use crate::evidence::{Check, CheckId, Picture, Verdict};
 use crate::imaging::error_map::ErrorMap;
 use crate::imaging::pictures::{self, full_scale, signed_error, tone_mapped};
@@ -65,7 +65,7 @@ impl Images<'_> {
         let map = |check: &Check| {
             let case = self.case_of(check)?;
             let (kind, actual) = self.image_of(check, case)?;
-            let own = [Kind::Realtime, Kind::RealtimeShadows].contains(&kind)
+            let own = [ImageKind::Realtime, ImageKind::RealtimeShadows].contains(&kind)
                 || check.id == CheckId::ImageOffline;
             let (reference, mask) = reference_of(kind, &case.expected);
             let map = ErrorMap::of(actual, reference, mask, case.expected.offline.median_lit)?;
@@ -119,15 +119,15 @@ impl Images<'_> {
     }
 
     /// The image that a check is about, and how it came about.
-    fn image_of(&self, check: &Check, case: &PreparedScene) -> Option<(Kind, &Image)> {
-        let own = |kind: Kind| {
+    fn image_of(&self, check: &Check, case: &PreparedScene) -> Option<(ImageKind, &Image)> {
+        let own = |kind: ImageKind| {
             let own = self.drawn.iter().find(|d| d.scene == check.scene && d.kind == kind);
             Some((kind, &own?.image))
         };
         match check.id {
-            CheckId::ImageOffline => own(Kind::Offline { spp: case.spp }),
-            CheckId::ImageRealtime => own(Kind::Realtime),
-            CheckId::BonusImage | CheckId::BonusProbe => own(Kind::RealtimeShadows),
+            CheckId::ImageOffline => own(ImageKind::Offline { spp: case.spp }),
+            CheckId::ImageRealtime => own(ImageKind::Realtime),
+            CheckId::BonusImage | CheckId::BonusProbe => own(ImageKind::RealtimeShadows),
             _ => self.submitted.iter().find_map(|image| image.shown_by(check)),
         }
     }
@@ -136,7 +136,7 @@ impl Images<'_> {
 fn triple(
     id: CheckId,
     case: &PreparedScene,
-    kind: Kind,
+    kind: ImageKind,
     actual: &Image,
     out: &Path,
 ) -> anyhow::Result<Vec<Picture>> {
@@ -180,7 +180,7 @@ fn ray_map(case: &PreparedScene, rays: &[(usize, bool)], out: &Path) -> anyhow::
 fn view(
     check: &Check,
     case: &PreparedScene,
-    kind: Kind,
+    kind: ImageKind,
     actual: &Image,
     tolerances: &Tolerances,
     folder: &Path,
@@ -190,11 +190,11 @@ fn view(
     let median = expected.offline.median_lit;
     let scene = &check.scene;
     let (what, note) = match kind {
-        Kind::Offline { spp } => ("offline", format!("{spp} samples per pixel")),
-        Kind::Realtime | Kind::SubmittedRealtime => ("realtime", String::new()),
-        Kind::RealtimeShadows | Kind::SubmittedShadows => ("bonus", String::new()),
+        ImageKind::Offline { spp } => ("offline", format!("{spp} samples per pixel")),
+        ImageKind::Realtime | ImageKind::SubmittedRealtime => ("realtime", String::new()),
+        ImageKind::RealtimeShadows | ImageKind::SubmittedShadows => ("bonus", String::new()),
     };
-    let submitted = matches!(kind, Kind::SubmittedRealtime | Kind::SubmittedShadows)
+    let submitted = matches!(kind, ImageKind::SubmittedRealtime | ImageKind::SubmittedShadows)
         || check.id == CheckId::SubmittedOffline;
     let whose = if submitted { "submitted image" } else { "drawn by the code" };
     let mut view = ViewedCase {

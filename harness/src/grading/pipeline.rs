@@ -91,17 +91,18 @@ impl RenderPath {
 
 impl<'a> Grading<'a> {
     /// Makes the batch ready: records the compiler call, loads all scenes, tries the adapter.
-    /// `perturb` is the seed of the held-back scenes; without one there are none.
+    /// `held_back_seed` is the seed of the held-back scenes; without one there are none.
     ///
     /// # Errors
     /// When the template cannot be built or expected images cannot be had: the machine's matter.
     pub fn prepare(
         store: &Store<'a>,
         adapter: Adapter,
-        perturb: Option<u64>,
+        held_back_seed: Option<u64>,
         cancel: &'a AtomicBool,
     ) -> anyhow::Result<Self> {
-        Self::prepare_beside(store, adapter, perturb, cancel, |_| ()).map(|(ready, ())| ready)
+        Self::prepare_beside(store, adapter, held_back_seed, cancel, |_| ())
+            .map(|(ready, ())| ready)
     }
 
     /// The same, while something is done that needs no scene. Answers what that gives, too.
@@ -111,15 +112,15 @@ impl<'a> Grading<'a> {
     pub fn prepare_beside<T: Send>(
         store: &Store<'a>,
         adapter: Adapter,
-        perturb: Option<u64>,
+        held_back_seed: Option<u64>,
         cancel: &'a AtomicBool,
         beside: impl FnOnce(&Workshop) -> T + Send,
     ) -> anyhow::Result<(Self, T)> {
         let assignment = store.assignment;
         anyhow::ensure!(
-            perturb.is_none() || store.reference.is_some(),
+            held_back_seed.is_none() || store.reference.is_some(),
             "held-back scenes cannot be made: there is no reference renderer to tell what is right on them; \
-             hint: `--perturb off` grades on the public scenes alone"
+             hint: `--held-back off` grades on the public scenes alone"
         );
         let begun = Instant::now();
         let recording =
@@ -130,7 +131,8 @@ impl<'a> Grading<'a> {
             Workshop { assignment, supervisor: store.supervisor, recording: &recording, cancel };
         let (ready, done) = std::thread::scope(|scope| {
             let done = scope.spawn(|| beside(&workshop));
-            let ready = Self::with_scenes(store, adapter, perturb, cancel, recording.clone());
+            let ready =
+                Self::with_scenes(store, adapter, held_back_seed, cancel, recording.clone());
             (ready, done.join().unwrap_or_else(|panic| resume_unwind(panic)))
         });
         Ok((ready?, done))
@@ -140,13 +142,14 @@ impl<'a> Grading<'a> {
     fn with_scenes(
         store: &Store<'a>,
         adapter: Adapter,
-        perturb: Option<u64>,
+        held_back_seed: Option<u64>,
         cancel: &'a AtomicBool,
         recording: Recording,
     ) -> anyhow::Result<Self> {
         let assignment = store.assignment;
         let mut cases = PreparedScene::all(store, &assignment.scenes)?;
-        let held_back = perturb.map(|seed| hold_back(store, seed, &mut cases)).transpose()?;
+        let held_back =
+            held_back_seed.map(|seed| hold_back(store, seed, &mut cases)).transpose()?;
         let mut grading = Self {
             assignment,
             supervisor: store.supervisor.clone(),

@@ -6,7 +6,7 @@ use basecode::gpu::{EMPTY_MAPS, Footprint};
 use basecode::{Image, Vec3};
 
 use super::coverage;
-use super::draw::{Frame, draw, draw_each, draw_one_each};
+use super::draw::{FrameRequest, draw, draw_each, draw_one_each};
 use super::judged::Judged;
 use super::line_edits::{self, LineEdit};
 use super::offline::Drawn;
@@ -14,21 +14,21 @@ use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use super::stages::{MOVED, Stages, negated_normals};
 use super::zoomed;
-use crate::evidence::images::{self, Kind};
+use crate::evidence::images::{self, ImageKind};
 use crate::evidence::pixels;
-use crate::evidence::price::{self, Class, Price};
+use crate::evidence::price::{self, Price, PriceClass};
 use crate::evidence::shadow_map::{EXCHANGED, Shadows};
 use crate::evidence::stages::VERTEX;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::expected::Expected;
 use crate::imaging::reference::{Region, RegionMask};
 use crate::imaging::tolerances::Tolerances;
-use crate::worker::{Fault, Outcome, STAGES, Stage};
+use crate::worker::{Fault, Outcome, STAGES, StageText};
 
-type View = (CheckId, &'static dyn Fn(&Region) -> bool);
+type RegionCheck = (CheckId, &'static dyn Fn(&Region) -> bool);
 
 /// The image as a whole, and by material.
-const VIEWS: [View; 3] = [
+const VIEWS: [RegionCheck; 3] = [
     (CheckId::ImageRealtime, &|_| true),
     (CheckId::ImageRealtimeDiffuse, &|region| region.exponent == 0.0),
     (CheckId::ImageRealtimePhong, &|region| region.exponent > 0.0),
@@ -42,7 +42,7 @@ pub fn judge_images(
     stages: &Stages,
     tolerances: &Tolerances,
 ) -> Vec<Judged> {
-    let right_as = |kind, view: View| {
+    let right_as = |kind, view: RegionCheck| {
         move |case: &PreparedScene, outcome: &Outcome| {
             let Outcome::Done(answer) = outcome else { return false };
             let (width, height) = case.film();
@@ -50,15 +50,15 @@ pub fn judge_images(
             judge(case, kind, &image, view, tolerances).verdict == Verdict::Pass
         }
     };
-    let frames: Vec<Frame> = cases.iter().map(Frame::plain).collect();
-    let plain = draw_one_each(session, plugin, &frames, &right_as(Kind::Realtime, VIEWS[0]));
+    let frames: Vec<FrameRequest> = cases.iter().map(FrameRequest::plain).collect();
+    let plain = draw_one_each(session, plugin, &frames, &right_as(ImageKind::Realtime, VIEWS[0]));
     // Workers of their own: the bonus may crash without a trace on the others.
-    let mut frames: Vec<Frame> = cases.iter().filter_map(Frame::bonus).collect();
+    let mut frames: Vec<FrameRequest> = cases.iter().filter_map(FrameRequest::bonus).collect();
     // What this one takes is looked at, and must not be there from another.
     frames.sort_by_key(|frame| !frame.case.entry.bonus_required);
-    let right = right_as(Kind::RealtimeShadows, (CheckId::BonusImage, &|_| true));
+    let right = right_as(ImageKind::RealtimeShadows, (CheckId::BonusImage, &|_| true));
     let outcomes = draw_one_each(session, plugin, &frames, &right);
-    let mut bonus: Vec<(Frame, Outcome)> = frames.into_iter().zip(outcomes).collect();
+    let mut bonus: Vec<(FrameRequest, Outcome)> = frames.into_iter().zip(outcomes).collect();
     let judged = cases.iter().zip(plain).map(|(case, plain)| {
         let footprint = plain.answer().and_then(|answer| answer.footprint);
         let fails = plain.fault() == Some(Fault::Submission);
@@ -120,11 +120,11 @@ fn settle_exchanged_visibility(
     };
     let seen = |(case, judged): (&PreparedScene, &Judged)| {
         let Expected { unshadowed, unshadowed_mask: mask, .. } = &case.expected;
-        let plain = drawn(judged, Kind::Realtime)?;
+        let plain = drawn(judged, ImageKind::Realtime)?;
         let mut pixels = plain.pixels.iter().zip(&mask.pixels);
         let apart = |value: u16| value & (RegionMask::EDGE | RegionMask::EMITTER) != 0;
         let is_black = pixels.all(|(pixel, value)| apart(*value) || *pixel == Vec3::ZERO);
-        let bonus = drawn(judged, Kind::RealtimeShadows)
+        let bonus = drawn(judged, ImageKind::RealtimeShadows)
             .map(|with| shadows(case).judge(&case.entry.name, &with, unshadowed, tolerances));
         Some(SeenVisibility { is_black, bonus })
     };
@@ -145,7 +145,7 @@ struct SeenVisibility {
 
 fn settle_exchanged(judged: &mut [Judged], seen: Vec<SeenVisibility>) {
     let is_exchanged =
-        |check: &Check| check.mistake == EXCHANGED && check.error <= 1.5 * Class::Slip.price();
+        |check: &Check| check.mistake == EXCHANGED && check.error <= 1.5 * PriceClass::Slip.price();
     let exchanged = |seen: SeenVisibility| match seen.bonus {
         _ if !seen.is_black => None,
         None => Some(None),
@@ -180,9 +180,9 @@ pub fn drawn_by_nobody(check: &mut Check, why: &str) {
 
 fn judge(
     case: &PreparedScene,
-    kind: Kind,
+    kind: ImageKind,
     image: &Image,
-    (id, wanted): View,
+    (id, wanted): RegionCheck,
     tolerances: &Tolerances,
 ) -> Check {
     images::judge(id, &case.entry.name, kind, image, &case.expected, wanted, tolerances)
@@ -192,7 +192,7 @@ fn judge(
 fn drawn(
     session: &Session,
     case: &PreparedScene,
-    kind: Kind,
+    kind: ImageKind,
     id: CheckId,
     outcome: &Outcome,
 ) -> Result<Drawn, Box<Check>> {
@@ -215,7 +215,7 @@ fn judge_plain(
     outcome: &Outcome,
     tolerances: &Tolerances,
 ) -> (Vec<Check>, Option<Drawn>) {
-    let drawn = match drawn(session, case, Kind::Realtime, VIEWS[0].0, outcome) {
+    let drawn = match drawn(session, case, ImageKind::Realtime, VIEWS[0].0, outcome) {
         Ok(drawn) => drawn,
         // Where a part cannot be judged alone either, a frame that is not there decides.
         Err(check) => {
@@ -226,7 +226,7 @@ fn judge_plain(
     };
     let Expected { scene, unshadowed_mask: mask, .. } = &case.expected;
     let views = VIEWS.map(|view| {
-        let check = judge(case, Kind::Realtime, &drawn.image, view, tolerances);
+        let check = judge(case, ImageKind::Realtime, &drawn.image, view, tolerances);
         // The whole image tells of no one part: what it may show is a slip with the film.
         if view.0 == VIEWS[0].0 {
             let right = &case.expected.unshadowed;
@@ -252,7 +252,7 @@ fn judge_bonus(
     plain: Option<&Image>,
     tolerances: &Tolerances,
 ) -> (Check, Option<Drawn>) {
-    let (kind, id) = (Kind::RealtimeShadows, CheckId::BonusImage);
+    let (kind, id) = (ImageKind::RealtimeShadows, CheckId::BonusImage);
     let drawn = match drawn(session, case, kind, id, outcome) {
         Ok(drawn) => drawn,
         Err(check) => return (*check, None),
@@ -277,7 +277,7 @@ fn judge_bonus_without(
 ) -> Option<Check> {
     let bonus = case.bonus.as_deref()?;
     // The template's vertex stage draws nothing.
-    let another = |index: &usize| Stage {
+    let another = |index: &usize| StageText {
         name: STAGES[*index].to_owned(),
         text: if *index == 0 { VERTEX.to_owned() } else { stages.template[*index].clone() },
     };
@@ -287,14 +287,15 @@ fn judge_bonus_without(
         .collect();
     let each = own.iter().map(|index| vec![*index]);
     let sets = each.chain((own.len() > 1).then(|| own.clone()));
-    let drawn = |toml: &Path, shadow_map, stages: &[Stage]| {
-        let frame = Frame { toml, shadow_map, stages: stages.to_vec(), ..Frame::plain(case) };
+    let drawn = |toml: &Path, shadow_map, stages: &[StageText]| {
+        let frame =
+            FrameRequest { toml, shadow_map, stages: stages.to_vec(), ..FrameRequest::plain(case) };
         let outcome = draw(session, Some(plugin), &frame);
         let (width, height) = frame.size;
         outcome.answer().map(|answer| session::image(&answer.values, width, height))
     };
     for set in sets {
-        let replaced: Vec<Stage> = set.iter().map(another).collect();
+        let replaced: Vec<StageText> = set.iter().map(another).collect();
         let Some(mut with) = drawn(bonus, true, &replaced) else { continue };
         let mut without = drawn(&case.realtime, false, &replaced)?;
         let Expected { unshadowed, unshadowed_mask: mask, .. } = &case.expected;
@@ -313,7 +314,7 @@ fn judge_bonus_without(
 /// Judges the bonus once more where the host's change of what a pass is given mends all frames without shadows: by
 /// visibility, and what is right then is right.
 pub fn judge_bonus_under(
-    stage: &dyn Fn(&PreparedScene) -> Stage,
+    stage: &dyn Fn(&PreparedScene) -> StageText,
     session: &Session,
     plugin: &Path,
     cases: &[PreparedScene],
@@ -326,15 +327,15 @@ pub fn judge_bonus_under(
     };
     for check in checks.iter_mut().filter(bonus) {
         let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
-        let Some(with) = Frame::bonus(case) else { continue };
-        let drawn = |frame: Frame| {
-            let frame = Frame { stages: vec![stage(case)], ..frame };
+        let Some(with) = FrameRequest::bonus(case) else { continue };
+        let drawn = |frame: FrameRequest| {
+            let frame = FrameRequest { stages: vec![stage(case)], ..frame };
             let (width, height) = frame.size;
             let outcome = draw(session, Some(plugin), &frame);
             outcome.answer().map(|answer| session::image(&answer.values, width, height))
         };
         let judged = || {
-            let (with, without) = (drawn(with)?, drawn(Frame::plain(case))?);
+            let (with, without) = (drawn(with)?, drawn(FrameRequest::plain(case))?);
             shadows(case).judge(&check.scene, &with, &without, tolerances)
         };
         if let Some(judged) =
@@ -363,7 +364,8 @@ pub fn judge_bonus_where_seen(
             let own = |drawn: &&Drawn| drawn.scene == check.scene && drawn.kind == kind;
             drawn.iter().find(own).map(|drawn| drawn.image.clone())
         };
-        let (Some(with), Some(mut without)) = (frame(Kind::RealtimeShadows), frame(Kind::Realtime))
+        let (Some(with), Some(mut without)) =
+            (frame(ImageKind::RealtimeShadows), frame(ImageKind::Realtime))
         else {
             continue;
         };
@@ -408,13 +410,15 @@ pub fn price_bonus_by_edits(
     failing.sort_by_key(|case| !case.entry.bonus_required);
     let Some(first) = failing.first() else { return };
     let shows = |case: &PreparedScene, edits: &[LineEdit]| -> Vec<bool> {
-        let own = |drawn: &&Drawn| drawn.scene == case.entry.name && drawn.kind == Kind::Realtime;
+        let own =
+            |drawn: &&Drawn| drawn.scene == case.entry.name && drawn.kind == ImageKind::Realtime;
         let plain = drawn.iter().find(own).map(|drawn| &drawn.image);
-        let frame =
-            |edit: &LineEdit| Some(Frame { stages: vec![edit.stage()], ..Frame::bonus(case)? });
-        let frames: Vec<Frame> = edits.iter().filter_map(frame).collect();
+        let frame = |edit: &LineEdit| {
+            Some(FrameRequest { stages: vec![edit.stage()], ..FrameRequest::bonus(case)? })
+        };
+        let frames: Vec<FrameRequest> = edits.iter().filter_map(frame).collect();
         let outcomes = draw_each(session, Some(plugin), &frames);
-        let is_right = |(frame, outcome): (&Frame, &Outcome)| {
+        let is_right = |(frame, outcome): (&FrameRequest, &Outcome)| {
             let Some(answer) = outcome.answer() else { return false };
             let with = session::image(&answer.values, frame.size.0, frame.size.1);
             let has_map = || {
@@ -436,7 +440,7 @@ pub fn price_bonus_by_edits(
             continue;
         };
         for check in checks.iter_mut().filter(|check| is_open(check)) {
-            (check.error, check.mistake) = (Class::Slip.price(), edit.name.to_owned());
+            (check.error, check.mistake) = (PriceClass::Slip.price(), edit.name.to_owned());
             check.summary = format!("{}: {} ({})", edit.name, edit.place(), check.summary);
         }
         return;
@@ -454,8 +458,8 @@ fn shows_its_shadows(
     plain: Option<&Image>,
     tolerances: &Tolerances,
 ) -> bool {
-    let view: View = (CheckId::BonusImage, &|_| true);
-    let as_image = judge(case, Kind::RealtimeShadows, with, view, tolerances);
+    let view: RegionCheck = (CheckId::BonusImage, &|_| true);
+    let as_image = judge(case, ImageKind::RealtimeShadows, with, view, tolerances);
     let by_visibility = || shadows(case).judge(&case.entry.name, with, plain?, tolerances);
     as_image.verdict == Verdict::Pass
         || by_visibility().is_some_and(|check| check.verdict == Verdict::Pass)
@@ -470,7 +474,7 @@ const LEAST_CHANGED: f64 = 0.2;
 fn no_shadow_map(
     session: &Session,
     plugin: &Path,
-    frame: &Frame,
+    frame: &FrameRequest,
     footprint: &Footprint,
     with: &Image,
 ) -> Option<String> {
@@ -484,9 +488,9 @@ fn no_shadow_map(
         let why = "the shadows are right, but the pass makes no pipeline to draw a shadow map with";
         return none.then(|| why.to_owned());
     }
-    let stage = Stage { name: EMPTY_MAPS.to_owned(), text: EMPTY_MAPS.to_owned() };
+    let stage = StageText { name: EMPTY_MAPS.to_owned(), text: EMPTY_MAPS.to_owned() };
     let stages = [frame.stages.clone(), vec![stage]].concat();
-    let outcome = draw(session, Some(plugin), &Frame { stages, ..frame.clone() });
+    let outcome = draw(session, Some(plugin), &FrameRequest { stages, ..frame.clone() });
     let without = session::image(&outcome.answer()?.values, frame.size.0, frame.size.1);
     let mask = &frame.case.expected.offline.mask;
     let inside = |value: u16| {
@@ -547,7 +551,7 @@ fn plain_but_for_shadows(
     let summary = "the default run draws shadows: only the bonus scene may";
     let mut checks = judged.to_vec();
     let check = Check::new(CheckId::BonusDefault, name, Verdict::Fail, summary);
-    checks.push(check.priced(|raw| Price::of_raw(raw).or(ALWAYS_SHADOWED, Class::Slip, 0.0)));
+    checks.push(check.priced(|raw| Price::of_raw(raw).or(ALWAYS_SHADOWED, PriceClass::Slip, 0.0)));
     Some(checks)
 }
 
@@ -570,16 +574,16 @@ fn judge_visibility(
     if let Some(own) = own.as_ref().filter(|own| passes(own)) {
         return own.clone();
     }
-    let drawn = |toml: &Path, shadow_map, times, stages: &[Stage]| {
+    let drawn = |toml: &Path, shadow_map, times, stages: &[StageText]| {
         let stages = stages.to_vec();
-        let frame = Frame { toml, shadow_map, times, stages, ..Frame::plain(case) };
+        let frame = FrameRequest { toml, shadow_map, times, stages, ..FrameRequest::plain(case) };
         let outcome = draw(session, Some(plugin), &frame);
         let (width, height) = frame.size;
         outcome.answer().map(|answer| session::image(&answer.values, width, height))
     };
-    let vertex = Stage { name: STAGES[0].to_owned(), text: VERTEX.to_owned() };
+    let vertex = StageText { name: STAGES[0].to_owned(), text: VERTEX.to_owned() };
     let bonus = case.bonus.as_deref();
-    let again = |times, stages: &[Stage]| {
+    let again = |times, stages: &[StageText]| {
         judge(&drawn(bonus?, true, times, stages)?, &drawn(&case.realtime, false, times, stages)?)
     };
     let swapped = again(1, &[vertex]);
@@ -627,7 +631,7 @@ mod tests {
 
     #[test]
     fn exchanged_visibility_is_the_bonus_slip_alone() {
-        let slip = Class::Slip.price();
+        let slip = PriceClass::Slip.price();
         let unsettled = vec![(Verdict::Fail, 1.0); 2];
         let exchanged = (true, Some(Some((EXCHANGED, slip))));
         let without = (true, None);

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::image_digest::ImageDigest;
-use super::likeness::SourceDigest;
+use super::similarity::SourceDigest;
 use crate::diagnosis::Diagnosis;
 use crate::evidence::{CheckId, Evidence};
 use crate::imaging::error_map::ErrorMap;

@@ -9,7 +9,7 @@ use renderer_api as api;
 
 use crate::diagnosis::{Observations, Thumbnail, View};
 use crate::evidence::{Check, CheckId, Verdict};
-use crate::process::Limits;
+use crate::process::ProcessLimits;
 use crate::worker::{
     Adapter, BsdfQuery, BsdfSource, Fault, Job, JobReport, Outcome, RayQuery, RetryBudget,
     SceneRef, Supervisor,
@@ -37,7 +37,7 @@ pub struct Session<'a> {
     /// Starts workers.
     pub supervisor: Supervisor,
     /// What each may use.
-    pub limits: Limits,
+    pub limits: ProcessLimits,
     /// Ctrl-C.
     pub cancel: &'a AtomicBool,
     /// What realtime is drawn with, or why nothing can be.
@@ -170,13 +170,13 @@ pub fn query(query: &api::BsdfQuery) -> BsdfQuery {
 }
 
 /// An answer as colors.
-pub fn colours(values: &[f32]) -> &[[f32; 3]] {
+pub fn colors(values: &[f32]) -> &[[f32; 3]] {
     values.as_chunks::<3>().0
 }
 
 /// An answer as an image.
 pub fn image(values: &[f32], width: u32, height: u32) -> Image {
-    let pixels = colours(values).iter().map(|&value| Vec3::from(value)).collect();
+    let pixels = colors(values).iter().map(|&value| Vec3::from(value)).collect();
     Image { width: width as usize, height: height as usize, pixels }
 }
 
@@ -243,12 +243,12 @@ pub fn unanswered(id: CheckId, scene: &str, parts: &[&str], outcome: &Outcome) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::worker::Late;
+    use crate::worker::Timeout;
 
     #[test]
     fn an_endless_loop_is_named_with_scene_part_and_limit() {
-        let late = Late { computing: true, limit_s: 3.0, reference_s: Some(0.041) };
-        let said = |late: Late, scene: &str, parts: &[&str]| {
+        let late = Timeout { computing: true, limit_s: 3.0, reference_s: Some(0.041) };
+        let said = |late: Timeout, scene: &str, parts: &[&str]| {
             unanswered(CheckId::RadianceLit, scene, parts, &Outcome::TimedOut(late)).summary
         };
         assert_eq!(
@@ -256,7 +256,7 @@ mod tests {
             "endless loop in 1.3 on scene \"teapot\": no answer within 3 s of CPU time (the reference \
              renderer takes 0.04 s)"
         );
-        let idle = Late { computing: false, limit_s: 10.0, reference_s: None };
+        let idle = Timeout { computing: false, limit_s: 10.0, reference_s: None };
         assert_eq!(
             said(idle, "", &[]),
             "stuck: no answer, and nothing done for 10 s: a deadlock or a sleep"
@@ -267,7 +267,7 @@ mod tests {
     fn what_was_not_asked_costs_the_part_and_is_not_its_first_reason() {
         let not_asked = Outcome::NotRun { reason: "not asked".into(), fault: Fault::Submission };
         let not_asked = unanswered(CheckId::RadianceLit, "s", &["1.3"], &not_asked);
-        let late = Late { computing: true, limit_s: 3.0, reference_s: None };
+        let late = Timeout { computing: true, limit_s: 3.0, reference_s: None };
         let hangs = unanswered(CheckId::RadianceLit, "s", &["1.3"], &Outcome::TimedOut(late));
         assert_eq!((not_asked.verdict, hangs.verdict), (Verdict::Fail, Verdict::Fail));
         assert!(not_asked.error < hangs.error && 25.0 * (1.0 - not_asked.error) < 0.005);

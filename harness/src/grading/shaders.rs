@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 use super::begun::{REFUSED, Say};
-use super::draw::{Frame, draw_each};
+use super::draw::{FrameRequest, draw_each};
 use super::isolate;
 use super::pipeline::Grading;
 use super::session::Session;
@@ -32,11 +32,11 @@ impl Grading<'_> {
     pub(super) fn compile_shaders(&mut self) -> anyhow::Result<()> {
         let (Some(reference), Ok(_)) = (&self.reference, &self.adapter) else { return Ok(()) };
         let Some(case) = self.cases.iter().find(|case| case.bonus.is_some()) else { return Ok(()) };
-        let plain = Frame::plain(case);
+        let plain = FrameRequest::plain(case);
         let toml = case.bonus.as_deref().unwrap_or(&case.realtime);
-        let mut frames = vec![plain.clone(), Frame { toml, shadow_map: true, ..plain }];
+        let mut frames = vec![plain.clone(), FrameRequest { toml, shadow_map: true, ..plain }];
         let shown = isolate::pass_shown().into_iter();
-        frames.extend(shown.map(|stages| Frame::probe(case, stages)));
+        frames.extend(shown.map(|stages| FrameRequest::probe(case, stages)));
         let folder = self.shaders_of(&mut self.session(""), Some(reference), frames, &|_| ())?;
         self.supervisor.shaders.push(folder.path().to_owned());
         self.compiled = Some(folder);
@@ -54,7 +54,7 @@ impl Grading<'_> {
         let (Some(own), Some(case)) = (stages.all_own(), self.cases.first()) else {
             return Ok(None);
         };
-        let folder = self.shaders_of(session, None, vec![Frame::probe(case, own)], say)?;
+        let folder = self.shaders_of(session, None, vec![FrameRequest::probe(case, own)], say)?;
         session.supervisor.shaders.push(folder.path().to_owned());
         Ok(Some(folder))
     }
@@ -65,7 +65,7 @@ impl Grading<'_> {
         &self,
         session: &mut Session,
         renderer: Option<&Path>,
-        mut frames: Vec<Frame>,
+        mut frames: Vec<FrameRequest>,
         say: Say,
     ) -> anyhow::Result<TempDir> {
         frames.iter_mut().for_each(|frame| frame.size = (16, 16));
@@ -100,7 +100,7 @@ impl Grading<'_> {
         &self,
         session: &Session,
         renderer: Option<&Path>,
-        frames: &[Frame],
+        frames: &[FrameRequest],
     ) -> anyhow::Result<Option<PathBuf>> {
         let Ok(adapter) = &session.adapter else { return Ok(None) };
         if self.supervisor.isolation.isolation() != Isolation::Full {

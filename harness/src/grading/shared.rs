@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::image_digest::ImageDigest;
-use super::likeness::SourceDigest;
 use super::record::Record;
+use super::similarity::SourceDigest;
 use crate::evidence::{Check, CheckId, Verdict};
 
 /// The check of images.
@@ -14,13 +14,13 @@ const NUMBER: CheckId = CheckId::SubmissionNumber;
 
 /// Sources are much alike from this share of matching tokens on. It says only whom to look at: renderers of one handout
 /// are alike in much, and nobody loses points by it.
-pub const ALIKE: f64 = 0.8;
+pub const SIMILAR: f64 = 0.8;
 
 /// Number of other submissions that a sentence names.
 const NAMES: usize = 8;
 
 /// The check of sources.
-const LIKENESS: CheckId = CheckId::SubmissionLikeness;
+const SIMILARITY: CheckId = CheckId::SubmissionSimilarity;
 
 /// Images, sources and student numbers of a batch, each with those who submitted it.
 ///
@@ -97,7 +97,7 @@ impl Shared {
     }
 
     /// With pairs of submissions, by their folders, whose sources something else found alike, and how much in [0, 1].
-    /// Those of one person and those below [`ALIKE`] are left out.
+    /// Those of one person and those below [`SIMILAR`] are left out.
     #[must_use]
     pub fn with_near<'a>(
         mut self,
@@ -105,7 +105,7 @@ impl Shared {
     ) -> Self {
         for (who, similarity) in pairs {
             let [first, second] = who.each_ref().map(|slug| self.persons.get(slug));
-            if similarity < ALIKE || first.is_none() || second.is_none() || first == second {
+            if similarity < SIMILAR || first.is_none() || second.is_none() || first == second {
                 continue;
             }
             for [own, other] in [[0, 1], [1, 0]] {
@@ -170,7 +170,7 @@ impl Shared {
     /// nothing. Names of other submissions are private.
     pub fn judge(&self, record: &mut Record) {
         let person = person(record);
-        record.evidence.checks.retain(|check| ![SHARED, NUMBER, LIKENESS].contains(&check.id));
+        record.evidence.checks.retain(|check| ![SHARED, NUMBER, SIMILARITY].contains(&check.id));
         let mut found = Vec::new();
         for ImageDigest { scene, path, sha256 } in &record.images {
             let others = others(&self.images[sha256], &person);
@@ -234,7 +234,7 @@ impl Shared {
         if more > 0 {
             same.push(format!("as alike to {more} more"));
         }
-        let check = Check::new(LIKENESS, "", Verdict::Fail, summary);
+        let check = Check::new(SIMILARITY, "", Verdict::Fail, summary);
         Some(Check { private: same.join("; "), ..check })
     }
 }
@@ -372,7 +372,7 @@ mod tests {
             with("eve", "3", &[("src/a.rs", "E")]),
         ];
         judge_shared(&mut batch);
-        let found = failed(&batch, LIKENESS);
+        let found = failed(&batch, SIMILARITY);
         assert_eq!(
             found["ada"],
             "src/a.rs, 300 characters beyond the template, is also in bob (there src/mine.rs)"

@@ -9,7 +9,7 @@ use basecode::{Image, Matrices, Vec3};
 use crate::evidence::stages::{bare, is_template};
 use crate::files::files_below;
 use crate::intake::Finding;
-use crate::worker::{STAGES, Stage};
+use crate::worker::{STAGES, StageText};
 
 /// The stage texts of a submission, and of the template.
 pub struct Stages {
@@ -89,7 +89,7 @@ impl Stages {
     }
 
     /// All three, when none is missing or the template's.
-    pub fn all_own(&self) -> Option<Vec<Stage>> {
+    pub fn all_own(&self) -> Option<Vec<StageText>> {
         let own = |index: usize| self.own[index].clone().filter(|_| !self.is_template(index));
         Some(named([own(0)?, own(1)?, own(2)?]))
     }
@@ -191,19 +191,19 @@ fn written(texts: &BTreeMap<PathBuf, String>, template: &BTreeMap<PathBuf, Strin
 }
 
 /// What the host replaces to have a pass draw a scene whose normals are negated.
-pub fn negated_normals() -> Stage {
-    Stage { name: NEGATED_NORMALS.to_owned(), text: NEGATED_NORMALS.to_owned() }
+pub fn negated_normals() -> StageText {
+    StageText { name: NEGATED_NORMALS.to_owned(), text: NEGATED_NORMALS.to_owned() }
 }
 
 /// What the host replaces to have a pass draw with ones where it sets nothing, and with the light in its place.
-pub fn nothing_unset(light: Vec3) -> Stage {
+pub fn nothing_unset(light: Vec3) -> StageText {
     let text = format!("{} {} {}", light.x, light.y, light.z);
-    Stage { name: NOTHING_UNSET.to_owned(), text }
+    StageText { name: NOTHING_UNSET.to_owned(), text }
 }
 
 /// What the host replaces to have a pass draw under other matrices.
-pub fn matrices(which: Matrices) -> Stage {
-    Stage { name: MATRICES.to_owned(), text: format!("{which:?}") }
+pub fn matrices(which: Matrices) -> StageText {
+    StageText { name: MATRICES.to_owned(), text: format!("{which:?}") }
 }
 
 /// A picture that is moved as a whole: what it is then, and the picture as it should be.
@@ -226,9 +226,9 @@ pub const MOVED: [Moved; 3] = [
 ];
 
 /// Texts under the names of the stages.
-pub fn named(texts: [String; 3]) -> Vec<Stage> {
+pub fn named(texts: [String; 3]) -> Vec<StageText> {
     let named = STAGES.iter().zip(texts);
-    named.map(|(&name, text)| Stage { name: name.to_owned(), text }).collect()
+    named.map(|(&name, text)| StageText { name: name.to_owned(), text }).collect()
 }
 
 #[cfg(test)]

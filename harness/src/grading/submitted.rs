@@ -10,7 +10,7 @@ use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use crate::decode::{Decoder, image_finding};
-use crate::evidence::images::{self, Kind};
+use crate::evidence::images::{self, ImageKind};
 use crate::evidence::submitted::{
     has_own_noise, judge_copied, judge_noise, judge_scene, judge_seed,
 };
@@ -21,16 +21,16 @@ use crate::imaging::tolerances::Tolerances;
 use crate::intake::{Finding, TreeSpec};
 use crate::worker::Request;
 
-type View = (CheckId, fn(&Region) -> bool);
+type RegionCheck = (CheckId, fn(&Region) -> bool);
 
-const OFFLINE: [View; 5] = [
+const OFFLINE: [RegionCheck; 5] = [
     (CheckId::SubmittedOffline, |_| true),
     (CheckId::SubmittedOfflineDiffuse, |region| region.exponent == 0.0 && region.lit),
     (CheckId::SubmittedOfflinePhong, |region| region.exponent > 0.0 && region.lit),
     (CheckId::SubmittedOfflineLit, |region| region.lit),
     (CheckId::SubmittedOfflineShadowed, |region| !region.lit),
 ];
-const REALTIME: [View; 3] = [
+const REALTIME: [RegionCheck; 3] = [
     (CheckId::SubmittedRealtimeAll, |_| true),
     (CheckId::SubmittedRealtimeDiffuse, |region| region.exponent == 0.0),
     (CheckId::SubmittedRealtimePhong, |region| region.exponent > 0.0),
@@ -41,7 +41,7 @@ pub struct SubmittedImage<'a> {
     case: &'a PreparedScene,
     /// Its path in the submission.
     path: String,
-    kind: Kind,
+    kind: ImageKind,
     /// Its pixels, or why there are none.
     image: Result<Image, String>,
 }
@@ -51,7 +51,7 @@ impl<'a> SubmittedImage<'a> {
     pub fn new(
         case: &'a PreparedScene,
         path: &str,
-        kind: Kind,
+        kind: ImageKind,
         image: Result<Image, String>,
     ) -> Self {
         Self { case, path: path.to_owned(), kind, image }
@@ -63,7 +63,7 @@ impl<'a> SubmittedImage<'a> {
     }
 
     /// The image and how it came about, when it is the one that a check of this id is about.
-    pub fn shown_by(&self, check: &Check) -> Option<(Kind, &Image)> {
+    pub fn shown_by(&self, check: &Check) -> Option<(ImageKind, &Image)> {
         let first = views(self.kind).first().is_some_and(|(id, _)| *id == check.id);
         let own = first && self.case.entry.name == check.scene;
         own.then_some((self.kind, self.image.as_ref().ok()?))
@@ -71,10 +71,10 @@ impl<'a> SubmittedImage<'a> {
 }
 
 /// What is judged of an image by itself. The code alone earns the bonus.
-fn views(kind: Kind) -> &'static [View] {
+fn views(kind: ImageKind) -> &'static [RegionCheck] {
     match kind {
-        Kind::Offline { .. } => &OFFLINE,
-        Kind::SubmittedRealtime => &REALTIME,
+        ImageKind::Offline { .. } => &OFFLINE,
+        ImageKind::SubmittedRealtime => &REALTIME,
         _ => &[],
     }
 }
@@ -94,9 +94,9 @@ pub fn read<'a>(
     for case in cases {
         let Some(paths) = &case.entry.submitted else { continue };
         for (path, kind) in [
-            (&paths.offline, Kind::Offline { spp: case.spp }),
-            (&paths.realtime, Kind::SubmittedRealtime),
-            (&paths.bonus, Kind::SubmittedShadows),
+            (&paths.offline, ImageKind::Offline { spp: case.spp }),
+            (&paths.realtime, ImageKind::SubmittedRealtime),
+            (&paths.bonus, ImageKind::SubmittedShadows),
         ] {
             if let Some(path) = tree.found_in(root, path) {
                 let image = decoder.image(&root.join(path), path)?;
@@ -122,7 +122,8 @@ pub fn judge(
     let image = match image {
         Ok(image) => image,
         Err(error) => {
-            let failed = |(id, _): &View| Check::new(*id, name, Verdict::Fail, error.clone());
+            let failed =
+                |(id, _): &RegionCheck| Check::new(*id, name, Verdict::Fail, error.clone());
             return (views(kind).iter().map(failed).collect(), None);
         }
     };
@@ -131,22 +132,22 @@ pub fn judge(
     }
     let is_right = checks.first().is_some_and(|check| check.verdict == Verdict::Pass);
     let drawn_as = match kind {
-        Kind::SubmittedRealtime => Kind::Realtime,
-        Kind::SubmittedShadows => Kind::RealtimeShadows,
+        ImageKind::SubmittedRealtime => ImageKind::Realtime,
+        ImageKind::SubmittedShadows => ImageKind::RealtimeShadows,
         offline => offline,
     };
     let own = drawn.iter().find(|drawn| drawn.scene == *name && drawn.kind == drawn_as);
     let same = match own {
         Some(own) => Some(images::same_origin(kind, image, &own.image, expected, tolerances)),
         // What the code draws is right: so is the image, or it is another.
-        None if matches!(kind, Kind::Offline { .. }) && right.contains(name) => Some(is_right),
+        None if matches!(kind, ImageKind::Offline { .. }) && right.contains(name) => Some(is_right),
         None => None,
     };
     let origin = same.map(|same| judge_origin(path, name, same));
     let own = origin.as_ref().is_some_and(|check| check.verdict == Verdict::Pass);
     checks.extend(origin);
     let mask = match kind {
-        Kind::SubmittedRealtime => &expected.unshadowed_mask,
+        ImageKind::SubmittedRealtime => &expected.unshadowed_mask,
         _ => &expected.offline.mask,
     };
     checks.push(if is_right || own {
@@ -156,13 +157,13 @@ pub fn judge(
         judge_scene(name, path, image, &[&expected.offline.mean, &expected.unshadowed], mask)
     });
     // Realtime images have no noise: two right ones may be equal, and nothing is proved by it.
-    if !matches!(kind, Kind::Offline { .. }) {
+    if !matches!(kind, ImageKind::Offline { .. }) {
         return (checks, None);
     }
     let reference = &expected.offline;
     let published = [
         ("the published mean of many samples", &reference.mean),
-        ("the published image at pixel centers", &reference.centre),
+        ("the published image at pixel centers", &reference.center),
         ("the published image without shadows", &expected.unshadowed),
     ];
     let noisy = NoisyPixels::new(reference);
@@ -182,7 +183,7 @@ pub fn judge_seeds(
 ) -> Vec<Check> {
     let mut checks = Vec::new();
     for SubmittedImage { case, path, kind, image } in submitted {
-        let (Kind::Offline { spp }, Ok(image)) = (kind, image) else { continue };
+        let (ImageKind::Offline { spp }, Ok(image)) = (kind, image) else { continue };
         let noisy = NoisyPixels::new(&case.expected.offline);
         let noise = noisy.as_ref().and_then(|noisy| noisy.measure(image));
         let (Some(noisy), true) = (noisy, has_own_noise(noise)) else { continue };

@@ -6,7 +6,7 @@ use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
-use crate::build::{BuildOutcome, BuildReport, Diagnostic, Place};
+use crate::build::{BuildOutcome, BuildReport, Diagnostic, SourcePlace};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::files::{copy_tree, files_below};
 use crate::intake::Finding;
@@ -132,7 +132,7 @@ fn located(errors: &[Diagnostic], src: &Path) -> Vec<Diagnostic> {
         let mut files = files.filter(|file| named.ends_with(file) || file.ends_with(&named));
         let found = files.find_map(|file| Some((below(&file)?, unreadable(&file)?)));
         if let Some((file, line)) = found {
-            error.place = Some(Place { file: seen(&file), line });
+            error.place = Some(SourcePlace { file: seen(&file), line });
             error.message = "the file is not UTF-8; save it as UTF-8".to_owned();
         }
         error
@@ -348,7 +348,7 @@ mod tests {
     use super::*;
 
     fn error(message: &str, file: &str, rendered: &str) -> Diagnostic {
-        let place = (!file.is_empty()).then(|| Place { file: file.into(), line: 7 });
+        let place = (!file.is_empty()).then(|| SourcePlace { file: file.into(), line: 7 });
         Diagnostic { message: message.into(), place, rendered: rendered.into() }
     }
 

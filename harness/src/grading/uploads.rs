@@ -10,12 +10,12 @@ use std::path::Path;
 use basecode::gpu::{EVERY_FRAGMENT, Footprint, OUTLINES};
 use basecode::{Image, Vec3};
 
-use super::draw::{Frame, draw};
+use super::draw::{FrameRequest, draw};
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::imaging::reference::RegionMask;
-use crate::worker::Stage;
+use crate::worker::StageText;
 
 /// Bytes for each pixel that may be a picture: a byte of brightness.
 const PICTURE: f64 = 1.0;
@@ -101,9 +101,10 @@ fn triangles(case: &PreparedScene) -> usize {
 /// A scene's small film with every fragment in one color, or the outlines of triangles alone.
 fn drawn(session: &Session, plugin: &Path, case: &PreparedScene, outlines: bool) -> Option<Image> {
     let mut stages = vec![every_fragment()];
-    stages
-        .extend(outlines.then(|| Stage { name: OUTLINES.to_owned(), text: "outlines".to_owned() }));
-    let frame = Frame::probe(case, stages);
+    stages.extend(
+        outlines.then(|| StageText { name: OUTLINES.to_owned(), text: "outlines".to_owned() }),
+    );
+    let frame = FrameRequest::probe(case, stages);
     let outcome = draw(session, Some(plugin), &frame);
     outcome.answer().map(|answer| session::image(&answer.values, frame.size.0, frame.size.1))
 }
@@ -135,8 +136,8 @@ fn nothing_draws(
 }
 
 /// What the host replaces to see every fragment in one color.
-pub fn every_fragment() -> Stage {
-    Stage { name: EVERY_FRAGMENT.to_owned(), text: SHOW.to_owned() }
+pub fn every_fragment() -> StageText {
+    StageText { name: EVERY_FRAGMENT.to_owned(), text: SHOW.to_owned() }
 }
 
 /// An image under [`every_fragment`] without what no such fragment drew.

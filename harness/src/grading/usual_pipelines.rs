@@ -5,21 +5,21 @@ use std::path::Path;
 
 use basecode::gpu::USUAL_PIPELINES;
 
-use super::draw::{Frame, draw_each};
+use super::draw::{FrameRequest, draw_each};
 use super::isolate::{pass_check, pass_check_of, pass_shown};
 use super::prepared_scene::PreparedScene;
 use super::session::Session;
-use crate::evidence::price::Class;
+use crate::evidence::price::PriceClass;
 use crate::evidence::stages::BoundValue;
 use crate::evidence::{Check, CheckId, Measure, Verdict};
-use crate::worker::{Outcome, Stage};
+use crate::worker::{Outcome, StageText};
 
 /// The number of vertex attributes that may be exchanged.
 const ATTRIBUTES: u32 = 4;
 
 /// Slips with a pipeline, and what the host replaces to mend each.
-pub fn slips() -> impl Iterator<Item = (&'static str, Stage)> {
-    let stage = |text: String| Stage { name: USUAL_PIPELINES.to_owned(), text };
+pub fn slips() -> impl Iterator<Item = (&'static str, StageText)> {
+    let stage = |text: String| StageText { name: USUAL_PIPELINES.to_owned(), text };
     let state = ("depth test, culling or channels of a pipeline are wrong", stage(String::new()));
     let pairs = (0..ATTRIBUTES).flat_map(|a| (a + 1..ATTRIBUTES).map(move |b| format!("{a} {b}")));
     let exchanged = move |pair| ("two vertex attributes are exchanged", stage(pair));
@@ -33,21 +33,21 @@ pub fn price_pass(
     plugin: &Path,
     cases: &[PreparedScene],
     checks: &mut [Check],
-) -> Option<Stage> {
+) -> Option<StageText> {
     let fails = |check: &Check| check.id == CheckId::PassUniforms && check.verdict == Verdict::Fail;
-    let slip = Class::Slip.price();
+    let slip = PriceClass::Slip.price();
     let failed = |case: &PreparedScene| {
         checks.iter().any(|check| fails(check) && check.scene == case.entry.name)
     };
     if !checks.iter().any(|check| fails(check) && check.error > slip) {
         return None;
     }
-    let is_right = |case: &PreparedScene, stage: &Stage| {
-        let with = |mut stages: Vec<Stage>| {
+    let is_right = |case: &PreparedScene, stage: &StageText| {
+        let with = |mut stages: Vec<StageText>| {
             stages.push(stage.clone());
-            Frame::probe(case, stages)
+            FrameRequest::probe(case, stages)
         };
-        let frames: Vec<Frame> = pass_shown().into_iter().map(with).collect();
+        let frames: Vec<FrameRequest> = pass_shown().into_iter().map(with).collect();
         let outcomes: Vec<Outcome> = draw_each(session, Some(plugin), &frames);
         // A pipeline that cannot be made that way is mended by nothing.
         match pass_check(case, &outcomes).verdict {
@@ -64,15 +64,15 @@ pub fn price_pass(
     let slips = hopeful(&slips().collect::<Vec<_>>(), &|stages| {
         let values = pass_shown();
         let (value, positions) = (&values[bound as usize], &values[values.len() - 1]);
-        let with = |stage: &&Stage, shown: &Vec<Stage>| {
-            Frame::probe(first, [shown.clone(), vec![(*stage).clone()]].concat())
+        let with = |stage: &&StageText, shown: &Vec<StageText>| {
+            FrameRequest::probe(first, [shown.clone(), vec![(*stage).clone()]].concat())
         };
-        let frames: Vec<Frame> =
+        let frames: Vec<FrameRequest> =
             stages.iter().flat_map(|stage| [with(stage, value), with(stage, positions)]).collect();
         let outcomes = draw_each(session, Some(plugin), &frames);
         outcomes.chunks(2).map(|pair| pass_check_of(first, bound, pair)).collect()
     });
-    let mends = |stage: &Stage| wrong.iter().chain(&others).all(|case| is_right(case, stage));
+    let mends = |stage: &StageText| wrong.iter().chain(&others).all(|case| is_right(case, stage));
     let (name, stage) = slips.into_iter().find(|(_, stage)| mends(stage))?;
     for check in checks.iter_mut().filter(|check| fails(check) && check.error > slip) {
         (check.error, check.mistake) = (slip, name.to_owned());
@@ -92,10 +92,10 @@ fn wrong_value(check: &Check) -> BoundValue {
 /// The slips that leave nothing wrong with one value of one scene: no others are looked at on all. `verdicts` are those
 /// on that value with what the host replaces.
 fn hopeful<'a>(
-    slips: &[(&'a str, Stage)],
-    verdicts: &dyn Fn(&[&Stage]) -> Vec<Verdict>,
-) -> Vec<(&'a str, Stage)> {
-    let stages: Vec<&Stage> = slips.iter().map(|(_, stage)| stage).collect();
+    slips: &[(&'a str, StageText)],
+    verdicts: &dyn Fn(&[&StageText]) -> Vec<Verdict>,
+) -> Vec<(&'a str, StageText)> {
+    let stages: Vec<&StageText> = slips.iter().map(|(_, stage)| stage).collect();
     let told = slips.iter().zip(verdicts(&stages));
     told.filter(|(_, verdict)| *verdict == Verdict::Pass).map(|(slip, _)| slip.clone()).collect()
 }
@@ -116,8 +116,8 @@ mod tests {
     fn what_leaves_one_value_wrong_is_not_looked_at_further() {
         let all: Vec<_> = slips().collect();
         let by = |right: &'static str| {
-            let judge = |stages: &[&Stage]| {
-                let verdict = |stage: &&Stage| match stage.text == right {
+            let judge = |stages: &[&StageText]| {
+                let verdict = |stage: &&StageText| match stage.text == right {
                     true => Verdict::Pass,
                     false => Verdict::Fail,
                 };

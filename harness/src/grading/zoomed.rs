@@ -6,7 +6,7 @@ use std::path::Path;
 
 use basecode::{Camera, Vec3};
 
-use super::draw::{Frame, draw};
+use super::draw::{FrameRequest, draw};
 use super::isolate::pass_shown;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
@@ -39,7 +39,7 @@ impl Masks {
 /// The regions of what a pass draws of a scene, if that is a zoomed picture of it.
 pub fn masks(session: &Session, plugin: &Path, case: &PreparedScene) -> Option<Masks> {
     let stages = pass_shown().pop()?;
-    let frame = Frame::probe(case, stages);
+    let frame = FrameRequest::probe(case, stages);
     let outcome = draw(session, Some(plugin), &frame);
     let (width, height) = (frame.size.0 as usize, frame.size.1 as usize);
     let positions = session::image(&outcome.answer()?.values, frame.size.0, frame.size.1);

@@ -12,7 +12,7 @@ use super::changed_scene::ChangedScene;
 use crate::assignment::SceneEntry;
 
 /// A file of a scene: its path below the scene's folder, and what is in it.
-pub type File = (PathBuf, Vec<u8>);
+pub type NewFile = (PathBuf, Vec<u8>);
 
 /// The files of `entry`'s scene as `draw` changes it, in the order of their paths. `folder` is the
 /// original's, with `tinyrender/` and `mesh/` below it.
@@ -24,7 +24,7 @@ pub fn changed(
     entry: &SceneEntry,
     scene: &Scene,
     draw: &ChangedScene,
-) -> anyhow::Result<Vec<File>> {
+) -> anyhow::Result<Vec<NewFile>> {
     let mut files = Vec::new();
     for toml in [Some(&entry.offline), Some(&entry.realtime), entry.bonus.as_ref()] {
         let Some(toml) = toml else { continue };

@@ -22,7 +22,7 @@ use crate::assignment::{Assignment, SceneEntry};
 use crate::expected::load_scene;
 use crate::files::{hex, write_new};
 use changed_scene::ChangedScene;
-use files::File;
+use files::NewFile;
 use preview::ScenePreview;
 
 /// Number of draws that are previewed before a scene is given up. Over 200 seeds about every fourth draw is accepted,
@@ -81,7 +81,7 @@ pub fn recorded_seed(file: &Path, chosen: Option<Option<u64>>) -> anyhow::Result
     })
 }
 
-/// The seed as `--perturb` takes it.
+/// The seed as `--held-back` takes it.
 pub fn in_words(seed: Option<u64>) -> String {
     seed.map_or_else(|| OFF.to_owned(), |seed| seed.to_string())
 }
@@ -93,7 +93,7 @@ pub fn in_words(seed: Option<u64>) -> String {
 pub fn make(assignment: &Assignment, seed: u64) -> anyhow::Result<(HeldBack, Vec<SceneEntry>)> {
     let mut held_back = HeldBack { seed, scenes: Vec::new() };
     let mut entries = Vec::new();
-    for original in assignment.scenes.iter().filter(|scene| scene.perturb) {
+    for original in assignment.scenes.iter().filter(|scene| scene.held_back_copies) {
         let files = scene_files(&assignment.root, original, seed)
             .with_context(|| format!("scene \"{}\" cannot be changed", original.name))?;
         let folder = write(&assignment.cache().join("held_back"), &files)?;
@@ -108,7 +108,7 @@ pub fn make(assignment: &Assignment, seed: u64) -> anyhow::Result<(HeldBack, Vec
             weight: original.weight,
             film: None,
             stored: false,
-            perturb: false,
+            held_back_copies: false,
             submitted: None,
         });
         held_back.scenes.push((name, original.name.clone()));
@@ -117,7 +117,7 @@ pub fn make(assignment: &Assignment, seed: u64) -> anyhow::Result<(HeldBack, Vec
 }
 
 /// The files of the first draw of a scene that is worth something.
-fn scene_files(root: &Path, entry: &SceneEntry, seed: u64) -> anyhow::Result<Vec<File>> {
+fn scene_files(root: &Path, entry: &SceneEntry, seed: u64) -> anyhow::Result<Vec<NewFile>> {
     let scene = load_scene(&root.join(&entry.offline))?;
     let original = ScenePreview::new(&scene, &ChangedScene::original(&scene))?;
     let mut why = "";
@@ -142,7 +142,7 @@ fn sub_seed(seed: u64, scene: &str, attempt: u32) -> u64 {
 }
 
 /// Writes a scene into a folder of its own, named by what is in it, in a folder for the owner alone.
-fn write(parent: &Path, files: &[File]) -> anyhow::Result<PathBuf> {
+fn write(parent: &Path, files: &[NewFile]) -> anyhow::Result<PathBuf> {
     let mut hash = Sha256::new();
     for (path, bytes) in files {
         hash.update(path.as_os_str().as_encoded_bytes());

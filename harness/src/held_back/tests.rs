@@ -15,8 +15,8 @@ fn assignment() -> Assignment {
 /// The scenes of which copies are held back.
 fn originals() -> Vec<(SceneEntry, Scene)> {
     let assignment = assignment();
-    let perturbed = assignment.scenes.iter().filter(|scene| scene.perturb);
-    let all = perturbed
+    let held_back = assignment.scenes.iter().filter(|scene| scene.held_back_copies);
+    let all = held_back
         .map(|entry| (entry.clone(), load_scene(&assignment.root.join(&entry.offline)).unwrap()));
     let all: Vec<_> = all.collect();
     assert!(all.len() >= 3 && all.iter().filter(|(entry, _)| entry.bonus.is_some()).count() >= 2);
@@ -161,17 +161,17 @@ fn what_shows_too_little_is_drawn_again() {
         change(&mut draw);
         ScenePreview::new(&scene, &draw).unwrap().problem(&first, true)
     };
-    let centre = Vec3::new(0.0, 0.995, 0.0);
+    let center = Vec3::new(0.0, 0.995, 0.0);
     assert_eq!(problem(&|_| ()), None);
     type Case<'a> = (&'a str, &'a dyn Fn(&mut ChangedScene));
     let cases: [Case; 9] = [
-        ("too little is lit", &|draw| draw.light = centre),
+        ("too little is lit", &|draw| draw.light = center),
         ("too little is lit", &|draw| draw.light.y = -9.0),
         ("too little is in shadow", &|draw| draw.light = draw.camera.eye),
         ("no highlight is seen", &|draw| draw.surfaces.iter_mut().for_each(|s| s.exponent = 3e4)),
         ("it is too dark or too bright", &|draw| draw.intensity *= 40.0),
         ("it is too dark or too bright", &|draw| draw.intensity *= 0.01),
-        ("the light is too near to a surface", &|draw| draw.light = centre + Vec3::Y * 1.05),
+        ("the light is too near to a surface", &|draw| draw.light = center + Vec3::Y * 1.05),
         ("the camera is too near to a surface", &|draw| {
             draw.camera.eye = Vec3::new(0.0, 0.01, 4.0)
         }),
@@ -182,7 +182,7 @@ fn what_shows_too_little_is_drawn_again() {
     }
     // A light that comes near sees the shadow under a wider angle.
     let near = |draw: &mut ChangedScene| {
-        draw.light = centre + Vec3::new(-0.75, 0.9, 0.9);
+        draw.light = center + Vec3::new(-0.75, 0.9, 0.9);
         draw.intensity *= 0.1;
     };
     assert_eq!(problem(&near), Some("one frustum does not hold the shadows"));

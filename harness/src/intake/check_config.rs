@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::finding::Finding;
-use super::limits::Limits;
+use super::limits::ArchiveLimits;
 use super::name::safe_path;
 use super::submitted_config::{Field, SubmittedConfig, why_no_number};
 use super::tree::{CONFIG_FILE, TreeSpec};
@@ -257,7 +257,7 @@ fn resolve(
     let unescaped = written.trim().replace('\t', "\\t").replace('\r', "\\r").replace('\n', "\\n");
     let unescaped = unescaped.replace('\u{8}', "\\b").replace('\u{c}', "\\f");
     let slashed = unescaped.replace('\\', "/");
-    let plain = safe_path(slashed.as_bytes(), &Limits::default());
+    let plain = safe_path(slashed.as_bytes(), &ArchiveLimits::default());
     // What a path from elsewhere ends with may be the submission's own: `/home/ada/a2/offline/cbox.exr`.
     let end_of = |path: &&&str| {
         slashed

@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 use unicode_normalization::UnicodeNormalization as _;
 
 use super::finding::{Finding, Findings};
-use super::limits::{Limits, mib};
+use super::limits::{ArchiveLimits, mib};
 use super::name::{Backslashes, safe_path};
 use super::submission::{
     Format, IntakeError, Refusal, Submission, SubmittedFile, archive_by_name, archive_magic,
@@ -36,7 +36,7 @@ impl From<IntakeError> for Stop {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum EntryKind {
     File,
     Folder,
 }
@@ -63,7 +63,7 @@ pub(super) struct Written {
 pub(super) struct PrivateCopy<'a> {
     dest: &'a Path,
     tree: &'a TreeSpec,
-    pub(super) limits: &'a Limits,
+    pub(super) limits: &'a ArchiveLimits,
     pub(super) findings: Findings,
     pub(super) backslashes: Backslashes,
     /// The bytes of names that are not UTF-8, by what they are written as.
@@ -83,7 +83,7 @@ impl<'a> PrivateCopy<'a> {
     pub(super) fn new(
         dest: &'a Path,
         tree: &'a TreeSpec,
-        limits: &'a Limits,
+        limits: &'a ArchiveLimits,
     ) -> Result<Self, IntakeError> {
         let mut entries = fs::read_dir(dest).map_err(|e| IntakeError::io("list", dest, e))?;
         if entries.next().is_some() {
@@ -141,7 +141,7 @@ impl<'a> PrivateCopy<'a> {
     }
 
     /// Checks the name of an entry that was counted, and its place beside the others.
-    pub(super) fn accept(&mut self, raw: &[u8], kind: Kind) -> EntryAction {
+    pub(super) fn accept(&mut self, raw: &[u8], kind: EntryKind) -> EntryAction {
         let safe = match safe_path(raw, self.limits) {
             Ok(safe) => safe,
             Err(finding) => {
@@ -151,7 +151,7 @@ impl<'a> PrivateCopy<'a> {
         };
         let path = safe.path;
         if path.is_empty() {
-            if kind == Kind::Folder {
+            if kind == EntryKind::Folder {
                 return EntryAction::Folder;
             }
             self.findings.push(Finding::error("name_empty", "a file without a name"));
@@ -186,8 +186,8 @@ impl<'a> PrivateCopy<'a> {
         let parents: Vec<&str> = path.match_indices('/').map(|(i, _)| &path[..i]).collect();
         let is_both = parents.iter().any(|parent| self.files.contains_key(*parent))
             || match kind {
-                Kind::File => self.folders.contains(&path),
-                Kind::Folder => self.files.contains_key(&path),
+                EntryKind::File => self.folders.contains(&path),
+                EntryKind::Folder => self.files.contains_key(&path),
             };
         if is_both {
             self.findings.push(
@@ -197,11 +197,11 @@ impl<'a> PrivateCopy<'a> {
         }
         self.folders.extend(parents.into_iter().map(str::to_owned));
         match kind {
-            Kind::Folder => {
+            EntryKind::Folder => {
                 self.folders.insert(path);
                 EntryAction::Folder
             }
-            Kind::File => {
+            EntryKind::File => {
                 // A second of this name must hold the same, see `write`.
                 self.files.entry(path.clone()).or_default();
                 EntryAction::File(path)

@@ -8,11 +8,11 @@ mod open;
 use std::io;
 use std::path::Path;
 
-use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
+use super::copy::{EntryAction, EntryKind, PrivateCopy, Stop};
 use super::finding::Finding;
 use super::submission::IntakeError;
 use crate::harmless::printable_bytes;
-use open::Folder;
+use open::OpenFolder;
 
 /// What lies under a name, not followed.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -30,10 +30,10 @@ type Id = (u64, u64);
 /// from `source`, and for a folder whether anything in it may be wanted.
 pub(super) fn read(
     source: &Path,
-    is_wanted: &dyn Fn(&str, Kind) -> bool,
+    is_wanted: &dyn Fn(&str, EntryKind) -> bool,
     copy: &mut PrivateCopy<'_>,
 ) -> Result<(), Stop> {
-    let folder = match Folder::open(source) {
+    let folder = match OpenFolder::open(source) {
         Ok(folder) => folder,
         Err(error) if is_gone(&error) => return Err(copy.refuse(changed(b"."))),
         Err(error) => return Err(IntakeError::io("list", source, error).into()),
@@ -48,14 +48,14 @@ pub(super) fn open_file(path: &Path) -> io::Result<std::fs::File> {
 
 struct Walk<'a, 'b> {
     source: &'a Path,
-    is_wanted: &'a dyn Fn(&str, Kind) -> bool,
+    is_wanted: &'a dyn Fn(&str, EntryKind) -> bool,
     copy: &'a mut PrivateCopy<'b>,
 }
 
 impl Walk<'_, '_> {
     /// Copies from an open folder, whose path ends with a slash. Folders that are deeper than allowed are not
     /// admitted, so that neither the stack nor open folders pile up.
-    fn folder(&mut self, mut folder: Folder, path: &[u8]) -> Result<(), Stop> {
+    fn folder(&mut self, mut folder: OpenFolder, path: &[u8]) -> Result<(), Stop> {
         let most = usize::try_from(self.copy.limits.most_headers()).unwrap_or(usize::MAX);
         let names = folder.names(most.saturating_add(1));
         let mut names = self.known("list", path, names)?;
@@ -66,20 +66,21 @@ impl Walk<'_, '_> {
         for name in names {
             let raw = [path, name.as_encoded_bytes()].concat();
             let found = self.known("read", &raw, folder.look(&name))?;
-            let kind = if matches!(found, Found::Folder(_)) { Kind::Folder } else { Kind::File };
+            let kind =
+                if matches!(found, Found::Folder(_)) { EntryKind::Folder } else { EntryKind::File };
             if !(self.is_wanted)(&String::from_utf8_lossy(&raw), kind) {
                 continue;
             }
             match found {
                 Found::Folder(id) => {
-                    if self.copy.accept(&raw, Kind::Folder) == EntryAction::Folder {
+                    if self.copy.accept(&raw, EntryKind::Folder) == EntryAction::Folder {
                         let inner = self.known("list", &raw, folder.folder(&name))?;
                         self.is_same(&raw, inner.id(), id)?;
                         self.folder(inner, &[raw.as_slice(), b"/"].concat())?;
                     }
                 }
                 Found::File(id) => {
-                    if let EntryAction::File(admitted) = self.copy.accept(&raw, Kind::File) {
+                    if let EntryAction::File(admitted) = self.copy.accept(&raw, EntryKind::File) {
                         let opened = self.known("read", &raw, folder.file(&name))?;
                         let Some((mut file, opened)) = opened else {
                             return Err(self.copy.refuse(changed(&raw)));

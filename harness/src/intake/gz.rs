@@ -6,7 +6,7 @@ use flate2::bufread::GzDecoder;
 
 use super::copy::{PrivateCopy, Stop};
 use super::finding::Finding;
-use super::limits::{Limits, mib};
+use super::limits::{ArchiveLimits, mib};
 use super::tar::{self, AGAIN, BLOCK, PADDING, Refused};
 use crate::columns::count;
 
@@ -45,7 +45,7 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop>
 
 /// What gzip data hold when it is no tar but another archive: some browsers and servers pack what is packed already.
 /// Nothing where it is a tar, or cannot be read.
-pub(super) fn packed_again(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
+pub(super) fn packed_again(bytes: &[u8], limits: &ArchiveLimits) -> Option<Vec<u8>> {
     let mut gz = GzDecoder::new(bytes);
     let mut unpacked = Vec::new();
     gz.by_ref().take(4).read_to_end(&mut unpacked).ok()?;
@@ -65,7 +65,7 @@ struct Gz<'a> {
     rest: Option<&'a [u8]>,
     packed: usize,
     unpacked: u64,
-    limits: &'a Limits,
+    limits: &'a ArchiveLimits,
 }
 
 impl Read for Gz<'_> {

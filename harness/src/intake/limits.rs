@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 /// EXRs of 3 MB and a few dozen source files).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Limits {
-    /// Entries in the archive or folder, folders included, besides ignored ones (`Limits::most_headers`).
+pub struct ArchiveLimits {
+    /// Entries in the archive or folder, folders included, besides ignored ones (`ArchiveLimits::most_headers`).
     pub max_entries: u64,
     /// Size of the archive itself, and of all its contents together (MiB).
     pub max_total_mib: u64,
@@ -25,7 +25,7 @@ pub struct Limits {
     pub max_path_bytes: u64,
 }
 
-impl Default for Limits {
+impl Default for ArchiveLimits {
     fn default() -> Self {
         Self {
             max_entries: 4000,
@@ -44,7 +44,7 @@ pub(super) fn mib(mib: u64) -> u64 {
     mib.saturating_mul(1 << 20)
 }
 
-impl Limits {
+impl ArchiveLimits {
     /// Entries of all kinds: ignored ones, whose content is not looked at, are a build folder's thousands.
     pub(super) fn most_headers(&self) -> u64 {
         self.max_entries.saturating_mul(25)

@@ -44,7 +44,7 @@ pub use check_config::check_config;
 pub use encoding::text_of;
 pub use finding::{Excerpt, Finding, Severity};
 pub use json_lines::{first_slip, line_of};
-pub use limits::Limits;
+pub use limits::ArchiveLimits;
 pub use pack::{Packed, archive_name, fix, mends, pack};
 pub use source_rules::{INCLUDE_INSIDE, scan_source, scan_text};
 pub use submission::{Format, IntakeError, Refusal, Submission, SubmittedFile};

@@ -1,7 +1,7 @@
 //! Names of entries: from hostile bytes to a relative path that cannot leave the destination.
 
 use super::finding::Finding;
-use super::limits::Limits;
+use super::limits::ArchiveLimits;
 use super::tree::CONFIG_FILE;
 use crate::harmless::{printable_bytes, reorders};
 
@@ -109,7 +109,7 @@ fn halves(raw: &[u8]) -> Vec<usize> {
 ///
 /// # Errors
 /// The finding that refuses the name.
-pub(super) fn safe_path(raw: &[u8], limits: &Limits) -> Result<SafePath, Finding> {
+pub(super) fn safe_path(raw: &[u8], limits: &ArchiveLimits) -> Result<SafePath, Finding> {
     let refuse = |code: &str, found: &str, hint: &str| {
         Err(Finding::error(
             code,
@@ -208,7 +208,7 @@ mod tests {
     use super::*;
 
     fn code(raw: &[u8]) -> String {
-        match safe_path(raw, &Limits::default()) {
+        match safe_path(raw, &ArchiveLimits::default()) {
             Ok(safe) => safe.path,
             Err(finding) => format!("!{}", finding.code),
         }

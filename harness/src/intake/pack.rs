@@ -9,9 +9,9 @@ use ::zip::write::SimpleFileOptions;
 use ::zip::{CompressionMethod, DateTime, ZipWriter};
 use serde::{Deserialize, Serialize};
 
-use super::copy::Kind;
+use super::copy::EntryKind;
 use super::finding::{Finding, Severity};
-use super::limits::Limits;
+use super::limits::ArchiveLimits;
 use super::submission::{Format, IntakeError, Refusal, Submission};
 use super::submitted_config::{Field, SubmittedConfig};
 use super::tree::TreeSpec;
@@ -45,9 +45,9 @@ pub fn pack(
     dir: &Path,
     out: &Path,
     tree: &TreeSpec,
-    limits: &Limits,
+    limits: &ArchiveLimits,
 ) -> Result<Packed, IntakeError> {
-    let is_wanted = |path: &str, kind| tree.may_hold(path, kind == Kind::Folder);
+    let is_wanted = |path: &str, kind| tree.may_hold(path, kind == EntryKind::Folder);
     let scratch = scratch_folder()?;
     let submission = copy_folder(dir, &is_wanted, scratch.path(), tree, limits)?;
     write(&submission, out, tree, limits, &|validation| validation.conforms, write_over_archive)
@@ -80,7 +80,7 @@ pub fn fix(
     submission: &Submission,
     out: &Path,
     tree: &TreeSpec,
-    limits: &Limits,
+    limits: &ArchiveLimits,
 ) -> Result<Packed, IntakeError> {
     let mut findings = match_tree(submission, tree)?.findings;
     findings.retain(is_choice);
@@ -126,7 +126,7 @@ fn write(
     submission: &Submission,
     out: &Path,
     tree: &TreeSpec,
-    limits: &Limits,
+    limits: &ArchiveLimits,
     is_good: &dyn Fn(&Validation) -> bool,
     put: fn(&Path, &[u8]) -> io::Result<()>,
 ) -> Result<Packed, IntakeError> {

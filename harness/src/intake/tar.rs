@@ -8,7 +8,7 @@ use std::path::Path;
 
 use tar::{EntryType, Header};
 
-use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
+use super::copy::{EntryAction, EntryKind, PrivateCopy, Stop};
 use super::finding::Finding;
 use super::submission::IntakeError;
 use super::tar_sparse::{Map, Records, gnu_map};
@@ -300,9 +300,9 @@ fn read_entry(
     let is_folder = entry_type.is_dir() || entry_type.as_byte() == DUMPED_FOLDER;
     // Old tars mark a folder by its name alone.
     let kind = match entry_type {
-        _ if is_folder => Kind::Folder,
-        EntryType::Regular | EntryType::Continuous if name.ends_with(b"/") => Kind::Folder,
-        EntryType::Regular | EntryType::Continuous | EntryType::GNUSparse => Kind::File,
+        _ if is_folder => EntryKind::Folder,
+        EntryType::Regular | EntryType::Continuous if name.ends_with(b"/") => EntryKind::Folder,
+        EntryType::Regular | EntryType::Continuous | EntryType::GNUSparse => EntryKind::File,
         // Nothing of it is copied, and nothing lies behind it.
         _ if copy.is_ignored(&name) => return skip(reader, padded(size), &name, copy),
         EntryType::Link => return read_link(reader, size, &name, &link, copy),
@@ -371,7 +371,7 @@ fn read_link(
         copy.findings.push(special(EntryType::Link).at(printable_bytes(name)));
         return skip(reader, padded(size), name, copy);
     };
-    if let EntryAction::File(path) = copy.accept(name, Kind::File) {
+    if let EntryAction::File(path) = copy.accept(name, EntryKind::File) {
         copy.write(&path, &mut file, None)?
             .map_err(|e| IntakeError::io("read", Path::new(&path), e))?;
     }

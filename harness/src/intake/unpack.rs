@@ -4,10 +4,10 @@ use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-use super::copy::{EntryAction, Kind, PrivateCopy, Stop, clear};
+use super::copy::{EntryAction, EntryKind, PrivateCopy, Stop, clear};
 use super::encoding::text_of;
 use super::finding::{Finding, Severity};
-use super::limits::{Limits, mib};
+use super::limits::{ArchiveLimits, mib};
 use super::source_paths::lacks_files;
 use super::submission::{Format, IntakeError, Refusal, Submission, archive_magic};
 use super::tree::{TreeFile, TreeSpec};
@@ -26,7 +26,7 @@ pub fn unpack(
     source: &Path,
     dest: &Path,
     tree: &TreeSpec,
-    limits: &Limits,
+    limits: &ArchiveLimits,
 ) -> Result<Submission, IntakeError> {
     match read_archive(source, limits)? {
         Some(bytes) => unpack_bytes(&bytes, &name_of(source), dest, tree, limits),
@@ -128,13 +128,13 @@ fn copy_working_folder(
     source: &Path,
     dest: &Path,
     tree: &TreeSpec,
-    limits: &Limits,
+    limits: &ArchiveLimits,
 ) -> Result<Submission, IntakeError> {
     let refusal = match copy_folder(source, &|_, _| true, dest, tree, limits) {
         Err(IntakeError::Refused(refusal)) => refusal,
         other => return other,
     };
-    let wanted = |path: &str, kind| tree.may_hold(path, kind == Kind::Folder);
+    let wanted = |path: &str, kind| tree.may_hold(path, kind == EntryKind::Folder);
     match copy_folder(source, &wanted, dest, tree, limits) {
         Ok(mut submission)
             if submission.files.iter().any(|file| tree.open_folder_of(&file.path).is_some()) =>
@@ -160,7 +160,10 @@ fn copy_working_folder(
 /// # Errors
 /// [`IntakeError::Refused`] when it is neither, a link among them: whoever submits may choose where it leads.
 /// And when it cannot be read.
-pub(crate) fn read_archive(source: &Path, limits: &Limits) -> Result<Option<Vec<u8>>, IntakeError> {
+pub(crate) fn read_archive(
+    source: &Path,
+    limits: &ArchiveLimits,
+) -> Result<Option<Vec<u8>>, IntakeError> {
     // Without a slash at the end, which would follow a link.
     let path = source.components().as_path();
     let refuse = |finding| refused(&name_of(source), None, finding);
@@ -198,7 +201,7 @@ pub(crate) fn copy_unpacked(
     contents: &[u8],
     dest: &Path,
     tree: &TreeSpec,
-    limits: &Limits,
+    limits: &ArchiveLimits,
 ) -> Result<Submission, IntakeError> {
     let mut copy = PrivateCopy::new(dest, tree, limits)?;
     let result = write_unpacked(unpacked, contents, &mut copy);
@@ -224,7 +227,7 @@ fn write_unpacked(
             return Err(copy.refuse(contradiction(&path)));
         };
         contents = rest;
-        match copy.accept(path.as_bytes(), Kind::File) {
+        match copy.accept(path.as_bytes(), EntryKind::File) {
             EntryAction::File(admitted) if admitted == path => {
                 copy.write(&path, &mut content, None)?
                     .map_err(|e| IntakeError::io("copy", Path::new(&path), e))?;
@@ -238,10 +241,10 @@ fn write_unpacked(
 /// Copies the wanted part of a folder.
 pub(super) fn copy_folder(
     source: &Path,
-    is_wanted: &dyn Fn(&str, Kind) -> bool,
+    is_wanted: &dyn Fn(&str, EntryKind) -> bool,
     dest: &Path,
     tree: &TreeSpec,
-    limits: &Limits,
+    limits: &ArchiveLimits,
 ) -> Result<Submission, IntakeError> {
     let mut copy = PrivateCopy::new(dest, tree, limits)?;
     let result = folder::read(source.components().as_path(), is_wanted, &mut copy);
@@ -265,7 +268,7 @@ pub fn unpack_bytes(
     name: &str,
     dest: &Path,
     tree: &TreeSpec,
-    limits: &Limits,
+    limits: &ArchiveLimits,
 ) -> Result<Submission, IntakeError> {
     with_source(unpack_twice(bytes, name, dest, tree, limits)?, dest, tree)
 }
@@ -275,7 +278,7 @@ fn unpack_twice(
     name: &str,
     dest: &Path,
     tree: &TreeSpec,
-    limits: &Limits,
+    limits: &ArchiveLimits,
 ) -> Result<Submission, IntakeError> {
     if format_of_bytes(bytes) == Some(Format::TarGz)
         && let Some(inner) = gz::packed_again(bytes, limits)
@@ -330,7 +333,7 @@ fn unpack_once(
     name: &str,
     dest: &Path,
     tree: &TreeSpec,
-    limits: &Limits,
+    limits: &ArchiveLimits,
 ) -> Result<Submission, IntakeError> {
     let mut copy = PrivateCopy::new(dest, tree, limits)?;
     if bytes.len() as u64 > mib(limits.max_total_mib) {

@@ -14,9 +14,9 @@ use std::ops::Range;
 
 use flate2::read::DeflateDecoder;
 
-use super::copy::{EntryAction, Kind, PrivateCopy, Stop};
+use super::copy::{EntryAction, EntryKind, PrivateCopy, Stop};
 use super::finding::Finding;
-use super::limits::Limits;
+use super::limits::ArchiveLimits;
 pub(super) use super::zip_headers::AGAIN;
 use super::zip_headers::{
     CENTRAL, Central, Entry, LOCAL, ZIP64, check_entry, u16_at, u32_at, u64_at,
@@ -53,7 +53,7 @@ pub(super) fn read(bytes: &[u8], copy: &mut PrivateCopy<'_>) -> Result<(), Stop>
     }
     let mut files = Vec::new();
     for entry in &entries {
-        let kind = if entry.is_folder() { Kind::Folder } else { Kind::File };
+        let kind = if entry.is_folder() { EntryKind::Folder } else { EntryKind::File };
         match copy.accept(&entry.name, kind) {
             EntryAction::File(path) => files.push((entry, path)),
             EntryAction::Folder if entry.unpacked_bytes > 0 => {
@@ -92,7 +92,7 @@ struct End {
     offset: u64,
 }
 
-fn find_directory(bytes: &[u8], limits: &Limits) -> Result<Directory, Finding> {
+fn find_directory(bytes: &[u8], limits: &ArchiveLimits) -> Result<Directory, Finding> {
     let Some(at) = last_end_record(bytes) else {
         return Err(Finding::error(
             "zip_truncated",

@@ -7,7 +7,7 @@ use crate::sandbox::{self, Isolation, Policy};
 /// What a child may use.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Limits {
+pub struct ProcessLimits {
     /// Seconds that it may stand still, neither computing nor waiting for a processor or a disk: a busy machine does
     /// not count. Where the system does not tell (it does on Linux), seconds by the clock. The parent enforces it, and
     /// gives up on a child that got no processor for 20 times as long.
@@ -31,7 +31,7 @@ pub struct Limits {
     pub threads: u32,
 }
 
-impl Default for Limits {
+impl Default for ProcessLimits {
     /// Enough for one case of the assignment on a slow machine.
     fn default() -> Self {
         Self {
@@ -52,7 +52,7 @@ impl Default for Limits {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Confinement {
     /// What it may use.
-    pub limits: Limits,
+    pub limits: ProcessLimits,
     /// What it may see: the sandbox confines it. None where there is no isolation at all: then it gets
     /// a session and limits only, by [`crate::process::confine_self`].
     pub sandbox: Option<Policy>,
@@ -61,10 +61,10 @@ pub struct Confinement {
 impl Confinement {
     /// A confinement that isolates by `policy`, or by limits alone when the policy has no layer.
     /// The policy's limits and quota are replaced by these.
-    pub fn new(limits: &Limits, mut policy: Policy) -> Self {
+    pub fn new(limits: &ProcessLimits, mut policy: Policy) -> Self {
         let none = policy.layers.isolation() == Isolation::None;
         policy.scratch.quota_mib = limits.scratch_mib;
-        policy.limits = sandbox::Limits {
+        policy.limits = sandbox::KernelLimits {
             cpu_s: limits.cpu_s,
             memory_mib: limits.memory_mib,
             file_size_mib: limits.file_size_mib,

@@ -18,7 +18,7 @@ mod watch;
 
 pub use crate::sandbox::EXIT_NOT_CONFINED;
 pub use capture::Captured;
-pub use limits::{Confinement, Limits};
+pub use limits::{Confinement, ProcessLimits};
 pub use start::{command, confine_self, exec_main, exit_now, start};
 pub use watch::run;
 

@@ -6,7 +6,7 @@ use std::io;
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
 
-use super::{Confinement, Limits};
+use super::{Confinement, ProcessLimits};
 use crate::sandbox::{self, EXIT_NOT_CONFINED};
 
 /// Carries the [`Confinement`] to the child, which removes it.
@@ -115,7 +115,7 @@ fn detach(_parent: Option<i32>) -> io::Result<()> {
 }
 
 #[cfg(unix)]
-fn limit(limits: &Limits) -> io::Result<()> {
+fn limit(limits: &ProcessLimits) -> io::Result<()> {
     use nix::sys::resource::{Resource, setrlimit};
     setrlimit(Resource::RLIMIT_CORE, 0, 0)?;
     setrlimit(Resource::RLIMIT_NOFILE, limits.open_files, limits.open_files)?;
@@ -127,7 +127,7 @@ fn limit(limits: &Limits) -> io::Result<()> {
 }
 
 #[cfg(not(unix))]
-fn limit(_limits: &Limits) -> io::Result<()> {
+fn limit(_limits: &ProcessLimits) -> io::Result<()> {
     Ok(())
 }
 

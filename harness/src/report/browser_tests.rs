@@ -43,7 +43,9 @@ fn a_class_of_a_thousand_is_sorted_searched_and_filtered_at_once() {
         let each = (0..4).map(|_| browser.value(&timed).as_f64().unwrap());
         each.fold(f64::INFINITY, f64::min)
     };
-    let layout = least_ms("const body = document.querySelector('.grades tbody'); body.replaceChildren(...body.rows)");
+    let layout = least_ms(
+        "const body = document.querySelector('.grades tbody'); body.replaceChildren(...body.rows)",
+    );
     for action in [
         "document.querySelectorAll('.grades thead button')[1].click()",
         "search.value = '300000123'; search.dispatchEvent(new Event('input'))",

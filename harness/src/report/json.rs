@@ -30,7 +30,7 @@ const DIGITS: usize = 6;
 
 /// The report of a batch.
 #[derive(Serialize, JsonSchema)]
-pub(super) struct Report<'a> {
+pub(super) struct JsonReport<'a> {
     /// `umbra.report`.
     schema: &'static str,
     /// Rises when a key changes its meaning or goes away.
@@ -141,7 +141,7 @@ pub(super) fn write(
         .collect();
     let checks = report.entries.iter().flat_map(|entry| &entry.record.evidence.checks);
     let checks = checks.map(|check| (check.id.name(), check.id.info())).collect();
-    let report = Report {
+    let report = JsonReport {
         schema: SCHEMA,
         version: VERSION,
         assignment: About {

@@ -36,8 +36,8 @@ use thiserror::Error;
 pub use self::csv::grades as csv_grades;
 pub use self::errors::{ClassErrors, ERRORS, ErrorPicture};
 pub use self::html::{
-    Alike, AlikePage, LIKENESS, Reader, batch as html_batch, mark_superseded,
-    submission as html_submission, viewer as html_viewer, write_alike,
+    Reader, SIMILARITY, SimilarPair, SimilarityPage, batch as html_batch, mark_superseded,
+    submission as html_submission, viewer as html_viewer, write_similarity,
 };
 pub use self::json::{SCHEMA, VERSION, report_json};
 pub use self::outline::outline;
@@ -135,7 +135,7 @@ pub struct BatchReport {
     pub released: bool,
     /// Whether there are pages that show pairs of submissions which are alike.
     #[serde(default)]
-    pub has_alike: bool,
+    pub has_similarity: bool,
 }
 
 impl SubmissionReport {
@@ -254,7 +254,7 @@ impl BatchReport {
             entries,
             class: None,
             released: false,
-            has_alike: false,
+            has_similarity: false,
         }
     }
 
@@ -277,7 +277,7 @@ impl BatchReport {
             entries,
             class,
             released: false,
-            has_alike: false,
+            has_similarity: false,
         }
     }
 

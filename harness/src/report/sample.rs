@@ -25,7 +25,7 @@ pub(crate) fn report() -> BatchReport {
         entries: vec![perfect(), two_cosines(), does_not_build()],
         class: None,
         released: false,
-        has_alike: false,
+        has_similarity: false,
     }
 }
 

@@ -6,7 +6,7 @@ use schemars::transform::{RecursiveTransform, Transform};
 use serde_json::json;
 
 use super::ReportError;
-use super::json::Report;
+use super::json::JsonReport;
 
 /// The schema (draft 2020-12), ending with a newline. It is kept in `docs/reference/report.schema.json`.
 ///
@@ -14,7 +14,7 @@ use super::json::Report;
 /// When it cannot be written as text, which no schema is.
 pub fn report_schema() -> Result<String, ReportError> {
     let settings = SchemaSettings::draft2020_12().for_serialize();
-    let mut schema = settings.into_generator().into_root_schema_for::<Report>();
+    let mut schema = settings.into_generator().into_root_schema_for::<JsonReport>();
     schema.insert("title".to_owned(), json!("report.json of Umbra"));
     RecursiveTransform(perhaps_null).transform(&mut schema);
     let text = serde_json::to_string_pretty(&schema);
@@ -118,7 +118,7 @@ mod tests {
         report.entries[0].record.evidence.checks[0].error = f64::NAN;
         report.class = Some(crate::class::Class {
             missing: vec![crate::class::Missing {
-                student: crate::class::Student::default(),
+                student: crate::class::ListedStudent::default(),
                 reason: String::new(),
             }],
             ..crate::class::Class::default()

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use nix::unistd::Pid;
 
-use super::{Limits, SandboxError};
+use super::{KernelLimits, SandboxError};
 
 /// Where control groups are mounted on every system that has them.
 const MOUNT: &str = "/sys/fs/cgroup";
@@ -21,7 +21,7 @@ pub struct Group {
 
 impl Group {
     /// Makes a group beside the caller's own, or at the top.
-    pub fn make(limits: &Limits) -> Result<Self, SandboxError> {
+    pub fn make(limits: &KernelLimits) -> Result<Self, SandboxError> {
         let error = |cause: io::Error| {
             SandboxError::new("cgroup", "make a control group", cause)
                 .hint("needs root or a delegated group with the memory and pids controllers")

@@ -10,7 +10,7 @@ use nix::sys::stat::{Mode, umask};
 use nix::unistd::{AccessFlags, access, chdir, setsid};
 
 use super::privileges::{self, Identity};
-use super::{InForce, Limits, Policy, SandboxError, filter, landlock};
+use super::{InForce, KernelLimits, Policy, SandboxError, filter, landlock};
 
 /// Confines this process, a child of init. The last step but the report: the system call filter.
 pub fn confine(policy: &Policy, identity: &Identity) -> Result<InForce, SandboxError> {
@@ -60,7 +60,7 @@ fn readable(policy: &Policy) -> Result<(), SandboxError> {
     Ok(())
 }
 
-fn limit(limits: &Limits) -> Result<(), SandboxError> {
+fn limit(limits: &KernelLimits) -> Result<(), SandboxError> {
     let all = [
         ("core", Resource::RLIMIT_CORE, 0, 0),
         ("cpu", Resource::RLIMIT_CPU, limits.cpu_s, limits.cpu_s + 1),

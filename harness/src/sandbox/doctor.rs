@@ -5,7 +5,7 @@ use std::process::Stdio;
 
 use serde::{Deserialize, Serialize};
 
-use super::{InForce, Isolation, Kind, Layers, Policy, SandboxError, command, read_report};
+use super::{ChildKind, InForce, Isolation, Layers, Policy, SandboxError, command, read_report};
 
 /// The hidden command that does nothing: what a probe executes.
 pub const PROBE_COMMAND: &str = "__probe";
@@ -15,7 +15,7 @@ const UMBRA: &str = "/umbra";
 
 /// One layer on this machine.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Finding {
+pub struct LayerFinding {
     /// Its name in [`Layers`].
     pub layer: String,
     /// Whether a child was confined with it.
@@ -30,7 +30,7 @@ pub struct Finding {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Examination {
     /// Every layer, in the order of [`Layers::named`].
-    pub findings: Vec<Finding>,
+    pub findings: Vec<LayerFinding>,
     /// The layers that work, all together: tried as such.
     pub layers: Layers,
     /// What they amount to.
@@ -86,7 +86,7 @@ fn probe(umbra: &Path, layers: &Layers) -> Result<InForce, SandboxError> {
         SandboxError::new("launcher", step.to_owned(), cause.to_string())
     };
     let folder = tempfile::tempdir().map_err(|cause| error("make a temporary folder", &cause))?;
-    let mut policy = Policy::new(Kind::Build);
+    let mut policy = Policy::new(ChildKind::Build);
     policy.layers = *layers;
     policy.read_only.push(super::Bind::new(umbra, UMBRA));
     policy.report = Some(folder.path().join("report"));
@@ -111,7 +111,7 @@ fn probe(umbra: &Path, layers: &Layers) -> Result<InForce, SandboxError> {
     }
 }
 
-fn finding(layer: &str, result: &Result<InForce, SandboxError>) -> Finding {
+fn finding(layer: &str, result: &Result<InForce, SandboxError>) -> LayerFinding {
     let layer = layer.to_owned();
     match result {
         Ok(in_force) => {
@@ -121,11 +121,11 @@ fn finding(layer: &str, result: &Result<InForce, SandboxError>) -> Finding {
                 ("drop_privileges", false) => "no capabilities".to_owned(),
                 _ => "works".to_owned(),
             };
-            Finding { layer, available: true, detail, remedy: String::new() }
+            LayerFinding { layer, available: true, detail, remedy: String::new() }
         }
         Err(error) => {
             let remedy = remedy(&layer, error).to_owned();
-            Finding { layer, available: false, detail: error.to_string(), remedy }
+            LayerFinding { layer, available: false, detail: error.to_string(), remedy }
         }
     }
 }

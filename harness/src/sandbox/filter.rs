@@ -13,7 +13,7 @@ use seccompiler::{
     SeccompRule, apply_filter,
 };
 
-use super::{Kind, Policy, SandboxError};
+use super::{ChildKind, Policy, SandboxError};
 
 type Rules = BTreeMap<i64, Vec<SeccompRule>>;
 
@@ -61,7 +61,7 @@ fn one_of(index: u8, values: &[u64]) -> Result<Vec<SeccompRule>, String> {
     values.iter().map(|&value| rule(vec![argument(index, SeccompCmpOp::Eq, value)?])).collect()
 }
 
-fn allowed(kind: Kind, gpu: bool, own_pid: u64) -> Result<Rules, String> {
+fn allowed(kind: ChildKind, gpu: bool, own_pid: u64) -> Result<Rules, String> {
     use SeccompCmpOp::{Eq, MaskedEq};
     let mut rules: Rules = PLAIN.iter().chain(LEGACY).map(|&call| (call, Vec::new())).collect();
     let thread = libc::CLONE_THREAD as u64;
@@ -89,7 +89,7 @@ fn allowed(kind: Kind, gpu: bool, own_pid: u64) -> Result<Rules, String> {
     Ok(rules)
 }
 
-fn refusals(kind: Kind, own_pid: u64) -> Result<Rules, String> {
+fn refusals(kind: ChildKind, own_pid: u64) -> Result<Rules, String> {
     use SeccompCmpOp::{MaskedEq, Ne};
     let mut rules: Rules =
         REFUSED.iter().chain(REFUSED_LEGACY).map(|&call| (call, Vec::new())).collect();
@@ -437,7 +437,7 @@ mod tests {
 
     #[test]
     fn nothing_is_both_allowed_and_refused_but_the_filter_itself() {
-        for kind in [Kind::Worker, Kind::Build, Kind::Decode] {
+        for kind in [ChildKind::Worker, ChildKind::Build, ChildKind::Decode] {
             let allowed = allowed(kind, false, 2).expect("rules");
             let refused = refusals(kind, 2).expect("rules");
             let plain = |rules: &Rules, call: &i64| rules.get(call).is_some_and(Vec::is_empty);

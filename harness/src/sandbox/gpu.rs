@@ -102,14 +102,14 @@ fn places(library: &Path) -> Vec<PathBuf> {
 
 #[cfg(all(test, target_os = "linux"))]
 mod tests {
-    use super::super::{Kind, Policy};
+    use super::super::{ChildKind, Policy};
     use super::*;
 
     #[test]
     fn manifests_lead_to_libraries() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().canonicalize().unwrap().join(name);
-        let usual = Policy::new(Kind::Worker).read_only;
+        let usual = Policy::new(ChildKind::Worker).read_only;
         let is_seen = |path: &Path| usual.iter().any(|bind| path.starts_with(&bind.host));
         fs::write(at("driver.so"), "").unwrap();
         let named = |library: &Path| {

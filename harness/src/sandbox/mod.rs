@@ -37,7 +37,8 @@ pub use gpu::Gpu;
 #[cfg(target_os = "linux")]
 pub use launch::{command, confine_self, kill_inside, launch_main, orders, payload_pid};
 pub use policy::{
-    Bind, InForce, Isolation, Kind, Layers, Limits, Policy, SandboxError, Scratch, read_report,
+    Bind, ChildKind, InForce, Isolation, KernelLimits, Layers, Policy, SandboxError, Scratch,
+    read_report,
 };
 
 /// The layers that this machine gives and that work with each other, tried for real with `umbra`,

@@ -22,7 +22,7 @@ pub const SCRATCH: &str = "/scratch";
 /// What a child is for; each kind has its own system calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum ChildKind {
     /// Loads a plugin and calls it: threads, but no new process and no program.
     Worker,
     /// Executes the compiler, which starts the linker.
@@ -31,7 +31,7 @@ pub enum Kind {
     Decode,
 }
 
-impl Kind {
+impl ChildKind {
     /// Whether new processes and programs are allowed.
     pub fn may_execute(self) -> bool {
         self == Self::Build
@@ -77,7 +77,7 @@ pub struct Scratch {
 
 /// What a child may use; the kernel enforces it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Limits {
+pub struct KernelLimits {
     /// CPU time of each process, in seconds: SIGXCPU, a second later SIGKILL.
     pub cpu_s: u64,
     /// Address space of each process and, with the cgroup layer, memory of all together, in MiB.
@@ -197,20 +197,20 @@ impl std::fmt::Display for Isolation {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Policy {
     /// What it is for.
-    pub kind: Kind,
+    pub kind: ChildKind,
     /// What it reads. The system's libraries are among them.
     pub read_only: Vec<Bind>,
     /// Existing files or folders that it changes. Nothing bounds a folder's total size: prefer
     /// single files of the right size, and [`Self::collect`].
     pub read_write: Vec<Bind>,
     /// Files beneath [`SCRATCH`] that are copied out when the child ended with code 0: regular
-    /// files, not reached through links, at most [`Limits::file_size_mib`] long. They are written
+    /// files, not reached through links, at most [`KernelLimits::file_size_mib`] long. They are written
     /// over the existing host file, which is left empty when there is no such file.
     pub collect: Vec<Bind>,
     /// Its writable place.
     pub scratch: Scratch,
     /// What it may use.
-    pub limits: Limits,
+    pub limits: KernelLimits,
     /// Device nodes and driver files, when it draws on a GPU.
     pub gpu: Option<super::Gpu>,
     /// Whether it has a `/proc` of its own process namespace. Landlock leaves `/proc/cpuinfo` and
@@ -226,14 +226,14 @@ pub struct Policy {
 
 impl Policy {
     /// A policy with full isolation that sees the system's libraries and nothing else.
-    pub fn new(kind: Kind) -> Self {
+    pub fn new(kind: ChildKind) -> Self {
         Self {
             kind,
             read_only: system(kind),
             read_write: Vec::new(),
             collect: Vec::new(),
             scratch: Scratch { quota_mib: 64, files: 4096, without_mount: None },
-            limits: Limits {
+            limits: KernelLimits {
                 cpu_s: 120,
                 memory_mib: 4096,
                 file_size_mib: 64,
@@ -241,7 +241,7 @@ impl Policy {
                 tasks: 64,
             },
             gpu: None,
-            proc: kind == Kind::Build,
+            proc: kind == ChildKind::Build,
             layers: Layers::full(),
             report: None,
         }
@@ -278,7 +278,7 @@ impl Policy {
 
 /// The system's files that each kind needs, as far as this machine has them. A worker loads
 /// libraries and drivers; a compiler's linker needs programs as well.
-fn system(kind: Kind) -> Vec<Bind> {
+fn system(kind: ChildKind) -> Vec<Bind> {
     let libraries: &[&str] = &[
         "/lib",
         "/lib32",
@@ -290,9 +290,9 @@ fn system(kind: Kind) -> Vec<Bind> {
         "/sys/devices/system/cpu",
     ];
     let more: &[&str] = match kind {
-        Kind::Worker => &["/usr/share/vulkan", "/usr/share/drirc.d", "/usr/share/glvnd"],
-        Kind::Build => &["/bin", "/usr/bin", "/usr/libexec", "/etc/alternatives"],
-        Kind::Decode => &[],
+        ChildKind::Worker => &["/usr/share/vulkan", "/usr/share/drirc.d", "/usr/share/glvnd"],
+        ChildKind::Build => &["/bin", "/usr/bin", "/usr/libexec", "/etc/alternatives"],
+        ChildKind::Decode => &[],
     };
     let there = |path: &&&str| Path::new(path).symlink_metadata().is_ok();
     libraries.iter().chain(more).filter(there).map(|&path| Bind::same(path)).collect()
@@ -389,7 +389,7 @@ mod tests {
 
     #[test]
     fn host_paths_are_seen_through_binds() {
-        let mut policy = Policy::new(Kind::Build);
+        let mut policy = Policy::new(ChildKind::Build);
         policy.read_only.push(Bind::new("/root/.rustup/toolchains/x", TOOLCHAIN));
         policy.read_write.push(Bind::new("/tmp/job/table", "/job/table"));
         let seen = |path: &str| policy.seen(Path::new(path)).display().to_string();

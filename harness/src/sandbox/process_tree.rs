@@ -39,7 +39,7 @@ pub fn follow(parent: u32) -> Result<(), SandboxError> {
 /// The payload, ready to run foreign code, and its pipe to the launcher.
 pub struct Ready {
     in_force: InForce,
-    report: Report,
+    report: ReportFile,
 }
 
 impl Ready {
@@ -57,9 +57,9 @@ impl Ready {
 }
 
 /// The pipe through which init and the payload tell the launcher how far they got.
-struct Report(File);
+struct ReportFile(File);
 
-impl Report {
+impl ReportFile {
     fn send(&mut self, report: &Result<InForce, SandboxError>) {
         if let Ok(mut line) = serde_json::to_vec(report) {
             line.push(b'\n');
@@ -124,7 +124,7 @@ fn begin(policy: &Policy) -> Result<Side, SandboxError> {
             drop((report_out, status_out, life_in));
             // Its removal is the launcher's.
             std::mem::forget(group);
-            let mut report = Report(File::from(report_in));
+            let mut report = ReportFile(File::from(report_in));
             match init(policy, &identity, File::from(life_out)) {
                 Ok(Some((payload, copies))) => {
                     drop(report);
@@ -146,7 +146,7 @@ fn begin(policy: &Policy) -> Result<Side, SandboxError> {
     }
 }
 
-fn give_up(report: &mut Report, error: SandboxError) -> ! {
+fn give_up(report: &mut ReportFile, error: SandboxError) -> ! {
     report.send(&Err(error));
     exit(EXIT_NOT_CONFINED.into())
 }

@@ -13,8 +13,8 @@ use super::job::{Request, SceneRef};
 use super::neutral_pass::Neutral;
 use super::shaders;
 use super::shared_memory::{Input, Output, Table};
-use super::table::{Record, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE};
-use super::wire::{self, CAMERA_BYTES, Folder, WireJob, WireRequest, queries, rays, words};
+use super::table::{STATUS_OURS, STATUS_REJECTED, STATUS_STAGE, Slot};
+use super::wire::{self, CAMERA_BYTES, WireJob, WireRequest, WorkerFolder, queries, rays, words};
 use crate::plugin::{
     CallError, CallErrorKind, HostPlugin, LoadedScene, OfflineJob, OpenPass, RealtimeJob, Witness,
     WitnessState,
@@ -32,7 +32,7 @@ pub fn child_main(dir: &Path) -> ExitCode {
 }
 
 fn work(dir: &Path) -> std::io::Result<()> {
-    let folder = Folder(dir);
+    let folder = WorkerFolder(dir);
     let job: WireJob = serde_json::from_slice(&std::fs::read(folder.job())?)?;
     let table = Table::open(&folder.table(), job.requests.len())?;
     let input = Input::open(&folder.input())?;
@@ -79,8 +79,8 @@ fn work(dir: &Path) -> std::io::Result<()> {
 fn answer_frames(
     plugin: &HostPlugin,
     wired: &WireRequest,
-    folder: &Folder,
-    record: &Record,
+    folder: &WorkerFolder,
+    record: &Slot,
 ) -> std::io::Result<()> {
     let mut cameras = File::open(folder.cameras())?;
     let mut answered = File::options().write(true).open(folder.frames())?;
@@ -118,7 +118,7 @@ fn ask<'p>(
     current: &mut Current<'p>,
     request: &WireRequest,
     input: &[u8],
-    record: &Record,
+    record: &Slot,
     values: &mut [f32],
 ) -> Result<(), CallError> {
     let scene = load(plugin, current, request.request.scene())?;

@@ -7,8 +7,8 @@ use std::process::Command;
 
 use super::job::{AdapterKind, Request};
 use super::policy::WorkerPolicy;
-use super::wire::Folder;
-use crate::process::Limits;
+use super::wire::WorkerFolder;
+use crate::process::ProcessLimits;
 
 /// The name of the program that loads plugins; it lies beside `umbra`.
 const PROGRAM: &str = "umbra-worker";
@@ -64,11 +64,11 @@ pub fn command(
     dir: &Path,
     own: &WorkerPolicy,
     requests: &[&Request],
-    limits: &Limits,
+    limits: &ProcessLimits,
     driver: Option<&Path>,
 ) -> Command {
     let mut command = program.command();
-    command.arg(&own.job).current_dir(Folder(dir).scratch()).env_clear();
+    command.arg(&own.job).current_dir(WorkerFolder(dir).scratch()).env_clear();
     command.env("LANG", "C").env("HOME", "/nonexistent");
     // What is compiled stays in the scratch of this one worker: one renderer's shaders are no
     // other's business (`shaders`).

@@ -10,7 +10,7 @@ use super::job::Request;
 use super::outcome::{Answer, Fault, Outcome, WitnessUse};
 use super::policy::WorkerPolicy;
 use super::table::{SLOT_BYTES, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE, SlotState};
-use super::wire::{Folder, Place, WireJob, WireRequest, take_input};
+use super::wire::{OutputRegion, WireJob, WireRequest, WorkerFolder, take_input};
 use crate::plugin::Witness;
 
 /// The files of a worker, as the parent holds them: opened before it began, read only by plain
@@ -18,7 +18,7 @@ use crate::plugin::Witness;
 pub(super) struct Files {
     table: File,
     output: File,
-    places: Vec<Place>,
+    places: Vec<OutputRegion>,
 }
 
 impl Files {
@@ -28,7 +28,7 @@ impl Files {
         requests: &[&Request],
         live: bool,
     ) -> io::Result<Self> {
-        let folder = Folder(dir);
+        let folder = WorkerFolder(dir);
         let new = |path| File::options().create_new(true).read(true).write(true).open(path);
         let (mut input, mut output) = (new(folder.input())?, new(folder.output())?);
         let (mut input_end, mut output_end) = (0, 0);
@@ -38,7 +38,7 @@ impl Files {
             rest.scene_mut().path.clone_from(scene);
             let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_ne_bytes()).collect();
             input.write_all(&bytes)?;
-            let place = Place::new(output_end, request.answer_floats());
+            let place = OutputRegion::new(output_end, request.answer_floats());
             output.write_all(&f32::NAN.to_ne_bytes().repeat(place.size / 4))?;
             wired.push(WireRequest {
                 request: rest,
@@ -127,7 +127,7 @@ fn read_at(file: &mut File, start: u64, size: usize) -> io::Result<Vec<u8>> {
 }
 
 /// The floats of a region; none when its size or its filler is not as the parent left it.
-fn values(region: &[u8], place: Place) -> Option<Vec<f32>> {
+fn values(region: &[u8], place: OutputRegion) -> Option<Vec<f32>> {
     if region.len() != place.size {
         return None;
     }

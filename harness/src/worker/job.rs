@@ -82,7 +82,7 @@ pub enum Request {
         /// What to draw with.
         adapter: Adapter,
         /// Stages to replace; without a plugin, all stages.
-        stages: Vec<Stage>,
+        stages: Vec<StageText>,
         /// One frame is drawn for each.
         cameras: Vec<CameraValue>,
     },
@@ -164,7 +164,7 @@ pub const STAGES: [&str; 3] = ["simple.vs", "diffuse.fs", "phong.fs"];
 
 /// The text of one shader stage.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Stage {
+pub struct StageText {
     /// `simple.vs`, `diffuse.fs` or `phong.fs`.
     pub name: String,
     /// WGSL.

@@ -22,12 +22,12 @@ use tempfile::TempDir;
 
 use super::files::Files;
 use super::job::{CameraValue, Job, Request};
-use super::outcome::{Late, Outcome};
+use super::outcome::{Outcome, Timeout};
 use super::retry_budget::Allowed;
 use super::supervise::{Ready, Supervisor, death, not_started};
 use super::table::SlotState;
-use super::wire::{Folder, camera_bytes};
-use crate::process::{self, ChildOutcome, Exit, Limits};
+use super::wire::{WorkerFolder, camera_bytes};
+use crate::process::{self, ChildOutcome, Exit, ProcessLimits};
 
 /// Bytes of its output that are kept, besides a tail.
 const KEEP_OUTPUT: usize = 16 << 10;
@@ -72,13 +72,13 @@ impl LiveWorker {
         supervisor: &Supervisor,
         plugin: std::path::PathBuf,
         request: Request,
-        limits: &Limits,
+        limits: &ProcessLimits,
     ) -> io::Result<Self> {
         // How long it stands still is watched by the frame.
-        let limits = Limits { wall_s: 86_400.0, cpu_s: 1 << 20, ..limits.clone() };
+        let limits = ProcessLimits { wall_s: 86_400.0, cpu_s: 1 << 20, ..limits.clone() };
         let private = supervisor.private_folder()?;
         let [cameras, frames] = {
-            let folder = Folder(private.path());
+            let folder = WorkerFolder(private.path());
             [folder.cameras(), folder.frames()]
         };
         let pipe = |path: &std::path::Path, mode| -> io::Result<File> {
@@ -142,8 +142,9 @@ impl LiveWorker {
         let ended =
             thread.join().map_err(|_| io::Error::other("the watching thread panicked"))??;
         let records = self.files.records()?;
-        let late =
-            |computing, limit_s| Outcome::TimedOut(Late { computing, limit_s, reference_s: None });
+        let late = |computing, limit_s| {
+            Outcome::TimedOut(Timeout { computing, limit_s, reference_s: None })
+        };
         Ok(Some(match (&records[..], ended.exit) {
             (_, Exit::Cancelled) => return Ok(None),
             // It said why and was gone before it was heard.
@@ -166,7 +167,7 @@ impl LiveWorker {
                 late(true, FRAME_CPU_S[usize::from(answered > 0)])
             }
             _ => {
-                let limits = Limits::default();
+                let limits = ProcessLimits::default();
                 death(&ended, &Allowed { limits, each_cpu_s: Vec::new() }, 0)
             }
         }))

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::job::{CameraValue, Request};
 use super::outcome::Outcome;
 use super::supervise::Supervisor;
-use crate::process::Limits;
+use crate::process::ProcessLimits;
 
 /// Not available here.
 pub enum LiveWorker {}
@@ -16,7 +16,7 @@ impl LiveWorker {
     ///
     /// # Errors
     /// Always.
-    pub fn start(_: &Supervisor, _: PathBuf, _: Request, _: &Limits) -> io::Result<Self> {
+    pub fn start(_: &Supervisor, _: PathBuf, _: Request, _: &ProcessLimits) -> io::Result<Self> {
         Err(io::Error::other("realtime is not drawn live on this system"))
     }
 

@@ -27,12 +27,12 @@ pub use child::{child_main, draw_in_process};
 pub(crate) use command::software_driver;
 pub use job::{
     Adapter, AdapterKind, BsdfQuery, BsdfSource, CameraValue, Job, RayQuery, Request, STAGES,
-    SceneRef, Stage,
+    SceneRef, StageText,
 };
 pub use live::LiveWorker;
-pub use outcome::{Answer, Fault, JobReport, Late, Outcome, WitnessUse, WorkerRun};
+pub use outcome::{Answer, Fault, JobReport, Outcome, Timeout, WitnessUse, WorkerRun};
 pub use policy::as_given;
 pub use retry_budget::{Budget, Reference, RetryBudget, is_environment_failure};
-pub use supervise::{Progress, Supervisor};
+pub use supervise::{JobProgress, Supervisor};
 // What is parsed of a file that foreign code could write: public for its fuzz target.
 pub use table::{SLOT_BYTES, SlotState};

@@ -40,7 +40,7 @@ pub enum Outcome {
     /// The worker exited by itself, with this code, before it answered.
     ExitedEarly(i32),
     /// Out of time.
-    TimedOut(Late),
+    TimedOut(Timeout),
     /// It ended at its memory limit.
     OutOfMemory,
     /// It wrote a larger file than allowed. Limits that only refuse (scratch, tasks, open files) end
@@ -102,7 +102,7 @@ impl Outcome {
 
 /// How a renderer ran out of time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Late {
+pub struct Timeout {
     /// Whether it computed until it was out of CPU time; otherwise it stood still.
     pub computing: bool,
     /// The limit in seconds, of CPU time or of standing still.
@@ -111,14 +111,14 @@ pub struct Late {
     pub reference_s: Option<f64>,
 }
 
-impl Late {
+impl Timeout {
     /// What it looks like, in two words.
     pub fn what(&self) -> &'static str {
         if self.computing { "endless loop" } else { "stuck" }
     }
 }
 
-impl fmt::Display for Late {
+impl fmt::Display for Timeout {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let limit_s = (10.0 * self.limit_s).round() / 10.0;
         if !self.computing {

@@ -9,9 +9,9 @@ use basecode::scene::SceneConfig;
 
 use super::job::{AdapterKind, Job, Request};
 use super::shaders;
-use super::wire::Folder;
+use super::wire::WorkerFolder;
 use crate::sandbox::policy::{JOB, PLUGIN, SCENE};
-use crate::sandbox::{Bind, Gpu, Kind, Layers, Policy};
+use crate::sandbox::{Bind, ChildKind, Gpu, Layers, Policy};
 
 /// A policy, and the names by which the worker is told of things.
 pub struct WorkerPolicy {
@@ -31,12 +31,12 @@ impl WorkerPolicy {
     /// # Errors
     /// When the current folder is not known, or the plugin's path names no file.
     pub fn new(dir: &Path, job: &Job, requests: &[&Request], layers: Layers) -> io::Result<Self> {
-        let mut policy = Policy::new(Kind::Worker);
+        let mut policy = Policy::new(ChildKind::Worker);
         policy.layers = layers;
-        policy.scratch.without_mount = Some(Folder(dir).scratch());
+        policy.scratch.without_mount = Some(WorkerFolder(dir).scratch());
         policy.report = Some(dir.join("report"));
-        let inside = Folder(Path::new(JOB));
-        let folder = Folder(dir);
+        let inside = WorkerFolder(Path::new(JOB));
+        let folder = WorkerFolder(dir);
         policy.read_only.push(Bind::new(folder.job(), inside.job()));
         policy.read_only.push(Bind::new(folder.input(), inside.input()));
         policy.read_write.push(Bind::new(folder.output(), inside.output()));
@@ -60,7 +60,7 @@ impl WorkerPolicy {
         }
         let drawn_by = |request: &&Request| request.adapter();
         if requests.iter().filter_map(drawn_by).any(|kind| kind != AdapterKind::Software) {
-            let usual = Policy::new(Kind::Worker).read_only;
+            let usual = Policy::new(ChildKind::Worker).read_only;
             let is_seen = |path: &Path| usual.iter().any(|bind| path.starts_with(&bind.host));
             policy.gpu = Gpu::of_this_machine(&is_seen);
         }
@@ -72,7 +72,7 @@ impl WorkerPolicy {
 impl WorkerPolicy {
     /// Gives it the pipes of a live worker; they must be there.
     pub fn live(&mut self, dir: &Path) {
-        let (folder, inside) = (Folder(dir), Folder(Path::new(JOB)));
+        let (folder, inside) = (WorkerFolder(dir), WorkerFolder(Path::new(JOB)));
         self.policy.read_only.push(Bind::new(folder.cameras(), inside.cameras()));
         self.policy.read_write.push(Bind::new(folder.frames(), inside.frames()));
     }

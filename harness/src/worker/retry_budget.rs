@@ -4,8 +4,8 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::job::{Job, Request};
-use super::outcome::{Fault, Late, Outcome};
-use crate::process::{ChildOutcome, Limits};
+use super::outcome::{Fault, Outcome, Timeout};
+use crate::process::{ChildOutcome, ProcessLimits};
 
 /// Number of requests of a kind that may be repeated: each may cost its time limit.
 const MAX_RETRIES: usize = 2;
@@ -80,13 +80,13 @@ struct OfKind {
     hangs: bool,
     timeouts: usize,
     /// How the first of them was late.
-    late: Option<Late>,
+    late: Option<Timeout>,
 }
 
 /// What one worker may use.
 pub(super) struct Allowed {
     /// All its questions together.
-    pub limits: Limits,
+    pub limits: ProcessLimits,
     /// CPU seconds of each question.
     pub each_cpu_s: Vec<f64>,
 }
@@ -156,7 +156,7 @@ impl<'a> RetryBudget<'a> {
     }
 
     /// What a worker may use that is asked `pending` of a job, at first or once a kind hangs.
-    pub(super) fn allowed(&self, job: &Job, pending: &[usize], limits: &Limits) -> Allowed {
+    pub(super) fn allowed(&self, job: &Job, pending: &[usize], limits: &ProcessLimits) -> Allowed {
         let mut limits = limits.clone();
         if !self.own_limits {
             let each_cpu_s = vec![f64::INFINITY; pending.len()];
@@ -182,7 +182,7 @@ impl<'a> RetryBudget<'a> {
 
     /// The limits under which a request that ran out of time is asked again, alone; nothing when it is
     /// not asked again.
-    pub(super) fn again(&self, job: &Job, index: usize, limits: &Limits) -> Option<Allowed> {
+    pub(super) fn again(&self, job: &Job, index: usize, limits: &ProcessLimits) -> Option<Allowed> {
         let request = &job.requests[index];
         {
             let of_kind = &mut self.state().kinds[kind(job, request)];
@@ -216,7 +216,7 @@ impl<'a> RetryBudget<'a> {
     }
 
     /// No worker of a submission may use more than is left of its budget.
-    fn clamp(&self, job: &Job, pending: &[usize], limits: &mut Limits) {
+    fn clamp(&self, job: &Job, pending: &[usize], limits: &mut ProcessLimits) {
         let (Some(budget), Some(&first)) = (&self.budget, pending.first()) else { return };
         let (cpu_s, still_s) = {
             let state = self.state();
@@ -276,7 +276,7 @@ impl<'a> RetryBudget<'a> {
         &self,
         job: &Job,
         index: usize,
-        late: Option<Late>,
+        late: Option<Timeout>,
         confirmed: bool,
     ) -> Outcome {
         let request = &job.requests[index];
@@ -289,7 +289,7 @@ impl<'a> RetryBudget<'a> {
         };
         match late.filter(|_| hangs) {
             Some(late) if self.own_limits => {
-                Outcome::TimedOut(Late { reference_s: self.reference_cpu_s(request), ..late })
+                Outcome::TimedOut(Timeout { reference_s: self.reference_cpu_s(request), ..late })
             }
             Some(late) => Outcome::TimedOut(late),
             None => unconfirmed(),

@@ -25,10 +25,10 @@ fn job() -> Job {
     Job { plugin: Some("a.so".into()), requests: vec![render(32, 4), bsdf] }
 }
 
-const LATE: Option<Late> = Some(Late { computing: true, limit_s: 3.0, reference_s: None });
+const LATE: Option<Timeout> = Some(Timeout { computing: true, limit_s: 3.0, reference_s: None });
 
-fn limits() -> Limits {
-    Limits { wall_s: 10.0, cpu_s: 20, ..Limits::default() }
+fn limits() -> ProcessLimits {
+    ProcessLimits { wall_s: 10.0, cpu_s: 20, ..ProcessLimits::default() }
 }
 
 /// One whose questions all cost the same.
@@ -135,7 +135,7 @@ fn a_question_has_what_fits_it_and_ten_times_the_reference_when_it_counts() {
     let again = retries.again(&job, 0, &limits()).unwrap();
     assert_eq!(again.each_cpu_s, [20.0]);
     let said = retries.timed_out(&job, 0, LATE, true);
-    assert_eq!(said, Outcome::TimedOut(Late { reference_s: Some(2.0), ..LATE.unwrap() }));
+    assert_eq!(said, Outcome::TimedOut(Timeout { reference_s: Some(2.0), ..LATE.unwrap() }));
     // From now on renders have three times what the reference takes.
     let short = retries.allowed(&job, &[0], &limits());
     assert_eq!((short.each_cpu_s, short.limits.wall_s), (vec![6.0], 2.0));
@@ -184,7 +184,7 @@ fn a_budget_ends_a_path_by_cpu_time_of_the_reference_or_by_standing_still() {
 }
 
 #[test]
-fn environment_failures_are_recognised() {
+fn environment_failures_are_recognized() {
     let machine = |fault| Outcome::NotRun { reason: "x".into(), fault };
     for (outcome, blames) in [
         (Outcome::NoAdapter(String::new()), true),

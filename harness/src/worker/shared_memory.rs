@@ -6,8 +6,8 @@ use std::path::Path;
 
 use memmap2::{Mmap, MmapMut, MmapOptions};
 
-use super::table::{Record, SLOT_BYTES};
-use super::wire::Place;
+use super::table::{SLOT_BYTES, Slot};
+use super::wire::OutputRegion;
 
 /// The inputs of all requests.
 pub struct Input(Option<Mmap>);
@@ -33,7 +33,7 @@ impl Input {
     }
 }
 
-/// The table; see [`Record`].
+/// The table; see [`Slot`].
 pub struct Table(MmapMut);
 
 impl Table {
@@ -52,26 +52,26 @@ impl Table {
     }
 
     /// The record of the plugin's loading.
-    pub fn loading(&self) -> &Record {
+    pub fn loading(&self) -> &Slot {
         self.record(0)
     }
 
     /// The record of a request.
-    pub fn request(&self, index: usize) -> &Record {
+    pub fn request(&self, index: usize) -> &Slot {
         self.record(1 + index)
     }
 
-    fn record(&self, index: usize) -> &Record {
+    fn record(&self, index: usize) -> &Slot {
         assert!((index + 1) * SLOT_BYTES <= self.0.len(), "record {index} lies outside the table");
         // SAFETY: inside the mapping, which starts on a page; a record is all atomics, so that
         // any bytes are valid and others may write at the same time.
-        unsafe { &*self.0.as_ptr().add(index * SLOT_BYTES).cast::<Record>() }
+        unsafe { &*self.0.as_ptr().add(index * SLOT_BYTES).cast::<Slot>() }
     }
 }
 
 /// A request's output: the floats end at an inaccessible page, and another lies before the region.
 pub struct Output {
-    place: Place,
+    place: OutputRegion,
     #[cfg(unix)]
     map: guarded::Map,
     #[cfg(not(unix))]
@@ -83,7 +83,7 @@ impl Output {
     ///
     /// # Errors
     /// When it cannot be mapped.
-    pub fn open(path: &Path, place: Place) -> io::Result<Self> {
+    pub fn open(path: &Path, place: OutputRegion) -> io::Result<Self> {
         let file = File::options().read(true).write(true).open(path)?;
         #[cfg(unix)]
         let map = guarded::Map::new(&file, place.start, place.size)?;

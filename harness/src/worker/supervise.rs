@@ -15,12 +15,12 @@ use tempfile::TempDir;
 use super::command::{Program, command, program_beside, software_driver};
 use super::files::Files;
 use super::job::{Job, Request};
-use super::outcome::{Fault, JobReport, Late, Outcome, WorkerRun};
+use super::outcome::{Fault, JobReport, Outcome, Timeout, WorkerRun};
 use super::policy::WorkerPolicy;
 use super::retry_budget::{Allowed, CANNOT_RUN, RetryBudget};
 use super::table::SlotState;
-use super::wire::Folder;
-use crate::process::{self, ChildOutcome, Confinement, Exit, Limits, signal_name};
+use super::wire::WorkerFolder;
+use crate::process::{self, ChildOutcome, Confinement, Exit, ProcessLimits, signal_name};
 use crate::sandbox::{self, Bind, Layers};
 
 /// Bytes of a worker's output that are kept, besides a tail.
@@ -47,7 +47,7 @@ pub struct Supervisor {
 
 /// How far a job is, by the worker's word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
+pub struct JobProgress {
     /// Requests with an outcome.
     pub answered: usize,
     /// Requests in all.
@@ -118,9 +118,9 @@ impl Supervisor {
     pub fn run_job(
         &self,
         job: &Job,
-        limits: &Limits,
+        limits: &ProcessLimits,
         cancel: &AtomicBool,
-        progress: &mut dyn FnMut(Progress),
+        progress: &mut dyn FnMut(JobProgress),
     ) -> JobReport {
         self.run_job_with_retries(job, limits, &RetryBudget::none(), cancel, progress)
     }
@@ -129,10 +129,10 @@ impl Supervisor {
     pub fn run_job_with_retries(
         &self,
         job: &Job,
-        limits: &Limits,
+        limits: &ProcessLimits,
         retries: &RetryBudget,
         cancel: &AtomicBool,
-        progress: &mut dyn FnMut(Progress),
+        progress: &mut dyn FnMut(JobProgress),
     ) -> JobReport {
         let count = job.requests.len();
         let mut outcomes: Vec<Option<Outcome>> = vec![None; count];
@@ -154,7 +154,7 @@ impl Supervisor {
             }
             let answered = count - pending.len();
             let mut worker_progress = |in_worker, rows| {
-                progress(Progress { answered: answered + in_worker, requests: count, rows });
+                progress(JobProgress { answered: answered + in_worker, requests: count, rows });
             };
             let allowed = retries.allowed(job, &pending, limits);
             let beside = self.beside_others();
@@ -256,10 +256,10 @@ impl Supervisor {
         private: &Path,
         job: &Job,
         requests: &[&Request],
-        limits: &Limits,
+        limits: &ProcessLimits,
         live: bool,
     ) -> io::Result<Ready> {
-        fs::create_dir(Folder(private).scratch())?;
+        fs::create_dir(WorkerFolder(private).scratch())?;
         let mut own = WorkerPolicy::new(private, job, requests, self.isolation)?;
         own.shaders(requests, &self.shaders, self.leaves_shaders.as_deref());
         if live {
@@ -403,7 +403,7 @@ fn starved() -> Outcome {
 pub(super) fn death(ended: &ChildOutcome, allowed: &Allowed, index: usize) -> Outcome {
     let limits = &allowed.limits;
     let late =
-        |computing, limit_s| Outcome::TimedOut(Late { computing, limit_s, reference_s: None });
+        |computing, limit_s| Outcome::TimedOut(Timeout { computing, limit_s, reference_s: None });
     match ended.exit {
         Exit::OutOfCpu => {
             let own = allowed.each_cpu_s.get(index).copied().unwrap_or(f64::INFINITY);

@@ -24,7 +24,7 @@ const ANSWERED: u32 = 2;
 
 /// A record as the worker writes it, while the parent may look. All zero: not started.
 #[repr(C)]
-pub struct Record {
+pub struct Slot {
     state: AtomicU32,
     status: AtomicI32,
     seconds: AtomicU64,
@@ -43,9 +43,9 @@ pub struct Record {
     message: [AtomicU8; MESSAGE_BYTES],
 }
 
-const _: () = assert!(size_of::<Record>() == SLOT_BYTES && align_of::<Record>() == 8);
+const _: () = assert!(size_of::<Slot>() == SLOT_BYTES && align_of::<Slot>() == 8);
 
-impl Record {
+impl Slot {
     /// Notes that the work begins.
     pub fn start(&self) {
         self.state.store(STARTED, Release);
@@ -156,12 +156,12 @@ mod tests {
     use super::*;
 
     /// A record's bytes, as the file would hold them.
-    fn bytes(record: &Record) -> [u8; SLOT_BYTES] {
+    fn bytes(record: &Slot) -> [u8; SLOT_BYTES] {
         // SAFETY: a record is 4096 bytes of atomics without padding, and nobody else writes it.
         unsafe { std::ptr::from_ref(record).cast::<[u8; SLOT_BYTES]>().read() }
     }
 
-    fn zero() -> Record {
+    fn zero() -> Slot {
         // SAFETY: all-zero is a valid record.
         unsafe { std::mem::zeroed() }
     }

@@ -31,13 +31,13 @@ pub struct WireRequest {
     /// Where they lie in the input file, in bytes.
     pub input: (usize, usize),
     /// Where the answer goes.
-    pub output: Place,
+    pub output: OutputRegion,
 }
 
 /// A region of the output file. The answer ends where the region ends, so that a guard page can
 /// follow it; what lies before it in the region is filler that nobody may change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Place {
+pub struct OutputRegion {
     /// First byte of the region, a multiple of [`ALIGN`].
     pub start: usize,
     /// Size of the region in bytes, a multiple of [`ALIGN`].
@@ -46,7 +46,7 @@ pub struct Place {
     pub floats: usize,
 }
 
-impl Place {
+impl OutputRegion {
     /// The region for `floats` at `start`.
     pub fn new(start: usize, floats: usize) -> Self {
         Self { start, size: (4 * floats).next_multiple_of(ALIGN), floats }
@@ -59,9 +59,9 @@ impl Place {
 }
 
 /// The files of a worker's private folder.
-pub struct Folder<'a>(pub &'a Path);
+pub struct WorkerFolder<'a>(pub &'a Path);
 
-impl Folder<'_> {
+impl WorkerFolder<'_> {
     /// The [`WireJob`].
     pub fn job(&self) -> PathBuf {
         self.0.join("job.json")
@@ -274,9 +274,9 @@ mod tests {
 
     #[test]
     fn an_answer_ends_at_the_end_of_its_region() {
-        let place = Place::new(ALIGN, 7);
+        let place = OutputRegion::new(ALIGN, 7);
         assert_eq!((place.size, place.offset()), (ALIGN, ALIGN - 28));
-        assert_eq!(Place::new(0, ALIGN / 4).offset(), 0);
-        assert_eq!(Place::new(0, 0).size, 0);
+        assert_eq!(OutputRegion::new(0, ALIGN / 4).offset(), 0);
+        assert_eq!(OutputRegion::new(0, 0).size, 0);
     }
 }

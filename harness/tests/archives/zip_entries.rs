@@ -159,7 +159,7 @@ fn zip_duplicate_entry() {
 }
 
 #[test]
-fn zip_duplicate_after_normalising() {
+fn zip_duplicate_after_normalizing() {
     let twice = [Entry::stored("src/lib.rs", b"a"), Entry::stored("./src//./lib.rs", b"b")];
     zip_refused(twice, "duplicate_entry", "src/lib.rs");
 }

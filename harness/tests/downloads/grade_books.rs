@@ -203,7 +203,8 @@ fn no_report_is_lost_when_nobody_reads_what_is_printed() {
     let root = place.assignment(LATE);
     place.put("class/a2.zip", &submission(&config("Ann", "Lee", "0260000003")));
     let root = root.to_str().unwrap();
-    let grade = ["grade", "class", "--perturb", "off", "--isolation", "reduced", "--output", "out"];
+    let grade =
+        ["grade", "class", "--held-back", "off", "--isolation", "reduced", "--output", "out"];
     let pipe = Some(nix::sys::signal::Signal::SIGPIPE as i32);
     assert_eq!(place.run_unread(&[&grade[..], &["--root", root]].concat()), pipe);
     for file in ["report.json", "grades.csv", "report.html", "a2/report.html"] {

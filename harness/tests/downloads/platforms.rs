@@ -267,7 +267,7 @@ fn what_holds_no_submission_is_said_and_nothing_is_written() {
     place.put("list.csv", b"a,b\n1,2\n");
     place.put("class/a2.zip", &submission("{}"));
     let mut all = vec!["grade", "class", "--class", "list.csv", "--root", root.to_str().unwrap()];
-    all.extend(["--isolation", "reduced", "--perturb", "off", "--output", "out"]);
+    all.extend(["--isolation", "reduced", "--held-back", "off", "--output", "out"]);
     let (code, _, errors) = place.run(&all);
     assert_eq!(code, Some(2), "{errors}");
     assert!(

@@ -5,7 +5,7 @@ use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
 use umbra::build::{BuildOutcome, Recording, compile, default_limits};
-use umbra::process::Limits;
+use umbra::process::ProcessLimits;
 use umbra::sandbox::{Isolation, Layers};
 use umbra::worker::{
     Adapter, AdapterKind, CameraValue, Job, JobReport, Request, SceneRef, Stage as StageText,
@@ -237,18 +237,23 @@ impl Fixture {
     }
 
     /// Limits of about a second, for actions that wait for them.
-    pub fn limits(&self, waits: bool) -> Limits {
-        Limits {
+    pub fn limits(&self, waits: bool) -> ProcessLimits {
+        ProcessLimits {
             wall_s: if waits { 1.0 } else { 20.0 },
             cpu_s: if waits { 1 } else { 10 },
             memory_mib: 1024,
             output_kib: 256,
-            ..Limits::default()
+            ..ProcessLimits::default()
         }
     }
 
     /// Asks a plugin of the stage; counts what leaks.
-    pub fn ask(&mut self, library: &str, asked: &[(Asked, &str)], limits: &Limits) -> JobReport {
+    pub fn ask(
+        &mut self,
+        library: &str,
+        asked: &[(Asked, &str)],
+        limits: &ProcessLimits,
+    ) -> JobReport {
         let report = self.ask_without(self.supervisor.isolation, library, asked, limits);
         self.leaks += leaks(&self.secrets, &report);
         report
@@ -260,7 +265,7 @@ impl Fixture {
         layers: Layers,
         library: &str,
         asked: &[(Asked, &str)],
-        limits: &Limits,
+        limits: &ProcessLimits,
     ) -> JobReport {
         let requests = asked.iter().map(|(asked, options)| self.request(*asked, options));
         let job = Job { plugin: Some(self.stage.join(library)), requests: requests.collect() };

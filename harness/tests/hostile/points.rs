@@ -143,7 +143,7 @@ fn check_reports(report: &BatchReport) -> anyhow::Result<()> {
     let slug = &report.entries[0].record.slug;
     let pages = [read(report::HTML_FILE)?, read(&format!("{slug}/{}", report::HTML_FILE))?];
     let csv = read(report::CSV_FILE)?;
-    let look = Look { width: 120, colours: false };
+    let look = Look { width: 120, colors: false };
     let texts = [
         report::text_table(report, 120, false)?,
         report::text_detail(report, &report.entries[0], look, true),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use umbra::build::{BuildOutcome, BuildReport, Recording, compile, default_limits};
-use umbra::process::{Exit, Limits};
+use umbra::process::{Exit, ProcessLimits};
 use umbra::worker::Supervisor;
 
 use crate::fixture::{Fixture, recording, workspace};
@@ -75,7 +75,7 @@ impl Source {
         if let Some((name, target)) = self.link {
             std::os::unix::fs::symlink(target, src.join(name)).expect("our own folder");
         }
-        let limits = Limits {
+        let limits = ProcessLimits {
             wall_s: if matches!(self.expect, Expect::TimedOut) { 1.5 } else { 30.0 },
             cpu_s: if matches!(self.expect, Expect::TimedOut) { 1 } else { 30 },
             memory_mib: 2048,

@@ -4,7 +4,9 @@ use std::fs;
 use std::path::Path;
 
 use similar_asserts::assert_eq;
-use umbra::intake::{Format, IntakeError, Limits, Severity, TreeSpec, fix, unpack, unpack_bytes};
+use umbra::intake::{
+    ArchiveLimits, Format, IntakeError, Severity, TreeSpec, fix, unpack, unpack_bytes,
+};
 
 use super::packing::{pack_in, working_folder};
 use super::{codes, moved, perfect, tar_of, validate, validate_files, write_folder, zip_of};
@@ -20,7 +22,7 @@ fn every_format_gives_the_same_copy() {
     write_folder(&source, &files);
     let scratch = Scratch::new();
     let from_folder =
-        unpack(&source, &scratch.dest, &TreeSpec::default(), &Limits::default()).unwrap();
+        unpack(&source, &scratch.dest, &TreeSpec::default(), &ArchiveLimits::default()).unwrap();
     assert_eq!(from_folder.format, Format::Folder);
     assert_eq!(from_folder.name, "a2_ada_lampglow");
     assert_eq!(from_folder.findings, []);
@@ -34,9 +36,14 @@ fn every_format_gives_the_same_copy() {
         (gz(&tar_of(&wrapped)), "a.tar.gz", Format::TarGz),
     ] {
         let scratch = Scratch::new();
-        let submission =
-            unpack_bytes(&bytes, name, &scratch.dest, &TreeSpec::default(), &Limits::default())
-                .unwrap();
+        let submission = unpack_bytes(
+            &bytes,
+            name,
+            &scratch.dest,
+            &TreeSpec::default(),
+            &ArchiveLimits::default(),
+        )
+        .unwrap();
         assert_eq!(submission.format, format);
         assert_eq!(submission.files, from_folder.files);
         assert_eq!(submission.digest, from_folder.digest);
@@ -190,16 +197,18 @@ fn black_images_pack_well_and_are_no_bomb() {
     }
     let scratch = Scratch::new();
     let tree = TreeSpec::default();
-    unpack_bytes(&zip_of(&files), "a.zip", &scratch.dest, &tree, &Limits::default()).unwrap();
+    unpack_bytes(&zip_of(&files), "a.zip", &scratch.dest, &tree, &ArchiveLimits::default())
+        .unwrap();
     let scratch = Scratch::new();
-    unpack_bytes(&gz(&tar_of(&files)), "a.tgz", &scratch.dest, &tree, &Limits::default()).unwrap();
+    unpack_bytes(&gz(&tar_of(&files)), "a.tgz", &scratch.dest, &tree, &ArchiveLimits::default())
+        .unwrap();
 }
 
 #[test]
 fn destination_must_be_empty() {
     let scratch = Scratch::new();
     fs::write(scratch.dest.join("mine"), "x").unwrap();
-    let result = scratch.unpack(&zip_of(&perfect()), "a.zip", &Limits::default());
+    let result = scratch.unpack(&zip_of(&perfect()), "a.zip", &ArchiveLimits::default());
     assert!(matches!(result, Err(IntakeError::DestinationNotEmpty { .. })));
     assert_eq!(fs::read_to_string(scratch.dest.join("mine")).unwrap(), "x");
 }
@@ -268,7 +277,7 @@ fn what_is_no_part_of_the_tree_refuses_no_working_folder() {
     #[cfg(unix)]
     std::os::unix::fs::symlink("/usr/bin/python3", source.join("python")).unwrap();
     let scratch = Scratch::new();
-    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    let (tree, limits) = (TreeSpec::default(), ArchiveLimits::default());
     let submission = unpack(&source, &scratch.dest, &tree, &limits).unwrap();
     assert!(submission.file("src/lib.rs").is_some() && submission.file("config.json").is_some());
     let warned = |code: &str, path: &str| {
@@ -293,7 +302,7 @@ fn fix_chooses_between_neither_images_nor_people() {
         files.extend(more.iter().map(|(path, content)| ((*path).to_owned(), content.to_vec())));
         let source = folder.path().join("work");
         write_folder(&source, &files);
-        let (tree, limits) = (TreeSpec::default(), Limits::default());
+        let (tree, limits) = (TreeSpec::default(), ArchiveLimits::default());
         let scratch = Scratch::new();
         let submission = unpack(&source, &scratch.dest, &tree, &limits).unwrap();
         match fix(&submission, &folder.path().join("out.zip"), &tree, &limits) {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use similar_asserts::assert_eq;
 use umbra::intake::{
-    IntakeError, Limits, Submission, TreeSpec, Validation, fix, pack, scan_source, unpack,
+    ArchiveLimits, IntakeError, Submission, TreeSpec, Validation, fix, pack, scan_source, unpack,
     unpack_bytes, validate_submission,
 };
 
@@ -22,7 +22,7 @@ pub(super) fn pack_in(
 ) -> Result<umbra::intake::Packed, IntakeError> {
     let source = folder.join("work");
     write_folder(&source, files);
-    pack(&source, folder, &TreeSpec::default(), &Limits::default())
+    pack(&source, folder, &TreeSpec::default(), &ArchiveLimits::default())
 }
 
 /// The working folder of a student: everything that does not belong into a submission, too.
@@ -108,12 +108,12 @@ pub(super) fn fix_files(files: &[(String, Vec<u8>)]) -> Result<Submission, Intak
     let (source, out) = (folder.path().join("in.zip"), folder.path().join("out.zip"));
     fs::write(&source, zip_of(files)).unwrap();
     let copy = Scratch::new();
-    let source = unpack(&source, &copy.dest, &TreeSpec::default(), &Limits::default())?;
-    let result = fix(&source, &out, &TreeSpec::default(), &Limits::default());
+    let source = unpack(&source, &copy.dest, &TreeSpec::default(), &ArchiveLimits::default())?;
+    let result = fix(&source, &out, &TreeSpec::default(), &ArchiveLimits::default());
     assert_eq!(result.is_ok(), out.exists());
     result?;
     let scratch = Scratch::new();
-    let submission = unpack(&out, &scratch.dest, &TreeSpec::default(), &Limits::default())?;
+    let submission = unpack(&out, &scratch.dest, &TreeSpec::default(), &ArchiveLimits::default())?;
     assert!(validate_submission(&submission, &TreeSpec::default())?.follows_tree());
     Ok(submission)
 }
@@ -199,7 +199,7 @@ fn no_source_is_lost_quietly() {
     let text = validate_files(&files).to_text();
     assert!(text.contains("shaders/x.wgsl: a source file outside src/"), "{text}");
     let (submission, scratch) = accepted(&files);
-    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    let (tree, limits) = (TreeSpec::default(), ArchiveLimits::default());
     let validation = validate_submission(&submission, &tree).unwrap();
     let said = umbra::intake::mends(&submission, &validation, &tree).unwrap();
     assert!(said.ends_with("; leaves out 1 source file outside src/"), "{said}");
@@ -227,7 +227,7 @@ fn a_build_folder_in_an_archive_does_not_count() {
     for bytes in [zip_of(&files), gz(&tar_of(&files))] {
         let (submission, _scratch) = {
             let scratch = Scratch::new();
-            let (tree, limits) = (TreeSpec::default(), Limits::default());
+            let (tree, limits) = (TreeSpec::default(), ArchiveLimits::default());
             (unpack_bytes(&bytes, "a.zip", &scratch.dest, &tree, &limits).unwrap(), scratch)
         };
         assert_eq!(submission.files.len(), perfect().len());

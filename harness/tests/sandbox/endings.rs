@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use umbra::sandbox::{Bind, EXIT_NOT_CONFINED, Kind, Layers, payload_pid};
+use umbra::sandbox::{Bind, ChildKind, EXIT_NOT_CONFINED, Layers, payload_pid};
 
 use super::fixture::{Fixture, Who, everyone, open_to_all, piped, survivors, wait};
 
@@ -17,7 +17,7 @@ use super::fixture::{Fixture, Who, everyone, open_to_all, piped, survivors, wait
 fn endings_are_mirrored() {
     for who in everyone() {
         let fixture = Fixture::new(who);
-        for kind in [Kind::Worker, Kind::Build] {
+        for kind in [ChildKind::Worker, ChildKind::Build] {
             let policy = fixture.policy(kind, Layers::full());
             let status = |args: &[&str]| {
                 let outcome = fixture.attack(&policy, args);
@@ -43,7 +43,7 @@ fn a_daemon_dies_with_its_child_and_lets_go_of_the_pipe() {
         for pid_ns in [true, false] {
             // Without the layer (and the limits that end the free one): it must survive here.
             let layers = Layers { pid_ns, ..Layers::full() };
-            let policy = fixture.policy(Kind::Build, layers);
+            let policy = fixture.policy(ChildKind::Build, layers);
             let mut child = piped(&mut fixture.command(&policy, &["daemon"]));
             let mut pipe = child.stdout.take().expect("a pipe");
             let status = wait(child);
@@ -83,7 +83,7 @@ fn drain(pipe: &mut (impl Read + AsFd), limit: Duration) -> (String, bool) {
 fn killing_the_launcher_ends_everything() {
     for who in everyone() {
         let fixture = Fixture::new(who);
-        for kind in [Kind::Worker, Kind::Build] {
+        for kind in [ChildKind::Worker, ChildKind::Build] {
             let policy = fixture.policy(kind, Layers::full());
             let mut child = piped(&mut fixture.command(&policy, &["sleep", "60"]));
             let payload = until(|| payload_pid(child.id())).expect("a payload");
@@ -100,7 +100,7 @@ fn killing_the_launcher_ends_everything() {
 #[test]
 fn a_child_dies_with_the_thread_that_started_it() {
     let fixture = Fixture::new(everyone()[0]);
-    let policy = fixture.policy(Kind::Build, Layers::full());
+    let policy = fixture.policy(ChildKind::Build, Layers::full());
     let mut child = std::thread::scope(|scope| {
         let start = || {
             let child = piped(&mut fixture.command(&policy, &["sleep", "60"]));
@@ -141,7 +141,7 @@ fn inherited_files_are_closed() {
             .output()
             .expect("the attack");
         assert_eq!(plain.stdout, b"ok\n");
-        for kind in [Kind::Worker, Kind::Build] {
+        for kind in [ChildKind::Worker, ChildKind::Build] {
             let policy = fixture.policy(kind, Layers::NONE);
             assert_eq!(fixture.attack(&policy, &["inherited", &number]).verdict(), "EBADF");
         }
@@ -156,7 +156,7 @@ fn results_are_collected_by_process_1() {
         let collect = |file_size_mib, script: &str| {
             std::fs::write(&host, "old").expect("a file");
             open_to_all(Path::new(&host), 0o666);
-            let mut policy = fixture.policy(Kind::Build, Layers::full());
+            let mut policy = fixture.policy(ChildKind::Build, Layers::full());
             policy.limits.file_size_mib = file_size_mib;
             // Otherwise no file could be too long.
             policy.layers.rlimits = false;
@@ -189,7 +189,7 @@ fn results_are_collected_by_process_1() {
 fn what_cannot_be_had_is_an_error() {
     for who in everyone() {
         let fixture = Fixture::new(who);
-        let full = fixture.policy(Kind::Build, Layers::full());
+        let full = fixture.policy(ChildKind::Build, Layers::full());
         let mut broken = vec![];
         let mut policy = full.clone();
         policy.read_only.push(Bind::new(fixture.path("nowhere"), "/src"));

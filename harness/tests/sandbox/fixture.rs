@@ -13,8 +13,8 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use umbra::sandbox::{
-    Bind, EXIT_NOT_CONFINED, InForce, Kind, Layers, Policy, SandboxError, confine_self, orders,
-    read_report,
+    Bind, ChildKind, EXIT_NOT_CONFINED, InForce, Layers, Policy, SandboxError, confine_self,
+    orders, read_report,
 };
 
 /// The binary under test.
@@ -111,7 +111,7 @@ impl Fixture {
     }
 
     /// A policy that sees the attacks and nothing else of the fixture.
-    pub fn policy(&self, kind: Kind, layers: Layers) -> Policy {
+    pub fn policy(&self, kind: ChildKind, layers: Layers) -> Policy {
         let mut policy = Policy::new(kind);
         policy.layers = layers;
         policy.read_only.push(Bind::new(self.path("attack"), "/plugin/attack"));

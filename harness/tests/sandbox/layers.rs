@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use umbra::sandbox::{Bind, Kind, Layers};
+use umbra::sandbox::{Bind, ChildKind, Layers};
 
 use super::fixture::{Fixture, Who, everyone, open_to_all};
 
@@ -21,7 +21,13 @@ fn words(words: &[&str]) -> Vec<String> {
 }
 
 /// Runs attacks with only one layer, expecting an errno, and without any, expecting success.
-fn expect(layer: &str, who: Who, kind: Kind, attacks: &[(Vec<String>, &str)], fixture: &Fixture) {
+fn expect(
+    layer: &str,
+    who: Who,
+    kind: ChildKind,
+    attacks: &[(Vec<String>, &str)],
+    fixture: &Fixture,
+) {
     for (args, errno) in attacks {
         let args = &args.iter().map(String::as_str).collect::<Vec<_>>()[..];
         let free = fixture.attack(&fixture.policy(kind, Layers::NONE), args);
@@ -54,15 +60,15 @@ fn mount_namespace_hides_files() {
             attacks.push((words(&["read", "/etc/shadow"]), "ENOENT"));
             attacks.push((words(&["list", "/root"]), "ENOENT"));
         }
-        expect("mount_ns", who, Kind::Worker, &attacks, &fixture);
+        expect("mount_ns", who, ChildKind::Worker, &attacks, &fixture);
         // Writable outside, read-only inside; and a root that is nobody's to change.
         open_to_all(Path::new(&fixture.path("jail")), 0o777);
-        let mut policy = fixture.policy(Kind::Worker, only("mount_ns", who));
+        let mut policy = fixture.policy(ChildKind::Worker, only("mount_ns", who));
         policy.read_only.push(Bind::new(fixture.path("jail"), "/src"));
         for place in ["/new", "/src/new", "/plugin/new"] {
             assert_eq!(fixture.attack(&policy, &["write", place]).verdict(), "EROFS", "{place}");
         }
-        let free = fixture.policy(Kind::Worker, Layers::NONE);
+        let free = fixture.policy(ChildKind::Worker, Layers::NONE);
         assert_eq!(fixture.attack(&free, &["write", &fixture.path("jail/new")]).verdict(), "ok");
     }
 }
@@ -79,7 +85,7 @@ fn process_namespace_hides_processes() {
         if who == Who::Root {
             attacks.push((words(&memory), "ESRCH"));
         }
-        expect("pid_ns", who, Kind::Worker, &attacks, &fixture);
+        expect("pid_ns", who, ChildKind::Worker, &attacks, &fixture);
     }
 }
 
@@ -94,7 +100,7 @@ fn network_namespace_reaches_nobody() {
             (words(&["udp", &udp]), "ENETUNREACH"),
             (words(&["abstract", &fixture.abstract_name]), "ECONNREFUSED"),
         ];
-        expect("net_ns", who, Kind::Worker, &attacks, &fixture);
+        expect("net_ns", who, ChildKind::Worker, &attacks, &fixture);
     }
 }
 
@@ -114,14 +120,17 @@ fn root_becomes_nobody() {
             (words(&["chroot", &jail]), "EPERM"),
             (words(&["mknod", &node]), "EPERM"),
         ];
-        expect("drop_privileges", Who::Root, Kind::Worker, &attacks, &fixture);
+        expect("drop_privileges", Who::Root, ChildKind::Worker, &attacks, &fixture);
         // With a mount namespace there is something to mount over, and nobody else notices.
         let mut layers = only("mount_ns", Who::Root);
         let mounts = ["mount", "/plugin"];
-        assert_eq!(fixture.attack(&fixture.policy(Kind::Worker, layers), &mounts).verdict(), "ok");
+        assert_eq!(
+            fixture.attack(&fixture.policy(ChildKind::Worker, layers), &mounts).verdict(),
+            "ok"
+        );
         layers.drop_privileges = true;
         assert_eq!(
-            fixture.attack(&fixture.policy(Kind::Worker, layers), &mounts).verdict(),
+            fixture.attack(&fixture.policy(ChildKind::Worker, layers), &mounts).verdict(),
             "EPERM"
         );
     }
@@ -137,7 +146,7 @@ fn landlock_guards_files_ports_and_signals() {
         let (secret, expected) = (fixture.path("secret"), fixture.path("expected"));
         let (new, program) = (fixture.path("new"), fixture.path("attack"));
         let version = fixture
-            .attack(&fixture.policy(Kind::Worker, only("landlock", who)), &["pid"])
+            .attack(&fixture.policy(ChildKind::Worker, only("landlock", who)), &["pid"])
             .report
             .expect("landlock")
             .landlock_abi;
@@ -159,7 +168,7 @@ fn landlock_guards_files_ports_and_signals() {
             attacks.push((words(&["abstract", &fixture.abstract_name]), "EPERM"));
             attacks.push((words(&["reach", &victim]), "EPERM"));
         }
-        expect("landlock", who, Kind::Worker, &attacks, &fixture);
+        expect("landlock", who, ChildKind::Worker, &attacks, &fixture);
     }
 }
 
@@ -191,11 +200,11 @@ fn filter_refuses_calls() {
         ];
         let worker: Attacks =
             vec![(words(&["exec", "/bin/sh"]), "EPERM"), (words(&["fork"]), "EPERM")];
-        for kind in [Kind::Worker, Kind::Build] {
+        for kind in [ChildKind::Worker, ChildKind::Build] {
             expect("seccomp", who, kind, &network, &fixture);
             expect("seccomp", who, kind, &common, &fixture);
         }
-        for kind in [Kind::Worker, Kind::Decode] {
+        for kind in [ChildKind::Worker, ChildKind::Decode] {
             expect("seccomp", who, kind, &worker, &fixture);
         }
     }

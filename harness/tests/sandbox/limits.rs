@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use umbra::sandbox::{Kind, Layers, Limits};
+use umbra::sandbox::{ChildKind, KernelLimits, Layers};
 
 use super::fixture::{Fixture, Who, everyone, piped};
 
-fn small() -> Limits {
-    Limits { cpu_s: 1, memory_mib: 1024, file_size_mib: 1, open_files: 64, tasks: 16 }
+fn small() -> KernelLimits {
+    KernelLimits { cpu_s: 1, memory_mib: 1024, file_size_mib: 1, open_files: 64, tasks: 16 }
 }
 
 #[test]
@@ -26,7 +26,7 @@ fn each_limit_of_a_process_holds() {
             (&["spin"], "SIGXCPU"),
         ];
         for (args, verdict) in attacks {
-            let mut policy = fixture.policy(Kind::Worker, layers);
+            let mut policy = fixture.policy(ChildKind::Worker, layers);
             policy.limits = small();
             let outcome = fixture.attack(&policy, args);
             assert_eq!(outcome.verdict(), verdict, "{who:?} {args:?}: {outcome:?}");
@@ -43,7 +43,7 @@ fn each_limit_of_a_process_holds() {
 fn processes_are_counted_per_child() {
     for who in everyone() {
         let fixture = Fixture::new(who);
-        let mut policy = fixture.policy(Kind::Build, Layers::full());
+        let mut policy = fixture.policy(ChildKind::Build, Layers::full());
         policy.limits.tasks = 16;
         // One at its limit does not keep another from starting.
         let mut hog = fixture.command(&policy, &["fork_forever", "10"]);
@@ -62,7 +62,7 @@ fn the_scratch_has_a_quota() {
         let fixture = Fixture::new(who);
         let layers = Layers { mount_ns: true, user_ns: who == Who::User, ..Layers::NONE };
         for attack in ["fill", "many"] {
-            let mut policy = fixture.policy(Kind::Worker, layers);
+            let mut policy = fixture.policy(ChildKind::Worker, layers);
             assert_eq!(fixture.attack(&policy, &[attack, "/scratch"]).verdict(), "ENOSPC");
             // To the kernel, 0 would mean without limit.
             match attack {
@@ -81,8 +81,8 @@ fn the_scratch_has_a_quota() {
 fn a_control_group_counts_all_together() {
     for who in everyone() {
         let fixture = Fixture::new(who);
-        let mut policy = fixture.policy(Kind::Build, Layers { cgroup: true, ..Layers::NONE });
-        policy.limits = Limits { memory_mib: 64, ..small() };
+        let mut policy = fixture.policy(ChildKind::Build, Layers { cgroup: true, ..Layers::NONE });
+        policy.limits = KernelLimits { memory_mib: 64, ..small() };
         let outcome = fixture.attack(&policy, &["touch", "200"]);
         if let Err(error) = &outcome.report {
             // Optional: not every machine has it. Then it says so, and nothing ran.
@@ -95,7 +95,8 @@ fn a_control_group_counts_all_together() {
         policy.layers.pid_ns = true;
         assert_eq!(fixture.attack(&policy, &["fork_forever"]).verdict(), "EAGAIN");
         let full = Layers { cgroup: true, ..Layers::full() };
-        let mut child = piped(&mut fixture.command(&fixture.policy(Kind::Build, full), &["fork"]));
+        let mut child =
+            piped(&mut fixture.command(&fixture.policy(ChildKind::Build, full), &["fork"]));
         assert!(child.wait().expect("our child").success());
         for controller in ["", "memory", "pids"] {
             let group = format!("/sys/fs/cgroup/{controller}/umbra-{}", child.id());

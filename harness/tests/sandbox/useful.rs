@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use umbra::sandbox::policy::{PLUGIN, SRC, TOOLCHAIN};
-use umbra::sandbox::{Bind, Isolation, Kind, Layers, Policy, command, doctor};
+use umbra::sandbox::{Bind, ChildKind, Isolation, Layers, Policy, command, doctor};
 
 use super::fixture::{Fixture, UMBRA, Who, as_user, everyone, open_to_all};
 
@@ -19,7 +19,7 @@ fn compile(fixture: &Fixture, source: &str) -> (Output, Vec<u8>) {
     std::fs::create_dir_all(at("src")).expect("a folder");
     std::fs::write(at("src/lib.rs"), source).expect("a file");
     std::fs::write(at("lib.so"), "").expect("a file");
-    let mut policy = fixture.policy(Kind::Build, Layers::full());
+    let mut policy = fixture.policy(ChildKind::Build, Layers::full());
     policy.read_only.push(Bind::new(sysroot(), TOOLCHAIN));
     policy.read_only.push(Bind::new(at("src"), SRC));
     policy.collect.push(Bind::new(at("lib.so"), "/scratch/lib.so"));
@@ -65,7 +65,7 @@ fn rustc_compiles_what_a_worker_then_loads() {
     assert!(output.status.success(), "{output:?}");
     assert!(library.starts_with(b"\x7fELF"));
     std::fs::write(fixture.path("attack.so"), library).expect("a file");
-    let policy = fixture.policy(Kind::Worker, Layers::full());
+    let policy = fixture.policy(ChildKind::Worker, Layers::full());
     let outcome = fixture.attack(&policy, &["any"]);
     assert_eq!(outcome.status.code(), Some(42), "{outcome:?}");
 }
@@ -97,7 +97,7 @@ fn the_linker_works_for_everyone() {
         let fixture = Fixture::new(who);
         std::fs::create_dir(fixture.path("src")).expect("a folder");
         std::fs::write(fixture.path("src/a.c"), "int two(void) { return 2; }").expect("a file");
-        let mut policy = fixture.policy(Kind::Build, Layers::full());
+        let mut policy = fixture.policy(ChildKind::Build, Layers::full());
         policy.read_only.push(Bind::new(fixture.path("src"), SRC));
         std::fs::write(fixture.path("lib.so"), "").expect("a file");
         open_to_all(Path::new(&fixture.path("lib.so")), 0o666);
@@ -122,7 +122,7 @@ fn without_namespaces_there_is_reduced_isolation() {
             rlimits: true,
             ..Layers::NONE
         };
-        let mut policy = fixture.policy(Kind::Build, layers);
+        let mut policy = fixture.policy(ChildKind::Build, layers);
         // Counted with every process of the same user.
         policy.limits.tasks = 1000;
         policy.read_only.push(Bind::new(&source, "/src/a.s"));
@@ -153,7 +153,7 @@ fn a_given_file_is_changed_in_place() {
     for who in everyone() {
         let fixture = Fixture::new(who);
         let table = fixture.path("secret");
-        let mut policy = fixture.policy(Kind::Worker, Layers::full());
+        let mut policy = fixture.policy(ChildKind::Worker, Layers::full());
         let inside = format!("{PLUGIN}/table");
         assert_eq!(fixture.attack(&policy, &["change", &inside]).verdict(), "ENOENT");
         if who == Who::User {

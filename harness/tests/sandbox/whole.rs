@@ -1,7 +1,7 @@
 //! All layers together: nothing gets through, and what is useful does.
 
 use nix::libc;
-use umbra::sandbox::{Isolation, Kind, Layers};
+use umbra::sandbox::{ChildKind, Isolation, Layers};
 
 use super::fixture::{Fixture, Who, everyone};
 
@@ -9,7 +9,7 @@ use super::fixture::{Fixture, Who, everyone};
 fn nothing_gets_through() {
     for who in everyone() {
         let fixture = Fixture::new(who);
-        for kind in [Kind::Worker, Kind::Build] {
+        for kind in [ChildKind::Worker, ChildKind::Build] {
             let policy = fixture.policy(kind, Layers::full());
             let in_force = fixture.attack(&policy, &["pid"]).report.expect("full isolation");
             assert_eq!(in_force.isolation, Isolation::Full);
@@ -24,7 +24,7 @@ fn nothing_gets_through() {
     }
 }
 
-fn attacks(fixture: &Fixture, kind: Kind) -> Vec<(Vec<String>, &'static str)> {
+fn attacks(fixture: &Fixture, kind: ChildKind) -> Vec<(Vec<String>, &'static str)> {
     let victim = fixture.victim.id().to_string();
     let port = fixture.tcp.local_addr().expect("bound").port().to_string();
     let umbra = std::process::id().to_string();

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use umbra::assignment::Assignment;
 use umbra::decode::Decoder;
 use umbra::intake::{
-    Finding, IntakeError, Limits, Severity, Submission, TreeSpec, unpack, unpack_bytes,
+    ArchiveLimits, Finding, IntakeError, Severity, Submission, TreeSpec, unpack, unpack_bytes,
 };
 use umbra::worker::Supervisor;
 
@@ -39,7 +39,7 @@ impl Scratch {
         &self,
         bytes: &[u8],
         name: &str,
-        limits: &Limits,
+        limits: &ArchiveLimits,
     ) -> Result<Submission, IntakeError> {
         let tree = TreeSpec::default();
         let apart =
@@ -65,7 +65,7 @@ impl Scratch {
         &self,
         bytes: &[u8],
         name: &str,
-        limits: &Limits,
+        limits: &ArchiveLimits,
     ) -> Result<Submission, IntakeError> {
         unpack_bytes(bytes, name, &self.dest, &TreeSpec::default(), limits)
     }
@@ -105,8 +105,8 @@ pub fn listing(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 /// Small limits, so that bombs in tests are small.
-pub fn small_limits() -> Limits {
-    Limits {
+pub fn small_limits() -> ArchiveLimits {
+    ArchiveLimits {
         max_entries: 40,
         max_total_mib: 4,
         max_file_mib: 2,

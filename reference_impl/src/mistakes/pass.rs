@@ -116,12 +116,12 @@ fn uniforms(mistakes: &Mistakes, material: &Material) -> MaterialUniforms {
         scale if has(M::PassScaleTwice) => scale * scale,
         scale => scale,
     };
-    let colour = |texture: &Texture| {
+    let color = |texture: &Texture| {
         if has(M::PassFirstTexel) { texture.lookup(Vec2::ZERO) } else { texture.average() }
     };
     let set = |unset, value: Vec3| if has(unset) { Vec3::ZERO } else { scale * value };
-    let mut rho_d = set(M::RhoDUnset, colour(&material.diffuse));
-    let mut rho_s = set(M::RhoSUnset, colour(&material.specular));
+    let mut rho_d = set(M::RhoDUnset, color(&material.diffuse));
+    let mut rho_s = set(M::RhoSUnset, color(&material.specular));
     if has(M::RhoSwapped) {
         (rho_d, rho_s) = (rho_s, rho_d);
     }

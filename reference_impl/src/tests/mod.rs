@@ -78,7 +78,7 @@ impl Build {
     }
 
     /// A sphere of many triangles with smooth normals.
-    fn sphere(&mut self, material: &str, centre: Vec3, radius: f32) {
+    fn sphere(&mut self, material: &str, center: Vec3, radius: f32) {
         let (rows, columns) = (96, 192);
         writeln!(self.obj, "o sphere{}\nusemtl {material}", self.vertices).unwrap();
         for row in 0..=rows {
@@ -86,7 +86,7 @@ impl Build {
                 let theta = std::f32::consts::PI * row as f32 / rows as f32;
                 let phi = std::f32::consts::TAU * column as f32 / columns as f32;
                 let n = vec3(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
-                writeln!(self.obj, "v {}\nvn {}", text(centre + radius * n), text(n)).unwrap();
+                writeln!(self.obj, "v {}\nvn {}", text(center + radius * n), text(n)).unwrap();
             }
         }
         for row in 0..rows {

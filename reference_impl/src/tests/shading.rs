@@ -86,7 +86,7 @@ fn still_life(material: &str) -> Build {
 }
 
 #[test]
-fn realtime_is_offline_at_the_pixel_centre() {
+fn realtime_is_offline_at_the_pixel_center() {
     let size = (160, 120);
     for kind in [ShadingKind::Simple, ShadingKind::Normal] {
         for material in

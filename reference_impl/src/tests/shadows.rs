@@ -113,9 +113,9 @@ fn all_six_faces_of_the_cube_see_their_blockers() {
     build.cuboid("white", Vec3::splat(2.0), Vec3::splat(-2.0));
     for axis in 0..3 {
         for side in [-1.0, 1.0] {
-            let mut centre = Vec3::splat(0.3);
-            centre[axis] = 1.2 * side;
-            build.cuboid("white", centre - Vec3::splat(0.2), centre + Vec3::splat(0.25));
+            let mut center = Vec3::splat(0.3);
+            center[axis] = 1.2 * side;
+            build.cuboid("white", center - Vec3::splat(0.2), center + Vec3::splat(0.25));
         }
     }
     let scene = build.load();

@@ -94,10 +94,10 @@ pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
         }
         Ok(sum)
     };
-    let graded = |folder: &Path, perturb: &str| {
+    let graded = |folder: &Path, held_back_seed: &str| {
         let output = bench.folder.join("report");
-        let perturb = format!("--perturb={perturb}");
-        let line = [&*bench.umbra, Path::new("grade"), folder, Path::new(&perturb)];
+        let held_back_seed = format!("--held-back={held_back_seed}");
+        let line = [&*bench.umbra, Path::new("grade"), folder, Path::new(&held_back_seed)];
         let rest = [Path::new("--isolation=reduced"), Path::new("--output"), &output];
         let _ = fs::remove_dir_all(&output);
         let cost = measure(line.into_iter().chain(rest))?;
@@ -115,9 +115,9 @@ pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
     let (mut public, mut all) = (Samples::default(), Samples::default());
     for _ in 0..rounds {
         hand.push(by_hand(&mut one)?.cpu);
-        for (perturb, samples) in [("off", &mut public), (SEED, &mut all)] {
+        for (held_back_seed, samples) in [("off", &mut public), (SEED, &mut all)] {
             one.edit()?;
-            samples.push(graded(&one.folder, perturb)?.cpu);
+            samples.push(graded(&one.folder, held_back_seed)?.cpu);
         }
         one.edit()?;
         edited.push(checked(&one.folder)?.wall);
@@ -150,9 +150,9 @@ pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
         for index in 0..count {
             several.push(Submission::new(bench, &format!("class/{index}"))?);
         }
-        for (curve, perturb) in [(0, "off"), (1, SEED)] {
+        for (curve, held_back_seed) in [(0, "off"), (1, SEED)] {
             several.iter_mut().try_for_each(Submission::edit)?;
-            curves[curve].push(f64::from(count), graded(&class, perturb)?.cpu);
+            curves[curve].push(f64::from(count), graded(&class, held_back_seed)?.cpu);
         }
         let cpu = several.iter_mut().map(|one| Ok(by_hand(one)?.cpu));
         let cpu: Vec<f64> = cpu.collect::<anyhow::Result<_>>().context("by hand")?;

@@ -4,7 +4,7 @@ use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use umbra::process::Limits;
+use umbra::process::ProcessLimits;
 use umbra::worker::{Job, Request, SceneRef, Supervisor};
 
 use super::Bench;
@@ -20,7 +20,7 @@ pub fn run(bench: &Bench) -> anyhow::Result<Vec<Line>> {
         let scene = SceneRef { path: "none.toml".into(), options: String::new() };
         let requests = vec![Request::EvalBsdf { scene, queries: Vec::new() }];
         let (job, never) = (Job { plugin: None, requests }, AtomicBool::new(false));
-        let report = supervisor.run_job(&job, &Limits::default(), &never, &mut |_| ());
+        let report = supervisor.run_job(&job, &ProcessLimits::default(), &never, &mut |_| ());
         anyhow::ensure!(report.runs.len() == 1, "no worker ran: {report:?}");
         ours.push(begin.elapsed().as_secs_f64());
         let begin = Instant::now();

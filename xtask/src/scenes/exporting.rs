@@ -7,7 +7,7 @@ use glam::DVec3;
 use std::fmt::Write;
 
 /// A file to be written; `path` is relative to `scenes/a2`, with forward slashes.
-pub struct File {
+pub struct ExportedFile {
     pub path: String,
     pub bytes: Vec<u8>,
 }
@@ -18,10 +18,10 @@ const DECIMALS: usize = 5;
 const EMITTER_DECIMALS: usize = 7;
 
 /// The files of one scene.
-pub fn scene_files(scene: &Scene) -> Result<Vec<File>> {
+pub fn scene_files(scene: &Scene) -> Result<Vec<ExportedFile>> {
     let mut files = Vec::new();
     let mut push = |path: String, bytes: Vec<u8>| {
-        files.push(File { path: format!("{}/{path}", scene.folder), bytes })
+        files.push(ExportedFile { path: format!("{}/{path}", scene.folder), bytes })
     };
     for (variant, realtime, bonus) in
         [("offline", false, false), ("realtime", true, false), ("realtime_bonus", true, true)]

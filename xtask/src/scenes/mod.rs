@@ -18,7 +18,7 @@ mod tests;
 mod textures;
 
 use anyhow::{Context, Result, bail};
-use exporting::File;
+use exporting::ExportedFile;
 use scene::Scene;
 use std::fs;
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ fn all() -> Vec<Scene> {
 }
 
 /// Every file of every scene; paths are relative to `scenes/a2`.
-fn files() -> Result<Vec<File>> {
+fn files() -> Result<Vec<ExportedFile>> {
     let mut files = Vec::new();
     for scene in all() {
         files.extend(

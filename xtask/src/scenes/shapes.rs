@@ -16,25 +16,25 @@ pub fn floor(y: f64, [x0, z0]: [f64; 2], [x1, z1]: [f64; 2]) -> Mesh {
 }
 
 /// A closed sphere with its poles on the y axis.
-pub fn sphere(centre: DVec3, radius: f64) -> Mesh {
-    sphere_band(centre, radius, 64, 32, 1.0)
+pub fn sphere(center: DVec3, radius: f64) -> Mesh {
+    sphere_band(center, radius, 64, 32, 1.0)
 }
 
 /// A coarser closed sphere, for small films.
-pub fn ball(centre: DVec3, radius: f64) -> Mesh {
-    sphere_band(centre, radius, 32, 16, 1.0)
+pub fn ball(center: DVec3, radius: f64) -> Mesh {
+    sphere_band(center, radius, 32, 16, 1.0)
 }
 
 /// The part of a sphere from its upper pole down to the fraction `part` of the way to the lower pole, seen from
 /// outside.
-pub fn sphere_band(centre: DVec3, radius: f64, segments: usize, rings: usize, part: f64) -> Mesh {
+pub fn sphere_band(center: DVec3, radius: f64, segments: usize, rings: usize, part: f64) -> Mesh {
     Mesh::grid(segments, rings, |u, v| {
         // Exact values at the seam and at the poles keep the mesh watertight.
         let (sin_phi, cos_phi) = if u == 1.0 { (0.0, 1.0) } else { (TAU * u).sin_cos() };
         let theta = PI * v * part;
         let sin_theta = if v * part == 1.0 { 0.0 } else { theta.sin() };
         let normal = dvec3(sin_theta * cos_phi, theta.cos(), -sin_theta * sin_phi);
-        Vertex { position: centre + normal * radius, normal, uv: dvec2(u, 1.0 - v * part) }
+        Vertex { position: center + normal * radius, normal, uv: dvec2(u, 1.0 - v * part) }
     })
 }
 
@@ -48,11 +48,11 @@ pub fn backdrop(half_width: f64, z_front: f64, z_wall: f64, height: f64, radius:
         let angle = FRAC_PI_2 * (step.clamp(1, arc_steps + 1) - 1) as f64 / arc_steps as f64;
         let normal =
             if step > arc_steps { dvec2(1.0, 0.0) } else { dvec2(angle.sin(), angle.cos()) };
-        let centre = dvec2(z_wall + radius, radius);
+        let center = dvec2(z_wall + radius, radius);
         match step {
             0 => (dvec2(z_front, 0.0), dvec2(0.0, 1.0)),
             s if s == arc_steps + 2 => (dvec2(z_wall, height), dvec2(1.0, 0.0)),
-            _ => (centre - radius * normal, normal),
+            _ => (center - radius * normal, normal),
         }
     };
     let steps = arc_steps + 2;

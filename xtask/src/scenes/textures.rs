@@ -13,9 +13,9 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Fills a square image of `size` texels a side with `colour(column, row)`.
-    pub fn new(file: &'static str, size: u32, colour: impl Fn(u32, u32) -> [u8; 3]) -> Self {
-        Self { file, image: RgbImage::from_fn(size, size, |x, y| Rgb(colour(x, y))) }
+    /// Fills a square image of `size` texels a side with `color(column, row)`.
+    pub fn new(file: &'static str, size: u32, color: impl Fn(u32, u32) -> [u8; 3]) -> Self {
+        Self { file, image: RgbImage::from_fn(size, size, |x, y| Rgb(color(x, y))) }
     }
 
     /// The bytes of the PNG file.

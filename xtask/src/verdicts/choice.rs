@@ -1,7 +1,7 @@
 //! Which renderers are graded: right ones, with one mistake, with two.
 
 use anyhow::{Context, Result};
-use umbra::diagnosis::{Catalogue, Class, RightVariant};
+use umbra::diagnosis::{Catalogue, MistakeClass, RightVariant};
 use umbra::evidence::CheckId;
 use umbra::grading::RenderPath;
 
@@ -91,7 +91,7 @@ pub struct Subject {
     /// Whether the diagnosis must name it.
     pub named: bool,
     /// What the first part's loss must be like, where that is known.
-    pub class: Option<Class>,
+    pub class: Option<MistakeClass>,
     /// Where a right variant shows; none for both.
     pub path: Option<RenderPath>,
 }

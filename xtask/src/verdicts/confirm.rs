@@ -15,18 +15,18 @@ use super::row::Row;
 use crate::parallel;
 
 /// Its name in `--only`.
-pub const NAME: &str = "unseen scenes";
+pub const NAME: &str = "held-back scenes";
 
 /// Primes after a million. A seed is spent once a threshold was changed by what it showed: then
 /// all ten are replaced by the next ten. (So were the first ten, by what hardware showed on them.)
-const UNSEEN: [u64; 10] = [
+const HELD_BACK_SEEDS: [u64; 10] = [
     1_000_159, 1_000_171, 1_000_183, 1_000_187, 1_000_193, 1_000_199, 1_000_211, 1_000_213,
     1_000_231, 1_000_249,
 ];
 /// Samples per pixel of right renderers, in turn.
 const SPP: [u32; 3] = [16, 4, 64];
 
-/// Grades on the held-back scenes of every unseen seed and on no others: right renderers on each, the
+/// Grades on the held-back scenes of each of several seeds and on no others: right renderers on each, the
 /// known mistakes dealt out among them. With `few`, one right renderer on those of every other seed, and no
 /// mistakes.
 ///
@@ -34,11 +34,11 @@ const SPP: [u32; 3] = [16, 4, 64];
 /// When scenes cannot be made or graded: the machine's matters.
 pub fn figure(bench: &Bench, store: &Store, few: bool, jobs: usize) -> Result<Figure> {
     let mut assignment = bench.assignment.clone();
-    assignment.scenes.retain(|scene| scene.perturb);
+    assignment.scenes.retain(|scene| scene.held_back_copies);
     let catalogue = Catalogue::known()?;
     let mistakes = if few { Vec::new() } else { singles(&catalogue) };
     let adapter = bench.grading.adapter.clone().map_err(anyhow::Error::msg)?;
-    let seeds: Vec<u64> = UNSEEN.into_iter().step_by(if few { 2 } else { 1 }).collect();
+    let seeds: Vec<u64> = HELD_BACK_SEEDS.into_iter().step_by(if few { 2 } else { 1 }).collect();
     let complaints = parallel::each(&seeds, jobs, |index, seed| {
         let reference = store.reference.clone();
         let store = Store { assignment: &assignment, reference, progress: &|_| {}, ..*store };
@@ -55,7 +55,8 @@ pub fn figure(bench: &Bench, store: &Store, few: bool, jobs: usize) -> Result<Fi
         println!("held-back scenes of seed {seed}");
         let spp = SPP[index % SPP.len()];
         let right = right(&catalogue, index, spp, few);
-        let own = mistakes.iter().skip(index).step_by(UNSEEN.len()).cloned().collect::<Vec<_>>();
+        let own =
+            mistakes.iter().skip(index).step_by(HELD_BACK_SEEDS.len()).cloned().collect::<Vec<_>>();
         let mut rows = bench.grade_all(&own, 1)?;
         for case in &mut bench.grading.cases {
             case.spp = spp;
@@ -82,7 +83,7 @@ fn right(catalogue: &Catalogue, index: usize, spp: u32, few: bool) -> Vec<Subjec
     if !few {
         // What is done otherwise is dealt out among the seeds.
         let others = variants(catalogue, None).into_iter();
-        plain.extend(others.skip(index).step_by(UNSEEN.len()));
+        plain.extend(others.skip(index).step_by(HELD_BACK_SEEDS.len()));
     }
     plain
 }

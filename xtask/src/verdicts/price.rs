@@ -2,17 +2,21 @@
 
 use std::fmt::Write;
 
-use umbra::diagnosis::{Catalogue, Class, KnownMistake};
+use umbra::diagnosis::{Catalogue, KnownMistake, MistakeClass};
 
 use super::row::Row;
 
 /// The least and the most of its part that a mistake of a class costs.
-const RANGES: [(Class, &str, [f64; 2]); 5] = [
-    (Class::Slip, "slip: one constant, sign, power, index or division", [0.10, 0.25]),
-    (Class::Concept, "concept: something that the handout asks for is missing", [0.40, 0.80]),
-    (Class::Nothing, "nothing: what the part is about is not there", [1.0, 1.0]),
-    (Class::Hidden, "hidden: only probes show it", [1e-6, 0.25]),
-    (Class::Finding, "finding: a remark", [0.0, 0.0]),
+const RANGES: [(MistakeClass, &str, [f64; 2]); 5] = [
+    (MistakeClass::Slip, "slip: one constant, sign, power, index or division", [0.10, 0.25]),
+    (
+        MistakeClass::Concept,
+        "concept: something that the handout asks for is missing",
+        [0.40, 0.80],
+    ),
+    (MistakeClass::Nothing, "nothing: what the part is about is not there", [1.0, 1.0]),
+    (MistakeClass::Hidden, "hidden: only probes show it", [1e-6, 0.25]),
+    (MistakeClass::Finding, "finding: a remark", [0.0, 0.0]),
 ];
 
 /// Mistakes that may cost all of their part, whatever their class: nothing that is drawn or traced tells
@@ -43,7 +47,7 @@ pub fn excuse(name: &str) -> Option<&'static str> {
 const ROUNDING: f64 = 0.005 / 5.0 + 1e-9;
 
 /// What is wrong with a price: the fraction of its part that a mistake of `class` cost.
-pub fn complaint(class: Class, fraction: f64) -> Option<String> {
+pub fn complaint(class: MistakeClass, fraction: f64) -> Option<String> {
     let (_, _, [least, most]) = RANGES.iter().find(|(own, ..)| *own == class)?;
     let right = fraction >= least - ROUNDING && fraction <= most + ROUNDING;
     (!right).then(|| {
@@ -112,13 +116,13 @@ mod tests {
 
     #[test]
     fn prices_outside_their_range_are_told() {
-        assert_eq!(complaint(Class::Slip, 0.1), None);
-        assert_eq!(complaint(Class::Slip, 0.2505), None);
-        assert!(complaint(Class::Slip, 0.3).is_some_and(|said| said.contains("30 %")));
-        assert!(complaint(Class::Slip, 0.05).is_some());
-        assert!(complaint(Class::Hidden, 0.0).is_none_or(|said| said.contains("0 %")));
-        assert_eq!(complaint(Class::Nothing, 1.0), None);
-        assert!(complaint(Class::Nothing, 0.99).is_some());
+        assert_eq!(complaint(MistakeClass::Slip, 0.1), None);
+        assert_eq!(complaint(MistakeClass::Slip, 0.2505), None);
+        assert!(complaint(MistakeClass::Slip, 0.3).is_some_and(|said| said.contains("30 %")));
+        assert!(complaint(MistakeClass::Slip, 0.05).is_some());
+        assert!(complaint(MistakeClass::Hidden, 0.0).is_none_or(|said| said.contains("0 %")));
+        assert_eq!(complaint(MistakeClass::Nothing, 1.0), None);
+        assert!(complaint(MistakeClass::Nothing, 0.99).is_some());
     }
 
     /// The published table is one of the mistakes that are known.

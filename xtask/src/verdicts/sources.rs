@@ -15,7 +15,7 @@ use super::figures::Figure;
 use crate::samples::{self, Recipe};
 
 /// Seed of the held-back scenes: the same in every run.
-const PERTURB: &str = "20191006";
+const HELD_BACK_SEED: &str = "20191006";
 
 /// Grades the samples whose names are wanted, none if there are none; those that wait for time
 /// limits only with `--full`, and with `--quick` none whose mistake is one of the matrix.
@@ -45,7 +45,7 @@ pub fn grade(
     let mut command = Command::new(umbra);
     command.arg("grade").args(samples.iter().map(|sample| &sample.archive));
     command.arg("--report").arg(&out).arg("--root").arg(root);
-    command.args(["--perturb", PERTURB]);
+    command.args(["--held-back", HELD_BACK_SEED]);
     if let Some(adapter) = arguments.adapter.to_possible_value() {
         command.args(["--adapter", adapter.get_name()]);
     }
@@ -56,7 +56,10 @@ pub fn grade(
     let file = out.join("report.json");
     let report = std::fs::read(&file).with_context(|| file.display().to_string())?;
     let report: Value = serde_json::from_slice(&report)?;
-    ensure!(report["held_back"]["seed"] == PERTURB, "the report has another seed than {PERTURB}");
+    ensure!(
+        report["held_back"]["seed"] == HELD_BACK_SEED,
+        "the report has another seed than {HELD_BACK_SEED}"
+    );
     let submissions =
         report["submissions"].as_array().context("the report lists no submissions")?;
     let complaint = |sample: &samples::Sample| {

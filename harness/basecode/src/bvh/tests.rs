@@ -33,8 +33,8 @@ fn agrees_with_brute_force_in_f64() {
     let sampler = Sampler::new(1);
     let triangles: Vec<[Vec3; 3]> = (0..400)
         .map(|_| {
-            let centre = random_vec3(&sampler);
-            [(); 3].map(|()| centre + 0.2 * random_vec3(&sampler))
+            let center = random_vec3(&sampler);
+            [(); 3].map(|()| center + 0.2 * random_vec3(&sampler))
         })
         .collect();
     let blocks: Vec<bool> = (0..400).map(|i| i % 3 != 0).collect();
@@ -109,9 +109,9 @@ fn odd_input_is_survived() {
 fn odd_triangles(sampler: &Sampler) -> Vec<[Vec3; 3]> {
     let mut triangles = Vec::new();
     for number in 0..600 {
-        let centre = random_vec3(sampler);
+        let center = random_vec3(sampler);
         let size = [0.2, 0.2, 1e-4, 30.0][number % 4];
-        let mut own = [(); 3].map(|()| centre + size * random_vec3(sampler));
+        let mut own = [(); 3].map(|()| center + size * random_vec3(sampler));
         match number % 50 {
             7 => own[1] = own[0],
             11 => own[2] = own[0] + 2.0 * (own[1] - own[0]),

@@ -40,7 +40,7 @@ pub struct SceneConfig {
 }
 
 #[derive(Deserialize)]
-struct File {
+struct SceneFile {
     input: Input,
     #[serde(default)]
     camera: CameraConfig,
@@ -127,7 +127,7 @@ impl SceneConfig {
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
         let text = &plain_lines(bytes);
         let written = Written::read(path, text)?;
-        let file: File = toml::from_str(text).map_err(|error| misread(path, text, &error))?;
+        let file: SceneFile = toml::from_str(text).map_err(|error| misread(path, text, &error))?;
         let camera = camera(file.camera, &written)?;
         let name = mesh_name(&file.input.objfile, &written)?;
         let folder = path.parent().unwrap_or(Path::new(""));

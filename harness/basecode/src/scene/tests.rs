@@ -6,9 +6,9 @@ use glam::{Vec3, vec3};
 use super::*;
 
 /// A scene folder under the system's temporary one, removed in the end.
-struct Folder(PathBuf);
+struct TestFolder(PathBuf);
 
-impl Folder {
+impl TestFolder {
     fn new(name: &str, obj: &str, mtl: &str) -> Self {
         let path = std::env::temp_dir().join(format!("basecode-{name}-{}", std::process::id()));
         fs::create_dir_all(&path).unwrap();
@@ -27,7 +27,7 @@ impl Folder {
     }
 }
 
-impl Drop for Folder {
+impl Drop for TestFolder {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.0);
     }
@@ -67,7 +67,7 @@ illum 7
 
 #[test]
 fn a_scene_loads_with_its_light_and_is_hit_where_it_should_be() {
-    let scene = Folder::new("good", OBJ, MTL).load().unwrap();
+    let scene = TestFolder::new("good", OBJ, MTL).load().unwrap();
     assert_eq!(scene.first_light_intensity(), vec3(10.0, 20.0, 30.0));
     // Index list 5 6 7 5 7 8: vertices 5 and 7 count twice.
     assert_eq!(scene.first_light_position(), vec3(0.0, 1.0, 4.0));
@@ -81,7 +81,7 @@ fn a_scene_loads_with_its_light_and_is_hit_where_it_should_be() {
 
 #[test]
 fn a_ray_respects_both_ends_and_emitters_never_block() {
-    let scene = Folder::new("ends", OBJ, MTL).load().unwrap();
+    let scene = TestFolder::new("ends", OBJ, MTL).load().unwrap();
     let origin = vec3(0.5, 0.5, 2.0);
     let segment = |min_t, max_t| Ray::segment(origin, -Vec3::Z, min_t, max_t);
     assert!(scene.occluded(&segment(0.0, 2.5)) && scene.intersect(&segment(0.0, 2.5)).is_some());
@@ -255,10 +255,10 @@ fn mistakes_in_mesh_and_materials_name_file_and_line() {
             "s.mtl:3: material \"grey\": map_Kd: the option -bm is not supported",
         ),
     ] {
-        let message = Folder::new(name, &obj, &mtl).error();
+        let message = TestFolder::new(name, &obj, &mtl).error();
         assert!(message.contains(expected), "{name}: {message:?} lacks {expected:?}");
     }
-    let folder = Folder::new("nomesh", OBJ, MTL);
+    let folder = TestFolder::new("nomesh", OBJ, MTL);
     fs::remove_file(folder.0.join("s.obj")).unwrap();
     assert!(folder.error().contains("s.obj"));
 }
@@ -266,7 +266,7 @@ fn mistakes_in_mesh_and_materials_name_file_and_line() {
 #[test]
 fn shading_normals_are_interpolated_and_missing_ones_are_flat() {
     let tilted = OBJ.replace("vn 0 0 1", "vn 0 0 1\nvn 3 0 0").replace("2/2/1", "2/2/2");
-    let scene = Folder::new("tilted", &tilted, MTL).load().unwrap();
+    let scene = TestFolder::new("tilted", &tilted, MTL).load().unwrap();
     let hit = scene.intersect(&Ray::new(vec3(0.75, 0.25, 1.0), -Vec3::Z)).unwrap();
     // On the edge's middle of triangle 1 2 3: weights 1/4, 1/2, 1/4 of Z, X, Z.
     let expected = vec3(0.5, 0.0, 0.5).normalize();
@@ -279,7 +279,7 @@ fn shading_normals_are_interpolated_and_missing_ones_are_flat() {
 /// The OBJ file of `OBJ`'s square and lamp in other words; all of them give the same scene.
 #[test]
 fn every_form_of_a_mesh_that_exporters_write_is_read() {
-    let plain = Folder::new("plain", OBJ, MTL).load().unwrap();
+    let plain = TestFolder::new("plain", OBJ, MTL).load().unwrap();
     let seen = |scene: &Scene| {
         let shapes = scene.shapes().iter();
         let shape = |s: &Shape| {
@@ -351,7 +351,7 @@ fn every_form_of_a_mesh_that_exporters_write_is_read() {
     ])
     .collect();
     for (name, obj, mtl) in forms {
-        let folder = Folder::new("forms", OBJ, MTL);
+        let folder = TestFolder::new("forms", OBJ, MTL);
         fs::write(folder.0.join("s.obj"), obj).unwrap();
         fs::write(folder.0.join("s.mtl"), mtl).unwrap();
         let scene = folder.load().unwrap_or_else(|error| panic!("{name}: {error}"));
@@ -380,7 +380,7 @@ fn names_of_two_bytes_a_character_hold_no_backslash() {
     ] {
         let obj = with_name(&OBJ.replace("grey", "NAME").replace("s.mtl", "NAME.mtl"), name);
         let mtl = with_name(&MTL.replace("grey", "NAME\nmap_Kd NAME.png"), name);
-        let folder = Folder::new("bytes", OBJ, MTL);
+        let folder = TestFolder::new("bytes", OBJ, MTL);
         let file = |end: &[u8]| folder.0.join(std::ffi::OsStr::from_bytes(&[name, end].concat()));
         fs::write(folder.0.join("s.obj"), obj).unwrap();
         fs::write(file(b".mtl"), mtl).unwrap();
@@ -403,21 +403,21 @@ fn accents_may_be_characters_of_their_own() {
     let (whole, apart) = ("B\u{f6}den", "Bo\u{308}den");
     for (used, there) in [(whole, apart), (apart, whole)] {
         let obj = OBJ.replace("grey", used).replace("s.mtl", &format!("{used}.mtl"));
-        let folder = Folder::new("accents", &obj, MTL);
+        let folder = TestFolder::new("accents", &obj, MTL);
         fs::write(folder.0.join(format!("{there}.mtl")), MTL.replace("grey", there)).unwrap();
         let scene = folder.load().unwrap();
         assert_eq!(scene.material_of(0).diffuse.average(), vec3(0.5, 0.25, 0.125));
     }
     // Names that differ only so are two.
     let mtl = format!("{}newmtl {apart}\nKd 1 1 1\n", MTL.replace("grey", whole));
-    let scene = Folder::new("both", &OBJ.replace("grey", apart), &mtl).load().unwrap();
+    let scene = TestFolder::new("both", &OBJ.replace("grey", apart), &mtl).load().unwrap();
     assert_eq!(scene.material_of(0).diffuse.average(), Vec3::ONE);
 }
 
 #[test]
 fn a_mesh_is_found_as_other_files_are() {
     let load = |there: &str, written: &[u8]| {
-        let folder = Folder::new("mesh-name", OBJ, MTL);
+        let folder = TestFolder::new("mesh-name", OBJ, MTL);
         fs::create_dir_all(folder.0.join(there).parent().unwrap()).unwrap();
         fs::rename(folder.0.join("s.obj"), folder.0.join(there)).unwrap();
         fs::rename(folder.0.join("s.mtl"), folder.0.join(there).with_file_name("s.mtl")).unwrap();
@@ -441,7 +441,7 @@ fn a_mesh_is_found_as_other_files_are() {
 #[test]
 fn nameless_materials_that_nothing_uses_are_remarked_on() {
     let obj = OBJ.replace("usemtl grey", "usemtl\nusemtl grey");
-    let scene = Folder::new("nameless", &obj, &format!("newmtl\n{MTL}")).load().unwrap();
+    let scene = TestFolder::new("nameless", &obj, &format!("newmtl\n{MTL}")).load().unwrap();
     let said = scene.remarks().join("\n");
     assert!(said.contains("s.obj:12: usemtl names no material; no face uses it"), "{said}");
     assert!(said.contains("s.mtl:1: newmtl names no material; no face uses this"), "{said}");
@@ -450,23 +450,23 @@ fn nameless_materials_that_nothing_uses_are_remarked_on() {
 #[test]
 fn a_name_that_leads_out_of_the_folder_is_looked_for_beside() {
     for name in ["../gone/s.mtl", "..\\..\\a b\\s.mtl", "../x/../y/sub/s.mtl"] {
-        let folder = Folder::new("out", &OBJ.replace("s.mtl", name), MTL);
+        let folder = TestFolder::new("out", &OBJ.replace("s.mtl", name), MTL);
         let scene = folder.load().unwrap_or_else(|error| panic!("{name}: {error}"));
         let said = scene.remarks().join("\n");
         assert!(said.contains("leads to no file; taken is"), "{said}");
     }
     // What is there is taken from there.
-    let folder = Folder::new("round", OBJ, MTL);
+    let folder = TestFolder::new("round", OBJ, MTL);
     let own = folder.0.file_name().unwrap().to_str().unwrap().to_owned();
     fs::write(folder.0.join("s.obj"), OBJ.replace("s.mtl", &format!("../{own}/s.mtl"))).unwrap();
     assert_eq!(folder.load().unwrap().remarks(), [""; 0]);
-    let error = Folder::new("nowhere", &OBJ.replace("s.mtl", "../t.mtl"), MTL).error();
+    let error = TestFolder::new("nowhere", &OBJ.replace("s.mtl", "../t.mtl"), MTL).error();
     assert!(error.contains("../t.mtl: No such file"), "{error}");
 }
 
 #[test]
 fn a_mesh_may_name_several_material_files() {
-    let (grey, lamp) = MTL.split_once("newmtl lamp").unwrap();
+    let (gray, lamp) = MTL.split_once("newmtl lamp").unwrap();
     let lamp = format!("newmtl lamp{lamp}newmtl grey\nKd 1 1 1\n");
     for (name, statement) in [
         ("words", "a.mtl b.mtl"),
@@ -476,26 +476,26 @@ fn a_mesh_may_name_several_material_files() {
         ("lines", "a.mtl\nmtllib b.mtl"),
         ("slashes", "sub\\a.mtl b.mtl"),
     ] {
-        let folder = Folder::new("several", &OBJ.replace("s.mtl", statement), "");
+        let folder = TestFolder::new("several", &OBJ.replace("s.mtl", statement), "");
         fs::create_dir(folder.0.join("sub")).unwrap();
         for (file, text) in [
-            ("a.mtl", grey),
+            ("a.mtl", gray),
             ("b.mtl", &lamp),
-            ("a b.MTL", grey),
-            ("a b", grey),
+            ("a b.MTL", gray),
+            ("a b", gray),
             ("lamp s.mtl", &lamp),
-            ("sub/a.mtl", grey),
+            ("sub/a.mtl", gray),
             ("my mat.mtl", MTL),
         ] {
             fs::write(folder.0.join(file), text).unwrap();
         }
         let scene = folder.load().unwrap_or_else(|error| panic!("{name}: {error}"));
         // Of two materials of one name the first file's counts.
-        let Texture::Constant(colour) = scene.material_of(0).diffuse else { panic!("{name}") };
-        assert_eq!(colour, vec3(0.5, 0.25, 0.125), "{name}");
+        let Texture::Constant(color) = scene.material_of(0).diffuse else { panic!("{name}") };
+        assert_eq!(color, vec3(0.5, 0.25, 0.125), "{name}");
         assert_eq!(scene.first_light_intensity(), vec3(10.0, 20.0, 30.0), "{name}");
     }
-    let folder = Folder::new("missing", &OBJ.replace("s.mtl", "s.mtl t.mtl"), MTL);
+    let folder = TestFolder::new("missing", &OBJ.replace("s.mtl", "s.mtl t.mtl"), MTL);
     let error = folder.error();
     assert!(
         error.contains("s.obj:1: cannot read the material file") && error.contains("t.mtl"),
@@ -505,9 +505,9 @@ fn a_mesh_may_name_several_material_files() {
 
 #[test]
 fn what_has_no_area_is_left_out_and_remarked_on() {
-    let plain = Folder::new("area", OBJ, MTL).load().unwrap();
+    let plain = TestFolder::new("area", OBJ, MTL).load().unwrap();
     let more = OBJ.replace("o lamp", "l 1 2\nl 1 2 3 4\np 1\nf 1 2\no lamp");
-    let scene = Folder::new("no-area", &more, MTL).load().unwrap();
+    let scene = TestFolder::new("no-area", &more, MTL).load().unwrap();
     let triangles =
         |scene: &Scene| scene.shapes().iter().map(|s| s.triangles.len()).collect::<Vec<_>>();
     assert_eq!(triangles(&scene), triangles(&plain));
@@ -519,17 +519,17 @@ fn what_has_no_area_is_left_out_and_remarked_on() {
     ] {
         assert!(said.contains(expected), "{said}");
     }
-    let far = Folder::new("far", &OBJ.replace("v 1 1 0", "v 1 -1e30 0 2"), MTL).load().unwrap();
+    let far = TestFolder::new("far", &OBJ.replace("v 1 1 0", "v 1 -1e30 0 2"), MTL).load().unwrap();
     let said = far.remarks().join("\n");
     assert!(said.contains("s.obj: a vertex lies at 1e30; beyond 1e6 from the origin"), "{said}");
     assert!(said.contains("s.obj:4: 1 weight (v x y z w) statement is ignored"), "{said}");
     let lines = OBJ.replace("f 1/1/1 2/2/1 3/3/1 4/4/1", "l 1 2 3 4").replace("f ", "l ");
-    assert!(Folder::new("lines", &lines, MTL).error().contains("holds no triangle"));
+    assert!(TestFolder::new("lines", &lines, MTL).error().contains("holds no triangle"));
 }
 
 #[test]
 fn a_broken_material_that_no_face_uses_is_remarked_on() {
-    let plain = Folder::new("plain-spare", OBJ, MTL).load().unwrap();
+    let plain = TestFolder::new("plain-spare", OBJ, MTL).load().unwrap();
     let count = MTL.lines().count();
     for (statement, expected) in [
         ("map_Kd gone.png", "map_Kd: cannot read the texture"),
@@ -542,7 +542,7 @@ fn a_broken_material_that_no_face_uses_is_remarked_on() {
         // A second material of one name is never used.
         for name in ["spare", "grey"] {
             let mtl = format!("{MTL}newmtl {name}\n{statement}\nillum 7\n");
-            let scene = Folder::new("spare", OBJ, &mtl).load().unwrap();
+            let scene = TestFolder::new("spare", OBJ, &mtl).load().unwrap();
             let said = scene.remarks().join("\n");
             let place = format!("s.mtl:{}: material \"{name}\": {expected}", count + 2);
             assert!(said.contains(&place), "{said}");
@@ -550,7 +550,7 @@ fn a_broken_material_that_no_face_uses_is_remarked_on() {
             assert_eq!(scene.first_light_intensity(), plain.first_light_intensity());
             let used = OBJ.replacen("usemtl grey", "usemtl spare", 1);
             if name == "spare" {
-                let error = Folder::new("used", &used, &mtl).error();
+                let error = TestFolder::new("used", &used, &mtl).error();
                 assert!(error.contains(&place) && !error.contains("no face"), "{error}");
             }
         }
@@ -561,7 +561,7 @@ fn a_broken_material_that_no_face_uses_is_remarked_on() {
 fn statements_that_are_not_supported_are_remarked_on() {
     let freeform = "vp 0.1\ncstype bezier\ndeg 1 1\nSURF 0 1 0 1 1 2 4 3\nparm u 0 1\nend\ncall a.obj\nface 1 2 3\n\
                     curv 0 1 1 2\nsurf 0 1 0 1 1 2 4 3\ns off\nmg 0\n";
-    let scene = Folder::new("freeform", &format!("{OBJ}{freeform}"), MTL).load().unwrap();
+    let scene = TestFolder::new("freeform", &format!("{OBJ}{freeform}"), MTL).load().unwrap();
     let said = scene.remarks().join("\n");
     let expected = [
         "s.obj:25: 2 surf statements are ignored",
@@ -575,7 +575,7 @@ fn statements_that_are_not_supported_are_remarked_on() {
     }
     // Few remarks on what is perhaps no mesh at all.
     let words: String = (0..100).map(|i| format!("word{i}\u{1b}[2J\n")).collect();
-    let scene = Folder::new("words", &format!("{OBJ}{words}"), MTL).load().unwrap();
+    let scene = TestFolder::new("words", &format!("{OBJ}{words}"), MTL).load().unwrap();
     assert_eq!(scene.remarks().len(), 13);
     let said = scene.remarks().join("\n");
     assert!(said.ends_with("s.obj:34: 88 more kinds of statements are ignored"), "{said}");
@@ -584,7 +584,7 @@ fn statements_that_are_not_supported_are_remarked_on() {
 
 #[test]
 fn what_a_material_says_in_vain_is_remarked_on() {
-    let folder = Folder::new("vain", OBJ, MTL);
+    let folder = TestFolder::new("vain", OBJ, MTL);
     let picture = image::RgbImage::from_pixel(1, 1, image::Rgb([255, 0, 0]));
     picture.save(folder.0.join("t.png")).unwrap();
     let said = |mtl: &str| {
@@ -635,7 +635,7 @@ fn what_a_material_says_in_vain_is_remarked_on() {
 fn a_face_without_uv_or_normal_concerns_itself_alone() {
     let tilted = OBJ.replace("vn 0 0 1", "vn 0 0.6 0.8");
     let more = tilted.replace("o lamp", "f 1//1 2//1 3//1\nf 1/1 3/3 4/4\nf 2 3 4\no lamp");
-    let scene = Folder::new("mixed", &more, MTL).load().unwrap();
+    let scene = TestFolder::new("mixed", &more, MTL).load().unwrap();
     let shape = &scene.shapes()[0];
     let corner = |triangle: usize, corner: usize| {
         let vertex = shape.triangles[triangle][corner] as usize;
@@ -656,7 +656,7 @@ fn concave_polygons_have_their_own_area() {
         .replace("v 1 0 0", "v 0.5 0.9 0")
         .replace("v 1 1 0", "v 1 0 0")
         .replace("v 0 1 0", "v 0.5 1 0");
-    let scene = Folder::new("arrow", &arrow, MTL).load().unwrap();
+    let scene = TestFolder::new("arrow", &arrow, MTL).load().unwrap();
     let shape = &scene.shapes()[0];
     let area: f32 = (0..shape.triangles.len())
         .map(|i| shape.corners(i))
@@ -668,7 +668,8 @@ fn concave_polygons_have_their_own_area() {
 
 #[test]
 fn a_scene_without_a_light_loads_and_only_asking_for_it_fails() {
-    let scene = Folder::new("dark", OBJ, &MTL.replace("Ke 10 20 30", "Ke 0 0 0")).load().unwrap();
+    let scene =
+        TestFolder::new("dark", OBJ, &MTL.replace("Ke 10 20 30", "Ke 0 0 0")).load().unwrap();
     assert_eq!(scene.light(), None);
     assert!(scene.intersect(&Ray::new(vec3(0.5, 0.5, 2.0), -Vec3::Z)).is_some());
     let said =
@@ -692,7 +693,7 @@ fn contact_shadows_stay_far_from_the_origin_and_from_the_camera() {
         let floor = quad(2.0, 0.0, at);
         let blocker = quad(0.9, 0.25, at);
         let obj = format!("mtllib s.mtl\n{floor}{blocker}usemtl grey\nf 1 2 3 4\nf 5 6 7 8\n");
-        let scene = Folder::new("moved", &obj, MTL).load().unwrap();
+        let scene = TestFolder::new("moved", &obj, MTL).load().unwrap();
         // Between floor and blocker, at a slant, lies the camera's line of sight.
         let eye = at + away * vec3(0.0, 0.1, 1.0).normalize();
         let light = at + vec3(0.0, 2.0, 0.0);
@@ -733,7 +734,7 @@ fn no_surface_shadows_itself_in_a_large_scene() {
             corner(2.0, -2.0),
             corner(-2.0, -2.0)
         );
-        let scene = Folder::new("large", &obj, MTL).load().unwrap();
+        let scene = TestFolder::new("large", &obj, MTL).load().unwrap();
         let (eye, light) = (scale * vec3(0.0, 3.0, 4.0), scale * vec3(0.3, 2.0, 0.0));
         for index in 0..10_000u16 {
             let (x, z) = (f32::from(index % 100) - 50.0, f32::from(index / 100) - 50.0);

@@ -58,7 +58,7 @@ impl Texture {
     /// The color at texture coordinates.
     pub fn lookup(&self, uv: Vec2) -> Vec3 {
         match self {
-            Self::Constant(colour) => *colour,
+            Self::Constant(color) => *color,
             Self::Bitmap(bitmap) => bitmap.lookup(uv),
         }
     }
@@ -66,7 +66,7 @@ impl Texture {
     /// The largest value of each component anywhere.
     pub fn max(&self) -> Vec3 {
         match self {
-            Self::Constant(colour) => *colour,
+            Self::Constant(color) => *color,
             Self::Bitmap(bitmap) => bitmap.max,
         }
     }
@@ -74,7 +74,7 @@ impl Texture {
     /// The mean color: what realtime uses in the texture's place.
     pub fn average(&self) -> Vec3 {
         match self {
-            Self::Constant(colour) => *colour,
+            Self::Constant(color) => *color,
             Self::Bitmap(bitmap) => bitmap.average,
         }
     }
@@ -192,8 +192,8 @@ fn why_not_decoded(error: &image::ImageError, bytes: &[u8], format: image::Image
 }
 
 impl From<Vec3> for Texture {
-    fn from(colour: Vec3) -> Self {
-        Self::Constant(colour)
+    fn from(color: Vec3) -> Self {
+        Self::Constant(color)
     }
 }
 

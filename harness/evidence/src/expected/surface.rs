@@ -153,11 +153,11 @@ impl SurfaceBuffer {
     /// When the film is empty or the scene's camera has no frame.
     pub fn new(scene: &Scene, width: usize, height: usize) -> Result<Self> {
         let camera = scene.camera(width, height)?;
-        let centres = (0..width * height).map(|index| {
+        let centers = (0..width * height).map(|index| {
             let ray = camera.ray((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
             (ray, SurfacePoint::cast(scene, ray))
         });
-        Ok(Self { width, height, pixels: centres.collect() })
+        Ok(Self { width, height, pixels: centers.collect() })
     }
 }
 

@@ -15,9 +15,9 @@ fn an_image_that_is_not_its_rays_is_found() {
     let check = judge_agreement("s", &mask, &flipped, &rays);
     assert_eq!(check.verdict, Verdict::Fail);
     assert!(check.summary.contains("first at (0, 0)"), "{}", check.summary);
-    assert_eq!(check.error, Class::Slip.price(), "rows from bottom to top are one slip");
+    assert_eq!(check.error, PriceClass::Slip.price(), "rows from bottom to top are one slip");
     let doubled: Vec<[f32; 3]> = rays.iter().map(|v| v.map(|v| 2.0 * v)).collect();
-    assert_eq!(judge_agreement("s", &mask, &doubled, &rays).error, Class::Slip.price());
+    assert_eq!(judge_agreement("s", &mask, &doubled, &rays).error, PriceClass::Slip.price());
     let black = [[0.0; 3]; 12];
     let nothing = judge_agreement("s", &mask, &black, &rays);
     assert_eq!((nothing.verdict, nothing.error), (Verdict::Fail, 1.0));
@@ -132,7 +132,7 @@ fn samples_that_do_not_cover_their_pixels_are_found() {
     for (name, samples) in all {
         let check = judge(&render(samples, mean));
         assert_eq!(check.verdict, Verdict::Fail, "{name}: {check:?}");
-        assert!(check.error <= Class::Slip.price(), "{name}: {check:?}");
+        assert!(check.error <= PriceClass::Slip.price(), "{name}: {check:?}");
     }
 }
 
@@ -167,7 +167,7 @@ fn single_pixels_that_are_never_written_or_written_over_are_a_slip() {
             let check = judge(&image);
             assert_eq!(
                 (check.verdict, check.error),
-                (Verdict::Fail, Class::Slip.price()),
+                (Verdict::Fail, PriceClass::Slip.price()),
                 "{check:?}"
             );
             assert!(check.summary.starts_with("1 of 3072"), "{}", check.summary);
@@ -185,7 +185,7 @@ fn averages_are_judged_whatever_is_shaded() {
     for average in [&sum as &dyn Fn(&[f32]) -> f32, &one_more] {
         let check = judge(&render(independent, average));
         assert_eq!(check.verdict, Verdict::Fail);
-        assert!(check.error < 1.2 * Class::Slip.price(), "{check:?}");
+        assert!(check.error < 1.2 * PriceClass::Slip.price(), "{check:?}");
     }
     let lit_only = |values: &[f32]| {
         let lit: Vec<f32> = values.iter().copied().filter(|v| *v > 0.0).collect();
@@ -243,6 +243,6 @@ fn edges_of_one_direction_are_seen_on_all_scenes_together() {
     assert_eq!(judge_edges(&one).verdict, Verdict::Pass, "too few to tell");
     (0..3).for_each(|_| all.add(&one));
     let check = judge_edges(&all);
-    assert_eq!((check.verdict, check.error), (Verdict::Fail, Class::Slip.price()));
+    assert_eq!((check.verdict, check.error), (Verdict::Fail, PriceClass::Slip.price()));
     assert!((check.measures[0].value - 1.8).abs() < 1e-9, "{check:?}");
 }

@@ -4,7 +4,7 @@ use basecode::Frame;
 
 use super::{RayBatch, STRAY_FRACTION};
 use crate::convention::Convention;
-use crate::price::Class;
+use crate::price::PriceClass;
 use crate::{Check, CheckId, Measure, RuleId, Verdict};
 use imaging::ratio::triple;
 
@@ -80,7 +80,7 @@ pub fn judge_material(batch: &RayBatch, own: &[OwnValue], radiance: &[[f32; 3]])
                 triple(radiance[ray]),
             );
             let check = Check::new(ID, &batch.scene, Verdict::Fail, summary);
-            Check { error: Class::Slip.price(), ..check }
+            Check { error: PriceClass::Slip.price(), ..check }
                 .with_hint("is it the material of the surface that the ray meets?")
         }
     };
@@ -170,7 +170,7 @@ mod tests {
         let next = |ray: usize| of[(ray + 1) % of.len()].1.map(f64::from);
         let wrong = judge(|ray, _| next(ray));
         assert_eq!(wrong.verdict, Verdict::Fail);
-        assert_eq!(wrong.error, Class::Slip.price());
+        assert_eq!(wrong.error, PriceClass::Slip.price());
         assert!(wrong.summary.contains("of 40 rays"), "{}", wrong.summary);
         // One ray of forty is more than a seam explains.
         assert_eq!(judge(|ray, own| if ray == 7 { next(7) } else { own }).verdict, Verdict::Fail);

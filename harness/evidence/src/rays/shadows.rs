@@ -8,7 +8,7 @@ use super::unshadowed::ELSEWHERE;
 use super::{RELATIVE, RayBatch, STRAY_FRACTION};
 use crate::expected::SurfacePoint;
 use crate::light_levels::{GAINS_LIGHT, LEAVES_LIGHT, LOSES_LIGHT, Levels, what_lit_get};
-use crate::price::{self, Class, Price};
+use crate::price::{self, Price, PriceClass};
 use crate::{Check, CheckId, Measure, RuleId, Verdict};
 use imaging::correlation::Moments;
 
@@ -203,12 +203,12 @@ fn judge_of_light(
             left if left <= LEFT => {
                 check.hint = format!("the switch is inverted: {INVERTED}");
                 // Nothing else explains what is drawn without shadows.
-                Price { error: Class::Slip.price() + left, mistake: Some(INVERTED), ..price }
+                Price { error: PriceClass::Slip.price() + left, mistake: Some(INVERTED), ..price }
             }
             _ => match color_of_shadows(batch, bsdf, with) {
                 Some(light) if lit_fraction <= LEFT => {
                     let light = price::fading(light.min(BRIGHTEST));
-                    price.or(ONE_COLOR, Class::Slip, light + lit_fraction)
+                    price.or(ONE_COLOR, PriceClass::Slip, light + lit_fraction)
                 }
                 _ => price,
             },
@@ -436,7 +436,7 @@ fn price(batch: &RayBatch, known: &[(usize, f64)], raw: f64, occluders: &Occlude
     let pairs = known.iter().map(|(index, visibility)| (*visibility, right(*index)));
     let start = match Moments::of(pairs).correlation() {
         likeness if likeness >= price::LIKE => {
-            Price::of_raw(raw).or(price::UNKNOWN, Class::Unknown, 0.0)
+            Price::of_raw(raw).or(price::UNKNOWN, PriceClass::Unknown, 0.0)
         }
         _ => Price::of_raw(raw),
     };
@@ -449,7 +449,7 @@ fn price(batch: &RayBatch, known: &[(usize, f64)], raw: f64, occluders: &Occlude
     let endless = BEYOND.iter().all(|name| left(ENDLESS) <= left(name));
     let told = changes.iter().filter(|(name, _)| !(endless && BEYOND.contains(name)));
     let price = told.fold(start, |price, (name, light)| {
-        let class = if *name == ENDLESS { Class::Concept } else { Class::Slip };
+        let class = if *name == ENDLESS { PriceClass::Concept } else { PriceClass::Slip };
         price.or(name, class, residual(light))
     });
     // Acne darkens some of what is lit, an offset too large lets some light through.

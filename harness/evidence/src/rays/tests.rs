@@ -4,7 +4,7 @@ use super::shadows::judge_shadows;
 use super::*;
 use crate::convention::Convention;
 use crate::expected::Visibility;
-use crate::price::Class;
+use crate::price::PriceClass;
 use crate::{Check, CheckId, Measure, RuleId, Verdict, changes};
 
 /// Forty lit and twenty dark rays at various distances and angles.
@@ -164,7 +164,7 @@ fn an_inverted_switch_and_a_color_of_shadows_are_slips() {
     let right = |index| if index < 40 { 1.0 } else { 0.0 };
     let inverted = shadows(|_| 1.0, right);
     assert_eq!(inverted.mistake, INVERTED);
-    assert_eq!(inverted.error, Class::Slip.price());
+    assert_eq!(inverted.error, PriceClass::Slip.price());
     assert!(inverted.hint.contains("inverted"), "{}", inverted.hint);
     let batch = batch();
     let without = answers(&batch, |_, _| 1.0);
@@ -386,7 +386,7 @@ fn a_slip_with_frames_distances_or_the_lights_place_is_one() {
     ] {
         let check = judge(&slip);
         assert_eq!(check.mistake, name);
-        assert!((check.error - Class::Slip.price()).abs() < 2e-3, "{name}: {}", check.error);
+        assert!((check.error - PriceClass::Slip.price()).abs() < 2e-3, "{name}: {}", check.error);
     }
 }
 

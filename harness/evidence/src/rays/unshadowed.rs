@@ -2,7 +2,7 @@
 
 use super::{RELATIVE, RayBatch, STRAY_FRACTION};
 use crate::convention::Convention;
-use crate::price::{self, Answers, Change, Class};
+use crate::price::{self, Answers, Change, PriceClass};
 use crate::shading::Shading;
 use crate::{Check, CheckId, Measure, RuleId, Verdict};
 use imaging::ratio::{ratio_name, triple};
@@ -89,7 +89,7 @@ pub fn judge_unshadowed(
         );
     }
     if shining as f64 > STRAY_FRACTION * black as f64 {
-        check.error = check.error.max(Class::Slip.price());
+        check.error = check.error.max(PriceClass::Slip.price());
     }
     check.measures = measures;
     check

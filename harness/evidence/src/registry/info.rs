@@ -236,7 +236,7 @@ impl CheckId {
             Self::SubmissionNumber => {
                 info("Does the student number stand under another name in the batch?", "", "", &[])
             }
-            Self::SubmissionLikeness => info(
+            Self::SubmissionSimilarity => info(
                 "Appears only if two submissions share a source file, apart from comments, blanks and the \
                     template's lines. Names both to the instructor. The same holds for what JPlag found very \
                     similar.",

@@ -60,7 +60,7 @@ impl CheckId {
                 of_one("src/grading/sampler.rs")
             }
             Self::SubmissionTree | Self::SubmissionConfig => of_one("src/grading/tree_checks.rs"),
-            Self::SubmissionNumber | Self::SubmissionLikeness | Self::SubmittedShared => {
+            Self::SubmissionNumber | Self::SubmissionSimilarity | Self::SubmittedShared => {
                 of_one("src/grading/shared.rs")
             }
             Self::SubmissionBuild => of_one("src/grading/begun.rs"),

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use super::*;
 use crate::expected::{SurfaceBuffer, load_scene, regions};
-use crate::price::Class;
+use crate::price::PriceClass;
 
 const FILM: (usize, usize) = (64, 48);
 
@@ -59,7 +59,7 @@ fn upside_down(image: &Image) -> Image {
 }
 
 #[track_caller]
-fn fails(check: &Check, classes: &[Class], mistake: &str) {
+fn fails(check: &Check, classes: &[PriceClass], mistake: &str) {
     let error: f64 = classes.iter().map(|class| class.price()).sum();
     assert_eq!(check.verdict, Verdict::Fail, "{}", check.summary);
     assert!(
@@ -85,26 +85,34 @@ fn a_slip_with_one_attribute_costs_a_slip() {
     let (positions, normals) = (&fixture.positions, &fixture.normals);
     let normal =
         |change: &dyn Fn(Vec3) -> Vec3| fixture.judge_all(positions, &changed(normals, change));
-    fails(&normal(&|n| -n), &[Class::Slip], "negated");
-    fails(&normal(&|n| Vec3::new(n.x, -n.y, n.z)), &[Class::Slip], "y of the normal is negated");
-    fails(&normal(&|n| Vec3::new(n.z, n.y, n.x)), &[Class::Slip], "axes exchanged");
+    fails(&normal(&|n| -n), &[PriceClass::Slip], "negated");
+    fails(
+        &normal(&|n| Vec3::new(n.x, -n.y, n.z)),
+        &[PriceClass::Slip],
+        "y of the normal is negated",
+    );
+    fails(&normal(&|n| Vec3::new(n.z, n.y, n.x)), &[PriceClass::Slip], "axes exchanged");
     let position = changed(positions, |p| p / 2.0);
-    fails(&fixture.judge_all(&position, normals), &[Class::Slip], "multiplied by a constant");
+    fails(&fixture.judge_all(&position, normals), &[PriceClass::Slip], "multiplied by a constant");
     // Few of the positions are right then, by chance: their place tells nothing.
     let [exchanged, mirrored] = [Vec3::new(1.0, 1.0, 1.0), Vec3::new(-1.0, 1.0, 1.0)]
         .map(|signs| changed(positions, |p| signs * Vec3::new(p.x, p.z, p.y)));
-    fails(&fixture.judge_all(&exchanged, normals), &[Class::Slip], "position has its axes");
-    fails(&fixture.judge_all(&mirrored, normals), &[Class::Concept], "another world position");
+    fails(&fixture.judge_all(&exchanged, normals), &[PriceClass::Slip], "position has its axes");
+    fails(&fixture.judge_all(&mirrored, normals), &[PriceClass::Concept], "another world position");
     let negated = changed(positions, |p| Vec3::new(p.x, -p.y, p.z));
-    fails(&fixture.judge_all(&negated, normals), &[Class::Slip], "y of the position is negated");
+    fails(
+        &fixture.judge_all(&negated, normals),
+        &[PriceClass::Slip],
+        "y of the position is negated",
+    );
     let direction = changed(positions, Vec3::normalize_or_zero);
     fails(
         &fixture.judge_all(positions, &direction),
-        &[Class::Slip],
+        &[PriceClass::Slip],
         "position stands for the normal",
     );
     let (positions, normals) = (upside_down(positions), upside_down(normals));
-    fails(&fixture.judge_all(&positions, &normals), &[Class::Slip], "upside down");
+    fails(&fixture.judge_all(&positions, &normals), &[PriceClass::Slip], "upside down");
 }
 
 #[test]
@@ -112,11 +120,11 @@ fn what_is_no_slip_costs_a_concept_and_two_things_cost_both() {
     let fixture = Fixture::new();
     let (positions, normals) = (&fixture.positions, &fixture.normals);
     let up = changed(normals, |_| Vec3::Y);
-    fails(&fixture.judge_all(positions, &up), &[Class::Concept], "another world normal");
+    fails(&fixture.judge_all(positions, &up), &[PriceClass::Concept], "another world normal");
     let bent = changed(positions, |p| p + 0.3 * Vec3::new(p.y.sin(), p.z.cos(), p.x));
-    fails(&fixture.judge_all(&bent, normals), &[Class::Concept], "another world position");
+    fails(&fixture.judge_all(&bent, normals), &[PriceClass::Concept], "another world position");
     let negated = changed(normals, |n| -n);
-    fails(&fixture.judge_all(&bent, &negated), &[Class::Concept, Class::Slip], "several");
+    fails(&fixture.judge_all(&bent, &negated), &[PriceClass::Concept, PriceClass::Slip], "several");
     let none = changed(positions, |_| Vec3::splat(f32::NAN));
     assert_eq!(fixture.judge_all(&none, normals).verdict, Verdict::Fail);
 }
@@ -130,16 +138,16 @@ fn matrices_tell_which_of_them_is_missing() {
     let judge = |frames| fixture.judge(frames);
     fails(
         &judge([nothing, right, nothing, nothing, nothing]),
-        &[Class::Concept],
+        &[PriceClass::Concept],
         "projection is missing",
     );
     fails(
         &judge([nothing, nothing, right, nothing, nothing]),
-        &[Class::Concept],
+        &[PriceClass::Concept],
         "view matrix is missing",
     );
-    fails(&judge([nothing, right, right, nothing, nothing]), &[Class::Slip], "exchanged");
-    fails(&judge([nothing, nothing, nothing, right, nothing]), &[Class::Slip], "on the left");
+    fails(&judge([nothing, right, right, nothing, nothing]), &[PriceClass::Slip], "exchanged");
+    fails(&judge([nothing, nothing, nothing, right, nothing]), &[PriceClass::Slip], "on the left");
     // Frames that show nothing at all tell nothing of what is forwarded.
     let all = judge([nothing; MATRICES]);
     assert_eq!((all.verdict, all.error), (Verdict::Fail, 1.0), "{}", all.summary);
@@ -166,7 +174,7 @@ fn a_translation_or_perspective_that_is_lost_is_a_slip() {
     let (positions, normals) = (image(&|p| p.position), image(&|p| p.normal));
     let (nothing, moved): (Frames, Frames) = ([&nothing, &nothing], [&positions, &normals]);
     let all = [nothing, nothing, nothing, nothing, moved];
-    fails(&fixture.judge(all), &[Class::Slip], "translation");
+    fails(&fixture.judge(all), &[PriceClass::Slip], "translation");
     let right: Frames = [&fixture.positions, &fixture.normals];
     let all = [nothing, nothing, nothing, nothing, right];
     assert_eq!(fixture.judge(all).error, 1.0, "elsewhere than these matrices put it");
@@ -179,5 +187,5 @@ fn a_translation_or_perspective_that_is_lost_is_a_slip() {
         Image { width, height, pixels: fixture.surface.pixels.iter().map(value).collect() }
     };
     let check = fixture.judge_all(&shown(&|p| p.position), &shown(&|p| p.normal));
-    fails(&check, &[Class::Slip], "perspective");
+    fails(&check, &[PriceClass::Slip], "perspective");
 }

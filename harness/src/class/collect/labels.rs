@@ -2,15 +2,15 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::{Collected, Empty, Source, Wanted};
-use crate::class::layout::{self, Kind, Label, label_of};
+use super::{CollectOptions, Collected, Empty, Source};
+use crate::class::layout::{self, Label, Platform, label_of};
 
 /// What stands in place of the files of an empty folder.
 pub(super) const NOTHING: &str = " (nothing in it)";
 
 /// What a search has found so far.
 #[derive(Default)]
-pub(super) struct Found {
+pub(super) struct SearchResult {
     pub(super) sources: Vec<Source>,
     pub(super) skipped: Vec<String>,
     /// Names with the reason.
@@ -21,15 +21,16 @@ pub(super) struct Found {
     pub(super) metadata: Vec<Label>,
 }
 
-impl Found {
+impl SearchResult {
     /// Recognizes the kinds and reads all names by them. Each download has its own, and so has each of the `groups`,
     /// which are of the submissions in their order.
-    pub(super) fn labelled(mut self, wanted: &Wanted, groups: &[usize]) -> Collected {
+    pub(super) fn labeled(mut self, wanted: &CollectOptions, groups: &[usize]) -> Collected {
         let platform_names = PlatformNames::of(&mut self);
         let names: Vec<String> = self.sources.iter().map(full_name).collect();
         let kinds = platform_names.kinds(&self.sources, &names, wanted, groups);
-        let number = |kind: &Kind| kinds.iter().filter(|own| *own == kind).count();
-        let found = Kind::PLATFORMS.into_iter().filter(|kind| number(kind) > 0).collect::<Vec<_>>();
+        let number = |kind: &Platform| kinds.iter().filter(|own| *own == kind).count();
+        let found =
+            Platform::PLATFORMS.into_iter().filter(|kind| number(kind) > 0).collect::<Vec<_>>();
         let most = found.iter().rev().max_by_key(|kind| number(kind)).copied();
         let kind = wanted.from.or(most).unwrap_or_default();
         let found = if found.is_empty() { vec![kind] } else { found };
@@ -75,7 +76,7 @@ struct PlatformNames {
 }
 
 impl PlatformNames {
-    fn of(found: &mut Found) -> Self {
+    fn of(found: &mut SearchResult) -> Self {
         let clones: Vec<String> = found.clones.iter().map(|name| last(name)).collect();
         let prefix =
             layout::prefix_of_clones(&clones.iter().map(String::as_str).collect::<Vec<_>>());
@@ -85,16 +86,16 @@ impl PlatformNames {
     }
 
     /// What a platform's name says, if it is one.
-    fn label(&self, kind: Kind, name: &str) -> Option<Label> {
+    fn label(&self, kind: Platform, name: &str) -> Option<Label> {
         match kind {
-            Kind::Github => self
+            Platform::Github => self
                 .clones
                 .iter()
                 .find(|clone| name.split('/').any(|part| part == *clone))
                 .map(|clone| layout::clone(clone, &self.prefix)),
             // Canvas names files alone.
-            Kind::Canvas => label_of(kind, &last(name)),
-            Kind::Gradescope => name
+            Platform::Canvas => label_of(kind, &last(name)),
+            Platform::Gradescope => name
                 .split('/')
                 .find_map(|part| label_of(kind, part))
                 .map(|label| self.metadata.get(&label.submission).cloned().unwrap_or(label)),
@@ -103,12 +104,12 @@ impl PlatformNames {
     }
 
     /// The platform that most of some names are of.
-    fn recognized(&self, names: &[&str]) -> Kind {
+    fn recognized(&self, names: &[&str]) -> Platform {
         let votes =
-            |kind: &Kind| names.iter().filter(|name| self.label(*kind, name).is_some()).count();
+            |kind: &Platform| names.iter().filter(|name| self.label(*kind, name).is_some()).count();
         // The first of those with most.
-        let best = Kind::PLATFORMS.into_iter().rev().max_by_key(votes);
-        let most_are = |kind: &Kind| votes(kind) > 0 && 2 * votes(kind) >= names.len();
+        let best = Platform::PLATFORMS.into_iter().rev().max_by_key(votes);
+        let most_are = |kind: &Platform| votes(kind) > 0 && 2 * votes(kind) >= names.len();
         best.filter(most_are).unwrap_or_default()
     }
 
@@ -117,16 +118,16 @@ impl PlatformNames {
         &self,
         sources: &[Source],
         names: &[String],
-        wanted: &Wanted,
+        wanted: &CollectOptions,
         groups: &[usize],
-    ) -> Vec<Kind> {
+    ) -> Vec<Platform> {
         // What is unpacked lies below the scratch folder, each download in one of its own.
         let download = |source: &Source| {
             let below = source.path.strip_prefix(wanted.scratch).ok()?;
             Some(below.iter().next()?.to_owned())
         };
         let together: Vec<_> = sources.iter().map(download).zip(groups).collect();
-        let mut kinds: BTreeMap<_, Kind> = BTreeMap::new();
+        let mut kinds: BTreeMap<_, Platform> = BTreeMap::new();
         for own in &together {
             if !kinds.contains_key(own) {
                 let all = together.iter().zip(names).filter(|(other, _)| *other == own);

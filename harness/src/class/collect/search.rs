@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 
-use super::labels::{Found, NOTHING};
-use super::{Source, Wanted, file_name};
+use super::labels::{NOTHING, SearchResult};
+use super::{CollectOptions, Source, file_name};
 use crate::class::download::{self, GRADESCOPE_METADATA};
 use crate::class::layout::{
-    ARCHIVES, Kind, end_of, gradescope_metadata, has_end_of_archive, is_labelled,
+    ARCHIVES, Platform, end_of, gradescope_metadata, has_end_of_archive, is_labeled,
 };
 use crate::intake::{REPORT_FILES, TreeSpec, format_of_bytes};
 
@@ -25,11 +25,11 @@ const DOCUMENTS: [&str; 10] =
 const PARTS: [&str; 8] = ["rs", "wgsl", "exr", "cpp", "hpp", "cc", "h", "py"];
 
 pub(super) struct Search<'a> {
-    pub(super) wanted: &'a Wanted<'a>,
+    pub(super) wanted: &'a CollectOptions<'a>,
     pub(super) output: Option<PathBuf>,
     /// Number of zips of many submissions that were unpacked.
     pub(super) unpacked: usize,
-    pub(super) found: Found,
+    pub(super) found: SearchResult,
 }
 
 impl Search<'_> {
@@ -69,7 +69,7 @@ impl Search<'_> {
                     self.found.sources.push(Source { path, name, place, label: None });
                     continue;
                 }
-                let all = |found: &Found| {
+                let all = |found: &SearchResult| {
                     (found.sources.len(), found.skipped.len(), found.unopened.len())
                 };
                 let before = all(&self.found);
@@ -111,7 +111,7 @@ impl Search<'_> {
             }
             if has_end_of_archive(&path.to_string_lossy()) && path.is_file() {
                 let is_one = download::may_be(&path)
-                    && !is_labelled(&file_name(&path))
+                    && !is_labeled(&file_name(&path))
                     && download::names(&path)
                         .is_some_and(|names| download::is_download(&names, self.wanted.tree, None));
                 if !is_one {
@@ -163,12 +163,12 @@ impl Search<'_> {
         path: &Path,
         place: &Path,
         inside: &str,
-        from: Option<Kind>,
+        from: Option<Platform>,
     ) -> anyhow::Result<bool> {
         let is_one = path.is_file()
             && !path.is_symlink()
             && download::may_be(path)
-            && !is_labelled(&file_name(path))
+            && !is_labeled(&file_name(path))
             && download::names(path)
                 .is_some_and(|names| download::is_download(&names, self.wanted.tree, from));
         if !is_one {
@@ -186,8 +186,8 @@ impl Search<'_> {
 
     /// Whose download an archive among others looks like. What lies in a student's folder, or is named as a
     /// student's, is the student's.
-    fn looks_like(&self, path: &Path, place: &Path) -> Option<Kind> {
-        let is_student_s = place.iter().any(|part| is_labelled(&part.to_string_lossy()));
+    fn looks_like(&self, path: &Path, place: &Path) -> Option<Platform> {
+        let is_student_s = place.iter().any(|part| is_labeled(&part.to_string_lossy()));
         if is_student_s || path.is_symlink() || !path.is_file() || !download::may_be(path) {
             return None;
         }
@@ -221,7 +221,7 @@ impl Search<'_> {
 }
 
 /// Why a zip that looks like a download is no submission.
-fn unopened(name: &str, platform: Kind, place: &Path) -> String {
+fn unopened(name: &str, platform: Platform, place: &Path) -> String {
     format!(
         "{name}: it looks like a download of {}, so among other archives it is neither opened nor graded; hint: name it \
          itself, {}",
@@ -244,7 +244,7 @@ pub(super) fn is_submission(folder: &Path, tree: &TreeSpec) -> anyhow::Result<bo
     for entry in entries(folder)? {
         let name = entry.file_name().to_string_lossy().into_owned();
         // A folder of many students' is none, whatever else lies there.
-        if is_labelled(&name) {
+        if is_labeled(&name) {
             return Ok(false);
         }
         let kind =

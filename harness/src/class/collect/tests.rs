@@ -18,9 +18,12 @@ fn class(files: &[&str]) -> tempfile::TempDir {
 
 fn find(paths: &[PathBuf], output: &Path) -> anyhow::Result<Collected> {
     let scratch = tempfile::tempdir().unwrap();
-    let (tree, limits) = (TreeSpec::default(), Limits::default());
+    let (tree, limits) = (TreeSpec::default(), ArchiveLimits::default());
     let (from, output) = (None, Some(output));
-    collect(paths, &Wanted { tree: &tree, limits: &limits, from, output, scratch: scratch.path() })
+    collect(
+        paths,
+        &CollectOptions { tree: &tree, limits: &limits, from, output, scratch: scratch.path() },
+    )
 }
 
 fn found(folder: &tempfile::TempDir) -> (Vec<String>, Vec<String>) {

@@ -2,8 +2,8 @@ use super::*;
 
 const DUE: &str = "2019-10-06T23:59:00-04:00";
 
-fn policy(text: &str) -> Policy {
-    let policy: Policy = serde_json::from_str(text).unwrap();
+fn policy(text: &str) -> LatePolicy {
+    let policy: LatePolicy = serde_json::from_str(text).unwrap();
     assert_eq!(policy.problem(DUE), None);
     policy
 }
@@ -20,7 +20,7 @@ fn grade(points: f64, points_max: f64) -> Grade {
 }
 
 /// Points after the penalty of one who earned 90, and the remark.
-fn judged(policy: &Policy, submitted: &str) -> (f64, String) {
+fn judged(policy: &LatePolicy, submitted: &str) -> (f64, String) {
     let mut grade = grade(90.0, 90.0);
     let mut late = policy.judge(DUE, submitted, |own| own == "1").unwrap();
     policy.charge(&mut late, &mut grade);
@@ -167,7 +167,7 @@ fn extensions_that_mean_nothing_are_refused_with_their_place() {
             r#"{{"penalty": 1, "unit": "points", "per": "day", "extensions": [{}]}}"#,
             extensions.replace("LATE", &late)
         );
-        let problem = serde_json::from_str::<Policy>(&text).unwrap().problem(DUE).unwrap();
+        let problem = serde_json::from_str::<LatePolicy>(&text).unwrap().problem(DUE).unwrap();
         assert_eq!(problem.at[1..].join(" "), format!("extensions {at}"), "{text}");
         assert!(problem.message.contains(expected), "{}", problem.message);
         let other = problem.other.map(|keys| keys.join(" "));
@@ -195,7 +195,7 @@ fn a_policy_that_says_too_little_is_refused() {
             "late.cut_off lies before the due date",
         ),
     ] {
-        let policy: Policy = serde_json::from_str(text).unwrap();
+        let policy: LatePolicy = serde_json::from_str(text).unwrap();
         assert!(policy.problem(DUE).unwrap().message.contains(expected), "{text}");
     }
 }
@@ -225,7 +225,7 @@ fn an_offset_that_the_time_zone_does_not_have_then_is_refused() {
                 r#"{{"penalty": 1, "unit": "points", "per": "day", "time_zone": "{zone}"{}}}"#,
                 more.replace("WINTER", winter)
             );
-            let problem = serde_json::from_str::<Policy>(&text).unwrap().problem(due);
+            let problem = serde_json::from_str::<LatePolicy>(&text).unwrap().problem(due);
             let found = problem.as_ref().map(|own| own.at.join(" "));
             let is_utc = due.ends_with('Z') || due.ends_with("+00:00");
             let expected = if zone == "Europe/Paris" && !is_utc { Some("due") } else { at };

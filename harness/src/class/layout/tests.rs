@@ -1,6 +1,6 @@
 use super::*;
 
-fn said(kind: Kind, component: &str) -> Option<[String; 4]> {
+fn said(kind: Platform, component: &str) -> Option<[String; 4]> {
     let label = label_of(kind, component)?;
     Some([label.submission, label.name, label.id, label.submitted])
 }
@@ -11,7 +11,7 @@ fn of(parts: [&str; 4]) -> Option<[String; 4]> {
 
 #[test]
 fn brightspace_folders_and_flat_files() {
-    let own = |component: &str| said(Kind::Brightspace, component);
+    let own = |component: &str| said(Platform::Brightspace, component);
     let folder = "12345-67890 - Ann Lee - Oct 5, 2019 1159 PM";
     assert_eq!(own(folder), of([folder, "Ann Lee", "12345", "2019-10-05T23:59:00"]));
     for flat in [" - a2_ann_lee.zip", "- a2.zip"] {
@@ -34,16 +34,16 @@ fn brightspace_folders_and_flat_files() {
 
 #[test]
 fn canvas_files() {
-    let own = |component: &str| said(Kind::Canvas, component);
+    let own = |component: &str| said(Platform::Canvas, component);
     assert_eq!(own("leeann_101_2001_a2.zip"), of(["leeann_101", "leeann", "101", ""]));
-    let late = label_of(Kind::Canvas, "müllerjörg_LATE_102_2002_a2_1_2.zip").unwrap();
+    let late = label_of(Platform::Canvas, "müllerjörg_LATE_102_2002_a2_1_2.zip").unwrap();
     assert_eq!(
         (late.name.as_str(), late.id.as_str(), late.marked_late),
         ("müllerjörg", "102", true)
     );
     // A name of a file with numbers, a name of a person with an underscore.
     assert_eq!(own("doe_x_103_2003_7_8_a2-1.zip").unwrap()[2], "103");
-    let anonymous = label_of(Kind::Canvas, "LATE_anon_x7Yz_2004_a2.zip").unwrap();
+    let anonymous = label_of(Platform::Canvas, "LATE_anon_x7Yz_2004_a2.zip").unwrap();
     assert_eq!((anonymous.id.as_str(), anonymous.marked_late), ("x7Yz", true));
     assert_eq!(own("anon_x7Yz_2004_a2.zip").unwrap()[1], "");
     let upload = |component: &str| canvas_upload(component).unwrap();
@@ -58,7 +58,7 @@ fn canvas_files() {
 
 #[test]
 fn moodle_folders_and_flat_files() {
-    let own = |component: &str| said(Kind::Moodle, component);
+    let own = |component: &str| said(Platform::Moodle, component);
     for component in [
         "Ann Lee_7_assignsubmission_file",
         "Ann Lee_7_assignsubmission_file_",
@@ -75,8 +75,8 @@ fn moodle_folders_and_flat_files() {
 
 #[test]
 fn gradescope_with_its_metadata() {
-    assert_eq!(said(Kind::Gradescope, "submission_12").unwrap()[0], "submission_12");
-    assert_eq!(said(Kind::Gradescope, "submission_metadata.yml"), None);
+    assert_eq!(said(Platform::Gradescope, "submission_12").unwrap()[0], "submission_12");
+    assert_eq!(said(Platform::Gradescope, "submission_metadata.yml"), None);
     let text = "---\nsubmission_12:\n  :submitters:\n  - :name: Zoë O'Neil\n    :sid: '0260000001'\n    \
                 :email: z@example.org\n  :created_at: 2019-10-06 03:59:01.123 Z\n  :score: 3.0\n  :results:\n    \
                 tests:\n    - name: x\n      sid: 9\n  :history:\n  - :id: 9\n    :created_at: 2019-01-01 00:00:00 Z\n\

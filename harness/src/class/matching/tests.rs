@@ -12,7 +12,7 @@ fn roster() -> Roster {
 
 fn claim(platform: &str, number: &str, full_name: &str) -> Claim {
     let label = Label {
-        kind: Kind::Brightspace,
+        kind: Platform::Brightspace,
         id: "9".into(),
         name: platform.into(),
         ..Label::default()

@@ -1,7 +1,7 @@
 //! The columns of class lists: what they are called, and which platform's list has such ones.
 
 use super::cells::unwrapped;
-use crate::class::layout::Kind;
+use crate::class::layout::Platform;
 use crate::class::names;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,15 +173,15 @@ const NO_PERSON: [&str; 23] = [
 
 /// What each column holds; the first of those that hold the same. A list of no platform has other headings for the
 /// student number: where one column alone is called like a number of a person, that is the one.
-pub(super) fn columns(header: &[String], kind: Kind) -> Vec<Option<Column>> {
+pub(super) fn columns(header: &[String], kind: Platform) -> Vec<Option<Column>> {
     let mut columns: Vec<Option<Column>> = Vec::new();
     for name in header {
         let own = column(name).filter(|own| !columns.contains(&Some(*own)));
         // Elsewhere it is that of a person.
-        let own = own.filter(|own| *own != Column::Status || kind == Kind::Moodle);
+        let own = own.filter(|own| *own != Column::Status || kind == Platform::Moodle);
         columns.push(own);
     }
-    if kind == Kind::Plain && !columns.contains(&Some(Column::Number)) {
+    if kind == Platform::Plain && !columns.contains(&Some(Column::Number)) {
         let is_number = |at: &usize| {
             columns[*at] == Some(Column::Id) || (columns[*at].is_none() && is_number(&header[*at]))
         };
@@ -225,22 +225,22 @@ pub(super) fn tells_students(header: &[String]) -> bool {
 }
 
 /// Whose export has such a header.
-pub(super) fn kind(header: &[String]) -> Kind {
+pub(super) fn kind(header: &[String]) -> Platform {
     let names: Vec<String> = header.iter().map(|name| names::letters(name)).collect();
     let has = |name: &str| names.iter().any(|own| own == name);
     if has("orgdefinedid") || has("endoflineindicator") {
-        Kind::Brightspace
+        Platform::Brightspace
     } else if has("section") && (has("student") || has("lastname")) && has("id") {
-        Kind::Canvas
+        Platform::Canvas
     } else if has("githubusername") {
-        Kind::Github
+        Platform::Github
     } else if (has("identifier") && (has("fullname") || has("grade")))
         || (has("identifiant") && (has("nomcomplet") || has("note")))
     {
-        Kind::Moodle
+        Platform::Moodle
     } else if has("sid") {
-        Kind::Gradescope
+        Platform::Gradescope
     } else {
-        Kind::Plain
+        Platform::Plain
     }
 }

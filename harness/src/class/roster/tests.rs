@@ -4,7 +4,7 @@ fn read(text: &str) -> Roster {
     Roster::parse(text.as_bytes(), Path::new("list.csv")).unwrap()
 }
 
-fn said(student: &Student) -> [&str; 5] {
+fn said(student: &ListedStudent) -> [&str; 5] {
     [&student.number, &student.id, &student.username, &student.first_name, &student.last_name]
         .map(String::as_str)
 }
@@ -15,7 +15,7 @@ fn lists_of_all_platforms() {
         "\u{feff}OrgDefinedId,Username,Last Name,First Name,Email,A2 Points Grade <Numeric MaxPoints:100>,End-of-Line Indicator\r\n\
          #0260000001,#zoneil,\"O'Neil, Jr\",Zoë,z@example.org,,#\r\n",
     );
-    assert_eq!(list.kind, Kind::Brightspace);
+    assert_eq!(list.kind, Platform::Brightspace);
     assert_eq!(said(&list.students[0]), ["0260000001", "", "zoneil", "Zoë", "O'Neil, Jr"]);
     assert_eq!((list.students[0].line, list.rows[0][0].as_str()), (2, "#0260000001"));
 
@@ -23,7 +23,7 @@ fn lists_of_all_platforms() {
         "Student,ID,SIS User ID,SIS Login ID,Section,A2 (77),Final Score\n,,,,,Manual Posting,\n\
          \"    Points Possible\",,,,,100,(read only)\n\"Lee, Ann\",101,260000001,alee,1,,\n\"Student, Test\",9,,x,1,,\n",
     );
-    assert_eq!(list.kind, Kind::Canvas);
+    assert_eq!(list.kind, Platform::Canvas);
     assert_eq!(list.students.len(), 1);
     assert_eq!(said(&list.students[0]), ["260000001", "101", "alee", "Ann", "Lee"]);
     assert_eq!((list.students[0].row, list.students[0].line), (2, 4));
@@ -32,21 +32,21 @@ fn lists_of_all_platforms() {
         "Identifier,Full name,ID number,Email address,Status,Grade,Maximum Grade,Last modified (submission),Last modified (grade)\n\
          Participant 7,Ann Lee,260000001,a@example.org,Submitted,,100,\"Sunday, 6 October 2019, 11:59 PM\",-\n",
     );
-    assert_eq!((list.kind, list.students[0].id.as_str()), (Kind::Moodle, "7"));
+    assert_eq!((list.kind, list.students[0].id.as_str()), (Platform::Moodle, "7"));
     assert_eq!(list.students[0].submitted, "2019-10-06T23:59:00");
 
     let list = read("Name;SID;Email\nAnn Lee;260000001;a@example.org\n");
-    assert_eq!(list.kind, Kind::Gradescope);
+    assert_eq!(list.kind, Platform::Gradescope);
     assert_eq!(said(&list.students[0]), ["260000001", "", "", "Ann Lee", ""]);
 
     let list = read("identifier,github_username,github_id,name\n260000001,ann-l,5,\n");
     assert_eq!(
         (list.kind, said(&list.students[0])[..3].to_vec()),
-        (Kind::Github, vec!["260000001", "", "ann-l"])
+        (Platform::Github, vec!["260000001", "", "ann-l"])
     );
 
     let list = read("student_id\tname\n00123\tAnn Lee\n");
-    assert_eq!((list.kind, said(&list.students[0])[0]), (Kind::Plain, "00123"));
+    assert_eq!((list.kind, said(&list.students[0])[0]), (Platform::Plain, "00123"));
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn a_list_of_excel() {
         assert_eq!((said(&list.students[0])[0], list.students[0].line), ("7", 3), "{text}");
     }
     let list = read("SID,Name\n7,Ann Lee\n,Total\n,Bo\n");
-    let names: Vec<String> = list.students.iter().map(Student::full_name).collect();
+    let names: Vec<String> = list.students.iter().map(ListedStudent::full_name).collect();
     assert_eq!(names, ["Ann Lee", "Bo"]);
     assert!(list.reading().ends_with("; no student: line 3, Total"), "{}", list.reading());
     let list = read("SID,Name\n\"=\"\"0260\"\"\",A\n26.0,B\n27.50,C\n12E5,D\n");

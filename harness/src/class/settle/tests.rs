@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::*;
-use crate::class::late::Policy;
+use crate::class::late::LatePolicy;
 use crate::class::layout::label_of;
 use crate::class::roster::Roster;
 use crate::class::set_aside;
@@ -21,7 +21,7 @@ fn claim(folder: &str, number: &str) -> Claim {
     Claim {
         name: format!("{folder}/a2.zip"),
         slug: folder.to_owned(),
-        label: Kind::PLATFORMS.into_iter().find_map(|kind| label_of(kind, folder)),
+        label: Platform::PLATFORMS.into_iter().find_map(|kind| label_of(kind, folder)),
         number: number.to_owned(),
         full_name: String::new(),
         digest: String::new(),
@@ -49,7 +49,7 @@ fn run(
 ) -> Settled {
     let matches = Matches::parse(matches, Path::new("matches.toml")).unwrap();
     let roster = roster();
-    let policy: Policy =
+    let policy: LatePolicy =
         serde_json::from_str(r#"{"penalty": 10, "unit": "points", "per": "day"}"#).unwrap();
     let deciding = Deciding {
         roster: with_list.then_some(&roster),
@@ -60,7 +60,7 @@ fn run(
     };
     let mut grades: Vec<Grade> = points.iter().map(|points| grade(*points)).collect();
     let (standings, class) =
-        settle(claims, &mut grades, &[], Kind::Brightspace, &deciding).unwrap();
+        settle(claims, &mut grades, &[], Platform::Brightspace, &deciding).unwrap();
     let names = standings.iter().map(|(at, _)| claims[*at].slug.clone()).collect();
     Settled { names, standings: standings.into_iter().map(|(_, own)| own).collect(), class, grades }
 }

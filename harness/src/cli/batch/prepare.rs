@@ -7,13 +7,13 @@ use anyhow::{Context as _, bail, ensure};
 
 use super::Batch;
 use crate::assignment::Assignment;
-use crate::class::{Collected, Decisions, Label, Pins, Stated, Wanted, collect};
+use crate::class::{CollectOptions, Collected, Decisions, Label, Pins, Stated, collect};
 use crate::cli::MachineLacks;
-use crate::cli::choices::{IsolationChoice, Perturb};
+use crate::cli::choices::{HeldBackSeed, IsolationChoice};
 use crate::cli::class::{self, Source, Telling};
 use crate::cli::context::Context;
 use crate::cli::export;
-use crate::cli::found::Found;
+use crate::cli::found::BatchIndex;
 use crate::cli::outputs::{at_root, ensure_apart, ensure_not_read, shell_path};
 use crate::cli::settled;
 use crate::columns::count;
@@ -27,7 +27,7 @@ impl Batch<'_> {
     pub(super) fn collect(&self, context: &Context, scratch: &Path) -> anyhow::Result<Collected> {
         let mut collected = match self.mode {
             Mode::Grade => {
-                let wanted = Wanted {
+                let wanted = CollectOptions {
                     tree: &context.assignment.tree,
                     limits: &context.assignment.limits.archive,
                     from: self.from,
@@ -148,16 +148,16 @@ impl Batch<'_> {
 
     /// The seed of the held-back scenes, if there are any: the one that the report has, in `file`.
     pub(super) fn seed(&self, file: &Path) -> anyhow::Result<Option<u64>> {
-        let chosen = self.perturb.map(|Perturb(seed)| seed);
+        let chosen = self.held_back_seed.map(|HeldBackSeed(seed)| seed);
         let seed = match (self.mode, chosen) {
             (Mode::Check, Some(seed)) => return Ok(seed),
             _ => recorded_seed(file, chosen)?,
         };
         // Before they are merged, tasks of a partition are compared with each other.
-        let is_merged = self.slice.is_none() || Found::read(self.output)?.is_some();
+        let is_merged = self.slice.is_none() || BatchIndex::read(self.output)?.is_some();
         ensure!(
             chosen.is_none_or(|own| own == seed || !is_merged),
-            "--perturb: {} is graded with {}, and all submissions of a report share their held-back scenes; hint: \
+            "--held-back: {} is graded with {}, and all submissions of a report share their held-back scenes; hint: \
              another --report, or delete {} and grade all of them again",
             self.output.display(),
             in_words(seed),
@@ -234,7 +234,7 @@ fn same_list(list: &Path, output: &Path) -> anyhow::Result<()> {
     };
     let kept = class::kept_list(output);
     ensure!(
-        Found::begun(output)?.is_empty() || !kept.is_file() || read(list)? == read(&kept)?,
+        BatchIndex::begun(output)?.is_empty() || !kept.is_file() || read(list)? == read(&kept)?,
         "--class: {} differs from {}, which the other tasks use; all tasks of a partition use the same list",
         list.display(),
         kept.display()
@@ -244,21 +244,21 @@ fn same_list(list: &Path, output: &Path) -> anyhow::Result<()> {
 
 /// Makes sure that a task of a partition uses the seed of one of the tasks that graded something, if any did.
 pub(super) fn same_seed(seed: Option<u64>, output: &Path) -> anyhow::Result<()> {
-    let begun = Found::begun(output)?;
-    let seed_of = |found: &Found| found.held_back.as_ref().map(|held_back| held_back.seed);
+    let begun = BatchIndex::begun(output)?;
+    let seed_of = |found: &BatchIndex| found.held_back.as_ref().map(|held_back| held_back.seed);
     if begun.iter().any(|(_, found)| seed_of(found) == seed) {
         return Ok(());
     }
     let instructor = output.join(report::INSTRUCTOR);
-    let graded = |(_, found): &&(PathBuf, Found)| {
+    let graded = |(_, found): &&(PathBuf, BatchIndex)| {
         let made = |slug: &String| RecordCache::conditions_of(&instructor.join(slug));
         class::folders(output).iter().filter_map(made).any(|made| made == found.conditions)
     };
     let Some((file, found)) = begun.iter().find(graded) else { return Ok(()) };
     let other = in_words(seed_of(found));
     bail!(
-        "--perturb: this task would use {}, another one used {other}: all tasks of a partition use the same seed; hint: \
-         --perturb {other}, or delete {} and run its task again",
+        "--held-back: this task would use {}, another one used {other}: all tasks of a partition use the same seed; \
+         hint: --held-back {other}, or delete {} and run its task again",
         in_words(seed),
         file.display()
     );

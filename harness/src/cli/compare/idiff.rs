@@ -18,7 +18,7 @@ use basecode::exr_io::{ExrRows, write_exr_channels};
 use crate::cli::outputs::ensure_not_read;
 use crate::harmless::harmless;
 use crate::imaging::rows::{Channels, Row, visit_rows};
-use crate::imaging::thresholds::{Limits, Tally};
+use crate::imaging::thresholds::{Tally, Thresholds};
 
 /// The images match within all thresholds.
 const MATCH: u8 = 0;
@@ -57,8 +57,8 @@ struct Options {
     verbose: bool,
     quiet: bool,
     all: bool,
-    fail: Limits,
-    warn: Limits,
+    fail: Thresholds,
+    warn: Thresholds,
     /// With at most so many failing pixels, nothing else counts.
     allowed: usize,
     output: Option<PathBuf>,
@@ -81,7 +81,8 @@ pub(super) fn run(arguments: &[OsString]) -> u8 {
 
 impl Options {
     fn parse(arguments: &[OsString]) -> anyhow::Result<Self> {
-        let limits = Limits { absolute: 1e-6, relative: 0.0, percent: 0.0, hard: f32::INFINITY };
+        let limits =
+            Thresholds { absolute: 1e-6, relative: 0.0, percent: 0.0, hard: f32::INFINITY };
         let mut options = Self {
             images: Vec::new(),
             verbose: false,
@@ -236,7 +237,7 @@ fn compare(options: &Options) -> anyhow::Result<u8> {
 fn verdict(options: &Options, tally: &Tally, pixels: usize) -> u8 {
     let Options { fail, warn, .. } = options;
     let largest = tally.largest.map_or(0.0, |largest| largest.size);
-    let above = |limits: &Limits, count: usize| {
+    let above = |limits: &Thresholds, count: usize| {
         count as f64 > f64::from(limits.percent) / 100.0 * pixels as f64 || largest > limits.hard
     };
     if tally.failing <= options.allowed {

@@ -6,9 +6,9 @@ use anyhow::{bail, ensure};
 
 use super::{Item, left_out, waits};
 use crate::class::export::{Book, Points, check_keys, grade_book};
-use crate::class::{Kind, Roster, Student};
+use crate::class::{ListedStudent, Platform, Roster};
 use crate::cli::class;
-use crate::cli::earlier::Report;
+use crate::cli::earlier::StoredReport;
 use crate::columns::count;
 use crate::report::harmless;
 
@@ -18,7 +18,7 @@ const CHANGEABLE: &str = "Grade can be changed";
 /// The class list, where it is this platform's.
 pub(super) fn of_platform(
     roster: Option<Roster>,
-    kind: Kind,
+    kind: Platform,
     output: &Path,
 ) -> anyhow::Result<Roster> {
     let Some(roster) = roster else {
@@ -29,7 +29,7 @@ pub(super) fn of_platform(
         );
     };
     ensure!(
-        roster.kind != Kind::Plain,
+        roster.kind != Platform::Plain,
         "{}: not an export of {}: no platform that Umbra knows has these columns; hint: grade with --class and the file \
          that {} exports, unchanged. If its headings are not in English, switch {} to English first",
         roster.path.display(),
@@ -38,7 +38,7 @@ pub(super) fn of_platform(
         kind.title()
     );
     let hint = match roster.kind {
-        Kind::Brightspace | Kind::Canvas | Kind::Moodle => {
+        Platform::Brightspace | Platform::Canvas | Platform::Moodle => {
             format!("the format {}", roster.kind.title().to_lowercase())
         }
         other => format!(
@@ -62,8 +62,8 @@ pub(super) fn book(
     file: &Path,
     output: &Path,
     item: &Item,
-    report: &Report,
-    kind: Kind,
+    report: &StoredReport,
+    kind: Platform,
     said: &mut Vec<String>,
 ) -> anyhow::Result<String> {
     let roster = of_platform(class::roster(None, output)?, kind, output)?;
@@ -102,7 +102,7 @@ struct Sorted<'a> {
     open: Vec<String>,
 }
 
-fn sorted<'a>(report: &Report, roster: &'a Roster) -> Sorted<'a> {
+fn sorted<'a>(report: &StoredReport, roster: &'a Roster) -> Sorted<'a> {
     let (mut graded, mut left, mut open) = (Vec::new(), Vec::new(), Vec::new());
     for row in &report.submissions {
         let student = row.standing.student.as_ref();
@@ -180,7 +180,7 @@ fn warnings(book: &Book, roster: &Roster, graded: &[Points], out_of: f64) -> Vec
 }
 
 /// Whether a submission that is not decided yet may be a student's, beside their own.
-fn may_have_another(student: &Student, report: &Report) -> bool {
+fn may_have_another(student: &ListedStudent, report: &StoredReport) -> bool {
     let undecided = report.class.iter().flat_map(|class| &class.undecided);
     undecided.flat_map(|own| &own.candidates).any(|candidate| candidate == student)
 }

@@ -6,12 +6,12 @@ use anyhow::bail;
 use serde_json::json;
 
 use super::remarks;
-use crate::cli::earlier::Report;
+use crate::cli::earlier::StoredReport;
 use crate::cli::outputs::shell_path;
 use crate::report::harmless;
 
 /// `results.json` of Gradescope's autograders: a test for each part.
-pub(super) fn gradescope(report: &Report, output: &Path) -> anyhow::Result<String> {
+pub(super) fn gradescope(report: &StoredReport, output: &Path) -> anyhow::Result<String> {
     let [row] = report.submissions.as_slice() else {
         bail!(
             "Gradescope takes one submission at a time, and there are {}; hint: umbra export FILE --format gradescope \

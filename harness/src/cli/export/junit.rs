@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::SystemTime;
 
-use super::super::earlier::{Report, Row};
+use super::super::earlier::{ReportRow, StoredReport};
 use crate::grading::RecordCache;
 use crate::report::{self, harmless};
 use crate::rubric::PartGrade;
@@ -33,7 +33,7 @@ impl Outcome {
 }
 
 /// The report as XML. When a submission was graded is told by its record in the folder `output`.
-pub fn junit(report: &Report, output: &Path) -> String {
+pub fn junit(report: &StoredReport, output: &Path) -> String {
     let all = report.submissions.iter().flat_map(|row| &row.parts);
     let wall_s: f64 = report.submissions.iter().map(|row| wall_s(report, row)).sum();
     let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
@@ -48,7 +48,7 @@ pub fn junit(report: &Report, output: &Path) -> String {
     xml + "</testsuites>\n"
 }
 
-fn suite(report: &Report, row: &Row, output: &Path) -> String {
+fn suite(report: &StoredReport, row: &ReportRow, output: &Path) -> String {
     let name = quoted(&row.slug);
     let record = output.join(report::INSTRUCTOR).join(&row.slug);
     let graded = RecordCache::when(&record).and_then(timestamp);
@@ -91,7 +91,7 @@ fn counts<'a>(parts: impl Iterator<Item = &'a PartGrade>) -> String {
 }
 
 /// What grading a submission took [s].
-fn wall_s(report: &Report, row: &Row) -> f64 {
+fn wall_s(report: &StoredReport, row: &ReportRow) -> f64 {
     report.timings.get(&row.slug).into_iter().flatten().map(|stage| stage.wall_s).sum()
 }
 
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn known_answer() {
         let report = report_json(&sample::report()).unwrap();
-        let report: Report = serde_json::from_str(&report).unwrap();
+        let report: StoredReport = serde_json::from_str(&report).unwrap();
         let xml = junit(&report, Path::new("nowhere"));
         let first: Vec<&str> = xml.lines().take(3).collect();
         assert_eq!(

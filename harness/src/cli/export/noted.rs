@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, ensure};
 use sha2::{Digest as _, Sha256};
 
-use super::Format;
+use super::ExportFormat;
 use crate::class::MATCHES;
 use crate::class::overrides::OVERRIDES;
 use crate::files::{hex, write_whole};
@@ -41,8 +41,10 @@ pub(super) fn is_same(a: &Path, b: &Path) -> bool {
 ///
 /// # Errors
 /// When it would.
-pub(super) fn may_replace(file: &Path, format: Format, output: &Path) -> anyhow::Result<()> {
-    if matches!(format, Format::Csv | Format::Json) && is_same(file, &output.join(format.file())) {
+pub(super) fn may_replace(file: &Path, format: ExportFormat, output: &Path) -> anyhow::Result<()> {
+    if matches!(format, ExportFormat::Csv | ExportFormat::Json)
+        && is_same(file, &output.join(format.file()))
+    {
         return Ok(());
     }
     let whole = whole_path(file);

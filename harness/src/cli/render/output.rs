@@ -11,12 +11,12 @@ use crate::imaging::pictures::clamped;
 
 /// What a file's name asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Format {
+pub(super) enum ImageFormat {
     Exr,
     Png,
 }
 
-impl Format {
+impl ImageFormat {
     /// The format of an output file, which must be possible to write.
     pub(super) fn of(output: &Path) -> anyhow::Result<Self> {
         let ending = output.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
@@ -109,20 +109,20 @@ mod tests {
             let pixels = pixels.map(Vec3::from).to_vec();
             looks_broken(&Image { width: 2, height: 2, pixels }).join("; ")
         };
-        let (grey, black) = ([0.5; 3], [0.0; 3]);
-        assert_eq!(said([grey, black, black, black]), "");
-        assert_eq!(said([[-1e-7; 3], grey, grey, grey]), "");
+        let (gray, black) = ([0.5; 3], [0.0; 3]);
+        assert_eq!(said([gray, black, black, black]), "");
+        assert_eq!(said([[-1e-7; 3], gray, gray, gray]), "");
         assert_eq!(said([black; 4]), "the image is black all over");
         let (nan, negative) = ([f32::NAN, 0.5, 0.5], [-0.5, 0.5, 0.5]);
-        assert_eq!(said([grey, black, nan, grey]), "1 pixel is not finite; first at (0, 1)");
+        assert_eq!(said([gray, black, nan, gray]), "1 pixel is not finite; first at (0, 1)");
         let infinite = [f32::INFINITY; 3];
         assert_eq!(said([infinite; 4]), "4 pixels are not finite; first at (0, 0)");
         assert_eq!(
-            said([grey, negative, grey, negative]),
+            said([gray, negative, gray, negative]),
             "2 pixels are negative; first at (1, 0)"
         );
         assert_eq!(
-            said([grey, negative, grey, nan]),
+            said([gray, negative, gray, nan]),
             "1 pixel is not finite; first at (1, 1); 1 pixel is negative; first at (1, 0)"
         );
     }

@@ -14,8 +14,8 @@ use anyhow::Context as _;
 use super::WatchArguments;
 use super::live::LiveView;
 use super::saves::{Change, Happened};
-use super::server::{Board, Stage};
-use crate::cli::earlier::{Report, Row};
+use super::server::{Board, CheckState};
+use crate::cli::earlier::{ReportRow, StoredReport};
 use crate::columns::count;
 use crate::grading::{REFUSED, SO_FAR};
 use crate::intake::Severity;
@@ -62,7 +62,7 @@ impl Running {
 }
 
 /// How a folder is checked.
-pub(super) struct Check<'a> {
+pub(super) struct Checker<'a> {
     pub folder: &'a Path,
     /// Where the report goes.
     pub output: &'a Path,
@@ -81,7 +81,7 @@ pub(super) fn is_judged(status: ExitStatus) -> bool {
 
 /// What a report comes to: in a few words, and in a sentence with what is to be mended first. Where everything was
 /// asked (`is_whole`), that is what keeps it from being submitted, too.
-pub(super) fn verdict(row: &Row, is_whole: bool) -> (Stage, String, String) {
+pub(super) fn verdict(row: &ReportRow, is_whole: bool) -> (CheckState, String, String) {
     let points = format!("{} of {} points", row.points, row.out_of);
     if let Some(first) = row.diagnostics.lines().find(|line| !line.trim().is_empty()) {
         // rustc says the place on the next line.
@@ -89,13 +89,13 @@ pub(super) fn verdict(row: &Row, is_whole: bool) -> (Stage, String, String) {
         let place = place.and_then(|line| line.trim_start().strip_prefix("--> "));
         let place = place.map_or(String::new(), |place| format!("{place}: "));
         let message = format!("{place}{first} ({points})");
-        return (Stage::Refused, "does not compile".to_owned(), message);
+        return (CheckState::Refused, "does not compile".to_owned(), message);
     }
     // Where no code decided anything, the last remark tells why there is none.
     let by_code = |part: &PartGrade| part.evidence.iter().any(|id| !id.starts_with("submitted."));
     let is_bare = is_whole && row.points_max == 0.0 && !row.parts.iter().any(by_code);
     if let Some(cause) = row.remarks.last().filter(|_| is_bare) {
-        return (Stage::Lost, points.clone(), format!("{points}. {cause}"));
+        return (CheckState::Lost, points.clone(), format!("{points}. {cause}"));
     }
     let mut errors = row.findings.iter().filter(|found| found.severity == Severity::Error);
     let lost: Vec<&PartGrade> = row.parts.iter().filter(|part| part.is_lost()).collect();
@@ -105,9 +105,9 @@ pub(super) fn verdict(row: &Row, is_whole: bool) -> (Stage, String, String) {
                 let error = error.to_string();
                 let error = error.trim_start_matches("error: ");
                 let short = format!("{points}, not ready to submit");
-                (Stage::Unready, short, format!("{points}. {error}"))
+                (CheckState::Unready, short, format!("{points}. {error}"))
             }
-            None => (Stage::Done, points.clone(), points),
+            None => (CheckState::Done, points.clone(), points),
         },
         Some((first, others)) => {
             let others = match others.len() {
@@ -115,15 +115,15 @@ pub(super) fn verdict(row: &Row, is_whole: bool) -> (Stage, String, String) {
                 more => format!(", and {} lost points too", count(more, "other part")),
             };
             let message = format!("{points}. {}: {}{others}", first.id, first.reason);
-            (Stage::Lost, points, message)
+            (CheckState::Lost, points, message)
         }
     }
 }
 
-impl Check<'_> {
+impl Checker<'_> {
     /// Shows how a check ended.
     pub fn show(&self, status: ExitStatus) {
-        let row = is_judged(status).then(|| Report::read(self.output).ok()).flatten();
+        let row = is_judged(status).then(|| StoredReport::read(self.output).ok()).flatten();
         match row.and_then(|report| report.submissions.into_iter().next()) {
             Some(row) => {
                 let is_whole = self.arguments.part.is_empty() && self.arguments.scene.is_empty();
@@ -131,7 +131,7 @@ impl Check<'_> {
                 self.board.report(stage, &verdict, &message);
             }
             // The last line said why.
-            None => self.board.show(Stage::Failed, ""),
+            None => self.board.show(CheckState::Failed, ""),
         }
     }
 
@@ -179,7 +179,7 @@ impl Check<'_> {
                     }
                     let doing = if is_result { None } else { Some(line.to_owned()) };
                     let words: Vec<String> = known.iter().cloned().chain(doing).collect();
-                    board.show(Stage::Running, &words.join("; "));
+                    board.show(CheckState::Running, &words.join("; "));
                     if live.has_new_library() {
                         board.compiled();
                     }

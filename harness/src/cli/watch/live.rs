@@ -40,7 +40,7 @@ use tempfile::TempDir;
 use crate::assignment::{Assignment, SceneEntry};
 use crate::cli::context::cores;
 use crate::grading::RenderPath;
-use crate::process::Limits;
+use crate::process::ProcessLimits;
 use crate::worker::{
     Adapter, AdapterKind, Answer, CameraValue, Job, LiveWorker, Outcome, Request, SceneRef,
     Supervisor,
@@ -53,7 +53,7 @@ const OFFLINE_CPU_S: [u64; 2] = [10, 2];
 
 /// What the browser asks for.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Question {
+pub struct FrameQuestion {
     path: RenderPath,
     /// Name of the scene.
     scene: String,
@@ -65,7 +65,7 @@ pub struct Question {
     viewer: u64,
 }
 
-impl Question {
+impl FrameQuestion {
     /// Reads `path=realtime&scene=NAME&shadows=1&spp=4&viewer=7&camera=` with ten numbers: eye, at, up, and the
     /// vertical field of view in degrees. None for anything else.
     pub fn parse(query: &str) -> Option<Self> {
@@ -130,7 +130,7 @@ pub struct LiveView {
     scenes: Vec<Scene>,
     root: PathBuf,
     supervisor: Supervisor,
-    limits: Limits,
+    limits: ProcessLimits,
     /// The library of the last save that compiled, and when it was last seen to change.
     library: PathBuf,
     seen: Mutex<Option<SystemTime>>,
@@ -171,7 +171,7 @@ impl LiveView {
             scenes: chosen.map(scene).collect::<Result<_, _>>()?,
             root: root.clone(),
             supervisor: supervisor.clone(),
-            limits: Limits { threads: cores(), ..limits.run.clone() },
+            limits: ProcessLimits { threads: cores(), ..limits.run.clone() },
             library: folder.path().join(crate::files::library_name("live")),
             seen: Mutex::default(),
             realtime: Mutex::default(),
@@ -210,7 +210,7 @@ impl LiveView {
     ///
     /// # Errors
     /// With the words for the browser when there is none.
-    pub fn picture(&self, question: &Question) -> Result<Option<Vec<u8>>, String> {
+    pub fn picture(&self, question: &FrameQuestion) -> Result<Option<Vec<u8>>, String> {
         let scene = self.scenes.iter().find(|scene| scene.name == question.scene);
         let scene = scene.ok_or("there is no such scene")?;
         let library = self.library_time().map_err(|_| "nothing has compiled yet".to_owned())?;
@@ -231,7 +231,7 @@ impl LiveView {
     fn draw(
         &self,
         scene: &Scene,
-        question: &Question,
+        question: &FrameQuestion,
         library: SystemTime,
     ) -> anyhow::Result<Option<Outcome>> {
         // A camera that moves on needs no picture of where it was.
@@ -302,7 +302,7 @@ impl LiveView {
     }
 
     /// None when it was given up for another question.
-    fn render(&self, scene: &Scene, question: &Question) -> Option<anyhow::Result<Outcome>> {
+    fn render(&self, scene: &Scene, question: &FrameQuestion) -> Option<anyhow::Result<Outcome>> {
         let cancel = Arc::<AtomicBool>::default();
         let new = (Arc::clone(&cancel), question.camera);
         if let Some((older, _)) = lock(&self.newest).insert(question.viewer, new) {
@@ -320,7 +320,7 @@ impl LiveView {
     fn render_until(
         &self,
         scene: &Scene,
-        question: &Question,
+        question: &FrameQuestion,
         cancel: &Arc<AtomicBool>,
     ) -> anyhow::Result<Outcome> {
         // Other pages wait their turn.
@@ -343,7 +343,7 @@ impl LiveView {
         let job = Job { plugin: Some(self.library.clone()), requests: vec![request] };
         let [fixed, each] = OFFLINE_CPU_S;
         let limits =
-            Limits { cpu_s: fixed + each * u64::from(question.spp), ..self.limits.clone() };
+            ProcessLimits { cpu_s: fixed + each * u64::from(question.spp), ..self.limits.clone() };
         let mut report = self.supervisor.run_job(&job, &limits, cancel, &mut |_| ());
         report.outcomes.pop().context("the worker gave no answer")
     }
@@ -421,7 +421,7 @@ mod tests {
     fn a_question_says_all_or_is_none() {
         let whole =
             "path=offline&scene=cbox&shadows=1&spp=4&viewer=7&camera=1,2,3,4,5,6,0,1,0,30.5";
-        let question = Question::parse(whole).unwrap();
+        let question = FrameQuestion::parse(whole).unwrap();
         assert_eq!((question.path, question.spp, question.shadows), (RenderPath::Offline, 4, true));
         assert_eq!((question.camera.at, question.camera.fov_y_deg), ([4.0, 5.0, 6.0], 30.5));
         for (part, other) in [
@@ -437,7 +437,7 @@ mod tests {
             ("&camera", "&kamera"),
             ("viewer=7&", ""),
         ] {
-            assert_eq!(Question::parse(&whole.replace(part, other)), None, "{part} {other}");
+            assert_eq!(FrameQuestion::parse(&whole.replace(part, other)), None, "{part} {other}");
         }
     }
 

@@ -15,10 +15,10 @@ use std::sync::mpsc::channel;
 
 use anyhow::Context as _;
 
-use self::check::{Check, is_judged};
+use self::check::{Checker, is_judged};
 use self::live::LiveView;
 use self::saves::{Change, Happened, Watched, wait};
-use self::server::{Board, Server, Stage};
+use self::server::{Board, CheckState, Server};
 use super::context::{Context, on_interrupt};
 use super::outputs::ensure_apart;
 use super::selection::Selection;
@@ -89,7 +89,7 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
     );
     super::view::open_page(&door.path());
 
-    let check = Check {
+    let check = Checker {
         folder: &folder,
         output: &output,
         arguments,
@@ -115,7 +115,7 @@ pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8
                     let gone =
                         format!("{} is gone; it is checked when it is back", folder.display());
                     eprintln!("umbra: {gone}");
-                    board.show(Stage::Failed, &gone);
+                    board.show(CheckState::Failed, &gone);
                     continue;
                 }
                 offline_holds &= change == Change::Shader;

@@ -14,7 +14,7 @@ use serde::Serialize;
 use tempfile::TempDir;
 use tiny_http::{Header, Method, Request, Response};
 
-use super::live::{LiveView, Question};
+use super::live::{FrameQuestion, LiveView};
 use super::page::page as watch_page;
 use crate::report::HTML_FILE;
 
@@ -26,7 +26,7 @@ const SECRET_BYTES: usize = 16;
 /// The state of the last save.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Stage {
+pub enum CheckState {
     /// It is being checked.
     #[default]
     Running,
@@ -60,7 +60,7 @@ enum Holds {
 struct Shown {
     /// Rises with every change.
     version: u64,
-    stage: Stage,
+    stage: CheckState,
     message: String,
     /// What the page's title says of the last report.
     verdict: String,
@@ -83,12 +83,12 @@ pub struct Board {
 
 impl Board {
     /// Shows a stage; an empty message leaves the last one.
-    pub fn show(&self, stage: Stage, message: &str) {
+    pub fn show(&self, stage: CheckState, message: &str) {
         self.change(stage, message, |_| ());
     }
 
     /// Shows that there is a new report, with its verdict in a few words and in a sentence.
-    pub fn report(&self, stage: Stage, verdict: &str, message: &str) {
+    pub fn report(&self, stage: CheckState, verdict: &str, message: &str) {
         self.change(stage, message, |shown| {
             shown.holds = Holds::All;
             shown.verdict = crate::report::harmless(verdict);
@@ -98,7 +98,7 @@ impl Board {
 
     /// Shows that a save is being checked, and whether what was found offline still holds.
     pub fn saved(&self, offline_holds: bool) {
-        self.change(Stage::Running, "starting", |shown| {
+        self.change(CheckState::Running, "starting", |shown| {
             shown.fresh = false;
             shown.holds = if offline_holds { Holds::Offline } else { Holds::Nothing };
         });
@@ -106,13 +106,13 @@ impl Board {
 
     /// Shows that it compiled.
     pub fn compiled(&self) {
-        self.change(Stage::Running, "", |shown| {
+        self.change(CheckState::Running, "", |shown| {
             shown.libraries += 1;
             shown.fresh = true;
         });
     }
 
-    fn change(&self, stage: Stage, message: &str, what: impl FnOnce(&mut Shown)) {
+    fn change(&self, stage: CheckState, message: &str, what: impl FnOnce(&mut Shown)) {
         let mut shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
         what(&mut shown);
         shown.version += 1;
@@ -205,7 +205,7 @@ enum Route {
     /// The scenes of the live view.
     Scenes,
     /// A picture of one.
-    Frame(Question),
+    Frame(FrameQuestion),
     /// A file of the report, by a path of plain names.
     File(PathBuf),
     /// Refused, with the status.
@@ -250,7 +250,7 @@ impl Route {
             "scenes" => Self::Scenes,
             "frame" => url
                 .split_once('?')
-                .and_then(|(_, query)| Question::parse(query))
+                .and_then(|(_, query)| FrameQuestion::parse(query))
                 .map_or(Self::Nothing(400), Self::Frame),
             _ => rest
                 .strip_prefix("report/")

@@ -247,7 +247,7 @@ fn of_lobe(formula: &Formula, say: Say) {
         );
         say(of, "exponent_plus", number(b), words);
     }
-    let k = formula.normalisation_plus;
+    let k = formula.normalization_plus;
     if k != 2.0 {
         let sum = match k {
             0.0 => "n".to_owned(),

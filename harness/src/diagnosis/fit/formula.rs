@@ -177,7 +177,7 @@ pub struct Formula {
     /// Whether the normalization is made from a n + b too.
     pub follows: bool,
     /// k of the normalization (n + k) / (2 pi).
-    pub normalisation_plus: f64,
+    pub normalization_plus: f64,
     /// What the energy scale is made from.
     pub scale: ScaleForm,
     /// Whose channel stands in each.
@@ -202,7 +202,7 @@ impl Formula {
         times: 1.0,
         plus: 0.0,
         follows: false,
-        normalisation_plus: 2.0,
+        normalization_plus: 2.0,
         scale: ScaleForm::Largest,
         order: [0, 1, 2],
         incident: Incident::Right,
@@ -270,14 +270,14 @@ impl Formula {
                     _ => sample.wi[2],
                 };
                 let lobe = if *phong { self.lobe_of(sample, *exponent) } else { 0.0 };
-                let term = |term: &Term, colour: &[f64; 3], lobe: f64, c: usize| {
+                let term = |term: &Term, color: &[f64; 3], lobe: f64, c: usize| {
                     let power =
                         |base: f64, extra: f64| if extra == 0.0 { 1.0 } else { base.powf(extra) };
                     if lobe == 0.0 {
                         return 0.0;
                     }
-                    colour[c]
-                        * power(colour[c], term.powers[Power::Reflectance as usize])
+                    color[c]
+                        * power(color[c], term.powers[Power::Reflectance as usize])
                         * scale[c]
                         * power(scale[c], term.powers[Power::Scale as usize])
                         * self.powers(term, sample, c)
@@ -339,7 +339,7 @@ impl Formula {
         };
         let raised = self.times * n + self.plus;
         let normal = if self.follows { raised } else { n };
-        (normal + self.normalisation_plus) / (2.0 * PI) * self.cos_lobe(sample).powf(raised)
+        (normal + self.normalization_plus) / (2.0 * PI) * self.cos_lobe(sample).powf(raised)
     }
 
     fn scale_of(&self, diffuse: &[f64; 3], specular: &[f64; 3]) -> [f64; 3] {

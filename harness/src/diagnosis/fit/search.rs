@@ -303,7 +303,7 @@ impl<'a> Search<'a> {
         let channels = self.estimate(base, scope, &[], Intercept::Channels, share);
         all.extend(factor.into_iter().chain(channels));
         if scope == Scope::Specular {
-            all.extend(normalisations(base));
+            all.extend(normalizations(base));
         }
         all
     }
@@ -323,7 +323,7 @@ impl<'a> Search<'a> {
             all.extend(estimate(base, &[first], Intercept::Channels));
         }
         if scope == Scope::Specular {
-            for base in normalisations(base) {
+            for base in normalizations(base) {
                 for &feature in &features {
                     all.extend(estimate(&base, &[feature], Intercept::None));
                 }
@@ -439,10 +439,10 @@ impl<'a> Search<'a> {
 }
 
 /// (n + k) / (2 pi) with other k.
-fn normalisations(base: &Formula) -> impl Iterator<Item = Formula> {
+fn normalizations(base: &Formula) -> impl Iterator<Item = Formula> {
     let base = *base;
     let others = [0.0, 1.0, 3.0, 4.0, 5.0, 6.0, 8.0, -1.0, -2.0];
-    others.into_iter().map(move |normalisation_plus| Formula { normalisation_plus, ..base })
+    others.into_iter().map(move |normalization_plus| Formula { normalization_plus, ..base })
 }
 
 /// The energy scale that is yet to be applied.

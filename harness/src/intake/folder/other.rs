@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use super::{Found, Id};
 
 /// A folder.
-pub(super) struct Folder(PathBuf);
+pub(super) struct OpenFolder(PathBuf);
 
-impl Folder {
+impl OpenFolder {
     pub(super) fn open(path: &Path) -> io::Result<Self> {
         path.read_dir()?;
         Ok(Self(path.to_owned()))

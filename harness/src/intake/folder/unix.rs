@@ -19,9 +19,9 @@ const FLAGS: OFlag =
     OFlag::O_NOFOLLOW.union(OFlag::O_NONBLOCK).union(OFlag::O_CLOEXEC).union(OFlag::O_NOCTTY);
 
 /// An open folder.
-pub(super) struct Folder(Dir);
+pub(super) struct OpenFolder(Dir);
 
-impl Folder {
+impl OpenFolder {
     /// Opens a folder, unless its path ends in a link.
     pub(super) fn open(path: &Path) -> io::Result<Self> {
         Ok(Self(Dir::open(path, FLAGS | OFlag::O_DIRECTORY, Mode::empty())?))

@@ -201,7 +201,7 @@ fn conditions(html: &mut Html, report: &BatchReport) {
         let original = |(name, original): &(String, String)| format!("{name} ({original})");
         let scenes: Vec<String> = held_back.scenes.iter().map(original).collect();
         html.raw("<p>Held-back scenes: ").text(&scenes.join(", ")).raw("; seed ");
-        html.show(held_back.seed).raw(", <code>--perturb ").show(held_back.seed);
+        html.show(held_back.seed).raw(", <code>--held-back ").show(held_back.seed);
         html.raw(
             "</code> reproduces them. Give students nothing but the folders of their submissions: ",
         );

@@ -4,12 +4,12 @@
 mod batch;
 mod checks;
 mod curve;
-mod likeness;
 mod lobe;
 mod lost;
 mod markup;
 mod overview;
 mod pictures;
+mod similarity;
 mod submission;
 mod superseded;
 #[cfg(test)]
@@ -20,8 +20,8 @@ use base64::Engine as _;
 use sha2::Digest as _;
 
 pub use batch::batch;
-pub use likeness::{Alike, AlikePage, LIKENESS, write_alike};
 pub use overview::is_read_by_class;
+pub use similarity::{SIMILARITY, SimilarPair, SimilarityPage, write_similarity};
 pub use submission::submission;
 pub use superseded::mark_superseded;
 pub use viewer::viewer;

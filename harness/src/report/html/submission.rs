@@ -37,7 +37,7 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
     let mut html = begin(&format!("{name} - {}", report.title));
     html.raw("<header class=\"top\">\n");
     if reader == Reader::Instructor {
-        neighbours(&mut html, report, own);
+        neighbors(&mut html, report, own);
     }
     html.raw("<p class=\"course\">").text(&report.title);
     html.raw("</p>\n<h1>").text(name).raw("</h1>\n<p class=\"who\">");
@@ -102,7 +102,7 @@ pub fn submission(report: &BatchReport, entry: &SubmissionReport, reader: Reader
 const ROOT: &str = "../..";
 
 /// Links to all submissions, the one before and the one after.
-fn neighbours(html: &mut Html, report: &BatchReport, own: &SubmissionReport) {
+fn neighbors(html: &mut Html, report: &BatchReport, own: &SubmissionReport) {
     html.raw("<nav><a href=\"").raw(ROOT).raw("/").raw(HTML_FILE).raw("\">All submissions</a>");
     let place = report.entries.iter().position(|entry| entry.record.slug == own.record.slug);
     let at = |place: Option<usize>| place.and_then(|place| report.entries.get(place));

@@ -17,7 +17,7 @@ fn pages_say_what_matters() {
         "not graded under the same conditions",
         "<td class=\"findings\">1 warning</td>",
         "<a href=\"./instructor/a2_ada/report.html\">Ada",
-        "--perturb 18446744073709551557",
+        "--held-back 18446744073709551557",
     ] {
         assert!(page.contains(words), "{words:?} is not in the batch's page");
     }

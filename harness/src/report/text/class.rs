@@ -2,7 +2,7 @@
 
 use super::super::BatchReport;
 use super::page::{Page, Style};
-use crate::class::{Class, INCOMPARABLE, recognised};
+use crate::class::{Class, INCOMPARABLE, recognized};
 
 /// Number of names that are listed of a kind.
 const NAMED: usize = 30;
@@ -10,7 +10,7 @@ const NAMED: usize = 30;
 /// The lines below the table.
 pub(super) fn class(page: &mut Page, report: &BatchReport, class: &Class) {
     let labels = report.entries.iter().filter_map(|entry| entry.standing.label.as_ref());
-    if let Some(text) = recognised(class.kind, labels) {
+    if let Some(text) = recognized(class.kind, labels) {
         page.wrapped(&[], Style::Plain, &text);
     }
     let aside = report.entries.iter().filter(|entry| !entry.standing.set_aside.is_empty());

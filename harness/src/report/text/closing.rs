@@ -36,7 +36,7 @@ pub fn closing(
     look: Look,
 ) -> String {
     let grade = &entry.grade;
-    let mut page = Page::new(look.width, look.colours);
+    let mut page = Page::new(look.width, look.colors);
     page.gap();
     page.wrapped(&[(Style::Faint, "report: ")], Style::Plain, closing.page);
     let changes = changes(&grade.parts, closing.last);
@@ -169,7 +169,7 @@ mod tests {
             last: &last,
             asked,
         };
-        let look = Look { width: 400, colours: false };
+        let look = Look { width: 400, colors: false };
         let text = closing(report, &report.entries[index], &made_of, look);
         text.lines().map(str::to_owned).collect()
     }

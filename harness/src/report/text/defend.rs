@@ -20,7 +20,7 @@ pub fn defend(
         let parts: Vec<&str> = entry.grade.parts.iter().map(|own| own.id.as_str()).collect();
         format!("there is no part {part}; expected one of {}", parts.join(", "))
     })?;
-    let mut page = Page::new(look.width, look.colours);
+    let mut page = Page::new(look.width, look.colors);
     let out_of = of_points(&graded.out_of.to_string());
     let title = format!("{part} {}: {} of {out_of}", graded.title, of_part(graded));
     page.line(&[(Style::Heading, &title)]);
@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn the_evidence_stands_with_its_bounds_and_costs() {
         let report = sample::report();
-        let look = Look { width: 100, colours: false };
+        let look = Look { width: 100, colors: false };
         let text = defend(&report, &report.entries[1], "1.3", look).unwrap();
         assert!(
             text.starts_with("1.3 Unshadowed direct illumination: 9.85 of 20 points\n"),

@@ -20,7 +20,7 @@ const VERDICT_WIDTH: usize = 17;
 /// compiler messages. With `verbose`, also every check with value, bound and verdict, and the conditions of grading.
 pub fn detail(report: &BatchReport, entry: &SubmissionReport, look: Look, verbose: bool) -> String {
     let SubmissionReport { record, grade, .. } = entry;
-    let mut page = Page::new(look.width, look.colours);
+    let mut page = Page::new(look.width, look.colors);
     page.wrapped(&[], Style::Heading, &report.title);
     page.wrapped(&[(Style::Plain, "checked  ")], Style::Plain, &record.name);
     let student = entry.student();
@@ -318,7 +318,7 @@ mod tests {
     #[test]
     fn known_answer() {
         let report = sample::report();
-        let look = Look { width: 100, colours: false };
+        let look = Look { width: 100, colors: false };
         insta::assert_snapshot!("detail", detail(&report, &report.entries[1], look, true));
         insta::assert_snapshot!("detail_plain", detail(&report, &report.entries[1], look, false));
     }
@@ -326,7 +326,7 @@ mod tests {
     #[test]
     fn what_does_not_build_shows_the_compiler() {
         let report = sample::report();
-        let text = detail(&report, &report.entries[2], Look { width: 80, colours: false }, true);
+        let text = detail(&report, &report.entries[2], Look { width: 80, colors: false }, true);
         for line in [
             "total    0/75",
             "remark   the source does not build; the images alone earn 11.44 points once the",
@@ -345,7 +345,7 @@ mod tests {
         let caret = format!("   │ {}^ expected `;`", " ".repeat(100));
         report.entries[2].record.diagnostics = format!("{line}\n{caret}");
         for width in [20, 80] {
-            let text = detail(&report, &report.entries[2], Look { width, colours: false }, true);
+            let text = detail(&report, &report.entries[2], Look { width, colors: false }, true);
             assert!(text.contains(&format!("\n  {line}\n  {caret}\n")), "{text}");
         }
     }
@@ -368,7 +368,7 @@ mod tests {
         }
         let said = harmless_lines(&entry.record.diagnostics, DIAGNOSTIC_LINES);
         for width in [1, 7, 20, 33, 80, 200] {
-            let look = Look { width, colours: false };
+            let look = Look { width, colors: false };
             let text = detail(&report, &report.entries[1], look, true);
             assert!(!text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}')));
             // What a compiler says is shown as it is.
@@ -380,9 +380,9 @@ mod tests {
     }
 
     #[test]
-    fn colours_do_not_change_the_words() {
+    fn colors_do_not_change_the_words() {
         let report = sample::report();
-        let look = |colours| Look { width: 80, colours };
+        let look = |colors| Look { width: 80, colors };
         let mut text = detail(&report, &report.entries[1], look(true), true);
         assert!(text.contains("\u{1b}[31m"));
         for code in ["0", "1", "2", "31", "32", "33"] {

@@ -9,7 +9,7 @@ use crate::rubric::{Part, Rules};
 /// # Errors
 /// When nothing has the name; the message names what is most alike.
 pub fn explain(rules: &Rules, name: &str, look: Look) -> Result<String, String> {
-    let mut page = Page::new(look.width, look.colours);
+    let mut page = Page::new(look.width, look.colors);
     let name = &*name.trim().to_lowercase();
     // `shadow_rays` is near enough.
     let plain = |name: &str| name.replace('_', ".");
@@ -61,7 +61,7 @@ fn not_found(rules: &Rules, name: &str, errors: [String; 2]) -> String {
 
 /// All checks, a line each.
 pub fn explain_all(rules: &Rules, look: Look) -> String {
-    let mut page = Page::new(look.width, look.colours);
+    let mut page = Page::new(look.width, look.colors);
     page.wrapped(
         &[],
         Style::Plain,
@@ -136,7 +136,7 @@ mod tests {
         Assignment::load(root).unwrap().rules
     }
 
-    const LOOK: Look = Look { width: 80, colours: false };
+    const LOOK: Look = Look { width: 80, colors: false };
 
     #[test]
     fn checks_rules_and_parts_are_explained_and_a_slip_is_told() {

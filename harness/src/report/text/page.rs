@@ -47,21 +47,21 @@ pub struct Look {
     /// Terminal columns; no line is wider.
     pub width: usize,
     /// Whether ANSI colors are allowed.
-    pub colours: bool,
+    pub colors: bool,
 }
 
 /// Text in the making.
 pub(super) struct Page {
     /// No line is wider, in terminal columns, but what is quoted.
     pub(super) width: usize,
-    colours: bool,
+    colors: bool,
     out: String,
 }
 
 impl Page {
     /// An empty page; `width` in terminal columns.
-    pub(super) fn new(width: usize, colours: bool) -> Self {
-        Self { width: width.max(1), colours, out: String::new() }
+    pub(super) fn new(width: usize, colors: bool) -> Self {
+        Self { width: width.max(1), colors, out: String::new() }
     }
 
     /// The text, each line ending with a newline.
@@ -121,7 +121,7 @@ impl Page {
     }
 
     fn styled(&mut self, style: Style, text: &str) {
-        match style.code().filter(|_| self.colours && !text.trim().is_empty()) {
+        match style.code().filter(|_| self.colors && !text.trim().is_empty()) {
             Some(code) => {
                 self.out.push_str("\x1b[");
                 self.out.push_str(code);
@@ -158,9 +158,9 @@ mod tests {
     }
 
     #[test]
-    fn colours_only_when_asked() {
-        for (colours, expected) in [(false, "a bc\n"), (true, "a \u{1b}[31mbc\u{1b}[0m\n")] {
-            let mut page = Page::new(80, colours);
+    fn colors_only_when_asked() {
+        for (colors, expected) in [(false, "a bc\n"), (true, "a \u{1b}[31mbc\u{1b}[0m\n")] {
+            let mut page = Page::new(80, colors);
             page.line(&[(Style::Plain, "a "), (Style::Bad, "bc"), (Style::Good, "  ")]);
             assert_eq!(page.finish(), expected);
         }

@@ -13,16 +13,16 @@ const GAP: &str = "  ";
 const NAME_MIN: usize = 8;
 
 /// A table with one row for each submission: name, student, points per part, total, and the numbers
-/// of the remarks that stand below it. `width` in terminal columns; no line is wider. `colours`
+/// of the remarks that stand below it. `width` in terminal columns; no line is wider. `colors`
 /// allows ANSI colors.
 ///
 /// # Errors
 /// When there is no submission.
-pub fn table(report: &BatchReport, width: usize, colours: bool) -> Result<String, ReportError> {
+pub fn table(report: &BatchReport, width: usize, colors: bool) -> Result<String, ReportError> {
     if report.entries.is_empty() {
         return Err(ReportError::Empty);
     }
-    let mut page = Page::new(width, colours);
+    let mut page = Page::new(width, colors);
     page.wrapped(&[], Style::Heading, &format!("{}, due {}", report.title, due(&report.due)));
     page.gap();
     let remarks = remarks(report);

@@ -121,9 +121,9 @@ pub fn near_light() -> Scene {
 /// Two plates and a sphere over a floor that is diffuse on the left and Phong on the right. Nothing
 /// touches and nothing grazes, so that no bias is put to the test.
 pub fn both_shadows() -> Scene {
-    let plate = |centre: DVec3| {
+    let plate = |center: DVec3| {
         let half = dvec3(0.42, 0.03, 0.32);
-        cuboid(centre - half, centre + half)
+        cuboid(center - half, center + half)
     };
     let mut scene = probe("both_shadows", dvec3(0.0, 4.6, 6.4), dvec3(0.0, 0.2, -0.1), 22.0)
         .with("floor", Material::diffuse([0.6, 0.58, 0.55]), floor(0.0, [-1.9, -1.5], [0.0, 1.4]))

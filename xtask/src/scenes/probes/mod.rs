@@ -3,7 +3,7 @@
 mod geometry;
 mod materials;
 
-use super::exporting::File;
+use super::exporting::ExportedFile;
 use super::mesh::Mesh;
 use super::scene::{Camera, Scene};
 use glam::DVec3;
@@ -104,7 +104,7 @@ pub fn all() -> Vec<Scene> {
 }
 
 /// The list of the probes, for people.
-pub fn readme() -> File {
+pub fn readme() -> ExportedFile {
     let mut text = String::from(
         "# Probe scenes\n\n\
          `xtask scenes` makes these scenes and this page from `xtask/src/scenes/probes`. Each shows faults that the four\n\
@@ -118,7 +118,7 @@ pub fn readme() -> File {
         let (name, [x, y, z]) = (&scene.name, light.to_array());
         text += &item(&format!("**`{name}`** ({width}x{height}, light at {x}, {y}, {z}). {shows}"));
     }
-    File { path: "probes/README.md".to_string(), bytes: text.into_bytes() }
+    ExportedFile { path: "probes/README.md".to_string(), bytes: text.into_bytes() }
 }
 
 /// An item of a Markdown list, in lines of at most 120 columns.

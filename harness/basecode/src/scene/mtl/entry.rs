@@ -101,7 +101,7 @@ impl Entry {
         let none = || Ok(Effect::None(format!("{keyword} is ignored")));
         match keyword.to_ascii_lowercase().as_str() {
             "kd" | "ks" => {
-                let color = colour(keyword, rest).map_err(wrong)?;
+                let color = color(keyword, rest).map_err(wrong)?;
                 let which = usize::from(keyword.eq_ignore_ascii_case("ks"));
                 self.colors[which] = Some((at.line, color));
                 if color.max_element() > MAX_REFLECTANCE {
@@ -111,7 +111,7 @@ impl Entry {
                     )));
                 }
             }
-            "ke" => self.emission = colour(keyword, rest).map_err(wrong)?,
+            "ke" => self.emission = color(keyword, rest).map_err(wrong)?,
             "ns" => {
                 let word = words(rest).next().unwrap_or_default();
                 let value =
@@ -217,7 +217,7 @@ fn words(rest: &str) -> impl Iterator<Item = &str> {
 }
 
 /// Three numbers, or one that counts for all.
-fn colour(keyword: &str, rest: &str) -> std::result::Result<Vec3, String> {
+fn color(keyword: &str, rest: &str) -> std::result::Result<Vec3, String> {
     let mut values = Vec::with_capacity(3);
     for word in words(rest).take(3) {
         if ["spectral", "xyz"].contains(&word) {
@@ -227,7 +227,7 @@ fn colour(keyword: &str, rest: &str) -> std::result::Result<Vec3, String> {
         values.push(word.parse::<f32>().map_err(|_| number())?);
     }
     let value = match values[..] {
-        [grey] => Vec3::splat(grey),
+        [gray] => Vec3::splat(gray),
         [r, g, b] => Vec3::new(r, g, b),
         _ => {
             let found = values.len();

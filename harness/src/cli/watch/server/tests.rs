@@ -11,7 +11,7 @@ fn only_the_page_itself_may_ask() {
     assert_eq!(ask("/abcdef/", own, None), Route::Page);
     assert_eq!(ask("/abcdef/frame?path=offline", own, None), Route::Nothing(400));
     let frame = "path=offline&scene=a&shadows=1&spp=4&viewer=1&camera=1,2,3,4,5,6,0,1,0,30";
-    let question = Question::parse(frame).unwrap();
+    let question = FrameQuestion::parse(frame).unwrap();
     assert_eq!(ask(&format!("/abcdef/frame?{frame}"), own, None), Route::Frame(question));
     assert_eq!(ask("/abcdef/events?x", own, Some("http://127.0.0.1:4000")), Route::Events);
     let file = |path: &str| Route::File(path.into());
@@ -104,9 +104,9 @@ fn a_browser_gets_the_report_and_nothing_else() {
             seen.push_str(&String::from_utf8_lossy(&bytes[..read]));
         }
     };
-    board.show(Stage::Running, "compiling\u{1b}[2J");
+    board.show(CheckState::Running, "compiling\u{1b}[2J");
     until("\"message\":\"compiling\\\\u{1b}[2J\"");
-    board.report(Stage::Lost, "3 of 5 points", "");
+    board.report(CheckState::Lost, "3 of 5 points", "");
     until("\"stage\":\"lost\",\"message\":\"compiling");
     until("\"verdict\":\"3 of 5 points\"");
     until("\"reports\":1");

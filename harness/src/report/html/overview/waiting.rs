@@ -7,8 +7,8 @@ use crate::class::{Class, INCOMPARABLE};
 use crate::columns::{self, count};
 use crate::evidence::{Check, CheckId};
 use crate::grading::{Shared, SharedFiles};
-use crate::report::html::likeness::LIKENESS;
 use crate::report::html::markup::Html;
+use crate::report::html::similarity::SIMILARITY;
 use crate::report::number::{is_failure, is_range, range};
 use crate::report::{BatchReport, HTML_FILE, INSTRUCTOR, SubmissionReport, is_private, is_unread};
 
@@ -54,8 +54,8 @@ pub fn waiting(html: &mut Html, report: &BatchReport) {
             .text(&count(found.len(), "submission"))
             .raw(": ");
         html.text(kind).raw("</summary>\n");
-        if kind == SHARE && report.has_alike {
-            html.raw("<p><a href=\"").address(&format!("{INSTRUCTOR}/{LIKENESS}/{HTML_FILE}"));
+        if kind == SHARE && report.has_similarity {
+            html.raw("<p><a href=\"").address(&format!("{INSTRUCTOR}/{SIMILARITY}/{HTML_FILE}"));
             html.raw("\">Sources side by side</a></p>\n");
         }
         if kind == SHARE {
@@ -120,7 +120,7 @@ fn kinds<'a>(report: &'a BatchReport, shared: &[SharedFiles]) -> Vec<Waiting<'a>
         let checks = entry.record.evidence.checks.iter();
         let told: Vec<&Check> = checks.filter(|check| !check.private.is_empty()).collect();
         let grouped = share_files.contains(entry.record.slug.as_str());
-        let own = told.iter().filter(|own| !grouped || own.id != CheckId::SubmissionLikeness);
+        let own = told.iter().filter(|own| !grouped || own.id != CheckId::SubmissionSimilarity);
         let words: Vec<&str> = own.map(|check| check.private.as_str()).collect();
         (!told.is_empty() && !entry.standing.is_confirmed()).then(|| words.join("; "))
     });

@@ -41,11 +41,11 @@ fn texture_options_are_applied_or_refused_by_name() {
 }
 
 #[test]
-fn colours_are_checked() {
-    assert_eq!(colour("Kd", "0.5"), Ok(Vec3::splat(0.5)));
-    assert_eq!(colour("Kd", "1 2 3 # red"), Ok(Vec3::new(1.0, 2.0, 3.0)));
+fn colors_are_checked() {
+    assert_eq!(color("Kd", "0.5"), Ok(Vec3::splat(0.5)));
+    assert_eq!(color("Kd", "1 2 3 # red"), Ok(Vec3::new(1.0, 2.0, 3.0)));
     for wrong in ["", "1 2", "-1 0 0", "nan 0 0", "0 inf 0", "1e39 0 0", "a b c", "spectral f.rfl"]
     {
-        assert!(colour("Kd", wrong).is_err_and(|error| error.starts_with("Kd ")), "{wrong}");
+        assert!(color("Kd", wrong).is_err_and(|error| error.starts_with("Kd ")), "{wrong}");
     }
 }

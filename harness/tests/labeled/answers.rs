@@ -10,7 +10,7 @@ use umbra::plugin::{Witness, WitnessQuery};
 
 /// A mistake and what it is called: its changes, when `label` is set, and nothing otherwise.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Labelled {
+pub struct Labeled {
     pub name: String,
     /// The part that it belongs to, which says what is asked.
     pub part: String,
@@ -29,7 +29,7 @@ pub struct Change {
 }
 
 /// All of them.
-pub fn labelled() -> Vec<Labelled> {
+pub fn labeled() -> Vec<Labeled> {
     serde_json::from_str(include_str!("mistakes.json")).unwrap()
 }
 
@@ -107,7 +107,7 @@ impl Answers {
     }
 }
 
-impl Labelled {
+impl Labeled {
     /// What a renderer answers that has this mistake and no other.
     pub fn answers(&self) -> Answers {
         let shading = |probes: Vec<Probe>| {
@@ -190,10 +190,10 @@ impl Labelled {
         let scale = self.scale(&probe);
         let [diffuse, specular] = ["diffuse", "specular"].map(|term| {
             let times = |c: usize| {
-                let colour = if term == "diffuse" { probe.kd } else { probe.ks };
-                let colour = colour[c].powf(self.number(term, "reflectance", 1.0));
+                let color = if term == "diffuse" { probe.kd } else { probe.ks };
+                let color = color[c].powf(self.number(term, "reflectance", 1.0));
                 let scale = scale[c].powf(self.number(term, "scale", 1.0));
-                colour * scale * self.three(term, "channels", [1.0; 3])[c] * powers(term)
+                color * scale * self.three(term, "channels", [1.0; 3])[c] * powers(term)
             };
             std::array::from_fn::<f64, 3, _>(times)
         });

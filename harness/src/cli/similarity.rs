@@ -1,4 +1,4 @@
-//! `umbra likeness`: submissions whose sources are alike, side by side. Umbra finds files that are equal apart from
+//! `umbra similarity`: submissions whose sources are alike, side by side. Umbra finds files that are equal apart from
 //! comments and white space. JPlag finds renamed or moved code, in a folder that is written for it.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -7,20 +7,20 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 
-use super::assemble::{self, Kept};
+use super::assemble::{self, KeptReport};
 use super::class;
 use super::context::{Context, INTERRUPTED};
 use super::outputs::shell_path;
 use super::report_folder::ReportFolder;
-use crate::class::jplag::{self, Match, Pair, Place};
-use crate::class::{Wanted, collect};
+use crate::class::jplag::{self, Pair, PassagePlace, SharedPassage};
+use crate::class::{CollectOptions, collect};
 use crate::columns::count;
 use crate::files::{files_below, write_whole};
-use crate::grading::{ALIKE, Mode, Shared};
+use crate::grading::{Mode, SIMILAR, Shared};
 use crate::harmless::harmless;
-use crate::report::{self, Alike, AlikePage, BatchReport};
+use crate::report::{self, BatchReport, SimilarPair, SimilarityPage};
 
-/// A folder of sources for each submission, in [`report::LIKENESS`].
+/// A folder of sources for each submission, in [`report::SIMILARITY`].
 const SUBMISSIONS: &str = "submissions";
 /// The file with the digest of each submission whose sources were written, beside that folder.
 const DIGESTS: &str = "digests.json";
@@ -29,9 +29,9 @@ const TEMPLATE: &str = "template";
 /// Number of pairs that are shown, JPlag's and those with equal files each: further pairs tell nothing more.
 const SHOWN: usize = 100;
 
-/// Options of `umbra likeness`.
+/// Options of `umbra similarity`.
 #[derive(clap::Args)]
-pub struct LikenessArguments {
+pub struct SimilarityArguments {
     /// The result of JPlag; without one, sources are written for JPlag and pairs of equal files are shown
     result: Option<PathBuf>,
     #[command(flatten)]
@@ -39,10 +39,10 @@ pub struct LikenessArguments {
 }
 
 /// Writes sources for JPlag or takes its result, and shows all pairs.
-pub fn run(arguments: &LikenessArguments, root: Option<&Path>) -> anyhow::Result<u8> {
+pub fn run(arguments: &SimilarityArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let output = &arguments.report.path;
-    let kept = Kept::read(output)?;
-    let folder = output.join(report::INSTRUCTOR).join(report::LIKENESS);
+    let kept = KeptReport::read(output)?;
+    let folder = output.join(report::INSTRUCTOR).join(report::SIMILARITY);
     match &arguments.result {
         Some(result) => take(result, output, &folder)?,
         None => write_sources(&kept, output, root, &folder)?,
@@ -61,7 +61,7 @@ fn take(result: &Path, output: &Path, folder: &Path) -> anyhow::Result<()> {
     let known = submissions(folder)?;
     ensure!(
         !known.is_empty(),
-        "no sources were written for JPlag yet; hint: run `umbra likeness --report {}` first",
+        "no sources were written for JPlag yet; hint: run `umbra similarity --report {}` first",
         shell_path(output)
     );
     let whose = pairs.iter().flat_map(|pair| &pair.who);
@@ -127,7 +127,7 @@ fn submissions(folder: &Path) -> anyhow::Result<BTreeSet<String>> {
 /// Writes the sources of all submissions, and of the template, as JPlag reads them. What JPlag found earlier holds for
 /// those that did not change.
 fn write_sources(
-    kept: &Kept,
+    kept: &KeptReport,
     output: &Path,
     root: Option<&Path>,
     folder: &Path,
@@ -135,7 +135,8 @@ fn write_sources(
     let context = Context::new(root)?;
     let scratch = tempfile::tempdir_in(&context.supervisor.scratch)?;
     let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);
-    let wanted = Wanted { tree, limits, from: None, output: Some(output), scratch: scratch.path() };
+    let wanted =
+        CollectOptions { tree, limits, from: None, output: Some(output), scratch: scratch.path() };
     let there: Vec<PathBuf> = kept.paths().iter().filter(|path| path.exists()).cloned().collect();
     let collected = collect(&there, &wanted)?;
     let sources = class::sources(Mode::Grade, &collected.sources, output, &kept.names());
@@ -188,7 +189,7 @@ fn write_sources(
     println!(
         "{}: the sources of {} for JPlag, which finds what was renamed or moved about:\n  \
          java -jar jplag.jar -l rust -bc {} -r {} {}\n  \
-         umbra likeness {} --report {}\n(JPlag before version 6 writes a .zip)",
+         umbra similarity {} --report {}\n(JPlag before version 6 writes a .zip)",
         folder.display(),
         count(submissions(folder)?.len(), "submission"),
         shell_path(&folder.join(TEMPLATE)),
@@ -229,7 +230,7 @@ fn copy_sources(from: &Path, to: &Path) -> anyhow::Result<bool> {
 }
 
 /// Writes the pages, and says what is alike.
-fn show(kept: &Kept, settled: &BatchReport, folder: &Path) -> anyhow::Result<()> {
+fn show(kept: &KeptReport, settled: &BatchReport, folder: &Path) -> anyhow::Result<()> {
     let shared = Shared::of(kept.records());
     let mut near = jplag::kept(folder)?;
     let before = near.len();
@@ -237,7 +238,7 @@ fn show(kept: &Kept, settled: &BatchReport, folder: &Path) -> anyhow::Result<()>
         pair.holds(|slug| Some(kept.records().find(|own| own.slug == slug)?.digest.as_str()))
     });
     say_lost(before - near.len());
-    let mut all: BTreeMap<[String; 2], Alike> = BTreeMap::new();
+    let mut all: BTreeMap<[String; 2], SimilarPair> = BTreeMap::new();
     let name = |slug: &String| {
         // As all pages call them: by the class list, where it knows them.
         if let Some(entry) = settled.entries.iter().find(|own| own.record.slug == *slug) {
@@ -246,10 +247,10 @@ fn show(kept: &Kept, settled: &BatchReport, folder: &Path) -> anyhow::Result<()>
         let record = kept.records().find(|record| record.slug == *slug);
         record.map(|record| record.student.full_name()).unwrap_or_default()
     };
-    let alike = |who: &[String; 2]| Alike {
+    let alike = |who: &[String; 2]| SimilarPair {
         who: who.clone(),
         names: who.each_ref().map(name),
-        ..Alike::default()
+        ..SimilarPair::default()
     };
     let other = |pair: &&Pair| !shared.is_one_person(&pair.who);
     for pair in near.iter().filter(other).take(SHOWN) {
@@ -271,11 +272,11 @@ fn show(kept: &Kept, settled: &BatchReport, folder: &Path) -> anyhow::Result<()>
         for paths in same.paths {
             // A passage of JPlag's is smaller than its file.
             own.matches.retain(|passage| passage.places[0].path != paths[0]);
-            let places = paths.map(|path| Place { path, lines: [1, usize::MAX] });
-            own.matches.push(Match { places, tokens: 0 });
+            let places = paths.map(|path| PassagePlace { path, lines: [1, usize::MAX] });
+            own.matches.push(SharedPassage { places, tokens: 0 });
         }
     }
-    let mut all: Vec<Alike> = all.into_values().collect();
+    let mut all: Vec<SimilarPair> = all.into_values().collect();
     let submitted =
         kept.records().map(|record| (record.slug.clone(), record.name.clone())).collect();
     tell_attempts_apart(&mut all, &submitted);
@@ -285,18 +286,18 @@ fn show(kept: &Kept, settled: &BatchReport, folder: &Path) -> anyhow::Result<()>
         pair.texts = [first?, second?];
     }
     all.sort_by(|a, b| {
-        let key = |own: &Alike| (own.same_files, own.similarity.unwrap_or_default());
+        let key = |own: &SimilarPair| (own.same_files, own.similarity.unwrap_or_default());
         let (a, b) = (key(a), key(b));
         b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
     });
-    let page = AlikePage {
+    let page = SimilarityPage {
         title: kept.decided()?.assignment.title.clone(),
         compared: near.len(),
         median: near.get(near.len() / 2).map(|pair| pair.similarity),
         pairs: all,
     };
-    report::write_alike(folder, &page)?;
-    let clear = |own: &&Alike| own.same_files > 0 || own.similarity >= Some(ALIKE);
+    report::write_similarity(folder, &page)?;
+    let clear = |own: &&SimilarPair| own.same_files > 0 || own.similarity >= Some(SIMILAR);
     println!(
         "{}: {} side by side, {} of them to be looked at; it costs nobody anything",
         folder.join(report::HTML_FILE).display(),
@@ -307,7 +308,7 @@ fn show(kept: &Kept, settled: &BatchReport, folder: &Path) -> anyhow::Result<()>
 }
 
 /// Adds to names that several submissions have, such as attempts of one student, what each was submitted as.
-fn tell_attempts_apart(pairs: &mut [Alike], submitted: &BTreeMap<String, String>) {
+fn tell_attempts_apart(pairs: &mut [SimilarPair], submitted: &BTreeMap<String, String>) {
     let mut slugs: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for pair in pairs.iter() {
         for (name, slug) in pair.names.iter().zip(&pair.who) {
@@ -340,10 +341,10 @@ mod tests {
 
     #[test]
     fn attempts_of_one_student_are_told_apart() {
-        let pair = |who: [&str; 2], names: [&str; 2]| Alike {
+        let pair = |who: [&str; 2], names: [&str; 2]| SimilarPair {
             who: who.map(str::to_owned),
             names: names.map(str::to_owned),
-            ..Alike::default()
+            ..SimilarPair::default()
         };
         let mut pairs = [
             pair(["a1", "b"], ["Ann Lee", "Bo Ode"]),

@@ -1,10 +1,10 @@
 //! A hundred small mistakes that the catalogue lacks, each with its label: term, quantity, value.
 //! Their answers are computed here from closed forms; what is said of them is counted.
 
-#[path = "labelled/answers.rs"]
+#[path = "labeled/answers.rs"]
 mod answers;
 
-use answers::{Answers, Labelled, Probe, labelled};
+use answers::{Answers, Labeled, Probe, labeled};
 use basecode::{Camera, CameraConfig, Vec3};
 use umbra::diagnosis::fit::{
     Accuracy, Bound, Deviation, Fitted, Reflector, Sample, ShadowRay, Subject, Value, VertexSeen,
@@ -25,12 +25,12 @@ fn differ(a: &Answers, b: &Answers) -> bool {
 
 #[test]
 fn a_hundred_mistakes_have_labels() {
-    let all = labelled();
+    let all = labeled();
     assert_eq!(all.len(), 100);
     for (index, mistake) in all.iter().enumerate() {
         assert!(all[..index].iter().all(|other| other.name != mistake.name), "{}", mistake.name);
         assert!(!mistake.changes.is_empty(), "{}", mistake.name);
-        let right = Labelled { changes: Vec::new(), ..mistake.clone() };
+        let right = Labeled { changes: Vec::new(), ..mistake.clone() };
         assert!(differ(&mistake.answers(), &right.answers()), "{} changes nothing", mistake.name);
     }
     let none = all.iter().filter(|mistake| !mistake.label).count();
@@ -41,8 +41,8 @@ fn a_hundred_mistakes_have_labels() {
 fn right_answers_are_those_of_the_checks() {
     use umbra::evidence::bsdf::{BsdfKind, probes};
     for (part, kind) in [("1.1", BsdfKind::Diffuse), ("1.2", BsdfKind::Phong)] {
-        let first = labelled().into_iter().find(|mistake| mistake.part == part).unwrap();
-        let right = Labelled { changes: Vec::new(), ..first };
+        let first = labeled().into_iter().find(|mistake| mistake.part == part).unwrap();
+        let right = Labeled { changes: Vec::new(), ..first };
         for (probe, found) in probes(kind).iter().zip(right.answers().values()) {
             for (expected, found) in probe.expected.iter().zip(found) {
                 assert!((expected - found).abs() < 1e-6 * (1e-3 + expected), "{probe:?}: {found}");
@@ -52,7 +52,7 @@ fn right_answers_are_those_of_the_checks() {
 }
 
 /// The stored answer of a catalogue entry that a labelled mistake of a BSDF equals, if any.
-fn in_the_catalogue(stored: &Stored, mistake: &Labelled) -> Option<String> {
+fn in_the_catalogue(stored: &Stored, mistake: &Labeled) -> Option<String> {
     let view = match mistake.part.as_str() {
         "1.1" => View::named("diffuse")?,
         "1.2" => View::named("phong")?,
@@ -73,7 +73,7 @@ fn in_the_catalogue(stored: &Stored, mistake: &Labelled) -> Option<String> {
 fn none_is_a_catalogue_entry() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let stored = Stored::load(&root.join("expected/a2/mistakes")).unwrap();
-    let known: Vec<String> = labelled()
+    let known: Vec<String> = labeled()
         .iter()
         .filter_map(|mistake| {
             Some(format!("{}: {}", mistake.name, in_the_catalogue(&stored, mistake)?))
@@ -110,7 +110,7 @@ fn said_of_shading(part: &str, samples: &[Sample]) -> Option<Fitted> {
 }
 
 /// What is said of a mistake's answers.
-fn said(mistake: &Labelled) -> Option<Fitted> {
+fn said(mistake: &Labeled) -> Option<Fitted> {
     match mistake.answers() {
         Answers::Shading(all) => {
             let samples = all.iter().map(|(probe, found)| sample(probe, *found));
@@ -158,7 +158,7 @@ fn said(mistake: &Labelled) -> Option<Fitted> {
 }
 
 /// Whether what is said is the label.
-fn is_label(mistake: &Labelled, deviations: &[Deviation]) -> bool {
+fn is_label(mistake: &Labeled, deviations: &[Deviation]) -> bool {
     let near = |a: f64, b: f64| (a - b).abs() <= 0.01 * (1.0 + b.abs());
     let same = |deviation: &Deviation| {
         mistake.changes.iter().any(|change| {
@@ -181,7 +181,7 @@ fn is_label(mistake: &Labelled, deviations: &[Deviation]) -> bool {
 #[test]
 fn most_labels_are_found_and_no_other_is_said() {
     let (mut right, mut silent, mut wrong) = (0, Vec::new(), Vec::new());
-    for mistake in labelled() {
+    for mistake in labeled() {
         let begin = std::time::Instant::now();
         match said(&mistake) {
             None if mistake.label => silent.push(mistake.name),
@@ -201,10 +201,10 @@ fn most_labels_are_found_and_no_other_is_said() {
 
 #[test]
 fn of_two_at_once_nothing_else_is_said() {
-    let all = labelled();
+    let all = labeled();
     let (mut both, mut silent, mut wrong) = (0, 0, Vec::new());
     for part in ["1.1", "1.2", "1.3", "2.3", "2.4"] {
-        let own: Vec<&Labelled> =
+        let own: Vec<&Labeled> =
             all.iter().filter(|m| m.part == part && m.changes.len() == 1).collect();
         // Some of all pairs, always the same.
         let pairs =
@@ -221,7 +221,7 @@ fn of_two_at_once_nothing_else_is_said() {
             }
             let changes = vec![one.clone(), other.clone()];
             let name = format!("{} + {}", a.name, b.name);
-            let mistake = Labelled { name, changes, label: a.label && b.label, ..a.clone() };
+            let mistake = Labeled { name, changes, label: a.label && b.label, ..a.clone() };
             match said(&mistake) {
                 None => silent += 1,
                 Some(fitted) if is_label(&mistake, &fitted.deviations) => both += 1,
@@ -237,8 +237,8 @@ fn of_two_at_once_nothing_else_is_said() {
 #[test]
 fn a_missing_intensity_is_told_alone_and_beside_the_falloff() {
     for part in ["1.3", "2.3", "2.4"] {
-        let of_part = labelled().into_iter().find(|mistake| mistake.part == part).unwrap();
-        let right = Labelled { changes: Vec::new(), ..of_part };
+        let of_part = labeled().into_iter().find(|mistake| mistake.part == part).unwrap();
+        let right = Labeled { changes: Vec::new(), ..of_part };
         let Answers::Shading(all) = right.answers() else { panic!("{part} shades nothing") };
         for power in [0, 2] {
             let found = |probe: &Probe, found: &[f64; 3]| {

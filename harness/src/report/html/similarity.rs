@@ -6,15 +6,15 @@ use std::path::Path;
 use super::super::{HTML_FILE, ReportError, put};
 use super::begin;
 use super::markup::Html;
-use crate::class::jplag::Match;
+use crate::class::jplag::SharedPassage;
 use crate::columns::count;
 
 /// The folder of these pages, in the instructor's folder.
-pub const LIKENESS: &str = "likeness";
+pub const SIMILARITY: &str = "likeness";
 
 /// Two submissions that are alike.
 #[derive(Clone, Debug, Default)]
-pub struct Alike {
+pub struct SimilarPair {
     /// Their folders in the report.
     pub who: [String; 2],
     /// Their students, where they say so.
@@ -24,14 +24,14 @@ pub struct Alike {
     /// The share of tokens that match, as JPlag says.
     pub similarity: Option<f64>,
     /// Where they are alike.
-    pub matches: Vec<Match>,
+    pub matches: Vec<SharedPassage>,
     /// The sources of both, by path.
     pub texts: [BTreeMap<String, String>; 2],
 }
 
 /// All pairs of a class.
 #[derive(Clone, Debug, Default)]
-pub struct AlikePage {
+pub struct SimilarityPage {
     /// The assignment's title.
     pub title: String,
     /// Number of pairs that JPlag compared.
@@ -39,10 +39,10 @@ pub struct AlikePage {
     /// The share of tokens that match in a pair in the middle of them.
     pub median: Option<f64>,
     /// The pairs to be shown, the clearest first.
-    pub pairs: Vec<Alike>,
+    pub pairs: Vec<SimilarPair>,
 }
 
-impl Alike {
+impl SimilarPair {
     fn page(&self) -> String {
         format!("{}--{}.html", self.who[0], self.who[1])
     }
@@ -57,7 +57,7 @@ impl Alike {
 ///
 /// # Errors
 /// When a file cannot be written.
-pub fn write_alike(folder: &Path, page: &AlikePage) -> Result<(), ReportError> {
+pub fn write_similarity(folder: &Path, page: &SimilarityPage) -> Result<(), ReportError> {
     // Pages of pairs that are alike no more.
     let is_pair = |name: &str| name.contains("--") && name.ends_with(".html");
     for entry in folder.read_dir().into_iter().flatten().flatten() {
@@ -72,7 +72,7 @@ pub fn write_alike(folder: &Path, page: &AlikePage) -> Result<(), ReportError> {
     put(folder, HTML_FILE, list(page).as_bytes())
 }
 
-fn list(page: &AlikePage) -> String {
+fn list(page: &SimilarityPage) -> String {
     let mut html = begin(&format!("Alike - {}", page.title));
     html.raw("<header class=\"top\">\n<nav><a href=\"../../").raw(HTML_FILE);
     html.raw("\">The class</a></nav>\n<p class=\"course\">").text(&page.title);
@@ -88,7 +88,7 @@ fn list(page: &AlikePage) -> String {
         }
         None => {
             html.raw(
-                "Equal files only: JPlag has not been asked yet (<code>umbra likeness</code>).",
+                "Equal files only: JPlag has not been asked yet (<code>umbra similarity</code>).",
             );
         }
     }
@@ -122,7 +122,7 @@ fn list(page: &AlikePage) -> String {
     html.finish()
 }
 
-fn pair_page(page: &AlikePage, pair: &Alike) -> String {
+fn pair_page(page: &SimilarityPage, pair: &SimilarPair) -> String {
     let title = format!("{} and {}", pair.name(0), pair.name(1));
     let mut html = begin(&format!("{title} - {}", page.title));
     html.raw("<header class=\"top\">\n<nav><a href=\"")
@@ -164,7 +164,7 @@ fn pair_page(page: &AlikePage, pair: &Alike) -> String {
 }
 
 /// A file with its lines numbered and what the other has too marked.
-fn source(html: &mut Html, pair: &Alike, at: usize, path: &str) {
+fn source(html: &mut Html, pair: &SimilarPair, at: usize, path: &str) {
     let (own, other) = if at == 0 { ("a", "b") } else { ("b", "a") };
     let places = pair.matches.iter().map(|passage| &passage.places[at]).enumerate();
     let places: Vec<_> = places.filter(|(_, place)| place.path == path).collect();
