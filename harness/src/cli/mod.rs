@@ -431,6 +431,18 @@ mod tests {
     }
 
     #[test]
+    fn old_spellings_are_understood() {
+        for line in [
+            "umbra grade in --perturb off",      // an old spelling
+            "umbra gradescope-pack --perturb 7", // an old spelling
+            "umbra likeness --output out",       // an old spelling
+        ] {
+            let parsed = Arguments::try_parse_from(line.split(' '));
+            assert!(parsed.is_ok(), "{line}");
+        }
+    }
+
+    #[test]
     fn help_is_as_wide_as_the_terminal() {
         let text = "Usage: umbra\n\n          one two three four five six\n";
         let expected = "Usage: umbra\n\n          one two three four\n          five six\n";

@@ -160,7 +160,7 @@ impl SubmissionReport {
     /// The entry as its student may read it; `released` where that includes held-back scenes.
     pub fn for_student(&self, rules: &Rules, released: bool) -> Self {
         let mut entry = self.clone();
-        // A likeness or a copied image is for the instructor to look at, and no verdict. Ones that passed would tell
+        // Similar code or a copied image is for the instructor to look at, and no verdict. Ones that passed would tell
         // which did not.
         let private = |check: &Check| rules.is_private(check.id);
         let hidden: Vec<String> = entry
