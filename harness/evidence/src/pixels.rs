@@ -6,7 +6,7 @@ use renderer_api as api;
 
 use super::CheckId;
 use super::changes::shader_changes;
-use super::price::{self, Answers, Price, PriceClass};
+use super::price::{self, Answers, Price, PriceClass, SURFACES_MISSING};
 use super::shading::{ShadedPoint, Shading};
 use super::vertex::other_normals;
 use crate::expected::SurfacePoint;
@@ -176,9 +176,6 @@ pub fn left_by_slips(scene: &Scene, image: &Image, mask: &RegionMask) -> Vec<Lef
 
 /// Number of points that tell something of surfaces.
 const LEAST_SHOWN: usize = 10;
-
-/// The slip that some surfaces are not drawn: what is there is right.
-pub const SURFACES_MISSING: &str = "surfaces are missing";
 
 /// What an image shows of surfaces if some of them are not drawn.
 struct Missing {

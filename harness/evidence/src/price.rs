@@ -287,6 +287,8 @@ pub const LIGHT_AT_ORIGIN: &str = "the light stands at the origin";
 pub const ANOTHER_PLACE: &str = "another clip-space position";
 /// What a vertex stage shows is right without a translation: with one, it lies behind the far plane.
 pub const WRONG_W: &str = "the translation is lost: w of the position is not 1";
+/// The slip that some surfaces are not drawn: what is there is right.
+pub const SURFACES_MISSING: &str = "surfaces are missing";
 
 /// What the values of a changed renderer are multiplied by, channel by channel.
 struct Factors {

@@ -7,8 +7,7 @@ use std::collections::BTreeMap;
 
 use basecode::{Camera, Image, MaterialModel, Scene, Vec2, Vec3};
 
-use super::pixels::SURFACES_MISSING;
-use super::price::{self, Price, PriceClass};
+use super::price::{self, Price, PriceClass, SURFACES_MISSING};
 use super::stage_film::{OFFSET_PX, StageFilm, median_length};
 use super::{Check, CheckId, Measure, RuleId, Verdict};
 

@@ -26,9 +26,9 @@ impl Session<'_> {
     }
 }
 
-/// Settles the outcomes of `job` that report an environment failure. The requests are repeated while retries are left: a
-/// worker may have met somebody else's signal. If a renderer of ours then succeeds, the failure is the submission's own.
-/// Otherwise they stay ungraded.
+/// Settles the outcomes of `job` that report an environment failure. The requests are repeated while retries are left:
+/// a worker may have met somebody else's signal. If a renderer of ours then succeeds, the failure is the submission's
+/// own. Otherwise they stay ungraded.
 fn attribute_failures(session: &Session, job: &Job, outcomes: &mut [Outcome]) {
     loop {
         let blaming = |&index: &usize| is_environment_failure(&outcomes[index]);

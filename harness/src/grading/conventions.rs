@@ -256,8 +256,8 @@ impl<'a> Answers<'a> {
     }
 }
 
-/// Whether an integrator holds the BSDFs of a kind: of each scene, whether its radiance is what they answer, and whether
-/// any of that is light. Black beside black tells nothing.
+/// Whether an integrator holds the BSDFs of a kind: of each scene, whether its radiance is what they answer, and
+/// whether any of that is light. Black beside black tells nothing.
 fn is_held(scenes: &[(bool, bool)]) -> bool {
     scenes.iter().all(|(same, _)| *same) && scenes.iter().any(|(_, shines)| *shines)
 }

@@ -29,12 +29,14 @@ pub struct LineEdit {
 pub struct Reached {
     pub vertex: bool,
     pub fragment: bool,
+    /// Whether the line stands in a function that reads a texture.
+    pub with_texture: bool,
 }
 
 /// Number of edits that one worker draws with.
 pub const TRIED_AT_ONCE: usize = 32;
 /// So many edits are tried at most.
-const MOST: usize = 400;
+const MOST: usize = 200;
 /// Lines that are longer are not looked at, in bytes.
 const LONGEST_LINE: usize = 300;
 /// Functions of a text that are looked at, the first ones.
@@ -52,7 +54,8 @@ impl LineEdit {
     }
 }
 
-/// The edits of all WGSL of a source. A line that occurs more than once is edited wherever it stands.
+/// The edits of all WGSL of a source, of lines that a stage reaches. A line that occurs more than once is edited
+/// wherever it stands.
 pub fn all(stages: &Stages) -> Vec<LineEdit> {
     let (mut edits, mut seen) = (Vec::<LineEdit>::new(), BTreeSet::new());
     for (path, text) in stages.wgsl() {
@@ -62,7 +65,8 @@ pub fn all(stages: &Stages) -> Vec<LineEdit> {
             let from = whole.trim_end();
             let of = reached(&functions, begin);
             begin += whole.len();
-            if from.len() > LONGEST_LINE {
+            let is_dead = !of.vertex && !of.fragment;
+            if is_dead || from.len() > LONGEST_LINE {
                 continue;
             }
             for (name, to) in of_line(from) {
@@ -97,11 +101,12 @@ fn functions(text: &str) -> Vec<Function> {
         let Some(open) = text[at..].find('{').map(|open| at + open) else { continue };
         let Some(close) = closing(text, open) else { continue };
         let attributes = &text[before.min(at)..at];
+        let body = text[open..close].to_owned();
         let of = Reached {
             vertex: attributes.contains("@vertex"),
             fragment: attributes.contains("@fragment"),
+            with_texture: body.contains("texture"),
         };
-        let body = text[open..close].to_owned();
         found.push(Function { name, range: before.min(at)..close, of, body });
         if found.len() == FUNCTIONS {
             break;
@@ -128,7 +133,9 @@ fn functions(text: &str) -> Vec<Function> {
 /// Of what stands outside of functions, every stage may hang on it.
 fn reached(functions: &[Function], at: usize) -> Reached {
     let own = functions.iter().find(|function| function.range.contains(&at));
-    own.map_or(Reached { vertex: true, fragment: true }, |function| function.of)
+    own.map_or(Reached { vertex: true, fragment: true, with_texture: false }, |function| {
+        function.of
+    })
 }
 
 /// The end of what a bracket opens.

@@ -384,7 +384,7 @@ pub fn judge_bonus_where_seen(
     }
 }
 
-/// Prices the bonus as a slip if one word of one line of the submission's own WGSL mends it on every scene that it fails
+/// Prices the bonus as a slip if one word of one line of its own WGSL mends it on every scene that it fails
 /// on, where no known mistake explains it. `drawn` has the frames without shadows.
 pub fn price_bonus_by_edits(
     session: &Session,
@@ -430,7 +430,9 @@ pub fn price_bonus_by_edits(
         };
         frames.iter().zip(&outcomes).map(is_right).collect()
     };
-    let edits = line_edits::all(stages);
+    // Of all lines, those that draw a map or read it.
+    let may_mend = |edit: &LineEdit| edit.of.vertex || edit.of.with_texture;
+    let edits: Vec<LineEdit> = line_edits::all(stages).into_iter().filter(may_mend).collect();
     for edits in edits.chunks(line_edits::TRIED_AT_ONCE) {
         let right = edits.iter().zip(shows(first, edits)).filter(|(_, right)| *right);
         let everywhere = |edit: &LineEdit| {
@@ -613,7 +615,9 @@ mod tests {
     }
 
     /// The verdicts and errors of a scene's frame and bonus frame, where two scenes show this.
-    fn settled(seen: [(bool, Option<Option<(&str, f64)>>); 2]) -> Vec<(Verdict, f64)> {
+    type Price<'a> = Option<(&'a str, f64)>;
+
+    fn settled(seen: [(bool, Option<Price>); 2]) -> Vec<(Verdict, f64)> {
         let judged = || {
             let checks =
                 vec![check(CheckId::ImageRealtime, "", 1.0), check(CheckId::BonusImage, "", 1.0)];

@@ -92,7 +92,7 @@ impl Expect {
     fn holds(&self, outcome: &BuildOutcome) -> bool {
         match (self, outcome) {
             (Self::Refused(text), BuildOutcome::CompileError { errors }) => {
-                let here = |place: &umbra::build::Place| place.file.starts_with("src/");
+                let here = |place: &umbra::build::SourcePlace| place.file.starts_with("src/");
                 errors[0].message.contains(text) && errors[0].place.as_ref().is_some_and(here)
             }
             (Self::NoPlugin(text), BuildOutcome::CompileError { errors }) => {

@@ -242,8 +242,8 @@ fn residual_of_inverted(
     fraction(0..batch.lit) + fraction(batch.lit..batch.points.len())
 }
 
-/// How much of the light a color amounts to that nearly all dark rays show, or that those have which meet the same shape:
-/// the median. Nothing where there is none, or where it is that of lit points.
+/// How much of the light a color amounts to that nearly all dark rays show, or that those have which meet the same
+/// shape: the median. Nothing where there is none, or where it is that of lit points.
 fn color_of_shadows(
     batch: &RayBatch,
     bsdf: &dyn Fn(&SurfacePoint) -> [f64; 3],
