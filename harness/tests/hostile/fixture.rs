@@ -8,8 +8,7 @@ use umbra::build::{BuildOutcome, Recording, compile, default_limits};
 use umbra::process::ProcessLimits;
 use umbra::sandbox::{Isolation, Layers};
 use umbra::worker::{
-    Adapter, AdapterKind, CameraValue, Job, JobReport, Request, SceneRef, StageText,
-    Supervisor,
+    Adapter, AdapterKind, CameraValue, Job, JobReport, Request, SceneRef, StageText, Supervisor,
 };
 
 use crate::secrets::{Secret, leaks};
