@@ -59,14 +59,15 @@ impl LineEdit {
 pub fn all(stages: &Stages) -> Vec<LineEdit> {
     let (mut edits, mut seen) = (Vec::<LineEdit>::new(), BTreeSet::new());
     for (path, text) in stages.wgsl() {
-        let functions = functions(text);
+        let (functions, loops) = (functions(text), loops(text));
         let mut begin = 0;
         for (index, whole) in text.split_inclusive('\n').enumerate() {
             let from = whole.trim_end();
             let of = reached(&functions, begin);
+            let in_loop = loops.iter().any(|range| range.contains(&begin));
             begin += whole.len();
             let is_dead = !of.vertex && !of.fragment;
-            if is_dead || from.len() > LONGEST_LINE {
+            if is_dead || in_loop || from.len() > LONGEST_LINE {
                 continue;
             }
             for (name, to) in of_line(from) {
@@ -128,6 +129,17 @@ fn functions(text: &str) -> Vec<Function> {
         }
     }
     found
+}
+
+/// Where loops stand, from the line that they begin in: with one word changed they may never end.
+fn loops(text: &str) -> Vec<Range<usize>> {
+    let begins = ["for ", "for(", "while ", "while(", "loop ", "loop{"].into_iter();
+    let found = begins.flat_map(|word| text.match_indices(word)).filter_map(|(at, _)| {
+        let line = text[..at].rfind('\n').map_or(0, |end| end + 1);
+        let open = at + text[at..].find('{')?;
+        Some(line..closing(text, open)?)
+    });
+    found.collect()
 }
 
 /// Of what stands outside of functions, every stage may hang on it.
@@ -420,6 +432,17 @@ mod tests {
         assert_eq!(at("    return 1.0"), (false, true));
         assert_eq!(at("    return V"), (true, false));
         assert_eq!(at("    return F"), (false, true));
+    }
+
+    #[test]
+    fn lines_of_loops_and_of_what_nobody_calls_stay() {
+        let text = "@fragment fn f() -> F {\n    let a = step(b, c);\n    for (var i = 0; i < 4; i++) {\n        d += step(b, d);\n    }\n    \
+                    return F(step(d, a));\n}\nfn dead() -> f32 {\n    return step(a, c);\n}\n";
+        let mut stages = Stages::default();
+        stages.set_text("a.wgsl", text);
+        let lines: std::collections::BTreeSet<usize> =
+            all(&stages).into_iter().map(|edit| edit.line).collect();
+        assert_eq!(lines, [2, 6].into());
     }
 
     #[test]
