@@ -47,7 +47,7 @@ pub struct Arguments {
     #[arg(long)]
     full: bool,
     /// A fast selection, as CI runs it: some right renderers, an eighth of the mistakes at 4 spp, 60 pairs, 20 triples,
-    /// a third of the samples and of the held-back seeds. Each mistake runs only on the path that shows it
+    /// a sixth of the samples, two held-back seeds. Each mistake runs only on the path that shows it
     #[arg(long, conflicts_with = "full")]
     quick: bool,
     /// Grade mistakes alone and write what they cost to this file, nothing else
