@@ -311,6 +311,11 @@ fn judge_bonus_without(
     None
 }
 
+fn is_failed_bonus(check: &Check) -> bool {
+    let is_bonus = [CheckId::BonusImage, CheckId::BonusProbe].contains(&check.id);
+    is_bonus && check.verdict == Verdict::Fail
+}
+
 /// Judges the bonus once more where the host's change of what a pass is given mends all frames without shadows: by
 /// visibility, and what is right then is right.
 pub fn judge_bonus_under(
@@ -321,11 +326,7 @@ pub fn judge_bonus_under(
     tolerances: &Tolerances,
     checks: &mut [Check],
 ) {
-    let bonus = |check: &&mut Check| {
-        [CheckId::BonusImage, CheckId::BonusProbe].contains(&check.id)
-            && check.verdict == Verdict::Fail
-    };
-    for check in checks.iter_mut().filter(bonus) {
+    for check in checks.iter_mut().filter(|check| is_failed_bonus(check)) {
         let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
         let Some(with) = FrameRequest::bonus(case) else { continue };
         let drawn = |frame: FrameRequest| {
@@ -354,11 +355,7 @@ pub fn judge_bonus_where_seen(
     tolerances: &Tolerances,
     checks: &mut [Check],
 ) {
-    let bonus = |check: &&mut Check| {
-        [CheckId::BonusImage, CheckId::BonusProbe].contains(&check.id)
-            && check.verdict == Verdict::Fail
-    };
-    for check in checks.iter_mut().filter(bonus) {
+    for check in checks.iter_mut().filter(|check| is_failed_bonus(check)) {
         let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
         let frame = |kind| {
             let own = |drawn: &&Drawn| drawn.scene == check.scene && drawn.kind == kind;
@@ -396,8 +393,7 @@ pub fn price_bonus_by_edits(
     checks: &mut [Check],
 ) {
     let is_open = |check: &Check| {
-        [CheckId::BonusImage, CheckId::BonusProbe].contains(&check.id)
-            && check.verdict == Verdict::Fail
+        is_failed_bonus(check)
             && !price::are_slight([check])
             && !price::is_explained(check)
             // What fails although the picture is right draws no shadow map.
