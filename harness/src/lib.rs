@@ -30,6 +30,8 @@
 mod output;
 
 #[doc(hidden)]
+pub use diagnosis;
+#[doc(hidden)]
 pub use evidence::{self, expected};
 #[doc(hidden)]
 pub use imaging;
@@ -45,8 +47,6 @@ pub mod cli;
 mod columns;
 #[doc(hidden)]
 pub mod decode;
-#[doc(hidden)]
-pub mod diagnosis;
 #[doc(hidden)]
 pub mod files;
 #[doc(hidden)]

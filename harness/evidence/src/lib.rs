@@ -25,6 +25,8 @@ pub mod stages;
 pub mod submitted;
 pub mod varyings;
 pub mod vertex;
+mod witness;
 
 pub use check::{Check, Evidence, Lobe, Measure, Picture, Verdict};
 pub use registry::{CheckId, CheckInfo, CheckSources, IMAGE_RULES, RuleId};
+pub use witness::{Witness, WitnessQuery};

@@ -15,6 +15,7 @@ pub mod metrics;
 pub mod noise;
 pub mod origin;
 pub mod pictures;
+pub mod planes;
 pub mod ratio;
 pub mod reference;
 pub mod rows;

@@ -2,6 +2,7 @@
 
 use std::sync::LazyLock;
 
+use basecode::Image;
 use glam::Vec3;
 
 /// Encodes a linear value in [0, 1].
@@ -62,6 +63,22 @@ pub fn levels_apart(a: Vec3, b: Vec3) -> u32 {
     let levels = |p: Vec3| p.to_array().map(level);
     let pairs = levels(a).into_iter().zip(levels(b));
     pairs.map(|(a, b)| u32::from(a.abs_diff(b))).max().unwrap_or(0)
+}
+
+/// The levels of an image, channel by channel of each pixel, after its values were rounded to halves.
+pub fn levels_of_halves(image: &Image) -> Vec<u8> {
+    let channels = image.pixels.iter().flat_map(|pixel| pixel.to_array());
+    channels.map(|value| level(to_half(value))).collect()
+}
+
+/// The nearest value with the ten fraction bits of half precision, ties to even. What half
+/// precision cannot hold (below 6e-5, above 65,504) has level 0 or 255 either way.
+fn to_half(value: f32) -> f32 {
+    let bits = value.to_bits();
+    if !value.is_finite() {
+        return value;
+    }
+    f32::from_bits((bits + 0x0fff + ((bits >> 13) & 1)) & !0x1fff)
 }
 
 #[cfg(test)]

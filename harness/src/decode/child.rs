@@ -65,11 +65,7 @@ fn image(file: &Path, name: &str, out: &mut impl Write) -> io::Result<()> {
         Ok(image) => {
             let answer = DecodeAnswer::Image { width: image.width, height: image.height };
             write_answer(out, &answer, &mut |out| {
-                image
-                    .pixels
-                    .iter()
-                    .flat_map(|pixel| pixel.to_array())
-                    .try_for_each(|value| out.write_all(&value.to_ne_bytes()))
+                out.write_all(bytemuck::cast_slice(&image.pixels))
             })
         }
         Err(error) => {

@@ -390,13 +390,10 @@ fn refused_copy(submission: &Submission, how: &str) -> IntakeError {
 
 fn image(width: usize, height: usize, content: &[u8]) -> Option<Image> {
     let fits = width.max(height) <= MAX_SIDE && width * height <= MAX_PIXELS;
-    let (pixels, rest) = content.as_chunks::<12>();
-    if !fits || !rest.is_empty() || pixels.len() != width * height {
+    if !fits || content.len() != width * height * size_of::<Vec3>() {
         return None;
     }
-    let float = |bytes: &[u8]| f32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-    let pixel = |p: &[u8; 12]| Vec3::new(float(&p[..4]), float(&p[4..8]), float(&p[8..]));
-    Some(Image { width, height, pixels: pixels.iter().map(pixel).collect() })
+    Some(Image { width, height, pixels: bytemuck::pod_collect_to_vec(content) })
 }
 
 fn write_json(folder: &DecodeFolder, value: &impl Serialize) -> io::Result<()> {

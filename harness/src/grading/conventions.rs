@@ -17,8 +17,8 @@ use crate::evidence::physical::Probes;
 use crate::evidence::rays::{self, OwnValue, RayBatch, Unshadowed};
 use crate::evidence::shading::{ShadedPoint, Shading};
 use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict};
+use crate::evidence::{Witness, WitnessQuery};
 use crate::expected::SurfacePoint;
-use crate::plugin::{Witness, WitnessQuery};
 use crate::worker::{Outcome, Request};
 
 /// What was answered on a group of scenes.

@@ -6,11 +6,11 @@ use basecode::{Image, MaterialModel, Ray, Scene, Vec3};
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use crate::diagnosis::fit::{Bound, Reflector, Sample, ShadowRay, VertexSeen};
+use crate::evidence::Witness;
 use crate::evidence::bsdf::{BsdfKind, BsdfProbe};
 use crate::evidence::stages::BoundValue;
 use crate::expected::SurfacePoint;
 use crate::imaging::reference::RegionMask;
-use crate::plugin::Witness;
 
 /// Number of answers of each kind that are kept of a scene.
 const KEPT: usize = 300;

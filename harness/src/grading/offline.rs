@@ -10,6 +10,7 @@ use super::prepared_scene::{PreparedScene, Sampled};
 use super::questions::{Outcomes, Question, Questions};
 use super::session::{self, Session};
 use crate::diagnosis::{self, LoopSeen, Thumbnail, View};
+use crate::evidence::Witness;
 use crate::evidence::images::{self, ImageKind};
 use crate::evidence::loops;
 use crate::evidence::price::PriceClass;
@@ -18,7 +19,6 @@ use crate::evidence::shading::{ShadedPoint, Shading};
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::expected::{Expected, SurfacePoint};
 use crate::imaging::tolerances::Tolerances;
-use crate::plugin::Witness;
 use crate::worker::{BsdfQuery, BsdfSource, Outcome, RayQuery, Request, SceneRef};
 
 /// The witnesses that an integrator is judged under, with their names for reports.
@@ -447,22 +447,13 @@ fn plain_surfaces(case: &PreparedScene) -> Vec<(usize, BsdfQuery)> {
     asked.collect()
 }
 
-/// Camera rays with directions that nobody normalized: up to the plane at distance 1, or up to the far plane, as the
-/// inverse of the matrices gives it.
+/// Camera rays with directions that nobody normalized.
 fn longer_rays(camera: &Camera, rays: &[RayQuery]) -> [Vec<RayQuery>; 2] {
-    let to_clip = camera.projection() * camera.view();
-    let (back, axis) = (to_clip.inverse(), camera.view().row(2).truncate());
-    let near = |direction: Vec3| direction / direction.dot(-axis);
-    let far = |direction: Vec3| {
-        let on_film = to_clip.project_point3(camera.eye() + direction);
-        back.project_point3(on_film.with_z(1.0)) - camera.eye()
-    };
-    let changed = |change: &dyn Fn(Vec3) -> Vec3| {
-        let longer =
-            |ray: &RayQuery| RayQuery { direction: change(ray.direction.into()).into(), ..*ray };
-        rays.iter().map(longer).collect()
-    };
-    [changed(&near), changed(&far)]
+    let directions: Vec<Vec3> = rays.iter().map(|ray| ray.direction.into()).collect();
+    rays::longer_directions(camera, &directions).map(|directions| {
+        let pairs = rays.iter().zip(directions);
+        pairs.map(|(ray, direction)| RayQuery { direction: direction.into(), ..*ray }).collect()
+    })
 }
 
 /// Keeps for the diagnosis what witnesses say of light and visibility.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use basecode::{Image, Ray, Vec3};
+use basecode::{Image, Ray};
 use renderer_api as api;
 
 use crate::diagnosis::{Observations, Thumbnail, View};
@@ -176,7 +176,7 @@ pub fn colors(values: &[f32]) -> &[[f32; 3]] {
 
 /// An answer as an image.
 pub fn image(values: &[f32], width: u32, height: u32) -> Image {
-    let pixels = colors(values).iter().map(|&value| Vec3::from(value)).collect();
+    let pixels = bytemuck::pod_collect_to_vec(colors(values));
     Image { width: width as usize, height: height as usize, pixels }
 }
 

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use renderer_api as api;
 
 pub use scene::{LoadedScene, OfflineJob, OpenPass, RealtimeJob};
-pub use witness::{Witness, WitnessQuery, WitnessState};
+pub use witness::WitnessState;
 
 /// A plugin that passed [`api::Plugin::check`]. It is never unloaded: threads that it left behind
 /// may still run its code.

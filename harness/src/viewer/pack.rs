@@ -7,11 +7,11 @@ use std::path::Path;
 use base64::Engine as _;
 use basecode::Image;
 use flate2::{Compression, write::ZlibEncoder};
-use half::f16;
 use sha2::{Digest as _, Sha256};
 
 use super::{DATA_FOLDER, ImageFile, Samples, ViewedCase};
 use crate::files::{files_below, hex, write_whole};
+use crate::imaging::planes;
 use crate::imaging::reference::RegionMask;
 
 /// Level of zlib: higher ones take three times as long for 2 % of the bytes, since most bits are noise.
@@ -27,9 +27,7 @@ const DIGITS: usize = 20;
 /// # Errors
 /// When it cannot be written.
 pub fn write_image(folder: &Path, image: &Image) -> io::Result<ImageFile> {
-    let plane = |c: usize| image.pixels.iter().map(move |pixel| pixel[c]);
-    let values: Vec<f32> = (0..3).flat_map(plane).collect();
-    write_channels(folder, (image.width, image.height, 3), &values)
+    write_channels(folder, (image.width, image.height, 3), &planes::channels(image))
 }
 
 /// Writes channels below `folder` one after the other, as [`write_image`] does three.
@@ -41,10 +39,9 @@ pub fn write_channels(
     (width, height, channels): (usize, usize, usize),
     values: &[f32],
 ) -> io::Result<ImageFile> {
-    let halves: Option<Vec<u16>> = values.iter().map(|&value| exact_half(value)).collect();
-    let (samples, planes) = match halves {
-        Some(halves) => (Samples::Half, byte_planes(halves.into_iter().map(u32::from), 2)),
-        None => (Samples::Float, byte_planes(values.iter().map(|value| value.to_bits()), 4)),
+    let (samples, planes) = match planes::exact_halves(values) {
+        Some(halves) => (Samples::Half, planes::of_words(&halves)),
+        None => (Samples::Float, planes::of_floats(values)),
     };
     write(folder, (width, height, channels, samples), &planes)
 }
@@ -73,14 +70,8 @@ pub fn write_excess(
     (width, height): (usize, usize),
     excess: &[f32],
 ) -> io::Result<ImageFile> {
-    let rounded = excess.iter().map(|&value| {
-        let half = f16::from_f32(value.min(f16::MAX.to_f32()));
-        let one = f16::ONE.to_bits();
-        let bits = if value > 1.0 { half.to_bits().max(one + 1) } else { half.to_bits().min(one) };
-        // NaN is as far off as can be.
-        u32::from(if value.is_nan() { f16::INFINITY.to_bits() } else { bits })
-    });
-    write(folder, (width, height, 1, Samples::Half), &byte_planes(rounded, 2))
+    let planes = planes::of_words(&planes::excess_halves(excess));
+    write(folder, (width, height, 1, Samples::Half), &planes)
 }
 
 /// Writes a mask of regions.
@@ -88,7 +79,7 @@ pub fn write_excess(
 /// # Errors
 /// When it cannot be written.
 pub fn write_mask(folder: &Path, mask: &RegionMask) -> io::Result<ImageFile> {
-    let planes = byte_planes(mask.pixels.iter().map(|&value| u32::from(value)), 2);
+    let planes = planes::of_words(&mask.pixels);
     write(folder, (mask.width, mask.height, 1, Samples::Uint16), &planes)
 }
 
@@ -109,27 +100,6 @@ pub fn remove_others(folder: &Path, cases: &[&ViewedCase]) -> io::Result<()> {
         }
     }
     Ok(())
-}
-
-/// The half with the very value of a float, the bits of what is not a number included.
-fn exact_half(value: f32) -> Option<u16> {
-    let half = f16::from_f32(value);
-    (half.to_f32().to_bits() == value.to_bits()).then(|| half.to_bits())
-}
-
-/// Differences between successive samples, all their highest bytes first: neighbors are alike, so these are alike.
-fn byte_planes(samples: impl ExactSizeIterator<Item = u32>, bytes: usize) -> Vec<u8> {
-    let count = samples.len();
-    let mut planes = vec![0; count * bytes];
-    let mut last = 0u32;
-    for (index, sample) in samples.enumerate() {
-        let step = sample.wrapping_sub(last).to_le_bytes();
-        for plane in 0..bytes {
-            planes[plane * count + index] = step[bytes - 1 - plane];
-        }
-        last = sample;
-    }
-    planes
 }
 
 fn write(
@@ -159,6 +129,7 @@ mod tests {
 
     use basecode::Vec3;
     use flate2::read::ZlibDecoder;
+    use half::f16;
 
     use super::super::Layer;
     use super::*;

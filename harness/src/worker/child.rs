@@ -15,8 +15,9 @@ use super::shaders;
 use super::shared_memory::{Input, Output, Table};
 use super::table::{STATUS_OURS, STATUS_REJECTED, STATUS_STAGE, Slot};
 use super::wire::{self, CAMERA_BYTES, WireJob, WireRequest, WorkerFolder, queries, rays, words};
+use crate::evidence::Witness;
 use crate::plugin::{
-    CallError, CallErrorKind, HostPlugin, LoadedScene, OfflineJob, OpenPass, RealtimeJob, Witness,
+    CallError, CallErrorKind, HostPlugin, LoadedScene, OfflineJob, OpenPass, RealtimeJob,
     WitnessState,
 };
 use crate::process::{self, exit_now};

@@ -10,8 +10,8 @@ use super::job::Request;
 use super::outcome::{Answer, Fault, Outcome, WitnessUse};
 use super::policy::WorkerPolicy;
 use super::table::{SLOT_BYTES, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE, SlotState};
-use super::wire::{OutputRegion, WireJob, WireRequest, WorkerFolder, take_input};
-use crate::plugin::Witness;
+use super::wire::{ALIGN, OutputRegion, WireJob, WireRequest, WorkerFolder, take_input};
+use crate::evidence::Witness;
 
 /// The files of a worker, as the parent holds them: opened before it began, read only by plain
 /// reads. (A mapping could be pulled away from under us by whoever truncates the file.)
@@ -36,10 +36,10 @@ impl Files {
         for (request, scene) in requests.iter().zip(&own.scenes) {
             let (mut rest, words) = take_input(request);
             rest.scene_mut().path.clone_from(scene);
-            let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_ne_bytes()).collect();
-            input.write_all(&bytes)?;
+            let bytes: &[u8] = bytemuck::cast_slice(&words);
+            input.write_all(bytes)?;
             let place = OutputRegion::new(output_end, request.answer_floats());
-            output.write_all(&f32::NAN.to_ne_bytes().repeat(place.size / 4))?;
+            output.write_all(bytemuck::cast_slice(&vec![f32::NAN; place.size / 4]))?;
             wired.push(WireRequest {
                 request: rest,
                 input: (input_end, bytes.len()),
@@ -126,15 +126,15 @@ fn read_at(file: &mut File, start: u64, size: usize) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// What lies before an answer: less than the multiple that its region is rounded up to.
+static FILLER: [f32; ALIGN / 4] = [f32::NAN; ALIGN / 4];
+
 /// The floats of a region; none when its size or its filler is not as the parent left it.
 fn values(region: &[u8], place: OutputRegion) -> Option<Vec<f32>> {
     if region.len() != place.size {
         return None;
     }
     let (filler, answer) = region.split_at(place.offset());
-    let (filler, _) = filler.as_chunks::<4>();
-    if filler.iter().any(|bytes| *bytes != f32::NAN.to_ne_bytes()) {
-        return None;
-    }
-    Some(answer.as_chunks::<4>().0.iter().map(|bytes| f32::from_ne_bytes(*bytes)).collect())
+    let untouched = filler == &bytemuck::bytes_of(&FILLER)[..filler.len()];
+    untouched.then(|| bytemuck::pod_collect_to_vec(answer))
 }

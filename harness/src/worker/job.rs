@@ -6,7 +6,7 @@ use basecode::{CameraConfig, Matrices};
 use renderer_api as api;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::plugin::Witness;
+use crate::evidence::Witness;
 
 /// Work for one worker: requests are answered in order, after a crash by a fresh worker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -124,8 +124,11 @@ pub enum BsdfSource {
     },
 }
 
-/// A ray segment, world space.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// A ray segment, world space. Its layout is that of `renderer_api`'s.
+#[derive(
+    Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable, Serialize, Deserialize,
+)]
+#[repr(C)]
 pub struct RayQuery {
     /// Origin.
     pub origin: [f32; 3],

@@ -94,31 +94,28 @@ impl WorkerFolder<'_> {
 
 /// Takes the arrays out of a request, as words in the order of `renderer_api`'s fields.
 pub fn take_input(request: &Request) -> (Request, Vec<u32>) {
-    let mut words = Vec::new();
     match request {
         Request::EvalBsdf { scene, queries } => {
-            queries.iter().for_each(|query| query_words(query, &mut words));
+            let mut words = Vec::with_capacity(QUERY_WORDS * queries.len());
+            for query in queries {
+                words.extend_from_slice(&query_words(query));
+            }
             (Request::EvalBsdf { scene: scene.clone(), queries: Vec::new() }, words)
         }
         Request::Radiance { scene, rays, shadows, witness, seed } => {
-            for ray in rays {
-                words.extend(ray.origin.map(f32::to_bits));
-                words.push(ray.min_t.to_bits());
-                words.extend(ray.direction.map(f32::to_bits));
-                words.push(ray.max_t.to_bits());
-            }
+            let words = bytemuck::pod_collect_to_vec(rays);
             let (scene, rays) = (scene.clone(), Vec::new());
             let (shadows, witness, seed) = (*shadows, *witness, *seed);
             (Request::Radiance { scene, rays, shadows, witness, seed }, words)
         }
-        other => (other.clone(), words),
+        other => (other.clone(), Vec::new()),
     }
 }
 
 const QUERY_WORDS: usize = 19;
 const RAY_WORDS: usize = 8;
 
-fn query_words(query: &BsdfQuery, words: &mut Vec<u32>) {
+fn query_words(query: &BsdfQuery) -> [u32; QUERY_WORDS] {
     let value = |model, diffuse, specular, exponent| api::MaterialValue {
         model,
         diffuse,
@@ -137,14 +134,16 @@ fn query_words(query: &BsdfQuery, words: &mut Vec<u32>) {
         }
         BsdfSource::Shape { shape, primitive } => (api::BSDF_OF_SHAPE, none, shape, primitive),
     };
-    words.extend([source, material.model]);
-    words.extend(material.diffuse.map(f32::to_bits));
-    words.extend(material.specular.map(f32::to_bits));
-    words.push(material.exponent.to_bits());
-    words.extend([shape, primitive]);
-    words.extend(query.uv.map(f32::to_bits));
-    words.extend(query.wo.map(f32::to_bits));
-    words.extend(query.wi.map(f32::to_bits));
+    let mut words = [0; QUERY_WORDS];
+    words[..2].copy_from_slice(&[source, material.model]);
+    words[2..5].copy_from_slice(bytemuck::cast_slice(&material.diffuse));
+    words[5..8].copy_from_slice(bytemuck::cast_slice(&material.specular));
+    words[8] = material.exponent.to_bits();
+    words[9..11].copy_from_slice(&[shape, primitive]);
+    words[11..13].copy_from_slice(bytemuck::cast_slice(&query.uv));
+    words[13..16].copy_from_slice(bytemuck::cast_slice(&query.wo));
+    words[16..].copy_from_slice(bytemuck::cast_slice(&query.wi));
+    words
 }
 
 /// Reads queries back.
@@ -208,15 +207,14 @@ pub fn camera(bytes: &[u8; CAMERA_BYTES]) -> api::CameraValue {
 
 /// Words of mapped bytes; a rest that is no whole word is left out.
 pub fn words(bytes: &[u8]) -> Vec<u32> {
-    let word = |word: &[u8]| u32::from_ne_bytes([word[0], word[1], word[2], word[3]]);
-    bytes.chunks_exact(4).map(word).collect()
+    bytemuck::pod_collect_to_vec(&bytes[..bytes.len() / 4 * 4])
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::job::{RayQuery, SceneRef};
     use super::*;
-    use crate::plugin::Witness;
+    use crate::evidence::Witness;
 
     fn scene() -> SceneRef {
         SceneRef { path: "s.toml".into(), options: String::new() }

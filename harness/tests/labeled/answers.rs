@@ -6,7 +6,7 @@ use basecode::{Frame, Sampler, Vec3};
 use serde::Deserialize;
 use serde_json::Value;
 use umbra::evidence::bsdf::{self, BsdfKind};
-use umbra::plugin::{Witness, WitnessQuery};
+use umbra::evidence::{Witness, WitnessQuery};
 
 /// A mistake and what it is called: its changes, when `label` is set, and nothing otherwise.
 #[derive(Clone, Debug, Deserialize)]

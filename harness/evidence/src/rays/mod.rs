@@ -9,7 +9,7 @@ mod shadows;
 mod unshadowed;
 
 use basecode::glam::{DMat3, DVec3};
-use basecode::{Frame, MaterialModel, Ray, Scene, Vec3};
+use basecode::{Camera, Frame, MaterialModel, Ray, Scene, Vec3};
 
 use super::Check;
 use super::shading::{Directions, Shading, power};
@@ -19,6 +19,19 @@ use imaging::reference::RegionMask;
 pub use material::{OwnValue, is_of_own_bsdfs, judge_material};
 pub use shadows::{INVERTED, Occluders, judge_shadows};
 pub use unshadowed::{Unshadowed, judge_unshadowed, passes_unshadowed};
+
+/// Directions of a camera's rays as an integrator may leave them, not normalized: up to the plane at distance 1, or up
+/// to the far plane, as the inverse of the matrices gives it.
+pub fn longer_directions(camera: &Camera, directions: &[Vec3]) -> [Vec<Vec3>; 2] {
+    let to_clip = camera.projection() * camera.view();
+    let (back, axis) = (to_clip.inverse(), camera.view().row(2).truncate());
+    let near = |direction: &Vec3| *direction / direction.dot(-axis);
+    let far = |direction: &Vec3| {
+        let on_film = to_clip.project_point3(camera.eye() + *direction);
+        back.project_point3(on_film.with_z(1.0)) - camera.eye()
+    };
+    [directions.iter().map(near).collect(), directions.iter().map(far).collect()]
+}
 
 /// Directions closer to the surface than this cosine are left out.
 const MIN_COSINE: f32 = 0.05;

@@ -33,13 +33,13 @@ use std::{fs, io};
 use anyhow::Context as _;
 use basecode::scene::SceneConfig;
 use basecode::{Matrices, ShadingKind};
-use half::f16;
 use serde::Serialize;
 use tempfile::TempDir;
 
 use crate::assignment::{Assignment, SceneEntry};
 use crate::cli::context::cores;
 use crate::grading::RenderPath;
+use crate::imaging::planes;
 use crate::process::ProcessLimits;
 use crate::worker::{
     Adapter, AdapterKind, Answer, CameraValue, Job, LiveWorker, Outcome, Request, SceneRef,
@@ -409,7 +409,7 @@ fn bytes(scene: &Scene, answer: &Answer) -> Vec<u8> {
     bytes.extend(scene.width.to_le_bytes());
     bytes.extend(scene.height.to_le_bytes());
     bytes.extend((answer.seconds as f32).to_le_bytes());
-    bytes.extend(answer.values.iter().flat_map(|&value| f16::from_f32(value).to_le_bytes()));
+    bytes.extend_from_slice(bytemuck::cast_slice(&planes::halves(&answer.values)));
     bytes
 }
 

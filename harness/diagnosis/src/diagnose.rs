@@ -11,9 +11,9 @@ use super::loops;
 use super::nearest::{Comparison, Hypothesis, Nearest, is_black, nearest};
 use super::stored::{Material, Stored};
 use super::view::{Observations, View, ViewKind};
-use crate::evidence::rays::INVERTED;
-use crate::evidence::{CheckId, Evidence, Picture, Verdict};
-use crate::imaging::ratio::ratio_name;
+use evidence::rays::INVERTED;
+use evidence::{CheckId, Evidence, Picture, Verdict};
+use imaging::ratio::ratio_name;
 
 /// What one failing part looks like.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -123,7 +123,7 @@ impl Input<'_> {
     }
 
     fn verdict_of(&self, check: CheckId, verdict: Verdict) -> bool {
-        let seen = |check: &crate::evidence::Check| !check.held_back && check.verdict == verdict;
+        let seen = |check: &evidence::Check| !check.held_back && check.verdict == verdict;
         self.evidence.named(check).any(seen)
     }
 
@@ -162,7 +162,7 @@ impl Input<'_> {
             return None;
         }
         // Its image is that of a renderer that tests nothing.
-        let inverted = |check: &crate::evidence::Check| check.mistake == INVERTED;
+        let inverted = |check: &evidence::Check| check.mistake == INVERTED;
         if part == "1.4" && self.evidence.named(CheckId::ShadowRays).any(inverted) {
             let words = format!("the switch is inverted: {INVERTED}");
             return Some(Diagnosis { part: part.to_owned(), words, ..self.known(&[], 0.0, 1.0) });

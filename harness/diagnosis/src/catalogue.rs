@@ -3,7 +3,7 @@
 //! Each is a switch of the reference renderer (`mistake=NAME` in its options); that both know the
 //! same names is tested in `reference_impl`.
 
-use crate::evidence::CheckId;
+use evidence::CheckId;
 use serde::{Deserialize, Serialize};
 
 /// The text that [`Catalogue::known`] reads.

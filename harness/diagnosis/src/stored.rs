@@ -12,7 +12,7 @@ use basecode::{Image, Vec3};
 use super::nearest::{Comparison, from_right};
 use super::thumbnail::{COLUMNS, LENGTH, Thumbnail};
 use super::view::View;
-use crate::imaging::reference::RegionMask;
+use imaging::reference::RegionMask;
 
 /// The first two thumbnails of every file.
 const HEAD: [&str; 2] = ["right", "material"];

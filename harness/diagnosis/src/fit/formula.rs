@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::plugin::{Witness, WitnessQuery};
+use evidence::{Witness, WitnessQuery};
 
 /// What multiplies the incident light at a point.
 #[derive(Clone, Copy, Debug)]

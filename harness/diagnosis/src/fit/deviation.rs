@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::formula::{After, ExponentForm, Formula, Gate, Incident, Lobe, Power, ScaleForm, Term};
-use crate::imaging::ratio::ratio_name;
+use imaging::ratio::ratio_name;
 
 /// Which part of an answer differs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
