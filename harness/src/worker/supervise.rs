@@ -269,7 +269,11 @@ impl Supervisor {
         let program = Program::open(&program_beside(&self.umbra))?;
         let driver = software_driver();
         let elsewhere = |driver: &PathBuf| !driver.starts_with("/usr/share/vulkan");
-        let command = command(&program, private, &own, requests, limits, driver.as_deref());
+        let mut command = command(&program, private, &own, requests, limits, driver.as_deref());
+        if !live {
+            // Mesa compiles a shader in half of the time, to the same pixels; few frames are drawn with it.
+            command.env("GALLIVM_PERF", "nopt");
+        }
         let mut policy = own.policy;
         policy.read_only.extend(driver.filter(elsewhere).map(Bind::same));
         let confinement = Confinement::new(limits, policy);
