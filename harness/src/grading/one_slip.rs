@@ -20,11 +20,14 @@ use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
 use crate::imaging::reference::Region;
 use crate::imaging::tolerances::Tolerances;
-use crate::worker::{Outcome, StageText};
+use crate::worker::{Outcome, STAGES, StageText};
 
 /// Pass and stages, each alone.
 const ALONE: [CheckId; 4] =
-    [CheckId::PassUniforms, CheckId::StageVertex, CheckId::StageDiffuse, CheckId::StagePhong];
+    [CheckId::PassUniforms, ALONE_STAGES[0], ALONE_STAGES[1], ALONE_STAGES[2]];
+/// The stages in the order of [`STAGES`].
+const ALONE_STAGES: [CheckId; 3] =
+    [CheckId::StageVertex, CheckId::StageDiffuse, CheckId::StagePhong];
 
 /// The convention of parts that one slip pays for.
 const ONE_SLIP: &str = "one slip explains every frame";
@@ -200,10 +203,14 @@ fn pays(edit: &LineEdit, found: &[Check]) -> bool {
         _ => CheckId::ImageRealtimeCoverage,
     };
     let alone = ALONE.into_iter().all(|id| ids.contains(&id) || failed(id).next().is_none());
+    // What stands in the file of a stage that is right alone is right.
+    let of_file = |(name, _): &(&str, CheckId)| edit.file == format!("shaders/{name}.wgsl");
+    let stage = STAGES.into_iter().zip(ALONE_STAGES).find(of_file);
+    let is_right = stage.is_some_and(|(_, id)| is_judged(id) && failed(id).next().is_none());
     let lost = |id: &CheckId| open(if is_judged(*id) { *id } else { by_frames(*id) });
     // Where nothing can be judged alone, surfaces that are missing are the fragment stage's as well.
     let missing = !is_judged(CheckId::PassUniforms) && open(CheckId::ImageRealtimeCoverage);
-    alone && (ids.iter().any(lost) || missing)
+    alone && !is_right && (ids.iter().any(lost) || missing)
 }
 
 /// What a pass draws of a scene with each of some edits.

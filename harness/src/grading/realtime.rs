@@ -429,12 +429,21 @@ pub fn price_bonus_by_edits(
     // Of all lines, those that draw a map or read it.
     let may_mend = |edit: &LineEdit| edit.of.vertex || edit.of.with_texture;
     let edits: Vec<LineEdit> = line_edits::all(stages).into_iter().filter(may_mend).collect();
+    let small = drawn_small(session, plugin, first, &[None]).pop().flatten();
     for edits in edits.chunks(line_edits::TRIED_AT_ONCE) {
-        let right = edits.iter().zip(shows(first, edits)).filter(|(_, right)| *right);
-        let everywhere = |edit: &LineEdit| {
-            failing[1..].iter().all(|case| shows(case, std::slice::from_ref(edit)) == [true])
+        let stages: Vec<_> = edits.iter().map(|edit| Some(edit.stage())).collect();
+        let tried = edits.iter().zip(drawn_small(session, plugin, first, &stages));
+        // Where the small film tells nothing, its own does.
+        let may_be_right = |with: &Image| {
+            let judge = |plain| small_shadows(first).judge("", with, plain, tolerances);
+            let judged = small.as_ref().and_then(judge);
+            judged.is_none_or(|check| check.verdict != Verdict::Fail)
         };
-        let Some((edit, _)) = right.into_iter().find(|(edit, _)| everywhere(edit)) else {
+        let mut right = tried.filter(|(_, image)| image.as_ref().is_some_and(may_be_right));
+        let everywhere = |edit: &LineEdit| {
+            failing.iter().all(|case| shows(case, std::slice::from_ref(edit)) == [true])
+        };
+        let Some((edit, _)) = right.find(|(edit, _)| everywhere(edit)) else {
             continue;
         };
         for check in checks.iter_mut().filter(|check| is_open(check)) {
@@ -443,6 +452,34 @@ pub fn price_bonus_by_edits(
         }
         return;
     }
+}
+
+/// What a pass draws of a scene on its small film: without shadows, and with them and a stage replaced.
+fn drawn_small(
+    session: &Session,
+    plugin: &Path,
+    case: &PreparedScene,
+    replaced: &[Option<StageText>],
+) -> Vec<Option<Image>> {
+    let frame = |stage: &Option<StageText>| {
+        let small = FrameRequest::probe(case, stage.iter().cloned().collect());
+        let toml = case.bonus.as_deref().filter(|_| stage.is_some());
+        let toml = toml.unwrap_or(small.toml);
+        FrameRequest { toml, shadow_map: stage.is_some(), ..small }
+    };
+    let frames: Vec<FrameRequest> = replaced.iter().map(frame).collect();
+    let outcomes = draw_each(session, Some(plugin), &frames);
+    let image = |(frame, outcome): (&FrameRequest, &Outcome)| {
+        Some(session::image(&outcome.answer()?.values, frame.size.0, frame.size.1))
+    };
+    frames.iter().zip(&outcomes).map(image).collect()
+}
+
+/// The shadows on a scene's small film.
+fn small_shadows(case: &PreparedScene) -> Shadows<'_> {
+    let film = &case.probe_film;
+    let median_lit = case.expected.offline.median_lit;
+    Shadows { mask: &film.mask, unshadowed: &film.unshadowed_mask, median_lit }
 }
 
 /// The largest relative difference of a pixel from what is right that shows the surface that belongs there.

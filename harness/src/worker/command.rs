@@ -75,6 +75,11 @@ pub fn command(
     command.env("MESA_SHADER_CACHE_DISABLE", "false").env("MESA_SHADER_CACHE_DIR", ".");
     // Mesa's layer that sorts devices looks for a display, and prints that there is none.
     command.env("NODEVICE_SELECT", "1");
+    // A frame's textures lie where those of the last one lay, in pages that are there: half of the system's time. Older
+    // versions of glibc refuse so much, and nothing changes.
+    for name in ["MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"] {
+        command.env(name, (1 << 30).to_string());
+    }
     command.env("LP_NUM_THREADS", limits.threads.to_string());
     command.env("RAYON_NUM_THREADS", limits.threads.to_string());
     let kinds: Vec<AdapterKind> = requests.iter().filter_map(|request| request.adapter()).collect();
