@@ -212,10 +212,12 @@ fn luminance_and_chroma_make_colors() {
         assert!(layer.is_empty() && layers.len() == 1);
         assert!(notes.iter().any(|note| note.contains("luminance and chroma")), "{notes:?}");
         let colors = values(&opened[0], channels);
-        for at in 0..width * height {
-            let [y, ry, by] = [2, 1, 0].map(|channel| values(&opened[0], &[channel])[0][at]);
-            assert_eq!((colors[0][at], colors[2][at]), ((ry + 1.0) * y, (by + 1.0) * y));
-            let sum = 0.2126 * colors[0][at] + 0.7152 * colors[1][at] + 0.0722 * colors[2][at];
+        let [y, ry, by] = [2, 1, 0].map(|channel| values(&opened[0], &[channel]).swap_remove(0));
+        let [red, green, blue] = [0, 1, 2].map(|c| &colors[c]);
+        for (at, &y) in y.iter().enumerate() {
+            assert_eq!((red[at], blue[at]), ((ry[at] + 1.0) * y, (by[at] + 1.0) * y));
+            // Both sides have terms a hundred times as large.
+            let sum = 0.2126 * red[at] + 0.7152 * green[at] + 0.0722 * blue[at];
             assert!((sum - y).abs() < 20.0, "{sum} is not {y}");
         }
         let (cases, said) = viewed(folder.path(), &[&file]);

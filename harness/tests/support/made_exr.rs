@@ -32,7 +32,7 @@ pub fn value(channel: usize, x: usize, y: usize) -> f32 {
 pub fn made(parts: &[Made]) -> Vec<u8> {
     let several = parts.len() > 1;
     let deep = parts.iter().any(|part| part.deep);
-    let flags = u8::from(deep) * 0x08 | u8::from(several) * 0x10;
+    let flags = (u8::from(deep) * 0x08) | (u8::from(several) * 0x10);
     let mut bytes = vec![0x76, 0x2f, 0x31, 0x01, 2, flags, 0, 0];
     for part in parts {
         attribute(&mut bytes, "channels", "chlist", &channels(part));
