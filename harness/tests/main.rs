@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used)] // their helpers are tests too
 
+mod any_exr;
 mod appeals;
 mod archives;
 mod arrivals;

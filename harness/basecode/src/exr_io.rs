@@ -14,9 +14,13 @@ use thiserror::Error;
 
 use crate::image::Image;
 
+mod attributes;
+mod blocks;
 mod encode;
 mod header;
+mod luminance;
 mod rows;
+mod source;
 
 pub(crate) use header::kind_of;
 pub use rows::{Band, ExrRows};

@@ -5,12 +5,18 @@
 //! Rendered High Dynamic Range Images", EG 2021: the largest LDR-FLIP over a range of exposures. Constants are the
 //! papers'. FLIP informs readers of a report and decides nothing.
 
+use std::ops::Range;
+
 use basecode::image::Image;
 use glam::{Mat3, Vec3, vec3};
 use rayon::prelude::*;
 
 /// Pixels per degree of the papers' viewer: 0.7 m from a display 0.7 m and 3840 pixels wide.
 pub const PIXELS_PER_DEGREE: f32 = 67.020_64;
+
+/// Rows that are filtered at a time: so many that the filters' overlap costs little, and so few that what is between
+/// two filters stays small.
+const BAND: usize = 96;
 
 /// XYZ of the white point D65.
 const WHITE: Vec3 = vec3(0.950_428_55, 1.0, 1.088_900_4);
@@ -39,9 +45,8 @@ impl FlipMap {
 /// `None` when the sizes differ or a value is not a number.
 pub fn flip_ldr(actual: &Image, expected: &Image, pixels_per_degree: f32) -> Option<FlipMap> {
     check(actual, expected)?;
-    let shown = |image: &Image| opponent(image, |p| p.clamp(Vec3::ZERO, Vec3::ONE));
-    let filters = Filters::new(pixels_per_degree);
-    Some(filters.difference(&shown(actual), &shown(expected), expected))
+    let tone = |p: Vec3| p.clamp(Vec3::ZERO, Vec3::ONE);
+    Some(Filters::new(pixels_per_degree).worst(actual, expected, &[tone], BAND))
 }
 
 /// HDR-FLIP with the ACES tone mapper and the exposures that the papers derive from the expected image. Negative values
@@ -52,22 +57,12 @@ pub fn flip_hdr(actual: &Image, expected: &Image, pixels_per_degree: f32) -> Opt
     check(actual, expected)?;
     let (start, stop) = exposure_range(expected)?;
     let count = ((stop - start).ceil() as usize).max(2);
-    let filters = Filters::new(pixels_per_degree);
-    let mut worst: Option<FlipMap> = None;
-    for i in 0..count {
+    let tone = |i: usize| {
         let gain = (start + (stop - start) * i as f32 / (count - 1) as f32).exp2();
-        let shown = |image: &Image| opponent(image, |p| aces(gain * p.max(Vec3::ZERO)));
-        let map = filters.difference(&shown(actual), &shown(expected), expected);
-        match &mut worst {
-            None => worst = Some(map),
-            Some(worst) => {
-                for (w, e) in worst.errors.iter_mut().zip(map.errors) {
-                    *w = w.max(e);
-                }
-            }
-        }
-    }
-    worst
+        move |p: Vec3| aces(gain * p.max(Vec3::ZERO))
+    };
+    let tones: Vec<_> = (0..count).map(tone).collect();
+    Some(Filters::new(pixels_per_degree).worst(actual, expected, &tones, BAND))
 }
 
 fn check(actual: &Image, expected: &Image) -> Option<()> {
@@ -116,18 +111,16 @@ fn to_xyz() -> Mat3 {
     )
 }
 
-/// Linearized CIELAB, the papers' YCxCz, of a tone-mapped image.
-fn opponent(image: &Image, tone: impl Fn(Vec3) -> Vec3 + Sync) -> [Vec<f32>; 3] {
+/// Linearized CIELAB, the papers' YCxCz, of tone-mapped pixels.
+fn opponent(pixels: &[Vec3], tone: impl Fn(Vec3) -> Vec3, planes: &mut [Vec<f32>; 3]) {
     let matrix = to_xyz();
-    let colors: Vec<Vec3> = image
-        .pixels
-        .par_iter()
-        .map(|&p| {
-            let xyz = matrix * tone(p) / WHITE;
-            vec3(116.0 * xyz.y - 16.0, 500.0 * (xyz.x - xyz.y), 200.0 * (xyz.y - xyz.z))
-        })
-        .collect();
-    [0, 1, 2].map(|c| colors.iter().map(|p| p[c]).collect())
+    planes.iter_mut().for_each(|plane| plane.clear());
+    for &p in pixels {
+        let xyz = matrix * tone(p) / WHITE;
+        planes[0].push(116.0 * xyz.y - 16.0);
+        planes[1].push(500.0 * (xyz.x - xyz.y));
+        planes[2].push(200.0 * (xyz.y - xyz.z));
+    }
 }
 
 /// CIELAB with Hunt's adjustment: colors count for less where it is dark.
@@ -207,12 +200,45 @@ impl Filters {
         }
     }
 
-    /// FLIP of two images in YCxCz; `like` gives the size.
-    fn difference(&self, a: &[Vec<f32>; 3], b: &[Vec<f32>; 3], like: &Image) -> FlipMap {
-        let width = like.width;
+    /// The largest FLIP of two images over some tone mappers, in bands of so many rows.
+    fn worst(
+        &self,
+        actual: &Image,
+        expected: &Image,
+        tones: &[impl Fn(Vec3) -> Vec3 + Sync],
+        band: usize,
+    ) -> FlipMap {
+        let (width, height) = (expected.width, expected.height);
+        let mut errors = vec![0.0f32; width * height];
+        let bands = errors.par_chunks_mut(width * band).enumerate();
+        bands.for_each_init(Room::default, |room, (index, out)| {
+            let rows = Rows::new(index * band, out.len() / width, (width, height), self.radius());
+            for (nth, tone) in tones.iter().enumerate() {
+                for (image, seen) in [actual, expected].into_iter().zip(&mut room.seen) {
+                    let pixels = &image.pixels[rows.around.start * width..rows.around.end * width];
+                    opponent(pixels, tone, &mut room.planes);
+                    self.colors(&rows, &room.planes, &mut room.between, &mut seen.colors);
+                    self.features(&rows, &room.planes[0], &mut room.between, &mut seen.features);
+                }
+                self.difference(&room.seen, &mut room.errors);
+                match nth {
+                    0 => out.copy_from_slice(&room.errors),
+                    _ => out.iter_mut().zip(&room.errors).for_each(|(w, e)| *w = w.max(*e)),
+                }
+            }
+        });
+        FlipMap { width, height, errors }
+    }
+
+    /// How many rows beyond a pixel's own decide what is seen there.
+    fn radius(&self) -> usize {
+        let color = self.color.iter().flatten().flatten();
+        color.chain([&self.smooth]).map(|weights| weights.len() / 2).max().unwrap_or(0)
+    }
+
+    /// FLIP of what is seen of two images.
+    fn difference(&self, [a, b]: &[Seen; 2], errors: &mut Vec<f32>) {
         let back = to_xyz().inverse();
-        let (colors_a, colors_b) = (self.seen(a, width), self.seen(b, width));
-        let (features_a, features_b) = (self.features(&a[0], width), self.features(&b[0], width));
         let forth = to_xyz();
         let (green, blue) = (hunt_lab(forth.y_axis), hunt_lab(forth.z_axis));
         let largest = hyab(green, blue).powf(0.7);
@@ -223,80 +249,171 @@ impl Filters {
             let xyz = vec3(y + ycc.y / 500.0, y, y - ycc.z / 200.0) * WHITE;
             hunt_lab(forth * (back * xyz).clamp(Vec3::ZERO, Vec3::ONE))
         };
-        let errors = (0..a[0].len())
-            .into_par_iter()
-            .map(|i| {
-                let pick = |c: &[Vec<f32>; 3]| lab(vec3(c[0][i], c[1][i], c[2][i]));
-                let color = hyab(pick(&colors_a), pick(&colors_b)).powf(0.7);
-                let color = if color < knee {
-                    0.95 * color / knee
-                } else {
-                    0.95 + 0.05 * (color - knee) / (largest - knee)
-                };
-                let apart = |k: usize| (features_a[k][i] - features_b[k][i]).abs();
-                let feature = (apart(0).max(apart(1)) * std::f32::consts::FRAC_1_SQRT_2).sqrt();
-                color.powf(1.0 - feature)
-            })
-            .collect();
-        FlipMap { width, height: like.height, errors }
+        errors.clear();
+        errors.extend((0..a.colors[0].len()).map(|i| {
+            let pick = |c: &[Vec<f32>; 3]| lab(vec3(c[0][i], c[1][i], c[2][i]));
+            let color = hyab(pick(&a.colors), pick(&b.colors)).powf(0.7);
+            let color = if color < knee {
+                0.95 * color / knee
+            } else {
+                0.95 + 0.05 * (color - knee) / (largest - knee)
+            };
+            let apart = |k: usize| (a.features[k][i] - b.features[k][i]).abs();
+            let feature = (apart(0).max(apart(1)) * std::f32::consts::FRAC_1_SQRT_2).sqrt();
+            color.powf(1.0 - feature)
+        }));
     }
 
-    /// The image as the eye's contrast sensitivity lets it through.
-    fn seen(&self, planes: &[Vec<f32>; 3], width: usize) -> [Vec<f32>; 3] {
-        [0, 1, 2].map(|c| {
-            let mut sum = vec![0.0; planes[c].len()];
+    /// The rows as the eye's contrast sensitivity lets them through.
+    fn colors(
+        &self,
+        rows: &Rows,
+        planes: &[Vec<f32>; 3],
+        between: &mut Between,
+        out: &mut [Vec<f32>; 3],
+    ) {
+        let Between { padded, across: middle, down: part, .. } = between;
+        for (c, sum) in out.iter_mut().enumerate() {
+            zeros(sum, rows.samples());
             for [across, down] in &self.color[c] {
-                let part = convolve_down(&convolve_across(&planes[c], width, across), width, down);
-                for (s, p) in sum.iter_mut().zip(part) {
+                rows.convolve_across(&planes[c], across, padded, middle);
+                rows.convolve_down(middle, down, part);
+                for (s, p) in sum.iter_mut().zip(part.iter()) {
                     *s += p;
                 }
             }
-            sum
-        })
+        }
     }
 
     /// Strength of edges and of points.
-    fn features(&self, y: &[f32], width: usize) -> [Vec<f32>; 2] {
-        let gray: Vec<f32> = y.iter().map(|y| (y + 16.0) / 116.0).collect();
-        let smooth = convolve_across(&gray, width, &self.smooth);
-        [&self.first, &self.second].map(|derivative| {
-            let across =
-                convolve_down(&convolve_across(&gray, width, derivative), width, &self.smooth);
-            let down = convolve_down(&smooth, width, derivative);
-            across.iter().zip(&down).map(|(x, y)| x.hypot(*y)).collect()
-        })
+    fn features(&self, rows: &Rows, y: &[f32], between: &mut Between, out: &mut [Vec<f32>; 2]) {
+        let Between { padded, across: middle, down: part, gray, smooth } = between;
+        gray.clear();
+        gray.extend(y.iter().map(|y| (y + 16.0) / 116.0));
+        rows.convolve_across(gray, &self.smooth, padded, smooth);
+        for (out, derivative) in out.iter_mut().zip([&self.first, &self.second]) {
+            rows.convolve_across(gray, derivative, padded, middle);
+            rows.convolve_down(middle, &self.smooth, out);
+            rows.convolve_down(smooth, derivative, part);
+            out.iter_mut().zip(part.iter()).for_each(|(x, y)| *x = x.hypot(*y));
+        }
     }
 }
 
-/// Correlates every row with `weights`; pixels outside repeat the border.
-fn convolve_across(image: &[f32], width: usize, weights: &[f32]) -> Vec<f32> {
-    let radius = weights.len() / 2;
-    let mut out = vec![0.0; image.len()];
-    out.par_chunks_mut(width).zip(image.par_chunks(width)).for_each(|(out, row)| {
-        let mut padded = vec![row[0]; radius];
-        padded.extend_from_slice(row);
-        padded.resize(width + 2 * radius, row[width - 1]);
-        for (k, w) in weights.iter().enumerate() {
-            for (o, p) in out.iter_mut().zip(&padded[k..]) {
-                *o += w * p;
-            }
-        }
-    });
-    out
+/// Memory that a thread needs again and again.
+#[derive(Default)]
+struct Room {
+    planes: [Vec<f32>; 3],
+    between: Between,
+    seen: [Seen; 2],
+    errors: Vec<f32>,
 }
 
-/// Correlates every column with `weights`; pixels outside repeat the border.
-fn convolve_down(image: &[f32], width: usize, weights: &[f32]) -> Vec<f32> {
-    let radius = weights.len() / 2;
-    let height = image.len() / width;
-    let mut out = vec![0.0; image.len()];
-    out.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
-        for (k, w) in weights.iter().enumerate() {
-            let source = (y + k).saturating_sub(radius).min(height - 1);
-            for (o, p) in out.iter_mut().zip(&image[source * width..][..width]) {
-                *o += w * p;
+/// What lies between two filters.
+#[derive(Default)]
+struct Between {
+    padded: Vec<f32>,
+    across: Vec<f32>,
+    down: Vec<f32>,
+    gray: Vec<f32>,
+    smooth: Vec<f32>,
+}
+
+/// What the eye sees of some rows of an image.
+#[derive(Default)]
+struct Seen {
+    colors: [Vec<f32>; 3],
+    features: [Vec<f32>; 2],
+}
+
+/// Rows of an image, and those around them that filters need.
+struct Rows {
+    width: usize,
+    /// Of the whole image.
+    height: usize,
+    wanted: Range<usize>,
+    around: Range<usize>,
+}
+
+impl Rows {
+    fn new(top: usize, rows: usize, (width, height): (usize, usize), radius: usize) -> Self {
+        let around = top.saturating_sub(radius)..height.min(top + rows + radius);
+        Self { width, height, wanted: top..top + rows, around }
+    }
+
+    fn samples(&self) -> usize {
+        self.wanted.len() * self.width
+    }
+
+    /// Correlates every row around with `weights`; pixels outside repeat the border.
+    fn convolve_across(
+        &self,
+        image: &[f32],
+        weights: &[f32],
+        padded: &mut Vec<f32>,
+        out: &mut Vec<f32>,
+    ) {
+        let (width, radius) = (self.width, weights.len() / 2);
+        zeros(out, image.len());
+        for (out, row) in out.chunks_exact_mut(width).zip(image.chunks_exact(width)) {
+            padded.clear();
+            padded.resize(radius, row[0]);
+            padded.extend_from_slice(row);
+            padded.resize(width + 2 * radius, row[width - 1]);
+            for (k, w) in weights.iter().enumerate() {
+                for (o, p) in out.iter_mut().zip(&padded[k..]) {
+                    *o += w * p;
+                }
             }
         }
-    });
-    out
+    }
+
+    /// Correlates every column with `weights`, where rows are wanted; pixels outside repeat the border.
+    fn convolve_down(&self, image: &[f32], weights: &[f32], out: &mut Vec<f32>) {
+        let (width, radius) = (self.width, weights.len() / 2);
+        zeros(out, self.samples());
+        for (y, out) in self.wanted.clone().zip(out.chunks_exact_mut(width)) {
+            for (k, w) in weights.iter().enumerate() {
+                let source = (y + k).saturating_sub(radius).min(self.height - 1);
+                let row = &image[(source - self.around.start) * width..][..width];
+                for (o, p) in out.iter_mut().zip(row) {
+                    *o += w * p;
+                }
+            }
+        }
+    }
+}
+
+/// Makes a buffer so many zeros.
+fn zeros(buffer: &mut Vec<f32>, count: usize) {
+    buffer.clear();
+    buffer.resize(count, 0.0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_change_no_bit() {
+        for (width, height) in [(37, 61), (5, 3), (64, 1)] {
+            let image = |scale: f32| {
+                let wave = |i: usize, k: f32| (1.0 + (i as f32 * k).sin()) * scale;
+                let pixel = |i| vec3(wave(i, 0.37), wave(i, 0.11), wave(i, 0.73));
+                Image { width, height, pixels: (0..width * height).map(pixel).collect() }
+            };
+            let (actual, expected) = (image(0.9), image(1.0));
+            let filters = Filters::new(PIXELS_PER_DEGREE);
+            let tones = [0.5, 2.0].map(|gain| move |p: Vec3| aces(gain * p));
+            let bits = |band: usize| {
+                let map = filters.worst(&actual, &expected, &tones, band);
+                map.errors.iter().map(|error| error.to_bits()).collect::<Vec<_>>()
+            };
+            let whole = bits(height);
+            assert!(whole.iter().any(|bits| *bits != 0));
+            for band in [1, 7, 20] {
+                assert_eq!(bits(band), whole, "{band} rows of {width}x{height}");
+            }
+        }
+    }
 }

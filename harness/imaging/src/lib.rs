@@ -14,6 +14,7 @@ pub mod likeness;
 pub mod metrics;
 pub mod noise;
 pub mod origin;
+pub mod packing;
 pub mod pictures;
 pub mod planes;
 pub mod ratio;

@@ -11,6 +11,8 @@ use super::flip::{PIXELS_PER_DEGREE, flip_hdr, flip_ldr};
 
 /// Number of pixels that one thread sums.
 const PART: usize = 1 << 14;
+/// Rows of SSIM's windows that a thread takes at a time.
+const SSIM_BAND: usize = 64;
 
 /// All metrics of an image against the expected one. A field is `None` where it is undefined: a value is not finite,
 /// the images are equal (PSNR), or smaller than SSIM's window.
@@ -152,33 +154,36 @@ pub fn ssim(actual: &Image, expected: &Image, peak: f64) -> Option<f64> {
 
     let inside = width - 2 * RADIUS;
     let mut sum = 0.0;
-    // Five moments of the window: a, b, a^2, b^2, ab; rows are smoothed across first, then down.
-    let mut smoothed = vec![[0.0f64; 5]; inside * height];
+    let tops: Vec<usize> = (0..height - 2 * RADIUS).step_by(SSIM_BAND).collect();
     for channel in 0..3 {
-        smoothed.par_chunks_mut(inside).enumerate().for_each(|(y, row)| {
-            let moments: Vec<[f64; 5]> = (y * width..(y + 1) * width)
-                .map(|i| {
+        // Five moments of the window: a, b, a^2, b^2, ab; rows are smoothed across first, then down.
+        let band = |(moments, smoothed): &mut (Vec<[f64; 5]>, Vec<[f64; 5]>), top: &usize| {
+            let rows = SSIM_BAND.min(height - 2 * RADIUS - top);
+            smoothed.clear();
+            for y in *top..top + rows + 2 * RADIUS {
+                moments.clear();
+                moments.extend((y * width..(y + 1) * width).map(|i| {
                     let a = f64::from(actual.pixels[i][channel]);
                     let b = f64::from(expected.pixels[i][channel]);
                     [a, b, a * a, b * b, a * b]
-                })
-                .collect();
-            for (x, out) in row.iter_mut().enumerate() {
-                *out = weighted(&weights, |k| &moments[x + k]);
+                }));
+                smoothed.extend((0..inside).map(|x| weighted(&weights, |k| &moments[x + k])));
             }
-        });
-        let row = |y: usize| {
-            let similarity = |x: usize| {
-                let [a, b, aa, bb, ab] = weighted(&weights, |k| &smoothed[(y + k) * inside + x]);
-                let covariance = ab - a * b;
-                let variances = (aa - a * a) + (bb - b * b);
-                (2.0 * a * b + c1) * (2.0 * covariance + c2)
-                    / ((a * a + b * b + c1) * (variances + c2))
+            let row = |y: usize| {
+                let similarity = |x: usize| {
+                    let [a, b, aa, bb, ab] =
+                        weighted(&weights, |k| &smoothed[(y + k) * inside + x]);
+                    let covariance = ab - a * b;
+                    let variances = (aa - a * a) + (bb - b * b);
+                    (2.0 * a * b + c1) * (2.0 * covariance + c2)
+                        / ((a * a + b * b + c1) * (variances + c2))
+                };
+                (0..inside).map(similarity).sum()
             };
-            (0..inside).map(similarity).sum()
+            (0..rows).map(row).collect::<Vec<f64>>()
         };
-        let rows: Vec<f64> = (0..height - 2 * RADIUS).into_par_iter().map(row).collect();
-        sum += rows.iter().sum::<f64>();
+        let rows: Vec<Vec<f64>> = tops.par_iter().map_init(Default::default, band).collect();
+        sum += rows.iter().flatten().sum::<f64>();
     }
     Some(sum / (3 * inside * (height - 2 * RADIUS)) as f64)
 }

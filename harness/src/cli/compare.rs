@@ -9,7 +9,7 @@ mod text;
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use basecode::exr_io::{ExrRows, REC_709};
@@ -254,20 +254,27 @@ pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
     Ok(if comparison.equal { super::EXIT_OK } else { super::EXIT_NOT_IN_ORDER })
 }
 
+/// A file that is open, and all that could be compared of it.
+struct Choices {
+    path: PathBuf,
+    parts: Vec<ExrRows<'static>>,
+    /// Each layer, and which of the parts it is in.
+    layers: Layers,
+    part_of: Vec<usize>,
+    /// What is to know of each part.
+    notes: Vec<Vec<String>>,
+    left_out: Vec<String>,
+}
+
 /// Opens both images and finds the layer to compare.
 fn open(paths: [&PathBuf; 2], wanted: Option<&str>) -> anyhow::Result<[Open; 2]> {
-    let [actual, expected] = paths.map(|path| {
-        let file = ExrRows::open(path)?;
-        let (layers, notes) = file.layers()?;
-        anyhow::Ok((file, layers, notes))
-    });
+    let [actual, expected] = paths.map(|path| Choices::of(path));
     let (actual, expected) = (actual?, expected?);
     if let Some(wanted) = wanted {
-        let lacks = |(file, layers, _): &(ExrRows, Layers, Vec<String>)| {
-            let has = layers.iter().any(|(name, _)| name == wanted);
-            (!has).then(|| {
-                (format!("{} (it has: {})", file.path().display(), names(layers)), is_plain(file))
-            })
+        let lacks = |file: &Choices| {
+            let has = file.layers.iter().any(|(name, _)| name == wanted);
+            let all = || format!("{} (it has: {})", file.path.display(), names(&file.layers));
+            (!has).then(|| (all(), file.is_plain()))
         };
         match (lacks(&actual), lacks(&expected)) {
             (Some((a, _)), Some((b, _))) => bail!("no layer \"{wanted}\" in {a} nor in {b}"),
@@ -277,13 +284,64 @@ fn open(paths: [&PathBuf; 2], wanted: Option<&str>) -> anyhow::Result<[Open; 2]>
             _ => {}
         }
     }
-    let choose = |(file, layers, notes)| Open::new(file, layers, notes, wanted);
-    Ok([choose(actual)?, choose(expected)?])
+    Ok([actual.choose(wanted)?, expected.choose(wanted)?])
 }
 
-/// Whether a file has no layers, but only channels without one.
-fn is_plain(file: &ExrRows) -> bool {
-    file.channels().iter().all(|name| !name.contains('.'))
+impl Choices {
+    /// Opens a file; an error where nothing in it can be compared.
+    fn of(path: &Path) -> anyhow::Result<Self> {
+        let (parts, left_out) = ExrRows::open_parts(path)?;
+        let (mut layers, mut part_of) = (Layers::new(), Vec::new());
+        let (mut notes, mut first) = (Vec::new(), None);
+        for (index, part) in parts.iter().enumerate() {
+            match part.layers() {
+                Ok((own, noted)) => {
+                    part_of.resize(part_of.len() + own.len(), index);
+                    let named = |(name, found): (String, _)| (part.name_in_file(&name), found);
+                    layers.extend(own.into_iter().map(named));
+                    notes.push(noted);
+                }
+                Err(error) => {
+                    notes.push(Vec::new());
+                    first.get_or_insert(error);
+                }
+            }
+        }
+        match first {
+            Some(error) if layers.is_empty() => Err(error.into()),
+            _ => Ok(Self { path: path.into(), parts, layers, part_of, notes, left_out }),
+        }
+    }
+
+    /// Whether there are no layers, but only channels without one.
+    fn is_plain(&self) -> bool {
+        let plain = |part: &ExrRows| part.channels().iter().all(|name| !name.contains('.'));
+        self.parts.len() == 1 && self.parts.iter().all(plain)
+    }
+
+    /// Takes a layer out of the file: the one wanted, if it is there; else plain R, G and B, or the only one.
+    fn choose(mut self, wanted: Option<&str>) -> anyhow::Result<Open> {
+        let at = |name: &str| self.layers.iter().position(|(own, _)| own == name);
+        let only = (self.layers.len() == 1).then_some(0);
+        let Some(index) = wanted.and_then(at).or_else(|| at("")).or(only) else {
+            let all = names(&self.layers);
+            bail!("{}: which layer? hint: --layer NAME, one of {all}", self.path.display());
+        };
+        let (layer, channels) = self.layers.remove(index);
+        let part = self.part_of[index];
+        let mut notes = self.left_out;
+        notes.append(&mut self.notes[part]);
+        if !self.layers.is_empty() {
+            let others = names(&self.layers);
+            notes.push(format!("other layers are not compared: {others} (--layer NAME)"));
+        }
+        let without = |index: &usize| !self.part_of.contains(index);
+        for index in (0..self.parts.len()).filter(without) {
+            let name = harmless(self.parts[index].part());
+            notes.push(format!("part {name} is not compared: it has no colors"));
+        }
+        Ok(Open { file: self.parts.swap_remove(part), layer, channels, notes })
+    }
 }
 
 /// The names of a file's layers, for messages.
@@ -296,28 +354,6 @@ fn shown(layer: &str) -> String {
 }
 
 impl Open {
-    /// Takes the layer out of a file: the one wanted, if it is there; else plain R, G and B, or the
-    /// only one.
-    fn new(
-        file: ExrRows<'static>,
-        mut layers: Layers,
-        mut notes: Vec<String>,
-        wanted: Option<&str>,
-    ) -> anyhow::Result<Self> {
-        let at = |name: &str| layers.iter().position(|(own, _)| own == name);
-        let only = (layers.len() == 1).then_some(0);
-        let Some(index) = wanted.and_then(at).or_else(|| at("")).or(only) else {
-            let all = names(&layers);
-            bail!("{}: which layer? hint: --layer NAME, one of {all}", file.path().display());
-        };
-        let (layer, channels) = layers.remove(index);
-        if !layers.is_empty() {
-            let others = names(&layers);
-            notes.push(format!("other layers are not compared: {others} (--layer NAME)"));
-        }
-        Ok(Self { file, layer, channels, notes })
-    }
-
     fn size(&self) -> [usize; 2] {
         [self.file.width(), self.file.height()]
     }

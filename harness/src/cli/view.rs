@@ -8,6 +8,7 @@ use basecode::exr_io::{Band, ExrRows};
 
 use super::outputs::ensure_not_read;
 use crate::files::{keep_newest_of, private_folder, write_whole};
+use crate::harmless::harmless;
 use crate::report::html_viewer;
 use crate::viewer::{ImageFile, Layer, ViewedCase, write_channels, write_image};
 
@@ -103,45 +104,67 @@ fn same_owner(one: &Path, other: &Path) -> bool {
     }
 }
 
-/// Writes the images of a file into the page's folder: each layer of colors, and every other channel by itself.
+/// Writes the images of a file into the page's folder, those of each part.
 fn unpack(path: &Path, name: &str, folder: &Path) -> anyhow::Result<Vec<Shown>> {
-    let file = ExrRows::open(path)?;
-    for note in file.notes() {
-        eprintln!("umbra: {}: {note}", path.display());
+    let (parts, left_out) = ExrRows::open_parts(path)?;
+    for note in left_out {
+        eprintln!("umbra: {}: {}", path.display(), harmless(&note));
     }
-    let channels = file.channels();
+    let mut shown = Vec::new();
+    for part in &parts {
+        shown.extend(unpack_part(part, name, folder)?);
+    }
+    Ok(shown)
+}
+
+/// Writes the images of a part: each layer of colors, and every other channel by itself.
+fn unpack_part(file: &ExrRows, name: &str, folder: &Path) -> anyhow::Result<Vec<Shown>> {
+    for note in file.notes() {
+        let part = file.part();
+        let part = if part.is_empty() { String::new() } else { format!("part {part}: ") };
+        eprintln!("umbra: {}: {}", file.path().display(), harmless(&format!("{part}{note}")));
+    }
     // A file without colors is shown by its channels.
-    let colors = file.layers().map(|(layers, _)| layers).unwrap_or_default();
+    let mut colors = file.layers().map(|(layers, _)| layers).unwrap_or_default();
+    // Luminance alone is a channel.
+    colors.retain(|(_, channels)| channels[0] != channels[1]);
     let mut images: Vec<(String, String, Vec<usize>)> = Vec::new();
     for (layer, channels) in &colors {
+        let layer = file.name_in_file(layer);
         let name = if layer.is_empty() { name.to_owned() } else { format!("{name} {layer}") };
         images.push((name, String::new(), channels.to_vec()));
     }
-    for (index, channel) in channels.iter().enumerate() {
+    for (index, channel) in file.channels().iter().enumerate() {
         if !colors.iter().any(|(_, own)| own.contains(&index)) {
-            images.push((format!("{name} {channel}"), channel.clone(), vec![index]));
+            let channel = file.name_in_file(channel);
+            images.push((format!("{name} {channel}"), channel, vec![index]));
         }
     }
+    let (width, height) = (file.width(), file.height());
     let mut shown = Vec::new();
     let mut band = Band::default();
     for (name, channel, own) in images {
-        let mut values = vec![Vec::with_capacity(file.width() * file.height()); own.len()];
-        for top in (0..file.height()).step_by(file.band_height()) {
-            let rows = top..file.height().min(top + file.band_height());
+        // The only copy of the pixels that is whole in memory.
+        let mut values = vec![0.0; width * height * own.len()];
+        for top in (0..height).step_by(file.band_height()) {
+            let rows = top..height.min(top + file.band_height());
             file.read(rows.clone(), &own, &mut band)?;
-            for (at, plane) in values.iter_mut().enumerate() {
-                rows.clone().for_each(|y| plane.extend_from_slice(band.row(at, y - top)));
+            for at in 0..own.len() {
+                for y in rows.clone() {
+                    let start = (at * height + y) * width;
+                    values[start..start + width].copy_from_slice(band.row(at, y - top));
+                }
             }
         }
-        for (&index, plane) in own.iter().zip(&mut values) {
+        for (&index, plane) in own.iter().zip(values.chunks_exact_mut(width * height)) {
             // An integer was read as a fraction of the largest.
             if file.is_integer(index) {
                 let whole = |value: f32| (f64::from(value) * f64::from(u32::MAX)).round() as f32;
                 plane.iter_mut().for_each(|value| *value = whole(*value));
             }
         }
-        let size = (file.width(), file.height(), own.len());
-        let file = write_channels(folder, size, &values.concat()).with_context(cannot(folder))?;
+        let size = (width, height, own.len());
+        let file = write_channels(folder, size, &values).with_context(cannot(folder))?;
         shown.push(Shown { name, channel, file });
     }
     Ok(shown)

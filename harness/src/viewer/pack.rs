@@ -1,21 +1,19 @@
 //! Images as scripts that hand their bits to the viewer. `docs/decisions/0024-viewer-data.md` says why.
 
 use std::collections::HashSet;
-use std::io::{self, Write as _};
+use std::io::{self, Write};
 use std::path::Path;
 
 use base64::Engine as _;
 use basecode::Image;
-use flate2::{Compression, write::ZlibEncoder};
 use sha2::{Digest as _, Sha256};
 
 use super::{DATA_FOLDER, ImageFile, Samples, ViewedCase};
-use crate::files::{files_below, hex, write_whole};
+use crate::files::{files_below, hex, write_whole_by};
+use crate::imaging::packing::{Packing, Values};
 use crate::imaging::planes;
 use crate::imaging::reference::RegionMask;
 
-/// Level of zlib: higher ones take three times as long for 2 % of the bytes, since most bits are noise.
-const LEVEL: u32 = 3;
 /// What the path of a shared file begins with.
 const ABOVE: &str = "../";
 /// Hexadecimal digits of a digest in a file's name.
@@ -27,7 +25,7 @@ const DIGITS: usize = 20;
 /// # Errors
 /// When it cannot be written.
 pub fn write_image(folder: &Path, image: &Image) -> io::Result<ImageFile> {
-    write_channels(folder, (image.width, image.height, 3), &planes::channels(image))
+    write(folder, (image.width, image.height, 3), Values::Image(image), Samples::Float)
 }
 
 /// Writes channels below `folder` one after the other, as [`write_image`] does three.
@@ -39,11 +37,7 @@ pub fn write_channels(
     (width, height, channels): (usize, usize, usize),
     values: &[f32],
 ) -> io::Result<ImageFile> {
-    let (samples, planes) = match planes::exact_halves(values) {
-        Some(halves) => (Samples::Half, planes::of_words(&halves)),
-        None => (Samples::Float, planes::of_floats(values)),
-    };
-    write(folder, (width, height, channels, samples), &planes)
+    write(folder, (width, height, channels), Values::Floats(values), Samples::Float)
 }
 
 /// Writes what `write` does into the folder above, which the pages in several folders share: of a class, each image
@@ -70,8 +64,8 @@ pub fn write_excess(
     (width, height): (usize, usize),
     excess: &[f32],
 ) -> io::Result<ImageFile> {
-    let planes = planes::of_words(&planes::excess_halves(excess));
-    write(folder, (width, height, 1, Samples::Half), &planes)
+    let halves = planes::excess_halves(excess);
+    write(folder, (width, height, 1), Values::Words(&halves), Samples::Half)
 }
 
 /// Writes a mask of regions.
@@ -79,8 +73,8 @@ pub fn write_excess(
 /// # Errors
 /// When it cannot be written.
 pub fn write_mask(folder: &Path, mask: &RegionMask) -> io::Result<ImageFile> {
-    let planes = planes::of_words(&mask.pixels);
-    write(folder, (mask.width, mask.height, 1, Samples::Uint16), &planes)
+    let size = (mask.width, mask.height, 1);
+    write(folder, size, Values::Words(&mask.pixels), Samples::Uint16)
 }
 
 /// Removes the data files below `folder` that none of the cases needs: those of an earlier submission.
@@ -102,25 +96,54 @@ pub fn remove_others(folder: &Path, cases: &[&ViewedCase]) -> io::Result<()> {
     Ok(())
 }
 
+/// Writes samples; floats as halves where that loses nothing.
 fn write(
     folder: &Path,
-    (width, height, channels, samples): (usize, usize, usize, Samples),
-    planes: &[u8],
+    (width, height, channels): (usize, usize, usize),
+    values: Values,
+    samples: Samples,
 ) -> io::Result<ImageFile> {
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(LEVEL));
-    encoder.write_all(planes)?;
-    let packed = encoder.finish()?;
+    let packing = Packing::new(values);
+    let samples = if packing.halves() { Samples::Half } else { samples };
     let mut digest = Sha256::new();
     digest.update(format!("{width} {height} {channels} {samples:?} "));
-    digest.update(&packed);
+    packing.each_piece(&mut |bytes: &[u8]| digest.update(bytes));
     let digest = hex(&digest.finalize());
     let file = format!("{DATA_FOLDER}/{}.js", &digest[..DIGITS]);
     let path = folder.join(&file);
     if !path.is_file() {
-        let text = base64::engine::general_purpose::STANDARD.encode(packed);
-        write_whole(&path, format!("umbraImage(\"{file}\",\"{text}\");\n").as_bytes())?;
+        write_whole_by(&path, |out| {
+            write!(out, "umbraImage(\"{file}\",\"")?;
+            let mut text = Base64 { out, rest: Vec::new() };
+            packing.pack(&mut |bytes| text.write(bytes))?;
+            text.end()?.write_all(b"\");\n")
+        })?;
     }
     Ok(ImageFile { file, width, height, channels, samples })
+}
+
+/// Turns bytes into text as they come.
+struct Base64<'a> {
+    out: &'a mut dyn Write,
+    /// Bytes that are no whole group of three yet.
+    rest: Vec<u8>,
+}
+
+impl<'a> Base64<'a> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.rest.extend_from_slice(bytes);
+        let whole = self.rest.len() / 3 * 3;
+        let text = base64::engine::general_purpose::STANDARD.encode(&self.rest[..whole]);
+        self.rest.drain(..whole);
+        self.out.write_all(text.as_bytes())
+    }
+
+    /// Writes what is left.
+    fn end(self) -> io::Result<&'a mut dyn Write> {
+        let text = base64::engine::general_purpose::STANDARD.encode(&self.rest);
+        self.out.write_all(text.as_bytes())?;
+        Ok(self.out)
+    }
 }
 
 #[cfg(test)]

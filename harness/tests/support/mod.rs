@@ -5,6 +5,7 @@
 #![allow(dead_code)]
 
 pub mod chromium;
+pub mod made_exr;
 pub mod scratch;
 pub mod tar_bytes;
 pub mod zip_bytes;

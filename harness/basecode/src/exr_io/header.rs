@@ -5,10 +5,11 @@ use std::path::Path;
 
 use exr::compression::Compression;
 use exr::meta::BlockDescription;
-use exr::meta::attribute::{ChannelList, LevelMode, SampleType, Text};
+use exr::meta::attribute::{ChannelList, IntegerBounds, LevelMode, SampleType, Text};
 use exr::meta::header::Header;
 use exr::prelude::Vec2;
 
+use super::attributes::{DEEP, Hidden, PARTS};
 use super::{ImageError, MAX_PIXELS, MAX_SIDE};
 
 /// The most channels a file may hold.
@@ -16,6 +17,9 @@ const MAX_CHANNELS: usize = 1024;
 /// No codec that is read shrinks pixels more: deflate 1032 to 1 (zlib's technical notes), after PXR24 has made three
 /// bytes of four.
 const MAX_COMPRESSION_RATIO: usize = 1376;
+
+/// What is not read, and what is expected in its place.
+const DEEP_DATA: (&str, &str) = ("deep data", "one colour a pixel");
 
 /// What is read.
 const COMPRESSIONS: &str = "none, RLE, ZIP, PIZ, PXR24 or B44";
@@ -45,6 +49,96 @@ fn split_channel(name: &str) -> (&str, &str) {
 /// The layers of a file: their names, sorted, and the channels that hold their R, G and B.
 pub(super) type Channels = Vec<(String, [usize; 3])>;
 
+/// Where the stored pixels lie in the picture.
+pub(super) struct Placed {
+    /// Size of the picture.
+    pub width: usize,
+    pub height: usize,
+    /// Its first column and row in the plane of all images.
+    pub origin: [i32; 2],
+    /// The column and row of the first stored pixel.
+    pub at: [usize; 2],
+    /// The columns and rows that are stored.
+    pub stored: [usize; 2],
+}
+
+impl Placed {
+    /// A picture of which all is stored.
+    fn of(data: IntegerBounds) -> Self {
+        let Vec2(width, height) = data.size;
+        let origin = [data.position.0, data.position.1];
+        Self { width, height, origin, at: [0, 0], stored: [width, height] }
+    }
+
+    /// The smallest picture with all that is stored and all that is to be shown, or, if that were too large, all that
+    /// is stored.
+    fn within(data: IntegerBounds, display: IntegerBounds) -> Self {
+        let start = |axis: fn(Vec2<i32>) -> i32| axis(data.position).min(axis(display.position));
+        let end = |at: i32, size: usize| i64::from(at) + size as i64;
+        let span = |start: i32, a: i64, b: i64| (a.max(b) - i64::from(start)) as usize;
+        let (left, top) = (start(|p| p.0), start(|p| p.1));
+        let width =
+            span(left, end(data.position.0, data.size.0), end(display.position.0, display.size.0));
+        let height =
+            span(top, end(data.position.1, data.size.1), end(display.position.1, display.size.1));
+        if !fits(width, height) {
+            return Self::of(data);
+        }
+        let offset = |at: i32, start: i32| (i64::from(at) - i64::from(start)) as usize;
+        Self {
+            width,
+            height,
+            origin: [left, top],
+            at: [offset(data.position.0, left), offset(data.position.1, top)],
+            stored: [data.size.0, data.size.1],
+        }
+    }
+
+    /// Whether some of the picture is not stored.
+    pub(super) fn has_margin(&self) -> bool {
+        self.stored != [self.width, self.height]
+    }
+}
+
+/// Whether an image has pixels, and not too many.
+fn fits(width: usize, height: usize) -> bool {
+    (1..=MAX_SIDE).contains(&width)
+        && (1..=MAX_SIDE).contains(&height)
+        && width * height <= MAX_PIXELS
+}
+
+/// A window in words.
+fn words(window: IntegerBounds) -> String {
+    let (Vec2(width, height), Vec2(x, y)) = (window.size, window.position);
+    format!("{width}x{height} at ({x}, {y})")
+}
+
+/// The layers that hold luminance: their names, and the channels of red, green and blue, counted on after those of the
+/// file where they are computed of chroma; and of each of those the channels Y, RY and BY.
+pub(super) fn luminance_layers(channels: &ChannelList) -> (Channels, Vec<[usize; 3]>) {
+    let names: Vec<String> = channels.list.iter().map(|c| name_of(&c.name)).collect();
+    let (mut layers, mut chroma) = (Channels::new(), Vec::new());
+    let find = |layer: &str, component: &str| {
+        let at = names.iter().position(|name| split_channel(name) == (layer, component));
+        at.filter(|&at| channels.list[at].sample_type != SampleType::U32)
+    };
+    for name in &names {
+        let (layer, component) = split_channel(name);
+        let Some(y) = find(layer, "Y").filter(|_| component == "Y") else { continue };
+        match (find(layer, "RY"), find(layer, "BY")) {
+            (Some(ry), Some(by)) => {
+                let first = names.len() + 3 * chroma.len();
+                layers.push((layer.to_owned(), [first, first + 1, first + 2]));
+                chroma.push([y, ry, by]);
+            }
+            // Coordinates and vectors have a Y too.
+            _ if find(layer, "X").is_none() => layers.push((layer.to_owned(), [y; 3])),
+            _ => {}
+        }
+    }
+    (layers, chroma)
+}
+
 /// A file that is being read, for checks and messages.
 pub(super) struct Checks<'a> {
     pub path: &'a Path,
@@ -53,7 +147,8 @@ pub(super) struct Checks<'a> {
 
 impl Checks<'_> {
     /// Magic number and version field, of the first bytes, for messages that the decoder would not give.
-    pub(super) fn signature(&self, start: &[u8]) -> Result<(), ImageError> {
+    /// `refused` are flags of [`super::attributes`].
+    pub(super) fn signature(&self, start: &[u8], refused: u8) -> Result<(), ImageError> {
         let found = match start {
             [] => "nothing (the file is empty)".to_owned(),
             bytes => {
@@ -69,9 +164,9 @@ impl Checks<'_> {
         let Some(flags) = start.get(5) else {
             return Err(self.truncated("the version field"));
         };
-        match flags {
-            f if f & 0x08 != 0 => Err(self.unsupported("deep data", "one colour a pixel")),
-            f if f & 0x10 != 0 => Err(self.unsupported("several parts", "one part")),
+        match flags & refused {
+            f if f & DEEP != 0 => Err(self.unsupported(DEEP_DATA.0, DEEP_DATA.1)),
+            f if f & PARTS != 0 => Err(self.unsupported("several parts", "one part")),
             _ => Ok(()),
         }
     }
@@ -97,35 +192,17 @@ impl Checks<'_> {
         Ok(())
     }
 
-    /// Everything that must hold before memory for pixels is taken; returns width and height.
+    /// Everything that must hold before memory for pixels is taken.
     pub(super) fn header(
         &self,
         header: &Header,
         notes: &mut Vec<String>,
-    ) -> Result<(usize, usize), ImageError> {
-        let Vec2(width, height) = header.layer_size;
-        if width == 0
-            || height == 0
-            || width > MAX_SIDE
-            || height > MAX_SIDE
-            || width * height > MAX_PIXELS
-        {
-            return Err(ImageError::Size {
-                path: self.path.into(),
-                found: format!("the image is {width}x{height}"),
-                expected: format!("1 to {MAX_SIDE} pixels a side and at most {MAX_PIXELS} pixels"),
-            });
-        }
-        let display = header.shared_attributes.display_window;
-        let data = header.data_window();
+    ) -> Result<Placed, ImageError> {
+        let (data, display) = (header.data_window(), header.shared_attributes.display_window);
+        self.size(header)?;
         if data != display {
-            let words =
-                |w: Vec2<usize>, p: Vec2<i32>| format!("{}x{} at ({}, {})", w.0, w.1, p.0, p.1);
-            return Err(ImageError::Windows {
-                path: self.path.into(),
-                data: words(data.size, data.position),
-                display: words(display.size, display.position),
-            });
+            let (data, display) = (words(data), words(display));
+            return Err(ImageError::Windows { path: self.path.into(), data, display });
         }
         if data.position != Vec2(0, 0) {
             notes.push(format!(
@@ -133,16 +210,98 @@ impl Checks<'_> {
                 data.position.0, data.position.1
             ));
         }
-        if let BlockDescription::Tiles(tiles) = header.blocks {
-            if tiles.level_mode != LevelMode::Singular {
-                return Err(self.unsupported("several resolution levels", "full resolution only"));
+        if let BlockDescription::Tiles(tiles) = header.blocks
+            && tiles.level_mode != LevelMode::Singular
+        {
+            return Err(self.unsupported("several resolution levels", "full resolution only"));
+        }
+        self.pixels(header, header.channels.bytes_per_pixel * data.size.area())?;
+        Ok(Placed::of(data))
+    }
+
+    /// As [`Checks::header`], of a part of any kind.
+    pub(super) fn any_header(
+        &self,
+        header: &Header,
+        hidden: &Hidden,
+        notes: &mut Vec<String>,
+    ) -> Result<Placed, ImageError> {
+        if hidden.deep {
+            return Err(self.unsupported(DEEP_DATA.0, DEEP_DATA.1));
+        }
+        self.size(header)?;
+        let (data, display) = (header.data_window(), header.shared_attributes.display_window);
+        if let BlockDescription::Tiles(tiles) = header.blocks
+            && tiles.level_mode != LevelMode::Singular
+        {
+            notes.push("only the full one of several resolutions is read".into());
+        }
+        let mut bytes = 0;
+        for (channel, factors) in header.channels.list.iter().zip(&hidden.sampling) {
+            let name = || visible(&name_of(&channel.name));
+            let [across, down] = *factors;
+            if *factors != [1, 1] {
+                notes.push(format!("channel {} has a sample for {across}x{down} pixels", name()));
+                let whole = |at: i32, size: usize, factor: usize| {
+                    i64::from(at) % factor as i64 == 0 && size.is_multiple_of(factor)
+                };
+                let (Vec2(x, y), Vec2(width, height)) = (data.position, data.size);
+                if !whole(x, width, across) || !whole(y, height, down) {
+                    let what = format!(
+                        "channel {} has a sample for {across}x{down} pixels of {}",
+                        name(),
+                        words(data)
+                    );
+                    return Err(self.malformed(what));
+                }
+                // The decoder has them wrong.
+                use Compression::{RLE, Uncompressed, ZIP1, ZIP16};
+                if !matches!(header.compression, Uncompressed | RLE | ZIP1 | ZIP16)
+                    || header.blocks != BlockDescription::ScanLines
+                {
+                    let what = format!("channel {} is subsampled, {}", name(), header.compression);
+                    return Err(
+                        self.unsupported(&what, "scan lines, compressed by none, RLE or ZIP")
+                    );
+                }
             }
-            if tiles.tile_size.0 > MAX_SIDE || tiles.tile_size.1 > MAX_SIDE {
-                return Err(self.malformed(format!(
-                    "tiles of {}x{} pixels",
-                    tiles.tile_size.0, tiles.tile_size.1
-                )));
-            }
+            bytes += channel.sample_type.bytes_per_sample() * data.size.area() / (across * down);
+        }
+        self.pixels(header, bytes)?;
+        let placed = Placed::within(data, display);
+        if data != display {
+            let margin = match placed.has_margin() {
+                true => "; pixels that are not stored are black",
+                false => "; all stored pixels are taken",
+            };
+            let (data, display) = (words(data), words(display));
+            notes.push(format!("the pixels cover {data}, the picture is {display}{margin}"));
+        }
+        Ok(placed)
+    }
+
+    /// The stored pixels must be some, and not too many.
+    fn size(&self, header: &Header) -> Result<(), ImageError> {
+        let Vec2(width, height) = header.layer_size;
+        if fits(width, height) {
+            return Ok(());
+        }
+        Err(ImageError::Size {
+            path: self.path.into(),
+            found: format!("the image is {width}x{height}"),
+            expected: format!("1 to {MAX_SIDE} pixels a side and at most {MAX_PIXELS} pixels"),
+        })
+    }
+
+    /// The channels and how they are stored, in so many bytes before compression.
+    fn pixels(&self, header: &Header, pixel_bytes: usize) -> Result<(), ImageError> {
+        if let BlockDescription::Tiles(tiles) = header.blocks
+            && (tiles.tile_size.0 > MAX_SIDE || tiles.tile_size.1 > MAX_SIDE)
+        {
+            return Err(self.malformed(format!(
+                "tiles of {}x{} pixels",
+                tiles.tile_size.0, tiles.tile_size.1
+            )));
         }
         let mut names = header.channels.list.windows(2);
         if let Some([twice, _]) = names.find(|pair| pair[0].name == pair[1].name) {
@@ -161,7 +320,6 @@ impl Checks<'_> {
             let found = format!("{} channels", header.channels.list.len());
             return Err(self.unsupported(&found, &format!("at most {MAX_CHANNELS}")));
         }
-        let pixel_bytes = width * height * header.channels.bytes_per_pixel;
         let least = 8 * header.chunk_count
             + if header.compression == Uncompressed {
                 pixel_bytes
@@ -169,11 +327,12 @@ impl Checks<'_> {
                 pixel_bytes / MAX_COMPRESSION_RATIO
             };
         if self.file_bytes < least as u64 {
+            let Vec2(width, height) = header.layer_size;
             return Err(self.truncated(&format!(
                 "the pixels of a {width}x{height} image, which take {least} bytes or more"
             )));
         }
-        Ok((width, height))
+        Ok(())
     }
 
     /// Finds R, G and B of each layer. What cannot be a color image is ignored, with a note, where another layer can.

@@ -1,43 +1,55 @@
 //! The pixels of a file, a few rows at a time, from several threads at once.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Seek};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use exr::block;
-use exr::block::chunk::{
-    CompressedBlock, CompressedScanLineBlock, CompressedTileBlock, TileCoordinates,
-};
 use exr::math::Vec2;
-use exr::meta::BlockDescription;
-use exr::meta::attribute::{IntegerBounds, SampleType};
+use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 
-use super::header::{Channels, Checks, name_of, provenance, visible};
+use super::attributes::{DEEP, PARTS, headers};
+use super::blocks::{Block, Part, find_blocks};
+use super::header::{Channels, Checks, Placed, luminance_layers, name_of, provenance, visible};
+use super::luminance;
+use super::source::{Cursor, Source};
 use super::{ExrLayers, ImageError, MAX_FILE_BYTES, read_file};
 use crate::Vec3;
 use crate::image::Image;
 
 /// Bytes in which a header's windows are looked for; most headers have a few hundred.
 const HEAD: u64 = 1 << 16;
+/// Bytes in which all headers of a file of any kind must lie.
+const HEADERS: u64 = 16 << 20;
 /// About so many bytes of samples are decoded at a time: what a core's own cache holds.
 const BAND_BYTES: usize = 256 << 10;
 
-/// An EXR file whose header has been checked and whose blocks have been found. No pixel is in memory.
+/// An EXR file, or a part of one, whose header has been checked and whose blocks have been found. No pixel is in
+/// memory.
+///
+/// Rows and columns are those of the picture: the stored pixels, and black ones where the display window has more.
 pub struct ExrRows<'a> {
-    source: Source<'a>,
+    source: Arc<Source<'a>>,
     path: PathBuf,
+    /// The name of the part; empty where the file has only one.
+    part: String,
     header: Header,
     /// From top to bottom, then from left to right; they cover every pixel once.
     blocks: Vec<Block>,
     /// Bytes of a pixel's samples before those of each channel.
     before: Vec<usize>,
-    width: usize,
-    height: usize,
+    /// How many columns and rows one sample of each channel stands for; empty where that is one for all.
+    sampling: Vec<[usize; 2]>,
+    /// Layers of luminance, whose channels are counted on after those of the file where they are computed.
+    gray: Channels,
+    /// The Y, RY and BY of the layers whose colors are computed.
+    chroma: Vec<[usize; 3]>,
+    placed: Placed,
     notes: Vec<String>,
 }
 
@@ -56,22 +68,6 @@ impl Band {
     }
 }
 
-/// Where a block's samples lie in the file, and in the image.
-struct Block {
-    /// Its number in the file, from 1.
-    number: usize,
-    at: u64,
-    bytes: usize,
-    place: IntegerBounds,
-}
-
-impl Block {
-    fn rows(&self) -> Range<usize> {
-        let top = self.place.position.y() as usize;
-        top..top + self.place.size.height()
-    }
-}
-
 impl ExrRows<'static> {
     /// Opens a file and reads all but its pixels.
     ///
@@ -79,16 +75,35 @@ impl ExrRows<'static> {
     /// See [`ImageError`]; nothing that a file can hold makes this panic.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, ImageError> {
         let path = path.as_ref();
-        let io = |source| ImageError::Io { path: path.into(), source };
-        let file = File::open(path).map_err(io)?;
-        let meta = file.metadata().map_err(io)?;
-        // A pipe can be read only once.
-        let source = match meta.is_file() {
-            true => Source::File(file, meta.len()),
-            false => Source::Memory(read_file(file, path)?.into()),
-        };
+        let source = source_of(path)?;
         Self::new(source, path)
     }
+
+    /// Opens all parts of a file of any kind: cropped or with overscan, with luminance or subsampled channels. Answers
+    /// those that can be read, and what is to know of the others.
+    ///
+    /// # Errors
+    /// See [`ImageError`]; also where no part can be read, as in a file of deep data.
+    pub fn open_parts(path: impl AsRef<Path>) -> Result<(Vec<Self>, Vec<String>), ImageError> {
+        let path = path.as_ref();
+        let source = source_of(path)?;
+        if source.len() > MAX_FILE_BYTES {
+            return Err(too_long(path));
+        }
+        guarded(path, || Self::index_parts(Arc::new(source), path))
+    }
+}
+
+/// A file's bytes.
+fn source_of(path: &Path) -> Result<Source<'static>, ImageError> {
+    let io = |source| ImageError::Io { path: path.into(), source };
+    let file = File::open(path).map_err(io)?;
+    let meta = file.metadata().map_err(io)?;
+    // A pipe can be read only once.
+    Ok(match meta.is_file() {
+        true => Source::File(file, meta.len()),
+        false => Source::Memory(read_file(file, path)?.into()),
+    })
 }
 
 impl<'a> ExrRows<'a> {
@@ -101,28 +116,44 @@ impl<'a> ExrRows<'a> {
         if source.len() > MAX_FILE_BYTES {
             return Err(too_long(path));
         }
-        guarded(path, || Self::index(source, path))
+        guarded(path, || Self::index(Arc::new(source), path))
     }
 
     /// Width in pixels.
     pub fn width(&self) -> usize {
-        self.width
+        self.placed.width
     }
 
     /// Height in pixels.
     pub fn height(&self) -> usize {
-        self.height
+        self.placed.height
     }
 
     /// Where the first column and row lie in the plane of all images; mostly (0, 0).
     pub fn origin(&self) -> [i32; 2] {
-        let Vec2(x, y) = self.header.data_window().position;
-        [x, y]
+        self.placed.origin
+    }
+
+    /// The name of the part; empty where the file has only one.
+    pub fn part(&self) -> &str {
+        &self.part
     }
 
     /// The file.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The name that a layer or channel of this part has in the whole file: that of the part comes first, unless it
+    /// does anyway.
+    pub fn name_in_file(&self, name: &str) -> String {
+        let begins = |rest: &str| rest.is_empty() || rest.starts_with('.');
+        match &*self.part {
+            "" => name.to_owned(),
+            part if name.strip_prefix(part).is_some_and(begins) => name.to_owned(),
+            part if name.is_empty() => part.to_owned(),
+            part => format!("{part}.{name}"),
+        }
     }
 
     /// The names of all channels, as the file has them.
@@ -132,7 +163,8 @@ impl<'a> ExrRows<'a> {
 
     /// Whether a channel (an index of [`ExrRows::channels`]) holds integers.
     pub fn is_integer(&self, channel: usize) -> bool {
-        self.header.channels.list[channel].sample_type == SampleType::U32
+        let channel = self.header.channels.list.get(channel);
+        channel.is_some_and(|channel| channel.sample_type == SampleType::U32)
     }
 
     /// What a reader may want to know about the file, but for its channels.
@@ -153,20 +185,30 @@ impl<'a> ExrRows<'a> {
     }
 
     /// The layers with R, G and B: name, sorted, and the indices of the three channels; and what a
-    /// reader may want to know about the file, such as channels of no layer.
+    /// reader may want to know about the file, such as channels of no layer. Of a part that was opened by
+    /// [`ExrRows::open_parts`] and has none, the layers of luminance: one channel three times, or three that are
+    /// computed of chroma.
     ///
     /// # Errors
     /// When there is none, because each lacks a channel or holds integers.
     pub fn layers(&self) -> Result<(Channels, Vec<String>), ImageError> {
         let mut notes = self.notes.clone();
-        let layers = self.checks().layers(&self.header.channels, &mut notes)?;
-        Ok((layers, notes))
+        match self.checks().layers(&self.header.channels, &mut notes) {
+            Err(_) if !self.gray.is_empty() => {
+                notes.push(match self.chroma.is_empty() {
+                    true => "luminance only (channel Y): red, green and blue are alike".into(),
+                    false => "colors are made of luminance and chroma (Y, RY, BY)".into(),
+                });
+                Ok((self.gray.clone(), notes))
+            }
+            layers => Ok((layers?, notes)),
+        }
     }
 
     /// How many rows are best read at once: whole blocks, and about as much as a core's cache holds.
     pub fn band_height(&self) -> usize {
         let block = self.blocks.first().map_or(1, |block| block.place.size.height());
-        let row = 4 * self.width * self.header.channels.list.len();
+        let row = 4 * self.placed.width * self.header.channels.list.len();
         (BAND_BYTES / row.max(1)).max(1).next_multiple_of(block)
     }
 
@@ -184,20 +226,67 @@ impl<'a> ExrRows<'a> {
         channels: &[usize],
         band: &mut Band,
     ) -> Result<(), ImageError> {
-        assert!(rows.end <= self.height, "rows {rows:?} of an image {} high", self.height);
-        band.width = self.width;
+        let Placed { width, height, at: [_, above], stored: [_, stored], .. } = self.placed;
+        assert!(rows.end <= height, "rows {rows:?} of an image {height} high");
+        band.width = width;
         band.planes.resize_with(channels.len(), Vec::new);
         for plane in &mut band.planes {
-            plane.resize(rows.len() * self.width, 0.0);
+            plane.resize(rows.len() * width, 0.0);
+            if self.placed.has_margin() {
+                plane.fill(0.0);
+            }
         }
-        let first = self.blocks.partition_point(|block| block.rows().end <= rows.start);
-        let blocks = self.blocks[first..].iter().take_while(|block| block.rows().start < rows.end);
+        if channels.iter().any(|&channel| channel >= self.before.len()) {
+            return self.read_colors(rows, channels, band);
+        }
+        let inside = |y: usize| y.saturating_sub(above).min(stored);
+        let wanted = inside(rows.start)..inside(rows.end);
+        // A sample of a row may stand for rows below it.
+        let down = self.sampling.iter().map(|[_, down]| wanted.start % down).max().unwrap_or(0);
+        let from = wanted.start - down;
+        let first = self.blocks.partition_point(|block| block.rows().end <= from);
+        let blocks =
+            self.blocks[first..].iter().take_while(|block| block.rows().start < wanted.end);
         guarded(&self.path, || {
             for block in blocks {
-                self.read_block(block, &rows, channels, band)?;
+                if self.sampling.is_empty() {
+                    self.read_block(block, (&rows, &wanted), channels, band)?;
+                } else {
+                    self.spread_block(block, (&rows, &wanted), channels, band)?;
+                }
             }
             Ok(())
         })
+    }
+
+    /// As [`ExrRows::read`], where some channels are computed of chroma.
+    fn read_colors(
+        &self,
+        rows: Range<usize>,
+        channels: &[usize],
+        band: &mut Band,
+    ) -> Result<(), ImageError> {
+        let count = self.before.len();
+        let weights = luminance::weights(self.chromaticities());
+        let mut stored = Band::default();
+        for (plane, &channel) in band.planes.iter_mut().zip(channels) {
+            let sources = match channel.checked_sub(count) {
+                Some(computed) => self.chroma[computed / 3],
+                None => [channel; 3],
+            };
+            self.read(rows.clone(), &sources, &mut stored)?;
+            let [y, ry, by] = [0, 1, 2].map(|source| &stored.planes[source]);
+            match channel.checked_sub(count) {
+                Some(computed) => {
+                    let values = y.iter().zip(ry).zip(by);
+                    for (value, ((&y, &ry), &by)) in plane.iter_mut().zip(values) {
+                        *value = luminance::component(computed % 3, weights, [y, ry, by]);
+                    }
+                }
+                None => plane.copy_from_slice(y),
+            }
+        }
+        Ok(())
     }
 
     /// The whole image of plain R, G and B.
@@ -230,16 +319,16 @@ impl<'a> ExrRows<'a> {
     /// The whole images of these layers.
     fn whole(&self, layers: Channels) -> Result<BTreeMap<String, Image>, ImageError> {
         let channels: Vec<usize> = layers.iter().flat_map(|(_, found)| *found).collect();
-        let mut images = vec![Image::new(self.width, self.height); layers.len()];
+        let mut images = vec![Image::new(self.placed.width, self.placed.height); layers.len()];
         let mut band = Band::default();
         let height = self.band_height();
-        for top in (0..self.height).step_by(height) {
-            let rows = top..self.height.min(top + height);
+        for top in (0..self.placed.height).step_by(height) {
+            let rows = top..self.placed.height.min(top + height);
             self.read(rows.clone(), &channels, &mut band)?;
             for (index, image) in images.iter_mut().enumerate() {
                 for y in rows.clone() {
                     let [r, g, b] = [0, 1, 2].map(|c| band.row(3 * index + c, y - top));
-                    let pixels = &mut image.pixels[y * self.width..][..self.width];
+                    let pixels = &mut image.pixels[y * self.placed.width..][..self.placed.width];
                     for (((pixel, &r), &g), &b) in pixels.iter_mut().zip(r).zip(g).zip(b) {
                         *pixel = Vec3::new(r, g, b);
                     }
@@ -254,15 +343,11 @@ impl<'a> ExrRows<'a> {
     }
 
     /// Reads the header and finds the blocks, which follow each other in any order.
-    fn index(source: Source<'a>, path: &Path) -> Result<Self, ImageError> {
+    fn index(source: Arc<Source<'a>>, path: &Path) -> Result<Self, ImageError> {
         let checks = Checks { path, file_bytes: source.len() };
-        let mut start = [0; 24];
-        let start = &mut start[..source.len().min(24) as usize];
-        source.read(start, 0).map_err(|source| ImageError::Io { path: path.into(), source })?;
-        checks.signature(start)?;
-        let mut head = vec![0; source.len().min(HEAD) as usize];
-        source.read(&mut head, 0).map_err(|source| ImageError::Io { path: path.into(), source })?;
-        checks.windows(&head)?;
+        let start = beginning(&source, 24, path)?;
+        checks.signature(&start, DEEP | PARTS)?;
+        checks.windows(&beginning(&source, HEAD, path)?)?;
         let mut cursor = BufReader::new(Cursor { source: &source, at: 0 });
         let reader = block::read(&mut cursor, false).map_err(|e| checks.error(e, "the header"))?;
         let [header] = reader.headers() else {
@@ -271,52 +356,160 @@ impl<'a> ExrRows<'a> {
         let header = header.clone();
         drop(reader);
         let mut notes = Vec::new();
-        let (width, height) = checks.header(&header, &mut notes)?;
+        let placed = checks.header(&header, &mut notes)?;
         let after_header = cursor
             .stream_position()
             .map_err(|source| ImageError::Io { path: path.into(), source })?;
-        let blocks = find_blocks(&source, &checks, &header, after_header)?;
+        drop(cursor);
+        let part = Part { header: &header, deep: false };
+        let blocks = find_blocks(&source, &checks, &[part], (after_header, false))?;
+        let blocks = blocks.into_iter().flatten().collect();
+        Ok(Self::of_part(source, path, header, blocks, placed, notes))
+    }
+
+    /// Reads all headers and finds the blocks of all parts that can be read; and says what the others are.
+    fn index_parts(
+        source: Arc<Source<'a>>,
+        path: &Path,
+    ) -> Result<(Vec<Self>, Vec<String>), ImageError> {
+        let checks = Checks { path, file_bytes: source.len() };
+        let head = beginning(&source, HEADERS, path)?;
+        // Deep data beside flat ones are left out.
+        let refused = if head.get(5).is_some_and(|flags| flags & PARTS != 0) { 0 } else { DEEP };
+        checks.signature(&head, refused)?;
+        let found = headers(&head).ok_or_else(|| checks.truncated("the header"))?;
+        for (_, place) in &found.parts {
+            checks.windows(&head[place.clone()])?;
+        }
+        let all = {
+            let plain = Source::Memory(found.bytes.into());
+            let cursor = BufReader::new(Cursor { source: &plain, at: 0 });
+            let reader = block::read(cursor, false).map_err(|e| checks.error(e, "the header"))?;
+            reader.headers().to_vec()
+        };
+        if all.len() != found.parts.len() {
+            return Err(checks.malformed("its headers contradict each other".into()));
+        }
+        let walked: Vec<Part> = all
+            .iter()
+            .zip(&found.parts)
+            .map(|(header, (hidden, _))| Part { header, deep: hidden.deep })
+            .collect();
+        let blocks = find_blocks(&source, &checks, &walked, (found.end, found.numbered))?;
+        let several = all.len() > 1;
+        let (mut parts, mut left_out, mut first) = (Vec::new(), Vec::new(), None);
+        for ((header, (hidden, _)), blocks) in all.into_iter().zip(found.parts).zip(blocks) {
+            let name = header.own_attributes.layer_name.as_ref().map(name_of);
+            let name = name.filter(|_| several).unwrap_or_default();
+            let mut notes = Vec::new();
+            match checks.any_header(&header, &hidden, &mut notes) {
+                Ok(placed) => {
+                    let source = Arc::clone(&source);
+                    let mut part = Self::of_part(source, path, header, blocks, placed, notes);
+                    part.part = name;
+                    if hidden.sampling.iter().any(|factors| *factors != [1, 1]) {
+                        for (channel, factors) in
+                            part.header.channels.list.iter_mut().zip(&hidden.sampling)
+                        {
+                            channel.sampling = Vec2(factors[0], factors[1]);
+                        }
+                        part.sampling = hidden.sampling;
+                    }
+                    (part.gray, part.chroma) = luminance_layers(&part.header.channels);
+                    parts.push(part);
+                }
+                Err(error @ (ImageError::Unsupported { .. } | ImageError::Size { .. })) => {
+                    let (what, expected) = match &error {
+                        ImageError::Unsupported { what, expected, .. } => (what, expected),
+                        ImageError::Size { found, expected, .. } => (found, expected),
+                        _ => continue,
+                    };
+                    let name = visible(&name);
+                    left_out.push(format!("part {name} is left out: {what}, expected {expected}"));
+                    first.get_or_insert(error);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        match first {
+            Some(error) if parts.is_empty() => Err(error),
+            _ => Ok((parts, left_out)),
+        }
+    }
+
+    fn of_part(
+        source: Arc<Source<'a>>,
+        path: &Path,
+        header: Header,
+        blocks: Vec<Block>,
+        placed: Placed,
+        notes: Vec<String>,
+    ) -> Self {
         let mut before = Vec::new();
         let mut bytes = 0;
         for channel in &header.channels.list {
             before.push(bytes);
             bytes += channel.sample_type.bytes_per_sample();
         }
-        Ok(Self { path: path.into(), source, header, blocks, before, width, height, notes })
+        let (path, part) = (path.into(), String::new());
+        let (sampling, gray, chroma) = (Vec::new(), Vec::new(), Vec::new());
+        Self { source, path, part, header, blocks, before, sampling, gray, chroma, placed, notes }
     }
 
-    /// Puts what a block holds of these rows into the band.
+    /// Puts what a block holds of these rows into the band: its rows, and what is wanted of the stored ones.
     fn read_block(
         &self,
         block: &Block,
-        rows: &Range<usize>,
+        (rows, wanted): (&Range<usize>, &Range<usize>),
         channels: &[usize],
         band: &mut Band,
     ) -> Result<(), ImageError> {
-        let Band { planes, bytes, .. } = band;
+        let Band { planes, bytes, width } = band;
+        let [left, top] = self.placed.at;
         let samples = self.samples(block, bytes)?;
-        let (left, columns) = (block.place.position.x() as usize, block.place.size.width());
+        let (first, columns) = (block.place.position.x() as usize, block.place.size.width());
         let line_bytes = columns * self.header.channels.bytes_per_pixel;
         let inside = block.rows();
-        for y in inside.start.max(rows.start)..inside.end.min(rows.end) {
+        for y in inside.start.max(wanted.start)..inside.end.min(wanted.end) {
             let line = &samples[(y - inside.start) * line_bytes..][..line_bytes];
             for (plane, &channel) in planes.iter_mut().zip(channels) {
-                let row = &mut plane[(y - rows.start) * self.width + left..][..columns];
-                let from = &line[columns * self.before[channel]..];
-                match self.header.channels.list[channel].sample_type {
-                    SampleType::F16 => {
-                        for (value, b) in row.iter_mut().zip(from.as_chunks::<2>().0) {
-                            *value = from_half(u16::from_ne_bytes(*b));
-                        }
-                    }
-                    SampleType::F32 => {
-                        for (value, b) in row.iter_mut().zip(from.as_chunks::<4>().0) {
-                            *value = f32::from_ne_bytes(*b);
-                        }
-                    }
-                    SampleType::U32 => {
-                        for (value, b) in row.iter_mut().zip(from.as_chunks::<4>().0) {
-                            *value = u32::from_ne_bytes(*b) as f32 / u32::MAX as f32;
+                let start = (y + top - rows.start) * *width + left + first;
+                let row = &mut plane[start..][..columns];
+                self.decode(channel, &line[columns * self.before[channel]..], row);
+            }
+        }
+        Ok(())
+    }
+
+    /// As [`ExrRows::read_block`], where channels have fewer samples: each is put in all the pixels that it stands for.
+    fn spread_block(
+        &self,
+        block: &Block,
+        (rows, wanted): (&Range<usize>, &Range<usize>),
+        channels: &[usize],
+        band: &mut Band,
+    ) -> Result<(), ImageError> {
+        let Band { planes, bytes, width } = band;
+        let [left, top] = self.placed.at;
+        let mut samples = self.samples(block, bytes)?;
+        let columns = block.place.size.width();
+        let mut values = vec![0.0; columns];
+        for y in block.rows() {
+            for (channel, &[across, down]) in self.sampling.iter().enumerate() {
+                if y % down != 0 {
+                    continue;
+                }
+                let count = columns / across;
+                let kind = self.header.channels.list[channel].sample_type;
+                let (line, rest) = samples.split_at(count * kind.bytes_per_sample());
+                samples = rest;
+                let targets = planes.iter_mut().zip(channels).filter(|(_, own)| **own == channel);
+                for (plane, _) in targets {
+                    self.decode(channel, line, &mut values[..count]);
+                    for y in y.max(wanted.start)..(y + down).min(wanted.end) {
+                        let row = &mut plane[(y + top - rows.start) * *width + left..][..columns];
+                        for (pixels, value) in row.chunks_exact_mut(across).zip(&values) {
+                            pixels.fill(*value);
                         }
                     }
                 }
@@ -325,11 +518,46 @@ impl<'a> ExrRows<'a> {
         Ok(())
     }
 
+    /// Turns samples of a channel into values.
+    fn decode(&self, channel: usize, from: &[u8], row: &mut [f32]) {
+        match self.header.channels.list[channel].sample_type {
+            SampleType::F16 => {
+                for (value, b) in row.iter_mut().zip(from.as_chunks::<2>().0) {
+                    *value = from_half(u16::from_ne_bytes(*b));
+                }
+            }
+            SampleType::F32 => {
+                for (value, b) in row.iter_mut().zip(from.as_chunks::<4>().0) {
+                    *value = f32::from_ne_bytes(*b);
+                }
+            }
+            SampleType::U32 => {
+                for (value, b) in row.iter_mut().zip(from.as_chunks::<4>().0) {
+                    *value = u32::from_ne_bytes(*b) as f32 / u32::MAX as f32;
+                }
+            }
+        }
+    }
+
+    /// The bytes of all samples of a block.
+    fn block_bytes(&self, block: &Block) -> usize {
+        let (columns, rows) = (block.place.size.width(), block.rows());
+        if self.sampling.is_empty() {
+            return columns * rows.len() * self.header.channels.bytes_per_pixel;
+        }
+        let channels = self.header.channels.list.iter().zip(&self.sampling);
+        let bytes = |(channel, &[across, down]): (&ChannelDescription, &[usize; 2])| {
+            let lines = rows.clone().filter(|y| y % down == 0).count();
+            lines * (columns / across) * channel.sample_type.bytes_per_sample()
+        };
+        channels.map(bytes).sum()
+    }
+
     /// The decompressed samples of a block, line by line, channel by channel, in this machine's byte order.
     fn samples<'b>(&self, block: &Block, buffer: &'b mut Vec<u8>) -> Result<&'b [u8], ImageError> {
         let place = || format!("pixel block {} of {}", block.number, self.blocks.len());
         let (columns, rows) = (block.place.size.width(), block.place.size.height());
-        let expected = columns * rows * self.header.channels.bytes_per_pixel;
+        let expected = self.block_bytes(block);
         buffer.resize(block.bytes, 0);
         self.source.read(buffer, block.at).map_err(|error| match error.kind() {
             io::ErrorKind::UnexpectedEof => self.checks().truncated(&place()),
@@ -337,16 +565,20 @@ impl<'a> ExrRows<'a> {
         })?;
         // Samples that compression would have made longer are stored as they are.
         if buffer.len() != expected || cfg!(target_endian = "big") {
-            *buffer = self
-                .header
-                .compression
-                .decompress_image_section_from_le(
-                    &self.header,
-                    std::mem::take(buffer),
-                    block.place,
-                    false,
-                )
-                .map_err(|e| self.checks().error(e, &place()))?;
+            let packed = std::mem::take(buffer);
+            let unpack = |header: &Header, packed: Vec<u8>| {
+                let compression = header.compression;
+                compression.decompress_image_section_from_le(header, packed, block.place, false)
+            };
+            let unpacked = if self.sampling.is_empty() {
+                unpack(&self.header, packed)
+            } else {
+                // The decoder counts the bytes of all channels for every pixel.
+                let mut header = self.header.clone();
+                header.channels.bytes_per_pixel = expected / (columns * rows).max(1);
+                unpack(&header, packed)
+            };
+            *buffer = unpacked.map_err(|e| self.checks().error(e, &place()))?;
         }
         if buffer.len() != expected {
             return Err(self.checks().malformed(format!(
@@ -356,74 +588,6 @@ impl<'a> ExrRows<'a> {
         }
         Ok(buffer)
     }
-}
-
-/// Walks through the blocks of a file. The table of their offsets is not needed, and often wrong.
-fn find_blocks(
-    source: &Source<'_>,
-    checks: &Checks<'_>,
-    header: &Header,
-    after_header: u64,
-) -> Result<Vec<Block>, ImageError> {
-    let count = header.chunk_count;
-    let mut at = after_header + 8 * count as u64;
-    let mut blocks = Vec::with_capacity(count);
-    for number in 1..=count {
-        let place = || format!("pixel block {number} of {count}");
-        let read = |bytes: &mut [u8], at: u64| {
-            source.read(bytes, at).map_err(|error| match error.kind() {
-                io::ErrorKind::UnexpectedEof => checks.truncated(&place()),
-                _ => ImageError::Io { path: checks.path.into(), source: error },
-            })
-        };
-        let mut head = [0; 20];
-        let head = match header.blocks {
-            BlockDescription::ScanLines => &mut head[..8],
-            BlockDescription::Tiles(_) => &mut head[..],
-        };
-        read(head, at)?;
-        at += head.len() as u64;
-        let block = match *head.as_chunks::<4>().0 {
-            [y, _] => CompressedBlock::ScanLine(CompressedScanLineBlock {
-                y_coordinate: i32::from_le_bytes(y),
-                compressed_pixels_le: Vec::new(),
-            }),
-            _ => CompressedBlock::Tile(CompressedTileBlock {
-                coordinates: TileCoordinates::read(&mut &*head)
-                    .map_err(|e| checks.error(e, &place()))?,
-                compressed_pixels_le: Vec::new(),
-            }),
-        };
-        let size = head.last_chunk::<4>().map_or(0, |size| i32::from_le_bytes(*size));
-        let bytes = usize::try_from(size)
-            .ok()
-            .filter(|&bytes| bytes <= header.max_block_byte_size())
-            .ok_or_else(|| checks.malformed(format!("{}: it claims {size} bytes", place())))?;
-        if at + bytes as u64 > source.len() {
-            return Err(checks.truncated(&place()));
-        }
-        let found = header.get_block_data_indices(&block).and_then(|indices| {
-            let place = header.get_absolute_block_pixel_coordinates(indices)?;
-            place.validate(Some(header.layer_size))?;
-            Ok((indices.level_index, place))
-        });
-        let (level, place) = found.map_err(|e| checks.error(e, &place()))?;
-        if level != Vec2(0, 0) {
-            let what = "a pixel block of a resolution level that is not there";
-            return Err(checks.malformed(what.into()));
-        }
-        blocks.push(Block { number, at, bytes, place });
-        at += bytes as u64;
-    }
-    let corner = |block: &Block| (block.place.position.y(), block.place.position.x());
-    blocks.sort_by_key(corner);
-    if let Some(pair) = blocks.windows(2).find(|pair| corner(&pair[0]) == corner(&pair[1])) {
-        let (row, column) = corner(&pair[0]);
-        return Err(
-            checks.malformed(format!("the pixels at column {column}, row {row} are stored twice"))
-        );
-    }
-    Ok(blocks)
 }
 
 /// The decoder has been fuzzed by its authors, but a panic in it must not end a batch.
@@ -439,83 +603,18 @@ pub(super) fn guarded<T>(
     })
 }
 
+/// The first bytes of a file, at most so many.
+fn beginning(source: &Source<'_>, most: u64, path: &Path) -> Result<Vec<u8>, ImageError> {
+    let mut bytes = vec![0; source.len().min(most) as usize];
+    source.read(&mut bytes, 0).map_err(|source| ImageError::Io { path: path.into(), source })?;
+    Ok(bytes)
+}
+
 pub(super) fn too_long(path: &Path) -> ImageError {
     ImageError::Size {
         path: path.into(),
         found: "the file is too long".into(),
         expected: format!("at most {MAX_FILE_BYTES} bytes"),
-    }
-}
-
-/// The bytes of a file, read at any place by any thread.
-enum Source<'a> {
-    Memory(Cow<'a, [u8]>),
-    /// And its length when it was opened.
-    File(File, u64),
-}
-
-impl Source<'_> {
-    fn len(&self) -> u64 {
-        match self {
-            Self::Memory(bytes) => bytes.len() as u64,
-            Self::File(_, bytes) => *bytes,
-        }
-    }
-
-    /// Fills `out`.
-    fn read(&self, out: &mut [u8], at: u64) -> io::Result<()> {
-        match self {
-            Self::Memory(bytes) => {
-                let inside = usize::try_from(at).ok().and_then(|at| bytes.get(at..));
-                let inside = inside.and_then(|rest| rest.get(..out.len()));
-                out.copy_from_slice(inside.ok_or(io::ErrorKind::UnexpectedEof)?);
-                Ok(())
-            }
-            #[cfg(unix)]
-            Self::File(file, _) => std::os::unix::fs::FileExt::read_exact_at(file, out, at),
-            #[cfg(windows)]
-            Self::File(file, _) => {
-                let (mut out, mut at) = (out, at);
-                while !out.is_empty() {
-                    let read = std::os::windows::fs::FileExt::seek_read(file, out, at)?;
-                    if read == 0 {
-                        return Err(io::ErrorKind::UnexpectedEof.into());
-                    }
-                    out = &mut out[read..];
-                    at += read as u64;
-                }
-                Ok(())
-            }
-        }
-    }
-}
-
-/// A source that is read from its start, as the decoder wants its header.
-struct Cursor<'s, 'a> {
-    source: &'s Source<'a>,
-    at: u64,
-}
-
-impl Read for Cursor<'_, '_> {
-    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        let left = self.source.len().saturating_sub(self.at);
-        let count = out.len().min(usize::try_from(left).unwrap_or(usize::MAX));
-        self.source.read(&mut out[..count], self.at)?;
-        self.at += count as u64;
-        Ok(count)
-    }
-}
-
-impl Seek for Cursor<'_, '_> {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        let from = |base: u64, by: i64| base.checked_add_signed(by);
-        let at = match to {
-            SeekFrom::Start(at) => Some(at),
-            SeekFrom::Current(by) => from(self.at, by),
-            SeekFrom::End(by) => from(self.source.len(), by),
-        };
-        self.at = at.ok_or(io::ErrorKind::InvalidInput)?;
-        Ok(self.at)
     }
 }
 
