@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use basecode::Matrices;
+use basecode::{Image, Matrices};
 
 use super::prepared_scene::PreparedScene;
-use super::session::Session;
+use super::session::{self, Session};
 use super::stages::named;
 use crate::evidence::stage_film::from_origin;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
@@ -49,6 +49,12 @@ impl<'a> FrameRequest<'a> {
         Self { size: (case.probe_film.width, case.probe_film.height), stages, ..Self::plain(case) }
     }
 
+    /// A scene's small film with shadows under other stages, if it has them.
+    pub fn small_bonus(case: &'a PreparedScene, stages: Vec<StageText>) -> Option<Self> {
+        let size = (case.probe_film.width, case.probe_film.height);
+        Some(Self { size, stages, ..Self::bonus(case)? })
+    }
+
     /// The request that asks for it.
     pub fn request(&self, session: &Session, adapter: &Adapter) -> Request {
         Request::RenderRealtime {
@@ -67,6 +73,11 @@ impl<'a> FrameRequest<'a> {
 }
 
 impl FrameRequest<'_> {
+    /// What an answer shows, if there is one.
+    pub fn picture(&self, outcome: &Outcome) -> Option<Image> {
+        Some(session::image(&outcome.answer()?.values, self.size.0, self.size.1))
+    }
+
     /// The camera of a frame under other matrices: where they leave it at the origin, it looks at the scene from there.
     fn camera_of(&self, matrices: Matrices) -> CameraValue {
         let camera = match matrices {
@@ -102,6 +113,12 @@ pub fn draw_each(
         }
     }
     outcomes
+}
+
+/// The pictures of frames that a plugin draws; none where it draws none.
+pub fn pictures(session: &Session, plugin: &Path, frames: &[FrameRequest]) -> Vec<Option<Image>> {
+    let outcomes = draw_each(session, Some(plugin), frames);
+    frames.iter().zip(&outcomes).map(|(frame, outcome)| frame.picture(outcome)).collect()
 }
 
 /// Draws the frames of several scenes with a plugin, all in one worker while it lives, where

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use basecode::{Image, Matrices};
 
-use super::draw::{FrameRequest, draw_each, draw_one_each};
+use super::draw::{FrameRequest, draw_each, draw_one_each, pictures};
 use super::isolate::{on_film, positions_and_normals};
 use super::line_edits::{self, LineEdit};
 use super::offline::Drawn;
@@ -107,12 +107,24 @@ pub fn judge(
         return slip(*id, (name, PriceClass::Slip));
     }
     let first = wrong.iter().position(|wrong| *wrong).unwrap_or_default();
+    let Some(case) = cases.get(first) else { return Found::default() };
     let mended = |stage: &StageText| mended_by(stage, session, plugin, (cases, first), tolerances);
-    if others_are_open(CheckId::PassUniforms)
-        && let Some((name, stage)) = usual_pipelines::slips().find(|(_, stage)| mended(stage))
-    {
-        let checks = slip(CheckId::PassUniforms, (name, PriceClass::Slip)).checks;
-        return Found { mended_by: Some(stage), ..Found::of(checks) };
+    // One worker tries them all on one scene.
+    let mends_first = |stages: &[StageText]| -> Vec<bool> {
+        let frame = |stage: &StageText| FrameRequest::probe(case, vec![stage.clone()]);
+        let pictures = pictures(session, plugin, &stages.iter().map(frame).collect::<Vec<_>>());
+        let is_right =
+            |image| are_right(std::slice::from_ref(case), vec![image], Film::Small, tolerances);
+        pictures.into_iter().map(is_right).collect()
+    };
+    if others_are_open(CheckId::PassUniforms) {
+        let (names, stages): (Vec<_>, Vec<_>) = usual_pipelines::slips().unzip();
+        let right = names.into_iter().zip(&stages).zip(mends_first(&stages));
+        let mut right = right.filter(|(_, right)| *right).map(|(slip, _)| slip);
+        if let Some((name, stage)) = right.find(|(_, stage)| mended(stage)) {
+            let checks = slip(CheckId::PassUniforms, (name, PriceClass::Slip)).checks;
+            return Found { mended_by: Some(stage.clone()), ..Found::of(checks) };
+        }
     }
     let Some(frames) = frames else { return Found::default() };
     if others_are_open(vertex) {
@@ -134,17 +146,13 @@ pub fn judge(
     }
     let edits = line_edits::all(stages).into_iter();
     let edits: Vec<LineEdit> = edits.filter(|edit| pays(edit, found)).collect();
-    let tries = |edits: &[LineEdit]| drawn_with(edits, session, plugin, &cases[first]);
-    let are_right = |image: Option<Image>| {
-        let case = std::slice::from_ref(&cases[first]);
-        are_right(case, vec![image], Film::Small, tolerances)
-    };
     for edits in edits.chunks(line_edits::TRIED_AT_ONCE) {
-        let right = edits.iter().zip(tries(edits)).filter(|(_, image)| are_right(image.clone()));
-        let mut right = right.map(|(edit, _)| (edit, edit.stage()));
+        let stages: Vec<StageText> = edits.iter().map(LineEdit::stage).collect();
+        let right = edits.iter().zip(&stages).zip(mends_first(&stages));
+        let mut right = right.filter(|(_, right)| *right).map(|(edit, _)| edit);
         if let Some((edit, stage)) = right.find(|(_, stage)| mended(stage)) {
             let of = slips(&paying(edit, found), (edit.name, PriceClass::Slip), &edit.place());
-            return Found { mended_by: Some(stage), ..of };
+            return Found { mended_by: Some(stage.clone()), ..of };
         }
     }
     let hole = |check: &&Check| {
@@ -211,22 +219,6 @@ fn pays(edit: &LineEdit, found: &[Check]) -> bool {
     // Where nothing can be judged alone, surfaces that are missing are the fragment stage's as well.
     let missing = !is_judged(CheckId::PassUniforms) && open(CheckId::ImageRealtimeCoverage);
     alone && !is_right && (ids.iter().any(lost) || missing)
-}
-
-/// What a pass draws of a scene with each of some edits.
-fn drawn_with(
-    edits: &[LineEdit],
-    session: &Session,
-    plugin: &Path,
-    case: &PreparedScene,
-) -> Vec<Option<Image>> {
-    let frame = |edit: &LineEdit| FrameRequest::probe(case, vec![edit.stage()]);
-    let frames: Vec<FrameRequest> = edits.iter().map(frame).collect();
-    let outcomes = draw_each(session, Some(plugin), &frames);
-    let image = |(frame, outcome): (&FrameRequest, &Outcome)| {
-        Some(session::image(&outcome.answer()?.values, frame.size.0, frame.size.1))
-    };
-    frames.iter().zip(&outcomes).map(image).collect()
 }
 
 /// What is wrong with the matrices of a pass that is right under other ones, and which these are.
@@ -356,17 +348,13 @@ fn mended_by(
     let is_mended = |cases: &[PreparedScene]| {
         let frame = |case| FrameRequest::probe(case, vec![stage.clone()]);
         let frames: Vec<FrameRequest> = cases.iter().map(frame).collect();
-        let image = |frame: &FrameRequest, outcome: &Outcome| {
-            let (width, height) = frame.size;
-            Some(session::image(&outcome.answer()?.values, width, height))
-        };
         let is_right = |case: &PreparedScene, outcome: &Outcome| {
-            let picture = image(&FrameRequest::probe(case, Vec::new()), outcome);
+            let picture = FrameRequest::probe(case, Vec::new()).picture(outcome);
             are_right(std::slice::from_ref(case), vec![picture], Film::Small, tolerances)
         };
         let outcomes = draw_one_each(session, plugin, &frames, &is_right);
         let pictures = frames.iter().zip(&outcomes);
-        let pictures = pictures.map(|(frame, outcome)| image(frame, outcome)).collect();
+        let pictures = pictures.map(|(frame, outcome)| frame.picture(outcome)).collect();
         are_right(cases, pictures, Film::Small, tolerances)
     };
     cases.get(first..=first).is_some_and(&is_mended) && is_mended(cases)

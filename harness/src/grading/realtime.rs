@@ -6,7 +6,7 @@ use basecode::gpu::{EMPTY_MAPS, Footprint};
 use basecode::{Image, Vec3};
 
 use super::coverage;
-use super::draw::{FrameRequest, draw, draw_each, draw_one_each};
+use super::draw::{FrameRequest, draw, draw_one_each, pictures};
 use super::judged::Judged;
 use super::line_edits::{self, LineEdit};
 use super::offline::Drawn;
@@ -405,44 +405,42 @@ pub fn price_bonus_by_edits(
     let mut failing: Vec<&PreparedScene> = cases.iter().filter(fails).collect();
     failing.sort_by_key(|case| !case.entry.bonus_required);
     let Some(first) = failing.first() else { return };
-    let shows = |case: &PreparedScene, edits: &[LineEdit]| -> Vec<bool> {
+    let shows = |case: &PreparedScene, edit: &LineEdit| {
         let own =
             |drawn: &&Drawn| drawn.scene == case.entry.name && drawn.kind == ImageKind::Realtime;
         let plain = drawn.iter().find(own).map(|drawn| &drawn.image);
-        let frame = |edit: &LineEdit| {
-            Some(FrameRequest { stages: vec![edit.stage()], ..FrameRequest::bonus(case)? })
+        let Some(bonus) = FrameRequest::bonus(case) else { return false };
+        let frame = FrameRequest { stages: vec![edit.stage()], ..bonus };
+        let outcome = draw(session, Some(plugin), &frame);
+        let Some((answer, with)) = outcome.answer().zip(frame.picture(&outcome)) else {
+            return false;
         };
-        let frames: Vec<FrameRequest> = edits.iter().filter_map(frame).collect();
-        let outcomes = draw_each(session, Some(plugin), &frames);
-        let is_right = |(frame, outcome): (&FrameRequest, &Outcome)| {
-            let Some(answer) = outcome.answer() else { return false };
-            let with = session::image(&answer.values, frame.size.0, frame.size.1);
-            let has_map = || {
-                let made = answer.footprint.as_ref();
-                made.is_none_or(|made| no_shadow_map(session, plugin, frame, made, &with).is_none())
-            };
-            shows_its_shadows(case, &with, plain, tolerances)
-                && (!case.entry.bonus_required || has_map())
+        let has_map = || {
+            let made = answer.footprint.as_ref();
+            made.is_none_or(|made| no_shadow_map(session, plugin, &frame, made, &with).is_none())
         };
-        frames.iter().zip(&outcomes).map(is_right).collect()
+        shows_its_shadows(case, &with, plain, tolerances)
+            && (!case.entry.bonus_required || has_map())
     };
     // Of all lines, those that draw a map or read it.
     let may_mend = |edit: &LineEdit| edit.of.vertex || edit.of.with_texture;
     let edits: Vec<LineEdit> = line_edits::all(stages).into_iter().filter(may_mend).collect();
-    let small = drawn_small(session, plugin, first, &[None]).pop().flatten();
+    let plain = [FrameRequest::probe(first, Vec::new())];
+    let Some(plain) = pictures(session, plugin, &plain).pop().flatten() else { return };
+    // Nothing is seen by which light and shadow could be told apart.
+    if small_shadows(first).judge("", &plain, &plain, tolerances).is_none() {
+        return;
+    }
     for edits in edits.chunks(line_edits::TRIED_AT_ONCE) {
-        let stages: Vec<_> = edits.iter().map(|edit| Some(edit.stage())).collect();
-        let tried = edits.iter().zip(drawn_small(session, plugin, first, &stages));
-        // Where the small film tells nothing, its own does.
+        let small = |edit: &LineEdit| FrameRequest::small_bonus(first, vec![edit.stage()]);
+        let frames: Vec<FrameRequest> = edits.iter().filter_map(small).collect();
+        let tried = edits.iter().zip(pictures(session, plugin, &frames));
         let may_be_right = |with: &Image| {
-            let judge = |plain| small_shadows(first).judge("", with, plain, tolerances);
-            let judged = small.as_ref().and_then(judge);
-            judged.is_none_or(|check| check.verdict != Verdict::Fail)
+            let judged = small_shadows(first).judge("", with, &plain, tolerances);
+            judged.is_some_and(|check| check.verdict != Verdict::Fail)
         };
         let mut right = tried.filter(|(_, image)| image.as_ref().is_some_and(may_be_right));
-        let everywhere = |edit: &LineEdit| {
-            failing.iter().all(|case| shows(case, std::slice::from_ref(edit)) == [true])
-        };
+        let everywhere = |edit: &LineEdit| failing.iter().all(|case| shows(case, edit));
         let Some((edit, _)) = right.find(|(edit, _)| everywhere(edit)) else {
             continue;
         };
@@ -452,27 +450,6 @@ pub fn price_bonus_by_edits(
         }
         return;
     }
-}
-
-/// What a pass draws of a scene on its small film: without shadows, and with them and a stage replaced.
-fn drawn_small(
-    session: &Session,
-    plugin: &Path,
-    case: &PreparedScene,
-    replaced: &[Option<StageText>],
-) -> Vec<Option<Image>> {
-    let frame = |stage: &Option<StageText>| {
-        let small = FrameRequest::probe(case, stage.iter().cloned().collect());
-        let toml = case.bonus.as_deref().filter(|_| stage.is_some());
-        let toml = toml.unwrap_or(small.toml);
-        FrameRequest { toml, shadow_map: stage.is_some(), ..small }
-    };
-    let frames: Vec<FrameRequest> = replaced.iter().map(frame).collect();
-    let outcomes = draw_each(session, Some(plugin), &frames);
-    let image = |(frame, outcome): (&FrameRequest, &Outcome)| {
-        Some(session::image(&outcome.answer()?.values, frame.size.0, frame.size.1))
-    };
-    frames.iter().zip(&outcomes).map(image).collect()
 }
 
 /// The shadows on a scene's small film.
