@@ -10,8 +10,8 @@ use sha2::{Digest as _, Sha256};
 
 use super::{DATA_FOLDER, ImageFile, Samples, ViewedCase};
 use crate::files::{files_below, hex, write_whole_by};
+use crate::imaging::halves;
 use crate::imaging::packing::{Packing, Values};
-use crate::imaging::planes;
 use crate::imaging::reference::RegionMask;
 
 /// What the path of a shared file begins with.
@@ -64,7 +64,7 @@ pub fn write_excess(
     (width, height): (usize, usize),
     excess: &[f32],
 ) -> io::Result<ImageFile> {
-    let halves = planes::excess_halves(excess);
+    let halves = halves::of_excess(excess);
     write(folder, (width, height, 1), Values::Words(&halves), Samples::Half)
 }
 

@@ -39,7 +39,7 @@ use tempfile::TempDir;
 use crate::assignment::{Assignment, SceneEntry};
 use crate::cli::context::cores;
 use crate::grading::RenderPath;
-use crate::imaging::planes;
+use crate::imaging::halves;
 use crate::process::ProcessLimits;
 use crate::worker::{
     Adapter, AdapterKind, Answer, CameraValue, Job, LiveWorker, Outcome, Request, SceneRef,
@@ -409,7 +409,7 @@ fn bytes(scene: &Scene, answer: &Answer) -> Vec<u8> {
     bytes.extend(scene.width.to_le_bytes());
     bytes.extend(scene.height.to_le_bytes());
     bytes.extend((answer.seconds as f32).to_le_bytes());
-    bytes.extend_from_slice(bytemuck::cast_slice(&planes::halves(&answer.values)));
+    bytes.extend_from_slice(bytemuck::cast_slice(&halves::of(&answer.values)));
     bytes
 }
 
