@@ -142,11 +142,8 @@ pub fn judge(questions: &[Conventional], together: &dyn Fn() -> Vec<(Party, Chec
             }));
         }
     }
-    let handouts = &checks[..questions.len()];
-    if limit > 0.0 {
-        let own = judge_together(questions, handouts, &together());
-        checks.extend(own);
-    }
+    let own = judge_together(questions, &checks[..questions.len()], together);
+    checks.extend(own);
     checks
 }
 
@@ -157,15 +154,20 @@ pub fn judge(questions: &[Conventional], together: &dyn Fn() -> Vec<(Party, Chec
 fn judge_together(
     questions: &[Conventional],
     handouts: &[Check],
-    together: &[(Party, Check)],
+    together: &dyn Fn() -> Vec<(Party, Check)>,
 ) -> Vec<Check> {
-    let of = |party: Party| together.iter().filter(move |(own, _)| *own == party);
-    let judged = |party: Party| {
-        of(party).any(|(_, check)| matches!(check.verdict, Verdict::Pass | Verdict::Fail))
-    };
     let is_wrong_alone = |party: Party| {
         let mut own = questions.iter().zip(handouts);
         own.any(|(question, check)| question.party == party && check.verdict == Verdict::Fail)
+    };
+    let bsdfs = [Party::Diffuse, Party::Phong];
+    if !is_wrong_alone(Party::Integrator) || !bsdfs.into_iter().any(is_wrong_alone) {
+        return Vec::new();
+    }
+    let together = together();
+    let of = |party: Party| together.iter().filter(move |(own, _)| *own == party);
+    let judged = |party: Party| {
+        of(party).any(|(_, check)| matches!(check.verdict, Verdict::Pass | Verdict::Fail))
     };
     let is_explained_alone = |party: Party| {
         let own = questions.iter().zip(handouts);
@@ -179,8 +181,7 @@ fn judge_together(
         let but_for_a_slip = price::are_slight(failed) && !is_explained_alone(party);
         is_wrong_alone(party) && judged(party) && (right || but_for_a_slip)
     };
-    if !is_wrong_alone(Party::Integrator) || ![Party::Diffuse, Party::Phong].into_iter().any(mends)
-    {
+    if !bsdfs.into_iter().any(mends) {
         return Vec::new();
     }
     let alone = questions.iter().zip(handouts).map(|(question, check)| {

@@ -8,6 +8,7 @@ mod check;
 pub mod convention;
 pub mod expected;
 mod film_slips;
+pub mod frame_slips;
 pub mod images;
 mod light_levels;
 mod lobe;

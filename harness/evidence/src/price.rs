@@ -42,7 +42,7 @@ const LEFT_BY_TWO: f64 = 0.01;
 const FEW: usize = 200;
 
 /// Some questions, spread over all.
-fn few_of(questions: &[usize]) -> Vec<usize> {
+pub(super) fn few_of(questions: &[usize]) -> Vec<usize> {
     questions.iter().copied().step_by(questions.len().div_ceil(FEW).max(1)).collect()
 }
 
@@ -504,6 +504,12 @@ impl Answers<'_> {
     /// Sum of differences from what is right over the sum of that, in the worst group.
     pub fn residual_of_right(&self) -> f64 {
         self.residual(&self.questions(), &Shading::default(), &Factors::default())
+    }
+
+    /// Whether a few questions tell that more than `most` is left unexplained.
+    pub(super) fn surely_leave_more(&self, most: f64) -> bool {
+        let few = few_of(&self.questions());
+        self.left_of(&few, &Shading::default(), &Factors::default()) > surely_more_than(most)
     }
 
     /// Sum of the right answers, in units.

@@ -13,8 +13,8 @@ use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use super::stages::{MOVED, Moved, Stages, matrices, negated_normals};
 use super::usual_pipelines;
+use crate::evidence::frame_slips::{FrameSlips, LeftBySlip};
 use crate::evidence::images::{self, ImageKind};
-use crate::evidence::pixels::{self, LeftBySlip};
 use crate::evidence::price::{self, Price, PriceClass, SURFACES_MISSING};
 use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
@@ -261,25 +261,32 @@ fn slips_of_frames(
     frames: &[&Image],
     wrong: &[bool],
 ) -> Vec<(CheckId, &'static str)> {
-    let of_scenes: Vec<Vec<LeftBySlip>> = cases
-        .iter()
-        .zip(frames)
-        .map(|(case, frame)| {
-            let expected = &case.expected;
-            pixels::left_by_slips(&expected.scene, frame, &expected.unshadowed_mask)
-        })
-        .collect();
-    let Some(first) = of_scenes.first() else { return Vec::new() };
-    let slips = first.iter().map(|left| (left.of, left.name));
+    let frames = cases.iter().zip(frames).map(|(case, frame)| {
+        let expected = &case.expected;
+        FrameSlips::new(&expected.scene, frame, &expected.unshadowed_mask)
+    });
+    let frames: Option<Vec<FrameSlips>> = frames.collect();
+    let Some(frames) = frames.filter(|frames| !frames.is_empty()) else { return Vec::new() };
+    let slips = frames[0].names();
     // Kinds of surfaces that there are: what leaves one of them dark explains nothing that is wrong with it.
     let kinds = [false, true].map(|phong| {
         let own = |region: &Region| region.lit && (region.exponent > 0.0) == phong;
         cases.iter().any(|case| case.expected.unshadowed_mask.regions.iter().any(own))
     });
+    // Most slips are told by a few pixels of each frame.
+    let may_explain = |index: usize| {
+        let surely_not = |is_wrong: bool| {
+            let own = frames.iter().zip(wrong).filter(move |(_, wrong)| **wrong == is_wrong);
+            own.filter(|(frame, _)| frame.surely_leaves_more(index, LEFT)).count()
+        };
+        let count = wrong.iter().filter(|wrong| **wrong).count();
+        2 * surely_not(true) < count && surely_not(false) == 0
+    };
     let explains = |index: usize| {
+        let lefts: Vec<LeftBySlip> = frames.iter().map(|frame| frame.left(index)).collect();
         let of = |is_wrong: bool| {
-            let scenes = of_scenes.iter().zip(wrong).filter(move |(_, wrong)| **wrong == is_wrong);
-            scenes.filter_map(move |(scene, _)| scene.get(index))
+            let own = lefts.iter().zip(wrong).filter(move |(_, wrong)| **wrong == is_wrong);
+            own.map(|(left, _)| left)
         };
         // Where what is right explains as much, a scene tells nothing of a slip.
         let shows = |left: &LeftBySlip| left.lights && left.left_by_right > LEFT;
@@ -295,13 +302,14 @@ fn slips_of_frames(
             let lit: Vec<f64> = all.filter_map(|left| left.left_of_lit[kind]).collect();
             let explained = lit.iter().filter(|left| **left <= LEFT).count();
             // What a pass leaves out may be all of a kind, and is then nobody's to know.
-            let is_dark = lit.is_empty() && first[index].name != SURFACES_MISSING;
+            let is_dark = lit.is_empty() && slips[index].1 != SURFACES_MISSING;
             is_dark || 2 * explained > lit.len()
         };
         let all_kinds = (0..kinds.len()).all(|kind| !kinds[kind] || explains_kind(kind));
         of(false).all(|left| left.left <= LEFT) && most(false) && most(true) && all_kinds
     };
-    slips.enumerate().filter(|(index, _)| explains(*index)).map(|(_, slip)| slip).collect()
+    let found = (0..slips.len()).filter(|index| may_explain(*index) && explains(*index));
+    found.map(|index| slips[index]).collect()
 }
 
 /// The film that pictures of a scene are drawn on.

@@ -329,18 +329,13 @@ pub fn judge_bonus_under(
     for check in checks.iter_mut().filter(|check| is_failed_bonus(check)) {
         let Some(case) = cases.iter().find(|case| case.entry.name == check.scene) else { continue };
         let Some(with) = FrameRequest::bonus(case) else { continue };
-        let drawn = |frame: FrameRequest| {
-            let frame = FrameRequest { stages: vec![stage(case)], ..frame };
-            let (width, height) = frame.size;
-            let outcome = draw(session, Some(plugin), &frame);
-            outcome.answer().map(|answer| session::image(&answer.values, width, height))
-        };
-        let judged = || {
-            let (with, without) = (drawn(with)?, drawn(FrameRequest::plain(case))?);
-            shadows(case).judge(&check.scene, &with, &without, tolerances)
-        };
+        let frames = [with, FrameRequest::plain(case)]
+            .map(|frame| FrameRequest { stages: vec![stage(case)], ..frame });
+        let pictures = pictures(session, plugin, &frames);
+        let [Some(with), Some(without)] = pictures.as_slice() else { continue };
+        let judged = shadows(case).judge(&check.scene, with, without, tolerances);
         if let Some(judged) =
-            judged().filter(|judged| judged.verdict != Verdict::Fail || judged.error < check.error)
+            judged.filter(|judged| judged.verdict != Verdict::Fail || judged.error < check.error)
         {
             *check = Check { id: check.id, ..judged };
         }
@@ -586,32 +581,49 @@ fn judge_visibility(
     if let Some(own) = own.as_ref().filter(|own| passes(own)) {
         return own.clone();
     }
-    let drawn = |toml: &Path, shadow_map, times, stages: &[StageText]| {
-        let stages = stages.to_vec();
-        let frame = FrameRequest { toml, shadow_map, times, stages, ..FrameRequest::plain(case) };
-        let outcome = draw(session, Some(plugin), &frame);
-        let (width, height) = frame.size;
-        outcome.answer().map(|answer| session::image(&answer.values, width, height))
-    };
     let vertex = StageText { name: STAGES[0].to_owned(), text: VERTEX.to_owned() };
-    let bonus = case.bonus.as_deref();
-    let again = |times, stages: &[StageText]| {
-        judge(&drawn(bonus?, true, times, stages)?, &drawn(&case.realtime, false, times, stages)?)
+    let tries = [(1, vec![vertex]), (1, vec![negated_normals()]), (2, Vec::new())];
+    let frames = |(times, stages): &(usize, Vec<StageText>), is_small: bool| {
+        let with = if is_small {
+            FrameRequest::small_bonus(case, stages.clone())?
+        } else {
+            FrameRequest { stages: stages.clone(), ..FrameRequest::bonus(case)? }
+        };
+        let without = FrameRequest { toml: &case.realtime, shadow_map: false, ..with.clone() };
+        Some([with, without].map(|frame| FrameRequest { times: *times, ..frame }))
     };
-    let swapped = again(1, &[vertex]);
+    // Small films tell what is not worth a whole one; one worker draws them all.
+    let small = small_shadows(case);
+    let may_pass = |[with, without]: &[Option<Image>; 2]| {
+        let judged = small.judge(name, with.as_ref()?, without.as_ref()?, tolerances)?;
+        Some(judged.verdict != Verdict::Fail)
+    };
+    let all: Option<Vec<_>> = tries.iter().map(|tried| frames(tried, true)).collect();
+    let all = pictures(session, plugin, &all.unwrap_or_default().concat());
+    let may_pass: Vec<bool> =
+        all.as_chunks().0.iter().map(|pair| may_pass(pair).unwrap_or(false)).collect();
+    let may_pass = |index: usize| may_pass.get(index).is_some_and(|may| *may);
+    let again = |index: usize| {
+        let pictures = pictures(session, plugin, &frames(&tries[index], false)?);
+        let [with, without] = pictures.as_slice() else { return None };
+        judge(with.as_ref()?, without.as_ref()?)
+    };
+    let passes_again =
+        |index: usize| if may_pass(index) { again(index).filter(passes) } else { None };
+    let swapped = if own.is_none() || may_pass(0) { again(0) } else { None };
     if let Some(swapped) = swapped.as_ref().filter(|swapped| passes(swapped)) {
         return swapped.clone();
     }
     let moved = without.and_then(|without| {
         MOVED.iter().find_map(|(_, moved)| judge(&moved(with), &moved(without)).filter(passes))
     });
-    let mended = moved.or_else(|| again(1, &[negated_normals()]).filter(passes));
+    let mended = moved.or_else(|| passes_again(1));
     let mended = mended.or_else(|| {
         let masks = zoomed::masks(session, plugin, case)?;
         let shadows = masks.shadows(shadows.median_lit);
         shadows.judge(name, with, without?, tolerances).filter(passes)
     });
-    let mended = mended.or_else(|| again(2, &[]).filter(passes));
+    let mended = mended.or_else(|| passes_again(2));
     mended.or(own).or(swapped).unwrap_or(check)
 }
 
