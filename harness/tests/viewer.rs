@@ -66,18 +66,17 @@ fn bits_of(image: &Image) -> Vec<u32> {
 
 /// The largest difference, in levels of 255, between what the screen shows of a pane and what `shade` says.
 const SCREEN_IS_WRONG_BY: &str = "(() => {
+  const { gl, context } = stage.painter, { width, height } = (gl ?? context).canvas;
+  // Rows of WebGL begin at the bottom.
+  const screen = gl ? new Uint8Array(4 * width * height) : context.getImageData(0, 0, width, height).data;
+  if (gl) gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, screen);
   let worst = 0;
   for (const { layer, box, clip } of panes()) {
     const origin = originOf(box), { zoom } = view(), settings = settingsOf(layer);
     for (let y = 0; y < layer.image.height; y += 3) for (let x = 0; x < layer.image.width; x += 3) {
       const px = Math.floor((origin.x + (x + 0.5) * zoom) * stage.ratio), py = Math.floor((origin.y + (y + 0.5) * zoom) * stage.ratio);
       if (px < clip.x || py < clip.y || px >= clip.x + clip.width || py >= clip.y + clip.height) continue;
-      let seen;
-      if (stage.painter.gl) {
-        seen = new Uint8Array(4);
-        const gl = stage.painter.gl;
-        gl.readPixels(px, stage.painter.height - 1 - py, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, seen);
-      } else seen = stage.painter.context.getImageData(px, py, 1, 1).data;
+      const at = 4 * ((gl ? height - 1 - py : py) * width + px), seen = screen.subarray(at, at + 4);
       const wanted = shade(layerValues(layer, x, y, settings), layer, settings);
       wanted.forEach((level, c) => { worst = Math.max(worst, Math.abs(level - seen[c])); });
     }
