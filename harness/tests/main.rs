@@ -9,7 +9,6 @@ mod archives;
 mod arrivals;
 mod attempts;
 mod batch;
-mod brute_force;
 mod build;
 mod check;
 mod compare;

@@ -3,6 +3,7 @@
 //! Nothing here depends on processes, GPUs or libraries.
 
 pub mod bsdf;
+pub mod changed_scene;
 pub mod changes;
 mod check;
 pub mod convention;

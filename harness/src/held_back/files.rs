@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use basecode::{Scene, Vec3};
 
-use super::changed_scene::ChangedScene;
 use crate::assignment::SceneEntry;
+use crate::evidence::changed_scene::ChangedScene;
 
 /// A file of a scene: its path below the scene's folder, and what is in it.
 pub type NewFile = (PathBuf, Vec<u8>);

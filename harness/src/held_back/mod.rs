@@ -4,9 +4,7 @@
 //! Light, camera, materials, exponents and film are drawn from the seed and previewed without any renderer; a draw that
 //! shows too little is repeated. The same seed and the same scenes give the same files, byte for byte.
 
-mod changed_scene;
 mod files;
-mod preview;
 #[cfg(test)]
 mod tests;
 
@@ -19,11 +17,10 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::assignment::{Assignment, SceneEntry};
+use crate::evidence::changed_scene::{ChangedScene, ScenePreview};
 use crate::expected::load_scene;
 use crate::files::{hex, write_new};
-use changed_scene::ChangedScene;
 use files::NewFile;
-use preview::ScenePreview;
 
 /// Number of draws that are previewed before a scene is given up. Over 200 seeds about every fourth draw is accepted,
 /// and none needed half of these.

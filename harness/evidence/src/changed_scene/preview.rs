@@ -3,8 +3,8 @@
 use basecode::{Camera, Frame, MaterialModel, Result, Scene, Vec3};
 use renderer_api as api;
 
-use super::changed_scene::ChangedScene;
-use crate::evidence::bsdf;
+use super::ChangedScene;
+use crate::bsdf;
 use crate::expected::{SurfacePoint, Visibility};
 
 /// Width in pixels of the film that is looked at.

@@ -1,8 +1,12 @@
-//! What is drawn from the seed: light, camera, materials, film.
+//! A scene with other light, camera, materials and film, drawn from a seed; and what it shows.
+
+mod preview;
 
 use std::f32::consts::{LN_2, PI, TAU};
 
 use basecode::{CameraConfig, Frame, MaterialModel, Sampler, Scene, Vec3, vec3};
+
+pub use preview::ScenePreview;
 
 /// The light stands within this angle of where it stood, seen from the point looked at.
 const LIGHT_TURN: f32 = 40.0 * PI / 180.0;

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use basecode::exr_io::read_exr_layers;
-use glam::{DVec2, DVec3, dvec3};
+use basecode::glam::{DVec2, DVec3, dvec3};
 
 /// Pixels of each image that are drawn again.
 const PIXELS: usize = 1500;
@@ -181,7 +181,7 @@ fn camera_ray(toml: &str, width: usize, height: usize, x: usize, y: usize) -> (D
 
 #[test]
 fn stored_images_are_what_a_slow_tracer_in_f64_without_a_bvh_draws() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     for name in ["sphere_diffuse", "sphere_phong", "cbox", "teapot"] {
         let folder = root.join("scenes/a2").join(name);
         let file = match name {
