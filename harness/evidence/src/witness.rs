@@ -5,6 +5,7 @@
 //! tangents of a local frame are arbitrary, so a witness depends only on what every correct frame
 //! agrees on: the two cosines and the angle between `wi` and `wo`.
 
+use basecode::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// Which BSDF an integrator meets. All values include the cosine [sr^-1] and, but for `Flat`, are zero unless `wi` and
@@ -57,6 +58,12 @@ impl Witness {
             // From [-1, 1] to [0, 1].
             Self::OfAngle => polynomial(0.5 + 0.5 * dot(wi, wo)),
         })
+    }
+
+    /// The same for directions in single precision; black for [`Witness::True`].
+    pub fn of_directions(&self, wi: Vec3, wo: Vec3) -> [f64; 3] {
+        let query = WitnessQuery { wi: wi.into(), wo: wo.into() };
+        self.value(&query).unwrap_or_default().map(f64::from)
     }
 }
 

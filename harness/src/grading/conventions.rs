@@ -16,8 +16,7 @@ use crate::evidence::loops::Edges;
 use crate::evidence::physical::Probes;
 use crate::evidence::rays::{self, OwnValue, RayBatch, Unshadowed};
 use crate::evidence::shading::{ShadedPoint, Shading};
-use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict};
-use crate::evidence::{Witness, WitnessQuery};
+use crate::evidence::{Check, CheckId, Measure, RuleId, Verdict, Witness};
 use crate::expected::SurfacePoint;
 use crate::worker::{Outcome, Request};
 
@@ -310,11 +309,7 @@ impl LightAnswer<'_> {
     fn of(&self, witness: Witness, index: usize, shading: &Shading) -> [f64; 3] {
         match self.own.get(index) {
             Some(point) => shading.radiance(point),
-            None => self
-                .case
-                .probe_film
-                .batch
-                .witnessed(index, shading, &|wi, wo| value(witness, wi, wo)),
+            None => self.case.probe_film.batch.under(index, shading, witness),
         }
     }
 
@@ -424,12 +419,6 @@ impl LightAnswer<'_> {
             }),
         }
     }
-}
-
-/// The value of a witness.
-pub fn value(witness: Witness, wi: Vec3, wo: Vec3) -> [f64; 3] {
-    let query = WitnessQuery { wi: wi.into(), wo: wo.into() };
-    witness.value(&query).unwrap_or_default().map(f64::from)
 }
 
 /// A lit point as its right BSDF sees it. A mirror is black.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use basecode::{Camera, Image, MaterialModel, Ray, Scene, Texture, Vec3};
 
-use super::conventions::{Answers, shaded_point, value};
+use super::conventions::{Answers, shaded_point};
 use super::observe;
 use super::prepared_scene::{PreparedScene, Sampled};
 use super::questions::{Outcomes, Question, Questions};
@@ -228,7 +228,7 @@ impl<'a> Asked<'_, 'a> {
         under.push((flat.1, FLAT, "constant, below the surface too"));
         answers.push_light(case, &under, Vec::new());
         answers.push_together(case, own.1);
-        let bsdf = |point: &SurfacePoint| value(FLAT, point.wi, point.wo);
+        let bsdf = |point: &SurfacePoint| FLAT.of_directions(point.wi, point.wo);
         let shadows = judge_shadows(case, &bsdf, flat, own);
         // Of a switch that does the opposite, visibility by its position says something else.
         let is_inverted = shadows.mistake == rays::INVERTED;

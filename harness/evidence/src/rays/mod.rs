@@ -11,8 +11,8 @@ mod unshadowed;
 use basecode::glam::{DMat3, DVec3};
 use basecode::{Camera, Frame, MaterialModel, Ray, Scene, Vec3};
 
-use super::Check;
 use super::shading::{Directions, Shading, power};
+use super::{Check, Witness};
 use crate::expected::{FARTHEST_START, SurfaceBuffer, SurfacePoint, Visibility};
 use imaging::reference::RegionMask;
 
@@ -262,6 +262,11 @@ impl RayBatch {
             Directions::LightFromViewer => (local(self.light - point.ray.origin), wo),
             Directions::LightPlusPoint => (local(self.light + point.position), wo),
         }
+    }
+
+    /// Radiance along lit ray `index` of an integrator that lights as `shading` says, under a witness.
+    pub fn under(&self, index: usize, shading: &Shading, witness: Witness) -> [f64; 3] {
+        self.witnessed(index, shading, &|wi, wo| witness.of_directions(wi, wo))
     }
 
     /// Radiance along lit ray `index` of an integrator that lights as `shading` says, under a BSDF
