@@ -1,13 +1,12 @@
 //! From a submitted EXR to its checks: whatever bits its pixels hold.
 
 use std::fs;
-use std::sync::LazyLock;
+use std::sync::{LazyLock, OnceLock};
 
 use basecode::exr_io::{Precision, decode_exr, write_exr};
 use basecode::{Image, Matrices, Vec3};
 use umbra::assignment::SceneEntry;
 use umbra::evidence::images::{self, ImageKind};
-use umbra::evidence::rays::RayBatch;
 use umbra::evidence::stage_film::StageFilm;
 use umbra::evidence::stages::{BoundValue, judge_pass};
 use umbra::evidence::vertex::judge_vertex;
@@ -68,7 +67,6 @@ static CASE: LazyLock<PreparedScene> = LazyLock::new(|| {
     let probe_film = ProbeFilm {
         width: WIDTH as u32,
         height: HEIGHT as u32,
-        batch: RayBatch::new("a", &scene, &surface, &shadowed),
         surface,
         mask: shadowed,
         unshadowed_mask: unshadowed_mask.clone(),
@@ -112,6 +110,7 @@ static CASE: LazyLock<PreparedScene> = LazyLock::new(|| {
         expected,
         first: None,
         probe_film,
+        batch: OnceLock::new(),
     }
 });
 

@@ -183,7 +183,7 @@ impl<'a> Answers<'a> {
         bsdfs: Vec<OwnValue>,
     ) {
         let own = asked.iter().any(|(_, witness, _)| *witness == Witness::True);
-        let points = case.probe_film.batch.points.iter().take(case.probe_film.batch.lit);
+        let points = case.batch().points.iter().take(case.batch().lit);
         let own =
             if own { points.map(|point| shaded_point(case, point)).collect() } else { Vec::new() };
         let values = asked.iter().map(|(outcome, witness, name)| match outcome {
@@ -204,7 +204,7 @@ impl<'a> Answers<'a> {
     /// Keeps what the renderer's own integrator and BSDFs make of each other along a scene's rays, without shadows.
     pub fn push_together(&mut self, case: &PreparedScene, radiance: &Outcome) {
         let Some(answer) = radiance.answer() else { return };
-        let (scene, batch) = (&case.expected.scene, &case.probe_film.batch);
+        let (scene, batch) = (&case.expected.scene, case.batch());
         let values = session::colors(&answer.values);
         for (kind, model) in
             [(BsdfKind::Diffuse, MaterialModel::Diffuse), (BsdfKind::Phong, MaterialModel::Phong)]
@@ -309,13 +309,13 @@ impl LightAnswer<'_> {
     fn of(&self, witness: Witness, index: usize, shading: &Shading) -> [f64; 3] {
         match self.own.get(index) {
             Some(point) => shading.radiance(point),
-            None => self.case.probe_film.batch.under(index, shading, witness),
+            None => self.case.batch().under(index, shading, witness),
         }
     }
 
     /// What its BSDFs of this kind answer, by ray.
     fn own_bsdfs(&self, model: MaterialModel) -> Vec<OwnValue> {
-        let batch = &self.case.probe_film.batch;
+        let batch = self.case.batch();
         let is_own = |(ray, _): &&OwnValue| {
             self.case.expected.scene.material_of(batch.points[*ray].shape).model == model
         };
@@ -330,7 +330,7 @@ impl LightAnswer<'_> {
 
     /// Whether its radiance is what the BSDFs of this kind answer, on all surfaces that tell.
     fn is_of_own_bsdfs(&self, model: MaterialModel) -> bool {
-        let (batch, own) = (&self.case.probe_film.batch, self.own_bsdfs(model));
+        let (batch, own) = (self.case.batch(), self.own_bsdfs(model));
         self.values.as_ref().is_ok_and(|answers| {
             answers.iter().all(|answer| rays::is_of_own_bsdfs(batch, &own, &answer.values))
         })
@@ -361,7 +361,7 @@ impl LightAnswer<'_> {
     /// there.
     fn judge_own(&self, answers: &[Unshadowed], paid: &[MaterialModel]) -> Check {
         let (case, handout) = (self.case, Convention::default());
-        let batch = &case.probe_film.batch;
+        let batch = case.batch();
         let changes = changes::shader_changes(true);
         let whole = rays::judge_unshadowed(batch, answers, &handout, &changes);
         let of_kind = |model: MaterialModel| {
@@ -395,7 +395,7 @@ impl LightAnswer<'_> {
     }
 
     fn question<'b>(&'b self, paid: &'b [MaterialModel]) -> Conventional<'b> {
-        let batch = &self.case.probe_film.batch;
+        let batch = self.case.batch();
         Conventional {
             party: Party::Integrator,
             passes: Box::new(move |convention: &Convention| {
@@ -441,7 +441,7 @@ pub fn shaded_point(case: &PreparedScene, point: &SurfacePoint) -> ShadedPoint {
         scale: f64::from(material.energy_scale()),
         wo: point.wo.to_array().map(f64::from),
         wi: point.wi.to_array().map(f64::from),
-        intensity: case.probe_film.batch.intensity.to_array().map(f64::from),
+        intensity: case.batch().intensity.to_array().map(f64::from),
         distance: f64::from(point.distance),
     }
 }

@@ -48,7 +48,7 @@ pub fn bsdf(session: &Session, kind: BsdfKind, probes: &[BsdfProbe], values: &[[
 
 /// Unshadowed radiance along lit rays under a witness.
 pub fn radiance(session: &Session, case: &PreparedScene, witness: Witness, values: &[[f32; 3]]) {
-    let batch = &case.probe_film.batch;
+    let batch = case.batch();
     let lit = batch.points[..batch.lit].iter().zip(values);
     let samples = few(lit, batch.lit).map(|(point, value)| {
         sample(Reflector::Witness(witness), point, batch.intensity, value.map(f64::from))
@@ -60,7 +60,7 @@ pub fn radiance(session: &Session, case: &PreparedScene, witness: Witness, value
 
 /// Radiance with and without shadows under a witness.
 pub fn shadows(session: &Session, case: &PreparedScene, with: &[[f32; 3]], without: &[[f32; 3]]) {
-    let (batch, scene) = (&case.probe_film.batch, &case.expected.scene);
+    let (batch, scene) = (case.batch(), &case.expected.scene);
     if case.held_back || !tells_visibility(batch.lit, without) {
         return;
     }
@@ -108,7 +108,7 @@ fn occluders(scene: &Scene, point: &SurfacePoint) -> Vec<f64> {
 
 /// What one of the two fragment stages draws under a pass and a vertex stage of ours.
 pub fn fragment(session: &Session, case: &PreparedScene, image: &Image, phong: bool) {
-    let (small, scene) = (&case.probe_film, &case.expected.scene);
+    let scene = &case.expected.scene;
     if case.held_back {
         return;
     }
@@ -130,7 +130,7 @@ pub fn fragment(session: &Session, case: &PreparedScene, image: &Image, phong: b
             exponent: f64::from(material.exponent),
             unscaled: false,
         };
-        sample(reflector, point, small.batch.intensity, pixel.to_array().map(f64::from))
+        sample(reflector, point, scene.first_light_intensity(), pixel.to_array().map(f64::from))
     });
     keep(session, if phong { "2.4" } else { "2.3" }, samples);
 }

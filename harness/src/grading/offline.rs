@@ -174,7 +174,7 @@ impl<'a> Asked<'_, 'a> {
     }
 
     fn rays(&self, questions: &mut Questions) -> RayQuestions {
-        let chosen: Vec<_> = self.case.probe_film.batch.rays.iter().map(session::ray).collect();
+        let chosen: Vec<_> = self.case.batch().rays.iter().map(session::ray).collect();
         let mut ask = |witness, shadows| questions.ask(self.radiance(&chosen, witness, shadows));
         let witnessed = WITNESSES.map(|(witness, _)| ask(witness, false));
         let flat = BothWays { without: ask(FLAT, false), with: ask(FLAT, true) };
@@ -244,7 +244,7 @@ impl<'a> Asked<'_, 'a> {
         {
             let values = asked.own_values(bsdfs);
             let radiance = session::colors(&radiance.values);
-            checks.push(rays::judge_material(&case.probe_film.batch, &values, radiance));
+            checks.push(rays::judge_material(case.batch(), &values, radiance));
         }
         checks
     }
@@ -426,7 +426,7 @@ fn is_black(outcome: &Outcome) -> bool {
 /// one color alone: beside a texel's edge a right renderer may take either.
 fn plain_surfaces(case: &PreparedScene) -> Vec<(usize, BsdfQuery)> {
     let scene = &case.expected.scene;
-    let batch = &case.probe_film.batch;
+    let batch = case.batch();
     let lit = batch.points.iter().take(batch.lit).enumerate();
     let asked = lit.filter_map(|(ray, point)| {
         let material = scene.material_of(point.shape);
@@ -467,16 +467,16 @@ fn record_rays(
     let size = (small.width as usize, small.height as usize);
     if let Outcome::Done(lit) = lit {
         let values = session::colors(&lit.values).iter().copied();
-        let tile = Thumbnail::of_pixels(size, small.batch.met().copied().zip(values));
+        let tile = Thumbnail::of_pixels(size, case.batch().met().copied().zip(values));
         session.record(View::new(diagnosis::ViewKind::Lit, name), tile);
     }
     if let (Outcome::Done(with), Outcome::Done(without)) = (with, without)
-        && observe::tells_visibility(small.batch.lit, session::colors(&without.values))
+        && observe::tells_visibility(case.batch().lit, session::colors(&without.values))
     {
         let pairs = session::colors(&with.values).iter().zip(session::colors(&without.values));
         let sums = pairs.map(|(a, b)| (a.iter().sum::<f32>(), b.iter().sum::<f32>()));
         // A ray that is black without shadows tells nothing.
-        let told = small.batch.met().zip(sums).filter(|(_, (_, without))| *without != 0.0);
+        let told = case.batch().met().zip(sums).filter(|(_, (_, without))| *without != 0.0);
         let visibility = told.map(|(&pixel, (with, without))| (pixel, [with / without; 3]));
         session.record(
             View::new(diagnosis::ViewKind::Shadow, name),
@@ -521,7 +521,7 @@ fn judge_shadows(
                 blocker: &|ray| blocker(scene, ray),
                 is_phong: &|shape| scene.material_of(shape).model == MaterialModel::Phong,
             };
-            rays::judge_shadows(&case.probe_film.batch, bsdf, (with, without), shaded, &occluders)
+            rays::judge_shadows(case.batch(), bsdf, (with, without), shaded, &occluders)
         }
         (Outcome::Done(_), missing) => {
             Check { verdict: Verdict::NotJudged, ..session::unanswered(id, name, &[], missing) }

@@ -36,6 +36,7 @@ impl Grading<'_> {
             }
             (answers, checks)
         });
+        PreparedScene::cast_rays(&self.cases);
         if self.is_told_by_bsdfs() {
             let mut told: Vec<Check> =
                 probed.iter().flat_map(|(answers, _)| answers.judge()).collect();

@@ -133,6 +133,9 @@ impl<'a> Grading<'a> {
             let done = scope.spawn(|| beside(&workshop));
             let ready =
                 Self::with_scenes(store, adapter, held_back_seed, cancel, recording.clone());
+            if let (Ok(ready), false) = (&ready, done.is_finished()) {
+                PreparedScene::cast_rays(&ready.cases);
+            }
             (ready, done.join().unwrap_or_else(|panic| resume_unwind(panic)))
         });
         Ok((ready?, done))
@@ -372,7 +375,9 @@ fn hold_back(store: &Store, seed: u64, cases: &mut Vec<PreparedScene>) -> anyhow
     let made = PreparedScene::all(store, &entries).with_context(|| format!("seed {seed}"))?;
     for case in made {
         // What the loop does wrong must explain the wrong images here as well.
-        cases.push(PreparedScene { held_back: true, ..case.with_samples()? });
+        let mut case = case.with_samples()?;
+        case.held_back = true;
+        cases.push(case);
     }
     Ok(held_back)
 }

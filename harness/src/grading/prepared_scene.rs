@@ -1,6 +1,7 @@
 //! A scene made ready for judging: its files, its expected images, its rays.
 
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 use anyhow::Context;
 use basecode::scene::SceneConfig;
@@ -47,6 +48,8 @@ pub struct PreparedScene {
     pub first: Option<Expected>,
     /// The small film.
     pub probe_film: ProbeFilm,
+    /// The unambiguous rays of the small film, once somebody asks: see [`PreparedScene::batch`].
+    pub batch: OnceLock<RayBatch>,
 }
 
 /// A small film of a scene, on which single rays are judged.
@@ -61,8 +64,6 @@ pub struct ProbeFilm {
     pub mask: RegionMask,
     /// Regions without shadows.
     pub unshadowed_mask: RegionMask,
-    /// The unambiguous rays.
-    pub batch: RayBatch,
     /// What several samples a pixel are judged on; of scenes with stored images alone.
     pub sampled: Option<Sampled>,
     /// What a stage that shades is compared with: centers, without shadows.
@@ -150,10 +151,6 @@ impl PreparedScene {
         let scene = &expected.scene;
         let surface = SurfaceBuffer::new(scene, w, h)?;
         let [mask, unshadowed_mask] = store.masks(&offline, scene, width, height)?;
-        let asked = without_mirrors(scene, &surface, &mask);
-        let fine = SurfaceBuffer::new(scene, FINE * w, FINE * h)?;
-        let batch = RayBatch::new(&entry.name, scene, &surface, &asked);
-        let batch = batch.with_contacts(scene, &fine, w);
         let probe_film = ProbeFilm {
             width,
             height,
@@ -163,7 +160,6 @@ impl PreparedScene {
             sampled: None,
             surface,
             mask,
-            batch,
         };
         let case = Self {
             offline,
@@ -174,11 +170,35 @@ impl PreparedScene {
             expected,
             first,
             probe_film,
+            batch: OnceLock::new(),
             entry: entry.clone(),
             held_back: false,
         };
         // The loop is the same on every scene: those that have most to show are enough.
         if entry.stored { case.with_samples() } else { Ok(case) }
+    }
+
+    /// The unambiguous rays of the small film: casting them takes as long as all else that makes a scene ready, and
+    /// what does not build needs none.
+    pub fn batch(&self) -> &RayBatch {
+        self.batch.get_or_init(|| {
+            let (scene, film) = (&self.expected.scene, &self.probe_film);
+            let asked = without_mirrors(scene, &film.surface, &film.mask);
+            let batch = RayBatch::new(&self.entry.name, scene, &film.surface, &asked);
+            let (width, height) = (film.width as usize, film.height as usize);
+            match SurfaceBuffer::new(scene, FINE * width, FINE * height) {
+                Ok(fine) => batch.with_contacts(scene, &fine, width),
+                // A camera has a frame on any film, or on none.
+                Err(_) => batch,
+            }
+        })
+    }
+
+    /// Casts the rays of scenes, several at once.
+    pub fn cast_rays(cases: &[Self]) {
+        cases.par_iter().for_each(|case| {
+            case.batch();
+        });
     }
 
     /// The scene with what the render loop is asked at several samples per pixel.
