@@ -34,9 +34,12 @@ pub struct Reached {
 }
 
 /// Number of edits that one worker draws with.
-pub const TRIED_AT_ONCE: usize = 32;
+pub const TRIED_AT_ONCE: usize = 16;
 /// So many edits are tried at most.
 const MOST: usize = 200;
+/// The names of some edits.
+const SIGN: &str = "a sign is wrong";
+const FACTORS: &str = "the factors of a product are exchanged";
 /// Lines that are longer are not looked at, in bytes.
 const LONGEST_LINE: usize = 300;
 /// Functions of a text that are looked at, the first ones.
@@ -78,6 +81,12 @@ pub fn all(stages: &Stages) -> Vec<LineEdit> {
             }
         }
     }
+    // The likeliest first: signs. Last what changes matrices alone.
+    edits.sort_by_key(|edit| match edit.name {
+        SIGN => 0,
+        FACTORS => 2,
+        _ => 1,
+    });
     edits.truncate(MOST);
     edits
 }
@@ -299,9 +308,9 @@ fn calls(code: &str, push: Push) {
         match called {
             "normalize" => {
                 push("a vector is normalized that must not be", replaced(code, begin..open, ""));
-                push("a sign is wrong", replaced(code, begin..open, "-normalize"));
+                push(SIGN, replaced(code, begin..open, "-normalize"));
             }
-            "reflect" => push("a sign is wrong", replaced(code, begin..open, "-reflect")),
+            "reflect" => push(SIGN, replaced(code, begin..open, "-reflect")),
             "max" => push("max and min are exchanged", replaced(code, begin..open, "min")),
             "min" => push("max and min are exchanged", replaced(code, begin..open, "max")),
             _ => (),
@@ -362,11 +371,11 @@ fn operators(code: &str, push: Push) {
         let sides = before.zip(operand_behind(code, behind));
         let mut by = |name, other: &str| push(name, replaced(code, at..behind, other));
         match operator {
-            "-" if sides.is_none() || !is_spaced => by("a sign is wrong", ""),
+            "-" if sides.is_none() || !is_spaced => by(SIGN, ""),
             "<" if is_spaced => by("a comparison is the wrong way round", ">"),
             ">" if is_spaced => by("a comparison is the wrong way round", "<"),
-            "+" if is_spaced => by("a sign is wrong", "-"),
-            "-" if is_spaced => by("a sign is wrong", "+"),
+            "+" if is_spaced => by(SIGN, "-"),
+            "-" if is_spaced => by(SIGN, "+"),
             "*" if is_spaced => by("multiplied in place of divided", "/"),
             "/" if is_spaced => by("divided in place of multiplied", "*"),
             _ => (),
@@ -375,8 +384,8 @@ fn operators(code: &str, push: Push) {
             && code[before.clone()] != code[behind.clone()]
         {
             let name = match operator {
-                "-" => "a sign is wrong",
-                "*" => "the factors of a product are exchanged",
+                "-" => SIGN,
+                "*" => FACTORS,
                 "/" => "dividend and divisor are exchanged",
                 _ => continue,
             };
@@ -443,6 +452,17 @@ mod tests {
         let lines: std::collections::BTreeSet<usize> =
             all(&stages).into_iter().map(|edit| edit.line).collect();
         assert_eq!(lines, [2, 6].into());
+    }
+
+    #[test]
+    fn signs_are_tried_first_and_exchanged_factors_last() {
+        let mut stages = Stages::default();
+        let text = "@vertex fn v() -> V {\n    let a = b * step(c, d);\n    return V(a - b);\n}\n";
+        stages.set_text("a.wgsl", text);
+        let names: Vec<&str> = all(&stages).iter().map(|edit| edit.name).collect();
+        let signs = names.iter().take_while(|name| **name == SIGN).count();
+        assert!(signs > 0 && !names[signs..].contains(&SIGN), "{names:?}");
+        assert_eq!(names.iter().position(|name| *name == FACTORS), Some(names.len() - 1));
     }
 
     #[test]
