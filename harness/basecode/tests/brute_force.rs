@@ -2,6 +2,8 @@
 //! reader of scene files, f64 throughout, every triangle tried for every ray, formulas of the
 //! handout written down again.
 
+#![allow(clippy::unwrap_used)] // its helpers are tests too
+
 use std::collections::HashMap;
 use std::path::Path;
 
