@@ -3,20 +3,21 @@
 //! Authors need only [`crate::export_renderer!`]. Everything here turns C data into calls of the
 //! trait, and errors and panics into a status with a message; no panic leaves the plugin.
 
-use std::any::Any;
+mod pass;
+mod status;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::{Mutex, Once};
 
 use glam::{Vec2, Vec3};
 pub use renderer_api as api;
 
-use crate::gpu::{AdapterKind, Footprint, Gpu, MATRICES, NEGATED_NORMALS, RenderPass, Target};
-use crate::realtime::{RayRefused, Realtime};
 use crate::{
-    Bsdf, Camera, CameraConfig, Error, Film, Frame, Material, Matrices, Ray, RenderJob, Renderer,
-    Result, Sampler, Scene, SurfaceInteraction,
+    Bsdf, Error, Film, Frame, Material, Ray, RenderJob, Renderer, Result, Sampler, Scene,
+    SurfaceInteraction,
 };
+use pass::{close_realtime, draw_frame, open_realtime, read_frame};
+use status::{forget, guard};
 
 /// Exports a type that implements [`Renderer`] as the library's plugin, with its name and version
 /// for reports. Use it once a library.
@@ -85,20 +86,6 @@ pub const fn plugin(
 struct Loaded {
     renderer: Box<dyn Renderer>,
     scene: Scene,
-}
-
-/// What an [`api::Pass`] points to. Fields are dropped in order: the device goes last.
-struct OpenPass {
-    pass: Box<dyn RenderPass>,
-    target: Target,
-    gpu: Gpu,
-    /// The kind and name of adapter that the device was opened with.
-    adapter: (AdapterKind, String),
-    realtime: Realtime,
-    /// What making the pass handed to the device.
-    opening: Footprint,
-    /// What the camera of a frame gives as its matrices.
-    matrices: Matrices,
 }
 
 /// Loads a scene into a new renderer.
@@ -237,123 +224,6 @@ unsafe extern "C" fn render_offline(
     })
 }
 
-unsafe extern "C" fn open_realtime(
-    scene: api::Scene,
-    settings: *const api::RealtimeSettings,
-    pass: *mut api::Pass,
-    message: *mut api::Message,
-) -> api::Status {
-    guard(message, || {
-        // SAFETY: a live scene of ours, valid settings with `stage_count` stages.
-        let (loaded, settings, stages) = unsafe {
-            let settings = &*settings;
-            let stages: &[api::StageText] = match settings.stage_count {
-                0 => &[],
-                count => std::slice::from_raw_parts(settings.stages, count),
-            };
-            (&*scene.cast::<Loaded>(), settings, stages)
-        };
-        let kind = match settings.adapter_kind {
-            api::ADAPTER_SOFTWARE => AdapterKind::Software,
-            api::ADAPTER_HARDWARE => AdapterKind::Hardware,
-            _ => AdapterKind::Any,
-        };
-        // SAFETY: texts of the host's, valid during the call.
-        let name = unsafe { text(&settings.adapter_name)? };
-        let realtime = Realtime::begin();
-        let mut gpu = Gpu::reopen(kind, name)?;
-        let mut replaced = Vec::new();
-        for stage in stages {
-            // SAFETY: as above.
-            let (name, source) = unsafe { (text(&stage.name)?, text(&stage.source)?) };
-            replaced.push((name.to_owned(), source.to_owned()));
-        }
-        let asked = replaced.iter().find(|(name, _)| name == MATRICES).map(|(_, text)| text);
-        let is_asked =
-            |matrices: &Matrices| asked.is_some_and(|text| *text == format!("{matrices:?}"));
-        let matrices = Matrices::ALL.into_iter().find(is_asked).unwrap_or_default();
-        let negated = replaced.iter().any(|(name, _)| name == NEGATED_NORMALS);
-        let negated = negated.then(|| loaded.scene.with_negated_normals());
-        let scene = negated.as_ref().unwrap_or(&loaded.scene);
-        gpu.replace_stages(replaced);
-        let target = Target::new(&gpu, settings.width as usize, settings.height as usize)?;
-        let shadow_map = settings.shadow_map != 0;
-        let _ = gpu.take_footprint();
-        let mut opened = None;
-        gpu.checked(&mut || {
-            let kind = scene.config().kind;
-            opened = Some(loaded.renderer.render_pass(kind, &gpu, scene, shadow_map)?);
-            Ok(())
-        })?;
-        realtime.without_rays()?;
-        let Some(opened) = opened else {
-            return Err(Error::Gpu("the render pass was not made".into()));
-        };
-        let adapter = (kind, name.to_owned());
-        let opening = gpu.take_footprint();
-        let opened = OpenPass { pass: opened, target, gpu, adapter, realtime, opening, matrices };
-        let opened = Box::new(opened);
-        // SAFETY: the host's place for the handle.
-        unsafe { *pass = Box::into_raw(opened).cast() };
-        Ok(())
-    })
-}
-
-unsafe extern "C" fn draw_frame(
-    pass: api::Pass,
-    camera: *const api::CameraValue,
-    message: *mut api::Message,
-) -> api::Status {
-    guard_noting(message, || {
-        // SAFETY: a live pass of ours and a valid camera.
-        let (open, camera) = unsafe { (&mut *pass.cast::<OpenPass>(), &*camera) };
-        let config = CameraConfig {
-            eye: camera.eye.into(),
-            at: camera.at.into(),
-            up: camera.up.into(),
-            fov_y_deg: camera.fov_y_deg,
-        };
-        let camera = Camera::new(config, open.target.width, open.target.height)?;
-        let camera = camera.with_matrices(open.matrices);
-        let OpenPass { pass, target, gpu, realtime, opening, .. } = open;
-        let _ = gpu.take_footprint();
-        gpu.checked(&mut || pass.draw(gpu, &camera, target))?;
-        realtime.without_rays()?;
-        Ok(opening.and(gpu.take_footprint()).to_string())
-    })
-}
-
-unsafe extern "C" fn read_frame(
-    pass: api::Pass,
-    pixels: *mut f32,
-    float_count: usize,
-    message: *mut api::Message,
-) -> api::Status {
-    guard(message, || {
-        // SAFETY: a live pass of ours.
-        let open = unsafe { &*pass.cast::<OpenPass>() };
-        expect_floats(open.target.width, open.target.height, float_count)?;
-        let image = open.target.read_back(&open.gpu)?;
-        // SAFETY: the host's buffer holds `float_count` floats, three for each pixel.
-        let pixels =
-            unsafe { std::slice::from_raw_parts_mut(pixels.cast::<Vec3>(), image.pixels.len()) };
-        pixels.copy_from_slice(&image.pixels);
-        Ok(())
-    })
-}
-
-unsafe extern "C" fn close_realtime(pass: api::Pass) {
-    // SAFETY: the host hands back what `open_realtime` gave, once.
-    let open = unsafe { Box::from_raw(pass.cast::<OpenPass>()) };
-    // A panic in a student's `drop` must not cross the boundary; the device goes with it.
-    let dropped = catch_unwind(AssertUnwindSafe(|| {
-        let OpenPass { pass, target, gpu, adapter: (kind, name), realtime: _realtime, .. } = *open;
-        drop((pass, target));
-        gpu.keep(kind, &name);
-    }));
-    dropped.unwrap_or_else(forget);
-}
-
 /// A surface point of no scene, for materials given by value.
 const FLAT: SurfaceInteraction = SurfaceInteraction {
     t: 0.0,
@@ -463,93 +333,4 @@ unsafe fn text<'a>(text: &api::Text) -> Result<&'a str> {
     std::str::from_utf8(unsafe { text.bytes() }).map_err(|error| {
         Error::Argument(format!("the host passed text that is not UTF-8: {error}"))
     })
-}
-
-/// Where the last panic of this library happened.
-static PANIC_PLACE: Mutex<Option<String>> = Mutex::new(None);
-
-/// Runs `body` and turns its error or panic into a status and a message.
-fn guard(message: *mut api::Message, body: impl FnOnce() -> Result<()>) -> api::Status {
-    guard_noting(message, || body().map(|()| String::new()))
-}
-
-/// The same for a call that has something to tell when it succeeds.
-fn guard_noting(message: *mut api::Message, body: impl FnOnce() -> Result<String>) -> api::Status {
-    static HOOK: Once = Once::new();
-    HOOK.call_once(|| {
-        std::panic::set_hook(Box::new(|info| {
-            // That one is an error of the scene, told by the answer.
-            if !panic_text(info.payload()).starts_with(crate::scene::NO_LIGHT) {
-                eprintln!("{info}");
-            }
-            if let Ok(mut place) = PANIC_PLACE.lock() {
-                *place = info.location().map(|l| format!("{}:{}", l.file(), l.line()));
-            }
-        }));
-    });
-    let (status, said) = match catch_unwind(AssertUnwindSafe(body)) {
-        Ok(Ok(note)) if note.is_empty() => return api::STATUS_OK,
-        Ok(Ok(note)) => (api::STATUS_OK, note),
-        // The status says it already: the message is the task alone, as for `todo!()`.
-        Ok(Err(Error::NotImplemented(task))) => (api::STATUS_NOT_IMPLEMENTED, task),
-        Ok(Err(error)) => (status_of(&error), error.to_string()),
-        Err(payload) => {
-            let described = describe_panic(payload.as_ref());
-            forget(payload);
-            described
-        }
-    };
-    // SAFETY: the host's message with a buffer of `capacity` bytes.
-    unsafe {
-        let message = &mut *message;
-        let mut length = said.len().min(message.capacity);
-        while !said.is_char_boundary(length) {
-            length -= 1;
-        }
-        std::ptr::copy_nonoverlapping(said.as_ptr(), message.data, length);
-        message.length = length;
-    }
-    status
-}
-
-fn status_of(error: &Error) -> api::Status {
-    match error {
-        Error::NoAdapter(_) => api::STATUS_NO_ADAPTER,
-        Error::Cancelled => api::STATUS_CANCELLED,
-        _ => api::STATUS_ERROR,
-    }
-}
-
-/// What a panic says.
-fn panic_text(payload: &(dyn Any + Send)) -> &str {
-    let text = payload.downcast_ref::<&str>().copied();
-    text.or_else(|| payload.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("a panic without a message")
-}
-
-/// Dropping a panic's payload may panic again, which would end the worker.
-fn forget(payload: Box<dyn Any + Send>) {
-    std::mem::forget(payload);
-}
-
-/// `todo!()` and `unimplemented!()` are panics with a fixed beginning: not a crash, but work to do.
-fn describe_panic(payload: &(dyn Any + Send)) -> (api::Status, String) {
-    if payload.is::<RayRefused>() {
-        let error = RayRefused::error();
-        return (status_of(&error), error.to_string());
-    }
-    let said = panic_text(payload).to_owned();
-    let task = ["not yet implemented", "not implemented"].iter().find_map(|p| said.strip_prefix(p));
-    if let Some(task) = task {
-        let task = task.trim_start_matches(':').trim();
-        return (api::STATUS_NOT_IMPLEMENTED, task.to_owned());
-    }
-    if said.starts_with(crate::scene::NO_LIGHT) {
-        return (api::STATUS_ERROR, said);
-    }
-    let place = PANIC_PLACE.lock().ok().and_then(|mut place| place.take());
-    match place {
-        Some(place) => (api::STATUS_PANICKED, format!("{said} (at {place})")),
-        None => (api::STATUS_PANICKED, said),
-    }
 }

@@ -3,10 +3,10 @@
 use basecode::Vec3;
 use renderer_api as api;
 
+use super::answers::Answers;
 use super::changes;
 use super::convention::Convention;
 use super::lobe::{self, Answer};
-use super::price::Answers;
 use super::shading::{ShadedPoint, Shading, energy_scale};
 use super::{Check, CheckId, Lobe, Measure, RuleId, Verdict};
 use imaging::ratio::{ratio_name, triple};

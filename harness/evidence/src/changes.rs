@@ -1,6 +1,7 @@
 //! The known single mistakes that answers are compared with, each with what a teacher takes it for.
 
-use super::price::{Change, Fitted, PriceClass};
+use super::answers::{Change, Fitted};
+use super::price::PriceClass;
 use super::shading::{Angle, Clamp, Directions, Shading, Terms, Tests};
 use imaging::srgb;
 

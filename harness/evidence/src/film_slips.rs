@@ -1,5 +1,6 @@
 //! The price of a wrong image: slips in how a film is written or viewed.
 
+use super::answers::{follows, surely_more_than};
 use super::price::{self, Price, PriceClass};
 use super::rays::RELATIVE;
 use imaging::correlation::Moments;
@@ -259,15 +260,11 @@ pub fn film_price(
     let mut changes: Vec<_> = changes.iter().map(|change| (left(change), change)).collect();
     changes.sort_by(|a, b| a.0.total_cmp(&b.0));
     changes.into_iter().fold(start, |price, (left, change)| {
-        if price.is_least()
-            || left > price::surely_more_than(price.error - PriceClass::Slip.price())
-        {
+        if price.is_least() || left > surely_more_than(price.error - PriceClass::Slip.price()) {
             return price;
         }
         match comparison(change, &all) {
-            Some(all) if price::follows(&all.pairs) => {
-                price.or(change.name, PriceClass::Slip, all.left)
-            }
+            Some(all) if follows(&all.pairs) => price.or(change.name, PriceClass::Slip, all.left),
             _ => price,
         }
     })

@@ -1,17 +1,21 @@
 //! Slips in what reaches a fragment stage, such as a wrong normal or a uniform that is not set: how far each explains
 //! an unshadowed realtime image. They are slips of the render pass or of the vertex stage.
 
-use basecode::glam::{DMat4, DVec3};
-use basecode::{Camera, Image, MaterialModel, Scene, Vec3};
+mod missing;
+mod slips;
+
+use basecode::{Image, Scene};
 use renderer_api as api;
 
 use super::CheckId;
+use super::answers::{Answers, few_of, surely_more_than};
 use super::pixels::{LEAST_LEFT, Looked, Places, RELATIVE};
-use super::price::{self, Answers, SURFACES_MISSING, few_of, surely_more_than};
+use super::price::SURFACES_MISSING;
 use super::shading::{ShadedPoint, Shading};
-use super::vertex::other_normals;
 use crate::expected::SurfacePoint;
 use imaging::reference::RegionMask;
+use missing::Missing;
+use slips::{Slip, materials_of_others, pass_slips, vertex_slips};
 
 /// A frame beside what each slip makes of its scene.
 pub struct FrameSlips<'a> {
@@ -149,199 +153,14 @@ fn left(changed: &[[f64; 3]], found: &[[f32; 3]], mean: f64) -> f64 {
 /// Number of points that tell something of surfaces.
 const LEAST_SHOWN: usize = 10;
 
-/// What an image shows of surfaces if some of them are not drawn.
-struct Missing {
-    /// Fraction of the points that show neither their surface, nor one behind it, nor nothing.
-    left: f64,
-    /// Lit points that show their own surface, diffuse and Phong ones.
-    shown: [usize; 2],
-}
-
-/// So many surfaces behind another are looked at.
-const BEHIND: usize = 8;
-
-impl Missing {
-    fn of(frame: &FrameSlips, pixels: &[usize]) -> Self {
-        let FrameSlips { scene, places, looked, mean, .. } = frame;
-        let shows = |point: &SurfacePoint, found: &[f32; 3]| {
-            let right = radiance(&places.shaded_point(scene, point));
-            let is_close = |c: usize| {
-                let apart = (f64::from(found[c]) - right[c]).abs();
-                apart <= RELATIVE * right[c].abs() + 1e-3 * mean
-            };
-            [0, 1, 2].into_iter().all(is_close)
-        };
-        let shows_behind = |point: &SurfacePoint, found: &[f32; 3]| {
-            let mut ray = point.ray;
-            for _ in 0..BEHIND {
-                let Some(hit) = scene.intersect(&ray) else { return false };
-                ray.min_t = hit.t + hit.epsilon;
-                if SurfacePoint::cast(scene, ray).is_some_and(|next| shows(&next, found)) {
-                    return true;
-                }
-            }
-            false
-        };
-        let (mut left, mut shown) = (0usize, [0usize; 2]);
-        for &pixel in pixels {
-            let (point, found) = (&looked.surfaces[pixel], &looked.found[pixel]);
-            if shows(point, found) {
-                let lit = found.iter().any(|value| f64::from(*value) > 1e-2 * mean);
-                let phong = scene.material_of(point.shape).model == MaterialModel::Phong;
-                shown[usize::from(phong)] += usize::from(lit);
-            } else if *found != [0.0; 3] && !shows_behind(point, found) {
-                left += 1;
-            }
-        }
-        Self { left: left as f64 / pixels.len().max(1) as f64, shown }
-    }
-}
-
 /// Where a direction lies in the surface, as from the origin on a floor through it, rounding decides what is black.
 const GRAZING: f64 = 1e-3;
-
-/// What a right stage makes of a point after a slip; `None` if that is not known.
-type Shaded<'a> = Box<dyn Fn(&SurfacePoint) -> Option<ShadedPoint> + 'a>;
-
-/// What a slip makes of a point; `None` if that is not known.
-type Moved<'a> = Box<dyn Fn(&SurfacePoint) -> Option<SurfacePoint> + 'a>;
-
-/// A slip in what reaches a fragment stage.
-struct Slip<'a> {
-    of: CheckId,
-    name: &'static str,
-    shaded: Shaded<'a>,
-}
-
-/// Slips with the values that a pass binds.
-fn pass_slips<'a>(scene: &'a Scene, right: Places) -> Vec<Slip<'a>> {
-    let slip = |name, shaded: Shaded<'a>| Slip { of: CheckId::PassUniforms, name, shaded };
-    let at = |name, places: Places| {
-        slip(name, Box::new(move |point| Some(places.shaded_point(scene, point))))
-    };
-    let changed = |name, change: fn(&mut ShadedPoint)| {
-        let shaded = move |point: &SurfacePoint| {
-            let mut shaded = right.shaded_point(scene, point);
-            change(&mut shaded);
-            Some(shaded)
-        };
-        slip(name, Box::new(shaded))
-    };
-    let beside = |name, by: isize| {
-        let shaded = move |point: &SurfacePoint| {
-            let other =
-                point.shape.checked_add_signed(by).filter(|at| *at < scene.shapes().len())?;
-            let is_drawn = !scene.material_of(other).is_emitter();
-            is_drawn.then(|| right.with_material(scene, other, point))
-        };
-        slip(name, Box::new(shaded))
-    };
-    vec![
-        at(price::VIEWER_AT_ORIGIN, Places { eye: Vec3::ZERO, ..right }),
-        at(price::LIGHT_AT_ORIGIN, Places { light: Vec3::ZERO, ..right }),
-        at("the light stands where the viewer does", Places { light: right.eye, ..right }),
-        changed("the intensity is missing", |p| p.intensity = [1.0; 3]),
-        changed("the intensity is grey", |p| p.intensity = [p.intensity[0]; 3]),
-        changed("the intensity is divided by 4 pi", |p| {
-            p.intensity = p.intensity.map(|v| v / (2.0 * std::f64::consts::TAU));
-        }),
-        changed("rho_d and rho_s are exchanged", |p| {
-            std::mem::swap(&mut p.material.diffuse, &mut p.material.specular);
-        }),
-        changed("albedos are grey", |p| {
-            p.material.diffuse = [p.material.diffuse[0]; 3];
-            p.material.specular = [p.material.specular[0]; 3];
-        }),
-        changed("albedos without the energy scale", |p| p.scale = 1.0),
-        changed("the energy scale twice", |p| p.scale *= p.scale),
-        beside("every surface is drawn with the material of the next one", 1),
-        beside("every surface is drawn with the material of the one before", -1),
-    ]
-}
-
-/// Slips with positions and normals. Positions may come from the depth of a pixel.
-fn vertex_slips<'a>(scene: &'a Scene, camera: &Camera, right: Places) -> Vec<Slip<'a>> {
-    let (view, projection) = (camera.view(), camera.projection());
-    let to_clip = projection * view;
-    let slip = |name, changed: Moved<'a>| Slip {
-        of: CheckId::StageVertex,
-        name,
-        shaded: Box::new(move |point| Some(right.shaded_point(scene, &changed(point)?))),
-    };
-    let moved = |name, position: Box<dyn Fn(Vec3) -> Vec3>| {
-        let changed = move |point: &SurfacePoint| {
-            let position = position(point.position);
-            position.is_finite().then_some(SurfacePoint { position, ..*point })
-        };
-        slip(name, Box::new(changed))
-    };
-    // Depth has few digits: in f64.
-    let [precise, exchanged] =
-        [projection.as_dmat4() * view.as_dmat4(), view.as_dmat4() * projection.as_dmat4()];
-    let from_film = |name, back: DMat4, other: fn(DVec3) -> DVec3| {
-        let there = move |p: Vec3| other(precise.project_point3(p.as_dvec3()));
-        moved(name, Box::new(move |p| back.project_point3(there(p)).as_vec3()))
-    };
-    let back = precise.inverse();
-    let mut slips = vec![
-        moved(
-            "the position is not divided by its w",
-            Box::new(move |p| p / (to_clip * p.extend(1.0)).w),
-        ),
-        moved("positions are in view space", Box::new(move |p| view.transform_point3(p))),
-        from_film("the inverse is that of view * projection", exchanged.inverse(), |ndc| ndc),
-        from_film("positions are upside down", back, |ndc| DVec3::new(ndc.x, -ndc.y, ndc.z)),
-        from_film("positions are mirrored", back, |ndc| DVec3::new(-ndc.x, ndc.y, ndc.z)),
-        from_film("positions are turned by half", back, |ndc| DVec3::new(-ndc.x, -ndc.y, ndc.z)),
-        from_film("depth is taken from -1 to 1", back, |ndc| ndc.with_z(2.0 * ndc.z - 1.0)),
-        from_film("the place on the film is taken from 0 to 1", back, |ndc| {
-            DVec3::new(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y, ndc.z)
-        }),
-        slip(
-            "values lose their perspective",
-            Box::new(move |point| point.without_perspective(scene, to_clip)),
-        ),
-    ];
-    let mut normals = other_normals();
-    normals.push(("the normal is not decoded", Box::new(|p| 0.5 * p.normal + 0.5)));
-    normals.push(("the normal is decoded twice", Box::new(|p| 2.0 * p.normal - 1.0)));
-    slips.extend(normals.into_iter().map(|(name, other)| {
-        let changed = move |point: &SurfacePoint| {
-            Some(SurfacePoint { normal: other(point).try_normalize()?, ..*point })
-        };
-        slip(name, Box::new(changed))
-    }));
-    slips
-}
-
-/// Number of points by which the material of a shape is known.
-const POINTS_PER_SHAPE: usize = 100;
-
-/// What a right stage makes of points if each shape has the material of whichever explains best what is found there.
-fn materials_of_others<'a>(scene: &'a Scene, right: Places, looked: &Looked) -> Shaded<'a> {
-    let count = scene.shapes().len();
-    let apart = |shape: usize, other: usize| -> f64 {
-        let own = looked.surfaces.iter().zip(&looked.found);
-        let own: Vec<_> = own.filter(|(point, _)| point.shape == shape).collect();
-        let few = own.iter().step_by(own.len().div_ceil(POINTS_PER_SHAPE).max(1));
-        let differences = few.flat_map(|(point, found)| {
-            let drawn = radiance(&right.with_material(scene, other, point));
-            [0, 1, 2].map(|c| (drawn[c] - f64::from(found[c])).abs())
-        });
-        differences.sum()
-    };
-    let best = |shape: usize| {
-        let by_fit = |a: &usize, b: &usize| apart(shape, *a).total_cmp(&apart(shape, *b));
-        let drawn = (0..count).filter(|other| !scene.material_of(*other).is_emitter());
-        drawn.min_by(by_fit).unwrap_or(shape)
-    };
-    let of: Vec<usize> = (0..count).map(best).collect();
-    Box::new(move |point| Some(right.with_material(scene, of[point.shape], point)))
-}
 
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+
+    use basecode::Vec3;
 
     use super::*;
     use crate::expected::{load_scene, regions};

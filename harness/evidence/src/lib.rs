@@ -2,6 +2,7 @@
 //!
 //! Nothing here depends on processes, GPUs or libraries.
 
+pub mod answers;
 pub mod bsdf;
 pub mod changed_scene;
 pub mod changes;

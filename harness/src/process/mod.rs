@@ -8,6 +8,8 @@
 mod capture;
 mod limits;
 #[cfg(unix)]
+mod pipes;
+#[cfg(unix)]
 mod standstill;
 mod start;
 #[cfg(unix)]

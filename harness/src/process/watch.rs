@@ -1,22 +1,18 @@
 //! Watching a child on Unix.
 
-use std::fs::File;
-use std::io::{self, Read};
-use std::os::fd::{AsFd, OwnedFd};
+use std::io;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use nix::errno::Errno;
-use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::libc;
-use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::wait::{Id, WaitPidFlag, WaitStatus, waitid};
 use nix::unistd::Pid;
 
-use super::capture::Capture;
+use super::pipes::Pipes;
 use super::standstill::{self, Standstill};
 use super::{ChildOutcome, Confinement, Exit, Watcher, start};
 use crate::sandbox::{InForce, Policy, SandboxError, read_report};
@@ -25,8 +21,6 @@ use crate::sandbox::{InForce, Policy, SandboxError, read_report};
 const TICK: Duration = Duration::from_millis(20);
 /// A child that is not done after so many times the seconds that it may stand still got no processor.
 const STARVED: u32 = 20;
-/// The most that is taken from an output stream at a time, so that a flood cannot keep us there.
-const READ_AT_ONCE: usize = 1 << 20;
 /// How long the output of a process that is gone may still be held open by another.
 const DRAIN: Duration = Duration::from_millis(200);
 
@@ -51,55 +45,16 @@ pub fn run(
     let mut child = start(command, confinement)?;
     let pid = Pid::from_raw(child.id() as i32);
     let mut group = Group { pid, reaped: false };
-    let mut pipes = Vec::new();
-    for end in [child.stdout.take().map(OwnedFd::from), child.stderr.take().map(OwnedFd::from)] {
-        pipes.push(Pipe::new(end, keep)?);
-    }
-    let may_stand_still = Duration::from_secs_f64(confinement.limits.wall_s);
-    let mut peak_address_mib = 0;
-    let mut running =
-        Running { child: pid, sandboxed: confinement.sandbox.is_some(), payload: None };
-    let (mut still, mut looked, mut printed) = (Standstill::new(begin), begin, false);
-    let ended_by_us = loop {
-        wait_readable(&pipes, TICK);
-        // Who waits for us to read does not wait by choice.
-        for pipe in &mut pipes {
-            printed |= pipe.read();
-        }
-        if has_exited(pid)? {
-            break None;
-        }
-        if cancel.load(Ordering::Relaxed) {
-            break Some(Exit::Cancelled);
-        }
-        let now = Instant::now();
-        if now - looked < TICK {
-            continue;
-        }
-        looked = now;
-        running.find();
-        still.look(now, running.stands_still().map(|still| still && !printed));
-        printed = false;
-        peak_address_mib = peak_address_mib.max(running.address_space_mib());
-        let cpu_s = running.cpu_s();
-        if watcher(cpu_s).is_break() {
-            break Some(Exit::OutOfCpu);
-        }
-        if still.so_far() >= may_stand_still {
-            break Some(Exit::TimedOut);
-        }
-        if now - begin >= STARVED * may_stand_still {
-            let computed = 2.0 * cpu_s > (now - begin).as_secs_f64();
-            break Some(if computed { Exit::OutOfCpu } else { Exit::Starved });
-        }
-    };
+    let mut pipes = Pipes::of(&mut child, keep)?;
+    let mut watch = Watch::new(pid, begin, confinement);
+    let ended_by_us = watch.until_end(&mut pipes, cancel, watcher)?;
     if ended_by_us.is_some() {
-        running.end_inside();
+        watch.running.end_inside();
     }
     let (status, usage) = group.end()?;
     let wall_s = begin.elapsed().as_secs_f64();
-    drain(&mut pipes);
-    let left_process = pipes.iter().any(Pipe::is_open);
+    pipes.drain(DRAIN);
+    let left_process = pipes.any_open();
     let cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
     let out_of_cpu = cpu_s >= confinement.limits.cpu_s as f64;
     let exit = ended_by_us.unwrap_or_else(|| exit_of(status, out_of_cpu));
@@ -109,12 +64,10 @@ pub fn run(
         Some(in_force) => in_force.ok(),
         None => None,
     };
-    let mut captured = pipes.into_iter().map(|pipe| pipe.capture.finish());
-    let (stdout, stderr) =
-        (captured.next().unwrap_or_default(), captured.next().unwrap_or_default());
+    let [stdout, stderr] = pipes.finish();
     // Kilobytes on Linux.
     let peak_resident_mib = usage.ru_maxrss as u64 >> 10;
-    let peak_mib = peak_resident_mib.max(peak_address_mib);
+    let peak_mib = peak_resident_mib.max(watch.peak_address_mib);
     Ok(ChildOutcome {
         exit: exit.with_memory(&stderr, peak_mib, confinement.limits.memory_mib),
         pid: pid.as_raw() as u32,
@@ -122,12 +75,86 @@ pub fn run(
         stderr,
         wall_s,
         cpu_s,
-        still_s: still.so_far().as_secs_f64(),
+        still_s: watch.still.so_far().as_secs_f64(),
         peak_resident_mib,
-        peak_address_mib,
+        peak_address_mib: watch.peak_address_mib,
         in_force,
         left_process,
     })
+}
+
+/// What is seen of a child while it runs.
+struct Watch {
+    running: Running,
+    begin: Instant,
+    may_stand_still: Duration,
+    still: Standstill,
+    /// Whether it has printed since the last look.
+    printed: bool,
+    peak_address_mib: u64,
+}
+
+impl Watch {
+    fn new(child: Pid, begin: Instant, confinement: &Confinement) -> Self {
+        Self {
+            running: Running { child, sandboxed: confinement.sandbox.is_some(), payload: None },
+            begin,
+            may_stand_still: Duration::from_secs_f64(confinement.limits.wall_s),
+            still: Standstill::new(begin),
+            printed: false,
+            peak_address_mib: 0,
+        }
+    }
+
+    /// Reads the output until the child is gone or must be ended. Returns the reason to end it.
+    fn until_end(
+        &mut self,
+        pipes: &mut Pipes,
+        cancel: &AtomicBool,
+        watcher: &mut Watcher,
+    ) -> io::Result<Option<Exit>> {
+        let mut looked = self.begin;
+        loop {
+            pipes.wait(TICK);
+            // Who waits for us to read does not wait by choice.
+            self.printed |= pipes.read();
+            if has_exited(self.running.child)? {
+                return Ok(None);
+            }
+            if cancel.load(Ordering::Relaxed) {
+                return Ok(Some(Exit::Cancelled));
+            }
+            let now = Instant::now();
+            if now - looked < TICK {
+                continue;
+            }
+            looked = now;
+            if let Some(exit) = self.look(now, watcher) {
+                return Ok(Some(exit));
+            }
+        }
+    }
+
+    /// Looks at its memory and time. Returns the reason to end it, if it has used too much.
+    fn look(&mut self, now: Instant, watcher: &mut Watcher) -> Option<Exit> {
+        self.running.find();
+        let stands_still = self.running.stands_still().map(|still| still && !self.printed);
+        self.still.look(now, stands_still);
+        self.printed = false;
+        self.peak_address_mib = self.peak_address_mib.max(self.running.address_space_mib());
+        let cpu_s = self.running.cpu_s();
+        if watcher(cpu_s).is_break() {
+            return Some(Exit::OutOfCpu);
+        }
+        if self.still.so_far() >= self.may_stand_still {
+            return Some(Exit::TimedOut);
+        }
+        let passed = now - self.begin;
+        (passed >= STARVED * self.may_stand_still).then(|| {
+            let computed = 2.0 * cpu_s > passed.as_secs_f64();
+            if computed { Exit::OutOfCpu } else { Exit::Starved }
+        })
+    }
 }
 
 /// How a child ended by itself, from its status.
@@ -138,17 +165,6 @@ fn exit_of(status: i32, out_of_cpu: bool) -> Exit {
         Some(libc::SIGKILL) if out_of_cpu => Exit::OutOfCpu,
         Some(signal) => Exit::Signal(signal),
         None => Exit::Code(libc::WEXITSTATUS(status)),
-    }
-}
-
-/// Reads what is left in the pipes of a child that is gone.
-fn drain(pipes: &mut [Pipe]) {
-    let drained = Instant::now() + DRAIN;
-    while pipes.iter().any(Pipe::is_open) && Instant::now() < drained {
-        wait_readable(pipes, drained.saturating_duration_since(Instant::now()));
-        pipes.iter_mut().for_each(|pipe| {
-            pipe.read();
-        });
     }
 }
 
@@ -268,59 +284,6 @@ fn has_exited(pid: Pid) -> io::Result<bool> {
         Ok(_) => Ok(true),
         Err(error) => Err(error.into()),
     }
-}
-
-/// The read end of one of the child's output streams.
-struct Pipe {
-    end: Option<File>,
-    capture: Capture,
-}
-
-impl Pipe {
-    fn new(end: Option<OwnedFd>, keep: usize) -> io::Result<Self> {
-        if let Some(end) = &end {
-            fcntl(end, FcntlArg::F_SETFL(OFlag::O_NONBLOCK))?;
-        }
-        Ok(Self { end: end.map(File::from), capture: Capture::new(keep) })
-    }
-
-    fn is_open(&self) -> bool {
-        self.end.is_some()
-    }
-
-    /// Reads the available bytes, up to a limit. Returns whether there were any.
-    fn read(&mut self) -> bool {
-        let Some(end) = &mut self.end else { return false };
-        let (mut buffer, mut taken) = ([0; 64 << 10], 0);
-        while taken < READ_AT_ONCE {
-            match end.read(&mut buffer) {
-                Ok(count @ 1..) => {
-                    self.capture.push(&buffer[..count]);
-                    taken += count;
-                }
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => break,
-                Ok(0) | Err(_) => {
-                    self.end = None;
-                    break;
-                }
-            }
-        }
-        taken > 0
-    }
-}
-
-/// Waits until a pipe can be read or `longest` has passed; less when the child closed both.
-fn wait_readable(pipes: &[Pipe], longest: Duration) {
-    let ends = pipes.iter().filter_map(|pipe| pipe.end.as_ref());
-    let mut polled: Vec<_> = ends.map(|end| PollFd::new(end.as_fd(), PollFlags::POLLIN)).collect();
-    if polled.is_empty() {
-        std::thread::sleep(longest.min(Duration::from_millis(1)));
-        return;
-    }
-    let longest = longest.as_millis() as u16;
-    // An error is a signal that arrived: the caller looks at everything anyway.
-    let _ = poll(&mut polled, PollTimeout::from(longest.max(1)));
 }
 
 /// The address space of a process now; 0 when it is not known.

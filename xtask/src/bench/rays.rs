@@ -124,6 +124,57 @@ impl Cast {
         (begin.elapsed().as_secs_f64(), hits)
     }
 
+    /// Rays beside both of Embree's ways to trace them. They must hit as much as the robust one's.
+    fn beside(
+        &self,
+        (words, kind, eight): (&str, usize, bool),
+        [plain, robust]: [&mut Server; 2],
+        rounds: usize,
+    ) -> anyhow::Result<[Line; 2]> {
+        let [mut ours, mut theirs, mut safe] = <[Samples; 3]>::default();
+        let (mut own_hits, mut safe_hits) = (0, 0);
+        for _ in 0..rounds {
+            let own = self.measure(kind, eight);
+            theirs.push(plain.measure(&kind.to_string())?.0);
+            let robust = robust.measure(&kind.to_string())?;
+            ours.push(own.0);
+            safe.push(robust.0);
+            (own_hits, safe_hits) = (own.1, robust.1);
+        }
+        let count = self.rays[kind].len();
+        anyhow::ensure!(
+            own_hits.abs_diff(safe_hits) * 100 <= count,
+            "{}, {words}: {own_hits} hits, Embree {safe_hits}",
+            self.name
+        );
+        let rate = |samples: &Samples| format!("{:.1} M/s", count as f64 / samples.median() / 1e6);
+        let call = KINDS[kind].1;
+        let line = |anchor: String, theirs: &Samples| Line {
+            work: format!("{words}, {}", self.name),
+            anchor,
+            theirs: rate(theirs),
+            ours: rate(&ours),
+            ratio: ours.faster_than(theirs).ratio(),
+        };
+        Ok([
+            line(format!("Embree `{call}`"), &theirs),
+            line(format!("Embree `{call}`, robust"), &safe),
+        ])
+    }
+
+    /// The build of the BVH beside Embree's.
+    fn build_beside(&self, embree: &mut Server, rounds: usize) -> anyhow::Result<Line> {
+        let (mut ours, mut theirs) = (Samples::default(), Samples::default());
+        for _ in 0..rounds {
+            let begin = Instant::now();
+            std::hint::black_box(build(&self.triangles));
+            ours.push(begin.elapsed().as_secs_f64());
+            theirs.push(embree.measure("build")?.0);
+        }
+        let work = format!("BVH, {}", self.name);
+        Ok(Line::of_times(work, "Embree, all cores", &theirs, &ours))
+    }
+
     fn write(&self, path: &Path) -> anyhow::Result<()> {
         let mut bytes = (self.triangles.len() as u32).to_le_bytes().to_vec();
         let mut put = |v: f32| bytes.extend(v.to_le_bytes());
@@ -180,53 +231,11 @@ pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
         cast.write(&file)?;
         let mut plain = Server::start(&program, &[file.as_os_str()])?;
         let mut robust = Server::start(&program, &[file.as_os_str(), OsStr::new("robust")])?;
-        for (row, (words, kind, eight)) in WORK.into_iter().enumerate() {
-            let call = KINDS[kind].1;
-            let (mut ours, mut theirs) = (Samples::default(), Samples::default());
-            let mut safe = Samples::default();
-            let mut found = [0; 3];
-            for _ in 0..bench.rounds {
-                for (side, samples) in [&mut ours, &mut theirs, &mut safe].into_iter().enumerate() {
-                    let (seconds, hits) = match side {
-                        0 => cast.measure(kind, eight),
-                        1 => plain.measure(&kind.to_string())?,
-                        _ => robust.measure(&kind.to_string())?,
-                    };
-                    samples.push(seconds);
-                    found[side] = hits;
-                }
-            }
-            let apart = found[0].abs_diff(found[2]);
-            anyhow::ensure!(
-                apart * 100 <= cast.rays[kind].len(),
-                "{}, {words}: {} hits, Embree {}",
-                cast.name,
-                found[0],
-                found[2]
-            );
-            let rate = |samples: &Samples| {
-                format!("{:.1} M/s", cast.rays[kind].len() as f64 / samples.median() / 1e6)
-            };
-            for (anchor, theirs) in [(call.to_owned(), theirs), (format!("{call}, robust"), safe)] {
-                lines[row].push(Line {
-                    work: format!("{words}, {}", cast.name),
-                    anchor: format!("Embree `{anchor}`").replace(", robust`", "`, robust"),
-                    theirs: rate(&theirs),
-                    ours: rate(&ours),
-                    ratio: ours.faster_than(&theirs).ratio(),
-                });
-            }
+        for (row, work) in WORK.into_iter().enumerate() {
+            lines[row].extend(cast.beside(work, [&mut plain, &mut robust], bench.rounds)?);
         }
         if cast.triangles.len() > 100_000 {
-            let (mut ours, mut theirs) = (Samples::default(), Samples::default());
-            for _ in 0..bench.rounds {
-                let begin = Instant::now();
-                std::hint::black_box(build(&cast.triangles));
-                ours.push(begin.elapsed().as_secs_f64());
-                theirs.push(plain.measure("build")?.0);
-            }
-            let work = format!("BVH, {}", cast.name);
-            lines[5].push(Line::of_times(work, "Embree, all cores", &theirs, &ours));
+            lines[5].push(cast.build_beside(&mut plain, bench.rounds)?);
         }
     }
     Ok((lines.into_iter().flatten().collect(), growth(bench, &program)?))

@@ -58,30 +58,31 @@ impl Submission {
     }
 }
 
-/// The table's rows, and how a batch grows.
-pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
-    samples::pack(&bench.root, &|name, _| ["perfect", "hangs"].contains(&name))?;
-    let recording = Recording::obtain(&bench.root, &bench.umbra)?;
-    let scratch = tempfile::tempdir()?;
-    let supervisor = Supervisor::new(bench.umbra.clone(), scratch.path().to_owned());
-    let mut one = Submission::new(bench, "one")?;
-    let by_hand = |submission: &mut Submission| -> anyhow::Result<Cost> {
+/// What a batch needs, done by hand or by Umbra.
+struct Batch<'a> {
+    bench: &'a Bench,
+    recording: Recording,
+    supervisor: Supervisor,
+}
+
+impl Batch<'_> {
+    /// Edits a submission, and costs its compiler call, its images and their comparison.
+    fn by_hand(&self, submission: &mut Submission) -> anyhow::Result<Cost> {
         submission.edit()?;
-        let mut sum = Cost { wall: 0.0, cpu: 0.0, memory: 0.0 };
-        let out = tempfile::tempdir_in(&bench.folder)?;
+        let out = tempfile::tempdir_in(&self.bench.folder)?;
         let never = AtomicBool::new(false);
-        let src = submission.folder.join("src");
-        let built = compile(&recording, &supervisor, &src, out.path(), &default_limits(), &never)?;
+        let (src, limits) = (submission.folder.join("src"), default_limits());
+        let built = compile(&self.recording, &self.supervisor, &src, out.path(), &limits, &never)?;
         let BuildOutcome::Built { library } = &built.outcome else {
             anyhow::bail!("the sample does not build: {:?}", built.outcome);
         };
-        (sum.wall, sum.cpu) = (built.wall_s, built.cpu_s);
+        let mut sum = Cost { wall: built.wall_s, cpu: built.cpu_s, memory: 0.0 };
         for (scene, image) in IMAGES {
-            let toml = bench.root.join("scenes/a2").join(scene).with_extension("toml");
+            let toml = self.bench.root.join("scenes/a2").join(scene).with_extension("toml");
             let drawn = out.path().join("image.exr");
             let submitted = submission.folder.join(image).with_extension("exr");
             let render = [Path::new("render"), &toml, Path::new("--plugin"), library];
-            let render = [&*bench.umbra].into_iter().chain(render);
+            let render = [&*self.bench.umbra].into_iter().chain(render);
             let mut costs = vec![measure(render.chain([Path::new("--output"), &drawn]))?];
             if submitted.exists() {
                 costs.push(measure([Path::new("idiff"), &drawn, &submitted])?);
@@ -93,70 +94,88 @@ pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
             }
         }
         Ok(sum)
-    };
-    let graded = |folder: &Path, held_back_seed: &str| {
-        let output = bench.folder.join("report");
+    }
+
+    fn graded(&self, folder: &Path, held_back_seed: &str) -> anyhow::Result<Cost> {
+        let output = self.bench.folder.join("report");
         let held_back_seed = format!("--held-back={held_back_seed}");
-        let line = [&*bench.umbra, Path::new("grade"), folder, Path::new(&held_back_seed)];
+        let line = [&*self.bench.umbra, Path::new("grade"), folder, Path::new(&held_back_seed)];
         let rest = [Path::new("--isolation=reduced"), Path::new("--output"), &output];
         let _ = fs::remove_dir_all(&output);
         let cost = measure(line.into_iter().chain(rest))?;
         anyhow::ensure!(output.join("report.json").exists(), "nothing was graded");
-        anyhow::Ok(cost)
-    };
-    let checked = |folder: &Path| {
-        let output = bench.folder.join("check");
-        measure([&*bench.umbra, Path::new("check"), folder, Path::new("--output"), &output])
-    };
-    // What is made once per batch is there before anything counts.
-    graded(&one.folder, SEED)?;
-    let rounds = bench.rounds.min(3);
-    let (mut hand, mut again, mut edited) = <[Samples; 3]>::default().into();
-    let (mut public, mut all) = (Samples::default(), Samples::default());
-    for _ in 0..rounds {
-        hand.push(by_hand(&mut one)?.cpu);
-        for (held_back_seed, samples) in [("off", &mut public), (SEED, &mut all)] {
+        Ok(cost)
+    }
+
+    fn checked(&self, folder: &Path) -> anyhow::Result<Cost> {
+        let output = self.bench.folder.join("check");
+        measure([&*self.bench.umbra, Path::new("check"), folder, Path::new("--output"), &output])
+    }
+
+    /// What one submission costs, by the ways to grade and to check it.
+    fn one(&self) -> anyhow::Result<Vec<Line>> {
+        let mut one = Submission::new(self.bench, "one")?;
+        // What is made once per batch is there before anything counts.
+        self.graded(&one.folder, SEED)?;
+        let [mut hand, mut again, mut edited, mut public, mut all] = <[Samples; 5]>::default();
+        for _ in 0..self.bench.rounds.min(3) {
+            hand.push(self.by_hand(&mut one)?.cpu);
+            for (held_back_seed, samples) in [("off", &mut public), (SEED, &mut all)] {
+                one.edit()?;
+                samples.push(self.graded(&one.folder, held_back_seed)?.cpu);
+            }
             one.edit()?;
-            samples.push(graded(&one.folder, held_back_seed)?.cpu);
+            edited.push(self.checked(&one.folder)?.wall);
+            again.push(self.checked(&one.folder)?.wall);
         }
-        one.edit()?;
-        edited.push(checked(&one.folder)?.wall);
-        again.push(checked(&one.folder)?.wall);
+        let begin = Instant::now();
+        self.graded(&self.bench.root.join("target/umbra/samples/hangs.zip"), "off")?;
+        let hangs = begin.elapsed().as_secs_f64();
+        let anchor = "rustc, six images, idiff";
+        let alone = |work: &str, ours: f64| Line {
+            work: work.to_owned(),
+            anchor: String::new(),
+            theirs: String::new(),
+            ours: seconds(ours),
+            ratio: String::new(),
+        };
+        Ok(vec![
+            Line::of_times("a right submission, public scenes, CPU".into(), anchor, &hand, &public),
+            Line::of_times("the same with held-back scenes, CPU".into(), anchor, &hand, &all),
+            alone("edit one line, then `check`, wall", edited.median()),
+            alone("`check` without an edit, wall", again.median()),
+            alone("the sample `hangs`, wall", hangs),
+        ])
     }
-    let anchor = "rustc, six images, idiff";
-    let alone = |work: &str, ours: &Samples| Line {
-        work: work.to_owned(),
-        anchor: String::new(),
-        theirs: String::new(),
-        ours: seconds(ours.median()),
-        ratio: String::new(),
-    };
-    let mut lines = vec![
-        Line::of_times("a right submission, public scenes, CPU".into(), anchor, &hand, &public),
-        Line::of_times("the same with held-back scenes, CPU".into(), anchor, &hand, &all),
-        alone("edit one line, then `check`, wall", &edited),
-        alone("`check` without an edit, wall", &again),
-    ];
-    let mut hangs = Samples::default();
-    let begin = Instant::now();
-    graded(&bench.root.join("target/umbra/samples/hangs.zip"), "off")?;
-    hangs.push(begin.elapsed().as_secs_f64());
-    lines.push(alone("the sample `hangs`, wall", &hangs));
-    let mut curves = ["Umbra", "Umbra, with held-back scenes", "by hand"].map(Curve::new);
-    for count in [1, 2, 4] {
-        let class = bench.folder.join("submissions/class");
-        let _ = fs::remove_dir_all(&class);
-        let mut several = Vec::new();
-        for index in 0..count {
-            several.push(Submission::new(bench, &format!("class/{index}"))?);
+
+    /// CPU time against the number of submissions.
+    fn growth(&self) -> anyhow::Result<Vec<Curve>> {
+        let mut curves = ["Umbra", "Umbra, with held-back scenes", "by hand"].map(Curve::new);
+        for count in [1, 2, 4] {
+            let class = self.bench.folder.join("submissions/class");
+            let _ = fs::remove_dir_all(&class);
+            let mut several = Vec::new();
+            for index in 0..count {
+                several.push(Submission::new(self.bench, &format!("class/{index}"))?);
+            }
+            for (curve, held_back_seed) in [(0, "off"), (1, SEED)] {
+                several.iter_mut().try_for_each(Submission::edit)?;
+                curves[curve].push(f64::from(count), self.graded(&class, held_back_seed)?.cpu);
+            }
+            let cpu = several.iter_mut().map(|one| Ok(self.by_hand(one)?.cpu));
+            let cpu: Vec<f64> = cpu.collect::<anyhow::Result<_>>().context("by hand")?;
+            curves[2].push(f64::from(count), cpu.iter().sum());
         }
-        for (curve, held_back_seed) in [(0, "off"), (1, SEED)] {
-            several.iter_mut().try_for_each(Submission::edit)?;
-            curves[curve].push(f64::from(count), graded(&class, held_back_seed)?.cpu);
-        }
-        let cpu = several.iter_mut().map(|one| Ok(by_hand(one)?.cpu));
-        let cpu: Vec<f64> = cpu.collect::<anyhow::Result<_>>().context("by hand")?;
-        curves[2].push(f64::from(count), cpu.iter().sum());
+        Ok(curves.into())
     }
-    Ok((lines, curves.into()))
+}
+
+/// The table's rows, and how a batch grows.
+pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
+    samples::pack(&bench.root, &|name, _| ["perfect", "hangs"].contains(&name))?;
+    let recording = Recording::obtain(&bench.root, &bench.umbra)?;
+    let scratch = tempfile::tempdir()?;
+    let supervisor = Supervisor::new(bench.umbra.clone(), scratch.path().to_owned());
+    let batch = Batch { bench, recording, supervisor };
+    Ok((batch.one()?, batch.growth()?))
 }

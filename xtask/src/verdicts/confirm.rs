@@ -8,9 +8,9 @@ use umbra::diagnosis::Catalogue;
 use umbra::grading::Grading;
 use umbra::store::Store;
 
-use super::Bench;
 use super::choice::{Subject, singles, variants};
 use super::figures::Figure;
+use super::grader::Grader;
 use super::row::Row;
 use crate::parallel;
 
@@ -32,14 +32,13 @@ const SPP: [u32; 3] = [16, 4, 64];
 ///
 /// # Errors
 /// When scenes cannot be made or graded: the machine's matters.
-pub fn figure(bench: &Bench, store: &Store, few: bool, jobs: usize) -> Result<Figure> {
-    let mut assignment = bench.assignment.clone();
+pub fn figure(grader: &Grader, store: &Store, few: bool) -> Result<Figure> {
+    let mut assignment = grader.assignment.clone();
     assignment.scenes.retain(|scene| scene.held_back_copies);
-    let catalogue = Catalogue::known()?;
-    let mistakes = if few { Vec::new() } else { singles(&catalogue) };
-    let adapter = bench.grading.adapter.clone().map_err(anyhow::Error::msg)?;
+    let mistakes = if few { Vec::new() } else { singles(grader.catalogue) };
+    let adapter = grader.grading.adapter.clone().map_err(anyhow::Error::msg)?;
     let seeds: Vec<u64> = HELD_BACK_SEEDS.into_iter().step_by(if few { 5 } else { 1 }).collect();
-    let complaints = parallel::each(&seeds, jobs, |index, seed| {
+    let complaints = parallel::each(&seeds, grader.jobs, |index, seed| {
         let reference = store.reference.clone();
         let store = Store { assignment: &assignment, reference, progress: &|_| {}, ..*store };
         let never = AtomicBool::new(false);
@@ -47,21 +46,25 @@ pub fn figure(bench: &Bench, store: &Store, few: bool, jobs: usize) -> Result<Fi
         // What is right on the public ones is the matrix' matter too. Here there are no others.
         grading.cases.retain(|case| case.held_back);
         grading.cases.iter_mut().for_each(|case| case.held_back = false);
-        let library = bench.library.clone();
-        let plain = Vec::new();
-        // That a mistake costs what it should is the matrix' fault: three scenes do not show all.
-        let mut bench =
-            Bench { grading, library, plain, assignment: &assignment, all_shown: false, ..*bench };
+        let mut own = Grader {
+            assignment: &assignment,
+            grading,
+            library: grader.library.clone(),
+            jobs: 1,
+            // That a mistake costs what it should is the matrix' fault: three scenes do not show all.
+            all_shown: false,
+            plain: Vec::new(),
+            ..*grader
+        };
         println!("held-back scenes of seed {seed}");
         let spp = SPP[index % SPP.len()];
-        let right = right(&catalogue, index, spp, few);
-        let own =
-            mistakes.iter().skip(index).step_by(HELD_BACK_SEEDS.len()).cloned().collect::<Vec<_>>();
-        let mut rows = bench.grade_all(&own, 1)?;
-        for case in &mut bench.grading.cases {
+        let right = right(grader.catalogue, index, spp, few);
+        let dealt = mistakes.iter().skip(index).step_by(HELD_BACK_SEEDS.len());
+        let mut rows = own.grade_all(&dealt.cloned().collect::<Vec<_>>())?;
+        for case in &mut own.grading.cases {
             case.spp = spp;
         }
-        rows.extend(bench.grade_all(&right, 1)?);
+        rows.extend(own.grade_all(&right)?);
         rows.retain(|row| !row.as_declared());
         let complaint = |row: &Row| {
             format!("held-back seed {seed}: {}: {}", row.subject.name(), row.complaint())

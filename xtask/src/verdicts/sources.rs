@@ -29,12 +29,11 @@ pub fn grade(
     root: &Path,
     umbra: &Path,
     rules: &Rules,
-    wanted: &(dyn Fn(&str) -> bool + Sync),
     arguments: &Arguments,
 ) -> Result<Option<Figure>> {
     let own = AtomicUsize::new(0);
     let wanted = |name: &str, recipe: &Recipe| {
-        if !wanted(name) || (recipe.slow && !arguments.full) {
+        if !arguments.names(name) || (recipe.slow && !arguments.full) {
             return false;
         }
         let is_one = || own.fetch_add(1, Ordering::Relaxed).is_multiple_of(QUICK_STEP);

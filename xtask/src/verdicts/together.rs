@@ -5,11 +5,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use anyhow::Result;
 use umbra::diagnosis::{Catalogue, KnownMistake};
 use umbra::evidence::{Check, CheckId, Verdict};
 
-use super::choice::Subject;
+use super::Arguments;
+use super::choice::{self, Subject};
 use super::figures::Figure;
+use super::grader::Grader;
 use super::row::Row;
 
 /// Seed of what is drawn: the same in every run.
@@ -25,8 +28,53 @@ const NOT_YET: f64 = 0.06;
 /// An image must be nearer by this fraction to tell that two mistakes mend each other.
 const NEARER: f64 = 0.98;
 
+/// The combinations of a run.
+pub struct Combinations {
+    pairs: Vec<Subject>,
+    triples: Vec<Subject>,
+}
+
+impl Combinations {
+    /// Draws triples from the mistakes in `single`, with `--quick` also pairs.
+    pub fn new(grader: &Grader, single: &[Subject], arguments: &Arguments) -> Self {
+        let fits = |names: &[String]| grader.stages(names).is_ok();
+        let names: Vec<&str> =
+            single.iter().flat_map(|s| &s.mistakes).map(String::as_str).collect();
+        let drawn = |size, count| drawn(grader.catalogue, &names, size, count, &fits);
+        let (pairs, triples) = if arguments.quick {
+            (drawn(2, choice::QUICK_PAIRS), drawn(3, choice::QUICK_TRIPLES))
+        } else {
+            (pairs(grader.catalogue, &fits), drawn(3, choice::TRIPLES))
+        };
+        Self { pairs: arguments.chosen(pairs), triples: arguments.chosen(triples) }
+    }
+
+    /// Grades pairs and triples, and each of their mistakes alone that is not among `known`. Returns the number of
+    /// each and how many are monotone.
+    ///
+    /// # Errors
+    /// When one cannot be graded.
+    pub fn figures(&self, grader: &Grader, known: &[Row]) -> Result<[(usize, Figure); 2]> {
+        let wanted = |single: &Subject| {
+            let name = &single.mistakes[0];
+            let own = self.pairs.iter().chain(&self.triples).any(|s| s.mistakes.contains(name));
+            own && !known.iter().any(|row| row.subject.mistakes == single.mistakes)
+        };
+        let missing: Vec<Subject> =
+            choice::singles(grader.catalogue).into_iter().filter(wanted).collect();
+        let missing = grader.grade_all(&missing)?;
+        let singles = known.iter().chain(&missing);
+        let singles = singles.map(|row| (row.subject.mistakes[0].as_str(), row)).collect();
+        let of = |name, subjects: &[Subject]| {
+            let rows = grader.grade_all(subjects)?;
+            anyhow::Ok((rows.len(), figure(name, &rows, &singles)))
+        };
+        Ok([of("monotone_pairs", &self.pairs)?, of("monotone_triples", &self.triples)?])
+    }
+}
+
 /// Whether the texts of the shaders can hold all of these mistakes.
-pub type Fits<'a> = &'a dyn Fn(&[String]) -> bool;
+type Fits<'a> = &'a dyn Fn(&[String]) -> bool;
 
 /// What combinations are made of.
 fn that_cost(mistakes: &[KnownMistake]) -> Vec<&KnownMistake> {
@@ -55,7 +103,7 @@ fn representatives(catalogue: &Catalogue) -> Vec<&KnownMistake> {
 }
 
 /// All pairs of representatives on one path.
-pub fn pairs(catalogue: &Catalogue, fits: Fits) -> Vec<Subject> {
+fn pairs(catalogue: &Catalogue, fits: Fits) -> Vec<Subject> {
     let all = representatives(catalogue);
     let mut pairs = Vec::new();
     for (index, first) in all.iter().enumerate() {
@@ -69,7 +117,7 @@ pub fn pairs(catalogue: &Catalogue, fits: Fits) -> Vec<Subject> {
 }
 
 /// A number of different combinations of `size` mistakes on one path, drawn from `names`.
-pub fn drawn(
+fn drawn(
     catalogue: &Catalogue,
     names: &[&str],
     size: usize,
@@ -110,7 +158,7 @@ fn subject(mistakes: &[&KnownMistake], fits: Fits) -> Option<Subject> {
 }
 
 /// How many combinations are monotone; `singles` holds each of their mistakes alone.
-pub fn figure(name: &str, rows: &[Row], singles: &BTreeMap<&str, &Row>) -> Figure {
+fn figure(name: &str, rows: &[Row], singles: &BTreeMap<&str, &Row>) -> Figure {
     let (mut complaints, mut mended) = (Vec::new(), 0);
     for row in rows {
         let alone: Vec<&Row> =

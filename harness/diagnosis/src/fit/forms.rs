@@ -1,10 +1,11 @@
 //! Candidates of the search whose form differs from the right formula.
 
 use super::deviation::ORDERS;
+use super::estimate::{Feature, median};
 use super::formula::{
     After, ExponentForm, Formula, Incident, Lobe, Power, Reflector, Sample, ScaleForm,
 };
-use super::search::{Feature, Search, difference, median, round};
+use super::search::{Search, difference, round};
 
 impl Search<'_> {
     /// Formulas of another form, without a value to be estimated.

@@ -2,6 +2,7 @@
 //! catalogue. A pure function from answers to words.
 
 mod deviation;
+mod estimate;
 mod forms;
 mod formula;
 mod linear;

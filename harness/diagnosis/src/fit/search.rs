@@ -1,11 +1,9 @@
 //! The search for a formula: candidates with one deviation, then with two, each estimated in log
 //! space from a part of the samples and verified on the rest.
 
-use std::f64::consts::PI;
-
-use super::deviation::{Deviation, Subject, deviations, pi_power};
-use super::formula::{Formula, Gate, Power, Reflector, Sample, Term};
-use super::linear::least_squares;
+use super::deviation::{Deviation, Subject, deviations};
+use super::estimate::{Answers, Change, Feature, Intercept, LEAST, Scope, scale};
+use super::formula::{Formula, Gate, Power, Reflector, Sample};
 
 /// How well answers to a question are known.
 #[derive(Clone, Copy, Debug)]
@@ -31,38 +29,12 @@ const UNEXPLAINED: f64 = 0.01;
 const FITTED: usize = 300;
 /// Number of the others that are looked at first.
 const GLANCE: usize = 60;
-/// Least number of samples that a fit needs.
-const LEAST: usize = 60;
 /// The mean relative difference from what is right below which there is nothing to explain.
 const NOTHING: f64 = 1e-5;
 /// A term is fitted where it is at least this fraction of the value.
 const SHARE: f64 = 0.1;
 /// A term is alone where it is at least this fraction of the value.
 const ALONE: f64 = 0.99999;
-
-/// Which terms a change concerns.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Scope {
-    All,
-    Diffuse,
-    Specular,
-}
-
-/// What is estimated.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Feature {
-    Power(Power),
-    ExponentTimes,
-    ExponentPlus,
-}
-
-/// Further quantities that are estimated.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Intercept {
-    None,
-    Factor,
-    Channels,
-}
 
 pub(super) struct Search<'a> {
     pub(super) fitted: Vec<&'a Sample>,
@@ -296,12 +268,15 @@ impl<'a> Search<'a> {
 
     fn changes_where(&self, base: &Formula, scope: Scope, share: f64) -> Vec<Formula> {
         let mut all = Vec::new();
+        let answers = self.answers();
+        let estimate = |features: &[Feature], intercept| {
+            Change { scope, features, intercept, share }.estimate(base, &answers)
+        };
         for feature in self.features_of(scope) {
-            all.extend(self.estimate(base, scope, &[feature], Intercept::None, share));
+            all.extend(estimate(&[feature], Intercept::None));
         }
-        let factor = self.estimate(base, scope, &[], Intercept::Factor, share);
-        let channels = self.estimate(base, scope, &[], Intercept::Channels, share);
-        all.extend(factor.into_iter().chain(channels));
+        all.extend(estimate(&[], Intercept::Factor));
+        all.extend(estimate(&[], Intercept::Channels));
         if scope == Scope::Specular {
             all.extend(normalizations(base));
         }
@@ -312,8 +287,9 @@ impl<'a> Search<'a> {
     fn pairs(&self, base: &Formula, scope: Scope) -> Vec<Formula> {
         let mut all = Vec::new();
         let features: Vec<Feature> = self.features_of(scope).collect();
+        let answers = self.answers();
         let estimate = |base: &Formula, features: &[Feature], intercept| {
-            self.estimate(base, scope, features, intercept, SHARE)
+            Change { scope, features, intercept, share: SHARE }.estimate(base, &answers)
         };
         for (i, &first) in features.iter().enumerate() {
             for &second in &features[i + 1..] {
@@ -333,6 +309,11 @@ impl<'a> Search<'a> {
         all
     }
 
+    /// What is fitted to.
+    fn answers(&self) -> Answers<'_> {
+        Answers { samples: &self.fitted, floor: self.floor, relative: self.accuracy.relative }
+    }
+
     fn features_of(&self, scope: Scope) -> impl Iterator<Item = Feature> {
         let own = move |feature: &Feature| match feature {
             Feature::ExponentTimes | Feature::ExponentPlus => scope == Scope::Specular,
@@ -342,100 +323,6 @@ impl<'a> Search<'a> {
         };
         self.features.iter().copied().filter(own)
     }
-
-    /// A change to the terms of `scope`, estimated by least squares and snapped to what somebody
-    /// may have written. Nothing when it is no such thing.
-    fn estimate(
-        &self,
-        base: &Formula,
-        scope: Scope,
-        features: &[Feature],
-        intercept: Intercept,
-        share: f64,
-    ) -> Option<Formula> {
-        let mut rows: Vec<([f64; 5], f64, f64)> = Vec::new();
-        let mut channels = Vec::new();
-        for sample in &self.fitted {
-            let [diffuse, specular] = base.terms(sample);
-            for c in 0..3 {
-                let (own, other) = match scope {
-                    Scope::All => (diffuse[c] + specular[c], 0.0),
-                    Scope::Diffuse => (diffuse[c], specular[c]),
-                    Scope::Specular => (specular[c], diffuse[c]),
-                };
-                let rest = sample.found[c] - other;
-                if own <= share * (own + other) || own <= 1e-2 * self.floor || rest <= 1e-4 * own {
-                    continue;
-                }
-                let mut row = [0.0; 5];
-                for (place, feature) in row.iter_mut().zip(features) {
-                    *place = logarithm(*feature, base, sample, scope, c)?;
-                }
-                match intercept {
-                    Intercept::None => {}
-                    Intercept::Factor => row[features.len()] = 1.0,
-                    Intercept::Channels => row[features.len() + c] = 1.0,
-                }
-                rows.push((row, (rest / own).ln(), own / (own + other)));
-                channels.push(c);
-            }
-        }
-        let used = features.len()
-            + match intercept {
-                Intercept::None => 0,
-                Intercept::Factor => 1,
-                Intercept::Channels => 3,
-            };
-        if rows.len() < LEAST {
-            return None;
-        }
-        let estimated = least_squares(&rows, used)?;
-        let mut formula = *base;
-        let mut snapped = Vec::new();
-        for (feature, estimate) in features.iter().zip(estimated) {
-            let value = snap(*feature, estimate)?;
-            snapped.push(value);
-            apply(&mut formula, scope, *feature, value);
-        }
-        let rest = |(row, y, _): &([f64; 5], f64, f64)| {
-            y - row.iter().zip(&snapped).map(|(a, x)| a * x).sum::<f64>()
-        };
-        let median = |wanted: &dyn Fn(usize) -> bool| {
-            let own = rows.iter().zip(&channels).filter(|(_, c)| wanted(**c));
-            median(own.map(|(row, _)| rest(row)).collect()).map(f64::exp)
-        };
-        let factor = match intercept {
-            Intercept::None => [1.0; 3],
-            Intercept::Factor => [self.snap_factor(median(&|_| true)?); 3],
-            Intercept::Channels => {
-                let of = |c: usize| median(&|own| own == c).map(|factor| self.snap_factor(factor));
-                [of(0)?, of(1)?, of(2)?]
-            }
-        };
-        let near = |a: f64, b: f64| (a / b - 1.0).abs() < 2.0 * self.accuracy.relative;
-        let one = factor.iter().all(|&factor| near(factor, 1.0));
-        let equal = near(factor[0], factor[1]) && near(factor[1], factor[2]);
-        match intercept {
-            Intercept::Factor if one => return None,
-            Intercept::Channels if equal => return None,
-            _ => {}
-        }
-        for term in terms(&mut formula, scope) {
-            term.factor = std::array::from_fn(|c| term.factor[c] * factor[c]);
-        }
-        Some(formula)
-    }
-
-    /// A factor, exact where it is 1 or a power of pi.
-    fn snap_factor(&self, factor: f64) -> f64 {
-        if (factor - 1.0).abs() < self.accuracy.relative {
-            return 1.0;
-        }
-        match pi_power(factor) {
-            Some(power) => PI.powf(power),
-            None => factor,
-        }
-    }
 }
 
 /// (n + k) / (2 pi) with other k.
@@ -443,90 +330,6 @@ fn normalizations(base: &Formula) -> impl Iterator<Item = Formula> {
     let base = *base;
     let others = [0.0, 1.0, 3.0, 4.0, 5.0, 6.0, 8.0, -1.0, -2.0];
     others.into_iter().map(move |normalization_plus| Formula { normalization_plus, ..base })
-}
-
-/// The energy scale that is yet to be applied.
-fn scale(sample: &Sample) -> f64 {
-    match &sample.reflector {
-        Reflector::Surface { phong: true, diffuse, specular, unscaled: true, .. } => {
-            let most = (0..3).map(|c| diffuse[c] + specular[c]).fold(0.0, f64::max);
-            if most > 1.0 { 0.99 / most } else { 1.0 }
-        }
-        _ => 1.0,
-    }
-}
-
-/// The logarithm whose multiple a feature adds; nothing where it is none.
-fn logarithm(
-    feature: Feature,
-    base: &Formula,
-    sample: &Sample,
-    scope: Scope,
-    c: usize,
-) -> Option<f64> {
-    let value = match (feature, &sample.reflector) {
-        (Feature::Power(Power::CosI), _) => sample.wi[2],
-        (Feature::Power(Power::CosO), _) => sample.wo[2],
-        (Feature::Power(Power::R), _) => sample.distance,
-        (Feature::Power(Power::Scale), _) => scale(sample),
-        (Feature::Power(Power::Reflectance), Reflector::Surface { diffuse, specular, .. }) => {
-            if scope == Scope::Specular {
-                specular[c]
-            } else {
-                diffuse[c]
-            }
-        }
-        (Feature::ExponentTimes, Reflector::Surface { exponent, .. }) => {
-            return Some(exponent * base.cos_lobe(sample).max(1e-30).ln());
-        }
-        (Feature::ExponentPlus, Reflector::Surface { .. }) => base.cos_lobe(sample),
-        (_, Reflector::Witness(_)) => return None,
-    };
-    (value > 0.0).then(|| value.ln())
-}
-
-/// The value that somebody may have written, as what it adds to the right one.
-fn snap(feature: Feature, estimate: f64) -> Option<f64> {
-    let (allowed, margin): (&[f64], f64) = match feature {
-        Feature::Power(Power::Reflectance) => {
-            (&[-1.0, -0.5, 1.0, 1.2, 2.0, 1.0 / 2.2 - 1.0, 1.4], 0.02)
-        }
-        Feature::Power(_) => {
-            (&[-4.0, -3.0, -2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0], 0.05)
-        }
-        Feature::ExponentTimes => {
-            (&[-0.75, -2.0 / 3.0, -0.5, -0.25, 0.25, 0.5, 1.0, 2.0, 3.0, 7.0], 0.01)
-        }
-        Feature::ExponentPlus => (&[-2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0], 0.05),
-    };
-    let near = allowed.iter().copied().find(|value| (value - estimate).abs() < margin)?;
-    Some(near)
-}
-
-fn apply(formula: &mut Formula, scope: Scope, feature: Feature, value: f64) {
-    match feature {
-        Feature::Power(power) => {
-            for term in terms(formula, scope) {
-                term.powers[power as usize] += value;
-            }
-        }
-        Feature::ExponentTimes => formula.times += value,
-        Feature::ExponentPlus => formula.plus += value,
-    }
-}
-
-fn terms(formula: &mut Formula, scope: Scope) -> Vec<&mut Term> {
-    match scope {
-        Scope::All => vec![&mut formula.diffuse, &mut formula.specular],
-        Scope::Diffuse => vec![&mut formula.diffuse],
-        Scope::Specular => vec![&mut formula.specular],
-    }
-}
-
-/// The middle of some values.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// Four digits: what was written rather than what was measured.

@@ -1,8 +1,9 @@
 //! Part 1.3: radiance without shadows.
 
 use super::{RELATIVE, RayBatch, STRAY_FRACTION};
+use crate::answers::{Answers, Change};
 use crate::convention::Convention;
-use crate::price::{self, Answers, Change, PriceClass};
+use crate::price::{self, PriceClass};
 use crate::shading::Shading;
 use crate::{Check, CheckId, Measure, RuleId, Verdict};
 use imaging::ratio::{ratio_name, triple};
