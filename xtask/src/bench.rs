@@ -51,6 +51,9 @@ impl Bench {
 }
 
 /// Runs it, and returns the table.
+///
+/// # Errors
+/// When a program that is compared with cannot be run, or a file cannot be written.
 pub fn run(root: &Path, arguments: &Arguments) -> anyhow::Result<String> {
     let folder = root.join("target/umbra/bench");
     std::fs::create_dir_all(&folder)?;

@@ -62,6 +62,9 @@ enum What {
 }
 
 /// Makes the kit and answers where it is.
+///
+/// # Errors
+/// When a file of the kit is missing or cannot be written, or the folder is not empty.
 pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
     let What::Student { out, umbra } = &arguments.what;
     if out.extension().is_some_and(|extension| extension == "zip") {

@@ -14,6 +14,9 @@ use crate::{Bsdf, Error, Film, Material, Ray, Result, Sampler, Scene, ShadingKin
 /// out is called from several threads where its trait says `Sync`.
 pub trait Renderer: Send + Sync {
     /// Makes the renderer. `options` is empty, except for the reference renderer.
+    ///
+    /// # Errors
+    /// When the renderer refuses the options.
     fn new(options: &str) -> Result<Self>
     where
         Self: Sized;

@@ -32,6 +32,9 @@ pub fn compare_offline(
 }
 
 /// [`compare_offline`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
+///
+/// # Errors
+/// When the images differ in size, or `spp` is 0.
 pub fn offline(
     actual: &Image,
     reference: &ReferenceImage,
@@ -94,6 +97,9 @@ pub fn compare_realtime_linear(
 }
 
 /// [`compare_realtime_linear`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
+///
+/// # Errors
+/// When the images differ in size, or the mask does not fit them.
 pub fn realtime_linear(
     actual: &Image,
     center: &Image,
@@ -146,6 +152,9 @@ pub fn compare_srgb8(
 }
 
 /// [`compare_srgb8`]; `excess` takes what each pixel's difference is over the allowed one, above 1 it fails.
+///
+/// # Errors
+/// When the images differ in size, or the mask does not fit them.
 pub fn srgb8(
     actual: &Image,
     center: &Image,

@@ -88,6 +88,9 @@ impl KeptReport {
     }
 
     /// What is pinned.
+    ///
+    /// # Errors
+    /// When nothing is pinned.
     pub fn decided(&self) -> anyhow::Result<&Decisions> {
         Ok(&self.pins.current().context("nothing is pinned")?.decided)
     }

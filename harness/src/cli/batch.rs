@@ -122,6 +122,9 @@ impl<'a> Batch<'a> {
     }
 
     /// Grades all and writes the reports, or the records of a slice.
+    ///
+    /// # Errors
+    /// When a path does not exist, an earlier report cannot be read, or a report cannot be written.
     pub fn run(&self, root: Option<&Path>) -> anyhow::Result<BatchOutcome> {
         for path in &self.paths {
             ensure!(path.exists(), "{} does not exist", path.display());

@@ -23,6 +23,9 @@ pub struct BlessArguments {
 }
 
 /// Renders and replaces, printing old and new.
+///
+/// # Errors
+/// When a name is no stored scene, or an image cannot be rendered or written.
 pub fn run(arguments: &BlessArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let mut context = Context::new(root)?;
     if arguments.mistakes {

@@ -83,6 +83,9 @@ struct LastCheck {
 }
 
 /// Checks one working folder and prints the result; exit 1 when points are missing.
+///
+/// # Errors
+/// When it is no working folder or archive, or the machine cannot grade it.
 pub fn check(arguments: &CheckArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let (parts, scenes) = (arguments.part.clone(), arguments.scene.clone());
     let selection = Selection { parts, scenes };

@@ -176,6 +176,9 @@ pub fn is_idiff(arguments: &[OsString]) -> bool {
 
 /// Prints where two images differ; exit 0 when they are equal, 1 when not. Without the scene's
 /// variance nothing more can be decided: `check` and `grade` decide, this only measures.
+///
+/// # Errors
+/// When two images are not given or cannot be read, or a page or picture cannot be written.
 pub fn run(arguments: &CompareArguments) -> anyhow::Result<u8> {
     let images = [&arguments.actual, &arguments.expected];
     if let Some(theirs) = &arguments.idiff {

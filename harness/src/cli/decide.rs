@@ -64,6 +64,9 @@ fn points(text: &str) -> Result<f64, String> {
 }
 
 /// Sets the points of a part.
+///
+/// # Errors
+/// When there is no report, part or student of that name, the points are out of range, or the decision cannot be kept.
 pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
     let OverrideArguments { student, part, points, decision } = arguments;
     let kept = KeptReport::read(&decision.report.path)?;
@@ -98,6 +101,9 @@ pub fn override_part(arguments: &OverrideArguments) -> anyhow::Result<u8> {
 }
 
 /// Confirms what was left to the instructor.
+///
+/// # Errors
+/// When there is no report or no such student, or the decision cannot be kept.
 pub fn confirm(arguments: &ConfirmArguments) -> anyhow::Result<u8> {
     let ConfirmArguments { student, decision } = arguments;
     let kept = KeptReport::read(&decision.report.path)?;
@@ -223,6 +229,9 @@ fn account() -> Option<String> {
 }
 
 /// Lists what waits for the instructor; exit 1 where anything does.
+///
+/// # Errors
+/// When there is no report, or it cannot be read.
 pub fn status(arguments: &StatusArguments) -> anyhow::Result<u8> {
     let report = StoredReport::read(&arguments.report.path)?;
     let class = report.class.unwrap_or_default();

@@ -29,6 +29,9 @@ pub struct DefendArguments {
 }
 
 /// Prints the evidence, its bounds, how to reproduce it, and what a right part would have earned.
+///
+/// # Errors
+/// When there is no such part or student in the report, or the submission does not count.
 pub fn run(arguments: &DefendArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let DefendArguments { student, part, report: ReportFolder { path: output } } = arguments;
     let kept = KeptReport::read(output)?;

@@ -12,6 +12,9 @@ use crate::sandbox::{Isolation, doctor::examine};
 const RUNTIME: &str = "XDG_RUNTIME_DIR";
 
 /// Prints what there is; exit 0 when submissions can be graded with full isolation.
+///
+/// # Errors
+/// When it cannot find or start its own program.
 pub fn run() -> anyhow::Result<u8> {
     if !std::env::var_os(RUNTIME).is_some_and(|folder| Path::new(&folder).is_absolute()) {
         // No socket lies in the root folder either, and nothing is said of that.

@@ -98,6 +98,9 @@ pub struct Item {
 }
 
 /// Writes the grades and says who is not in them.
+///
+/// # Errors
+/// When there is no report, the format cannot hold what is asked, or the file cannot be written.
 pub fn export(arguments: &ExportArguments) -> anyhow::Result<u8> {
     let ExportArguments { file, format, report: ReportFolder { path: output }, item, only } =
         arguments;

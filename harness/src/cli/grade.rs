@@ -89,6 +89,9 @@ pub struct GradeArguments {
 
 /// Grades submissions and prints the table; exit 0 when all could be graded, whatever their points, 1 when a zip that
 /// looks like a download was left out.
+///
+/// # Errors
+/// When an option contradicts another, or the batch cannot be graded or written.
 pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     export::check(&arguments.export, &arguments.output, arguments.class.as_deref())?;
     let batch = Batch {
@@ -130,6 +133,9 @@ pub fn grade(arguments: &GradeArguments, root: Option<&Path>) -> anyhow::Result<
 }
 
 /// Prints the table of a report, what was skipped, and what is left to do; the exit code that it stands for.
+///
+/// # Errors
+/// When the table cannot be made.
 pub fn shown(report: &BatchReport, output: &Path, skipped: Option<String>) -> anyhow::Result<u8> {
     print_as_is!("{}", report::text_table(report, terminal::width(), terminal::colors())?);
     if let Some(skipped) = skipped {

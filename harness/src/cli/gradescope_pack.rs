@@ -41,6 +41,9 @@ pub struct PackArguments {
 }
 
 /// Writes the zip and says what to do with it.
+///
+/// # Errors
+/// When Umbra's repository is incomplete, or the zip cannot be read or written.
 pub fn run(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let assignment = Context::assignment(root)?;
     for needed in NEEDED {

@@ -41,6 +41,9 @@ pub struct MendArguments {
 }
 
 /// Grades the mended submission beside the record of the unmended one, and keeps the decision.
+///
+/// # Errors
+/// When the patch is not allowed or does not apply, or the result cannot be graded or kept.
 pub fn run(arguments: &MendArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let MendArguments { student, patch, decision, .. } = arguments;
     let output = &decision.report.path;

@@ -43,6 +43,9 @@ pub struct MergeArguments {
 
 /// Writes the reports and prints the table. Refuses a class that is incomplete, or was not judged by one program and
 /// one kind of machine.
+///
+/// # Errors
+/// When it refuses, or a record cannot be read or a report written.
 pub fn merge(arguments: &MergeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let MergeArguments { output, allow_mixed } = arguments;
     let instructor = output.join(report::INSTRUCTOR);

@@ -32,6 +32,9 @@ pub struct RegradeArguments {
 }
 
 /// Shows what changes; applies it where that is asked.
+///
+/// # Errors
+/// When there is no report, a change means nothing, or it cannot be kept.
 pub fn regrade(arguments: &RegradeArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let RegradeArguments { apply, undo, reason, report: ReportFolder { path: output } } = arguments;
     let reason = reason.as_deref().map(str::trim);

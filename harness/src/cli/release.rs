@@ -27,6 +27,9 @@ pub struct ReleaseArguments {
 }
 
 /// Writes the scenes and the students' pages with them.
+///
+/// # Errors
+/// Before the last due date, when nothing is held back, or when files cannot be written.
 pub fn run(arguments: &ReleaseArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let output = &arguments.report.path;
     let assignment = Context::assignment(root)?;

@@ -177,6 +177,9 @@ fn check_scene(toml: &Path, size: Option<Size>, output: &Path) -> anyhow::Result
 }
 
 /// Renders the image and writes it.
+///
+/// # Errors
+/// When the scene or plugin cannot be used, the plugin does not answer, or the image cannot be written.
 pub fn run(arguments: &RenderArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
     let format = ImageFormat::of(&arguments.output)?;

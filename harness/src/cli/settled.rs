@@ -239,6 +239,9 @@ fn aside_of(
 }
 
 /// What submissions share, also according to JPlag, where it compared what they hold now.
+///
+/// # Errors
+/// When the pairs that were kept of JPlag cannot be read.
 pub fn shared(output: &Path, records: &[StoredRecord]) -> anyhow::Result<Shared> {
     let near = jplag::kept(&output.join(report::INSTRUCTOR).join(report::SIMILARITY))?;
     let own = |slug: &str| records.iter().find(|own| own.record.slug == slug);
@@ -249,6 +252,9 @@ pub fn shared(output: &Path, records: &[StoredRecord]) -> anyhow::Result<Shared>
 }
 
 /// The whole record of a submission.
+///
+/// # Errors
+/// When there is no such submission, or its record cannot be read.
 pub fn whole(records: &[StoredRecord], slug: &str) -> anyhow::Result<Record> {
     let own = records.iter().find(|own| own.record.slug == slug);
     own.with_context(|| format!("there is no submission {slug}"))?.whole()

@@ -39,6 +39,9 @@ pub struct SimilarityArguments {
 }
 
 /// Writes sources for JPlag or takes its result, and shows all pairs.
+///
+/// # Errors
+/// When the result is not JPlag's of these sources, or a file cannot be read or written.
 pub fn run(arguments: &SimilarityArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let output = &arguments.report.path;
     let kept = KeptReport::read(output)?;

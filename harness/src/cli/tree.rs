@@ -48,6 +48,9 @@ pub struct PackArguments {
 }
 
 /// Prints the expected tree beside the found one, or a table of many submissions; exit 0 when all conform, 1 when not.
+///
+/// # Errors
+/// When a path does not exist, or an archive cannot be decoded or written.
 pub fn validate(arguments: &ValidateArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
     for path in &arguments.submissions {
@@ -308,6 +311,9 @@ fn working_folders_in(named: &Path, tree: &TreeSpec) -> Vec<PathBuf> {
 }
 
 /// Writes a conforming archive; exit 1 when the folder lacks something.
+///
+/// # Errors
+/// When it is no working folder, or the archive cannot be written.
 pub fn pack(arguments: &PackArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let context = Context::new(root)?;
     let (tree, limits) = (&context.assignment.tree, &context.assignment.limits.archive);

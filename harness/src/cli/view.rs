@@ -36,6 +36,9 @@ struct Shown {
 }
 
 /// Writes the page, opens it where there is a browser, and prints its path; exit 1 when a file could not be read.
+///
+/// # Errors
+/// When no image can be read, or the page cannot be written.
 pub fn run(arguments: &ViewArguments) -> anyhow::Result<u8> {
     let paths: Vec<&Path> = arguments.images.iter().map(PathBuf::as_path).collect();
     let folder = match &arguments.output {

@@ -52,6 +52,9 @@ pub fn changed(
 }
 
 /// A path of the assignment without the scene's folder: its last two names.
+///
+/// # Errors
+/// When the scene does not lie in a folder `tinyrender`.
 pub fn below(path: &Path) -> anyhow::Result<PathBuf> {
     let names: Vec<_> = path.iter().rev().take(2).collect();
     ensure!(

@@ -20,6 +20,9 @@ pub(super) struct Pipes([Pipe; 2]);
 
 impl Pipes {
     /// Takes them from the child. Of each stream the first `keep` bytes and a short tail are kept.
+    ///
+    /// # Errors
+    /// When a pipe cannot be made non-blocking.
     pub fn of(child: &mut Child, keep: usize) -> io::Result<Self> {
         let [stdout, stderr] =
             [child.stdout.take().map(OwnedFd::from), child.stderr.take().map(OwnedFd::from)];

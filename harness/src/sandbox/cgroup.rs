@@ -21,6 +21,9 @@ pub struct Group {
 
 impl Group {
     /// Makes a group beside the caller's own, or at the top.
+    ///
+    /// # Errors
+    /// When the kernel lets this process make no group with these limits.
     pub fn make(limits: &KernelLimits) -> Result<Self, SandboxError> {
         let error = |cause: io::Error| {
             SandboxError::new("cgroup", "make a control group", cause)
@@ -70,6 +73,9 @@ impl Group {
     }
 
     /// Puts a process into the group; its children follow.
+    ///
+    /// # Errors
+    /// When the kernel refuses.
     pub fn add(&self, pid: Pid) -> Result<(), SandboxError> {
         for folder in &self.folders {
             write(&folder.join("cgroup.procs"), &pid.to_string()).map_err(|cause| {

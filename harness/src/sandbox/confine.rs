@@ -13,6 +13,9 @@ use super::privileges::{self, Identity};
 use super::{InForce, KernelLimits, Policy, SandboxError, filter, landlock};
 
 /// Confines this process, a child of init. The last step but the report: the system call filter.
+///
+/// # Errors
+/// When a layer that the policy wants cannot be had.
 pub fn confine(policy: &Policy, identity: &Identity) -> Result<InForce, SandboxError> {
     let error = |step: &str, cause: Errno| SandboxError::new("launcher", step, cause);
     // Without a process namespace nothing else ends it with init.

@@ -18,6 +18,9 @@ use super::{ChildKind, Policy, SandboxError};
 type Rules = BTreeMap<i64, Vec<SeccompRule>>;
 
 /// Installs the filter on this thread and all that it starts. Needs `no_new_privs`.
+///
+/// # Errors
+/// When a filter does not compile, or the kernel refuses it.
 pub fn install(policy: &Policy) -> Result<(), SandboxError> {
     let error = |step: &str, cause: &dyn ToString| {
         SandboxError::new("seccomp", step.to_owned(), cause.to_string())

@@ -14,6 +14,9 @@ use super::{Policy, SandboxError};
 const NEWEST: ABI = ABI::V9;
 
 /// Restricts this process and its descendants; returns the version in force.
+///
+/// # Errors
+/// When the kernel has no Landlock or does not enforce the rules.
 pub fn restrict(policy: &Policy) -> Result<u32, SandboxError> {
     let error = |step: &str, cause: &dyn ToString| {
         SandboxError::new("landlock", step.to_owned(), cause.to_string())

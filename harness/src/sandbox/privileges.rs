@@ -49,6 +49,9 @@ impl Identity {
 /// Leaves the host's namespaces, but for the mount namespace, which is init's to leave: a change
 /// of root would take the launcher along. Without root it begins with a user namespace; the
 /// process namespace holds for the next child.
+///
+/// # Errors
+/// When the kernel refuses a namespace or the map of its ids.
 pub fn enter_namespaces(policy: &Policy, identity: &Identity) -> Result<(), SandboxError> {
     let layers = &policy.layers;
     let wanted = [
@@ -73,6 +76,9 @@ pub fn enter_namespaces(policy: &Policy, identity: &Identity) -> Result<(), Sand
 }
 
 /// Enters new namespaces of one layer.
+///
+/// # Errors
+/// When the kernel refuses; with a hint.
 pub fn enter(
     layer: &str,
     flags: CloneFlags,
@@ -90,6 +96,9 @@ pub fn enter(
 }
 
 /// The files of this process in `/proc`, to be reached when `/proc` no longer is.
+///
+/// # Errors
+/// When `/proc` is not there.
 pub fn own_proc() -> Result<OwnedFd, SandboxError> {
     open("/proc/self", OFlag::O_PATH | OFlag::O_DIRECTORY | OFlag::O_CLOEXEC, Mode::empty())
         .map_err(|cause| SandboxError::new("launcher", "open /proc/self", cause))
@@ -121,6 +130,9 @@ fn dumpable(yes: bool) -> Result<(), SandboxError> {
 
 /// Drops root and all capabilities for good. As root with the user namespace layer, the new user then enters a
 /// namespace of its own: its processes are counted apart.
+///
+/// # Errors
+/// When the kernel refuses a step.
 pub fn drop_all(
     policy: &Policy,
     identity: &Identity,
@@ -200,6 +212,9 @@ fn drop_capabilities() -> Result<(), Errno> {
 }
 
 /// Whether this process holds no capability at all.
+///
+/// # Errors
+/// When the kernel does not tell.
 pub fn powerless() -> Result<bool, SandboxError> {
     let header = Header { version: VERSION_3, pid: 0 };
     let mut sets = [0u32; 6];

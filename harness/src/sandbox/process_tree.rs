@@ -71,6 +71,9 @@ impl ReportFile {
 
 /// Confines this process by `policy`: returns in the payload. An error is returned in the
 /// launcher; of the other two, the one that failed has ended.
+///
+/// # Errors
+/// When a layer that the policy wants cannot be had, or a process of the sandbox cannot be made.
 pub fn confine(policy: &Policy) -> Result<Ready, SandboxError> {
     let error = |step: &str, cause: Errno| SandboxError::new("launcher", step, cause);
     single_threaded()?;

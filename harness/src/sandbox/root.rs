@@ -42,6 +42,9 @@ enum What {
 }
 
 /// Makes the new root and moves there. Host paths mean nothing afterwards.
+///
+/// # Errors
+/// When a file of the policy is missing, or the kernel refuses a mount.
 pub fn enter(policy: &Policy, identity: &Identity) -> Result<(), SandboxError> {
     privileges::enter("mount_ns", CloneFlags::CLONE_NEWNS, policy, identity)?;
     let none = None::<&str>;

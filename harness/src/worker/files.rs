@@ -22,6 +22,10 @@ pub(super) struct Files {
 }
 
 impl Files {
+    /// Writes the requests, and makes room for the answers.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
     pub fn prepare(
         dir: &Path,
         own: &WorkerPolicy,
@@ -63,6 +67,9 @@ impl Files {
     }
 
     /// All records; what is missing at the end of the file was not started.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
     pub fn records(&mut self) -> io::Result<Vec<SlotState>> {
         let size = SLOT_BYTES * (1 + self.places.len());
         let mut bytes = read_at(&mut self.table, 0, size)?;
@@ -71,6 +78,10 @@ impl Files {
         Ok(records.iter().map(SlotState::parse).collect())
     }
 
+    /// The outcome of a request that `noted` says was answered.
+    ///
+    /// # Errors
+    /// When it was not answered, or the answer cannot be read.
     pub fn outcome(
         &mut self,
         index: usize,

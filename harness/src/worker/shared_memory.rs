@@ -126,6 +126,10 @@ mod guarded {
     }
 
     impl Map {
+        /// Maps `size` bytes of a file from `offset` on.
+        ///
+        /// # Errors
+        /// When the system refuses to map the file.
         pub fn new(file: &File, offset: usize, size: usize) -> io::Result<Self> {
             let reserved = size + 2 * ALIGN;
             let flags = libc::MAP_PRIVATE | libc::MAP_ANONYMOUS | libc::MAP_NORESERVE;

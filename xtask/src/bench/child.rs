@@ -21,6 +21,9 @@ pub struct Cost {
 }
 
 /// Runs a command line in a process of its own that has no other children: `xtask bench-child`.
+///
+/// # Errors
+/// When it cannot be started or measured.
 pub fn measure<I: IntoIterator<Item = S>, S: AsRef<OsStr>>(command: I) -> anyhow::Result<Cost> {
     let own = std::env::current_exe()?;
     let output = Command::new(own).arg("bench-child").args(command).output()?;
@@ -34,6 +37,9 @@ pub fn measure<I: IntoIterator<Item = S>, S: AsRef<OsStr>>(command: I) -> anyhow
 }
 
 /// The side of [`measure`] in the new process. Whatever the exit code of the command is, it ran.
+///
+/// # Errors
+/// When there is no command, or it cannot be started.
 pub fn run(command: &[String]) -> anyhow::Result<String> {
     let [program, arguments @ ..] = command else { anyhow::bail!("no command") };
     let begin = Instant::now();
@@ -59,6 +65,9 @@ pub struct Server {
 
 impl Server {
     /// Starts it.
+    ///
+    /// # Errors
+    /// When it cannot be started.
     pub fn start(program: &Path, arguments: &[&OsStr]) -> anyhow::Result<Self> {
         let mut child = Command::new(program)
             .args(arguments)
@@ -72,6 +81,9 @@ impl Server {
     }
 
     /// Seconds, and a count, of what `what` names.
+    ///
+    /// # Errors
+    /// When it has ended, or answers something else.
     pub fn measure(&mut self, what: &str) -> anyhow::Result<(f64, usize)> {
         writeln!(self.input.as_mut().context("it has ended")?, "{what}")?;
         let mut line = String::new();
@@ -89,6 +101,9 @@ impl Drop for Server {
 }
 
 /// Compiles a C++ program.
+///
+/// # Errors
+/// When there is no compiler, or it refuses the source.
 pub fn compile(source: &Path, program: &Path, libraries: &[&str]) -> anyhow::Result<()> {
     let status = Command::new("c++")
         .args(["-O3", "-march=native", "-std=c++17", "-o"])

@@ -36,6 +36,9 @@ impl Costs {
 }
 
 /// `umbra compare` against `idiff`, and how both grow with pixels.
+///
+/// # Errors
+/// When `idiff` cannot be run, or an image cannot be written.
 pub fn compare(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
     let mut lines = Vec::new();
     let names = ["Umbra, uncompressed", "Umbra, ZIP", "idiff, uncompressed", "idiff, ZIP"];
@@ -101,6 +104,9 @@ fn pair(folder: &Path, width: usize, height: usize, zip: bool) -> anyhow::Result
 }
 
 /// Reading an OBJ file of two million triangles.
+///
+/// # Errors
+/// When the other reader does not compile, or counts other triangles.
 pub fn objects(bench: &Bench) -> anyhow::Result<Vec<Line>> {
     let (path, program) = (bench.folder.join("knot.obj"), bench.folder.join("objects"));
     compile(&bench.root.join("xtask/bench/objects.cpp"), &program, &[])?;

@@ -34,6 +34,9 @@ impl Curve {
 }
 
 /// Writes the page, and its plots beside it.
+///
+/// # Errors
+/// When a file cannot be written.
 pub fn write(
     root: &Path,
     about: &str,

@@ -216,6 +216,9 @@ fn thousands(count: usize) -> String {
 }
 
 /// The table's rows, and plots of millions of rays a second against the number of triangles.
+///
+/// # Errors
+/// When Embree's side does not compile, or hits other triangles.
 pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
     let program = bench.folder.join("embree");
     let source = bench.root.join("xtask/bench/embree.cpp");

@@ -11,6 +11,9 @@ use super::figures::{Line, Samples, seconds};
 const LLVM: &str = "libLLVM.so.19.1";
 
 /// CPU time of the teapot at 768x576 and 16 samples per pixel.
+///
+/// # Errors
+/// When `umbra` or Mitsuba cannot be run.
 pub fn run(bench: &Bench) -> anyhow::Result<Vec<Line>> {
     let python = bench.folder.join("mitsuba/bin/python");
     if !python.exists() {

@@ -171,6 +171,9 @@ impl Batch<'_> {
 }
 
 /// The table's rows, and how a batch grows.
+///
+/// # Errors
+/// When a sample cannot be packed, built or graded.
 pub fn run(bench: &Bench) -> anyhow::Result<(Vec<Line>, Vec<Curve>)> {
     samples::pack(&bench.root, &|name, _| ["perfect", "hangs"].contains(&name))?;
     let recording = Recording::obtain(&bench.root, &bench.umbra)?;

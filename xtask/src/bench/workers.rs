@@ -11,6 +11,9 @@ use super::Bench;
 use super::figures::{Line, Samples};
 
 /// Start to exit of a worker that refuses its one question, and of `true`.
+///
+/// # Errors
+/// When a worker or `true` cannot be started.
 pub fn run(bench: &Bench) -> anyhow::Result<Vec<Line>> {
     let scratch = tempfile::tempdir()?;
     let supervisor = Supervisor::new(bench.umbra.clone(), scratch.path().to_owned());

@@ -18,6 +18,9 @@ const DECIMALS: usize = 5;
 const EMITTER_DECIMALS: usize = 7;
 
 /// The files of one scene.
+///
+/// # Errors
+/// When a texture cannot be encoded.
 pub fn scene_files(scene: &Scene) -> Result<Vec<ExportedFile>> {
     let mut files = Vec::new();
     let mut push = |path: String, bytes: Vec<u8>| {

@@ -49,6 +49,9 @@ fn root() -> PathBuf {
 }
 
 /// Writes every file and returns one line that says what was written.
+///
+/// # Errors
+/// When a file cannot be made or written.
 pub fn write() -> Result<String> {
     let (root, files) = (root(), files()?);
     for file in &files {

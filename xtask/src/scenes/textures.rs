@@ -19,6 +19,9 @@ impl Texture {
     }
 
     /// The bytes of the PNG file.
+    ///
+    /// # Errors
+    /// When it cannot be encoded.
     pub fn png(&self) -> Result<Vec<u8>> {
         let mut bytes = Cursor::new(Vec::new());
         self.image.write_to(&mut bytes, ImageFormat::Png)?;

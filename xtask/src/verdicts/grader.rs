@@ -38,6 +38,9 @@ pub struct Grader<'a> {
 
 impl<'a> Grader<'a> {
     /// Undoes what variants changed: samples per pixel and threads.
+    ///
+    /// # Errors
+    /// When a scene cannot be loaded.
     pub fn reset(&mut self, store: &Store<'a>) -> Result<()> {
         for case in &mut self.grading.cases {
             case.spp = umbra::expected::load_scene(&case.offline)?.config().spp as u32;
@@ -47,6 +50,9 @@ impl<'a> Grader<'a> {
     }
 
     /// Grades all and prints a row for each as it is done.
+    ///
+    /// # Errors
+    /// When one cannot be graded: the machine's fault, or ours.
     pub fn grade_all(&self, subjects: &[Subject]) -> Result<Vec<Row>> {
         parallel::each(subjects, self.jobs, |_, subject| {
             let row = self.grade(subject)?;
@@ -56,6 +62,9 @@ impl<'a> Grader<'a> {
     }
 
     /// Finds out about the reference as it is.
+    ///
+    /// # Errors
+    /// When it cannot be graded.
     pub fn grade_plain(&mut self) -> Result<()> {
         let stages = self.stages(&[])?;
         for path in RenderPath::ALL {
@@ -84,6 +93,9 @@ impl<'a> Grader<'a> {
     }
 
     /// The reference's stage texts with mistakes, and the template's.
+    ///
+    /// # Errors
+    /// When the reference lacks a stage, or two mistakes change the same text.
     pub fn stages(&self, mistakes: &[String]) -> Result<Stages> {
         let names: Vec<&str> = switches(mistakes).collect();
         let reference = self.root.join("reference_impl/src");

@@ -237,9 +237,13 @@ pub struct Queue {
 
 /// Methods that upload nothing.
 macro_rules! pass_on {
-    ($inner:ident: $wrapped:ident; $($name:ident($($argument:ident: $type:ty),*) $(-> $answer:ty)?;)*) => {
+    (
+        $inner:ident: $wrapped:ident;
+        $($(#[$about:meta])* $name:ident($($argument:ident: $type:ty),*) $(-> $answer:ty)?;)*
+    ) => {
         impl $wrapped {$(
             #[doc = concat!("As [`wgpu::", stringify!($wrapped), "::", stringify!($name), "`].")]
+            $(#[$about])*
             pub fn $name(&self, $($argument: $type),*) $(-> $answer)? {
                 self.$inner.$name($($argument),*)
             }
@@ -248,6 +252,9 @@ macro_rules! pass_on {
 }
 
 pass_on! { device: Device;
+    ///
+    /// # Errors
+    /// When the work that is waited for is not done in time, or was never submitted.
     poll(poll_type: wgpu::PollType) -> Result<wgpu::PollStatus, wgpu::PollError>;
     features() -> wgpu::Features;
     limits() -> wgpu::Limits;

@@ -136,6 +136,9 @@ impl Checker<'_> {
     }
 
     /// Checks what was saved.
+    ///
+    /// # Errors
+    /// When the child cannot be started.
     pub fn start(&self, change: Change, begun: &mut usize) -> anyhow::Result<Running> {
         self.board.saved(change == Change::Shader);
         *begun += 1;

@@ -48,6 +48,9 @@ pub struct WatchArguments {
 }
 
 /// Watches until Ctrl-C.
+///
+/// # Errors
+/// When the folder cannot be watched, or the page cannot be served.
 pub fn run(arguments: &WatchArguments, root: Option<&Path>) -> anyhow::Result<u8> {
     let name = || format!("cannot watch {}", arguments.folder.display());
     let folder = arguments.folder.canonicalize().with_context(name)?;

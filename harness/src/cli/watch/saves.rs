@@ -21,6 +21,9 @@ pub(super) struct Watched {
 
 impl Watched {
     /// Prepares to report what is saved in `folder`, other than what is `written` there.
+    ///
+    /// # Errors
+    /// When the system gives no watcher.
     pub fn new(folder: &Path, written: &Path, saved: Sender<Happened>) -> notify::Result<Self> {
         let (watched, written) = (folder.to_owned(), written.to_owned());
         let watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
@@ -39,6 +42,9 @@ impl Watched {
     }
 
     /// Begins to watch.
+    ///
+    /// # Errors
+    /// When the folder cannot be watched.
     pub fn begin(&mut self) -> notify::Result<()> {
         self.watcher.watch(&self.folder, RecursiveMode::Recursive)?;
         self.identity = identity(&self.folder);

@@ -77,6 +77,9 @@ impl Entry {
     }
 
     /// Applies a statement, and says which earlier one it replaces.
+    ///
+    /// # Errors
+    /// When the statement's values cannot be read.
     pub fn read(&mut self, at: &Place, keyword: &str, rest: &str) -> Result<Effect> {
         let effect = self.apply(at, keyword, rest)?;
         let lower = keyword.to_ascii_lowercase();
@@ -153,6 +156,9 @@ impl Entry {
     }
 
     /// Loads the textures, which lie beside the MTL file at `path`.
+    ///
+    /// # Errors
+    /// When a texture's statement is wrong, or its file cannot be read.
     pub fn material(
         self,
         path: &Path,
