@@ -277,7 +277,9 @@ pub fn judge_samples(
         total += pixel.mean.abs();
         if !found.is_finite() || difference.abs() > room {
             off += 1;
-            let calm = error < CALM * pixel.mean.abs();
+            // Where all is black no shading is computed that could be no number.
+            let is_black = pixel.mean == 0.0 && error == 0.0;
+            let calm = error < CALM * pixel.mean.abs() || (is_black && !found.is_finite());
             if calm && difference.abs() > STRAY * pixel.mean.abs() {
                 stray.push((index, found, pixel.mean));
             }

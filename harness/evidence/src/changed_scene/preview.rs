@@ -43,9 +43,9 @@ pub struct ScenePreview {
     pub of_model: [f64; 2],
     /// Median radiance of what is lit, the channels' mean [W m^-2 sr^-1].
     pub median: f32,
-    /// Half the angle of the cone from the light that holds every shadow in view [rad].
+    /// Half the angle of the cone from the light that holds every shadow in view, in radians.
     pub shadow_cone: f32,
-    /// The same for all that faces the light, in shadow or not [rad].
+    /// The same for all that faces the light, in shadow or not, in radians.
     pub facing_cone: f32,
     /// Distance of the light, and of the eye, from the nearest surface, as fractions of its distance
     /// from the point looked at.

@@ -176,6 +176,11 @@ fn single_pixels_that_are_never_written_or_written_over_are_a_slip() {
         image[index] = image[index].map(|v| 1.005 * v);
         assert_eq!(judge(&image).verdict, Verdict::Pass);
     }
+    // The last pixel, with nothing behind it: 0 / 0 samples.
+    let mut image = right;
+    image[(WIDTH * HEIGHT) as usize - 1] = [f32::NAN; 3];
+    let check = judge(&image);
+    assert_eq!((check.verdict, check.error), (Verdict::Fail, PriceClass::Slip.price()));
 }
 
 #[test]
