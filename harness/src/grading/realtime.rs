@@ -592,11 +592,12 @@ fn judge_visibility(
         let without = FrameRequest { toml: &case.realtime, shadow_map: false, ..with.clone() };
         Some([with, without].map(|frame| FrameRequest { times: *times, ..frame }))
     };
-    // Small films tell what is not worth a whole one; one worker draws them all.
+    // Small films tell what is not worth a whole one, and one worker draws them all. Where they tell nothing, whole
+    // ones do.
     let small = small_shadows(case);
     let may_pass = |[with, without]: &[Option<Image>; 2]| {
-        let judged = small.judge(name, with.as_ref()?, without.as_ref()?, tolerances)?;
-        Some(judged.verdict != Verdict::Fail)
+        let judged = small.judge(name, with.as_ref()?, without.as_ref()?, tolerances);
+        Some(judged.is_none_or(|judged| judged.verdict != Verdict::Fail))
     };
     let all: Option<Vec<_>> = tries.iter().map(|tried| frames(tried, true)).collect();
     let all = pictures(session, plugin, &all.unwrap_or_default().concat());
