@@ -139,11 +139,12 @@ impl Supervisor {
         let mut report = JobReport { outcomes: Vec::new(), renderer: None, runs: Vec::new() };
         let mut pending: Vec<usize> = (0..count).collect();
         let used_up = || job.plugin.is_some() && retries.used_up().is_some();
-        // Which requests were asked again because their worker was ended from outside. A renderer can do that to
-        // itself: then it ends so again, and is to blame.
-        let mut ended_before = vec![false; count];
+        // Which requests were asked again because their worker was ended from outside, or could not be started. A
+        // renderer can end itself so: then it does again, and is to blame.
+        let mut asked_again = vec![false; count];
         loop {
-            // Each worker settles one request, or is the second to be ended from outside at it, so this ends.
+            // Each worker settles one request, or is the second that was ended from outside at it or could not be
+            // started for it, so this ends.
             pending.retain(|&index| outcomes[index].is_none());
             for &index in &pending {
                 outcomes[index] = retries.given_up(job, &job.requests[index]);
@@ -163,7 +164,11 @@ impl Supervisor {
             let run = match run {
                 Ok(run) => run,
                 Err(error) => {
-                    pending.iter().for_each(|&index| outcomes[index] = Some(cannot_run(&error)));
+                    for &index in &pending {
+                        if std::mem::replace(&mut asked_again[index], true) {
+                            outcomes[index] = Some(cannot_run(&error));
+                        }
+                    }
                     continue;
                 }
             };
@@ -176,8 +181,12 @@ impl Supervisor {
             report.runs.push(WorkerRun { requests: pending.clone(), ended: run.ended });
             if exit.is_from_outside() {
                 for &index in &pending {
-                    let ended_it = matches!(outcomes[index], Some(Outcome::CrashedBySignal(_)));
-                    if ended_it && !std::mem::replace(&mut ended_before[index], true) {
+                    // One that had not begun has no outcome but that.
+                    let is_of_its_end = matches!(
+                        outcomes[index],
+                        Some(Outcome::CrashedBySignal(_) | Outcome::NotRun { .. })
+                    );
+                    if is_of_its_end && !std::mem::replace(&mut asked_again[index], true) {
                         outcomes[index] = None;
                     }
                 }
