@@ -38,10 +38,10 @@ impl From<Error> for Failure {
     }
 }
 
-/// An open device and its pipelines, by the texts of their stages.
+/// An open device, and the texts that it compiled.
 struct Open {
     gpu: Gpu,
-    pipelines: Vec<([String; 2], wgpu::RenderPipeline)>,
+    compiled: Vec<String>,
 }
 
 impl Neutral {
@@ -77,7 +77,7 @@ impl Neutral {
             let scene = load(&mut self.scene, &scene.path)?;
             let (width, height) = (*width as usize, *height as usize);
             let target = Target::new(&open.gpu, width, height)?;
-            let pass = NeutralPass::new(open, scene, texts)?;
+            let pass = NeutralPass::new(&open.gpu, scene, texts)?;
             for (camera, frame) in cameras.iter().zip(values.chunks_mut(3 * width * height)) {
                 let config = CameraConfig {
                     eye: camera.eye.into(),
@@ -130,17 +130,17 @@ impl Open {
             AdapterKind::Software => gpu::AdapterKind::Software,
             AdapterKind::Hardware => gpu::AdapterKind::Hardware,
         };
-        Ok(Self { gpu: Gpu::open(kind, &adapter.name)?, pipelines: Vec::new() })
+        Ok(Self { gpu: Gpu::open(kind, &adapter.name)?, compiled: Vec::new() })
     }
 
     /// Compiles each stage by itself, so that what is no WGSL is told from what only does not fit.
     fn compile(
-        &self,
+        &mut self,
         texts: [&str; 3],
         refused: &mut Vec<(String, String)>,
     ) -> Result<(), Failure> {
         for (name, text) in STAGES.into_iter().zip(texts) {
-            if self.pipelines.iter().any(|(known, _)| known.iter().any(|known| known == text)) {
+            if self.compiled.iter().any(|known| known == text) {
                 continue;
             }
             match self.gpu.check_stage(Stage { name, text }) {
@@ -150,22 +150,9 @@ impl Open {
                 }
                 checked => checked?,
             }
+            self.compiled.push(text.to_owned());
         }
         Ok(())
-    }
-
-    fn pipeline(
-        &mut self,
-        vertex: Stage,
-        fragment: Stage,
-    ) -> basecode::Result<wgpu::RenderPipeline> {
-        let texts = [vertex.text, fragment.text];
-        if let Some((_, made)) = self.pipelines.iter().find(|(known, _)| *known == texts) {
-            return Ok(made.clone());
-        }
-        let made = self.gpu.checked(&mut || Ok(self.gpu.pipeline(vertex, fragment)))?;
-        self.pipelines.push((texts.map(str::to_owned), made.clone()));
-        Ok(made)
     }
 }
 
@@ -191,18 +178,14 @@ struct NeutralPass {
 }
 
 impl NeutralPass {
-    fn new(
-        open: &mut Open,
-        scene: &Scene,
-        [vs, diffuse, phong]: [&str; 3],
-    ) -> basecode::Result<Self> {
+    fn new(gpu: &Gpu, scene: &Scene, [vs, diffuse, phong]: [&str; 3]) -> basecode::Result<Self> {
         let vertex = Stage { name: STAGES[0], text: vs };
+        let pipeline = |fragment| gpu.checked(&mut || Ok(gpu.pipeline(vertex, fragment)));
         let pipelines = [
-            open.pipeline(vertex, Stage { name: STAGES[1], text: diffuse })?,
-            open.pipeline(vertex, Stage { name: STAGES[2], text: phong })?,
-            open.pipeline(vertex, EMITTER_FS)?,
+            pipeline(Stage { name: STAGES[1], text: diffuse })?,
+            pipeline(Stage { name: STAGES[2], text: phong })?,
+            pipeline(EMITTER_FS)?,
         ];
-        let gpu = &open.gpu;
         let object = |(index, shape)| {
             let material = scene.material_of(index);
             let scale = material.energy_scale();

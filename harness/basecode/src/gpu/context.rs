@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::device::{Footprint, Overrides, Watch, named_position};
+use super::made_pipelines::MadePipelines;
 use super::message::readable;
 use super::{
     Device, EDITED_LINE, EMPTY_MAPS, EVERY_FRAGMENT, FrameUniforms, Layouts, NOTHING_UNSET,
@@ -35,10 +36,11 @@ pub struct Gpu {
     /// The bind group layouts of the shader contract.
     pub layouts: Layouts,
     stages: Vec<(String, String)>,
+    pub(super) pipelines: MadePipelines,
     /// Bodies of [`Gpu::checked`] that were begun and did not end well.
     unfinished: AtomicUsize,
     trouble: Arc<Mutex<Trouble>>,
-    watch: Arc<Watch>,
+    pub(super) watch: Arc<Watch>,
 }
 
 /// Errors that the graphics library reports outside of any call.
@@ -122,9 +124,11 @@ impl Gpu {
         }));
         let layouts = Layouts::new(&device);
         let (stages, unfinished) = (Vec::new(), AtomicUsize::new(0));
+        let pipelines = MadePipelines::default();
         let watch = Arc::new(Watch::default());
         let (device, queue) = (Device::new(device, &watch), Queue::new(queue, &watch));
-        Ok(Self { device, queue, adapter: info, layouts, stages, unfinished, trouble, watch })
+        let adapter = info;
+        Ok(Self { device, queue, adapter, layouts, stages, pipelines, unfinished, trouble, watch })
     }
 
     /// As [`Gpu::open`], but takes a device of this process that was [kept](Gpu::keep).
@@ -317,6 +321,32 @@ mod tests {
         let trouble = Arc::clone(&gpu.trouble);
         gpu.keep(KIND, "");
         Arc::ptr_eq(&trouble, &reopen().trouble)
+    }
+
+    #[test]
+    fn a_pipeline_is_made_once_and_counted_each_time() {
+        let text = "@vertex fn vs_main(@location(0) p: vec3f) -> @builtin(position) vec4f { return vec4f(p, 1.0); }";
+        let vertex = Stage { name: "simple.vs", text };
+        let white = "@fragment fn fs_main() -> @location(0) vec4f { return vec4f(1.0); }";
+        let fragment = Stage { name: "diffuse.fs", text: white };
+        let mut gpu = reopen();
+        let first = gpu.pipeline(vertex, fragment);
+        let depth = gpu.depth_pipeline(vertex);
+        gpu.take_footprint();
+        assert!(gpu.pipeline(vertex, fragment) == first && gpu.depth_pipeline(vertex) == depth);
+        let footprint = gpu.take_footprint();
+        assert_eq!((footprint.vertex_pipelines, footprint.maps), (1, 1));
+        // What the host changes makes others.
+        let black = white.replace("1.0", "0.0");
+        for (name, text) in [("diffuse.fs", black.as_str()), (EMPTY_MAPS, "")] {
+            gpu.replace_stages(vec![(name.into(), text.into())]);
+            assert!(gpu.pipeline(vertex, fragment) != first, "{name}");
+        }
+        let edit = format!("{white}\n{black}");
+        gpu.replace_stages(vec![(EDITED_LINE.into(), edit)]);
+        assert!(gpu.pipeline(vertex, fragment) != first && gpu.depth_pipeline(vertex) == depth);
+        gpu.replace_stages(Vec::new());
+        assert!(gpu.pipeline(vertex, fragment) == first);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! They refuse nothing. The host reads what a pass hands to the device for a frame. It may also change the pipelines
 //! that the pass asks for: the resulting frame shows how the pass makes its pictures.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
@@ -106,7 +107,7 @@ impl fmt::Display for Footprint {
 }
 
 /// Changes to pipelines that the host asks for.
-#[derive(Clone, Default)]
+#[derive(Clone, Default, PartialEq, Eq)]
 pub(super) struct Overrides {
     /// The text of [`EVERY_FRAGMENT`].
     pub shown: Option<String>,
@@ -120,6 +121,20 @@ pub(super) struct Overrides {
     pub edited: Option<String>,
     /// The text of [`NOTHING_UNSET`].
     pub nothing_unset: Option<String>,
+}
+
+impl Overrides {
+    /// The WGSL that is compiled in the place of another.
+    pub(super) fn wgsl<'a>(&self, text: &'a str) -> Cow<'a, str> {
+        let mut text = Cow::Borrowed(text);
+        if let Some(edit) = &self.edited {
+            text = with_line(&text, edit).into();
+        }
+        if let Some(shown) = &self.shown {
+            text = format!("{text}\n{shown}\n").into();
+        }
+        text
+    }
 }
 
 /// The position that a text of [`NOTHING_UNSET`] names.
@@ -215,6 +230,18 @@ impl Watch {
         self.uploaded.fetch_add(bytes, Relaxed);
     }
 
+    fn upload_wgsl(&self, text: &str) {
+        self.upload((text.len() as u64).saturating_sub(LONG_WGSL));
+    }
+
+    /// Counts a pipeline that is used once more, made of these texts, as if it were made anew.
+    pub(super) fn reuse(&self, vertex: &str, fragment: Option<&str>) {
+        self.upload_wgsl(vertex);
+        fragment.iter().for_each(|text| self.upload_wgsl(text));
+        let kind = if fragment.is_some() { &self.vertex_pipelines } else { &self.maps };
+        kind.fetch_add(1, Relaxed);
+    }
+
     pub(super) fn overrides(&self) -> Overrides {
         self.overrides.lock().map(|overrides| overrides.clone()).unwrap_or_default()
     }
@@ -294,14 +321,8 @@ impl Device {
     pub fn create_shader_module(&self, desc: wgpu::ShaderModuleDescriptor) -> wgpu::ShaderModule {
         let wgpu::ShaderModuleDescriptor { label, mut source } = desc;
         if let wgpu::ShaderSource::Wgsl(text) = &mut source {
-            self.watch.upload((text.len() as u64).saturating_sub(LONG_WGSL));
-            let Overrides { shown, edited, .. } = self.watch.overrides();
-            if let Some(edit) = edited {
-                *text = with_line(text, &edit).into();
-            }
-            if let Some(shown) = shown {
-                *text = format!("{text}\n{shown}\n").into();
-            }
+            self.watch.upload_wgsl(text);
+            *text = self.watch.overrides().wgsl(text).into_owned().into();
         }
         self.device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source })
     }

@@ -23,6 +23,7 @@ mod context;
 mod contract;
 mod device;
 mod layouts;
+mod made_pipelines;
 mod matrices;
 mod mesh;
 mod message;

@@ -1,5 +1,6 @@
 //! Pipelines: the fixed part of the shader contract.
 
+use super::made_pipelines::MadeOf;
 use super::{COLOR_FORMAT, DEPTH_FORMAT, Gpu, VERTEX_STRIDE};
 
 /// The fragment stage of emitters: plain white.
@@ -20,20 +21,43 @@ impl Gpu {
     ///
     /// What is wrong with a stage is reported by [`Gpu::checked`].
     pub fn pipeline(&self, vertex: Stage, fragment: Stage) -> wgpu::RenderPipeline {
-        let module = self.module(fragment);
-        let fragment_state = wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fs_main"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            targets: &[Some(COLOR_FORMAT.into())],
-        };
-        self.make_pipeline(fragment.name, &self.layouts.all, vertex, Some(fragment_state))
+        self.made_once(vertex, Some(fragment), || {
+            let module = self.module(fragment);
+            let fragment_state = wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fs_main"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &[Some(COLOR_FORMAT.into())],
+            };
+            self.make_pipeline(fragment.name, &self.layouts.all, vertex, Some(fragment_state))
+        })
     }
 
     /// A pipeline that draws depth alone, as into a layer of a [`super::ShadowMap`]. Bind groups 0
     /// and 1 must be set before it draws; no others exist for it.
     pub fn depth_pipeline(&self, vertex: Stage) -> wgpu::RenderPipeline {
-        self.make_pipeline(vertex.name, &self.layouts.depth, vertex, None)
+        self.made_once(vertex, None, || {
+            self.make_pipeline(vertex.name, &self.layouts.depth, vertex, None)
+        })
+    }
+
+    /// A pipeline that was made of the same stages before, or else a new one.
+    fn made_once<'a>(
+        &'a self,
+        vertex: Stage<'a>,
+        fragment: Option<Stage<'a>>,
+        make: impl FnOnce() -> wgpu::RenderPipeline,
+    ) -> wgpu::RenderPipeline {
+        let text = |stage: Stage<'a>| self.stage(stage.name, stage.text);
+        let (vertex, fragment) = (text(vertex), fragment.map(text));
+        let made_of = MadeOf::new(vertex, fragment, self.watch.overrides());
+        if let Some(pipeline) = self.pipelines.find(&made_of) {
+            self.watch.reuse(vertex, fragment);
+            return pipeline;
+        }
+        let pipeline = make();
+        self.pipelines.keep(made_of, &pipeline);
+        pipeline
     }
 
     /// Compiles a stage by itself.
