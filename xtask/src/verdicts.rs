@@ -94,8 +94,10 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         progress: &|message| eprintln!("{message}"),
     };
     let cancel = AtomicBool::new(false);
-    let grading =
+    let mut grading =
         Grading::prepare(&store, arguments.adapter.adapter(), arguments.held_back_seed, &cancel)?;
+    // Most renderers share all stages but one.
+    grading.keep_frames(scratch.path().join("frames"));
     if let Err(why) = &grading.adapter {
         anyhow::bail!("realtime cannot be judged here: {why}");
     }

@@ -245,7 +245,7 @@ impl<'a> Batch<'a> {
             found.begin(self.output)?;
         }
         if self.mode == Mode::Check {
-            grading.keep_frames();
+            grading.keep_frames(context.assignment.cache().join("frames"));
         }
         if self.budget == BudgetChoice::None {
             grading.budget = None;

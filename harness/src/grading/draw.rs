@@ -1,6 +1,7 @@
 //! Draws frames of scenes with given stages, by a plugin or by Umbra's neutral pass.
 
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
 use basecode::{Image, Matrices};
 
@@ -9,7 +10,7 @@ use super::session::{self, Session};
 use super::stages::named;
 use crate::evidence::stage_film::from_origin;
 use crate::evidence::stages::{SHOW_NORMAL, VERTEX};
-use crate::worker::{Adapter, CameraValue, Outcome, Request, StageText};
+use crate::worker::{Adapter, CameraValue, Outcome, Request, SceneRef, StageText};
 
 /// A frame to be drawn.
 #[derive(Clone)]
@@ -55,10 +56,17 @@ impl<'a> FrameRequest<'a> {
         Some(Self { size, stages, ..Self::bonus(case)? })
     }
 
-    /// The request that asks for it.
-    pub fn request(&self, session: &Session, adapter: &Adapter) -> Request {
+    /// The request that asks a renderer for it, or Umbra's own pass, which takes no options.
+    pub fn request(
+        &self,
+        session: &Session,
+        renderer: Option<&Path>,
+        adapter: &Adapter,
+    ) -> Request {
+        let path = self.toml.to_owned();
+        let options = renderer.map_or(String::new(), |_| session.options.clone());
         Request::RenderRealtime {
-            scene: session.scene(self.toml),
+            scene: SceneRef { path, options },
             width: self.size.0,
             height: self.size.1,
             shadow_map: self.shadow_map,
@@ -104,7 +112,7 @@ pub fn draw_each(
         Ok(adapter) => adapter,
         Err(reason) => return vec![Outcome::NoAdapter(reason.clone()); frames.len()],
     };
-    let requests = frames.iter().map(|frame| frame.request(session, adapter)).collect();
+    let requests = frames.iter().map(|frame| frame.request(session, plugin, adapter)).collect();
     let mut outcomes = session.run(plugin, requests);
     for (outcome, frame) in outcomes.iter_mut().zip(frames) {
         if let Outcome::Done(answer) = outcome {
@@ -119,6 +127,20 @@ pub fn draw_each(
 pub fn pictures(session: &Session, plugin: &Path, frames: &[FrameRequest]) -> Vec<Option<Image>> {
     let outcomes = draw_each(session, Some(plugin), frames);
     frames.iter().zip(&outcomes).map(|(frame, outcome)| frame.picture(outcome)).collect()
+}
+
+/// The same for the frames of several scenes: all in one worker, unless [`draw_scenes`] saw that one left something
+/// behind for another.
+pub fn pictures_of_scenes(
+    session: &Session,
+    plugin: &Path,
+    scenes: &[Vec<FrameRequest>],
+) -> Vec<Vec<Option<Image>>> {
+    if session.scenes_interfere.load(Ordering::Relaxed) {
+        return scenes.iter().map(|frames| pictures(session, plugin, frames)).collect();
+    }
+    let mut pictures = pictures(session, plugin, &scenes.concat()).into_iter();
+    scenes.iter().map(|frames| pictures.by_ref().take(frames.len()).collect()).collect()
 }
 
 /// Draws the frames of several scenes with a plugin, all in one worker while it lives, where
@@ -140,6 +162,7 @@ pub fn draw_scenes(
     if let Some((&last, others)) = wrong.split_last().filter(|(last, _)| **last > 0) {
         let own = alone(last);
         if !drawn[last].iter().zip(&own).all(|(shared, own)| same(shared, own)) {
+            session.scenes_interfere.store(true, Ordering::Relaxed);
             drawn[last] = own;
             others.iter().for_each(|&index| drawn[index] = alone(index));
         }

@@ -7,6 +7,7 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use sha2::{Digest, Sha256};
 
@@ -18,16 +19,15 @@ use crate::sandbox::Isolation;
 use crate::store::scene_digest;
 use crate::worker::{Adapter, Answer, Outcome, Request};
 
-/// Number of sets of frames that are kept, of about 4 MB each; the oldest go.
+/// Number of sets of frames that are kept, of about 4 MB each; those that were not used for longest go.
 const KEPT: usize = 24;
 
 impl Grading<'_> {
-    /// Keeps what Umbra's own pass draws of a submission's stages, where isolation is full: elsewhere a plugin could
-    /// write there.
-    pub fn keep_frames(&mut self) {
+    /// Keeps in a folder what Umbra's own pass draws of a submission's stages, where isolation is full: elsewhere a
+    /// plugin could write there.
+    pub fn keep_frames(&mut self, folder: PathBuf) {
         if self.supervisor.isolation.isolation() == Isolation::Full && !self.drawn_with.is_empty() {
             let [_, worker] = self.supervisor.programs();
-            let folder = self.assignment.cache().join("frames");
             let drawn_with = self.drawn_with.clone();
             self.kept_frames = Some(KeptFrames { folder, worker, drawn_with });
         }
@@ -44,8 +44,12 @@ pub fn draw_sets(session: &Session, sets: &[Vec<FrameRequest>]) -> Vec<Vec<Outco
     let file = |set: &Vec<FrameRequest>| kept.file(session, adapter, set, &conditions?).ok();
     let files: Vec<Option<PathBuf>> = sets.iter().map(file).collect();
     let found = |(set, file): (&Vec<FrameRequest>, &Option<PathBuf>)| {
-        let requests = set.iter().map(|frame| frame.request(session, adapter));
-        outcomes(&fs::read(file.as_ref()?).ok()?, requests)
+        let requests = set.iter().map(|frame| frame.request(session, None, adapter));
+        let file = file.as_ref()?;
+        let found = outcomes(&fs::read(file).ok()?, requests)?;
+        // Where that cannot be noted, others go first.
+        let _ = fs::File::open(file).and_then(|file| file.set_modified(SystemTime::now()));
+        Some(found)
     };
     let mut all: Vec<_> = sets.iter().zip(&files).map(found).collect();
     let missing = sets.iter().zip(&all).filter(|(_, found)| found.is_none());
@@ -86,7 +90,7 @@ impl KeptFrames {
         let mut hash = Sha256::new();
         hash.update(conditions);
         for frame in frames {
-            hash.update(serde_json::to_vec(&frame.request(session, adapter))?);
+            hash.update(serde_json::to_vec(&frame.request(session, None, adapter))?);
             hash.update(scene_digest(frame.toml)?);
         }
         Ok(self.folder.join(hex(&hash.finalize())))

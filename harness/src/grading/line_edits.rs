@@ -33,8 +33,8 @@ pub struct Reached {
     pub with_texture: bool,
 }
 
-/// Number of edits that one worker draws with.
-pub const TRIED_AT_ONCE: usize = 16;
+/// Number of edits that the first worker draws with; each later one takes twice as many.
+const TRIED_FIRST: usize = 16;
 /// So many edits are tried at most.
 const MOST: usize = 200;
 /// The names of some edits.
@@ -89,6 +89,16 @@ pub fn all(stages: &Stages) -> Vec<LineEdit> {
     });
     edits.truncate(MOST);
     edits
+}
+
+/// Edits, the likeliest first, by the worker that tries them: starting one costs as much as a few edits.
+pub fn batches(edits: &[LineEdit]) -> impl Iterator<Item = &[LineEdit]> {
+    let (mut rest, mut count) = (edits, TRIED_FIRST);
+    std::iter::from_fn(move || {
+        let (batch, later) = rest.split_at(count.min(rest.len()));
+        (rest, count) = (later, 2 * count);
+        (!batch.is_empty()).then_some(batch)
+    })
 }
 
 /// A function of WGSL.
@@ -400,6 +410,19 @@ mod tests {
 
     fn holds(line: &str, mended: &str) -> bool {
         of_line(line).iter().any(|(_, edited)| edited == mended)
+    }
+
+    #[test]
+    fn each_worker_tries_twice_as_many_edits_as_the_one_before() {
+        let (name, file, of) = (SIGN, String::new(), Reached::default());
+        let (from, to) = (String::new(), String::new());
+        let first = LineEdit { name, file, line: 0, of, from, to };
+        let edits: Vec<LineEdit> =
+            (0..100).map(|line| LineEdit { line, ..first.clone() }).collect();
+        let sizes: Vec<usize> = batches(&edits).map(<[LineEdit]>::len).collect();
+        assert_eq!(sizes, [16, 32, 52]);
+        assert!(batches(&edits).flatten().eq(&edits));
+        assert!(batches(&[]).next().is_none());
     }
 
     #[test]

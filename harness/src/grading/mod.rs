@@ -2,6 +2,7 @@
 
 mod attribution;
 mod begun;
+mod bonus;
 mod cache;
 mod cache_key;
 mod conventions;
@@ -9,6 +10,7 @@ mod costs;
 mod coverage;
 mod diagnose;
 mod draw;
+mod frame_checks;
 mod image_digest;
 mod isolate;
 mod judged;

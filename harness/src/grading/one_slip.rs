@@ -62,9 +62,15 @@ pub fn judge(
     (found, drawn): (&[Check], &[Drawn]),
     tolerances: &Tolerances,
 ) -> Found {
-    let is_open = |check: &Check| matches!(check.verdict, Verdict::Pass | Verdict::NotJudged);
-    let fails = |id: CheckId| found.iter().any(|check| check.id == id && !is_open(check));
-    let others_are_open = |id: CheckId| ALONE.into_iter().all(|of| of == id || !fails(of));
+    let is_wrong = |case: &PreparedScene| {
+        let own =
+            |check: &Check| check.scene == case.entry.name && check.id == CheckId::ImageRealtime;
+        found.iter().any(|check| own(check) && check.verdict == Verdict::Fail)
+    };
+    let wrong: Vec<bool> = cases.iter().map(is_wrong).collect();
+    let first = wrong.iter().position(|wrong| *wrong).unwrap_or_default();
+    let Some(first) = cases.get(first) else { return Found::default() };
+    let renderer = Renderer { session, plugin, cases, first, wrong, found, tolerances };
     let frame = |case: &PreparedScene| {
         let own =
             |drawn: &&Drawn| drawn.scene == case.entry.name && drawn.kind == ImageKind::Realtime;
@@ -72,13 +78,94 @@ pub fn judge(
     };
     // A pipeline that cannot be drawn with leaves no frame.
     let frames: Option<Vec<&Image>> = cases.iter().map(frame).collect();
-    let is_wrong = |case: &PreparedScene| {
-        let own =
-            |check: &Check| check.scene == case.entry.name && check.id == CheckId::ImageRealtime;
-        found.iter().any(|check| own(check) && check.verdict == Verdict::Fail)
+    let Some(frames) = frames else {
+        return renderer.by_host_changes(HostChange::of_pipelines()).unwrap_or_default();
     };
-    let wrong: Vec<bool> = cases.iter().map(is_wrong).collect();
-    let slips = |ids: &[CheckId], (name, class): (&str, PriceClass), place: &str| {
+    let slips = slips_of_frames(cases, &frames, &renderer.wrong);
+    // What costs least is asked first.
+    let found = renderer
+        .by_frames(&slips)
+        .or_else(|| renderer.by_moved_frames(&frames))
+        .or_else(|| renderer.by_host_changes(HostChange::all()))
+        .or_else(|| renderer.by_line_edits(stages))
+        .or_else(|| renderer.by_missing_surfaces(&slips));
+    match found {
+        Some(found) => found,
+        None if ALONE.into_iter().any(|id| renderer.fails(id)) => Found::default(),
+        None => Found::of(vertex_under_own_pass(session, plugin, cases, stages)),
+    }
+}
+
+/// What the host may change of what a pass is given.
+#[derive(Clone)]
+enum HostChange {
+    /// How pipelines are made; mends a slip of this name.
+    Pipelines(&'static str, StageText),
+    /// The scene's normals, which are negated.
+    Normals,
+    /// The matrices of the camera.
+    Matrices(Matrices),
+}
+
+impl HostChange {
+    /// Those of pipelines.
+    fn of_pipelines() -> Vec<Self> {
+        usual_pipelines::slips().map(|(name, stage)| Self::Pipelines(name, stage)).collect()
+    }
+
+    /// All, the likeliest first.
+    fn all() -> Vec<Self> {
+        let under = [Matrices::InView, Matrices::InProjection, Matrices::Transposed];
+        let of_vertices = std::iter::once(Self::Normals).chain(under.map(Self::Matrices));
+        Self::of_pipelines().into_iter().chain(of_vertices).collect()
+    }
+
+    /// The part that is wrong where it mends all frames.
+    fn part(&self) -> CheckId {
+        match self {
+            Self::Pipelines(..) => CheckId::PassUniforms,
+            Self::Normals | Self::Matrices(_) => CheckId::StageVertex,
+        }
+    }
+
+    /// What the host replaces.
+    fn stage(&self) -> StageText {
+        match self {
+            Self::Pipelines(_, stage) => stage.clone(),
+            Self::Normals => negated_normals(),
+            Self::Matrices(which) => matrices(*which),
+        }
+    }
+}
+
+/// A renderer with wrong frames, and what is known of it.
+struct Renderer<'a> {
+    session: &'a Session<'a>,
+    plugin: &'a Path,
+    cases: &'a [PreparedScene],
+    /// The first of them that it draws wrongly.
+    first: &'a PreparedScene,
+    /// Which of them it draws wrongly.
+    wrong: Vec<bool>,
+    /// The checks of pass, stages and frames.
+    found: &'a [Check],
+    tolerances: &'a Tolerances,
+}
+
+impl Renderer<'_> {
+    /// Whether a part is wrong, or cannot be told.
+    fn fails(&self, id: CheckId) -> bool {
+        let is_open = |check: &Check| matches!(check.verdict, Verdict::Pass | Verdict::NotJudged);
+        self.found.iter().any(|check| check.id == id && !is_open(check))
+    }
+
+    /// Whether no part but this one is wrong alone.
+    fn others_are_open(&self, id: CheckId) -> bool {
+        ALONE.into_iter().all(|of| of == id || !self.fails(of))
+    }
+
+    /// What slips of the parts `ids` at a place in the source cost, and all others nothing.
+    fn slips(&self, ids: &[CheckId], (name, class): (&str, PriceClass), place: &str) -> Found {
         let scene = |(case, wrong): (&PreparedScene, &bool)| {
             let own = |other| (ids.contains(&other) && *wrong).then_some((name, class, place));
             // What a pass shows by itself tells more than its frames.
@@ -87,88 +174,118 @@ pub fn judge(
                 let is_worse =
                     |check: &&Check| check.verdict == Verdict::Fail && check.error > class.price();
                 let pass = ids.contains(&other) && other == CheckId::PassUniforms;
-                found.iter().filter(|_| pass).find(own).filter(is_worse)
+                self.found.iter().filter(|_| pass).find(own).filter(is_worse)
             };
             ALONE.map(|other| match shown(other) {
                 Some(shown) => Check { convention: ONE_SLIP.to_owned(), ..shown.clone() },
                 None => explained(other, case, own(other)),
             })
         };
-        Found::of(cases.iter().zip(&wrong).flat_map(scene).collect())
-    };
-    let slip = |id, found: (&str, PriceClass)| slips(&[id], found, "");
-    let vertex = CheckId::StageVertex;
-    // Of a stage that is wrong alone its own frames tell.
-    let is_open = |id: CheckId| others_are_open(id) && !(id == vertex && fails(vertex));
-    let told = |frames: &Vec<&Image>| slips_of_frames(cases, frames, &wrong);
-    let slips_of_frames = frames.as_ref().map(told).unwrap_or_default();
-    let mut of_frames = slips_of_frames.iter().filter(|(id, _)| is_open(*id));
-    if let Some((id, name)) = of_frames.find(|(_, name)| *name != SURFACES_MISSING) {
-        return slip(*id, (name, PriceClass::Slip));
+        Found::of(self.cases.iter().zip(&self.wrong).flat_map(scene).collect())
     }
-    let first = wrong.iter().position(|wrong| *wrong).unwrap_or_default();
-    let Some(case) = cases.get(first) else { return Found::default() };
-    let mended = |stage: &StageText| mended_by(stage, session, plugin, (cases, first), tolerances);
-    // One worker tries them all on one scene.
-    let mends_first = |stages: &[StageText]| -> Vec<bool> {
-        let frame = |stage: &StageText| FrameRequest::probe(case, vec![stage.clone()]);
-        let pictures = pictures(session, plugin, &stages.iter().map(frame).collect::<Vec<_>>());
-        let is_right =
-            |image| are_right(std::slice::from_ref(case), vec![image], Film::Small, tolerances);
-        pictures.into_iter().map(is_right).collect()
-    };
-    if others_are_open(CheckId::PassUniforms) {
-        let (names, stages): (Vec<_>, Vec<_>) = usual_pipelines::slips().unzip();
-        let right = names.into_iter().zip(&stages).zip(mends_first(&stages));
-        let mut right = right.filter(|(_, right)| *right).map(|(slip, _)| slip);
-        if let Some((name, stage)) = right.find(|(_, stage)| mended(stage)) {
-            let checks = slip(CheckId::PassUniforms, (name, PriceClass::Slip)).checks;
-            return Found { mended_by: Some(stage.clone()), ..Found::of(checks) };
-        }
+
+    fn slip(&self, id: CheckId, name: &str) -> Found {
+        self.slips(&[id], (name, PriceClass::Slip), "")
     }
-    let Some(frames) = frames else { return Found::default() };
-    if others_are_open(vertex) {
+
+    /// By what the frames themselves show.
+    fn by_frames(&self, slips: &[(CheckId, &str)]) -> Option<Found> {
+        // Of a stage that is wrong alone its own frames tell.
+        let vertex = CheckId::StageVertex;
+        let is_open = |id| self.others_are_open(id) && !(id == vertex && self.fails(vertex));
+        let mut open = slips.iter().filter(|(id, name)| is_open(*id) && *name != SURFACES_MISSING);
+        open.next().map(|(id, name)| self.slip(*id, name))
+    }
+
+    /// By frames that are moved as a whole.
+    fn by_moved_frames(&self, frames: &[&Image]) -> Option<Found> {
+        let id = CheckId::StageVertex;
         let is_moved = |(_, moved): &&Moved| {
             let moved = frames.iter().map(|frame| Some(moved(frame)));
-            are_right(cases, moved.collect(), Film::Whole, tolerances)
+            are_right(self.cases, moved.collect(), Film::Whole, self.tolerances)
         };
-        if let Some((name, _)) = MOVED.iter().find(is_moved) {
-            return slip(vertex, (name, PriceClass::Slip));
-        }
-        if mended(&negated_normals()) {
-            return slip(vertex, ("the normal is negated", PriceClass::Slip));
-        }
-        if is_open(vertex)
-            && let Some((found, which)) = slip_of_matrices(&|which| mended(&matrices(which)))
-        {
-            return Found { mended_by: Some(matrices(which)), ..slip(vertex, found) };
-        }
+        let mut moved = MOVED.iter().filter(|_| self.others_are_open(id));
+        moved.find(is_moved).map(|(name, _)| self.slip(id, name))
     }
-    let edits = line_edits::all(stages).into_iter();
-    let edits: Vec<LineEdit> = edits.filter(|edit| pays(edit, found)).collect();
-    for edits in edits.chunks(line_edits::TRIED_AT_ONCE) {
-        let stages: Vec<StageText> = edits.iter().map(LineEdit::stage).collect();
-        let right = edits.iter().zip(&stages).zip(mends_first(&stages));
-        let mut right = right.filter(|(_, right)| *right).map(|(edit, _)| edit);
-        if let Some((edit, stage)) = right.find(|(_, stage)| mended(stage)) {
-            let of = slips(&paying(edit, found), (edit.name, PriceClass::Slip), &edit.place());
-            return Found { mended_by: Some(stage.clone()), ..of };
-        }
+
+    /// By what the host changes of what the pass is given.
+    fn by_host_changes(&self, changes: Vec<HostChange>) -> Option<Found> {
+        let is_open = |change: &HostChange| match change {
+            // The matrices of a stage that is wrong alone are told by its own frames.
+            HostChange::Matrices(_) if self.fails(change.part()) => false,
+            _ => self.others_are_open(change.part()),
+        };
+        let open: Vec<HostChange> = changes.into_iter().filter(is_open).collect();
+        let stages: Vec<StageText> = open.iter().map(HostChange::stage).collect();
+        let hopeful = open.iter().zip(self.mend_first(&stages)).filter(|(_, right)| *right);
+        let mends = |stage: &StageText| self.is_mended_by(stage);
+        let slip = |change: &HostChange| -> Option<((&str, PriceClass), HostChange)> {
+            let mended = || mends(&change.stage()).then(|| change.clone());
+            match change {
+                HostChange::Pipelines(name, _) => Some(((name, PriceClass::Slip), mended()?)),
+                HostChange::Normals => {
+                    Some((("the normal is negated", PriceClass::Slip), mended()?))
+                }
+                HostChange::Matrices(_) => {
+                    let (slip, which) = slip_of_matrices(&|which| mends(&matrices(which)))?;
+                    Some((slip, HostChange::Matrices(which)))
+                }
+            }
+        };
+        let (slip, change) = hopeful.map(|(change, _)| change).find_map(slip)?;
+        let mended_by = Some(change.stage());
+        Some(Found { mended_by, ..self.slips(&[change.part()], slip, "") })
     }
-    let hole = |check: &&Check| {
-        check.id == CheckId::ImageRealtimeCoverage && check.verdict == Verdict::Fail
-    };
-    let holes = found.iter().filter(hole).count();
-    let missing = slips_of_frames.iter().find(|(_, name)| *name == SURFACES_MISSING);
-    if let Some((id, name)) = missing.filter(|(id, _)| others_are_open(*id))
-        && 2 * holes > wrong.iter().filter(|wrong| **wrong).count()
-    {
-        return Found { is_of_missing_surfaces: true, ..slip(*id, (name, PriceClass::Slip)) };
+
+    /// By one word of one line of the submission's own WGSL.
+    fn by_line_edits(&self, stages: &Stages) -> Option<Found> {
+        let edits = line_edits::all(stages).into_iter();
+        let edits: Vec<LineEdit> = edits.filter(|edit| pays(edit, self.found)).collect();
+        line_edits::batches(&edits).find_map(|edits| {
+            let stages: Vec<StageText> = edits.iter().map(LineEdit::stage).collect();
+            let hopeful = edits.iter().zip(&stages).zip(self.mend_first(&stages));
+            let mut hopeful = hopeful.filter(|(_, right)| *right).map(|(edit, _)| edit);
+            let (edit, stage) = hopeful.find(|(_, stage)| self.is_mended_by(stage))?;
+            let slip = (edit.name, PriceClass::Slip);
+            let of = self.slips(&paying(edit, self.found), slip, &edit.place());
+            Some(Found { mended_by: Some(stage.clone()), ..of })
+        })
     }
-    if ALONE.into_iter().any(fails) {
-        return Found::default();
+
+    /// By surfaces that are not drawn, where that is what is wrong with most frames.
+    fn by_missing_surfaces(&self, slips: &[(CheckId, &str)]) -> Option<Found> {
+        let hole = |check: &&Check| {
+            check.id == CheckId::ImageRealtimeCoverage && check.verdict == Verdict::Fail
+        };
+        let holes = self.found.iter().filter(hole).count();
+        let wrong = self.wrong.iter().filter(|wrong| **wrong).count();
+        let (id, name) = slips.iter().find(|(_, name)| *name == SURFACES_MISSING)?;
+        let explains = self.others_are_open(*id) && 2 * holes > wrong;
+        explains.then(|| Found { is_of_missing_surfaces: true, ..self.slip(*id, name) })
     }
-    Found::of(vertex_under_own_pass(session, plugin, cases, stages))
+
+    /// Whether the pass draws the first wrong scene rightly under each change of the host's: one worker tries all.
+    fn mend_first<'a>(&self, stages: impl IntoIterator<Item = &'a StageText>) -> Vec<bool> {
+        let frame = |stage: &StageText| FrameRequest::probe(self.first, vec![stage.clone()]);
+        let frames: Vec<FrameRequest> = stages.into_iter().map(frame).collect();
+        let scene = std::slice::from_ref(self.first);
+        let is_right = |image| are_right(scene, vec![image], Film::Small, self.tolerances);
+        pictures(self.session, self.plugin, &frames).into_iter().map(is_right).collect()
+    }
+
+    /// Whether the pass draws every scene rightly where the host changes what it is given.
+    fn is_mended_by(&self, stage: &StageText) -> bool {
+        let frame = |case| FrameRequest::probe(case, vec![stage.clone()]);
+        let frames: Vec<FrameRequest> = self.cases.iter().map(frame).collect();
+        let is_right = |case: &PreparedScene, outcome: &Outcome| {
+            let picture = FrameRequest::probe(case, Vec::new()).picture(outcome);
+            are_right(std::slice::from_ref(case), vec![picture], Film::Small, self.tolerances)
+        };
+        let outcomes = draw_one_each(self.session, self.plugin, &frames, &is_right);
+        let pictures = frames.iter().zip(&outcomes);
+        let pictures = pictures.map(|(frame, outcome)| frame.picture(outcome)).collect();
+        are_right(self.cases, pictures, Film::Small, self.tolerances)
+    }
 }
 
 /// The parts of an edit: what reaches it and draws wrongly.
@@ -342,30 +459,6 @@ fn are_right(
     let right =
         |verdict: &Option<Verdict>| matches!(verdict, Some(Verdict::Pass | Verdict::NotJudged));
     verdicts.iter().all(right) && verdicts.contains(&Some(Verdict::Pass))
-}
-
-/// Whether a pass draws the right picture of every scene where the host changes what it is given. `first` is one that
-/// it draws wrongly otherwise: where that stays wrong, no other is drawn.
-fn mended_by(
-    stage: &StageText,
-    session: &Session,
-    plugin: &Path,
-    (cases, first): (&[PreparedScene], usize),
-    tolerances: &Tolerances,
-) -> bool {
-    let is_mended = |cases: &[PreparedScene]| {
-        let frame = |case| FrameRequest::probe(case, vec![stage.clone()]);
-        let frames: Vec<FrameRequest> = cases.iter().map(frame).collect();
-        let is_right = |case: &PreparedScene, outcome: &Outcome| {
-            let picture = FrameRequest::probe(case, Vec::new()).picture(outcome);
-            are_right(std::slice::from_ref(case), vec![picture], Film::Small, tolerances)
-        };
-        let outcomes = draw_one_each(session, plugin, &frames, &is_right);
-        let pictures = frames.iter().zip(&outcomes);
-        let pictures = pictures.map(|(frame, outcome)| frame.picture(outcome)).collect();
-        are_right(cases, pictures, Film::Small, tolerances)
-    };
-    cases.get(first..=first).is_some_and(&is_mended) && is_mended(cases)
 }
 
 /// The vertex stage under the submission's own pass: its matrices may show what Umbra's, of which the model's is an

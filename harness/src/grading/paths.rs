@@ -10,7 +10,7 @@ use super::pipeline::Grading;
 use super::prepared_scene::PreparedScene;
 use super::session::Session;
 use super::stages::{Stages, nothing_unset};
-use super::{isolate, one_slip, realtime, sampler, uploads, usual_pipelines};
+use super::{bonus, isolate, one_slip, realtime, sampler, uploads, usual_pipelines};
 use crate::evidence::{Check, CheckId, Verdict, loops, price, rays, shadow_map};
 
 /// By how much the standard error of a region's mean grows when its rows share their noise: the
@@ -154,20 +154,18 @@ impl Grading<'_> {
                         let light = case.expected.scene.first_light_position();
                         mended_by.clone().unwrap_or_else(|| nothing_unset(light))
                     };
-                    let bonus = &mut checks[begin..];
-                    realtime::judge_bonus_under(&stage, session, plugin, cases, tolerances, bonus);
+                    let found = &mut checks[begin..];
+                    bonus::judge_under(&stage, session, plugin, cases, tolerances, found);
                     if slip.is_of_missing_surfaces {
-                        realtime::judge_bonus_where_seen(cases, drawn, tolerances, bonus);
+                        bonus::judge_where_seen(cases, drawn, tolerances, found);
                     }
                     checks.extend(slip.checks);
                 });
             }
             if nothing_draws.is_none() {
-                let bonus = &mut checks[begin..];
+                let found = &mut checks[begin..];
                 session.retries.uncounted(|| {
-                    realtime::price_bonus_by_edits(
-                        session, plugin, cases, stages, drawn, tolerances, bonus,
-                    );
+                    bonus::price_by_edits(session, plugin, cases, stages, drawn, tolerances, found);
                 });
             }
             price::settle_by_common_mistake(&mut checks[begin..]);

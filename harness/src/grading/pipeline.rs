@@ -201,6 +201,7 @@ impl<'a> Grading<'a> {
                 self.budget.clone(),
             ),
             reference: self.reference.as_deref(),
+            scenes_interfere: AtomicBool::new(false),
             kept_frames: self.kept_frames.as_ref(),
             observations: Mutex::default(),
             compiler_messages: Mutex::default(),

@@ -53,6 +53,8 @@ pub struct Session<'a> {
     /// The reference renderer's library, absent in a student's kit: what it can draw, the machine
     /// is not to blame for.
     pub reference: Option<&'a Path>,
+    /// Whether a scene was drawn otherwise after another than alone.
+    pub scenes_interfere: AtomicBool,
     /// Where frames of Umbra's own pass are kept, if anywhere.
     pub kept_frames: Option<&'a KeptFrames>,
     /// What was answered, for the diagnosis.

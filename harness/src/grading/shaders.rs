@@ -114,7 +114,7 @@ impl Grading<'_> {
             hash.update(format!("{:?} {} {:?}", program, meta.len(), meta.modified()?));
         }
         for frame in frames {
-            hash.update(serde_json::to_vec(&frame.request(session, adapter))?);
+            hash.update(serde_json::to_vec(&frame.request(session, renderer, adapter))?);
             hash.update(scene_digest(frame.toml)?);
         }
         Ok(Some(self.assignment.cache().join("shaders").join(hex(&hash.finalize()))))
