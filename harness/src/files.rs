@@ -1,9 +1,10 @@
 //! Files that are written atomically, temporary folders, and digests as text.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read as _, Write};
 use std::path::{Path, PathBuf};
 
+use sha2::Digest;
 use tempfile::{NamedTempFile, TempDir};
 
 /// Prefix of process folders.
@@ -134,6 +135,21 @@ pub fn keep_newest_of(
         })?;
     }
     Ok(())
+}
+
+/// Adds what a file holds to a digest, piece by piece.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn feed(hash: &mut impl Digest, file: &Path) -> io::Result<()> {
+    let mut file = File::open(file)?;
+    let mut piece = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut piece)? {
+            0 => return Ok(()),
+            read => hash.update(&piece[..read]),
+        }
+    }
 }
 
 fn end_at(path: &Path, stage: &str) {

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::assignment::{Assignment, SceneEntry};
 use crate::expected::{Expected, load_scene, region_table, regions};
-use crate::files::{hex, library_name};
+use crate::files::{feed, hex, library_name};
 use crate::imaging::reference::{ReferenceImage, RegionMask};
 use crate::process::ProcessLimits;
 use crate::worker::{
@@ -433,7 +433,7 @@ fn as_mask(scene: &Scene, image: &Image) -> RegionMask {
 pub(crate) fn scene_digest(toml: &Path) -> anyhow::Result<String> {
     let config = basecode::scene::SceneConfig::load(toml)?;
     let mut hash = Sha256::new();
-    hash.update(std::fs::read(toml)?);
+    feed(&mut hash, toml)?;
     let folder = config.mesh.parent().unwrap_or(Path::new(""));
     let mut files = Vec::new();
     for entry in folder.read_dir().with_context(|| format!("{}", folder.display()))? {
@@ -445,7 +445,7 @@ pub(crate) fn scene_digest(toml: &Path) -> anyhow::Result<String> {
     files.sort();
     for file in files {
         hash.update(file.file_name().unwrap_or_default().as_encoded_bytes());
-        hash.update(std::fs::read(&file)?);
+        feed(&mut hash, &file)?;
     }
     Ok(hex(&hash.finalize()))
 }

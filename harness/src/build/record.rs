@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 use super::TEMPLATE;
 use super::closure::{Metadata, compiled_package, libraries};
-use crate::files::{files_below, hex};
+use crate::files::{feed, files_below, hex};
 
 /// The manifest of this program's own package.
 const UMBRA: &str = "harness/Cargo.toml";
@@ -343,10 +343,9 @@ fn key(workspace: &Path, rustc: &Path) -> Result<(String, String), RecordError> 
         ["harness/api/Cargo.toml", "harness/basecode/Cargo.toml"].map(|f| workspace.join(f)),
     );
     for file in &files {
-        let bytes = fs::read(file).map_err(at(file))?;
         hash.update(file.to_string_lossy().as_bytes());
-        hash.update((bytes.len() as u64).to_le_bytes());
-        hash.update(bytes);
+        hash.update(file.metadata().map_err(at(file))?.len().to_le_bytes());
+        feed(&mut hash, file).map_err(at(file))?;
     }
     let name = version.lines().next().unwrap_or_default().to_owned();
     Ok((hex(&hash.finalize()[..8]), name))

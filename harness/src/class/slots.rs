@@ -1,13 +1,12 @@
 //! The place that a submission has in the download of a class, and keeps in a newer one; and whether two are the same.
 
-use std::fs::File;
-use std::io::{self, Read as _};
+use std::io;
 use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 
 use super::layout::{Label, Platform, label_of};
-use crate::files::{files_below, hex};
+use crate::files::{feed, files_below, hex};
 
 /// Folders that are no part of a submission, and may be large.
 const LEFT_OUT: [&str; 2] = ["target", ".git"];
@@ -68,17 +67,6 @@ pub fn content(path: &Path) -> io::Result<String> {
         feed(&mut hash, &file)?;
     }
     Ok(hex(&hash.finalize()))
-}
-
-fn feed(hash: &mut Sha256, file: &Path) -> io::Result<()> {
-    let mut file = File::open(file)?;
-    let mut bytes = vec![0; 1 << 16];
-    loop {
-        match file.read(&mut bytes)? {
-            0 => return Ok(()),
-            read => hash.update(&bytes[..read]),
-        }
-    }
 }
 
 #[cfg(test)]

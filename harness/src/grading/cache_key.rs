@@ -1,6 +1,5 @@
 //! The cache key of a batch: everything that its records depend on.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::Context;
@@ -8,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 use super::cache::RecordCache;
 use super::pipeline::Grading;
-use crate::files::files_below;
+use crate::files::{feed, files_below};
 use crate::store::scene_digest;
 
 impl Grading<'_> {
@@ -30,13 +29,13 @@ impl Grading<'_> {
         let below = files_below(&folder);
         files.extend(below.with_context(|| format!("cannot read {}", folder.display()))?);
         for file in files {
-            let bytes =
-                fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
+            let mut own = Sha256::new();
+            feed(&mut own, &file).with_context(|| format!("cannot read {}", file.display()))?;
             // Not where the repository lies: a copy of it judges alike.
             let below = file.strip_prefix(&folder).ok();
             let name = below.map(Path::as_os_str).or(file.file_name()).unwrap_or_default();
             hash.update(name.as_encoded_bytes());
-            hash.update(Sha256::digest(bytes));
+            hash.update(own.finalize());
         }
         hash.update(scene_digest(&assignment.root.join(&assignment.sampler_scene))?);
         for case in &self.cases {

@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 use super::draw::{FrameRequest, draw_each};
 use super::pipeline::Grading;
 use super::session::{KeptFrames, Session};
-use crate::files::{hex, keep_newest, write_whole};
+use crate::files::{feed, hex, keep_newest, write_whole};
 use crate::sandbox::Isolation;
 use crate::store::scene_digest;
 use crate::worker::{Adapter, Answer, Outcome, Request};
@@ -75,8 +75,9 @@ fn draw_missing(session: &Session, sets: Vec<&Vec<FrameRequest>>) -> Vec<Vec<Out
 impl KeptFrames {
     /// The digest of what all frames depend on.
     fn conditions(&self) -> io::Result<[u8; 32]> {
-        let worker = Sha256::digest(fs::read(&self.worker)?);
-        Ok(Sha256::new().chain_update(worker).chain_update(&self.drawn_with).finalize().into())
+        let mut hash = Sha256::new();
+        feed(&mut hash, &self.worker)?;
+        Ok(hash.chain_update(&self.drawn_with).finalize().into())
     }
 
     /// The file of some frames.
