@@ -365,8 +365,16 @@ pub fn price_by_edits(
             // What fails although the picture is right draws no shadow map.
             && check.measures.iter().any(|measure| !measure.passed)
     };
+    // Of a frame that is not drawn at all, no one word is wrong.
+    let is_drawn = |case: &PreparedScene| {
+        let own = |drawn: &Drawn| {
+            drawn.scene == case.entry.name && drawn.kind == ImageKind::RealtimeShadows
+        };
+        drawn.iter().any(own)
+    };
     let fails = |case: &&PreparedScene| {
-        checks.iter().any(|check| is_open(check) && check.scene == case.entry.name)
+        let own = |check: &Check| is_open(check) && check.scene == case.entry.name;
+        is_drawn(case) && checks.iter().any(own)
     };
     let mut failing: Vec<&PreparedScene> = cases.iter().filter(fails).collect();
     failing.sort_by_key(|case| !case.entry.bonus_required);
