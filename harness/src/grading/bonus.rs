@@ -63,31 +63,31 @@ pub fn judge(
         Some(WrongBonus { case, with, without, by_visibility, may_pass, check })
     });
     judge_visibility(session, plugin, wrong.collect(), tolerances);
-    for ((frame, outcome), (mut check, bonus)) in frames.iter().zip(&outcomes).zip(found) {
+    for ((frame, outcome), (check, drawn)) in frames.iter().zip(&outcomes).zip(&mut found) {
         let case = frame.case;
         if matches!(outcome, Outcome::Failed(_))
             && let Some(rest) = judge_without_stages(session, plugin, case, stages, tolerances)
         {
-            check = rest;
+            *check = rest;
         }
         let required = case.entry.bonus_required;
-        let id = if required { CheckId::BonusProbe } else { CheckId::BonusImage };
+        check.id = if required { CheckId::BonusProbe } else { CheckId::BonusImage };
         // How shadows come about is the same on all scenes.
-        if required && check.verdict == Verdict::Pass {
-            let footprint = outcome.answer().and_then(|answer| answer.footprint);
-            let with = bonus.as_ref().map(|drawn| &drawn.image);
-            let plain = of_scene(frame).and_then(|index| judged[index].drawn.first());
-            let plain = plain.map(|drawn| &drawn.image);
-            if let (Some(footprint), Some(with)) = (footprint, with)
-                && shows_its_shadows(case, with, plain, tolerances)
-                && let Some(why) = no_shadow_map(session, plugin, frame, &footprint, with)
-            {
-                check = Check { error: 1.0, verdict: Verdict::Fail, summary: why, ..check };
-            }
+        if required
+            && passes(check)
+            && let Some(with) = drawn.as_ref().map(|drawn| &drawn.image)
+            && let Some(footprint) = outcome.answer().and_then(|answer| answer.footprint)
+            && shows_its_shadows(case, with, plain(frame), tolerances)
+            && let Some(why) = no_shadow_map(session, plugin, frame, &footprint, with)
+        {
+            (check.error, check.verdict, check.summary) = (1.0, Verdict::Fail, why);
         }
-        if let Some(index) = of_scene(frame) {
-            judged[index].checks.push(Check { id, ..check });
-            judged[index].drawn.extend(bonus);
+    }
+    let of_scene: Vec<Option<usize>> = frames.iter().map(of_scene).collect();
+    for (index, (check, drawn)) in of_scene.into_iter().zip(found) {
+        if let Some(index) = index {
+            judged[index].checks.push(check);
+            judged[index].drawn.extend(drawn);
         }
     }
 }

@@ -70,7 +70,7 @@ pub fn judge(
     let wrong: Vec<bool> = cases.iter().map(is_wrong).collect();
     let first = wrong.iter().position(|wrong| *wrong).unwrap_or_default();
     let Some(first) = cases.get(first) else { return Found::default() };
-    let renderer = Renderer { session, plugin, cases, first, wrong, found, tolerances };
+    let renderer = WrongRenderer { session, plugin, cases, first, wrong, found, tolerances };
     let frame = |case: &PreparedScene| {
         let own =
             |drawn: &&Drawn| drawn.scene == case.entry.name && drawn.kind == ImageKind::Realtime;
@@ -139,7 +139,7 @@ impl HostChange {
 }
 
 /// A renderer with wrong frames, and what is known of it.
-struct Renderer<'a> {
+struct WrongRenderer<'a> {
     session: &'a Session<'a>,
     plugin: &'a Path,
     cases: &'a [PreparedScene],
@@ -152,7 +152,7 @@ struct Renderer<'a> {
     tolerances: &'a Tolerances,
 }
 
-impl Renderer<'_> {
+impl WrongRenderer<'_> {
     /// Whether a part is wrong, or cannot be told.
     fn fails(&self, id: CheckId) -> bool {
         let is_open = |check: &Check| matches!(check.verdict, Verdict::Pass | Verdict::NotJudged);

@@ -181,12 +181,9 @@ impl Supervisor {
             report.runs.push(WorkerRun { requests: pending.clone(), ended: run.ended });
             if exit.is_from_outside() {
                 for &index in &pending {
-                    // One that had not begun has no outcome but that.
-                    let is_of_its_end = matches!(
-                        outcomes[index],
-                        Some(Outcome::CrashedBySignal(_) | Outcome::NotRun { .. })
-                    );
-                    if is_of_its_end && !std::mem::replace(&mut asked_again[index], true) {
+                    if is_of_its_end(outcomes[index].as_ref())
+                        && !std::mem::replace(&mut asked_again[index], true)
+                    {
                         outcomes[index] = None;
                     }
                 }
@@ -207,8 +204,9 @@ impl Supervisor {
                 continue;
             }
             if let Some(allowed) = retries.again(job, first, limits) {
+                let own = (first, &mut asked_again[first]);
                 outcomes[first] =
-                    self.run_again_alone(job, first, &allowed, retries, cancel, &mut report.runs);
+                    self.run_again_alone(job, own, &allowed, retries, cancel, &mut report.runs);
             } else if let Some(was) = was {
                 let late = match was {
                     Outcome::TimedOut(late) => Some(late),
@@ -221,11 +219,12 @@ impl Supervisor {
         report
     }
 
-    /// Runs one late request again, alone on the machine. Returns nothing when no time is left to settle it.
+    /// Runs one late request again, alone on the machine. Returns nothing when no time is left to settle it, or when
+    /// its worker was ended from outside or could not be started and it was not asked again before.
     fn run_again_alone(
         &self,
         job: &Job,
-        index: usize,
+        (index, asked_again): (usize, &mut bool),
         allowed: &Allowed,
         retries: &RetryBudget,
         cancel: &AtomicBool,
@@ -236,12 +235,19 @@ impl Supervisor {
         drop(alone);
         let run = match run {
             Ok(run) => run,
-            Err(error) => return Some(cannot_run(&error)),
+            Err(error) => {
+                return std::mem::replace(asked_again, true).then(|| cannot_run(&error));
+            }
         };
         retries.spent(job, &run.ended);
-        let is_late = run.ended.exit.is_out_of_time();
+        let exit = run.ended.exit;
+        let is_late = exit.is_out_of_time();
         runs.push(WorkerRun { requests: vec![index], ended: run.ended });
         let outcome = run.outcomes.into_iter().next().flatten();
+        let is_ended = exit.is_from_outside() && is_of_its_end(outcome.as_ref());
+        if is_ended && !std::mem::replace(asked_again, true) {
+            return None;
+        }
         if !is_late {
             return outcome;
         }
@@ -356,6 +362,11 @@ impl Supervisor {
         }
         Ok(run)
     }
+}
+
+/// Whether an outcome may be that of a worker's end and nothing else; one that had not begun has no other.
+fn is_of_its_end(outcome: Option<&Outcome>) -> bool {
+    matches!(outcome, Some(Outcome::CrashedBySignal(_) | Outcome::NotRun { .. }))
 }
 
 fn cannot_run(error: &io::Error) -> Outcome {

@@ -17,11 +17,11 @@ pub(super) struct MadeOf {
 }
 
 impl MadeOf {
-    /// A pipeline of these texts, as the host changes them and other things.
+    /// A pipeline of these texts where the host asks for these changes.
     pub(super) fn new(vertex: &str, fragment: Option<&str>, overrides: Overrides) -> Self {
         let text = |text: &str| overrides.wgsl(text).into_owned();
         let texts = (text(vertex), fragment.map(text));
-        // Of the changes to texts, what is left to know is whether an entry point is another.
+        // The texts are changed by now; what is left to tell is whether the entry point is the host's.
         let shown = overrides.shown.as_ref().map(|_| String::new());
         Self { texts, overrides: Overrides { shown, edited: None, ..overrides } }
     }
