@@ -29,7 +29,8 @@ pub use pass::{spoil as spoil_pass, spoil_frame};
 /// What was asked for: nothing, nearly always.
 #[derive(Clone, Debug, Default)]
 pub struct Mistakes {
-    made: Vec<Mistake>,
+    /// A bit for each: it is asked for many with every ray.
+    made: [u64; Mistake::COUNT.div_ceil(64)],
     stages: Vec<&'static str>,
 }
 
@@ -41,7 +42,10 @@ impl Mistakes {
     pub fn add(&mut self, name: &str) -> Result<()> {
         let code = Mistake::WRONG.iter().chain(Mistake::RIGHT).find(|(_, known)| *known == name);
         let stage = stages::all().find(|mistake| mistake.name == name);
-        self.made.extend(code.map(|(mistake, _)| *mistake));
+        if let Some((mistake, _)) = code {
+            let (word, bit) = place(*mistake);
+            self.made[word] |= bit;
+        }
         self.stages.extend(stage.map(|mistake| mistake.name));
         if code.is_none() && stage.is_none() {
             return Err(Error::Argument(format!("unknown mistake \"{name}\"")));
@@ -50,13 +54,15 @@ impl Mistakes {
     }
 
     /// Whether a mistake is to be made.
+    #[inline]
     pub fn has(&self, mistake: Mistake) -> bool {
-        self.made.contains(&mistake)
+        let (word, bit) = place(mistake);
+        self.made[word] & bit != 0
     }
 
     /// Whether nothing is wrong outside the shaders.
     fn none(&self) -> bool {
-        self.made.is_empty()
+        self.made.iter().all(|word| *word == 0)
     }
 
     /// The text of a shader stage, with its mistakes.
@@ -95,6 +101,11 @@ impl Mistakes {
     ) -> Option<Result<()>> {
         (!self.none()).then(|| render::render(self, scene, integrator, job, film))
     }
+}
+
+/// Which bit of which word stands for a mistake.
+const fn place(mistake: Mistake) -> (usize, u64) {
+    (mistake as usize / 64, 1 << (mistake as usize % 64))
 }
 
 #[cfg(test)]

@@ -154,10 +154,7 @@ impl Recording {
         progress: &dyn Fn(Compiling),
     ) -> Result<Self, RecordError> {
         let workspace = &workspace_of_template(workspace)?;
-        let sysroot = run(Command::new("rustc").args(["--print", "sysroot"]), workspace)?;
-        let sysroot = PathBuf::from(sysroot.trim());
-        let rustc = sysroot.join("bin").join(format!("rustc{}", std::env::consts::EXE_SUFFIX));
-        let (key, version) = key(workspace, &rustc)?;
+        let (key, version) = key(workspace)?;
         let folder = workspace.join("target/umbra");
         fs::create_dir_all(&folder).map_err(at(&folder))?;
         let lock = folder.join("record.lock");
@@ -168,6 +165,7 @@ impl Recording {
             && let Ok(mut recording) = serde_json::from_slice::<Self>(&bytes)
             && recording.key == key
             && recording.closure.is_dir()
+            && recording.rustc.is_file()
         {
             // It was asked for: see `forget_old`. That may fail on a disk that cannot be written, where nothing is
             // forgotten.
@@ -176,6 +174,9 @@ impl Recording {
             recording.version = version;
             return Ok(recording);
         }
+        let sysroot = run(Command::new("rustc").args(["--print", "sysroot"]), workspace)?;
+        let sysroot = PathBuf::from(sysroot.trim());
+        let rustc = sysroot.join("bin").join(format!("rustc{}", std::env::consts::EXE_SUFFIX));
         let host = run(Command::new(&rustc).args(["--print", "host-tuple"]), workspace)?;
         let mut cargo = Command::new("cargo");
         // Without the filter, cargo would download what other platforms need.
@@ -324,9 +325,9 @@ fn stage(folder: &Path, key: &str, libraries: &[PathBuf]) -> Result<PathBuf, Rec
 }
 
 /// The hash of everything that the recorded call and its closure depend on, and the compiler's own name.
-fn key(workspace: &Path, rustc: &Path) -> Result<(String, String), RecordError> {
+fn key(workspace: &Path) -> Result<(String, String), RecordError> {
     let mut hash = Sha256::new();
-    let version = run(Command::new(rustc).arg("-vV"), workspace)?;
+    let version = run(Command::new("rustc").arg("-vV"), workspace)?;
     hash.update(&version);
     for variable in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
         hash.update(std::env::var(variable).unwrap_or_default());

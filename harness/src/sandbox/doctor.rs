@@ -49,8 +49,14 @@ impl Examination {
     }
 }
 
-/// Tries every layer by itself, then all that worked together. `umbra` is the binary that knows
-/// the hidden commands. Takes some tens of milliseconds.
+/// The layers to ask for: those of full isolation where they work together, as on most machines, otherwise what
+/// [`examine`] finds usable. `umbra` is the binary that knows the hidden commands.
+pub fn available(umbra: &Path) -> Layers {
+    let full = Layers::full();
+    if probe(umbra, &full).is_ok() { full } else { examine(umbra).usable() }
+}
+
+/// Tries every layer by itself, then all that worked together. Takes some hundred milliseconds.
 pub fn examine(umbra: &Path) -> Examination {
     let mut layers = Layers::NONE;
     let mut findings = Vec::new();

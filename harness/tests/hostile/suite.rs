@@ -13,7 +13,7 @@ use nix::sys::signal::{Signal, kill, killpg};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
-use umbra::sandbox::{Isolation, Layers, doctor};
+use umbra::sandbox::{self, Isolation, Layers};
 
 use crate::fixture::{self, Fixture};
 use crate::{archives, plugins, points, sources};
@@ -83,7 +83,7 @@ struct Count {
 
 /// Runs everything whose name holds `only`; whether all was as it should be.
 fn all(layers: Layers, only: &str) -> Result<bool, String> {
-    let found = doctor::examine(Path::new(env!("CARGO_BIN_EXE_umbra"))).usable();
+    let found = sandbox::available(Path::new(env!("CARGO_BIN_EXE_umbra")));
     if layers == Layers::full() && found.isolation() != Isolation::Full {
         return Err(format!("isolation would be {}; see `umbra doctor`", found.isolation()));
     }

@@ -181,7 +181,9 @@ fn the_doctor_finds_what_there_is() {
     }
     // The tests of this file need full isolation anyway.
     assert_eq!(examination.isolation, Isolation::Full);
+    assert_eq!(doctor::available(Path::new(UMBRA)), examination.usable());
     // A binary that is not Umbra proves nothing.
-    let liar = doctor::examine(Path::new("/bin/true"));
-    assert_eq!(liar.isolation, Isolation::None);
+    let liar = Path::new("/bin/true");
+    assert_eq!(doctor::examine(liar).isolation, Isolation::None);
+    assert_eq!(doctor::available(liar), Layers::NONE);
 }

@@ -13,6 +13,8 @@ macro_rules! switches {
             pub const WRONG: &'static [(Self, &'static str)] = &[$((Self::$mistake, $wrong),)*];
             /// What is right, with its name.
             pub const RIGHT: &'static [(Self, &'static str)] = &[$((Self::$variant, $right),)*];
+            /// How many there are.
+            pub const COUNT: usize = Self::WRONG.len() + Self::RIGHT.len();
         }
     };
 }
