@@ -19,7 +19,7 @@ use umbra::assignment::Assignment;
 use umbra::cli::AdapterChoice;
 use umbra::diagnosis::Catalogue;
 use umbra::files::library_name;
-use umbra::grading::Grading;
+use umbra::grading::{Grading, Stages};
 use umbra::store::Store;
 use umbra::worker::Supervisor;
 
@@ -102,14 +102,15 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
         anyhow::bail!("realtime cannot be judged here: {why}");
     }
     let mut grader = Grader {
-        root,
         assignment: &assignment,
         catalogue: &catalogue,
         grading,
         library,
+        right: Stages::read(&root.join("reference_impl/src"), &assignment.template()),
         jobs: arguments.jobs.unwrap_or(cores + 1).max(1),
         explain: arguments.explain,
         all_shown: true,
+        beside: arguments.quick.then_some(choice::QUICK_BESIDE),
         plain: Vec::new(),
     };
 

@@ -12,6 +12,7 @@ use crate::intake::Finding;
 use crate::worker::{STAGES, StageText};
 
 /// The stage texts of a submission, and of the template.
+#[derive(Clone)]
 pub struct Stages {
     /// `simple.vs`, `diffuse.fs`, `phong.fs` of the submission; absent where the file is.
     pub own: [Option<String>; 3],

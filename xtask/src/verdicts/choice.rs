@@ -18,6 +18,8 @@ pub const QUICK_PAIRS: usize = 60;
 pub const QUICK_TRIPLES: usize = 20;
 /// The samples per pixel of all these.
 pub const QUICK_SPP: u32 = 4;
+/// What all these have on besides: shadow maps of a quarter of the texels.
+pub const QUICK_BESIDE: &str = "shadow-map-1024";
 /// Number of triples without `--quick`.
 pub const TRIPLES: usize = 500;
 
@@ -134,7 +136,7 @@ impl Subject {
     }
 
     /// Whether it must lose nothing.
-    fn is_right(&self) -> bool {
+    pub fn is_right(&self) -> bool {
         self.parts.is_empty() && self.findings.is_empty()
     }
 

@@ -50,6 +50,7 @@ pub fn figure(grader: &Grader, store: &Store, few: bool) -> Result<Figure> {
             assignment: &assignment,
             grading,
             library: grader.library.clone(),
+            right: grader.right.clone(),
             jobs: 1,
             // That a mistake costs what it should is the matrix' fault: three scenes do not show all.
             all_shown: false,

@@ -1,6 +1,6 @@
 //! Grades renderers: the reference with switches on, and its stage texts with the same mistakes.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
@@ -19,18 +19,21 @@ use crate::parallel;
 
 /// What it takes to grade a renderer.
 pub struct Grader<'a> {
-    pub root: &'a Path,
     pub assignment: &'a Assignment,
     pub catalogue: &'a Catalogue,
     pub grading: Grading<'a>,
     /// The reference, with its switches.
     pub library: PathBuf,
+    /// Its stages, and the template's.
+    pub right: Stages,
     /// Number of renderers that are graded at the same time.
     pub jobs: usize,
     /// Whether the evidence behind lost points is printed.
     pub explain: bool,
     /// Whether the scenes show every mistake.
     pub all_shown: bool,
+    /// A right switch that every wrong renderer has on besides.
+    pub beside: Option<&'static str>,
     /// What was found out about the reference on each path, to stand for renderers that differ from
     /// it on the other alone; empty when every path of every renderer is to be seen.
     pub plain: Vec<(RenderPath, Vec<Check>)>,
@@ -78,8 +81,9 @@ impl<'a> Grader<'a> {
     fn grade(&self, subject: &Subject) -> Result<Row> {
         let since = Instant::now();
         let paths = if self.plain.is_empty() { RenderPath::ALL.to_vec() } else { subject.paths() };
-        let options: Vec<String> =
-            switches(&subject.mistakes).map(|name| format!("mistake={name}")).collect();
+        let beside = self.beside.filter(|_| !subject.is_right());
+        let names = switches(&subject.mistakes).chain(beside);
+        let options: Vec<String> = names.map(|name| format!("mistake={name}")).collect();
         let stages = self.stages(&subject.mistakes)?;
         let options = options.join(",");
         let (mut evidence, diagnoses) =
@@ -98,8 +102,7 @@ impl<'a> Grader<'a> {
     /// When the reference lacks a stage, or two mistakes change the same text.
     pub fn stages(&self, mistakes: &[String]) -> Result<Stages> {
         let names: Vec<&str> = switches(mistakes).collect();
-        let reference = self.root.join("reference_impl/src");
-        let mut own = Stages::read(&reference, &self.assignment.template());
+        let mut own = self.right.clone();
         for (index, name) in STAGES.into_iter().enumerate() {
             let right =
                 own.own[index].take().with_context(|| format!("the reference has no {name}"))?;

@@ -9,6 +9,9 @@ use crate::shading::{Shading, Tests};
 pub(super) const TWO_SLIPS: f64 = 0.0686;
 /// What two slips may leave unexplained.
 pub(super) const LEFT_BY_TWO: f64 = 0.01;
+/// A difference of a value that is none, in units.
+const ROOM: f64 = 1e-6;
+
 /// The slips of a renderer, beside its answers to a few questions.
 pub(super) struct Slips<'a> {
     answers: &'a Answers<'a>,
@@ -16,6 +19,8 @@ pub(super) struct Slips<'a> {
     slips: Vec<Shading>,
     /// What was answered to the few.
     found: Vec<[f64; 3]>,
+    /// The sum of its finite values in units, with the room of each.
+    total: f64,
     /// The right answers to them.
     right: Vec<[f64; 3]>,
     /// The answers of each slip.
@@ -27,9 +32,15 @@ impl<'a> Slips<'a> {
         let slips = answers.changes.iter().filter(|change| change.class == PriceClass::Slip);
         let slips: Vec<Shading> = slips.filter_map(|change| change.shading).collect();
         let values = |shading: &Shading| values(answers, few, shading);
-        let found = few.iter().map(|&index| answers.found[index].map(f64::from)).collect();
+        let found: Vec<[f64; 3]> =
+            few.iter().map(|&index| answers.found[index].map(f64::from)).collect();
+        let sizes = few.iter().zip(&found).flat_map(|(&index, found)| {
+            let unit = (answers.unit)(index);
+            found.iter().filter(|value| value.is_finite()).map(move |v| v.abs() / unit + ROOM)
+        });
+        let total = sizes.sum();
         let (right, slipped) = (values(&Shading::default()), slips.iter().map(values).collect());
-        Self { answers, few, slips, found, right, slipped }
+        Self { answers, few, slips, found, total, right, slipped }
     }
 
     /// Whether two slips explain the answers, or a slip and a constant factor. Of two factors of the right value their
@@ -97,6 +108,11 @@ impl<'a> Slips<'a> {
     fn explains(&self, of: &dyn Fn(usize, usize) -> f64) -> bool {
         let (mut apart, mut total) = (0.0, 0.0);
         for (at, &index) in self.few.iter().enumerate() {
+            // All that is told comes to no more than what was found and what is apart from it, with its room.
+            let most = (self.total + apart) / (1.0 - self.answers.relative);
+            if apart > LEFT_BY_TWO * most {
+                return false;
+            }
             let unit = (self.answers.unit)(index);
             for c in 0..3 {
                 let (found, told) = (self.found[at][c], of(at, c));
@@ -104,7 +120,7 @@ impl<'a> Slips<'a> {
                     return false;
                 }
                 if told.is_finite() {
-                    let room = self.answers.relative * told.abs() + 1e-6 * unit;
+                    let room = self.answers.relative * told.abs() + ROOM * unit;
                     let difference = (found - told).abs();
                     apart += if difference <= room { 0.0 } else { difference / unit };
                     total += told.abs() / unit;
