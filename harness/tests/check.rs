@@ -13,8 +13,13 @@ struct Work(tempfile::TempDir);
 
 impl Work {
     fn new() -> Self {
+        Self::of(&["student_template", "samples/perfect"])
+    }
+
+    /// One with these sources, of which later ones replace files of earlier ones.
+    fn of(sources: &[&str]) -> Self {
         let work = Self(tempfile::tempdir().unwrap());
-        for source in ["student_template", "samples/perfect"] {
+        for source in sources {
             copy_folder(&root().join(source).join("src"), &work.folder().join("src"));
         }
         fs::copy(root().join("student_template/config.json"), work.folder().join("config.json"))
@@ -117,4 +122,32 @@ fn a_stage_that_does_not_compile_earns_no_more_of_the_bonus_than_one_without_sha
     // Umbra's own vertex stage stands in.
     let vertex = said("shaders/simple.vs.wgsl", "@vertex", "@vertex @vertex");
     assert!(vertex.contains("20/20"), "{vertex}");
+}
+
+#[test]
+fn a_light_that_is_not_set_costs_the_pass_alone_in_bind_groups_of_its_own_too() {
+    let said = |unset: &[&str]| {
+        let sources = ["student_template", "samples/perfect", "samples/perfect-own-layout"];
+        let work = Work::of(&sources);
+        // The source of one shader file holds no other.
+        for stage in ["simple.vs", "diffuse.fs", "phong.fs"] {
+            fs::remove_file(work.folder().join(format!("src/shaders/{stage}.wgsl"))).unwrap();
+        }
+        for value in unset {
+            work.change("renderpasses/simple.rs", value, "[0.0f32; 4]");
+        }
+        let parts = ["2.1", "2.2", "2.4"].map(|part| ["--part", part]);
+        let arguments = [&["work", "--scene", "sphere_phong"][..], parts.as_flattened()].concat();
+        work.check(&arguments).1
+    };
+    let (position, intensity) = ("(view * position).to_array()", "intensity.to_array()");
+    for (unset, points, why) in [
+        (&[][..], "2.1  5/5", ""),
+        (&[intensity], "2.1  4.06/5", "the light's intensity is not set"),
+        (&[position, intensity], "2.1  2/5", "the light is not set"),
+    ] {
+        let out = said(unset);
+        assert!(out.contains(points) && out.contains(why), "{unset:?}: {out}");
+        assert!(out.contains("2.2  5/5") && out.contains("2.4  25/25"), "{unset:?}: {out}");
+    }
 }

@@ -327,18 +327,21 @@ fn what_nobody_sets_is_one_where_the_host_asks_for_it() {
         @group(0) @binding(0) var<storage, read> f: F;
         @fragment fn fs_main() -> @location(0) vec4f { return f.i + vec4f(f.eye.x, f.b[3].x, 0.0, 0.0); }";
     let mut gpu = gpu();
-    let mut shown = |names: &[&str]| {
-        let all = names.iter().map(|name| ((*name).to_owned(), String::new()));
-        gpu.replace_stages(all.collect());
+    let mut shown = |unset: Option<&str>| {
+        let unset = unset.map(|text| (NOTHING_UNSET.to_owned(), text.to_owned()));
+        gpu.replace_stages(unset.into_iter().collect());
         let target = Target::new(&gpu, 8, 8).unwrap();
         draw(&gpu, Stage { name: "phong.fs", text: LIGHT }, &target).unwrap();
         target.read_back(&gpu).unwrap().at(4, 4)
     };
-    let unset = shown(&[]);
+    let unset = shown(None);
     assert_eq!(unset.z, 0.0, "the square is drawn without a light");
-    let set = shown(&[NOTHING_UNSET]);
+    let set = shown(Some(""));
     assert_eq!(set.z, 1.0);
     assert_eq!(set - unset, Vec3::ONE, "what is set stays as it is");
+    // The light's place is given, so that the intensity is the first that is not set.
+    let in_turn = shown(Some("1 2 3 0.25 0.5 0.75 0 8 8 8 8"));
+    assert_eq!(in_turn - unset, vec3(0.25, 0.5, 0.75));
 }
 
 #[test]

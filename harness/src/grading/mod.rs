@@ -11,6 +11,7 @@ mod coverage;
 mod diagnose;
 mod draw;
 mod frame_checks;
+mod host_changes;
 mod image_digest;
 mod isolate;
 mod judged;

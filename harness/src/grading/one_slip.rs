@@ -3,22 +3,22 @@
 
 use std::path::Path;
 
-use basecode::{Image, Matrices};
+use basecode::{Image, Matrices, Vec3};
 
 use super::draw::{FrameRequest, draw_each, draw_one_each, pictures};
+use super::host_changes::{HostChange, MendedBy, UnsetLight, slip_of_matrices};
 use super::isolate::{on_film, positions_and_normals};
 use super::line_edits::{self, LineEdit};
 use super::offline::Drawn;
 use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
-use super::stages::{MOVED, Moved, Stages, matrices, negated_normals};
-use super::usual_pipelines;
+use super::stages::{MOVED, Moved, Stages, matrices};
 use crate::evidence::frame_slips::{FrameSlips, LeftBySlip};
 use crate::evidence::images::{self, ImageKind};
 use crate::evidence::price::{self, Price, PriceClass, SURFACES_MISSING};
 use crate::evidence::vertex::judge_vertex;
 use crate::evidence::{Check, CheckId, Verdict};
-use crate::imaging::reference::Region;
+use crate::imaging::reference::{Region, RegionMask};
 use crate::imaging::tolerances::Tolerances;
 use crate::worker::{Outcome, STAGES, StageText};
 
@@ -40,8 +40,8 @@ const LEFT: f64 = 0.01;
 pub struct Found {
     /// The checks under which it pays for all.
     pub checks: Vec<Check>,
-    /// What the host replaces to have the pass draw the right pictures, if that is how it is known.
-    pub mended_by: Option<StageText>,
+    /// What the host changes to have the pass draw the right pictures, if that is how it is known.
+    pub mended_by: Option<MendedBy>,
     /// Whether some surfaces are not drawn, and no more is wrong.
     pub is_of_missing_surfaces: bool,
 }
@@ -87,54 +87,13 @@ pub fn judge(
         .by_frames(&slips)
         .or_else(|| renderer.by_moved_frames(&frames))
         .or_else(|| renderer.by_host_changes(HostChange::all()))
+        .or_else(|| renderer.by_unset_light(&frames))
         .or_else(|| renderer.by_line_edits(stages))
         .or_else(|| renderer.by_missing_surfaces(&slips));
     match found {
         Some(found) => found,
         None if ALONE.into_iter().any(|id| renderer.fails(id)) => Found::default(),
         None => Found::of(vertex_under_own_pass(session, plugin, cases, stages)),
-    }
-}
-
-/// What the host may change of what a pass is given.
-#[derive(Clone)]
-enum HostChange {
-    /// How pipelines are made; mends a slip of this name.
-    Pipelines(&'static str, StageText),
-    /// The scene's normals, which are negated.
-    Normals,
-    /// The matrices of the camera.
-    Matrices(Matrices),
-}
-
-impl HostChange {
-    /// Those of pipelines.
-    fn of_pipelines() -> Vec<Self> {
-        usual_pipelines::slips().map(|(name, stage)| Self::Pipelines(name, stage)).collect()
-    }
-
-    /// All, the likeliest first.
-    fn all() -> Vec<Self> {
-        let under = [Matrices::InView, Matrices::InProjection, Matrices::Transposed];
-        let of_vertices = std::iter::once(Self::Normals).chain(under.map(Self::Matrices));
-        Self::of_pipelines().into_iter().chain(of_vertices).collect()
-    }
-
-    /// The part that is wrong where it mends all frames.
-    fn part(&self) -> CheckId {
-        match self {
-            Self::Pipelines(..) => CheckId::PassUniforms,
-            Self::Normals | Self::Matrices(_) => CheckId::StageVertex,
-        }
-    }
-
-    /// What the host replaces.
-    fn stage(&self) -> StageText {
-        match self {
-            Self::Pipelines(_, stage) => stage.clone(),
-            Self::Normals => negated_normals(),
-            Self::Matrices(which) => matrices(*which),
-        }
     }
 }
 
@@ -218,7 +177,7 @@ impl WrongRenderer<'_> {
         let open: Vec<HostChange> = changes.into_iter().filter(is_open).collect();
         let stages: Vec<StageText> = open.iter().map(HostChange::stage).collect();
         let hopeful = open.iter().zip(self.mend_first(&stages)).filter(|(_, right)| *right);
-        let mends = |stage: &StageText| self.is_mended_by(stage);
+        let mends = |stage: &StageText| self.is_mended_by(&|_| stage.clone());
         let slip = |change: &HostChange| -> Option<((&str, PriceClass), HostChange)> {
             let mended = || mends(&change.stage()).then(|| change.clone());
             match change {
@@ -233,8 +192,32 @@ impl WrongRenderer<'_> {
             }
         };
         let (slip, change) = hopeful.map(|(change, _)| change).find_map(slip)?;
-        let mended_by = Some(change.stage());
+        let mended_by = Some(MendedBy::Stage(change.stage()));
         Some(Found { mended_by, ..self.slips(&[change.part()], slip, "") })
+    }
+
+    /// By a light that is not set, where no surface is lit.
+    fn by_unset_light(&self, frames: &[&Image]) -> Option<Found> {
+        let id = CheckId::PassUniforms;
+        let is_dark = |(case, frame): (&PreparedScene, &&Image)| {
+            let mask = &case.expected.unshadowed_mask;
+            let surface = |value: u16| {
+                value & RegionMask::INDEX != 0
+                    && value & (RegionMask::EDGE | RegionMask::EMITTER) == 0
+            };
+            let mut own =
+                frame.pixels.iter().zip(&mask.pixels).filter(|(_, value)| surface(**value));
+            own.all(|(pixel, _)| *pixel == Vec3::ZERO)
+        };
+        if !self.others_are_open(id) || !self.cases.iter().zip(frames).all(is_dark) {
+            return None;
+        }
+        let stages = UnsetLight::ALL.map(|unset| unset.stage(self.first));
+        let hopeful = UnsetLight::ALL.into_iter().zip(self.mend_first(&stages));
+        let mut hopeful = hopeful.filter(|(_, right)| *right).map(|(unset, _)| unset);
+        let unset = hopeful.find(|unset| self.is_mended_by(&|case| unset.stage(case)))?;
+        let mended_by = Some(MendedBy::Light(unset));
+        Some(Found { mended_by, ..self.slips(&[id], unset.slip(), "") })
     }
 
     /// By one word of one line of the submission's own WGSL.
@@ -245,10 +228,11 @@ impl WrongRenderer<'_> {
             let stages: Vec<StageText> = edits.iter().map(LineEdit::stage).collect();
             let hopeful = edits.iter().zip(&stages).zip(self.mend_first(&stages));
             let mut hopeful = hopeful.filter(|(_, right)| *right).map(|(edit, _)| edit);
-            let (edit, stage) = hopeful.find(|(_, stage)| self.is_mended_by(stage))?;
+            let (edit, stage) =
+                hopeful.find(|(_, stage)| self.is_mended_by(&|_| (*stage).clone()))?;
             let slip = (edit.name, PriceClass::Slip);
             let of = self.slips(&paying(edit, self.found), slip, &edit.place());
-            Some(Found { mended_by: Some(stage.clone()), ..of })
+            Some(Found { mended_by: Some(MendedBy::Stage(stage.clone())), ..of })
         })
     }
 
@@ -274,8 +258,8 @@ impl WrongRenderer<'_> {
     }
 
     /// Whether the pass draws every scene rightly where the host changes what it is given.
-    fn is_mended_by(&self, stage: &StageText) -> bool {
-        let frame = |case| FrameRequest::probe(case, vec![stage.clone()]);
+    fn is_mended_by(&self, stage: &dyn Fn(&PreparedScene) -> StageText) -> bool {
+        let frame = |case| FrameRequest::probe(case, vec![stage(case)]);
         let frames: Vec<FrameRequest> = self.cases.iter().map(frame).collect();
         let is_right = |case: &PreparedScene, outcome: &Outcome| {
             let picture = FrameRequest::probe(case, Vec::new()).picture(outcome);
@@ -336,23 +320,6 @@ fn pays(edit: &LineEdit, found: &[Check]) -> bool {
     // Where nothing can be judged alone, surfaces that are missing are the fragment stage's as well.
     let missing = !is_judged(CheckId::PassUniforms) && open(CheckId::ImageRealtimeCoverage);
     alone && !is_right && (ids.iter().any(lost) || missing)
-}
-
-/// What is wrong with the matrices of a pass that is right under other ones, and which these are.
-fn slip_of_matrices(
-    is_right: &dyn Fn(Matrices) -> bool,
-) -> Option<((&'static str, PriceClass), Matrices)> {
-    use Matrices::{InProjection, InView, Transposed};
-    let exchanged = ("view and projection are exchanged", PriceClass::Slip);
-    Some(match (is_right(InView), is_right(InProjection)) {
-        (true, true) => (exchanged, InView),
-        (true, false) => (("the projection is missing", PriceClass::Concept), InView),
-        (false, true) => (("the view matrix is missing", PriceClass::Concept), InProjection),
-        (false, false) if is_right(Transposed) => {
-            (("the position stands on the left of the matrices", PriceClass::Slip), Transposed)
-        }
-        (false, false) => return None,
-    })
 }
 
 /// The check of a part under the mistake that explains all frames: where it is the part's own.
@@ -498,21 +465,4 @@ fn vertex_under_own_pass(
     }
     // Right there as well: nothing is explained.
     if checks.iter().any(|check| check.verdict == Verdict::Fail) { checks } else { Vec::new() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_matrices_mend_is_told_by_which_do() {
-        let of = |right: &[Matrices]| slip_of_matrices(&|which| right.contains(&which));
-        use Matrices::{InProjection, InView, Transposed};
-        assert_eq!(of(&[]), None);
-        let class = |right: &[Matrices]| of(right).map(|((_, class), _)| class);
-        assert_eq!(class(&[InView, InProjection]), Some(PriceClass::Slip));
-        assert_eq!(class(&[InView]), Some(PriceClass::Concept));
-        assert_eq!(class(&[InProjection]), Some(PriceClass::Concept));
-        assert_eq!(class(&[Transposed]), Some(PriceClass::Slip));
-    }
 }

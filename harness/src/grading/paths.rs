@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 
 use super::begun::Say;
 use super::conventions::Answers;
+use super::host_changes::MendedBy;
 use super::offline::{self, Drawn, Run};
 use super::pipeline::Grading;
 use super::prepared_scene::PreparedScene;
@@ -149,10 +150,10 @@ impl Grading<'_> {
                     let own = (&checks[begin..], &drawn[..]);
                     let slip = one_slip::judge(session, plugin, cases, stages, own, tolerances);
                     // What a pass forgets to set leaves no light to see shadows by.
-                    let mended_by = slip.mended_by.or(mended_by);
-                    let stage = |case: &PreparedScene| {
-                        let light = case.expected.scene.first_light_position();
-                        mended_by.clone().unwrap_or_else(|| nothing_unset(light))
+                    let mended_by = slip.mended_by.or(mended_by.map(MendedBy::Stage));
+                    let stage = |case: &PreparedScene| match &mended_by {
+                        Some(mended_by) => mended_by.stage(case),
+                        None => nothing_unset(case.expected.scene.first_light_position(), &[]),
                     };
                     let found = &mut checks[begin..];
                     bonus::judge_under(&stage, session, plugin, cases, tolerances, found);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use basecode::gpu::{MATRICES, NEGATED_NORMALS, NOTHING_UNSET};
-use basecode::{Image, Matrices, Vec3};
+use basecode::{Image, Matrices, Vec3, Vec4};
 
 use crate::evidence::stages::{bare, is_template};
 use crate::files::files_below;
@@ -196,9 +196,11 @@ pub fn negated_normals() -> StageText {
     StageText { name: NEGATED_NORMALS.to_owned(), text: NEGATED_NORMALS.to_owned() }
 }
 
-/// What the host replaces to have a pass draw with ones where it sets nothing, and with the light in its place.
-pub fn nothing_unset(light: Vec3) -> StageText {
-    let text = format!("{} {} {}", light.x, light.y, light.z);
+/// What the host replaces to have a pass draw with these in turn where it sets nothing, or with ones where there are
+/// none, and with the light in its place.
+pub fn nothing_unset(light: Vec3, in_turn: &[Vec4]) -> StageText {
+    let numbers = light.to_array().into_iter().chain(in_turn.iter().flat_map(|v| v.to_array()));
+    let text = numbers.map(|number| number.to_string()).collect::<Vec<_>>().join(" ");
     StageText { name: NOTHING_UNSET.to_owned(), text }
 }
 

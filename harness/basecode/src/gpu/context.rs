@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::device::{Footprint, Overrides, Watch, named_position};
+use super::device::{Footprint, Overrides, Watch};
 use super::made_pipelines::MadePipelines;
 use super::message::readable;
 use super::{
@@ -185,8 +185,7 @@ impl Gpu {
 
     /// A frame's uniforms, with the light in its place if it has none and the host asks for [`NOTHING_UNSET`].
     pub(super) fn nothing_unset(&self, values: &FrameUniforms) -> FrameUniforms {
-        let light = self.watch.overrides().nothing_unset.as_deref().and_then(named_position);
-        match light {
+        match self.watch.unset().and_then(|unset| unset.light) {
             Some(light) if values.light_position.truncate() == glam::Vec3::ZERO => {
                 FrameUniforms { light_position: light.extend(1.0), ..*values }
             }

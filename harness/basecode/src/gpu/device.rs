@@ -38,8 +38,9 @@ pub const MATRICES: &str = "matrices";
 pub const EDITED_LINE: &str = "edited.line";
 /// A host switch in the form of a stage name. When the host sets it, four floats in uniforms and storage that are all
 /// zero are all one: what a pass forgets to set leaves nothing dark then. The text holds the light's position, such as
-/// `1 2 3`, which [`crate::gpu::FrameUniforms`] without one have. Resources of a [`crate::gpu::ShadowMap`] stay as they
-/// are.
+/// `1 2 3`, which [`crate::gpu::FrameUniforms`] without one have. More numbers, four by four, stand in place of ones:
+/// in what is written at once, the next four for each zero, and after the last the first again. Resources of a
+/// [`crate::gpu::ShadowMap`] stay as they are.
 pub const NOTHING_UNSET: &str = "nothing.unset";
 
 /// Name of the entry point in the text of [`EVERY_FRAGMENT`].
@@ -137,10 +138,35 @@ impl Overrides {
     }
 }
 
-/// The position that a text of [`NOTHING_UNSET`] names.
-pub(super) fn named_position(text: &str) -> Option<glam::Vec3> {
-    let numbers: Vec<f32> = text.split(' ').filter_map(|number| number.parse().ok()).collect();
-    <[f32; 3]>::try_from(numbers).ok().map(glam::Vec3::from)
+/// What a text of [`NOTHING_UNSET`] says.
+pub(super) struct Unset {
+    /// The light's position.
+    pub light: Option<glam::Vec3>,
+    /// What stands in place of zeros, in turn.
+    in_turn: Vec<[f32; 4]>,
+}
+
+impl Unset {
+    fn parse(text: &str) -> Self {
+        let numbers: Vec<f32> = text.split(' ').filter_map(|number| number.parse().ok()).collect();
+        let (light, rest) = numbers.split_at(numbers.len().min(3));
+        let in_turn = match rest.as_chunks().0 {
+            [] => vec![[1.0; 4]],
+            some => some.to_vec(),
+        };
+        Self { light: <[f32; 3]>::try_from(light).ok().map(glam::Vec3::from), in_turn }
+    }
+
+    /// What is written of a buffer instead of this.
+    fn set(&self, data: &[u8]) -> Vec<u8> {
+        let mut data = data.to_owned();
+        let is_zero = |four: &&mut [u8]| four.iter().all(|byte| *byte == 0);
+        let unset = data.chunks_exact_mut(FOUR_FLOATS).filter(is_zero);
+        for (four, values) in unset.zip(self.in_turn.iter().cycle()) {
+            four.copy_from_slice(&values.map(f32::to_ne_bytes).concat());
+        }
+        data
+    }
 }
 
 /// WGSL with a line in place of another, as a text of [`EDITED_LINE`] says.
@@ -159,16 +185,6 @@ fn takes_values(usage: wgpu::BufferUsages) -> bool {
 
 /// Bytes of four floats.
 const FOUR_FLOATS: usize = 16;
-
-/// What is written of a buffer with ones where four floats are all zero.
-fn nothing_unset(data: &[u8]) -> Vec<u8> {
-    let mut data = data.to_owned();
-    for four in data.chunks_exact_mut(FOUR_FLOATS).filter(|four| four.iter().all(|byte| *byte == 0))
-    {
-        four.copy_from_slice(&[1.0f32.to_ne_bytes(); 4].concat());
-    }
-    data
-}
 
 /// The vertex attributes that a text of [`USUAL_PIPELINES`] names.
 fn exchanged(text: &str) -> Option<[u32; 2]> {
@@ -213,6 +229,11 @@ impl Watch {
         if let Ok(mut current) = self.overrides.lock() {
             *current = overrides;
         }
+    }
+
+    /// What stands where nothing is set, if the host asks for that.
+    pub(super) fn unset(&self) -> Option<Unset> {
+        self.overrides().nothing_unset.as_deref().map(Unset::parse)
     }
 
     /// What was handed over since the last call.
@@ -415,9 +436,11 @@ impl Device {
     pub fn create_buffer(&self, desc: &wgpu::BufferDescriptor) -> wgpu::Buffer {
         if desc.mapped_at_creation || desc.usage.contains(wgpu::BufferUsages::MAP_WRITE) {
             self.watch.upload(desc.size);
-        } else if takes_values(desc.usage) && self.watch.overrides().nothing_unset.is_some() {
+        } else if takes_values(desc.usage)
+            && let Some(unset) = self.watch.unset()
+        {
             // What nobody writes is zero otherwise.
-            let contents = &nothing_unset(&vec![0; desc.size as usize]);
+            let contents = &unset.set(&vec![0; desc.size as usize]);
             let (label, usage) = (desc.label, desc.usage);
             return self.device.create_buffer_init(&BufferInitDescriptor {
                 label,
@@ -431,8 +454,10 @@ impl Device {
     /// As [`DeviceExt::create_buffer_init`].
     pub fn create_buffer_init(&self, desc: &BufferInitDescriptor) -> wgpu::Buffer {
         self.watch.upload(desc.contents.len() as u64);
-        if takes_values(desc.usage) && self.watch.overrides().nothing_unset.is_some() {
-            let contents = &nothing_unset(desc.contents);
+        if takes_values(desc.usage)
+            && let Some(unset) = self.watch.unset()
+        {
+            let contents = &unset.set(desc.contents);
             return self.device.create_buffer_init(&BufferInitDescriptor { contents, ..*desc });
         }
         self.device.create_buffer_init(desc)
@@ -473,9 +498,9 @@ impl Queue {
 
     /// As [`wgpu::Queue::write_buffer`].
     pub fn write_buffer(&self, buffer: &wgpu::Buffer, offset: u64, data: &[u8]) {
-        match takes_values(buffer.usage()) && self.watch.overrides().nothing_unset.is_some() {
-            true => self.write_exactly(buffer, offset, &nothing_unset(data)),
-            false => self.write_exactly(buffer, offset, data),
+        match takes_values(buffer.usage()).then(|| self.watch.unset()).flatten() {
+            Some(unset) => self.write_exactly(buffer, offset, &unset.set(data)),
+            None => self.write_exactly(buffer, offset, data),
         }
     }
 
