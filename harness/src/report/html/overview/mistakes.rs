@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{OUT_OF_TIME, some_names};
-use crate::evidence::{Check, CheckId, Verdict};
+use crate::evidence::{Check, CheckId, Verdict, price};
 use crate::report::html::lost::is_lost_by_evidence;
 use crate::report::html::markup::Html;
 use crate::report::number::{is_range, percent};
@@ -114,12 +114,20 @@ fn groups(report: &BatchReport) -> Vec<Group<'_>> {
     merged
 }
 
+/// The mistake that the sentence on a part names, where one explains its answers.
+fn named_in<'a>(reason: &str, checks: &'a [Check]) -> Option<&'a str> {
+    let says = |check: &&Check| {
+        price::is_explained(check) && check.summary == reason && reason.contains(&check.mistake)
+    };
+    checks.iter().find(says).map(|check| check.mistake.as_str())
+}
+
 /// What happened to a part that no diagnosis names. Nothing where the remark on the whole says why it lost points.
-fn words_of(
+fn words_of<'a>(
     own: &PartGrade,
-    entry: &SubmissionReport,
+    entry: &'a SubmissionReport,
     report: &BatchReport,
-) -> Option<&'static str> {
+) -> Option<&'a str> {
     let checks = &entry.record.evidence.checks;
     let is_no_code =
         |check: &Check| check.id == CheckId::SubmissionBuild && check.verdict == Verdict::Fail;
@@ -136,6 +144,9 @@ fn words_of(
     };
     if own.points_max == 0.0 && checks.iter().any(is_undone) {
         return Some(UNDONE);
+    }
+    if let Some(mistake) = named_in(&own.reason, checks) {
+        return Some(mistake);
     }
     let is_gated = |gate: &Gate| gate.ceiling < 1.0 && entry.grade.remarks.contains(&gate.reason);
     (!report.rules.gates.iter().any(is_gated)).then_some(OTHER)

@@ -1,6 +1,8 @@
 use super::super::super::{html_batch, sample};
 use super::mistakes::{NO_CODE, OTHER};
 use super::*;
+use crate::evidence::price::PriceClass;
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::grading::SourceDigest;
 
 #[test]
@@ -40,6 +42,31 @@ fn no_part_that_lost_points_is_left_out_of_the_mistakes() {
         let found = format!("<span class=\"id\">1.1, 1.2, 1.3, 1.4, 2.4</span> {NO_CODE}");
         assert!(page.contains(&found), "{page}");
     }
+}
+
+#[test]
+fn a_mistake_that_explains_all_frames_has_its_name_in_the_class_too() {
+    let mut report = sample::report();
+    let entry = &mut report.entries[0];
+    entry.record.diagnoses.clear();
+    let reason =
+        "one slip explains the submission's own frames on every scene: surfaces are missing";
+    let found = Check::new(CheckId::PassUniforms, "teapot", Verdict::Fail, reason);
+    let error = PriceClass::Slip.price();
+    entry.record.evidence.checks.push(Check {
+        error,
+        mistake: "surfaces are missing".into(),
+        ..found
+    });
+    let part = &mut entry.grade.parts[1];
+    (part.points, part.points_max, part.reason) = (4.0, 4.0, reason.into());
+    let page = html_batch(&report, &[]).unwrap();
+    assert!(page.contains("<span class=\"id\">1.2</span> surfaces are missing <span"), "{page}");
+    // Of a mistake that the sentence does not name, nothing is claimed.
+    let checks = &mut report.entries[0].record.evidence.checks;
+    checks.last_mut().unwrap().mistake = "the picture is upside down".into();
+    let page = html_batch(&report, &[]).unwrap();
+    assert!(page.contains(&format!("<span class=\"id\">1.2</span> {OTHER} <span")), "{page}");
 }
 
 #[test]
