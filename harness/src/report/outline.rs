@@ -4,19 +4,21 @@
 use std::collections::HashSet;
 
 use super::SubmissionReport;
-use super::html::is_read_by_class;
+use super::html::{is_read_by_class, says_its_mistake};
 use crate::diagnosis::Diagnosis;
 use crate::evidence::{Check, CheckId};
 use crate::grading::INTERNAL_ERROR;
 use crate::intake::Finding;
 
 /// An entry with what the files of the class are made from, `report.json` and the pages of submissions left out: of its
-/// checks those that they read, and the first of each kind.
+/// checks those that they read, and the first of each kind and mistake.
 pub fn outline(mut entry: SubmissionReport) -> SubmissionReport {
-    let mut kinds: HashSet<(CheckId, bool)> = HashSet::new();
+    let mut kinds: HashSet<(CheckId, bool, String)> = HashSet::new();
     let record = &mut entry.record;
     let checks = std::mem::take(&mut record.evidence.checks).into_iter().filter(|check| {
-        let first = kinds.insert((check.id, check.held_back));
+        let mistake = Some(&check.mistake).filter(|_| says_its_mistake(check));
+        let mistake = mistake.cloned().unwrap_or_default();
+        let first = kinds.insert((check.id, check.held_back, mistake));
         first || check.id == INTERNAL_ERROR || is_read_by_class(check)
     });
     record.evidence.checks = fitting(checks.map(short));
@@ -45,7 +47,8 @@ fn fitting<T>(all: impl Iterator<Item = T>) -> Vec<T> {
 }
 
 fn short(check: Check) -> Check {
-    let summary = if is_read_by_class(&check) { check.summary } else { String::new() };
+    let is_read = is_read_by_class(&check) || says_its_mistake(&check);
+    let summary = if is_read { check.summary } else { String::new() };
     Check {
         summary,
         hint: String::new(),
@@ -64,6 +67,7 @@ mod tests {
     use super::super::{ReportError, csv_grades, html_batch, sample, text_table, write_outlined};
     use super::*;
     use crate::evidence::Verdict;
+    use crate::evidence::price::PriceClass;
     use crate::report::{BatchReport, JSON_FILE, report_json};
 
     /// A class with all that its pages tell of.
@@ -82,6 +86,16 @@ mod tests {
             }
             add(index, CheckId::BsdfDiffuse, false, Verdict::NotImplemented, "not implemented");
         }
+        // What decides a part of the first is not the first check of its kind.
+        let slips = "one slip explains every frame: surfaces are missing";
+        let entry = &mut report.entries[0];
+        entry.record.diagnoses.clear();
+        let part = &mut entry.grade.parts[1];
+        (part.points, part.points_max, part.reason) = (4.0, 4.0, slips.into());
+        let check = Check::new(CheckId::BsdfDiffuse, "teapot", Verdict::Fail, slips);
+        let error = PriceClass::Slip.price();
+        let mistake = "surfaces are missing".into();
+        entry.record.evidence.checks.push(Check { error, mistake, ..check });
         let private = &mut report.entries[2].record.evidence.checks[0].private;
         *private = "the same image is in a2_ada".into();
         report
@@ -100,6 +114,7 @@ mod tests {
             ]
         };
         assert_eq!(pages(&outlined), pages(&whole));
+        assert!(pages(&whole)[0].contains("1.2</span> surfaces are missing"));
         let bytes = |report: &BatchReport| serde_json::to_vec(&report.entries).unwrap().len();
         assert!(bytes(&outlined) * 2 < bytes(&whole), "{} {}", bytes(&outlined), bytes(&whole));
 

@@ -20,7 +20,7 @@ use base64::Engine as _;
 use sha2::Digest as _;
 
 pub use batch::batch;
-pub use overview::is_read_by_class;
+pub use overview::{is_read_by_class, says_its_mistake};
 pub use similarity::{SIMILARITY, SimilarPair, SimilarityPage, write_similarity};
 pub use submission::submission;
 pub use superseded::mark_superseded;

@@ -12,7 +12,7 @@ use super::super::number::{is_failure, percent, points, value};
 use super::super::{BatchReport, ERRORS, ErrorPicture, HTML_FILE, INSTRUCTOR, SubmissionReport};
 use super::markup::Html;
 use crate::columns::count;
-use crate::evidence::{Check, CheckId, Verdict};
+use crate::evidence::{Check, CheckId, Verdict, price};
 use crate::rubric::Part;
 
 /// Number of names in a list before the rest is collapsed.
@@ -28,6 +28,11 @@ pub fn is_read_by_class(check: &Check) -> bool {
         || check.verdict == Verdict::NotImplemented
         || (is_failure(check) && check.summary.contains(OUT_OF_TIME))
         || IMAGES.contains(&check.id)
+}
+
+/// Whether a check says which mistake explains its answers.
+pub fn says_its_mistake(check: &Check) -> bool {
+    price::is_explained(check) && check.summary.contains(&check.mistake)
 }
 
 /// Who a submission is by, for lists.

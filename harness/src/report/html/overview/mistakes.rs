@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::{OUT_OF_TIME, some_names};
-use crate::evidence::{Check, CheckId, Verdict, price};
+use super::{OUT_OF_TIME, says_its_mistake, some_names};
+use crate::evidence::{Check, CheckId, Verdict};
 use crate::report::html::lost::is_lost_by_evidence;
 use crate::report::html::markup::Html;
 use crate::report::number::{is_range, percent};
@@ -116,10 +116,8 @@ fn groups(report: &BatchReport) -> Vec<Group<'_>> {
 
 /// The mistake that the sentence on a part names, where one explains its answers.
 fn named_in<'a>(reason: &str, checks: &'a [Check]) -> Option<&'a str> {
-    let says = |check: &&Check| {
-        price::is_explained(check) && check.summary == reason && reason.contains(&check.mistake)
-    };
-    checks.iter().find(says).map(|check| check.mistake.as_str())
+    let decides = |check: &&Check| check.summary == reason && says_its_mistake(check);
+    checks.iter().find(decides).map(|check| check.mistake.as_str())
 }
 
 /// What happened to a part that no diagnosis names. Nothing where the remark on the whole says why it lost points.
