@@ -42,9 +42,9 @@ pub struct Arguments {
     /// Scenes on their own films; without it the large ones are drawn at 128x96
     #[arg(long)]
     full: bool,
-    /// A fast selection, as CI runs it: some right renderers, an eighth of the mistakes, 60 pairs, 20 triples, a sixth of
-    /// the samples, two held-back seeds. Each mistake runs only on the path that shows it, at 4 spp and with shadow maps
-    /// of 1024 texels a side
+    /// A fast selection, as CI runs it: some right renderers, an eighth of the mistakes, 60 pairs, 20 triples, a sixth
+    /// of the samples, two held-back seeds. Each mistake runs only on the path that shows it, at 4 spp and with shadow
+    /// maps of 1024 texels a side
     #[arg(long, conflicts_with = "full")]
     quick: bool,
     /// Grade mistakes alone and write what they cost to this file, nothing else
