@@ -112,10 +112,10 @@ impl Store<'_> {
         let masks = self.layers(&file, &["shadowed", "unshadowed"], || {
             let [with, without] = regions(scene, width as usize, height as usize)?;
             let layers =
-                [("shadowed".into(), as_image(&with)), ("unshadowed".into(), as_image(&without))];
+                [("shadowed".into(), with.to_image()), ("unshadowed".into(), without.to_image())];
             Ok(ExrLayers { layers: layers.into(), ..Default::default() })
         })?;
-        Ok(masks.map(|image| as_mask(scene, &image)))
+        Ok(masks.map(|image| RegionMask::of_image(region_table(scene), &image)))
     }
 
     /// The pixel-center image of a scene without shadows.
@@ -413,20 +413,6 @@ impl Store<'_> {
 fn mean_radiance(image: &Image) -> f64 {
     let sum: f64 = image.pixels.iter().map(|p| f64::from(p.element_sum()) / 3.0).sum();
     sum / image.pixels.len() as f64
-}
-
-/// A mask as an image: 16-bit values are exact in floats.
-fn as_image(mask: &RegionMask) -> Image {
-    let pixels = mask.pixels.iter().map(|&value| Vec3::new(f32::from(value), 0.0, 0.0)).collect();
-    Image { width: mask.width, height: mask.height, pixels }
-}
-
-fn as_mask(scene: &Scene, image: &Image) -> RegionMask {
-    let mut mask = region_table(scene, image.width, image.height);
-    for (value, pixel) in mask.pixels.iter_mut().zip(&image.pixels) {
-        *value = pixel.x as u16;
-    }
-    mask
 }
 
 /// SHA-256 over all that an image of a scene depends on: the TOML file and the files beside its mesh.

@@ -85,7 +85,8 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<String> {
     let assignment = assignment(root, arguments.full)?;
     let [umbra, library] = built(root)?;
     let scratch = assignment.scratch()?;
-    let supervisor = Supervisor::available(umbra.clone(), scratch.path().to_owned());
+    let mut supervisor = Supervisor::available(umbra.clone(), scratch.path().to_owned());
+    supervisor.compiles_quickly = arguments.quick;
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let store = Store {
         assignment: &assignment,

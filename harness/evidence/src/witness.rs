@@ -35,9 +35,19 @@ pub struct WitnessQuery {
     pub wo: [f32; 3],
 }
 
+impl WitnessQuery {
+    /// The larger | |w| - 1 | of both directions; infinite when one is not finite.
+    pub fn norm_error(&self) -> f32 {
+        let error = |w: [f32; 3]| {
+            let error = (Vec3::from(w).length() - 1.0).abs();
+            if error.is_finite() { error } else { f32::INFINITY }
+        };
+        error(self.wi).max(error(self.wo))
+    }
+}
+
 impl Witness {
     /// The witness' value; none for [`Witness::True`].
-    #[inline]
     pub fn value(&self, query: &WitnessQuery) -> Option<[f32; 3]> {
         let WitnessQuery { wi, wo } = *query;
         if let Self::Flat(value) = self {

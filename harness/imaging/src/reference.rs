@@ -1,5 +1,6 @@
 //! The data that an image is compared with: mean, variance, pixel-center image, and a mask of regions.
 
+use basecode::Vec3;
 use basecode::image::Image;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -55,6 +56,46 @@ impl RegionMask {
     pub fn is_lit_interior(&self, value: u16) -> bool {
         value & (Self::EDGE | Self::EMITTER) == 0 && self.region(value).lit
     }
+
+    /// The mask as an image, to be stored: the values in red, which floats hold exactly.
+    pub fn to_image(&self) -> Image {
+        let pixels = self.pixels.iter().map(|&value| Vec3::new(f32::from(value), 0.0, 0.0));
+        Image { width: self.width, height: self.height, pixels: pixels.collect() }
+    }
+
+    /// The mask with these regions and the values of such an image.
+    pub fn of_image(regions: Vec<Region>, image: &Image) -> Self {
+        let pixels = image.pixels.iter().map(|pixel| pixel.x as u16).collect();
+        Self { width: image.width, height: image.height, regions, pixels }
+    }
+
+    /// Where an image that is not black shows surfaces; edges, emitters and what is unlit do not count.
+    pub fn coverage(&self, image: &Image) -> Coverage {
+        let mut coverage = Coverage::default();
+        for (pixel, &value) in image.pixels.iter().zip(&self.pixels) {
+            let background = value & Self::INDEX == 0;
+            if value & (Self::EDGE | Self::EMITTER) != 0 || !(background || self.region(value).lit)
+            {
+                continue;
+            }
+            let covered = *pixel != Vec3::ZERO;
+            coverage.counted += 1;
+            coverage.missing += usize::from(!covered && !background);
+            coverage.extra += usize::from(covered && (background || !pixel.is_finite()));
+        }
+        coverage
+    }
+}
+
+/// Numbers of pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Coverage {
+    /// Those that count.
+    pub counted: usize,
+    /// Black where a surface is.
+    pub missing: usize,
+    /// Not black where none is, or not finite.
+    pub extra: usize,
 }
 
 /// The expected image of a scene, with all that is needed to judge another image of it at any spp.

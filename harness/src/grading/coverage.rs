@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use basecode::{Image, Vec3};
+use basecode::Image;
 
 use super::draw::{FrameRequest, draw_each};
 use super::judged::Judged;
@@ -10,7 +10,7 @@ use super::prepared_scene::PreparedScene;
 use super::session::{self, Session};
 use super::uploads::{drawn_parts, every_fragment};
 use crate::evidence::{Check, CheckId, Verdict, price};
-use crate::imaging::reference::RegionMask;
+use crate::imaging::reference::Coverage;
 
 /// Whether surfaces lie where they should, for what cannot be judged alone.
 pub const COVERAGE: CheckId = CheckId::ImageRealtimeCoverage;
@@ -21,28 +21,9 @@ const LEAST_SHADING: f64 = 0.2;
 /// Fraction of the pixels that may be wrong.
 const STRAY: f64 = 5e-3;
 
-/// The pixels that count, those that show nothing where a surface is, and those that show one where none is.
-fn count(case: &PreparedScene, image: &Image) -> [usize; 3] {
-    let mask = &case.expected.unshadowed_mask;
-    let [mut counted, mut missing, mut extra] = [0usize; 3];
-    for (pixel, &value) in image.pixels.iter().zip(&mask.pixels) {
-        let background = value & RegionMask::INDEX == 0;
-        if value & (RegionMask::EDGE | RegionMask::EMITTER) != 0
-            || !(background || mask.region(value).lit)
-        {
-            continue;
-        }
-        counted += 1;
-        let covered = *pixel != Vec3::ZERO;
-        missing += usize::from(!covered && !background);
-        extra += usize::from(covered && (background || !pixel.is_finite()));
-    }
-    [counted, missing, extra]
-}
-
 /// Where the image shows a surface and where not.
 pub fn judge(case: &PreparedScene, image: &Image) -> Check {
-    let [counted, missing, extra] = count(case, image);
+    let Coverage { counted, missing, extra } = case.expected.unshadowed_mask.coverage(image);
     let (name, wrong) = (&case.entry.name, missing + extra);
     let error = wrong as f64 / counted.max(1) as f64;
     if error > STRAY {
@@ -67,7 +48,8 @@ pub fn accept_explained(cases: &[PreparedScene], judged: &mut [Judged]) {
     }
     for (case, judged) in cases.iter().zip(judged) {
         let Some(drawn) = judged.drawn.first() else { continue };
-        let [counted, missing, extra] = count(case, &drawn.image);
+        let Coverage { counted, missing, extra } =
+            case.expected.unshadowed_mask.coverage(&drawn.image);
         if missing > 0 && extra as f64 <= STRAY * counted as f64 {
             for check in judged.checks.iter_mut().filter(|check| check.id == COVERAGE) {
                 let summary =

@@ -3,7 +3,6 @@
 use std::ffi::c_void;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use basecode::Vec3;
 use renderer_api as api;
 
 use crate::evidence::{Witness, WitnessQuery};
@@ -40,11 +39,7 @@ impl WitnessState {
 
     fn eval(&self, query: &WitnessQuery) -> [f32; 3] {
         self.calls.fetch_add(1, Ordering::Relaxed);
-        for w in [query.wi, query.wo] {
-            let error = (Vec3::from(w).length() - 1.0).abs();
-            let error = if error.is_finite() { error } else { f32::INFINITY };
-            self.worst.fetch_max(error.to_bits(), Ordering::Relaxed);
-        }
+        self.worst.fetch_max(query.norm_error().to_bits(), Ordering::Relaxed);
         self.witness.value(query).unwrap_or_default()
     }
 }

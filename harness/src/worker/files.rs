@@ -10,7 +10,7 @@ use super::job::Request;
 use super::outcome::{Answer, Fault, Outcome, WitnessUse};
 use super::policy::WorkerPolicy;
 use super::table::{SLOT_BYTES, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE, SlotState};
-use super::wire::{ALIGN, OutputRegion, WireJob, WireRequest, WorkerFolder, take_input};
+use super::wire::{OutputRegion, WireJob, WireRequest, WorkerFolder, take_input};
 use crate::evidence::Witness;
 
 /// The files of a worker, as the parent holds them: opened before it began, read only by plain
@@ -43,7 +43,7 @@ impl Files {
             let bytes: &[u8] = bytemuck::cast_slice(&words);
             input.write_all(bytes)?;
             let place = OutputRegion::new(output_end, request.answer_floats());
-            output.write_all(bytemuck::cast_slice(&vec![f32::NAN; place.size / 4]))?;
+            output.write_all(&vec![UNWRITTEN; place.size])?;
             wired.push(WireRequest {
                 request: rest,
                 input: (input_end, bytes.len()),
@@ -137,8 +137,8 @@ fn read_at(file: &mut File, start: u64, size: usize) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What lies before an answer: less than the multiple that its region is rounded up to.
-static FILLER: [f32; ALIGN / 4] = [f32::NAN; ALIGN / 4];
+/// Each byte of an output before it is written: floats that nobody wrote are not numbers.
+const UNWRITTEN: u8 = 0xff;
 
 /// The floats of a region; none when its size or its filler is not as the parent left it.
 fn values(region: &[u8], place: OutputRegion) -> Option<Vec<f32>> {
@@ -146,6 +146,6 @@ fn values(region: &[u8], place: OutputRegion) -> Option<Vec<f32>> {
         return None;
     }
     let (filler, answer) = region.split_at(place.offset());
-    let untouched = filler == &bytemuck::bytes_of(&FILLER)[..filler.len()];
+    let untouched = filler.iter().all(|byte| *byte == UNWRITTEN);
     untouched.then(|| bytemuck::pod_collect_to_vec(answer))
 }

@@ -41,6 +41,8 @@ pub struct Supervisor {
     pub shaders: Vec<PathBuf>,
     /// Where workers leave the shaders that they compile; only for those that run no foreign code.
     pub leaves_shaders: Option<PathBuf>,
+    /// Shaders are compiled in half of the time to the same pixels, and draw slower: for few and small frames.
+    pub compiles_quickly: bool,
     /// Whatever runs holds it for reading; who must have the machine for itself, for writing.
     pub machine: Arc<RwLock<()>>,
 }
@@ -73,6 +75,7 @@ impl Supervisor {
             isolation: Layers::of_this_system(),
             shaders: Vec::new(),
             leaves_shaders: None,
+            compiles_quickly: false,
             machine: Arc::default(),
         }
     }
@@ -285,8 +288,7 @@ impl Supervisor {
         let driver = software_driver();
         let elsewhere = |driver: &PathBuf| !driver.starts_with("/usr/share/vulkan");
         let mut command = command(&program, private, &own, requests, limits, driver.as_deref());
-        if !live {
-            // Mesa compiles a shader in half of the time, to the same pixels; few frames are drawn with it.
+        if self.compiles_quickly {
             command.env("GALLIVM_PERF", "nopt");
         }
         let mut policy = own.policy;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use renderer_api as api;
 use serde::{Deserialize, Serialize};
 
-use super::job::{BsdfQuery, BsdfSource, CameraValue, Request};
+use super::job::{BsdfQuery, BsdfSource, CameraValue, RayQuery, Request};
 
 /// Outputs begin at multiples of this in their file: a multiple of every system's page size.
 pub const ALIGN: usize = 64 << 10;
@@ -96,10 +96,8 @@ impl WorkerFolder<'_> {
 pub fn take_input(request: &Request) -> (Request, Vec<u32>) {
     match request {
         Request::EvalBsdf { scene, queries } => {
-            let mut words = Vec::with_capacity(QUERY_WORDS * queries.len());
-            for query in queries {
-                words.extend_from_slice(&query_words(query));
-            }
+            let wired: Vec<WireQuery> = queries.iter().map(WireQuery::new).collect();
+            let words = bytemuck::pod_collect_to_vec(&wired);
             (Request::EvalBsdf { scene: scene.clone(), queries: Vec::new() }, words)
         }
         Request::Radiance { scene, rays, shadows, witness, seed } => {
@@ -112,72 +110,61 @@ pub fn take_input(request: &Request) -> (Request, Vec<u32>) {
     }
 }
 
-const QUERY_WORDS: usize = 19;
-const RAY_WORDS: usize = 8;
+/// A [`BsdfQuery`] as it goes to a worker. The words of a [`RayQuery`] go as they are.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct WireQuery {
+    source: u32,
+    model: u32,
+    diffuse: [f32; 3],
+    specular: [f32; 3],
+    exponent: f32,
+    shape: u32,
+    primitive: u32,
+    uv: [f32; 2],
+    wo: [f32; 3],
+    wi: [f32; 3],
+}
 
-fn query_words(query: &BsdfQuery) -> [u32; QUERY_WORDS] {
-    let value = |model, diffuse, specular, exponent| api::MaterialValue {
-        model,
-        diffuse,
-        specular,
-        exponent,
-    };
-    let none = value(api::MATERIAL_DIFFUSE, [0.0; 3], [0.0; 3], 0.0);
-    let (source, material, shape, primitive) = match query.source {
-        BsdfSource::Diffuse(albedo) => {
-            let material = value(api::MATERIAL_DIFFUSE, albedo, [0.0; 3], 0.0);
-            (api::BSDF_OF_VALUE, material, 0, 0)
-        }
-        BsdfSource::Phong { diffuse, specular, exponent } => {
-            let material = value(api::MATERIAL_PHONG, diffuse, specular, exponent);
-            (api::BSDF_OF_VALUE, material, 0, 0)
-        }
-        BsdfSource::Shape { shape, primitive } => (api::BSDF_OF_SHAPE, none, shape, primitive),
-    };
-    let mut words = [0; QUERY_WORDS];
-    words[..2].copy_from_slice(&[source, material.model]);
-    words[2..5].copy_from_slice(bytemuck::cast_slice(&material.diffuse));
-    words[5..8].copy_from_slice(bytemuck::cast_slice(&material.specular));
-    words[8] = material.exponent.to_bits();
-    words[9..11].copy_from_slice(&[shape, primitive]);
-    words[11..13].copy_from_slice(bytemuck::cast_slice(&query.uv));
-    words[13..16].copy_from_slice(bytemuck::cast_slice(&query.wo));
-    words[16..].copy_from_slice(bytemuck::cast_slice(&query.wi));
-    words
+impl WireQuery {
+    fn new(query: &BsdfQuery) -> Self {
+        let BsdfQuery { source, uv, wo, wi } = *query;
+        let none = [0.0; 3];
+        let (source, model, (diffuse, specular, exponent), (shape, primitive)) = match source {
+            BsdfSource::Diffuse(albedo) => {
+                (api::BSDF_OF_VALUE, api::MATERIAL_DIFFUSE, (albedo, none, 0.0), (0, 0))
+            }
+            BsdfSource::Phong { diffuse, specular, exponent } => {
+                let value = (diffuse, specular, exponent);
+                (api::BSDF_OF_VALUE, api::MATERIAL_PHONG, value, (0, 0))
+            }
+            BsdfSource::Shape { shape, primitive } => {
+                let value = (none, none, 0.0);
+                (api::BSDF_OF_SHAPE, api::MATERIAL_DIFFUSE, value, (shape, primitive))
+            }
+        };
+        Self { source, model, diffuse, specular, exponent, shape, primitive, uv, wo, wi }
+    }
 }
 
 /// Reads queries back.
 pub fn queries(words: &[u32]) -> Vec<api::BsdfQuery> {
-    let query = |w: &[u32]| api::BsdfQuery {
-        source: w[0],
-        material: api::MaterialValue {
-            model: w[1],
-            diffuse: floats(w, 2),
-            specular: floats(w, 5),
-            exponent: f32::from_bits(w[8]),
-        },
-        shape: w[9],
-        primitive: w[10],
-        uv: floats(w, 11),
-        wo: floats(w, 13),
-        wi: floats(w, 16),
+    let query = |query: &WireQuery| {
+        let WireQuery { source, model, diffuse, specular, exponent, shape, primitive, uv, wo, wi } =
+            *query;
+        let material = api::MaterialValue { model, diffuse, specular, exponent };
+        api::BsdfQuery { source, material, shape, primitive, uv, wo, wi }
     };
-    words.chunks_exact(QUERY_WORDS).map(query).collect()
+    bytemuck::cast_slice(words).iter().map(query).collect()
 }
 
 /// Reads rays back.
 pub fn rays(words: &[u32]) -> Vec<api::RayQuery> {
-    let ray = |w: &[u32]| api::RayQuery {
-        origin: floats(w, 0),
-        min_t: f32::from_bits(w[3]),
-        direction: floats(w, 4),
-        max_t: f32::from_bits(w[7]),
+    let ray = |ray: &RayQuery| {
+        let RayQuery { origin, min_t, direction, max_t } = *ray;
+        api::RayQuery { origin, min_t, direction, max_t }
     };
-    words.chunks_exact(RAY_WORDS).map(ray).collect()
-}
-
-fn floats<const N: usize>(words: &[u32], at: usize) -> [f32; N] {
-    std::array::from_fn(|i| f32::from_bits(words[at + i]))
+    bytemuck::cast_slice(words).iter().map(ray).collect()
 }
 
 /// Size of a camera in bytes.
@@ -196,13 +183,9 @@ pub fn camera_bytes(camera: &CameraValue) -> [u8; CAMERA_BYTES] {
 
 /// Reads a camera back.
 pub fn camera(bytes: &[u8; CAMERA_BYTES]) -> api::CameraValue {
-    let words = words(bytes);
-    api::CameraValue {
-        eye: floats(&words, 0),
-        at: floats(&words, 3),
-        up: floats(&words, 6),
-        fov_y_deg: f32::from_bits(words[9]),
-    }
+    let [eye, at, up]: [[f32; 3]; 3] = bytemuck::pod_read_unaligned(&bytes[..36]);
+    let fov_y_deg = bytemuck::pod_read_unaligned(&bytes[36..]);
+    api::CameraValue { eye, at, up, fov_y_deg }
 }
 
 /// Words of mapped bytes; a rest that is no whole word is left out.
@@ -212,7 +195,7 @@ pub fn words(bytes: &[u8]) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::job::{RayQuery, SceneRef};
+    use super::super::job::SceneRef;
     use super::*;
     use crate::evidence::Witness;
 

@@ -39,7 +39,8 @@ fn mask(
     height: usize,
     shadows: bool,
 ) -> RegionMask {
-    let mut mask = table(scene, width, height);
+    let mut mask = RegionMask::background(width, height);
+    mask.regions = table(scene);
     let mut edges = vec![false; width * height];
     for y in 0..height {
         for x in 0..width {
@@ -68,9 +69,9 @@ fn mask(
     mask
 }
 
-/// A mask that is background everywhere, with the regions of a scene: two for each material.
-pub fn table(scene: &Scene, width: usize, height: usize) -> RegionMask {
-    let mut mask = RegionMask::background(width, height);
+/// The background, and two regions for each material of a scene.
+pub fn table(scene: &Scene) -> Vec<Region> {
+    let mut regions = RegionMask::background(0, 0).regions;
     for material in scene.materials() {
         let exponent = match material.model {
             MaterialModel::Phong => material.exponent,
@@ -78,10 +79,10 @@ pub fn table(scene: &Scene, width: usize, height: usize) -> RegionMask {
         };
         for light in ["lit", "shadowed"] {
             let name = format!("{}, {light}", material.name);
-            mask.regions.push(Region { name, lit: light == "lit", exponent });
+            regions.push(Region { name, lit: light == "lit", exponent });
         }
     }
-    mask
+    regions
 }
 
 /// What one point of the lattice sees.
