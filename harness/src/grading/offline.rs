@@ -42,6 +42,10 @@ pub struct Drawn {
     pub image: Image,
 }
 
+/// One in so many of a pixel's samples is drawn on the large film that shows what small ones cannot, such as rows
+/// that are left out.
+const LARGE_FILM_SHARE: u32 = 4;
+
 /// How a plugin's offline images are drawn.
 #[derive(Clone, Copy)]
 pub struct Run {
@@ -113,7 +117,8 @@ pub fn judge_scene<'a>(
     let mut questions = Questions::default();
     let rays = asked.rays(&mut questions);
     let at_centers = asked.at_centers(&mut questions, true);
-    let image = questions.ask(asked.film(asked.first_film()));
+    let (first, spp) = asked.first_film();
+    let image = questions.ask(asked.film(first, spp));
     let at_samples = small.sampled.as_ref().map(|sampled| {
         let along = questions.ask(asked.radiance(&sampled.rays, Witness::True, false));
         let size = (sampled.film.width, sampled.film.height);
@@ -162,15 +167,20 @@ impl<'a> Asked<'_, 'a> {
     }
 
     /// The whole render, on the film of what is expected.
-    fn film(&self, expected: &Expected) -> Request {
+    fn film(&self, expected: &Expected, spp: u32) -> Request {
         let run = self.run;
-        self.render(size_of(expected), self.case.spp, run.seed, run.threads, true)
+        self.render(size_of(expected), spp, run.seed, run.threads, true)
     }
 
-    /// The small film that is drawn first, if there is one.
-    fn first_film(&self) -> &'a Expected {
-        let first = self.case.first.as_ref().filter(|_| !self.run.whole);
-        first.unwrap_or(&self.case.expected)
+    /// The film that is drawn first, with its samples per pixel: the small one, if there is one. A large one has
+    /// enough pixels with few samples each.
+    fn first_film(&self) -> (&'a Expected, u32) {
+        let Self { case, run, .. } = self;
+        match &case.first {
+            Some(first) if !run.whole => (first, case.spp),
+            Some(_) => (&case.expected, case.spp.div_ceil(LARGE_FILM_SHARE)),
+            None => (&case.expected, case.spp),
+        }
     }
 
     fn rays(&self, questions: &mut Questions) -> RayQuestions {
@@ -363,8 +373,8 @@ impl<'a> Asked<'_, 'a> {
         tolerances: &Tolerances,
     ) -> (Check, Option<Drawn>) {
         let (case, name) = (self.case, &self.case.entry.name);
-        let kind = ImageKind::Offline { spp: case.spp };
-        let judge = |outcome: &Outcome, expected: &Expected| {
+        let judge = |outcome: &Outcome, expected: &Expected, spp: u32| {
+            let kind = ImageKind::Offline { spp };
             let id = CheckId::ImageOffline;
             let Outcome::Done(answer) = outcome else {
                 let parts = ["1.1", "1.2", "1.3", "1.4"];
@@ -375,8 +385,8 @@ impl<'a> Asked<'_, 'a> {
             let check = images::judge(id, name, kind, &image, expected, &|_| true, tolerances);
             (check, Some(Drawn { scene: name.clone(), kind, image }))
         };
-        let first = self.first_film();
-        let (mut check, drawn) = judge(outcome, first);
+        let (first, spp) = self.first_film();
+        let (mut check, drawn) = judge(outcome, first, spp);
         if std::ptr::eq(first, &case.expected) {
             if case.first.is_some() && draws_small {
                 settle_slow(&mut check, outcome);
@@ -387,9 +397,9 @@ impl<'a> Asked<'_, 'a> {
             return (check, None);
         }
         let mut questions = Questions::default();
-        let whole = questions.ask(self.film(&case.expected));
+        let whole = questions.ask(self.film(&case.expected, case.spp));
         let outcomes = questions.run(self.session, self.plugin);
-        let (whole, drawn) = judge(&outcomes[whole], &case.expected);
+        let (whole, drawn) = judge(&outcomes[whole], &case.expected, case.spp);
         // An image that is wrong on any film is wrong; the larger one is shown.
         (if whole.verdict == Verdict::Fail { whole } else { check }, drawn)
     }

@@ -118,7 +118,8 @@ impl CheckId {
             ),
             Self::ImageOffline => info(
                 "Renders the scene's film at its samples per pixel, with the student's seed. A large film is \
-                    rendered small first. If it passes on every scene, 1.1 to 1.4 are earned in full.",
+                    rendered small first, and on one scene in full with a quarter of the samples. If it passes on \
+                    every scene, 1.1 to 1.4 are earned in full.",
                 "The sum of differences over the sum of expected values, away from edges.",
                 "See section Images of docs/evidence.md.",
                 IMAGE_RULES,
