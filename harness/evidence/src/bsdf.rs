@@ -256,7 +256,7 @@ pub fn judge(
             id,
             "",
             Verdict::Pass,
-            format!("the {name} BSDF is right at all {} directions probed", probes.len()),
+            format!("the {name} BSDF is right at all {} directions", probes.len()),
         ),
         Some((_, index)) => {
             let summary = describe(name, wrong, probes, index, values[index]);

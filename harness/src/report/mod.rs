@@ -40,6 +40,7 @@ pub use self::html::{
     submission as html_submission, viewer as html_viewer, write_similarity,
 };
 pub use self::json::{SCHEMA, VERSION, report_json};
+pub use self::number::earned;
 pub use self::outline::outline;
 pub use self::schema::report_schema;
 pub use self::text::{

@@ -31,6 +31,21 @@ pub(super) fn of_part(part: &PartGrade) -> String {
     range(part.points, part.points_max)
 }
 
+/// What parts earned, a bonus by itself: `95.5 of 100 points, 20 of 20 bonus points`.
+pub fn earned(parts: &[PartGrade]) -> String {
+    let (bonus, plain): (Vec<&PartGrade>, Vec<&PartGrade>) =
+        parts.iter().partition(|part| part.bonus);
+    let mut said = Vec::new();
+    for (parts, what) in [(plain, "points"), (bonus, "bonus points")] {
+        if !parts.is_empty() {
+            let sum = |value: fn(&PartGrade) -> f64| parts.iter().map(|part| value(part)).sum();
+            let own = range(sum(|part| part.points), sum(|part| part.points_max));
+            said.push(format!("{own} of {} {what}", points(sum(|part| part.out_of))));
+        }
+    }
+    said.join(", ")
+}
+
 /// The total with what it is out of: `95.5/100`, `80..100/100`.
 pub(super) fn total(grade: &Grade) -> String {
     format!("{}/{}", range(grade.points, grade.points_max), points(grade.out_of))
@@ -107,17 +122,6 @@ pub(super) fn looks_like(part: &str, diagnoses: &[Diagnosis]) -> Vec<String> {
         format!("{} (explains {percent} % of the difference)", diagnosis.words)
     });
     words.collect()
-}
-
-/// Words of Umbra's own, and what they are called where only the handout's are known.
-const PLAIN: [(&str, &str); 2] = [
-    ("under the witness BSDF", "with a test BSDF in place of yours,"),
-    (" directions probed", " directions"),
-];
-
-/// What a check says, without words that only Umbra's documents explain.
-pub(super) fn plain(text: &str) -> String {
-    PLAIN.iter().fold(text.to_owned(), |text, (own, plain)| text.replace(own, plain))
 }
 
 /// A date as `2006-01-02 15:04 -07:00`; anything but RFC 3339 stays as it is.

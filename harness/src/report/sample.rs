@@ -170,7 +170,7 @@ fn two_cosines() -> SubmissionReport {
     let student = ["Jörg", "Müller", "0260000002"];
     let mut entry =
         entry("two_cosines.tar.gz", "two_cosines", student, conditions("llvmpipe (LLVM 15)"));
-    let lit = "unshadowed radiance is wrong along 496 of 512 rays under the witness BSDF \"constant\"; worst at \
+    let lit = "unshadowed radiance is wrong along 496 of 512 rays with a test BSDF in place of yours, \"constant\"; worst at \
                (0.120, 1.200, -0.400): expected (0.5310, 0.5310, 0.5310), found (0.2104, 0.2104, 0.2104)";
     grade(
         &mut entry,
@@ -194,8 +194,8 @@ fn two_cosines() -> SubmissionReport {
         Verdict::Fail,
         lit,
         &[
-            ("rays wrong under the witness BSDF \"constant\" (fraction)", 0.96875, 2e-3),
-            ("rays wrong under the witness BSDF \"function of wo\" (fraction)", 0.0, 2e-3),
+            ("rays wrong with the test BSDF \"constant\" (fraction)", 0.96875, 2e-3),
+            ("rays wrong with the test BSDF \"function of wo\" (fraction)", 0.0, 2e-3),
         ],
     )
     .with_hint("cos theta_i is multiplied twice: eval() holds it already");

@@ -72,7 +72,7 @@ pub fn judge_unshadowed(
         let difference = Difference::of(batch, answer, &right);
         measures.push(Measure::at_most(
             RuleId::RaysLit,
-            format!("rays wrong under the witness BSDF \"{}\" (fraction)", answer.witness),
+            format!("rays wrong with the test BSDF \"{}\" (fraction)", answer.witness),
             difference.wrong,
             STRAY_FRACTION,
         ));
@@ -207,8 +207,8 @@ impl Difference {
             wrong: wrong as f64 / batch.lit as f64,
             error: sum / total,
             summary: format!(
-                "unshadowed radiance is wrong along {wrong} of {} rays under the witness BSDF \"{}\"; worst at \
-                 ({:.3}, {:.3}, {:.3}): expected {}, found {}",
+                "unshadowed radiance is wrong along {wrong} of {} rays with a test BSDF in place of yours, \"{}\"; \
+                 worst at ({:.3}, {:.3}, {:.3}): expected {}, found {}",
                 batch.lit,
                 answer.witness,
                 p.x,

@@ -19,6 +19,7 @@ use crate::cli::earlier::{ReportRow, StoredReport};
 use crate::columns::count;
 use crate::grading::{REFUSED, SO_FAR};
 use crate::intake::Severity;
+use crate::report;
 use crate::rubric::PartGrade;
 
 /// Time that a check has to end once it is told to.
@@ -82,7 +83,7 @@ pub(super) fn is_judged(status: ExitStatus) -> bool {
 /// What a report comes to: in a few words, and in a sentence with what is to be mended first. Where everything was
 /// asked (`is_whole`), that is what keeps it from being submitted, too.
 pub(super) fn verdict(row: &ReportRow, is_whole: bool) -> (CheckState, String, String) {
-    let points = format!("{} of {} points", row.points, row.out_of);
+    let points = report::earned(&row.parts);
     if let Some(first) = row.diagnostics.lines().find(|line| !line.trim().is_empty()) {
         // rustc says the place on the next line.
         let place = row.diagnostics.lines().skip_while(|line| *line != first).nth(1);

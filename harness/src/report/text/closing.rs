@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::number::{plain, points, range};
+use super::super::number::{earned, points, range};
 use super::super::{BatchReport, SubmissionReport};
 use super::page::{Look, Page, Style};
 use crate::evidence::{Check, Verdict};
@@ -43,22 +43,13 @@ pub fn closing(
     if !changes.is_empty() {
         page.wrapped(&[(Style::Heading, "since last time: ")], Style::Plain, &changes.join(", "));
     }
-    let (bonus, plain): (Vec<&PartGrade>, Vec<&PartGrade>) =
-        grade.parts.iter().partition(|part| part.bonus);
-    let mut verdict = Vec::new();
-    for (parts, what) in [(&plain, "points"), (&bonus, "bonus points")] {
-        if !parts.is_empty() {
-            let sum = |value: fn(&PartGrade) -> f64| parts.iter().map(|part| value(part)).sum();
-            let own = range(sum(|part| part.points), sum(|part| part.points_max));
-            verdict.push(format!("{own} of {} {what}", points(sum(|part| part.out_of))));
-        }
-    }
-    let mut verdict = verdict.join(", ");
+    let mut verdict = earned(&grade.parts);
     verdict.push_str(" on the public scenes");
     if !closing.asked.is_empty() {
         verdict.push_str(&format!("; {}", checked_only(closing.asked)));
     }
-    let whole = plain.iter().all(|part| is_whole(part)) && !grade.parts.is_empty();
+    let mut plain = grade.parts.iter().filter(|part| !part.bonus);
+    let whole = plain.all(is_whole) && !grade.parts.is_empty();
     let style = if whole { Style::Good } else { Style::Bad };
     page.wrapped(&[(style, "verdict: ")], Style::Plain, &verdict);
     page.wrapped(&[(Style::Heading, "next: ")], Style::Plain, &next(report, entry, closing));
@@ -132,7 +123,7 @@ fn next(report: &BatchReport, entry: &SubmissionReport, closing: &Closing) -> St
 /// `1.2 Phong reflectance model, in src/bsdfs/phong.rs: wrong at ...`
 fn work_on(part: &PartGrade, closing: &Closing) -> String {
     let place = closing.files.get(&part.id).map(|file| format!(", in {file}"));
-    format!("{} {}{}: {}", part.id, part.title, place.unwrap_or_default(), plain(&part.reason))
+    format!("{} {}{}: {}", part.id, part.title, place.unwrap_or_default(), part.reason)
 }
 
 #[cfg(test)]

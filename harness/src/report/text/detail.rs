@@ -1,7 +1,7 @@
 //! Every detail of one submission.
 
 use super::super::number::{
-    self, hints, is_failure, is_range, looks_like, of_part, plain, points, seconds, total,
+    self, hints, is_failure, is_range, looks_like, of_part, points, seconds, total,
 };
 use super::super::{BatchReport, SubmissionReport};
 use super::page::{Look, Page, Style, columns, left};
@@ -75,8 +75,7 @@ fn parts(
         let indent = " ".repeat(columns(&id) + columns(&worth));
         let lost = style != Style::Good;
         if lost || verbose {
-            let reason = if verbose { part.reason.clone() } else { plain(&part.reason) };
-            page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &reason);
+            page.wrapped(&[(Style::Plain, &indent)], Style::Faint, &part.reason);
         }
         if !lost {
             continue;
@@ -138,7 +137,7 @@ fn noticed(
             heading(page, "to be noticed, without cost");
         }
         told.push(check.id);
-        page.wrapped(&[(Style::Open, "  ")], Style::Plain, &plain(&check.summary));
+        page.wrapped(&[(Style::Open, "  ")], Style::Plain, &check.summary);
         if !check.hint.is_empty() {
             page.wrapped(&[(Style::Heading, "    hint: ")], Style::Plain, &check.hint);
         }

@@ -38,7 +38,7 @@ fn a_verdict_is_green_only_where_nothing_is_wrong() {
     let (stage, _, words) = told(bonus(4.0), "");
     assert_eq!(
         (stage, words.as_str()),
-        (CheckState::Lost, "24 of 20 points. 2.5: the map is black")
+        (CheckState::Lost, "20 of 20 points, 4 of 10 bonus points. 2.5: the map is black")
     );
     let (stage, short, words) =
         told(full(), "\nerror[E0308]: mismatched types\n --> src/lib.rs:7:1\n  |");
