@@ -177,15 +177,13 @@ fn cannot(folder: &Path) -> impl Fn() -> String {
     move || format!("cannot write to {}", folder.display())
 }
 
-/// The names of files, without the folder that all share.
+/// The names of files, without the folders that all share.
 pub(super) fn names_of(files: &[&Path]) -> Vec<String> {
-    let parents: Vec<_> = files.iter().map(|file| file.parent()).collect();
-    let shared = parents.first().copied().flatten();
-    let shared = shared.filter(|folder| parents.iter().all(|parent| *parent == Some(folder)));
-    let name = |file: &&Path| {
-        let rest = shared.and_then(|folder| file.strip_prefix(folder).ok());
-        rest.unwrap_or(file).display().to_string()
-    };
+    let mut folders = files.first().into_iter().flat_map(|file| file.ancestors().skip(1));
+    let shared = folders.find(|folder| files.iter().all(|file| file.starts_with(folder)));
+    // Without the root, a path would look like another one.
+    let shared = shared.filter(|folder| folder.parent().is_some()).unwrap_or(Path::new(""));
+    let name = |file: &&Path| file.strip_prefix(shared).unwrap_or(file).display().to_string();
     files.iter().map(name).collect()
 }
 
@@ -253,5 +251,22 @@ pub fn open_page(page: &Path) {
     let desktop = cfg!(not(target_os = "linux")) || set("DISPLAY") || set("WAYLAND_DISPLAY");
     if desktop && let Err(error) = open::that_detached(page) {
         eprintln!("umbra: no browser could be started ({error}); open the page yourself");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_named_by_what_tells_them_apart() {
+        let named = |files: &[&str]| {
+            names_of(&files.iter().map(|file| Path::new(*file)).collect::<Vec<_>>())
+        };
+        assert_eq!(named(&["/home/me/a/x.exr", "/home/me/b/x.exr"]), ["a/x.exr", "b/x.exr"]);
+        assert_eq!(named(&["out/x.exr", "out/old/x.exr"]), ["x.exr", "old/x.exr"]);
+        assert_eq!(named(&["/a/x.exr", "/b/x.exr"]), ["/a/x.exr", "/b/x.exr"]);
+        assert_eq!(named(&["../one/x.exr", "x.exr"]), ["../one/x.exr", "x.exr"]);
+        assert_eq!(named(&["/home/me/x.exr"]), ["x.exr"]);
     }
 }
