@@ -162,6 +162,9 @@ struct Pixel {
     range: f64,
     /// Slope across the pixel, in x and in y.
     slope: [f64; 2],
+    /// By how much the mean of the rays near the center column, and of those near the center row, is larger than that
+    /// of all. Other rays than those that judge.
+    line: [f64; 2],
 }
 
 impl Pixel {
@@ -179,11 +182,17 @@ impl Pixel {
             let pairs = sums.iter().zip(offsets);
             pairs.map(|(v, offset)| (v - mean) * (f64::from(offset[axis]) - 0.5)).sum::<f64>()
         });
+        let line = [0, 1].map(|axis| {
+            let near = |offset: &[f32; 2]| (offset[axis] - 0.5).abs() < 0.25;
+            let own = sums.iter().zip(offsets).filter(|(_, offset)| near(offset));
+            // Half of the strata lie there.
+            own.map(|(v, _)| v).sum::<f64>() / (0.5 * n) - mean
+        });
         // The larger of both sets': a small one makes much of little.
         let other = judging.iter().map(|v| (v - judged) * (v - judged)).sum::<f64>() / (n - 1.0);
         let found = variance > EDGE_VARIANCE * (largest - smallest).powi(2);
         let range = if found { largest - smallest } else { 0.0 };
-        let pixel = Self { mean: judged, variance: variance.max(other), range, slope };
+        let pixel = Self { mean: judged, variance: variance.max(other), range, slope, line };
         (mean + judged).is_finite().then_some(pixel)
     }
 
@@ -196,6 +205,13 @@ impl Pixel {
         let [x, y] = self.slope;
         let turns = y.atan2(x) / std::f64::consts::PI;
         (turns * DIRECTIONS as f64).round().rem_euclid(DIRECTIONS as f64) as usize
+    }
+
+    /// The axis that an edge lies across, if it lies aslant: along an edge that is parallel to the rows of pixels, all
+    /// pixels are alike, and the samples of a right grid may be off there as those of one row are.
+    fn across(&self) -> Option<usize> {
+        let [x, y] = self.slope.map(f64::abs);
+        (x.min(y) > ASLANT * x.max(y)).then_some(usize::from(y > x))
     }
 }
 
@@ -213,6 +229,13 @@ const SPARE_PIXELS: f64 = 4.0;
 /// Mean square of z, by the largest variance around, on edges of one direction: 0.4 for independent samples and rays in
 /// strata, less where the samples are spread better; 4 where all samples of a pixel are the same.
 const EDGE_RATIO: f64 = 1.1;
+/// Slope along an edge over that across it, at least, where the pixels along it differ.
+const ASLANT: f64 = 0.25;
+/// How much of what a pixel's center column or row alone would leave on the edges across it may be there, and in standard
+/// deviations for independent samples: about 0 for samples that spread along both axes, 1 for those on one line.
+const LINE_SHARE: (f64, f64) = (0.4, 6.0);
+/// One standard deviation of that share, at most, that a verdict needs.
+const LINE_DEVIATION: f64 = 0.13;
 /// Sum of z on all edges over its standard deviation: under 4 for a right renderer, for points of a
 /// Sobol sequence too, whose mean is half a stratum off; 17 where black samples are not counted.
 const EDGE_BIAS: f64 = 8.0;
@@ -289,8 +312,14 @@ pub fn judge_samples(
         let z = difference / error;
         // One that is off counts above: a glint that no ray met is no edge.
         if pixel.is_edge(typical) && z.abs() <= Z_LIMIT {
-            let (count, squares) = &mut edges.0[pixel.direction()];
+            let (count, squares) = &mut edges.spread[pixel.direction()];
             (*count, *squares) = (*count + 1, *squares + z * z);
+            if let Some(axis) = pixel.across() {
+                let error = pixel.variance / f64::from(SAMPLES);
+                let (products, squares) = &mut edges.lines[axis];
+                *products += pixel.line[axis] * difference / error;
+                *squares += pixel.line[axis] * pixel.line[axis] / error;
+            }
             (bias, edge_count) = (bias + z, edge_count + 1);
         }
     }
@@ -398,36 +427,69 @@ pub fn judge_samples(
 pub fn judge_edges(edges: &Edges) -> Check {
     let id = CheckId::LoopSamples;
     let name = "mean square error on the edges of one direction over that of independent samples";
-    let measure = Measure::at_most(RuleId::LoopEdges, name, edges.worst(), EDGE_RATIO);
-    if measure.passed {
-        let summary = "samples spread over their pixels in every direction";
-        return Check { measures: vec![measure], ..Check::new(id, "", Verdict::Pass, summary) };
-    }
-    let summary = format!(
-        "edges of one direction are {:.1} times as far off as {SAMPLES} independent samples a pixel would leave them",
-        measure.value
-    );
+    let spread = Measure::at_most(RuleId::LoopEdges, name, edges.worst(), EDGE_RATIO);
+    let name =
+        "of the error on edges that samples on one column or row alone would leave (fraction)";
+    let (share, bound) = edges.line_share();
+    let line = Measure::at_most(RuleId::LoopEdges, name, share, bound);
+    let summary = match (spread.passed, line.passed) {
+        (true, true) => {
+            let summary = "samples spread over their pixels in every direction";
+            let measures = vec![spread, line];
+            return Check { measures, ..Check::new(id, "", Verdict::Pass, summary) };
+        }
+        (false, _) => format!(
+            "edges of one direction are {:.1} times as far off as {SAMPLES} independent samples a pixel would leave \
+             them",
+            spread.value
+        ),
+        (true, false) => {
+            "edges are off as if the samples of a pixel had one place along one of its axes"
+                .to_owned()
+        }
+    };
     let check = Check::new(id, "", Verdict::Fail, summary);
-    let check = Check { error: PriceClass::Slip.price(), measures: vec![measure], ..check };
+    let check = Check { error: PriceClass::Slip.price(), measures: vec![spread, line], ..check };
     check.with_hint("look at whether both axes have random numbers of their own")
 }
 
-/// How far off the pixels on edges are, by direction: how many, and the sum of their squared z.
+/// How far off the pixels on edges are.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Edges([(usize, f64); DIRECTIONS]);
+pub struct Edges {
+    /// By direction: how many, and the sum of their squared z.
+    spread: [(usize, f64); DIRECTIONS],
+    /// By the axis that they lie across: what the center column or row would leave times the error, and squared, both
+    /// summed over the variance of independent samples.
+    lines: [(f64, f64); 2],
+}
 
 impl Edges {
     /// Adds those of another scene.
     pub fn add(&mut self, other: &Self) {
-        for (own, other) in self.0.iter_mut().zip(other.0) {
+        for (own, other) in self.spread.iter_mut().zip(other.spread) {
+            *own = (own.0 + other.0, own.1 + other.1);
+        }
+        for (own, other) in self.lines.iter_mut().zip(other.lines) {
             *own = (own.0 + other.0, own.1 + other.1);
         }
     }
 
+    /// How much of what one column or row alone would leave is there, by least squares, and its bound; of the
+    /// axis that comes closest to its own.
+    fn line_share(&self) -> (f64, f64) {
+        let (least, deviations) = LINE_SHARE;
+        let known = |(_, squares): &&(f64, f64)| *squares > LINE_DEVIATION.powi(-2);
+        let shares = self.lines.iter().filter(known).map(|(products, squares)| {
+            (products / squares, f64::max(least, deviations / squares.sqrt()))
+        });
+        let closest = shares.max_by(|(a, of_a), (b, of_b)| (a / of_a).total_cmp(&(b / of_b)));
+        closest.unwrap_or((0.0, least))
+    }
+
     /// The largest mean of any direction, or of all, that has enough pixels.
     fn worst(&self) -> f64 {
-        let all = self.0.iter().fold((0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
-        let told = self.0.iter().chain([&all]).filter(|(count, _)| *count >= LEAST_EDGES);
+        let all = self.spread.iter().fold((0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+        let told = self.spread.iter().chain([&all]).filter(|(count, _)| *count >= LEAST_EDGES);
         told.map(|(count, squares)| squares / *count as f64).fold(0.0, f64::max)
     }
 }

@@ -83,6 +83,11 @@ fn judge(image: &[[f32; 3]]) -> Check {
     judge_samples("s", &film, image, &own(&film)).0
 }
 
+fn edges(image: &[[f32; 3]]) -> Edges {
+    let film = SampledFilm::new(WIDTH, HEIGHT);
+    judge_samples("s", &film, image, &own(&film)).1
+}
+
 #[test]
 fn every_way_to_spread_samples_over_a_pixel_is_right() {
     let grid = |_: &Sampler| {
@@ -109,6 +114,27 @@ fn every_way_to_spread_samples_over_a_pixel_is_right() {
     for (name, samples) in all {
         let check = judge(&render(samples, mean));
         assert_eq!(check.verdict, Verdict::Pass, "{name}: {check:?}");
+        let edges = judge_edges(&edges(&render(samples, mean)));
+        assert_eq!(edges.verdict, Verdict::Pass, "{name}: {edges:?}");
+    }
+}
+
+/// On slanted edges alone, such samples are hardly farther off than independent ones.
+#[test]
+fn samples_on_one_line_of_their_pixels_are_found_by_what_the_line_sees() {
+    let row = |sampler: &Sampler| (0..SAMPLES).map(|_| [sampler.next_1d(), 0.5]).collect();
+    let column = |sampler: &Sampler| (0..SAMPLES).map(|_| [0.5, sampler.next_1d()]).collect();
+    let nearly = |sampler: &Sampler| {
+        let at = |sampler: &Sampler| 0.4 + 0.2 * sampler.next_1d();
+        (0..SAMPLES).map(|_| [sampler.next_1d(), at(sampler)]).collect()
+    };
+    type Samples<'a> = &'a dyn Fn(&Sampler) -> Vec<[f32; 2]>;
+    let all: [(&str, Samples); 3] = [("row", &row), ("column", &column), ("nearly", &nearly)];
+    for (name, samples) in all {
+        let check = judge_edges(&edges(&render(samples, mean)));
+        let line = &check.measures[1];
+        assert!(!line.passed && line.value > 0.6, "{name}: {line:?}");
+        assert_eq!((check.verdict, check.error), (Verdict::Fail, PriceClass::Slip.price()));
     }
 }
 
@@ -244,7 +270,7 @@ fn slips_with_the_film_are_priced_and_other_pictures_are_not() {
 fn edges_of_one_direction_are_seen_on_all_scenes_together() {
     let mut all = Edges::default();
     let mut one = Edges::default();
-    one.0[6] = (20, 36.0);
+    one.spread[6] = (20, 36.0);
     assert_eq!(judge_edges(&one).verdict, Verdict::Pass, "too few to tell");
     (0..3).for_each(|_| all.add(&one));
     let check = judge_edges(&all);

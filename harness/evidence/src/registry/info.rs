@@ -103,7 +103,8 @@ impl CheckId {
                 "Pixels: 4 standard errors, by the largest variance of the 3x3 around; 1 % + 4 pixels may \
                     exceed them. Edges, by direction: the mean square error, over the largest variance \
                     around, is at most 1.1 times that of independent samples. A right renderer has 0.4, \
-                    samples that are all the same have 4. The mean error on edges may be 8 standard \
+                    samples that are all the same have 4. What a pixel's center column or row alone would leave \
+                    on edges may be there to 0.4, and to 6 standard deviations. The mean error on edges may be 8 standard \
                     deviations. No pixel may be 5 % off where the rays around it vary by 3 % at most.",
                 &[RuleId::LoopPixels, RuleId::LoopEdges, RuleId::LoopEdgeBias, RuleId::LoopStray],
             ),
