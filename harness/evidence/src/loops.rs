@@ -428,8 +428,7 @@ pub fn judge_edges(edges: &Edges) -> Check {
     let id = CheckId::LoopSamples;
     let name = "mean square error on the edges of one direction over that of independent samples";
     let spread = Measure::at_most(RuleId::LoopEdges, name, edges.worst(), EDGE_RATIO);
-    let name =
-        "of the error on edges that samples on one column or row alone would leave (fraction)";
+    let name = "error on edges over that of samples on one column or row alone (fraction)";
     let (share, bound) = edges.line_share();
     let line = Measure::at_most(RuleId::LoopEdges, name, share, bound);
     let summary = match (spread.passed, line.passed) {

@@ -10,7 +10,7 @@ use super::job::Request;
 use super::outcome::{Answer, Fault, Outcome, WitnessUse};
 use super::policy::WorkerPolicy;
 use super::table::{SLOT_BYTES, STATUS_OURS, STATUS_REJECTED, STATUS_STAGE, SlotState};
-use super::wire::{OutputRegion, WireJob, WireRequest, WorkerFolder, take_input};
+use super::wire::{ALIGN, OutputRegion, WireJob, WireRequest, WorkerFolder, take_input};
 use crate::evidence::Witness;
 
 /// The files of a worker, as the parent holds them: opened before it began, read only by plain
@@ -139,6 +139,8 @@ fn read_at(file: &mut File, start: u64, size: usize) -> io::Result<Vec<u8>> {
 
 /// Each byte of an output before it is written: floats that nobody wrote are not numbers.
 const UNWRITTEN: u8 = 0xff;
+/// What lies before an answer: less than the multiple that its region is rounded up to.
+static FILLER: [u8; ALIGN] = [UNWRITTEN; ALIGN];
 
 /// The floats of a region; none when its size or its filler is not as the parent left it.
 fn values(region: &[u8], place: OutputRegion) -> Option<Vec<f32>> {
@@ -146,6 +148,6 @@ fn values(region: &[u8], place: OutputRegion) -> Option<Vec<f32>> {
         return None;
     }
     let (filler, answer) = region.split_at(place.offset());
-    let untouched = filler.iter().all(|byte| *byte == UNWRITTEN);
+    let untouched = filler == &FILLER[..filler.len()];
     untouched.then(|| bytemuck::pod_collect_to_vec(answer))
 }
