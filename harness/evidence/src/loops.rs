@@ -207,8 +207,8 @@ impl Pixel {
         (turns * DIRECTIONS as f64).round().rem_euclid(DIRECTIONS as f64) as usize
     }
 
-    /// The axis that an edge lies across, if it lies aslant: along an edge that is parallel to the rows of pixels, all
-    /// pixels are alike, and the samples of a right grid may be off there as those of one row are.
+    /// The axis that an edge lies across, if it lies aslant. Along one that is parallel to the rows of pixels all
+    /// pixels are alike: a right grid may be off there as samples of one row are.
     fn across(&self) -> Option<usize> {
         let [x, y] = self.slope.map(f64::abs);
         (x.min(y) > ASLANT * x.max(y)).then_some(usize::from(y > x))
@@ -231,8 +231,8 @@ const SPARE_PIXELS: f64 = 4.0;
 const EDGE_RATIO: f64 = 1.1;
 /// Slope along an edge over that across it, at least, where the pixels along it differ.
 const ASLANT: f64 = 0.25;
-/// How much of what a pixel's center column or row alone would leave on the edges across it may be there, and in standard
-/// deviations for independent samples: about 0 for samples that spread along both axes, 1 for those on one line.
+/// Error on edges over that of samples on a pixel's center column or row alone, at most, and in standard deviations.
+/// It is about 0 for samples that spread along both axes, 1 for those on one line.
 const LINE_SHARE: (f64, f64) = (0.4, 6.0);
 /// One standard deviation of that share, at most, that a verdict needs.
 const LINE_DEVIATION: f64 = 0.13;
