@@ -387,20 +387,19 @@ impl<'a> Asked<'_, 'a> {
         };
         let (first, spp) = self.first_film();
         let (mut check, drawn) = judge(outcome, first, spp);
-        if std::ptr::eq(first, &case.expected) {
-            if case.first.is_some() && draws_small {
-                settle_slow(&mut check, outcome);
-            }
-            return (check, drawn);
+        let is_large = std::ptr::eq(first, &case.expected);
+        if is_large && case.first.is_some() && draws_small {
+            settle_slow(&mut check, outcome);
         }
-        if check.verdict != Verdict::Fail {
-            return (check, None);
+        let is_whole = is_large && (spp == case.spp || drawn.is_none());
+        if is_whole || check.verdict != Verdict::Fail {
+            return (check, drawn.filter(|_| is_large));
         }
         let mut questions = Questions::default();
         let whole = questions.ask(self.film(&case.expected, case.spp));
         let outcomes = questions.run(self.session, self.plugin);
         let (whole, drawn) = judge(&outcomes[whole], &case.expected, case.spp);
-        // An image that is wrong on any film is wrong; the larger one is shown.
+        // An image that is wrong on any film is wrong; the one with all pixels and samples is shown.
         (if whole.verdict == Verdict::Fail { whole } else { check }, drawn)
     }
 }
